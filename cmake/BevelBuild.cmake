@@ -1,0 +1,64 @@
+# Compiler settings and the three functions with which every target of the project is made.
+set(CMAKE_CXX_STANDARD 20)
+set(CMAKE_CXX_STANDARD_REQUIRED ON)
+set(CMAKE_CXX_EXTENSIONS OFF)
+set(CMAKE_EXPORT_COMPILE_COMMANDS ON)
+set(CMAKE_RUNTIME_OUTPUT_DIRECTORY ${CMAKE_BINARY_DIR}/bin)
+set(CMAKE_POSITION_INDEPENDENT_CODE ON)
+if(NOT CMAKE_BUILD_TYPE)
+  set(CMAKE_BUILD_TYPE Release)
+endif()
+
+option(BEVEL_SANITIZE "Build with address and undefined-behaviour sanitizers" OFF)
+option(BEVEL_TIDY "Run clang-tidy with every compilation" OFF)
+
+find_program(CCACHE ccache)
+if(CCACHE)
+  set(CMAKE_CXX_COMPILER_LAUNCHER ${CCACHE})
+endif()
+
+add_library(bevel_options INTERFACE)
+target_compile_options(bevel_options INTERFACE -Wall -Wextra -Wpedantic -Wshadow -Wnon-virtual-dtor
+  -Wold-style-cast -Woverloaded-virtual -Wnull-dereference -Werror)
+# GCC 12 sees null dereferences and uninitialised reads inside Eigen's vectorised paths at -O3 that are not there.
+target_compile_options(bevel_options INTERFACE $<$<CXX_COMPILER_ID:GNU>:-Wno-null-dereference -Wno-maybe-uninitialized>)
+target_include_directories(bevel_options INTERFACE ${CMAKE_SOURCE_DIR})
+if(BEVEL_SANITIZE)
+  target_compile_options(bevel_options INTERFACE -fsanitize=address,undefined -fno-sanitize-recover=all -fno-omit-frame-pointer)
+  target_link_options(bevel_options INTERFACE -fsanitize=address,undefined)
+endif()
+if(BEVEL_TIDY)
+  find_program(CLANG_TIDY NAMES clang-tidy clang-tidy-14 REQUIRED)
+  set(CMAKE_CXX_CLANG_TIDY ${CLANG_TIDY} --quiet)
+endif()
+
+# bevel_library(NAME SOURCES... [LINK libs...]): target bevel_NAME; with no sources a header-only one.
+function(bevel_library name)
+  cmake_parse_arguments(arg "" "" "LINK" ${ARGN})
+  if(arg_UNPARSED_ARGUMENTS)
+    add_library(bevel_${name} STATIC ${arg_UNPARSED_ARGUMENTS})
+    target_link_libraries(bevel_${name} PUBLIC bevel_options ${arg_LINK})
+  else()
+    add_library(bevel_${name} INTERFACE)
+    target_link_libraries(bevel_${name} INTERFACE bevel_options ${arg_LINK})
+  endif()
+endfunction()
+
+# bevel_program(NAME SOURCES... [LINK libs...]): an executable in build/bin.
+function(bevel_program name)
+  cmake_parse_arguments(arg "" "" "LINK" ${ARGN})
+  add_executable(${name} ${arg_UNPARSED_ARGUMENTS})
+  target_link_libraries(${name} PRIVATE bevel_options ${arg_LINK})
+  target_compile_definitions(${name} PRIVATE BEVEL_VERSION="${PROJECT_VERSION}")
+endfunction()
+
+# bevel_test(NAME SOURCES... [LINK libs...] [LABELS labels...]): a GoogleTest program; ctest lists each of its tests.
+function(bevel_test name)
+  cmake_parse_arguments(arg "" "" "LINK;LABELS" ${ARGN})
+  add_executable(test_${name} ${arg_UNPARSED_ARGUMENTS})
+  target_link_libraries(test_${name} PRIVATE bevel_options ${arg_LINK} GTest::gmock GTest::gtest_main)
+  target_compile_definitions(test_${name} PRIVATE BEVEL_SOURCE_DIR="${CMAKE_SOURCE_DIR}"
+    BEVEL_BINARY_DIR="${CMAKE_BINARY_DIR}")
+  gtest_discover_tests(test_${name} TEST_PREFIX "${name}." DISCOVERY_TIMEOUT 60
+    PROPERTIES TIMEOUT 300 LABELS "${arg_LABELS}")
+endfunction()
