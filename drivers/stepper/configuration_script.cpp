@@ -1,0 +1,103 @@
+#include "drivers/stepper/configuration_script.hpp"
+
+#include <cmath>
+#include <initializer_list>
+
+namespace bevel::stepper {
+namespace {
+
+using cia301::ObjectAddress;
+using Kind = SdoJob::Kind;
+
+constexpr std::uint32_t kPdoOff = 0x80000000;
+constexpr std::uint32_t kCobIdMask = 0x800007FF;  // switched off, and the identifier
+constexpr std::uint32_t kEverySync = 1;
+constexpr std::uint32_t kOnReception = 255;
+constexpr std::uint32_t kProfileVelocity = 3;
+
+struct Mapped {
+  std::uint16_t index;
+  std::uint8_t bits;
+};
+
+class Script {
+ public:
+  void write(ObjectAddress object, std::uint8_t size_bytes, std::uint32_t value) {
+    jobs_.push_back({Kind::write, object, size_bytes, value});
+  }
+  void write_if_present(ObjectAddress object, std::uint8_t size_bytes, std::uint32_t value) {
+    jobs_.push_back({Kind::write_if_present, object, size_bytes, value});
+  }
+  void expect(ObjectAddress object, std::uint32_t value, std::uint32_t mask = 0xFFFFFFFF,
+              StopReason otherwise = StopReason::configuration_failed, Kind kind = Kind::expect) {
+    jobs_.push_back({kind, object, 4, value, mask, otherwise});
+  }
+  void write_and_check(ObjectAddress object, std::uint8_t size_bytes, std::uint32_t value) {
+    write(object, size_bytes, value);
+    expect(object, value, size_bytes == 4 ? 0xFFFFFFFFU : (1U << (8 * size_bytes)) - 1);
+  }
+
+  void map_pdo(std::uint16_t communication, std::uint16_t mapping, std::uint32_t cob_id, std::uint32_t type,
+               std::initializer_list<Mapped> objects) {
+    write({communication, 1}, 4, cob_id | kPdoOff);
+    write({mapping, 0}, 1, 0);
+    std::uint8_t n = 0;
+    for (const auto& object : objects)
+      write_and_check({mapping, ++n}, 4, static_cast<std::uint32_t>(object.index) << 16 | object.bits);
+    write_and_check({mapping, 0}, 1, n);
+    write_and_check({communication, 2}, 1, type);
+    write({communication, 1}, 4, cob_id);
+    expect({communication, 1}, cob_id, kCobIdMask);
+  }
+
+  std::vector<SdoJob> take() { return std::move(jobs_); }
+
+ private:
+  std::vector<SdoJob> jobs_;
+};
+
+std::uint32_t counts(double units, double counts_per_unit) {
+  return static_cast<std::uint32_t>(std::lround(units * std::abs(counts_per_unit)));
+}
+
+}  // namespace
+
+std::vector<SdoJob> configuration_script(const StepperConfig& config, std::size_t index) {
+  const AxisConfig& axis = config.axes.at(index);
+  const std::uint8_t node = axis.node_id;
+  Script script;
+
+  script.expect({0x1000, 0}, 402, 0xFFFF, StopReason::wrong_device);
+  const std::array<std::uint32_t, 4> identity{axis.vendor_id, axis.product_code, axis.revision, axis.serial};
+  for (std::uint8_t sub = 1; sub <= identity.size(); ++sub)
+    if (identity.at(sub - 1U) != 0)
+      script.expect({0x1018, sub}, identity.at(sub - 1U), 0xFFFFFFFF, StopReason::wrong_device);
+  constexpr std::uint32_t kVelocityModeBit = 1U << (kProfileVelocity - 1);
+  script.expect({0x6502, 0}, kVelocityModeBit, kVelocityModeBit, StopReason::wrong_device);
+
+  // Each side watches the other. On our silence the drive quick-stops and leaves NMT operational, so that a driver that
+  // comes back has to start it anew.
+  script.write_and_check({0x1017, 0}, 2, static_cast<std::uint32_t>(config.drive_heartbeat_ns / kMs));
+  script.write_and_check({0x1016, 1}, 4,
+                         static_cast<std::uint32_t>(config.master_id) << 16 |
+                             static_cast<std::uint32_t>(config.master_heartbeat_timeout_ns / kMs));
+  script.write_if_present({0x1029, 1}, 1, 0);
+  script.write_and_check({0x6007, 0}, 2, 3);
+
+  script.map_pdo(0x1400, 0x1600, cia301::rpdo1_id(node), kOnReception, {{0x6040, 16}, {0x60FF, 32}});
+  script.map_pdo(0x1800, 0x1A00, cia301::tpdo1_id(node), kEverySync, {{0x6041, 16}, {0x606C, 32}});
+  script.map_pdo(0x1801, 0x1A01, cia301::tpdo2_id(node), kEverySync, {{0x6064, 32}, {0x6061, 8}});
+
+  script.write_and_check({0x605A, 0}, 2, static_cast<std::uint16_t>(config.quick_stop_option));
+  script.write_if_present({0x605E, 0}, 2, 2);  // fault: quick-stop ramp, then no torque
+  script.write_if_present({0x607F, 0}, 4, counts(axis.rate_limit_unit_s, axis.counts_per_unit));
+  script.write({0x6083, 0}, 4, counts(axis.acceleration_unit_s2, axis.counts_per_unit));
+  script.write({0x6084, 0}, 4, counts(axis.acceleration_unit_s2, axis.counts_per_unit));
+  script.write({0x6085, 0}, 4, counts(axis.quick_stop_unit_s2, axis.counts_per_unit));
+  script.write({0x60FF, 0}, 4, 0);
+  script.write({0x6060, 0}, 1, kProfileVelocity);
+  script.expect({0x6061, 0}, kProfileVelocity, 0xFF, StopReason::wrong_mode, Kind::expect_eventually);
+  return script.take();
+}
+
+}  // namespace bevel::stepper

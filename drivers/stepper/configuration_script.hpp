@@ -1,0 +1,36 @@
+// The list of SDO transfers that makes a drive fit for service: identity checks, supervision, PDO mapping, mode,
+// limits.
+#pragma once
+
+#include <cstdint>
+#include <vector>
+
+#include "drivers/stepper/cia301.hpp"
+#include "drivers/stepper/reason.hpp"
+#include "drivers/stepper/stepper_config.hpp"
+
+namespace bevel::stepper {
+
+struct SdoJob {
+  enum class Kind : std::uint8_t {
+    write,
+    write_if_present,   // an object that drives may leave out; an abort is accepted
+    expect,             // read, (value & mask) must be `value`
+    expect_eventually,  // the same, asked again until transition_timeout_ns
+  };
+  Kind kind = Kind::write;
+  cia301::ObjectAddress object{};
+  std::uint8_t size_bytes = 4;  // writes only
+  std::uint32_t value = 0;
+  std::uint32_t mask = 0xFFFFFFFF;
+  StopReason otherwise = StopReason::configuration_failed;  // of an expectation
+};
+
+constexpr std::uint32_t code_of(cia301::ObjectAddress object) {
+  return static_cast<std::uint32_t>(object.index) << 8 | object.sub;
+}
+
+// In the order of CiA 301 section 7.5.2.36 for the mapping: switched off, emptied, filled, counted, typed, switched on.
+std::vector<SdoJob> configuration_script(const StepperConfig& config, std::size_t axis);
+
+}  // namespace bevel::stepper

@@ -1,0 +1,104 @@
+// One drive as its master sees it: presence, configuration, state, position.
+#pragma once
+
+#include <cstdint>
+#include <vector>
+
+#include "drivers/stepper/cia301.hpp"
+#include "drivers/stepper/cia402.hpp"
+#include "drivers/stepper/configuration_script.hpp"
+#include "drivers/stepper/reason.hpp"
+#include "drivers/stepper/stepper_config.hpp"
+#include "drivers/stepper/transmitter.hpp"
+
+namespace bevel::stepper {
+
+class DriveNode {
+ public:
+  enum class Phase : std::uint8_t {
+    absent,       // being told to reset its communication until its boot-up is heard
+    configuring,  // SDO
+    starting,     // told to start, until it is operational and sends its PDOs
+    operational,
+  };
+
+  struct Counters {
+    std::uint64_t malformed = 0;    // frames of a wrong length
+    std::uint64_t missed_pdos = 0;  // SYNCs without both answers
+  };
+
+  DriveNode(const StepperConfig& config, std::size_t axis);
+
+  void restart();                                               // from absent, whatever was
+  void on_frame(const can::Frame& frame, std::int64_t now_ns);  // ignores frames of others
+  void on_sync(std::int64_t now_ns);                            // our SYNC was sent
+  void configure(std::int64_t now_ns, Transmitter& out);        // one cycle of work towards operational
+  void supervise(std::int64_t now_ns);                          // time-outs
+  void read_error_code(std::int64_t now_ns, Transmitter& out);  // in fault: 0x603F, once
+  // rate: in counts of the drive, by sign of counts_per_unit.
+  void command(std::uint16_t controlword, double rate_unit_s, std::int64_t now_ns, Transmitter& out) const;
+
+  Stop take_trouble();  // the oldest trouble since the last call
+
+  Phase phase() const { return phase_; }
+  cia402::State state() const { return cia402::decode(statusword_); }
+  std::uint16_t statusword() const { return statusword_; }
+  std::uint16_t error_code() const { return error_code_; }
+  double position_unit() const;
+  double rate_unit_s() const;
+  std::int64_t sampled_ns() const { return sampled_ns_; }  // 0: never
+  bool position_trusted() const { return position_trusted_; }
+  void confirm_position() { position_trusted_ = true; }
+  void set_zero();
+
+  const Counters& counters() const { return counters_; }
+  std::uint64_t sdo_ignored() const { return sdo_.ignored(); }
+
+ private:
+  void on_heartbeat(const can::Frame& frame, std::int64_t now_ns);
+  void on_emergency(const can::Frame& frame);
+  void on_position(const can::Frame& frame, std::int64_t now_ns);
+  void out_of_sight();
+  void trouble(StopReason reason, std::uint32_t code = 0);
+  void transfer(std::int64_t now_ns, Transmitter& out);
+  void begin_job();
+  void finish_job(std::int64_t now_ns);
+  void next_job(std::int64_t now_ns);
+
+  const StepperConfig& config_;
+  std::size_t axis_;
+  std::uint8_t node_;
+  std::vector<SdoJob> script_;
+  cia301::SdoClient sdo_;
+
+  Phase phase_ = Phase::absent;
+  std::int64_t next_nmt_ns_ = INT64_MIN;
+  std::int64_t phase_since_ns_ = 0;
+  std::size_t job_ = 0;
+  int retries_ = 0;
+  std::int64_t job_since_ns_ = 0;
+  bool seen_operational_ = false;
+  bool error_code_asked_ = false;
+  Stop trouble_{};
+
+  cia301::NmtState nmt_state_ = cia301::NmtState::boot_up;
+  std::int64_t heartbeat_ns_ = 0;
+  std::int64_t status_pdo_ns_ = 0;
+  std::int64_t position_pdo_ns_ = 0;
+  std::int64_t sync_ns_ = 0;
+  bool status_pdo_due_ = false;
+  bool position_pdo_due_ = false;
+
+  std::uint16_t statusword_ = 0;
+  std::uint16_t error_code_ = 0;
+  std::int32_t rate_counts_s_ = 0;
+  std::int32_t raw_position_ = 0;
+  std::int64_t position_counts_ = 0;  // raw_position_ unwrapped
+  std::int64_t zero_counts_ = 0;
+  bool have_position_ = false;
+  bool position_trusted_ = true;
+  std::int64_t sampled_ns_ = 0;
+  Counters counters_;
+};
+
+}  // namespace bevel::stepper

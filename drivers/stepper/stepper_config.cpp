@@ -1,0 +1,79 @@
+#include "drivers/stepper/stepper_config.hpp"
+
+#include <cmath>
+#include <sstream>
+
+namespace bevel::stepper {
+namespace {
+
+constexpr double kLargestCounts = 1e9;  // rates travel as 32-bit integers
+
+class Checker {
+ public:
+  template <typename T>
+  void require(bool ok, const std::string& key, T value, const char* allowed) {
+    if (ok) return;
+    std::ostringstream text;
+    text << key << " = " << value << ": must be " << allowed;
+    problems_.push_back(text.str());
+  }
+  std::vector<std::string> take() { return std::move(problems_); }
+
+ private:
+  std::vector<std::string> problems_;
+};
+
+void check_axis(Checker& check, const AxisConfig& axis, const std::string& name) {
+  const int node = axis.node_id;
+  check.require(node >= 1 && node <= 127, name + ".node_id", node, "1 to 127");
+  const double counts = std::abs(axis.counts_per_unit);
+  check.require(std::isfinite(counts) && counts > 0.0, name + ".counts_per_unit", axis.counts_per_unit,
+                "finite and not 0");
+  const auto rate = [&](double value, const char* key) {
+    check.require(std::isfinite(value) && value > 0.0 && value * counts < kLargestCounts, name + key, value,
+                  "positive, and below 1e9 counts");
+  };
+  rate(axis.rate_limit_unit_s, ".rate_limit_unit_s");
+  rate(axis.acceleration_unit_s2, ".acceleration_unit_s2");
+  rate(axis.quick_stop_unit_s2, ".quick_stop_unit_s2");
+  check.require(axis.position_min_unit < axis.position_max_unit, name + ".position_min_unit", axis.position_min_unit,
+                "below position_max_unit");
+}
+
+}  // namespace
+
+std::vector<std::string> problems_of(const StepperConfig& config) {
+  Checker check;
+  check_axis(check, config.axes[kInsertion], "insertion");
+  check_axis(check, config.axes[kRotation], "rotation");
+  const int master = config.master_id;
+  check.require(config.axes[0].node_id != config.axes[1].node_id, "rotation.node_id",
+                static_cast<int>(config.axes[1].node_id), "different from insertion.node_id");
+  check.require(master >= 1 && master <= 127 && master != config.axes[0].node_id && master != config.axes[1].node_id,
+                "master_id", master, "1 to 127 and no drive's node_id");
+  const auto duration = [&](std::int64_t value, const char* key, std::int64_t least_ns) {
+    check.require(value >= least_ns && value <= 10'000 * kMs, key, value,
+                  "no shorter than what it supervises, at most 10 s");
+  };
+  duration(config.period_ns, "period_ns", kMs);
+  duration(config.listen_ns, "listen_ns", config.master_heartbeat_ns);
+  duration(config.master_heartbeat_ns, "master_heartbeat_ns", config.period_ns);
+  duration(config.master_heartbeat_timeout_ns, "master_heartbeat_timeout_ns", 2 * config.master_heartbeat_ns);
+  duration(config.drive_heartbeat_ns, "drive_heartbeat_ns", kMs);
+  duration(config.drive_heartbeat_timeout_ns, "drive_heartbeat_timeout_ns", 2 * config.drive_heartbeat_ns);
+  duration(config.sdo_timeout_ns, "sdo_timeout_ns", config.period_ns);
+  duration(config.transition_timeout_ns, "transition_timeout_ns", 10 * config.period_ns);
+  duration(config.tpdo_timeout_ns, "tpdo_timeout_ns", 3 * config.period_ns);
+  duration(config.echo_timeout_ns, "echo_timeout_ns", 2 * config.period_ns);
+  duration(config.overrun_stop_ns, "overrun_stop_ns", 2 * config.period_ns);
+  duration(config.setpoint_zero_age_ns, "setpoint_zero_age_ns", config.period_ns);
+  duration(config.setpoint_stop_age_ns, "setpoint_stop_age_ns", config.setpoint_zero_age_ns);
+  duration(config.not_following_ns, "not_following_ns", config.period_ns);
+  check.require(config.sdo_retries >= 0 && config.sdo_retries <= 10, "sdo_retries", config.sdo_retries, "0 to 10");
+  check.require(config.queue_full_limit >= 1, "queue_full_limit", config.queue_full_limit, "at least 1");
+  check.require(config.quick_stop_option == 2 || config.quick_stop_option == 6, "quick_stop_option",
+                config.quick_stop_option, "2 or 6");
+  return check.take();
+}
+
+}  // namespace bevel::stepper

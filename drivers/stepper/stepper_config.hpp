@@ -1,0 +1,71 @@
+// Settings of the stepper driver. Plain data: whoever reads a file fills it in.
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <limits>
+#include <numbers>
+#include <string>
+#include <vector>
+
+namespace bevel::stepper {
+
+inline constexpr std::size_t kInsertion = 0;
+inline constexpr std::size_t kRotation = 1;
+inline constexpr std::size_t kAxes = 2;
+
+// Units below: "unit" is mm for the insertion axis, rad for the rotation axis. Drives count velocity in counts/s.
+struct AxisConfig {
+  std::uint8_t node_id = 1;             // 1..127
+  double counts_per_unit = 1000.0;      // sign gives the direction; not 0
+  double rate_limit_unit_s = 10.0;      // > 0
+  double acceleration_unit_s2 = 100.0;  // > 0, of set-points and of the drive's own ramps
+  double quick_stop_unit_s2 = 500.0;    // > 0
+  // Workspace, applied while the position is trusted: the rate falls so that the axis comes to rest at the limit.
+  double position_min_unit = -std::numeric_limits<double>::infinity();
+  double position_max_unit = std::numeric_limits<double>::infinity();
+  // Identity as in object 0x1018; 0 accepts any. The device type (0x1000 = 402) is always checked.
+  std::uint32_t vendor_id = 0;
+  std::uint32_t product_code = 0;
+  std::uint32_t revision = 0;
+  std::uint32_t serial = 0;
+};
+
+inline constexpr std::int64_t kMs = 1'000'000;  // ns
+
+struct StepperConfig {
+  std::array<AxisConfig, kAxes> axes{AxisConfig{.node_id = 1,
+                                                .counts_per_unit = 2000.0,
+                                                .rate_limit_unit_s = 20.0,
+                                                .acceleration_unit_s2 = 200.0,
+                                                .quick_stop_unit_s2 = 500.0},
+                                     AxisConfig{.node_id = 2,
+                                                .counts_per_unit = 51200.0 / (2.0 * std::numbers::pi),
+                                                .rate_limit_unit_s = 12.0,
+                                                .acceleration_unit_s2 = 60.0,
+                                                .quick_stop_unit_s2 = 200.0}};
+  std::uint8_t master_id = 127;  // node id of our own heartbeat
+
+  std::int64_t period_ns = 10 * kMs;                     // of step(), hence of SYNC
+  std::int64_t listen_ns = 300 * kMs;                    // silence demanded before our first frame: no second driver
+  std::int64_t master_heartbeat_ns = 30 * kMs;           // ours
+  std::int64_t master_heartbeat_timeout_ns = 120 * kMs;  // after which a drive stops by itself (0x1016)
+  std::int64_t drive_heartbeat_ns = 30 * kMs;            // theirs (0x1017)
+  std::int64_t drive_heartbeat_timeout_ns = 120 * kMs;
+  std::int64_t sdo_timeout_ns = 500 * kMs;
+  int sdo_retries = 1;
+  std::int64_t transition_timeout_ns = 1000 * kMs;  // NMT start, mode change, enabling, fault reset
+  std::int64_t tpdo_timeout_ns = 60 * kMs;          // no fresh position
+  std::int64_t echo_timeout_ns = 60 * kMs;          // a frame of ours that does not get onto the wire
+  std::int64_t overrun_stop_ns = 100 * kMs;         // step() called this late while enabled
+  std::int64_t setpoint_zero_age_ns = 80 * kMs;     // older: rate 0 by the normal ramp
+  std::int64_t setpoint_stop_age_ns = 150 * kMs;    // older: quick stop, latched
+  std::int64_t not_following_ns = 300 * kMs;        // actual rate far from the commanded one for this long
+  int queue_full_limit = 5;                         // refused frames in a row
+  std::int16_t quick_stop_option = 6;               // 0x605A: 6 stays in quick stop with torque, 2 lets go
+};
+
+// What is wrong with a configuration, one sentence each (key, value, allowed range); empty when it can be used.
+std::vector<std::string> problems_of(const StepperConfig& config);
+
+}  // namespace bevel::stepper

@@ -1,0 +1,380 @@
+#include "drivers/stepper/stepper_driver.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <stdexcept>
+#include <string>
+
+namespace bevel::stepper {
+namespace {
+
+constexpr int kReceptionsPerCall = 256;
+constexpr std::int64_t kPurgePause_ns = 500 * kMs;
+constexpr std::uint64_t kFaultResetSteps =
+    4;  // half a period of the fault reset bit, long enough to survive a lost PDO
+
+StepperConfig checked(const StepperConfig& config) {
+  std::string text;
+  for (const auto& problem : problems_of(config)) text += (text.empty() ? "stepper: " : "; ") + problem;
+  if (!text.empty()) throw std::invalid_argument(text);
+  return config;
+}
+
+}  // namespace
+
+StepperDriver::StepperDriver(can::Bus& bus, const StepperConfig& config)
+    : config_(checked(config)),
+      bus_(bus),
+      out_(bus, config_),
+      nodes_{DriveNode(config_, kInsertion), DriveNode(config_, kRotation)},
+      shapers_{RateShaper(config_.axes[kInsertion]), RateShaper(config_.axes[kRotation])} {}
+
+std::vector<std::uint32_t> StepperDriver::listen_ids(const StepperConfig& config) {
+  // What we send is heard too: as our echoes, and as a sign of another master.
+  std::vector<std::uint32_t> ids{cia301::kNmtId, cia301::kSyncId, cia301::heartbeat_id(config.master_id)};
+  for (const auto& axis : config.axes) {
+    const auto node = axis.node_id;
+    ids.insert(ids.end(),
+               {cia301::emcy_id(node), cia301::tpdo1_id(node), cia301::tpdo2_id(node), cia301::rpdo1_id(node),
+                cia301::sdo_response_id(node), cia301::sdo_request_id(node), cia301::heartbeat_id(node)});
+  }
+  return ids;
+}
+
+bool StepperDriver::all_in(cia402::State state) const {
+  return std::all_of(nodes_.begin(), nodes_.end(), [&](const DriveNode& node) {
+    return node.phase() == DriveNode::Phase::operational && node.state() == state;
+  });
+}
+
+EnableAnswer StepperDriver::enable() {
+  if (state_ != DriverState::ready) return EnableAnswer::not_ready;
+  for (const auto& node : nodes_)
+    if (!node.position_trusted()) return EnableAnswer::position_not_trusted;
+  if (!enable_wanted_) enable_since_ns_ = last_step_ns_;
+  enable_wanted_ = true;
+  return EnableAnswer::accepted;
+}
+
+void StepperDriver::disable() {
+  enable_wanted_ = false;
+  if (state_ == DriverState::enabled) state_ = DriverState::ready;
+  for (auto& shaper : shapers_) shaper.reset();
+}
+
+void StepperDriver::request_stop() {
+  if (latched()) return;
+  latch({StopReason::operator_stop, -1, 0});
+}
+
+bool StepperDriver::rearm() {
+  if (!latched()) return false;
+  const bool listen_first = silent_ || stop_.reason == StopReason::foreign_master || !bus_.is_open();
+  state_ = listen_first ? DriverState::off : DriverState::configuring;
+  state_since_ns_ = listen_since_ns_ = last_step_ns_;
+  silent_ = false;
+  reset_faults_ = true;
+  stop_ = {};
+  for (auto& node : nodes_) node.restart();
+  return true;
+}
+
+void StepperDriver::set_zero() {
+  for (auto& node : nodes_) node.set_zero();
+}
+
+void StepperDriver::confirm_position() {
+  for (auto& node : nodes_) node.confirm_position();
+}
+
+void StepperDriver::latch(const Stop& stop) {
+  enable_wanted_ = false;
+  for (auto& shaper : shapers_) shaper.reset();
+  if (latched()) {
+    ++counters_.later_stops;
+  } else {
+    stop_ = stop;
+    state_ = DriverState::stopped;
+  }
+  if (is_fault(stop.reason)) state_ = DriverState::fault;
+}
+
+void StepperDriver::on_trouble(const Stop& trouble) {
+  switch (state_) {
+    case DriverState::ready:
+    case DriverState::enabled:
+    case DriverState::stopped:
+    case DriverState::fault:
+      latch(trouble);
+      break;
+    case DriverState::configuring:
+      // Nothing has been enabled yet: what passes by itself is waited out. A drive that still complains about its lost
+      // master does so once more while it is reset.
+      stop_ = trouble;
+      if (is_fault(trouble.reason) && trouble.reason != StopReason::drive_emergency) latch(trouble);
+      break;
+    case DriverState::off:
+      stop_ = trouble;
+      break;
+  }
+}
+
+void StepperDriver::purge(std::int64_t now_ns) {
+  if (now_ns < next_purge_ns_) return;
+  next_purge_ns_ = now_ns + kPurgePause_ns;
+  ++counters_.purges;
+  (void)bus_.purge();  // where it is not permitted, one old frame per identifier may still go out
+  out_.forget();
+}
+
+void StepperDriver::on_event(can::BusEvent event, std::int64_t now_ns) {
+  using can::BusEvent;
+  StopReason reason = StopReason::none;
+  switch (event) {
+    case BusEvent::error_passive:
+      reason = StopReason::bus_error_passive;
+      break;
+    case BusEvent::bus_off:
+      reason = StopReason::bus_off;
+      break;
+    case BusEvent::link_down:
+    case BusEvent::gone:
+      reason = StopReason::link_down;
+      break;
+    case BusEvent::reopened:
+      out_.forget();
+      listen_since_ns_ = now_ns;
+      return;
+    case BusEvent::recovered:
+    case BusEvent::overflow:
+      ++counters_.bus_errors;
+      return;  // lost answers show up as time-outs
+  }
+  ++counters_.bus_errors;
+  out_.forget();
+  if (reason != StopReason::link_down) purge(now_ns);
+  on_trouble({reason, -1, 0});
+  if (state_ == DriverState::configuring) state_ = DriverState::off;
+}
+
+void StepperDriver::on_frame(const can::Frame& frame, std::int64_t now_ns) {
+  if (!out_.is_ours(frame.id)) {
+    for (auto& node : nodes_) node.on_frame(frame, now_ns);
+    return;
+  }
+  // Only a master sends this, and it was not us. While we have not sent anything ourselves, we leave the bus to it.
+  if (state_ == DriverState::off) silent_ = true;
+  const bool known = latched() && stop_.reason == StopReason::foreign_master;
+  if (!known) latch({StopReason::foreign_master, -1, frame.id});
+}
+
+void StepperDriver::receive(std::int64_t now_ns) {
+  for (int i = 0; i < kReceptionsPerCall; ++i) {
+    const can::Reception found = bus_.receive();
+    switch (found.kind) {
+      case can::Reception::Kind::nothing:
+        return;
+      case can::Reception::Kind::frame:
+        on_frame(found.frame, now_ns);
+        break;
+      case can::Reception::Kind::echo:
+        out_.on_echo(found.frame);
+        break;
+      case can::Reception::Kind::event:
+        on_event(found.event, now_ns);
+        break;
+    }
+  }
+}
+
+void StepperDriver::note_timing(std::int64_t now_ns) {
+  if (counters_.steps++ == 0) {
+    listen_since_ns_ = state_since_ns_ = now_ns;
+  } else {
+    const std::int64_t elapsed_ns = now_ns - last_step_ns_;
+    if (elapsed_ns > config_.period_ns * 3 / 2) ++counters_.overruns;
+    if (state_ == DriverState::enabled && elapsed_ns > config_.overrun_stop_ns)
+      latch({StopReason::driver_overrun, -1, 0});
+  }
+}
+
+void StepperDriver::supervise_transmission(std::int64_t now_ns) {
+  StopReason reason = StopReason::none;
+  if (out_.refused_in_a_row() >= config_.queue_full_limit) reason = StopReason::queue_full;
+  if (out_.longest_wait_ns(now_ns) > config_.echo_timeout_ns) reason = StopReason::transmit_stalled;
+  if (reason == StopReason::none || now_ns < next_purge_ns_) return;
+  on_trouble({reason, -1, 0});
+  purge(now_ns);
+  if (state_ == DriverState::configuring) state_ = DriverState::off;
+}
+
+void StepperDriver::step(std::int64_t now_ns, const std::optional<MotionSetpoint>& setpoint) {
+  note_timing(now_ns);
+  bus_.maintain(now_ns);
+  receive(now_ns);
+  for (auto& node : nodes_) {
+    node.supervise(now_ns);
+    if (const Stop trouble = node.take_trouble(); trouble.reason != StopReason::none) on_trouble(trouble);
+  }
+  supervise_transmission(now_ns);
+  switch (state_) {
+    case DriverState::off:
+      run_off(now_ns);
+      break;
+    case DriverState::configuring:
+      run_configuring(now_ns);
+      break;
+    case DriverState::ready:
+      run_ready(now_ns);
+      break;
+    case DriverState::enabled:
+      run_enabled(now_ns, setpoint);
+      break;
+    case DriverState::stopped:
+    case DriverState::fault:
+      if (!silent_)
+        for (auto& node : nodes_) node.read_error_code(now_ns, out_);
+      break;
+  }
+  transmit(now_ns);
+  last_step_ns_ = now_ns;
+}
+
+void StepperDriver::run_off(std::int64_t now_ns) {
+  if (!bus_.is_open()) listen_since_ns_ = now_ns;
+  if (now_ns - listen_since_ns_ < config_.listen_ns) return;
+  state_ = DriverState::configuring;
+  state_since_ns_ = now_ns;
+  for (auto& node : nodes_) node.restart();
+}
+
+void StepperDriver::run_configuring(std::int64_t now_ns) {
+  bool all_operational = true;
+  for (auto& node : nodes_) {
+    node.configure(now_ns, out_);
+    all_operational = all_operational && node.phase() == DriveNode::Phase::operational;
+  }
+  if (!all_operational) {
+    state_since_ns_ = now_ns;  // a drive may be switched on much later
+    return;
+  }
+  const bool out_of_time = now_ns - state_since_ns_ > config_.transition_timeout_ns;
+  for (std::size_t axis = 0; axis < kAxes; ++axis) {
+    const DriveNode& node = nodes_.at(axis);
+    const bool in_fault = node.state() == cia402::State::fault;
+    // The operator asked for a reset by rearm(), and by nothing else.
+    if (in_fault && (!reset_faults_ || out_of_time))
+      return latch({StopReason::drive_fault, static_cast<int>(axis), node.error_code()});
+    if (out_of_time && node.state() != cia402::State::ready_to_switch_on)
+      return latch({StopReason::start_timeout, static_cast<int>(axis), node.statusword()});
+  }
+  if (!all_in(cia402::State::ready_to_switch_on)) return;
+  state_ = DriverState::ready;
+  stop_ = {};
+  reset_faults_ = false;
+}
+
+void StepperDriver::run_ready(std::int64_t now_ns) {
+  for (std::size_t axis = 0; axis < kAxes; ++axis) {
+    const auto state = nodes_.at(axis).state();
+    if (state == cia402::State::fault || state == cia402::State::fault_reaction)
+      return latch({StopReason::drive_fault, static_cast<int>(axis), nodes_.at(axis).error_code()});
+  }
+  if (!enable_wanted_) return;
+  if (all_in(cia402::State::operation_enabled)) {
+    state_ = DriverState::enabled;
+    fresh_setpoint_ns_ = now_ns;
+    refusing_setpoints_ = false;
+    following_ns_.fill(now_ns);
+  } else if (now_ns - enable_since_ns_ > config_.transition_timeout_ns) {
+    latch({StopReason::enable_timeout, -1, 0});
+  }
+}
+
+std::array<double, kAxes> StepperDriver::wanted_rates(std::int64_t now_ns,
+                                                      const std::optional<MotionSetpoint>& setpoint) {
+  std::array<double, kAxes> rates{};
+  if (setpoint) {
+    const bool usable = std::isfinite(setpoint->insertion_rate_mm_s) && std::isfinite(setpoint->rotation_rate_rad_s) &&
+                        setpoint->age_ns >= -config_.period_ns;
+    refusing_setpoints_ = !usable;
+    if (!usable) {
+      ++counters_.setpoints_refused;
+    } else {
+      fresh_setpoint_ns_ = std::max(fresh_setpoint_ns_, now_ns - std::max<std::int64_t>(setpoint->age_ns, 0));
+      if (setpoint->run) rates = {setpoint->insertion_rate_mm_s, setpoint->rotation_rate_rad_s};
+    }
+  }
+  const std::int64_t age_ns = now_ns - fresh_setpoint_ns_;
+  if (age_ns > config_.setpoint_zero_age_ns) {
+    ++counters_.setpoints_stale;
+    rates = {};
+  }
+  if (age_ns > config_.setpoint_stop_age_ns)
+    latch({refusing_setpoints_ ? StopReason::setpoint_invalid : StopReason::setpoint_stale, -1, 0});
+  return rates;
+}
+
+void StepperDriver::run_enabled(std::int64_t now_ns, const std::optional<MotionSetpoint>& setpoint) {
+  supervise_motion(now_ns);
+  if (state_ != DriverState::enabled) return;
+  const auto rates = wanted_rates(now_ns, setpoint);
+  if (state_ != DriverState::enabled) return;
+  // A late step does not buy a larger change of rate.
+  const double dt_s =
+      static_cast<double>(std::clamp<std::int64_t>(now_ns - last_step_ns_, 0, 2 * config_.period_ns)) * 1e-9;
+  bool clamped = false;
+  for (std::size_t axis = 0; axis < kAxes; ++axis) {
+    shapers_.at(axis).step(rates.at(axis), dt_s, nodes_.at(axis).position_unit());
+    clamped = clamped || shapers_.at(axis).clamped();
+  }
+  if (clamped) ++counters_.setpoints_clamped;
+}
+
+void StepperDriver::supervise_motion(std::int64_t now_ns) {
+  for (std::size_t axis = 0; axis < kAxes; ++axis) {
+    const DriveNode& node = nodes_.at(axis);
+    switch (node.state()) {
+      case cia402::State::operation_enabled:
+        break;
+      case cia402::State::fault:
+      case cia402::State::fault_reaction:
+        return latch({StopReason::drive_fault, static_cast<int>(axis), node.error_code()});
+      default:
+        return latch({StopReason::drive_left_operation, static_cast<int>(axis), node.statusword()});
+    }
+    const double commanded = shapers_.at(axis).rate_unit_s();
+    const double tolerance = std::max(0.5 * std::abs(commanded), 0.1 * config_.axes.at(axis).rate_limit_unit_s);
+    if (std::abs(node.rate_unit_s() - commanded) <= tolerance) following_ns_.at(axis) = now_ns;
+    if (now_ns - following_ns_.at(axis) > config_.not_following_ns)
+      return latch({StopReason::not_following, static_cast<int>(axis), 0});
+  }
+}
+
+std::uint16_t StepperDriver::controlword_for(const DriveNode& node) const {
+  using cia402::Goal;
+  if (latched()) return cia402::controlword_towards(Goal::stop, node.state());
+  if (state_ == DriverState::configuring && reset_faults_ && node.state() == cia402::State::fault)
+    return counters_.steps / kFaultResetSteps % 2 == 0 ? cia402::controlword::kFaultReset
+                                                       : cia402::controlword::kDisableVoltage;
+  const bool on = state_ == DriverState::enabled || enable_wanted_;
+  return cia402::controlword_towards(on ? Goal::enabled : Goal::ready, node.state());
+}
+
+void StepperDriver::transmit(std::int64_t now_ns) {
+  if (state_ == DriverState::off || silent_ || !bus_.is_open()) return;
+  for (std::size_t axis = 0; axis < kAxes; ++axis) {
+    const DriveNode& node = nodes_.at(axis);
+    // A stop is meant for every drive, also for one that we do not see.
+    if (node.phase() != DriveNode::Phase::operational && !latched()) continue;
+    const double rate = state_ == DriverState::enabled ? shapers_.at(axis).rate_unit_s() : 0.0;
+    node.command(controlword_for(node), rate, now_ns, out_);
+  }
+  if (out_.send(cia301::sync(), now_ns))
+    for (auto& node : nodes_) node.on_sync(now_ns);
+  if (now_ns >= next_heartbeat_ns_ &&
+      out_.send(cia301::heartbeat(config_.master_id, cia301::NmtState::operational), now_ns))
+    next_heartbeat_ns_ = now_ns + config_.master_heartbeat_ns;
+}
+
+}  // namespace bevel::stepper

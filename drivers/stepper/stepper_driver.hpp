@@ -1,0 +1,142 @@
+// Two CiA 402 drives, insertion and rotation, as one needle driver. Stands on a can::Bus; knows no files, clocks,
+// messages.
+//
+//   off --(bus open, nobody else commands)--> configuring --(both drives checked, operational)--> ready
+//   ready --enable()--> enabled --disable()--> ready
+//   ready, enabled --(any trouble)--> stopped or fault, latched: quick stop on both axes until rearm()
+//
+// Nothing moves without enable(), nothing recovers from a latched stop without rearm() and enable().
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <optional>
+#include <vector>
+
+#include "drivers/can/bus.hpp"
+#include "drivers/stepper/drive_node.hpp"
+#include "drivers/stepper/rate_shaper.hpp"
+#include "drivers/stepper/reason.hpp"
+#include "drivers/stepper/stepper_config.hpp"
+#include "drivers/stepper/transmitter.hpp"
+
+namespace bevel::stepper {
+
+struct MotionSetpoint {
+  std::int64_t age_ns = 0;           // since it was made; more than a cycle below zero is refused
+  bool run = false;                  // false: rates are taken as zero
+  double insertion_rate_mm_s = 0.0;  // + into the tissue
+  double rotation_rate_rad_s = 0.0;
+};
+
+enum class DriverState : std::uint8_t {
+  off,          // no bus, or listening whether somebody else commands the drives
+  configuring,  // also while a drive is not there yet
+  ready,
+  enabled,
+  stopped,  // latched
+  fault,    // latched: drive, configuration or another master at fault (is_fault(reason))
+};
+const char* to_string(DriverState state);
+
+enum class AxisStatus : std::int8_t { off = 0, ready = 1, enabled = 2, quick_stop = 3, fault = 4 };
+
+enum class EnableAnswer : std::uint8_t { accepted, not_ready, position_not_trusted };
+
+struct DriverCounters {
+  std::uint64_t steps = 0;
+  std::uint64_t overruns = 0;  // step() more than half a period late
+  std::uint64_t setpoints_refused = 0;
+  std::uint64_t setpoints_stale = 0;    // steps in which the rate was forced to zero by age
+  std::uint64_t setpoints_clamped = 0;  // steps with a rate over a limit
+  std::uint64_t held_back = 0;          // frames not sent, as the one before was not on the wire yet
+  std::uint64_t queue_full = 0;
+  std::uint64_t missed_pdos = 0;
+  std::uint64_t malformed = 0;
+  std::uint64_t sdo_ignored = 0;
+  std::uint64_t bus_errors = 0;
+  std::uint64_t purges = 0;
+  std::uint64_t later_stops = 0;  // troubles after the one that is latched
+};
+
+struct AxesReport {
+  std::int64_t sampled_ns = 0;  // clock of step(): the SYNC at which the older of both positions was taken; 0: none yet
+  std::array<AxisStatus, kAxes> status{};
+  double insertion_mm = 0.0;
+  double insertion_rate_mm_s = 0.0;
+  double rotation_rad = 0.0;
+  double rotation_rate_rad_s = 0.0;
+  std::array<bool, kAxes> position_trusted{};
+  std::array<std::uint16_t, kAxes> error_code{};  // last EMCY code or 0x603F
+  DriverState state = DriverState::off;
+  Stop stop{};  // latched in stopped and fault; in off and configuring what stands in the way, if known
+  DriverCounters counters{};
+};
+
+class StepperDriver {
+ public:
+  // bus: must outlive the driver and hear listen_ids(). Throws std::invalid_argument listing every problem of config.
+  StepperDriver(can::Bus& bus, const StepperConfig& config);
+  StepperDriver(const StepperDriver&) = delete;
+  StepperDriver& operator=(const StepperDriver&) = delete;
+
+  static std::vector<std::uint32_t> listen_ids(const StepperConfig& config);
+
+  // One cycle, every config.period_ns. now_ns: steady clock. setpoint: the newest known (hand it in again while its age
+  // grows), or nothing. Does not allocate, lock or block.
+  void step(std::int64_t now_ns, const std::optional<MotionSetpoint>& setpoint);
+  // Optional, between steps, when the bus is readable: takes in frames early.
+  void receive(std::int64_t now_ns);
+
+  EnableAnswer enable();    // carried out by the following steps
+  void disable();           // the drives ramp down and let go; back to ready
+  void request_stop();      // quick stop, latched
+  bool rearm();             // out of stopped or fault: configure again, reset faults. False: nothing is latched
+  void set_zero();          // both axes are at their zero now
+  void confirm_position();  // the drives' positions still hold, although a drive was out of sight
+
+  AxesReport report() const;
+
+ private:
+  void on_frame(const can::Frame& frame, std::int64_t now_ns);
+  void on_event(can::BusEvent event, std::int64_t now_ns);
+  void on_trouble(const Stop& trouble);
+  void latch(const Stop& stop);
+  void purge(std::int64_t now_ns);
+  void note_timing(std::int64_t now_ns);
+  void supervise_transmission(std::int64_t now_ns);
+  void run_off(std::int64_t now_ns);
+  void run_configuring(std::int64_t now_ns);
+  void run_ready(std::int64_t now_ns);
+  void run_enabled(std::int64_t now_ns, const std::optional<MotionSetpoint>& setpoint);
+  void supervise_motion(std::int64_t now_ns);
+  std::array<double, kAxes> wanted_rates(std::int64_t now_ns, const std::optional<MotionSetpoint>& setpoint);
+  void transmit(std::int64_t now_ns);
+  std::uint16_t controlword_for(const DriveNode& node) const;
+  bool latched() const { return state_ == DriverState::stopped || state_ == DriverState::fault; }
+  bool all_in(cia402::State state) const;
+
+  const StepperConfig config_;
+  can::Bus& bus_;
+  Transmitter out_;
+  std::array<DriveNode, kAxes> nodes_;
+  std::array<RateShaper, kAxes> shapers_;
+
+  DriverState state_ = DriverState::off;
+  Stop stop_{};
+  bool silent_ = false;  // another master was there first: not a frame from us
+  bool enable_wanted_ = false;
+  bool reset_faults_ = false;  // rearm() was called
+  std::int64_t last_step_ns_ = 0;
+  std::int64_t state_since_ns_ = 0;
+  std::int64_t listen_since_ns_ = 0;
+  std::int64_t enable_since_ns_ = 0;
+  std::int64_t next_heartbeat_ns_ = INT64_MIN;
+  std::int64_t next_purge_ns_ = INT64_MIN;
+  std::int64_t fresh_setpoint_ns_ = 0;  // when the newest usable set-point was made
+  bool refusing_setpoints_ = false;
+  std::array<std::int64_t, kAxes> following_ns_{};  // last time each axis followed
+  DriverCounters counters_;
+};
+
+}  // namespace bevel::stepper
