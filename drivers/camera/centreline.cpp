@@ -1,0 +1,184 @@
+#include "drivers/camera/centreline.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+namespace bevel::camera {
+namespace {
+
+constexpr int kMinRows = 8;
+constexpr double kTukey = 4.685;  // 95 % efficient for Gaussian residuals
+
+double bilinear(const cv::Mat& m, double x, double y) {
+  x = std::clamp(x, 0.0, m.cols - 1.001);
+  y = std::clamp(y, 0.0, m.rows - 1.001);
+  const int x0 = static_cast<int>(x);
+  const int y0 = static_cast<int>(y);
+  const double fx = x - x0;
+  const double fy = y - y0;
+  const uchar* a = m.ptr<uchar>(y0) + x0;
+  const uchar* b = m.ptr<uchar>(y0 + 1) + x0;
+  return (1.0 - fy) * ((1.0 - fx) * a[0] + fx * a[1]) + fy * ((1.0 - fx) * b[0] + fx * b[1]);
+}
+
+double median_of(std::vector<double>& values) {
+  const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
+  std::nth_element(values.begin(), middle, values.end());
+  return *middle;
+}
+
+}  // namespace
+
+double centre_in_row(const cv::Mat& patch, int row, double near_col, const RidgeScale& scale) {
+  constexpr double nothing = std::numeric_limits<double>::quiet_NaN();
+  const uchar* line = patch.ptr<uchar>(row);
+  const auto mean_about = [&](int x) { return (line[x - 1] + line[x] + line[x + 1]) / 3.0; };
+  const int reach = scale.offset_px - 1;
+  double centre = near_col;
+  for (int turn = 0; turn < 2; ++turn) {
+    const int x = cvRound(centre);
+    if (x - scale.offset_px - 1 < 0 || x + scale.offset_px + 1 >= patch.cols) return nothing;
+    const double left = mean_about(x - scale.offset_px);
+    const double right = mean_about(x + scale.offset_px);
+    double weight = 0.0;
+    double moment = 0.0;
+    for (int i = -reach; i <= reach; ++i) {
+      const double share = 0.5 + 0.5 * i / scale.offset_px;
+      const double dark = (1.0 - share) * left + share * right - line[x + i];
+      if (dark <= 0.0) continue;
+      weight += dark;
+      moment += dark * i;
+    }
+    if (weight <= 0.0) return nothing;
+    centre = x + moment / weight;
+  }
+  return centre;
+}
+
+double Centreline::col(double row) const {
+  const double t = (row - last_row) / scale_px;
+  return coefficient[0] + t * (coefficient[1] + t * coefficient[2]);
+}
+
+double Centreline::slope(double row) const {
+  const double t = (row - last_row) / scale_px;
+  return (coefficient[1] + 2.0 * t * coefficient[2]) / scale_px;
+}
+
+double Centreline::variance_px2(double row) const {
+  const double t = (row - last_row) / scale_px;
+  const cv::Vec3d g(1.0, t, t * t);
+  return g.dot(covariance * g);
+}
+
+cv::Point2d Centreline::along(double row, double arc_px) const {
+  // Midpoint steps of at most two pixels; the curve turns by far less than a degree in one.
+  const int steps = std::max(1, static_cast<int>(std::ceil(std::abs(arc_px) / 2.0)));
+  const double step = arc_px / steps;
+  for (int i = 0; i < steps; ++i) {
+    const double half = 0.5 * step / std::hypot(1.0, slope(row));
+    row += step / std::hypot(1.0, slope(row + half));
+  }
+  return {col(row), row};
+}
+
+Centreline fit_centreline(const std::vector<cv::Point2d>& centres, double correlation_px) {
+  Centreline fit;
+  if (centres.size() < kMinRows) return fit;
+  fit.last_row = centres.back().y;
+  fit.scale_px = std::max(1.0, fit.last_row - centres.front().y);
+  // Over a short piece curvature is not seen, only noise; a line then extrapolates better.
+  const bool curved = centres.size() >= 40;
+  std::vector<double> weight(centres.size(), 1.0);
+  std::vector<double> residual(centres.size());
+  cv::Matx33d inverse = cv::Matx33d::eye();
+  double weight_sum = 0.0;
+  for (int turn = 0; turn < 6; ++turn) {
+    cv::Matx33d normal = cv::Matx33d::zeros();
+    cv::Vec3d right(0.0, 0.0, 0.0);
+    for (size_t i = 0; i < centres.size(); ++i) {
+      const double t = (centres[i].y - fit.last_row) / fit.scale_px;
+      const cv::Vec3d g(1.0, t, curved ? t * t : 0.0);
+      normal += weight[i] * (g * g.t());
+      right += weight[i] * centres[i].x * g;
+    }
+    if (!curved) normal(2, 2) = 1.0;
+    inverse = normal.inv(cv::DECOMP_CHOLESKY);
+    fit.coefficient = inverse * right;
+    std::vector<double> magnitude(centres.size());
+    for (size_t i = 0; i < centres.size(); ++i) {
+      residual[i] = centres[i].x - fit.col(centres[i].y);
+      magnitude[i] = std::abs(residual[i]);
+    }
+    const double spread = std::max(1.4826 * median_of(magnitude), 0.02);
+    weight_sum = 0.0;
+    for (size_t i = 0; i < centres.size(); ++i) {
+      const double z = residual[i] / (kTukey * spread);
+      weight[i] = std::abs(z) < 1.0 ? (1.0 - z * z) * (1.0 - z * z) : 0.0;
+      weight_sum += weight[i];
+    }
+  }
+  if (weight_sum < kMinRows) return Centreline{};
+  double squares = 0.0;
+  for (size_t i = 0; i < centres.size(); ++i) squares += weight[i] * residual[i] * residual[i];
+  const int parameters = curved ? 3 : 2;
+  const double variance = squares / std::max(1.0, weight_sum - parameters);
+  fit.residual_px = std::sqrt(variance);
+  fit.covariance = inverse * (variance * correlation_px);
+  if (!curved) fit.covariance(2, 2) = 0.0;
+  fit.rows_used = static_cast<int>(weight_sum);
+  return fit;
+}
+
+double darkness_across(const cv::Mat& patch, const cv::Point2d& p, double slope, const RidgeScale& scale) {
+  const double length = std::hypot(1.0, slope);
+  const cv::Point2d normal(1.0 / length, -slope / length);
+  const auto mean = [&](double middle, int half) {
+    double sum = 0.0;
+    for (int i = -half; i <= half; ++i) {
+      const cv::Point2d at = p + (middle + i) * normal;
+      sum += bilinear(patch, at.x, at.y);
+    }
+    return sum / (2 * half + 1);
+  };
+  const double sides = 0.5 * (mean(-scale.offset_px, 1) + mean(scale.offset_px, 1));
+  return sides - mean(0.0, scale.core_px / 2 + 1);
+}
+
+double blur_across_px(const cv::Mat& patch, const Centreline& line, int first_row, int last_row,
+                      double needle_width_px) {
+  constexpr double tail_share = 0.1;  // of the peak: below it is background
+  const int reach = static_cast<int>(std::ceil(3.0 * needle_width_px)) + 4;
+  std::vector<double> mean(static_cast<size_t>(2 * reach + 1), 0.0);
+  double cosine = 1.0;
+  int rows = 0;
+  for (int r = std::max(0, first_row); r <= last_row; ++r, ++rows) {
+    const double middle = line.col(r);
+    for (int i = -reach; i <= reach; ++i) mean[static_cast<size_t>(i + reach)] += bilinear(patch, middle + i, r);
+    cosine = 1.0 / std::hypot(1.0, line.slope(r));
+  }
+  if (rows == 0) return 0.0;
+  for (double& m : mean) m /= rows;
+  std::vector<double> copy = mean;
+  const auto bright = copy.begin() + static_cast<std::ptrdiff_t>(copy.size() * 3 / 4);
+  std::nth_element(copy.begin(), bright, copy.end());
+  const double background = *bright;
+  const auto middle = static_cast<size_t>(reach);
+  const double peak = background - mean[middle];
+  if (peak <= 0.0) return 0.0;
+  double weight = peak;
+  double second = 0.0;
+  for (const int side : {-1, 1}) {
+    for (int i = 1; i <= reach; ++i) {
+      const double dark = background - mean[static_cast<size_t>(reach + side * i)];
+      if (dark < tail_share * peak) break;  // what lies beyond a bright gap is another line
+      weight += dark;
+      second += dark * i * i;
+    }
+  }
+  const double variance_px2 = second / weight * cosine * cosine - needle_width_px * needle_width_px / 12.0;
+  return std::sqrt(std::max(0.0, variance_px2));
+}
+
+}  // namespace bevel::camera

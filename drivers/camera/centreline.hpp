@@ -1,0 +1,43 @@
+#pragma once
+// Sub-pixel geometry of a found needle (canonical: it runs down the patch).
+#include <opencv2/core.hpp>
+#include <vector>
+
+#include "drivers/camera/ridge_path.hpp"
+
+namespace bevel::camera {
+
+/// Darkness-weighted centre of the needle in one row, near column `near_col`; NaN if nothing there is darker than the
+/// straight line between its two sides.
+double centre_in_row(const cv::Mat& patch, int row, double near_col, const RidgeScale& scale);
+
+/// col(row) as a polynomial of degree 1 or 2 around the last row: a good arc over the short piece that is fitted (the
+/// cubic term of a circle of 200 mm radius over 25 mm is below 0.02 px).
+struct Centreline {
+  double last_row = 0.0;   ///< origin of the polynomial
+  double scale_px = 1.0;   ///< rows per unit, for conditioning
+  cv::Vec3d coefficient;   ///< col = c0 + c1 t + c2 t^2, t = (row - last_row) / scale_px
+  cv::Matx33d covariance;  ///< of the coefficients, from the residuals
+  double residual_px = 0.0;
+  int rows_used = 0;
+
+  double col(double row) const;
+  double slope(double row) const;                      ///< d col / d row
+  double variance_px2(double row) const;               ///< of col(row)
+  cv::Point2d along(double row, double arc_px) const;  ///< the point `arc_px` further down the curve than `row`
+};
+
+/// Iteratively reweighted least squares with Tukey's biweight: rows in which the centre was drawn aside by a bubble or
+/// a grid line lose their vote. rows_used is 0 if fewer than 8 rows remain.
+Centreline fit_centreline(const std::vector<cv::Point2d>& centres, double correlation_px);
+
+/// Darkness of the needle against its two sides, averaged across its width, at the point `p` of a curve with direction
+/// (slope, 1). In the units of the picture.
+double darkness_across(const cv::Mat& patch, const cv::Point2d& p, double slope, const RidgeScale& scale);
+
+/// Standard deviation of the blur across the shaft in [first_row, last_row]: the second moment of its mean dark profile
+/// less that of a bar of `needle_width_px`. Grows to about three needle widths, then only says "at least".
+double blur_across_px(const cv::Mat& patch, const Centreline& line, int first_row, int last_row,
+                      double needle_width_px);
+
+}  // namespace bevel::camera

@@ -1,0 +1,111 @@
+// Frames from files: an image folder, a video.
+#include <algorithm>
+#include <cctype>
+#include <cmath>
+#include <opencv2/imgcodecs.hpp>
+#include <opencv2/imgproc.hpp>
+
+#include "drivers/camera/frame_sources.hpp"
+
+namespace bevel::camera {
+namespace {
+
+bool is_image(const std::filesystem::path& file) {
+  std::string extension = file.extension().string();
+  std::transform(extension.begin(), extension.end(), extension.begin(),
+                 [](unsigned char c) { return static_cast<char>(std::tolower(c)); });
+  static constexpr std::array known = {".jpg", ".jpeg", ".png", ".bmp", ".pgm", ".ppm", ".tif", ".tiff"};
+  return std::find(known.begin(), known.end(), extension) != known.end();
+}
+
+bool is_digit(char c) { return c >= '0' && c <= '9'; }
+
+std::string_view digits_at(std::string_view text, size_t at) {
+  size_t end = at;
+  while (end < text.size() && is_digit(text[end])) ++end;
+  return text.substr(at, end - at);
+}
+
+std::string_view without_leading_zeros(std::string_view number) {
+  const size_t first = number.find_first_not_of('0');
+  return first == std::string_view::npos ? std::string_view{} : number.substr(first);
+}
+
+}  // namespace
+
+bool natural_less(std::string_view a, std::string_view b) {
+  size_t i = 0;
+  size_t j = 0;
+  while (i < a.size() && j < b.size()) {
+    if (is_digit(a[i]) && is_digit(b[j])) {
+      const std::string_view run_a = digits_at(a, i);
+      const std::string_view run_b = digits_at(b, j);
+      // Compared as text, so that no run of digits is too long for an integer.
+      const std::string_view number_a = without_leading_zeros(run_a);
+      const std::string_view number_b = without_leading_zeros(run_b);
+      if (number_a.size() != number_b.size()) return number_a.size() < number_b.size();
+      if (number_a != number_b) return number_a < number_b;
+      i += run_a.size();
+      j += run_b.size();
+      continue;
+    }
+    if (a[i] != b[j]) return a[i] < b[j];
+    ++i;
+    ++j;
+  }
+  if ((i < a.size()) != (j < b.size())) return j < b.size();
+  return a < b;  // equal but for leading zeros: still a strict order
+}
+
+FolderSource::FolderSource(const SourceConfig& config) : config_(config) {
+  std::error_code error;
+  if (!std::filesystem::is_directory(config.path, error))
+    throw SourceError("source path '" + config.path + "': not a folder");
+  for (const auto& entry : std::filesystem::directory_iterator(config.path))
+    if (entry.is_regular_file() && is_image(entry.path())) files_.push_back(entry.path());
+  if (files_.empty()) throw SourceError("source path '" + config.path + "': no jpg, png, bmp, pgm, ppm or tif in it");
+  std::sort(files_.begin(), files_.end(),
+            [](const auto& a, const auto& b) { return natural_less(a.filename().string(), b.filename().string()); });
+}
+
+FrameResult FolderSource::next(std::chrono::milliseconds /*timeout*/) {
+  if (next_ >= files_.size()) return EndOfFrames{};
+  Frame frame;
+  frame.gray = cv::imread(files_[next_].string(), cv::IMREAD_GRAYSCALE);
+  if (frame.gray.empty()) {
+    const std::string name = files_[next_].string();
+    next_ = files_.size();
+    return SourceFailure{"'" + name + "': not a readable image"};
+  }
+  frame.seq = static_cast<int64_t>(next_);
+  frame.camera = config_.camera;
+  frame.capture_utime = config_.start_utime + frame.seq * config_.period_us;
+  ++next_;
+  return frame;
+}
+
+VideoSource::VideoSource(const SourceConfig& config) : config_(config) {
+  std::error_code error;
+  if (!std::filesystem::is_regular_file(config.path, error))
+    throw SourceError("source path '" + config.path + "': not a file");
+  if (!capture_.open(config.path)) throw SourceError("source path '" + config.path + "': no decoder opens it as video");
+  const double rate_hz = capture_.get(cv::CAP_PROP_FPS);
+  if (std::isfinite(rate_hz) && rate_hz > 0.1 && rate_hz < 1e4)
+    config_.period_us = static_cast<int64_t>(std::llround(1e6 / rate_hz));
+}
+
+FrameResult VideoSource::next(std::chrono::milliseconds /*timeout*/) {
+  cv::Mat picture;
+  if (!capture_.read(picture) || picture.empty()) return EndOfFrames{};
+  Frame frame;
+  if (picture.channels() == 1)
+    frame.gray = picture.clone();
+  else
+    cv::cvtColor(picture, frame.gray, cv::COLOR_BGR2GRAY);
+  frame.seq = seq_++;
+  frame.camera = config_.camera;
+  frame.capture_utime = config_.start_utime + frame.seq * config_.period_us;
+  return frame;
+}
+
+}  // namespace bevel::camera

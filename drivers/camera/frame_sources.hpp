@@ -1,0 +1,69 @@
+#pragma once
+// The adapters behind make_frame_source(); include frame_source.hpp instead unless you are a test.
+#include <filesystem>
+#include <opencv2/videoio.hpp>
+#include <vector>
+
+#include "drivers/camera/frame_source.hpp"
+
+namespace bevel::camera {
+
+/// Images of a folder in natural order; every readable image extension, nothing else.
+class FolderSource : public FrameSource {
+ public:
+  explicit FolderSource(const SourceConfig& config);
+  FrameResult next(std::chrono::milliseconds timeout) override;
+  const std::vector<std::filesystem::path>& files() const { return files_; }
+
+ private:
+  SourceConfig config_;
+  std::vector<std::filesystem::path> files_;
+  size_t next_ = 0;
+};
+
+class VideoSource : public FrameSource {
+ public:
+  explicit VideoSource(const SourceConfig& config);
+  FrameResult next(std::chrono::milliseconds timeout) override;
+
+ private:
+  SourceConfig config_;
+  cv::VideoCapture capture_;
+  int64_t seq_ = 0;
+};
+
+/// Video4Linux. One buffer, so that a frame is never older than one period when it is read; stamped by the driver.
+class DeviceSource : public FrameSource {
+ public:
+  explicit DeviceSource(const SourceConfig& config);
+  FrameResult next(std::chrono::milliseconds timeout) override;
+
+ private:
+  int64_t count_lost(int64_t stamp_utime);
+
+  SourceConfig config_;
+  std::vector<cv::VideoCapture> capture_;  // one element: cv::VideoCapture::waitAny wants a vector
+  int64_t period_us_ = 0;
+  int64_t seq_ = 0;
+  int64_t last_utime_ = 0;
+};
+
+/// Raw frames of frame_stream.hpp over a Unix socket.
+class StreamSource : public FrameSource {
+ public:
+  explicit StreamSource(const SourceConfig& config);
+  ~StreamSource() override;
+  FrameResult next(std::chrono::milliseconds timeout) override;
+
+ private:
+  FrameResult fail(const std::string& text);
+
+  std::string path_;
+  int socket_ = -1;
+  std::vector<unsigned char> head_;  // bytes of the header received so far
+  Frame frame_;                      // being filled
+  size_t body_received_ = 0;
+  bool failed_ = false;
+};
+
+}  // namespace bevel::camera

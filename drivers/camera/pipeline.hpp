@@ -1,0 +1,79 @@
+#pragma once
+// One source, one tracker per camera: frames in, tip observations out. What bevel-camera wires to LCM.
+#include <chrono>
+#include <cstdint>
+#include <functional>
+#include <map>
+#include <memory>
+#include <optional>
+#include <string>
+#include <variant>
+#include <vector>
+
+#include "drivers/camera/frame_source.hpp"
+#include "drivers/camera/tip_tracker.hpp"
+#include "drivers/camera/view.hpp"
+
+namespace bevel::camera {
+
+/// One camera's answer to one frame; field for field what tip_measurement_t carries, and what a display wants beside
+/// it.
+struct TipObservation {
+  int64_t capture_utime = 0;
+  int64_t seq = 0;
+  int32_t camera = 0;
+  TipStatus status = TipStatus::lost;
+  Vector3 position_mm{};          ///< in {A}; zero unless ok
+  Matrix3 information_per_mm2{};  ///< zero unless ok, and along the optical axis
+  cv::Point2d tip_px;             ///< and the rest: only if ok
+  cv::Vec2d direction_px;
+  std::string_view reason;  ///< why not ok; static storage
+};
+
+struct CameraSetup {
+  int32_t camera = 0;
+  std::shared_ptr<const View> view;
+  TrackerConfig tracker;
+  cv::Mat background;  ///< optional picture without a needle
+};
+
+struct CameraCounters {
+  int64_t frames = 0;
+  int64_t lost_frames = 0;     ///< gaps in seq
+  int64_t unknown_camera = 0;  ///< frames of cameras that are not set up; dropped
+  std::array<int64_t, 8> by_status{};
+};
+
+class CameraPipeline {
+ public:
+  using Clock = std::function<int64_t()>;  ///< microseconds since the epoch
+  using Result = std::variant<TipObservation, FrameTimeout, EndOfFrames, SourceFailure>;
+
+  /// An empty `clock` means that age has no meaning (files). Throws std::invalid_argument: no camera, the same number
+  /// twice, no view, or a bad tracker configuration, which names the camera.
+  CameraPipeline(std::unique_ptr<FrameSource> source, const std::vector<CameraSetup>& cameras, Clock clock = {});
+
+  /// Waits at most `timeout` for a frame of a camera that is set up and tracks it.
+  Result next(std::chrono::milliseconds timeout);
+
+  /// Where the estimator expects the tip, in {A}; used once, for the next frame of every camera.
+  void predict(const Vector3& position_mm);
+
+  const CameraCounters& counters() const { return counters_; }
+
+ private:
+  struct Eye {
+    std::shared_ptr<const View> view;
+    TipTracker tracker;
+    std::optional<int64_t> last_seq;
+    std::optional<cv::Point2d> predicted_px;
+  };
+  TipObservation observe(Eye& eye, const Frame& frame);
+
+  std::unique_ptr<FrameSource> source_;
+  std::map<int32_t, Eye> eyes_;
+  Clock clock_;
+  CameraCounters counters_;
+};
+
+}  // namespace bevel::camera

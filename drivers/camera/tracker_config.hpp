@@ -1,0 +1,47 @@
+#pragma once
+#include <cstdint>
+#include <opencv2/core.hpp>
+
+namespace bevel::camera {
+
+/// The side of the picture through which the shaft comes in. The needle is followed to within 45 degrees of the inward
+/// normal of this side, which covers |gamma| < pi/4 of the model.
+enum class EntrySide { top, bottom, left, right };
+
+enum class Background {
+  local,        ///< a pixel is compared with its neighbours across the needle; needs no empty picture
+  first_frame,  ///< the first frame shows no needle and is subtracted from all others (gain corrected)
+};
+
+/// Lengths in mm are turned into pixels by the view. "Gray" is levels of 255.
+struct TrackerConfig {
+  // Where the needle comes in
+  EntrySide entry_side = EntrySide::top;
+  cv::Point2d entry_px{-1.0, -1.0};   ///< pixel where tracking starts; negative: the middle of the entry side
+  double entry_half_width_px = -1.0;  ///< how far beside entry_px the shaft may cross; negative: anywhere
+  // The needle
+  double needle_diameter_mm = 1.27;  ///< 18 gauge
+  double bevel_length_mm = 3.49;     ///< diameter / tan(bevel angle); 20 degrees here. Zero for a blunt end
+  double min_contrast_gray = 20.0;   ///< darker than its surroundings by at least this; fainter lines are ignored
+  double min_length_mm = 6.0;        ///< shorter visible needles are reported as `too_short`
+  // What is fitted
+  double fit_length_mm = 25.0;  ///< piece behind the tip which fixes direction and curvature
+  // Region of interest
+  double roi_ahead_mm = 10.0;  ///< how far beyond the prediction the tip may be
+  double roi_side_mm = 8.0;    ///< how far beside it
+  // When to refuse
+  double max_blur_mm = 0.9;         ///< standard deviation of the edge at the tip
+  double saturated_fraction = 0.3;  ///< of the pixels around the tip at 255 or 0
+  double second_score_ratio = 0.6;  ///< a second needle with this share of the first one's evidence is an ambiguity
+  int64_t max_age_us = 500'000;     ///< older frames are `late`
+  // Honesty of the covariance. Neighbouring rows share blur and texture, so they are not independent samples.
+  double correlation_px = 4.0;    ///< length over which residuals are correlated
+  double floor_across_mm = 0.03;  ///< standard deviation below which no measurement is trusted
+  double floor_along_mm = 0.10;
+  Background background = Background::local;
+};
+
+/// Throws std::invalid_argument naming the key, the value and what is allowed.
+void check(const TrackerConfig& config);
+
+}  // namespace bevel::camera

@@ -1,0 +1,33 @@
+#pragma once
+// Port: what a pixel of one camera says about a point of {A} (mm; origin at the entry point, z into the tissue).
+#include <array>
+
+#include <opencv2/core.hpp>
+
+namespace bevel::camera {
+
+using Vector3 = std::array<double, 3>;  ///< along x, y, z of {A}
+using Matrix3 = std::array<double, 9>;  ///< row-major
+
+class View {
+ public:
+  View() = default;
+  virtual ~View() = default;
+
+  /// Point of {A} in mm seen at `pixel` (u right, v down; the centre of the first pixel is 0, 0). Along an axis
+  /// which the camera cannot see the value means nothing; the information matrix says so.
+  virtual Vector3 position_mm(const cv::Point2d& pixel) const = 0;
+  virtual cv::Point2d pixel(const Vector3& position_mm) const = 0;
+
+  /// Inverse covariance in {A}, 1/mm^2, of a pixel with the 2x2 covariance `covariance_px2`; zero along the optical
+  /// axis.
+  virtual Matrix3 information_per_mm2(const cv::Point2d& pixel, const cv::Matx22d& covariance_px2) const = 0;
+
+  virtual double px_per_mm() const = 0;
+
+ protected:
+  View(const View&) = default;
+  View& operator=(const View&) = default;
+};
+
+}  // namespace bevel::camera
