@@ -1,12 +1,14 @@
 #pragma once
 // The needle's parameters, and the set in which the extended bicycle model is defined.
-// Source: "Extended Bicycle Model for Needle Steering in Soft Tissue" (IROS 2015), Section III.A; equation numbers are the paper's.
+// Source: "Extended Bicycle Model for Needle Steering in Soft Tissue" (IROS 2015), Section III.A; equation numbers are
+// the paper's.
 #include <optional>
 #include <string>
 
 namespace bevel::model {
 
-// Which component of the tip's tilt slips once the shaft has been turned; the paper leaves it open (its (18) is planar).
+// Which component of the tip's tilt slips once the shaft has been turned; the paper leaves it open (its (18) is
+// planar).
 enum class SlipDirection {
   isotropic,    // f = tan(alpha) d along the tilt: tissue does not know the bevel
   bevel_plane,  // as printed in (18): only the component along body y
@@ -16,10 +18,11 @@ enum class SlipDirection {
 enum class FrontWheel { published, nonslip };
 
 struct NeedleParameters {
-  double curvature_per_mm = 0.0047;  // k = tan(beta)/ell; k > 0 bends toward body -y. Inferred, not printed in the paper
-  double wheelbase_mm = 20.0;        // ell; inferred, not printed in the paper
-  double lambda1_per_rad = 0.0;      // (25)
-  double lambda2 = 0.0;              // (25)
+  double curvature_per_mm =
+      0.0047;                    // k = tan(beta)/ell; k > 0 bends toward body -y. Inferred, not printed in the paper
+  double wheelbase_mm = 20.0;    // ell; inferred, not printed in the paper
+  double lambda1_per_rad = 0.0;  // (25)
+  double lambda2 = 0.0;          // (25)
   SlipDirection slip = SlipDirection::isotropic;
   FrontWheel front_wheel = FrontWheel::published;
 

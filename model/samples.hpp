@@ -13,9 +13,9 @@ struct TipMeasurement {
   std::int64_t utime = 0;  // us since the epoch, time of capture
   std::int64_t seq = 0;
   std::int32_t camera = 0;
-  std::int32_t status = 0;                                                  // 0 ok, else why not usable
-  Eigen::Vector3d position_mm = Eigen::Vector3d::Zero();                    // tip in {A}
-  Eigen::Matrix3d information_per_mm2 = Eigen::Matrix3d::Zero();            // inverse covariance, any rank
+  std::int32_t status = 0;                                        // 0 ok, else why not usable
+  Eigen::Vector3d position_mm = Eigen::Vector3d::Zero();          // tip in {A}
+  Eigen::Matrix3d information_per_mm2 = Eigen::Matrix3d::Zero();  // inverse covariance, any rank
 };
 
 struct ActuatorState {

@@ -21,12 +21,7 @@ Slip evaluate_slip(double tilt_rad, double lambda1_per_rad, double lambda2) {
   if (!(gamma < std::numbers::pi / 2) || !(std::abs(alpha) < std::numbers::pi / 2)) return kOutside;
   const double f = std::tan(alpha);
   const double f_by_alpha = 1 + f * f;
-  return {gamma,
-          alpha,
-          f,
-          f_by_alpha * (1 / root - 1),
-          -f_by_alpha * gamma * gamma / root,
-          f_by_alpha * gamma / root,
+  return {gamma, alpha, f, f_by_alpha * (1 / root - 1), -f_by_alpha * gamma * gamma / root, f_by_alpha * gamma / root,
           true};
 }
 

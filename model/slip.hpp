@@ -13,7 +13,7 @@ struct Slip {
   double f_by_tilt_per_rad;  // df/dtheta
   double f_by_lambda1_rad;   // df/dlambda1
   double f_by_lambda2;       // df/dlambda2
-  bool in_domain;            // false: no real gamma, or gamma or alpha at or past 90 degrees; the other fields are then zero
+  bool in_domain;  // false: no real gamma, or gamma or alpha at or past 90 degrees; the other fields are then zero
 };
 
 // gamma solves theta = gamma - alpha(gamma) = (1 - lambda2) gamma + lambda1 gamma |gamma|, from (25).
