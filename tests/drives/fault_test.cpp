@@ -1,0 +1,281 @@
+// Each row of the fault table that can be made on a wire in memory. Every stop is latched: see expect_latched().
+#include <gmock/gmock.h>
+
+#include "tests/drives/bench.hpp"
+
+namespace bevel::test {
+namespace {
+
+using rig::PowerStateMachine;
+using stepper::AxisStatus;
+using stepper::EnableAnswer;
+
+class Fault : public testing::Test {
+ protected:
+  void SetUp() override {
+    ASSERT_TRUE(bench.enable()) << to_string(bench.reason());
+    bench.move(10.0, 3.0);
+    bench.run_ms(400);
+    ASSERT_GT(bench.insertion.velocity_unit_s(), 9.0);
+  }
+
+  void expect_rest_within_ms(int limit_ms) {
+    const auto ms = bench.ms_to_rest();
+    ASSERT_TRUE(ms.has_value());
+    EXPECT_LE(*ms, limit_ms);
+  }
+
+  // Latched, and fresh set-points and a repaired world change nothing.
+  void expect_latched(StopReason reason, DriverState state) {
+    bench.run_ms(1000);
+    EXPECT_EQ(bench.reason(), reason);
+    EXPECT_EQ(bench.report().state, state);
+    EXPECT_EQ(bench.driver->enable(), EnableAnswer::not_ready);
+    const double before = bench.insertion.position_unit();
+    bench.run_ms(500);
+    EXPECT_NEAR(bench.insertion.position_unit(), before, 1e-3);
+  }
+
+  void expect_rearm_works() {
+    ASSERT_TRUE(bench.driver->rearm());
+    ASSERT_TRUE(bench.reach(DriverState::ready)) << to_string(bench.reason());
+    bench.driver->confirm_position();
+    const double before = bench.insertion.position_unit();
+    bench.run_ms(300);
+    EXPECT_NEAR(bench.insertion.position_unit(), before, 1e-3);  // re-armed is not yet enabled
+    ASSERT_TRUE(bench.enable());
+    bench.run_ms(400);
+    EXPECT_GT(bench.insertion.position_unit(), before + 1.0);
+  }
+
+  Bench bench;
+};
+
+TEST_F(Fault, DriveHeartbeatLostStopsBothAxes) {
+  bench.insertion.set_silent(true);  // it cannot hear us either, and has to stop by itself
+  expect_rest_within_ms(200);
+  expect_latched(StopReason::drive_heartbeat_lost, DriverState::stopped);
+  bench.insertion.set_silent(false);
+  expect_latched(StopReason::drive_heartbeat_lost, DriverState::stopped);
+  EXPECT_FALSE(bench.report().position_trusted[0]);
+  EXPECT_TRUE(bench.report().position_trusted[1]);
+  ASSERT_TRUE(bench.driver->rearm());
+  ASSERT_TRUE(bench.reach(DriverState::ready));
+  EXPECT_EQ(bench.driver->enable(), EnableAnswer::position_not_trusted);
+  bench.driver->confirm_position();
+  EXPECT_TRUE(bench.enable());
+}
+
+TEST_F(Fault, OurHeartbeatLostStopsTheDrivesByThemselves) {
+  bench.driver_runs = false;
+  expect_rest_within_ms(200);
+  EXPECT_EQ(bench.insertion.state(), PowerStateMachine::State::quick_stop_active);
+  EXPECT_EQ(bench.rotation.state(), PowerStateMachine::State::quick_stop_active);
+  bench.driver_runs = true;  // continued after a SIGSTOP: its old intent must not restart anything
+  bench.run_ms(10);
+  expect_latched(StopReason::driver_overrun, DriverState::stopped);
+  EXPECT_TRUE(bench.at_rest());
+  expect_rearm_works();
+}
+
+TEST_F(Fault, AKilledDriverMayBeReplaced) {
+  bench.driver_runs = false;
+  expect_rest_within_ms(200);
+  bench.driver_bus = bench.wire.attach();
+  bench.driver = std::make_unique<stepper::StepperDriver>(*bench.driver_bus, bench.config);
+  bench.driver_runs = true;
+  const double before = bench.insertion.position_unit();
+  ASSERT_TRUE(bench.reach(DriverState::ready)) << to_string(bench.reason());
+  bench.run_ms(200);
+  EXPECT_NEAR(bench.insertion.position_unit(), before, 1e-3);
+}
+
+TEST_F(Fault, NodeResetIsNotReadyAndItsPositionNotTrusted) {
+  bench.rotation.power_cycle();
+  expect_rest_within_ms(100);
+  expect_latched(StopReason::drive_reset, DriverState::stopped);
+  EXPECT_EQ(bench.report().status[1], AxisStatus::off);
+  EXPECT_FALSE(bench.report().position_trusted[1]);
+  ASSERT_TRUE(bench.driver->rearm());
+  ASSERT_TRUE(bench.reach(DriverState::ready));
+  EXPECT_EQ(bench.rotation.objects().get(0x6007), 3U);  // configured anew
+  EXPECT_EQ(bench.driver->enable(), EnableAnswer::position_not_trusted);
+  bench.driver->set_zero();
+  EXPECT_TRUE(bench.enable());
+}
+
+TEST_F(Fault, EmergencyIsReportedAndTheOtherAxisQuickStopped) {
+  bench.rotation.raise_fault(0x2310);
+  expect_rest_within_ms(100);
+  expect_latched(StopReason::drive_emergency, DriverState::fault);
+  EXPECT_EQ(bench.report().stop.code, 0x2310U);
+  EXPECT_EQ(bench.report().stop.axis, 1);
+  EXPECT_EQ(bench.report().error_code[1], 0x2310U);
+  EXPECT_EQ(bench.report().status[0], AxisStatus::quick_stop);
+  EXPECT_EQ(bench.report().status[1], AxisStatus::fault);
+  expect_rearm_works();
+}
+
+TEST_F(Fault, FaultIsFoundWithoutItsEmergency) {
+  bench.wire.set_tap([](can::Frame& frame) { return frame.id != 0x082; });
+  bench.rotation.raise_fault(0x4310);
+  expect_rest_within_ms(100);
+  expect_latched(StopReason::drive_fault, DriverState::fault);
+  EXPECT_EQ(bench.report().error_code[1], 0x4310U);  // read from 0x603F
+}
+
+TEST_F(Fault, BlockedMotor) {
+  bench.insertion.set_motor_blocked(true);
+  expect_latched(StopReason::drive_emergency, DriverState::fault);
+  EXPECT_EQ(bench.report().stop.code, 0x8611U);
+  EXPECT_TRUE(bench.at_rest());
+}
+
+TEST_F(Fault, LostPdosStopTheAxes) {
+  bench.wire.set_tap([](can::Frame& frame) { return frame.id != 0x281; });  // positions of the insertion axis
+  expect_rest_within_ms(200);
+  expect_latched(StopReason::pdo_lost, DriverState::stopped);
+  EXPECT_GT(bench.report().counters.missed_pdos, 0U);
+}
+
+TEST_F(Fault, AFewLostPdosAreCountedAndBorne) {
+  int n = 0;
+  bench.wire.set_tap([&n](can::Frame& frame) { return (frame.id & 0x780) != 0x280 || ++n % 3 != 0; });
+  bench.run_ms(1000);
+  EXPECT_EQ(bench.report().state, DriverState::enabled);
+  EXPECT_GT(bench.report().counters.missed_pdos, 20U);
+}
+
+TEST_F(Fault, FrozenPdosOfALivingDrive) {
+  bench.insertion.set_pdos_frozen(true);
+  bench.run_ms(300);
+  EXPECT_EQ(bench.reason(), StopReason::pdo_lost);
+  EXPECT_LT(std::abs(bench.rotation.velocity_unit_s()), 0.01);
+}
+
+TEST_F(Fault, PdosOfAWrongLengthAreNotTaken) {
+  bench.wire.set_tap([](can::Frame& frame) {
+    if (frame.id == 0x181) frame.size = 3;
+    return true;
+  });
+  expect_rest_within_ms(200);
+  expect_latched(StopReason::pdo_lost, DriverState::stopped);
+  EXPECT_GT(bench.report().counters.malformed, 0U);
+}
+
+TEST_F(Fault, DriveStoppedByAnNmtStateOfItsOwn) {
+  bench.wire.inject({0x701, 1, {0x04}});
+  expect_rest_within_ms(100);
+  expect_latched(StopReason::drive_left_operation, DriverState::stopped);
+}
+
+TEST_F(Fault, NobodyAcknowledges_QueuedCommandsAreNeverReplayed) {
+  bench.wire.set_acknowledged(false);
+  EXPECT_TRUE(bench.run_until([&] { return bench.report().state == DriverState::stopped; }, 200));
+  EXPECT_THAT(bench.reason(), testing::AnyOf(StopReason::transmit_stalled, StopReason::pdo_lost));
+  expect_rest_within_ms(200);
+  EXPECT_GE(bench.report().counters.held_back, 1U);
+  // What goes out when the bus returns: not one old velocity.
+  bool replayed = false;
+  bench.wire.set_tap([&](can::Frame& frame) {
+    const bool moves = frame.id == 0x201 && (frame.data[2] | frame.data[3] | frame.data[4] | frame.data[5]) != 0;
+    replayed = replayed || moves;
+    return true;
+  });
+  bench.run_ms(300);
+  bench.wire.set_acknowledged(true);
+  bench.run_ms(300);
+  EXPECT_FALSE(replayed);
+  EXPECT_TRUE(bench.at_rest());
+  EXPECT_GE(bench.report().counters.purges, 1U);
+  bench.wire.set_tap(nullptr);
+  expect_rearm_works();
+}
+
+TEST_F(Fault, AtMostOneCommandPerAxisWaits) {
+  bench.wire.set_acknowledged(false);
+  bench.run_ms(50);                           // several cycles, before any time-out
+  EXPECT_LE(bench.driver_bus->queued(), 4U);  // two set-points, SYNC, heartbeat
+}
+
+TEST_F(Fault, QueueFullIsCountedAndLatched) {
+  for (std::size_t i = 0; i < can::MemoryBus::kTransmitQueueFrames; ++i) {
+    if (i == 0) bench.wire.set_acknowledged(false);
+    (void)bench.driver_bus->send({0x7E0, 0, {}});  // somebody else's frames on our interface
+  }
+  EXPECT_TRUE(bench.run_until([&] { return bench.report().state == DriverState::stopped; }, 200));
+  EXPECT_EQ(bench.reason(), StopReason::queue_full);
+  EXPECT_GE(bench.report().counters.queue_full, 5U);
+}
+
+TEST_F(Fault, ErrorPassive) {
+  bench.wire.raise(can::BusEvent::error_passive);
+  bench.run_ms(20);
+  EXPECT_EQ(bench.report().counters.purges, 1U);
+  expect_rest_within_ms(200);
+  expect_latched(StopReason::bus_error_passive, DriverState::stopped);
+  expect_rearm_works();
+}
+
+TEST_F(Fault, BusOff) {
+  bench.wire.raise(can::BusEvent::bus_off);
+  expect_rest_within_ms(200);
+  expect_latched(StopReason::bus_off, DriverState::stopped);
+  bench.wire.raise(can::BusEvent::recovered);
+  expect_latched(StopReason::bus_off, DriverState::stopped);
+}
+
+TEST_F(Fault, LinkDownIsReopenedButStaysLatched) {
+  bench.wire.set_link_up(false);
+  expect_rest_within_ms(200);
+  expect_latched(StopReason::link_down, DriverState::stopped);
+  bench.wire.set_link_up(true);
+  bench.run_ms(1500);
+  EXPECT_TRUE(bench.driver_bus->is_open());
+  expect_latched(StopReason::link_down, DriverState::stopped);
+  expect_rearm_works();
+}
+
+TEST_F(Fault, OperatorStop) {
+  bench.driver->request_stop();
+  expect_rest_within_ms(100);
+  expect_latched(StopReason::operator_stop, DriverState::stopped);
+  expect_rearm_works();
+}
+
+TEST_F(Fault, TheFirstReasonStays) {
+  bench.driver->request_stop();
+  bench.run_ms(50);
+  bench.insertion.raise_fault(0x4310);
+  bench.run_ms(50);
+  EXPECT_EQ(bench.reason(), StopReason::operator_stop);
+  EXPECT_EQ(bench.report().state, DriverState::fault);
+  EXPECT_GE(bench.report().counters.later_stops, 1U);
+}
+
+TEST_F(Fault, ASecondDriverIsRefusedAndDoesNotDisturb) {
+  const auto bus = bench.wire.attach();
+  stepper::StepperDriver second(*bus, bench.config);
+  bench.each_ms = [&] {
+    if ((bench.now_ns / kMs) % 10 == 5) second.step(bench.now_ns, std::nullopt);
+  };
+  bench.run_ms(1000);
+  EXPECT_EQ(second.report().state, DriverState::fault);
+  EXPECT_EQ(second.report().stop.reason, StopReason::foreign_master);
+  EXPECT_EQ(bus->counters().sent, 0U);
+  EXPECT_EQ(bench.report().state, DriverState::enabled);
+  EXPECT_TRUE(second.rearm());
+  bench.run_ms(1000);
+  EXPECT_EQ(second.report().stop.reason, StopReason::foreign_master);
+  EXPECT_EQ(bus->counters().sent, 0U);
+}
+
+TEST_F(Fault, AnotherMasterInFlightStopsTheAxes) {
+  bench.wire.inject({0x201, 6, {0x0F, 0x00, 0x10, 0x27, 0x00, 0x00}});
+  expect_rest_within_ms(100);
+  expect_latched(StopReason::foreign_master, DriverState::fault);
+  EXPECT_EQ(bench.report().stop.code, 0x201U);
+}
+
+}  // namespace
+}  // namespace bevel::test
