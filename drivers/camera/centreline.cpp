@@ -83,13 +83,16 @@ cv::Point2d Centreline::along(double row, double arc_px) const {
   return {col(row), row};
 }
 
-Centreline fit_centreline(const std::vector<cv::Point2d>& centres, double correlation_px) {
+Centreline fit_centreline(const std::vector<cv::Point2d>& centres, double correlation_px,
+                          double curvature_sigma_per_px) {
   Centreline fit;
   if (centres.size() < kMinRows) return fit;
   fit.last_row = centres.back().y;
   fit.scale_px = std::max(1.0, fit.last_row - centres.front().y);
-  // Over a short piece curvature is not seen, only noise; a line then extrapolates better.
-  const bool curved = centres.size() >= 40;
+  constexpr double typical_residual_px = 0.3;
+  const double bend_sigma_px = 0.5 * curvature_sigma_per_px * fit.scale_px * fit.scale_px;
+  const double prior_weight =
+      typical_residual_px * typical_residual_px * correlation_px / (bend_sigma_px * bend_sigma_px);
   std::vector<double> weight(centres.size(), 1.0);
   std::vector<double> residual(centres.size());
   cv::Matx33d inverse = cv::Matx33d::eye();
@@ -99,11 +102,11 @@ Centreline fit_centreline(const std::vector<cv::Point2d>& centres, double correl
     cv::Vec3d right(0.0, 0.0, 0.0);
     for (size_t i = 0; i < centres.size(); ++i) {
       const double t = (centres[i].y - fit.last_row) / fit.scale_px;
-      const cv::Vec3d g(1.0, t, curved ? t * t : 0.0);
+      const cv::Vec3d g(1.0, t, t * t);
       normal += weight[i] * (g * g.t());
       right += weight[i] * centres[i].x * g;
     }
-    if (!curved) normal(2, 2) = 1.0;
+    normal(2, 2) += prior_weight;
     inverse = normal.inv(cv::DECOMP_CHOLESKY);
     fit.coefficient = inverse * right;
     std::vector<double> magnitude(centres.size());
@@ -122,11 +125,9 @@ Centreline fit_centreline(const std::vector<cv::Point2d>& centres, double correl
   if (weight_sum < kMinRows) return Centreline{};
   double squares = 0.0;
   for (size_t i = 0; i < centres.size(); ++i) squares += weight[i] * residual[i] * residual[i];
-  const int parameters = curved ? 3 : 2;
-  const double variance = squares / std::max(1.0, weight_sum - parameters);
+  const double variance = squares / std::max(1.0, weight_sum - 3.0);
   fit.residual_px = std::sqrt(variance);
   fit.covariance = inverse * (variance * correlation_px);
-  if (!curved) fit.covariance(2, 2) = 0.0;
   fit.rows_used = static_cast<int>(weight_sum);
   return fit;
 }

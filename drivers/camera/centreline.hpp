@@ -11,7 +11,7 @@ namespace bevel::camera {
 /// straight line between its two sides.
 double centre_in_row(const cv::Mat& patch, int row, double near_col, const RidgeScale& scale);
 
-/// col(row) as a polynomial of degree 1 or 2 around the last row: a good arc over the short piece that is fitted (the
+/// col(row) as a polynomial of degree 2 around the last row: a good arc over the short piece that is fitted (the
 /// cubic term of a circle of 200 mm radius over 25 mm is below 0.02 px).
 struct Centreline {
   double last_row = 0.0;   ///< origin of the polynomial
@@ -29,7 +29,10 @@ struct Centreline {
 
 /// Iteratively reweighted least squares with Tukey's biweight: rows in which the centre was drawn aside by a bubble or
 /// a grid line lose their vote. rows_used is 0 if fewer than 8 rows remain.
-Centreline fit_centreline(const std::vector<cv::Point2d>& centres, double correlation_px);
+/// Curvature has a prior of 0 +- `curvature_sigma_per_px`: a short piece shows none, and noise must not bend the
+/// tangent.
+Centreline fit_centreline(const std::vector<cv::Point2d>& centres, double correlation_px,
+                          double curvature_sigma_per_px);
 
 /// Darkness of the needle against its two sides, averaged across its width, at the point `p` of a curve with direction
 /// (slope, 1). In the units of the picture.

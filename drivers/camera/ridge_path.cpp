@@ -104,6 +104,12 @@ int end_of_needle(const RidgePath& path, int window_rows, double share) {
   return best_row;
 }
 
+double share_of_rows_above(const RidgePath& path, double threshold_gray) {
+  if (path.ridge.empty()) return 0.0;
+  const auto above = std::count_if(path.ridge.begin(), path.ridge.end(), [=](double r) { return r > threshold_gray; });
+  return static_cast<double>(above) / static_cast<double>(path.ridge.size());
+}
+
 void erase_path(cv::Mat& response, const RidgePath& path, int half_width_px) {
   for (int r = 0; r <= path.last_row(); ++r) {
     const int x = path.cols[static_cast<size_t>(r)];

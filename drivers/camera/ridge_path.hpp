@@ -57,6 +57,8 @@ class RidgePathFinder {
 /// track) is not taken for it.
 int end_of_needle(const RidgePath& path, int window_rows, double share);
 
+double share_of_rows_above(const RidgePath& path, double threshold_gray);
+
 /// Sets the response to zero along a path, so that the next best can be looked for.
 void erase_path(cv::Mat& response, const RidgePath& path, int half_width_px);
 

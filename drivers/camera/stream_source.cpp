@@ -70,8 +70,10 @@ FrameResult StreamSource::next(std::chrono::milliseconds timeout) {
     const size_t want = in_body ? frame_.gray.total() - body_received_ : FrameHeader::kBytes - head_.size();
     const ssize_t got = recv(socket_, into, want, MSG_DONTWAIT);
     if (got < 0 && (errno == EAGAIN || errno == EINTR)) continue;
-    if (got < 0) return fail(std::strerror(errno));
-    if (got == 0) {
+    // A server that goes before it has accepted us resets the connection; that is an end like any other.
+    const bool closed = got == 0 || (got < 0 && errno == ECONNRESET);
+    if (got < 0 && !closed) return fail(std::strerror(errno));
+    if (closed) {
       failed_ = true;
       if (head_.empty()) return EndOfFrames{};
       return SourceFailure{"'" + path_ + "': the server closed in the middle of a frame"};

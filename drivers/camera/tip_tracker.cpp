@@ -175,7 +175,11 @@ double TipTracker::saturated_share(const cv::Mat& raw, const cv::Rect& area) con
 bool TipTracker::second_needle(const RidgePath& path, const PathQuery& query) {
   response_copy_ = ridge_.last().clone();
   erase_path(response_copy_, path, 2 * scale_.offset_px);
-  return finder_.find(response_copy_, query).score > config_.second_score_ratio * path.score;
+  const RidgePath second = finder_.find(response_copy_, query);
+  // A path that crosses empty ground to reach a line elsewhere is no needle from this entry.
+  constexpr double covered = 0.8;
+  return second.score > config_.second_score_ratio * path.score &&
+         share_of_rows_above(second, query.threshold_gray) > covered;
 }
 
 TipTracker::Found TipTracker::look(const cv::Mat& gray, const Canonical& turn, const Search& search) {
@@ -251,7 +255,7 @@ void TipTracker::measure(const cv::Mat& patch, const RidgePath& path, int end_ro
     const double col = centre_in_row(patch, r, path.cols[static_cast<size_t>(r)], scale_);
     if (std::isfinite(col)) centres.emplace_back(col, r);
   }
-  found.line = fit_centreline(centres, config_.correlation_px);
+  found.line = fit_centreline(centres, config_.correlation_px, config_.curvature_sigma_per_mm / px_per_mm_);
   if (found.line.rows_used == 0) return;
 
   result.reason = "the end of the needle is not seen";

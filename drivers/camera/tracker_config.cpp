@@ -26,6 +26,7 @@ void check(const TrackerConfig& c) {
       {"min_contrast_gray", c.min_contrast_gray, 2.0, 250.0},
       {"min_length_mm", c.min_length_mm, 1.0, 200.0},
       {"fit_length_mm", c.fit_length_mm, 3.0, 200.0},
+      {"curvature_sigma_per_mm", c.curvature_sigma_per_mm, 1e-6, 1.0},
       {"roi_ahead_mm", c.roi_ahead_mm, 1.0, 200.0},
       {"roi_side_mm", c.roi_side_mm, 1.0, 200.0},
       {"max_blur_mm", c.max_blur_mm, 0.01, 50.0},

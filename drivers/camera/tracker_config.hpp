@@ -25,7 +25,8 @@ struct TrackerConfig {
   double min_contrast_gray = 20.0;   ///< darker than its surroundings by at least this; fainter lines are ignored
   double min_length_mm = 6.0;        ///< shorter visible needles are reported as `too_short`
   // What is fitted
-  double fit_length_mm = 25.0;  ///< piece behind the tip which fixes direction and curvature
+  double fit_length_mm = 25.0;           ///< piece behind the tip which fixes direction and curvature
+  double curvature_sigma_per_mm = 0.01;  ///< curvatures expected; twice the 0.0047 / mm of the model's needle
   // Region of interest
   double roi_ahead_mm = 10.0;  ///< how far beyond the prediction the tip may be
   double roi_side_mm = 8.0;    ///< how far beside it
