@@ -33,10 +33,12 @@ class RateShaper {
   bool clamped() const { return clamped_; }  // the last wanted rate was over a limit
 
  private:
-  // The rate from which the axis comes to rest within `room`. A fifth less than the full acceleration, as the position
-  // is one cycle old.
+  // The rate from which the axis comes to rest within `room`: by a fifth less than the full acceleration, and with a
+  // linear end, as a square root's slope at zero is more than any axis can follow.
   double braking_rate(double room) const {
-    return room <= 0.0 ? 0.0 : std::min(rate_limit_, std::sqrt(2.0 * 0.8 * acceleration_ * room));
+    constexpr double kLinearEnd_s = 0.05;
+    if (room <= 0.0) return 0.0;
+    return std::min({rate_limit_, std::sqrt(2.0 * 0.8 * acceleration_ * room), room / kLinearEnd_s});
   }
 
   double rate_limit_;

@@ -325,7 +325,11 @@ void StepperDriver::run_enabled(std::int64_t now_ns, const std::optional<MotionS
       static_cast<double>(std::clamp<std::int64_t>(now_ns - last_step_ns_, 0, 2 * config_.period_ns)) * 1e-9;
   bool clamped = false;
   for (std::size_t axis = 0; axis < kAxes; ++axis) {
-    shapers_.at(axis).step(rates.at(axis), dt_s, nodes_.at(axis).position_unit());
+    // Where the axis will be when this command takes effect: the position is a cycle old, the drive lags by another.
+    const DriveNode& node = nodes_.at(axis);
+    const double delay_s = static_cast<double>(now_ns - node.sampled_ns() + config_.period_ns) * 1e-9;
+    const double ahead_unit = node.position_unit() + shapers_.at(axis).rate_unit_s() * delay_s;
+    shapers_.at(axis).step(rates.at(axis), dt_s, ahead_unit);
     clamped = clamped || shapers_.at(axis).clamped();
   }
   if (clamped) ++counters_.setpoints_clamped;

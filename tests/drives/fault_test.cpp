@@ -52,11 +52,17 @@ class Fault : public testing::Test {
 };
 
 TEST_F(Fault, DriveHeartbeatLostStopsBothAxes) {
+  bench.wire.set_tap([](can::Frame& frame) { return frame.id != 0x701; });
+  expect_rest_within_ms(250);  // 30 ms between heartbeats, 120 ms of patience, and the ramp
+  expect_latched(StopReason::drive_heartbeat_lost, DriverState::stopped);
+}
+
+TEST_F(Fault, DriveUnplugged) {
   bench.insertion.set_silent(true);  // it cannot hear us either, and has to stop by itself
   expect_rest_within_ms(200);
-  expect_latched(StopReason::drive_heartbeat_lost, DriverState::stopped);
+  expect_latched(StopReason::pdo_lost, DriverState::stopped);
   bench.insertion.set_silent(false);
-  expect_latched(StopReason::drive_heartbeat_lost, DriverState::stopped);
+  expect_latched(StopReason::pdo_lost, DriverState::stopped);
   EXPECT_FALSE(bench.report().position_trusted[0]);
   EXPECT_TRUE(bench.report().position_trusted[1]);
   ASSERT_TRUE(bench.driver->rearm());
@@ -73,7 +79,7 @@ TEST_F(Fault, OurHeartbeatLostStopsTheDrivesByThemselves) {
   EXPECT_EQ(bench.rotation.state(), PowerStateMachine::State::quick_stop_active);
   bench.driver_runs = true;  // continued after a SIGSTOP: its old intent must not restart anything
   bench.run_ms(10);
-  expect_latched(StopReason::driver_overrun, DriverState::stopped);
+  expect_latched(StopReason::driver_overrun, DriverState::fault);  // fault: the drives' own complaint comes second
   EXPECT_TRUE(bench.at_rest());
   expect_rearm_works();
 }
