@@ -10,7 +10,7 @@ cv::Mat Canonical::crop(const cv::Mat& picture, const cv::Rect& rect) const {
   const cv::Point2d b = to_picture({rect.x + rect.width - 1.0, rect.y + rect.height - 1.0});
   const cv::Point first(cvRound(std::min(a.x, b.x)), cvRound(std::min(a.y, b.y)));
   const cv::Point last(cvRound(std::max(a.x, b.x)), cvRound(std::max(a.y, b.y)));
-  const cv::Mat piece = picture(cv::Rect(first, last + cv::Point(1, 1)));
+  cv::Mat piece = picture(cv::Rect(first, last + cv::Point(1, 1)));
   cv::Mat turned;
   switch (side_) {
     case EntrySide::top:

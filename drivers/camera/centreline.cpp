@@ -151,12 +151,16 @@ double blur_across_px(const cv::Mat& patch, const Centreline& line, int first_ro
                       double needle_width_px) {
   constexpr double tail_share = 0.1;  // of the peak: below it is background
   const int reach = static_cast<int>(std::ceil(3.0 * needle_width_px)) + 4;
-  std::vector<double> mean(static_cast<size_t>(2 * reach + 1), 0.0);
+  const auto at = [reach](int i) {
+    const int shifted = reach + i;
+    return static_cast<size_t>(shifted);
+  };
+  std::vector<double> mean(at(reach) + 1, 0.0);
   double cosine = 1.0;
   int rows = 0;
   for (int r = std::max(0, first_row); r <= last_row; ++r, ++rows) {
     const double middle = line.col(r);
-    for (int i = -reach; i <= reach; ++i) mean[static_cast<size_t>(i + reach)] += bilinear(patch, middle + i, r);
+    for (int i = -reach; i <= reach; ++i) mean[at(i)] += bilinear(patch, middle + i, r);
     cosine = 1.0 / std::hypot(1.0, line.slope(r));
   }
   if (rows == 0) return 0.0;
@@ -165,14 +169,13 @@ double blur_across_px(const cv::Mat& patch, const Centreline& line, int first_ro
   const auto bright = copy.begin() + static_cast<std::ptrdiff_t>(copy.size() * 3 / 4);
   std::nth_element(copy.begin(), bright, copy.end());
   const double background = *bright;
-  const auto middle = static_cast<size_t>(reach);
-  const double peak = background - mean[middle];
+  const double peak = background - mean[at(0)];
   if (peak <= 0.0) return 0.0;
   double weight = peak;
   double second = 0.0;
   for (const int side : {-1, 1}) {
     for (int i = 1; i <= reach; ++i) {
-      const double dark = background - mean[static_cast<size_t>(reach + side * i)];
+      const double dark = background - mean[at(side * i)];
       if (dark < tail_share * peak) break;  // what lies beyond a bright gap is another line
       weight += dark;
       second += dark * i * i;

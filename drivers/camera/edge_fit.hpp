@@ -17,7 +17,7 @@ struct EdgeFit {
   double height = 0.0;
   double base = 0.0;
   double taper_px = 0.0;
-  double rest = 0.0;
+  double rest = 0.0;  ///< share of the height left just before the tip
   double blur_px = 0.0;
   double residual = 0.0;  ///< root mean square, weighted
 };
@@ -26,13 +26,13 @@ struct EdgeGuess {
   double tip_px = 0.0;
   double height = 0.0;  ///< darkness of the shaft
   double taper_px = 0.0;
-  double rest = 0.0;     ///< of the bevel
+  double rest = 0.0;     ///< share of the height left just before the tip     ///< of the bevel
   double blur_px = 1.0;  ///< of the lens, as measured across the shaft, where nothing tapers
 };
 
 /// Levenberg-Marquardt over (tip, height, base, log blur, log taper, rest) with Huber weights. Where a bevel fades
 /// slowly into the background these trade off, so all but the tip carry a prior: height as guessed +-15 %, base 0 +-3
-/// gray, blur as guessed +-20 %, taper as guessed within a factor of 1.5. `s` and `profile` have equal length, at least
+/// gray, blur as guessed +-20 %, taper as guessed within a factor of 2.2. `s` and `profile` have equal length, at least
 /// 8; evenly spaced by one pixel.
 EdgeFit fit_edge(std::span<const double> s, std::span<const double> profile, const EdgeGuess& guess,
                  double correlation_px);
