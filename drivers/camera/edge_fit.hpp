@@ -24,10 +24,9 @@ struct EdgeFit {
 
 struct EdgeGuess {
   double tip_px = 0.0;
-  double height = 0.0;  ///< darkness of the shaft
-  double taper_px = 0.0;
-  double rest = 0.0;     ///< share of the height left just before the tip     ///< of the bevel
-  double blur_px = 1.0;  ///< of the lens, as measured across the shaft, where nothing tapers
+  double height = 0.0;    ///< darkness of the shaft
+  double taper_px = 0.0;  ///< of the bevel
+  double blur_px = 1.0;   ///< of the lens, as measured across the shaft, where nothing tapers
 };
 
 /// Levenberg-Marquardt over (tip, height, base, log blur, log taper, rest) with Huber weights. Where a bevel fades

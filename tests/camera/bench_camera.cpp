@@ -14,8 +14,11 @@ std::vector<cv::Mat> pictures(cv::Size size_px, const PlanarView& view) {
   bevel::rig::SceneConfig scene;
   scene.size_px = size_px;
   bevel::rig::NeedleRenderer renderer(scene, view);
+  constexpr int count = 4;
   std::vector<cv::Mat> out;
-  for (int i = 0; i < 4; ++i) out.push_back(renderer.render(bevel::test::arc(60.0 + 0.1 * i, 0.004, 0.0), 0.5).gray);
+  out.reserve(count);
+  for (int i = 0; i < count; ++i)
+    out.push_back(renderer.render(bevel::test::arc(60.0 + 0.1 * i, 0.004, 0.0), 0.5).gray);
   return out;
 }
 
