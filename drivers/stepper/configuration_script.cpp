@@ -69,9 +69,9 @@ std::vector<SdoJob> configuration_script(const StepperConfig& config, std::size_
 
   script.expect({0x1000, 0}, 402, 0xFFFF, StopReason::wrong_device);
   const std::array<std::uint32_t, 4> identity{axis.vendor_id, axis.product_code, axis.revision, axis.serial};
-  for (std::uint8_t sub = 1; sub <= identity.size(); ++sub)
-    if (identity.at(sub - 1U) != 0)
-      script.expect({0x1018, sub}, identity.at(sub - 1U), 0xFFFFFFFF, StopReason::wrong_device);
+  for (std::size_t i = 0; i < identity.size(); ++i)
+    if (identity.at(i) != 0)
+      script.expect({0x1018, static_cast<std::uint8_t>(i + 1)}, identity.at(i), 0xFFFFFFFF, StopReason::wrong_device);
   constexpr std::uint32_t kVelocityModeBit = 1U << (kProfileVelocity - 1);
   script.expect({0x6502, 0}, kVelocityModeBit, kVelocityModeBit, StopReason::wrong_device);
 

@@ -223,7 +223,7 @@ void SimulatedDrive::on_sync() {
 
 void SimulatedDrive::send_tpdo(std::size_t pdo) {
   can::Frame frame{od_.get(nth(0x1800, pdo), 1) & kIdMask, 0, {}};
-  const std::uint32_t count = od_.get(nth(0x1A00, pdo));
+  const auto count = static_cast<std::uint8_t>(od_.get(nth(0x1A00, pdo)));
   for (std::uint8_t n = 1; n <= count; ++n) {
     const std::uint32_t entry = od_.get(nth(0x1A00, pdo), n);
     const auto bytes = static_cast<std::uint8_t>((entry & 0xFF) / 8);
@@ -245,7 +245,7 @@ void SimulatedDrive::on_rpdo(std::size_t pdo, const can::Frame& frame) {
 
 void SimulatedDrive::obey(std::size_t pdo, const can::Frame& frame) {
   const std::uint16_t mapping = nth(0x1600, pdo);
-  const std::uint32_t count = od_.get(mapping);
+  const auto count = static_cast<std::uint8_t>(od_.get(mapping));
   unsigned length = 0;
   for (std::uint8_t n = 1; n <= count; ++n) length += (od_.get(mapping, n) & 0xFF) / 8;
   if (frame.size < length) return send_emergency(kPdoTooShort);

@@ -93,8 +93,8 @@ Abort SimulatedDrive::check_mapping(std::uint16_t index, std::uint32_t entry) co
 
 Abort SimulatedDrive::check_mapping_length(std::uint16_t mapping, std::uint32_t count) const {
   unsigned bits = 0;
-  for (std::uint8_t n = 1; n <= count; ++n) {
-    const std::uint32_t entry = od_.get(mapping, n);
+  for (std::uint32_t n = 1; n <= count; ++n) {
+    const std::uint32_t entry = od_.get(mapping, static_cast<std::uint8_t>(n));
     if (entry == 0) return Abort::no_object;
     bits += entry & 0xFF;
   }

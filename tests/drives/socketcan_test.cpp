@@ -106,7 +106,7 @@ class SocketCan : public testing::Test {
     ASSERT_TRUE(run_until([&] { return insertion.position_unit() > 2.0; }));
   }
 
-  StepperConfig config = patient();
+  const StepperConfig config = patient();
   std::unique_ptr<can::Bus> insertion_bus = can::open_bus(kInterface);
   std::unique_ptr<can::Bus> rotation_bus = can::open_bus(kInterface);
   rig::SimulatedDrive insertion{*insertion_bus, {1, config.axes[0].counts_per_unit, 0.004, {}}};
@@ -201,7 +201,7 @@ TEST_F(SocketCan, LinkDownIsALatchedStopAndIsReopened) {
   const double before = insertion.position_unit();
   run_ms(1000);
   EXPECT_NEAR(insertion.position_unit(), before, 1e-3);
-  EXPECT_TRUE(is_fault(master->driver.report().stop.reason) || master->driver.report().state >= DriverState::stopped);
+  EXPECT_GE(master->driver.report().state, DriverState::stopped);
   EXPECT_EQ(master->driver.report().stop.reason, StopReason::link_down);
   ASSERT_TRUE(master->driver.rearm());
   EXPECT_TRUE(reach(DriverState::ready)) << describe(master->driver.report().stop);
