@@ -3,7 +3,7 @@
 //
 // Depth is divided into equal cells that stay with the tissue. A cell remembers the mean lateral position of the tip as
 // it passed (the spring's anchor: an uncut cell has none), for good: a second passage through an existing cut changes
-// nothing. Per length of shaft the spring is a standard linear solid; r of the modulus k relaxes, with time T:
+// nothing. Per length of shaft the spring is a standard linear solid; a fraction r of k relaxes with time T:
 //   force = -k (1 - r) e - k r (e - q),   dq/dt = (e - q) / T,   e = w - anchor.
 // q is stepped exactly for an e that varies linearly over the step, so the step may be long beside T.
 #include <complex>
