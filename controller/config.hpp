@@ -1,0 +1,41 @@
+#pragma once
+// What the controller may do and when it stops. One plain structure, filled from a file elsewhere.
+namespace bevel::controller {
+
+struct SteeringLimits {
+  double insertion_rate_mm_s = 5.0;        // nominal
+  double insertion_rate_min_share = 0.25;  // of the nominal while the bevel points away from the target
+  double rotation_rate_rad_s = 8.0;        // largest
+  double rotation_acceleration_rad_s2 = 40.0;
+  double insertion_acceleration_mm_s2 = 40.0;
+  double total_rotation_rad = 62.8;  // cable wrap, either way from the zero of the axis
+};
+
+struct SteeringGains {
+  double convergence_rad_s = 1.5;      // eta: guaranteed rate of approach to sigma = 0 outside the boundary layer
+  double boundary_layer_rad = 0.25;    // Phi
+  double tolerance_mm = 0.05;          // inside this predicted miss the law stops turning; a target may bring its own
+  double parameter_uncertainty = 0.3;  // relative error of k and f that the drift bound covers
+};
+
+struct SafetyLimits {
+  double state_age_s = 0.15;     // of NEEDLE_STATE
+  double actuator_age_s = 0.15;  // of ACTUATOR_STATE
+  double position_sd_mm = 3.0;   // largest along any axis
+  double depth_min_mm = -2.0;    // workspace of the tip in {A}
+  double depth_max_mm = 140.0;
+  double lateral_max_mm = 60.0;
+  double tracking_error_mm_s = 5.0;  // commanded against reported insertion rate, for tracking_error_s
+  double tracking_error_rad_s = 6.0;
+  double tracking_error_s = 0.4;
+  double target_miss_max_mm = 5.0;  // predicted miss above which a target is refused before insertion
+};
+
+struct ControllerConfig {
+  double period_s = 0.02;
+  SteeringLimits limits;
+  SteeringGains gains;
+  SafetyLimits safety;
+};
+
+}  // namespace bevel::controller

@@ -1,0 +1,100 @@
+#pragma once
+// When the needle may move. States: off, armed, steering, hold, stopped (latched, with its reason), fault. Motion fails
+// safe: whatever is missing, stale, unhealthy or out of bounds stops within one period, and only an operator's word
+// starts it again.
+#include <cstdint>
+#include <optional>
+#include <string>
+
+#include "controller/reach.hpp"
+#include "model/samples.hpp"
+
+namespace bevel::controller {
+
+enum class State { off, armed, steering, hold, stopped, fault };
+
+enum class Reason {
+  none,
+  operator_stop,
+  state_stale,      // NEEDLE_STATE too old, or none
+  state_unhealthy,  // its health word is not zero
+  state_uncertain,  // position variance above its bound
+  state_reset,      // the estimator declared a reset during motion
+  state_not_finite,
+  actuator_stale,
+  axes_not_enabled,    // quick stop, fault or off during motion
+  tracking_error,      // the axes do not do what is commanded
+  workspace,           // the tip left the allowed space
+  target_unreachable,  // refused before insertion, with the predicted miss
+  outside_model,       // the pose left the model's domain
+  overrun,             // the loop could not keep its period
+};
+const char* to_string(State state);
+const char* to_string(Reason reason);
+
+enum class Request : std::int32_t { stop = 0, arm = 1, start = 2, hold = 3 };
+
+// What the controller needs of NEEDLE_STATE.
+struct NeedleView {
+  std::int64_t utime = 0;
+  model::Pose pose;
+  double curvature_per_mm = 0;
+  double lambda1_per_rad = 0;
+  double lambda2 = 0;
+  double position_variance_mm2 = 0;  // largest along any axis
+  std::int32_t health = 0;
+  std::int32_t reset_count = 0;
+};
+
+struct Target {
+  Eigen::Vector3d position_mm = Eigen::Vector3d::Zero();
+  double tolerance_mm = 0;  // 0: the configured one
+};
+
+struct Status {
+  State state = State::off;
+  Reason reason = Reason::none;
+  double value = 0;  // the value behind the reason (an age, a miss, a rate...), in `unit`
+  const char* unit = "";
+  double predicted_miss_mm = 0;  // of the best constant inputs, updated while steering
+  SteeringGeometry geometry;
+};
+
+class Supervisor {
+ public:
+  // `needle` gives ell and the variants; k and lambda come with each state.
+  Supervisor(const ControllerConfig& config, const model::NeedleParameters& needle);
+
+  // The newest of each; the supervisor judges their age by the time handed to step().
+  void set_needle(const NeedleView& view) { needle_state_ = view; }
+  void set_actuator(const model::ActuatorState& state) { actuator_ = state; }
+
+  // An operator's word. arm: takes the target and leaves off, hold or stopped; refused (reason latched) when out of
+  // reach. start: from armed or hold to steering. hold: stands still, may go on. stop: latched.
+  void request(Request request, const std::optional<Target>& target, std::int64_t now_utime);
+  void report_overrun() { stop(Reason::overrun, 0, ""); }
+
+  // One period: rates to command now. Zero unless steering. Does not allocate.
+  model::MotionCommand step(std::int64_t now_utime, double dt_s);
+
+  const Status& status() const { return status_; }
+
+ private:
+  void stop(Reason reason, double value, const char* unit);
+  bool check_inputs(std::int64_t now_utime);
+  bool check_tracking(double dt_s);
+  model::NeedleParameters needle_now() const;
+
+  ControllerConfig config_;
+  model::NeedleParameters needle_;
+  std::optional<NeedleView> needle_state_;
+  std::optional<model::ActuatorState> actuator_;
+  std::optional<Target> target_;
+  Status status_;
+  Rates rates_;
+  std::int64_t seq_ = 0;
+  std::int32_t reset_count_ = 0;
+  double tracking_bad_s_ = 0;
+};
+
+}  // namespace bevel::controller

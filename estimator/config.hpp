@@ -1,0 +1,49 @@
+#pragma once
+// What the estimator believes before it has seen anything, and how much it lets the model err.
+#include "model/needle.hpp"
+
+namespace bevel::estimator {
+
+struct Prior {
+  model::NeedleParameters needle;  // means of k, lambda1, lambda2; ell, slip and front_wheel are taken as they are
+  double curvature_sd_per_mm = 0.001;
+  double lambda1_sd_per_rad = 0.15;
+  double lambda2_sd = 0.08;
+  double position_sd_mm = 0.3;  // tip at the entry point
+  double tilt_sd_rad = 0.02;    // heading about body x and y
+  double roll_sd_rad = 0.05;    // bevel about the heading
+};
+
+// Random walk per sqrt(mm) of insertion: what tissue does that the model does not. Nothing grows at rest.
+struct ProcessNoise {
+  double position_mm = 0.005;
+  double tilt_rad = 5e-4;
+  double roll_rad = 1e-3;  // per sqrt(mm) and, when turning, per sqrt(rad) of rotation
+  double roll_per_sqrt_rad = 0.01;
+  double curvature_per_mm = 2e-5;
+  double lambda1_per_rad = 1e-3;
+  double lambda2 = 5e-4;
+};
+
+struct Gate {
+  double probability = 0.9999;        // share of good measurements that pass
+  int rejects_before_unhealthy = 5;   // in a row
+  int rejects_before_reset = 20;      // in a row: then a declared reset
+  double reset_position_sd_mm = 5.0;  // covariance of the pose after a reset
+  double reset_tilt_sd_rad = 0.1;
+};
+
+struct HealthLimits {
+  double measurement_age_s = 0.25;
+  double actuator_age_s = 0.1;
+  double position_sd_mm = 3.0;  // largest standard deviation along any axis
+};
+
+struct EstimatorConfig {
+  Prior prior;
+  ProcessNoise process;
+  Gate gate;
+  HealthLimits limits;
+};
+
+}  // namespace bevel::estimator

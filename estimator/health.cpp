@@ -1,0 +1,17 @@
+#include "estimator/health.hpp"
+
+namespace bevel::estimator {
+
+std::string describe_health(std::int32_t health) {
+  static constexpr std::pair<Health, const char*> kWords[] = {
+      {kNoMeasurement, "no measurement yet"},   {kMeasurementStale, "measurements stale"},
+      {kActuatorStale, "actuator state stale"}, {kUncertain, "position too uncertain"},
+      {kRejecting, "rejecting measurements"},   {kOutsideModel, "outside the model's domain"},
+  };
+  std::string text;
+  for (const auto& [bit, word] : kWords)
+    if (health & bit) text += (text.empty() ? "" : ", ") + std::string(word);
+  return text.empty() ? "healthy" : text;
+}
+
+}  // namespace bevel::estimator

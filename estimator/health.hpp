@@ -1,0 +1,20 @@
+#pragma once
+// Why an estimate must not be trusted: the bits of needle_state_t.health. Zero is healthy.
+#include <cstdint>
+#include <string>
+
+namespace bevel::estimator {
+
+enum Health : std::int32_t {
+  kHealthy = 0,
+  kNoMeasurement = 1,     // none accepted since the start or the last reset
+  kMeasurementStale = 2,  // the newest accepted measurement is too old
+  kActuatorStale = 4,     // the newest actuator state is too old, so the estimate is too
+  kUncertain = 8,         // position variance above its bound
+  kRejecting = 16,        // the gate refused several measurements in a row
+  kOutsideModel = 32,     // the pose left the domain of the slip law; propagation stopped
+};
+
+std::string describe_health(std::int32_t health);
+
+}  // namespace bevel::estimator

@@ -1,0 +1,156 @@
+#include "estimator/needle_estimator.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <tuple>
+
+#include "estimator/health.hpp"
+
+namespace bevel::estimator {
+
+NeedleEstimator::NeedleEstimator(const EstimatorConfig& config, std::size_t history) : filter_(config) {
+  pool_.resize(std::max<std::size_t>(history, 8));
+  order_.reserve(pool_.size());
+  free_.reserve(pool_.size());
+  for (std::size_t i = pool_.size(); i-- > 0;) free_.push_back(static_cast<std::uint32_t>(i));
+}
+
+// Finds the place of a new node and opens it; nullptr when it is a duplicate. An actuator state comes before a
+// measurement of the same instant, measurements of one instant are ordered by camera and number: the order of arrival
+// plays no part.
+NeedleEstimator::Node* NeedleEstimator::insert(std::int64_t utime, Kind kind, std::int32_t camera, std::int64_t seq,
+                                               std::size_t& index) {
+  const auto key = [](const Node& n) {
+    return n.kind == Kind::actuator ? std::tuple(n.utime, 0, std::int32_t{0}, std::int64_t{0})
+                                    : std::tuple(n.utime, 1, n.measurement.camera, n.measurement.seq);
+  };
+  const auto wanted = kind == Kind::actuator ? std::tuple(utime, 0, std::int32_t{0}, std::int64_t{0})
+                                             : std::tuple(utime, 1, camera, seq);
+  index = order_.size();
+  while (index > 0 && key(node(index - 1)) > wanted) --index;
+  if (index > 0 && key(node(index - 1)) == wanted) return nullptr;
+  if (free_.empty()) {  // drop the oldest; the next keeps its posterior and becomes the anchor
+    free_.push_back(order_.front());
+    order_.erase(order_.begin());
+    if (processed_ > 0) --processed_;
+    --index;
+  }
+  const std::uint32_t slot = free_.back();
+  free_.pop_back();
+  order_.insert(order_.begin() + static_cast<std::ptrdiff_t>(index), slot);
+  Node& made = pool_[slot];
+  made.utime = utime;
+  made.kind = kind;
+  made.applied_before = false;
+  return &made;
+}
+
+void NeedleEstimator::add(const model::ActuatorState& actuator) {
+  ++counters_.actuators;
+  std::size_t index = 0;
+  // The first node anchors the history: nothing older can be placed, and a full history drops its oldest first.
+  if (!order_.empty() && actuator.utime <= node(0).utime) {
+    ++counters_.actuators_refused;
+    return;
+  }
+  Node* made = insert(actuator.utime, Kind::actuator, 0, 0, index);
+  if (!made) {
+    ++counters_.actuators_refused;
+    return;
+  }
+  made->insertion_mm = actuator.insertion_mm;
+  made->rotation_rad = actuator.rotation_rad;
+  if (index == 0) made->state = filter_.initial();
+  // Measurements since the previous actuator state are interpolated anew.
+  std::size_t from = index;
+  while (from > 1 && node(from - 1).kind == Kind::measurement) --from;
+  process_from(from);
+}
+
+void NeedleEstimator::add(const model::TipMeasurement& measurement) {
+  ++counters_.measurements;
+  if (measurement.status != 0 || !(measurement.information_per_mm2.trace() > 0)) {
+    ++counters_.not_usable;
+    return;
+  }
+  // A full history drops its oldest node; one full of measurements that wait for the axes must keep its anchor.
+  if (order_.empty() || measurement.utime < node(0).utime || (free_.empty() && (measurement.utime < node(1).utime || processed_ < 2))) {
+    ++counters_.too_old;
+    return;
+  }
+  std::size_t index = 0;
+  Node* made = insert(measurement.utime, Kind::measurement, measurement.camera, measurement.seq, index);
+  if (!made) {
+    ++counters_.duplicate;
+    return;
+  }
+  made->measurement = measurement;
+  if (index < processed_) ++counters_.late;
+  process_from(index);
+}
+
+void NeedleEstimator::interpolate(std::size_t index) {
+  Node& n = node(index);
+  std::size_t before = index - 1;
+  while (before > 0 && node(before).kind != Kind::actuator) --before;
+  std::size_t after = index + 1;
+  while (node(after).kind != Kind::actuator) ++after;
+  const Node& a = node(before);
+  const Node& b = node(after);
+  const double share = static_cast<double>(n.utime - a.utime) / static_cast<double>(b.utime - a.utime);
+  n.insertion_mm = a.insertion_mm + share * (b.insertion_mm - a.insertion_mm);
+  n.rotation_rad = a.rotation_rad + share * (b.rotation_rad - a.rotation_rad);
+}
+
+void NeedleEstimator::process_from(std::size_t index) {
+  std::size_t end = order_.size();
+  while (end > 0 && node(end - 1).kind != Kind::actuator) --end;
+  for (std::size_t i = std::max<std::size_t>(index, 1); i < end; ++i) {
+    Node& n = node(i);
+    const Node& previous = node(i - 1);
+    if (n.kind == Kind::measurement) interpolate(i);
+    n.state = previous.state;
+    filter_.predict(n.state, n.insertion_mm - previous.insertion_mm, n.rotation_rad - previous.rotation_rad);
+    if (n.kind != Kind::measurement) continue;
+    if (observer_ && !n.applied_before) {
+      Applied applied{n.utime, n.measurement.camera, n.state, {}};
+      n.update = filter_.update(n.state, n.measurement);
+      applied.update = n.update;
+      observer_(observer_context_, applied);
+    } else {
+      n.update = filter_.update(n.state, n.measurement);
+    }
+    n.applied_before = true;
+    if (n.utime >= newest_update_utime_) newest_update_ = n.update, newest_update_utime_ = n.utime;
+  }
+  processed_ = std::max<std::size_t>(end, order_.empty() ? 0 : 1);
+}
+
+Estimate NeedleEstimator::estimate(std::int64_t now_utime) const {
+  Estimate result;
+  result.health = kNoMeasurement | kActuatorStale;
+  if (processed_ == 0) return result;
+  const Node& newest = node(processed_ - 1);
+  const FilterState& state = newest.state;
+  const HealthLimits& limits = filter_.config().limits;
+  result.utime = newest.utime;
+  result.state = state;
+  result.newest_update = newest_update_;
+  result.health = kHealthy;
+  const auto older_than = [now_utime](std::int64_t utime, double limit_s) {
+    return static_cast<double>(now_utime - utime) > limit_s * 1e6;
+  };
+  if (older_than(newest.utime, limits.actuator_age_s)) result.health |= kActuatorStale;
+  if (state.measurement_utime == 0) {
+    result.health |= kNoMeasurement;
+  } else if (older_than(state.measurement_utime, limits.measurement_age_s)) {
+    result.health |= kMeasurementStale;
+  }
+  const double largest_variance = state.covariance.diagonal().head<3>().maxCoeff();
+  if (!(largest_variance < limits.position_sd_mm * limits.position_sd_mm)) result.health |= kUncertain;
+  if (state.rejects_in_row >= filter_.config().gate.rejects_before_unhealthy) result.health |= kRejecting;
+  if (state.outside_model) result.health |= kOutsideModel;
+  return result;
+}
+
+}  // namespace bevel::estimator

@@ -1,0 +1,88 @@
+#pragma once
+// The filter over a bounded, time-ordered history: measurements that arrive late or out of order are applied at their
+// own capture time and rolled forward, so that shuffled input gives the same state as sorted input, bit for bit.
+//
+// Actuator states and measurements become nodes ordered by time. A measurement between two actuator states is applied
+// at positions interpolated between them; one that is newer than the newest actuator state waits for the next.
+#include <cstdint>
+#include <vector>
+
+#include "estimator/needle_filter.hpp"
+
+namespace bevel::estimator {
+
+struct Counters {
+  std::int64_t measurements = 0;  // offered
+  std::int64_t not_usable = 0;    // status other than 0, or no axis seen
+  std::int64_t too_old = 0;       // older than the history
+  std::int64_t duplicate = 0;
+  std::int64_t late = 0;       // arrived behind a newer node: the history was rolled back
+  std::int64_t actuators = 0;  // offered
+  std::int64_t actuators_refused = 0;
+};
+
+// The estimate at the newest actuator state, and what the newest measurement said.
+struct Estimate {
+  std::int64_t utime = 0;  // 0: nothing yet
+  FilterState state;
+  Update newest_update;
+  std::int32_t health = 0;  // see health.hpp
+};
+
+class NeedleEstimator {
+ public:
+  // history: number of nodes kept; at 100 Hz of actuators and 2 x 30 Hz of cameras 256 nodes are 1.6 s.
+  explicit NeedleEstimator(const EstimatorConfig& config, std::size_t history = 256);
+
+  void add(const model::ActuatorState& actuator);
+  void add(const model::TipMeasurement& measurement);
+
+  // The newest estimate. `now_utime` is only for the age limits of health; pass the newest sample's time in a replay.
+  Estimate estimate(std::int64_t now_utime) const;
+
+  // Called, if set, once for each measurement when it is first applied: for replay's statistics. Not for late
+  // roll-backs.
+  struct Applied {
+    std::int64_t utime;
+    std::int32_t camera;
+    FilterState state_before;
+    Update update;
+  };
+  using Observer = void (*)(void* context, const Applied&);
+  void observe(Observer observer, void* context) { observer_ = observer, observer_context_ = context; }
+
+  const Counters& counters() const { return counters_; }
+  const NeedleFilter& filter() const { return filter_; }
+
+ private:
+  enum class Kind : std::uint8_t { actuator, measurement };
+  struct Node {
+    std::int64_t utime = 0;
+    Kind kind = Kind::actuator;
+    bool applied_before = false;
+    double insertion_mm = 0;
+    double rotation_rad = 0;
+    model::TipMeasurement measurement;
+    FilterState state;
+    Update update;
+  };
+
+  Node& node(std::size_t i) { return pool_[order_[i]]; }
+  const Node& node(std::size_t i) const { return pool_[order_[i]]; }
+  Node* insert(std::int64_t utime, Kind kind, std::int32_t camera, std::int64_t seq, std::size_t& index);
+  void process_from(std::size_t index);
+  void interpolate(std::size_t index);
+
+  NeedleFilter filter_;
+  std::vector<Node> pool_;            // sized once
+  std::vector<std::uint32_t> order_;  // indices into the pool, by time; reserved once
+  std::vector<std::uint32_t> free_;
+  std::size_t processed_ = 0;  // nodes before this index hold a posterior
+  Counters counters_;
+  Update newest_update_;
+  std::int64_t newest_update_utime_ = 0;
+  Observer observer_ = nullptr;
+  void* observer_context_ = nullptr;
+};
+
+}  // namespace bevel::estimator

@@ -1,0 +1,197 @@
+#include "estimator/needle_filter.hpp"
+
+#include <Eigen/Cholesky>
+#include <Eigen/Eigenvalues>
+#include <boost/math/distributions/chi_squared.hpp>
+#include <cmath>
+#include <numbers>
+
+namespace bevel::estimator {
+namespace {
+
+// Information below this share of the largest is an axis that the camera does not see.
+constexpr double kRankTolerance = 1e-9;
+constexpr double kLambda2Max = 0.9;  // (24) with room: 1 - lambda2 stays away from zero
+constexpr double kVarianceFloor = 1e-14;
+
+double square(double x) { return x * x; }
+
+template <int kRank>
+Update update_rank(FilterState& state, const Eigen::Matrix3d& axes, const Eigen::Vector3d& variance,
+                   const Eigen::Vector3d& residual, double gate) {
+  using Vec = Eigen::Matrix<double, kRank, 1>;
+  using Mat = Eigen::Matrix<double, kRank, kRank>;
+  // h = axes^T p; p moves by R delta_p under a body-frame error.
+  const Eigen::Matrix<double, kRank, 3> H = axes.rightCols<kRank>().transpose() * state.pose.R;
+  const Eigen::Matrix<double, 9, kRank> PHt = state.covariance.leftCols<3>() * H.transpose();
+  Mat S = H * PHt.template topRows<3>();
+  S.diagonal() += variance.tail<kRank>();
+  const Eigen::LLT<Mat> llt(S);
+  const Vec y = axes.rightCols<kRank>().transpose() * residual;
+  const Vec whitened = llt.matrixL().solve(y);
+
+  Update result;
+  result.rank = kRank;
+  result.mahalanobis2 = whitened.squaredNorm();
+  result.test_ratio = result.mahalanobis2 / gate;
+  result.innovation.head<kRank>() = y;
+  result.innovation_whitened.head<kRank>() = whitened;
+  result.accepted = result.test_ratio <= 1;  // false for a NaN too
+  if (!result.accepted) return result;
+
+  const Eigen::Matrix<double, 9, kRank> K = llt.solve(PHt.transpose()).transpose();
+  const Vector9d correction = K * y;
+  // Joseph form, (I - K H) P (I - K H)^T + K R K^T, with H only in the first three columns.
+  Matrix9d P = state.covariance;
+  P.noalias() -= K * PHt.transpose();
+  const Eigen::Matrix<double, 9, kRank> PHt2 = P.leftCols<3>() * H.transpose();
+  P.noalias() -= PHt2 * K.transpose();
+  P.noalias() += K * variance.tail<kRank>().asDiagonal() * K.transpose();
+  state.covariance = 0.5 * (P + P.transpose());
+  state.pose = state.pose * model::exp_se3(correction.head<6>());
+  state.pose.R = model::orthonormalised(state.pose.R);
+  state.curvature_per_mm += correction[6];
+  state.lambda1_per_rad += correction[7];
+  state.lambda2 += correction[8];
+  return result;
+}
+
+}  // namespace
+
+NeedleFilter::NeedleFilter(const EstimatorConfig& config)
+    : config_(config), slip_(model::slip_parameters(config.prior.needle)) {
+  for (int rank = 1; rank <= 3; ++rank)
+    gate_[static_cast<std::size_t>(rank - 1)] =
+        boost::math::quantile(boost::math::chi_squared(rank), config.gate.probability);
+}
+
+FilterState NeedleFilter::initial() const {
+  const Prior& prior = config_.prior;
+  FilterState state;
+  state.curvature_per_mm = prior.needle.curvature_per_mm;
+  state.lambda1_per_rad = prior.needle.lambda1_per_rad;
+  state.lambda2 = prior.needle.lambda2;
+  state.covariance.diagonal() << Eigen::Vector3d::Constant(square(prior.position_sd_mm)), square(prior.tilt_sd_rad),
+      square(prior.tilt_sd_rad), square(prior.roll_sd_rad), square(prior.curvature_sd_per_mm),
+      square(prior.lambda1_sd_per_rad), square(prior.lambda2_sd);
+  return state;
+}
+
+void NeedleFilter::predict(FilterState& state, double insertion_mm, double rotation_rad) const {
+  if (insertion_mm == 0 && rotation_rad == 0) return;
+  model::SlipParameters slip = slip_;
+  slip.lambda1_per_rad = state.lambda1_per_rad;
+  slip.lambda2 = state.lambda2;
+  model::StepJacobian jacobian;
+  if (!model::advance(state.pose, {insertion_mm, rotation_rad, {state.curvature_per_mm, 0}}, slip, jacobian)) {
+    state.outside_model = true;
+    return;
+  }
+  state.outside_model = false;
+
+  // F = [Phi G; 0 I]: pose by pose, and by (k, lambda1, lambda2).
+  Eigen::Matrix<double, 6, 3> G;
+  G << jacobian.input.col(2), jacobian.slip.leftCols<2>();
+  Eigen::Matrix<double, 6, 9> F;
+  F << jacobian.pose, G;
+  const Eigen::Matrix<double, 6, 9> FP = F * state.covariance;
+  const model::Matrix6d pose_block = FP * F.transpose();
+  state.covariance.topLeftCorner<6, 6>() = 0.5 * (pose_block + pose_block.transpose());
+  state.covariance.topRightCorner<6, 3>() = FP.rightCols<3>();
+  state.covariance.bottomLeftCorner<3, 6>() = FP.rightCols<3>().transpose();
+
+  const ProcessNoise& noise = config_.process;
+  const double length_mm = std::abs(insertion_mm);
+  Vector9d added;
+  added << Eigen::Vector3d::Constant(square(noise.position_mm)), square(noise.tilt_rad), square(noise.tilt_rad),
+      square(noise.roll_rad), square(noise.curvature_per_mm), square(noise.lambda1_per_rad), square(noise.lambda2);
+  added *= length_mm;
+  added[5] += square(noise.roll_per_sqrt_rad) * std::abs(rotation_rad);
+  // A parameter that the prior holds fixed (standard deviation zero) stays fixed: no walk is added to it.
+  for (int i = 6; i < 9; ++i)
+    if (state.covariance(i, i) == 0) added[i] = 0;
+  state.covariance.diagonal() += added;
+}
+
+Update NeedleFilter::update(FilterState& state, const model::TipMeasurement& measurement) const {
+  Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> eigen;
+  eigen.computeDirect(measurement.information_per_mm2);
+  const Eigen::Vector3d information = eigen.eigenvalues();  // ascending
+  int rank = 0;
+  Eigen::Vector3d variance = Eigen::Vector3d::Zero();
+  for (int i = 0; i < 3; ++i)
+    if (information[i] > kRankTolerance * information[2] && information[i] > 0) {
+      variance[i] = 1 / information[i];
+      ++rank;
+    }
+  const Eigen::Vector3d residual = measurement.position_mm - state.pose.p_mm;
+  Update result;
+  switch (rank) {
+    case 1:
+      result = update_rank<1>(state, eigen.eigenvectors(), variance, residual, gate_[0]);
+      break;
+    case 2:
+      result = update_rank<2>(state, eigen.eigenvectors(), variance, residual, gate_[1]);
+      break;
+    case 3:
+      result = update_rank<3>(state, eigen.eigenvectors(), variance, residual, gate_[2]);
+      break;
+    default:
+      return result;  // sees nothing: no rejection either
+  }
+  if (result.accepted) {
+    state.measurement_utime = measurement.utime;
+    state.rejects_in_row = 0;
+    keep_in_domain(state);
+  } else if (++state.rejects_in_row >= config_.gate.rejects_before_reset) {
+    declare_reset(state);
+    result.reset = true;
+  }
+  return result;
+}
+
+// Moves the parameters back into the valid set of Section III.A along the covariance, so that what is correlated with
+// them moves too; the covariance itself is kept (a bound that is reached must not make the filter confident).
+void NeedleFilter::keep_in_domain(FilterState& state) const {
+  const auto move = [&state](const Vector9d& normal, double excess) {
+    const Vector9d Pa = state.covariance * normal;
+    const double variance = normal.dot(Pa);
+    if (!(variance > 0)) return;
+    const Vector9d correction = -Pa * (excess / variance);
+    state.pose = state.pose * model::exp_se3(correction.head<6>());
+    state.curvature_per_mm += correction[6];
+    state.lambda1_per_rad += correction[7];
+    state.lambda2 += correction[8];
+  };
+  if (state.lambda1_per_rad == 0 && state.lambda2 == 0) return;
+  if (state.lambda2 > kLambda2Max) move(Vector9d::Unit(8), state.lambda2 - kLambda2Max);
+  // (26), linearised at the present lambda2; the set is convex, so twice is enough for small excesses.
+  for (int i = 0; i < 2; ++i) {
+    const double bound = square(state.lambda2) / (2 * std::numbers::pi) + 1e-6;
+    if (state.lambda1_per_rad >= bound) break;
+    Vector9d normal = Vector9d::Zero();
+    normal[7] = 1;
+    normal[8] = -state.lambda2 / std::numbers::pi;
+    move(normal, state.lambda1_per_rad - bound);
+  }
+  // Whatever the covariance allowed, the state ends inside.
+  state.lambda2 = std::min(state.lambda2, kLambda2Max);
+  state.lambda1_per_rad = std::max(state.lambda1_per_rad, square(state.lambda2) / (2 * std::numbers::pi) + 1e-9);
+  for (int i = 0; i < 9; ++i)
+    if (state.covariance(i, i) != 0) state.covariance(i, i) = std::max(state.covariance(i, i), kVarianceFloor);
+}
+
+void NeedleFilter::declare_reset(FilterState& state) const {
+  // The pose is believed no more; the parameters are, but less: their prior widths come back, correlations go.
+  const FilterState prior = initial();
+  const Gate& gate = config_.gate;
+  state.covariance = prior.covariance;
+  state.covariance.diagonal().head<6>() << Eigen::Vector3d::Constant(square(gate.reset_position_sd_mm)),
+      square(gate.reset_tilt_sd_rad), square(gate.reset_tilt_sd_rad),
+      square(std::max(gate.reset_tilt_sd_rad, config_.prior.roll_sd_rad));
+  state.rejects_in_row = 0;
+  state.measurement_utime = 0;
+  ++state.reset_count;
+}
+
+}  // namespace bevel::estimator

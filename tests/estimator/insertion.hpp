@@ -1,0 +1,104 @@
+#pragma once
+// A simulated insertion for the estimator's tests: true path, actuator states at 100 Hz, tip measurements at 30 Hz.
+#include <random>
+#include <vector>
+
+#include "estimator/config.hpp"
+#include "model/kinematics.hpp"
+#include "model/samples.hpp"
+
+namespace bevel::estimator::testing {
+
+struct Insertion {
+  std::vector<model::ActuatorState> actuators;
+  std::vector<model::TipMeasurement> measurements;
+  model::Pose final_pose;  // at the newest actuator state
+};
+
+struct InsertionPlan {
+  double rate_mm_s = 10;
+  double length_mm = 100;
+  double rotation_rate_rad_s = 0.6;
+  double sigma_mm = 0.15;
+  int cameras = 1;  // 1: one camera that sees all three axes; 2: (y, z) and (x, z), taken at different times
+  double lost_share = 0;
+};
+
+inline constexpr std::int64_t kStart_utime = 1'700'000'000'000'000;
+
+inline model::TipMeasurement measure(const Eigen::Vector3d& tip_mm, std::int64_t utime, std::int64_t seq, int camera,
+                                     const Eigen::Vector3d& sees, double sigma_mm, std::mt19937_64& rng) {
+  std::normal_distribution<double> noise(0, sigma_mm);
+  model::TipMeasurement m;
+  m.utime = utime;
+  m.seq = seq;
+  m.camera = camera;
+  m.information_per_mm2 = (sees / (sigma_mm * sigma_mm)).asDiagonal();
+  for (int i = 0; i < 3; ++i) m.position_mm[i] = sees[i] > 0 ? tip_mm[i] + noise(rng) : 0;
+  return m;
+}
+
+// `start` is the true pose at the entry. The path between samples is the model's own with the truth's parameters.
+inline Insertion insert(const model::NeedleParameters& truth, const model::Pose& start, const InsertionPlan& plan,
+                        std::mt19937_64& rng) {
+  Insertion out;
+  std::uniform_real_distribution<double> unit(0, 1);
+  model::Pose pose = start;
+  double rotation = 0;
+  const auto slip = model::slip_parameters(truth);
+  const double duration_s = plan.length_mm / plan.rate_mm_s;
+  // Steps of 1 ms hit every sample time of 100 Hz; measurements come every 33 ms, off the actuators' grid.
+  std::int64_t seq = 0;
+  for (int ms = 0; ms <= static_cast<int>(duration_s * 1000); ++ms) {
+    const double t = ms * 1e-3;
+    const std::int64_t utime = kStart_utime + ms * 1000;
+    // The shaft turns one way and back, at constant rates between actuator samples.
+    const double rate = (ms / 2000) % 2 ? -plan.rotation_rate_rad_s : plan.rotation_rate_rad_s;
+    if (ms % 10 == 0) {
+      model::ActuatorState a;
+      a.utime = utime;
+      a.seq = ms / 10;
+      a.axis_status = {2, 2};
+      a.insertion_mm = plan.rate_mm_s * t;
+      a.insertion_rate_mm_s = plan.rate_mm_s;
+      a.rotation_rad = rotation;
+      a.rotation_rate_rad_s = rate;
+      out.actuators.push_back(a);
+      out.final_pose = pose;
+    }
+    if (ms % 33 == 7 && unit(rng) >= plan.lost_share) {
+      if (plan.cameras == 1) {
+        out.measurements.push_back(measure(pose.p_mm, utime, seq++, 0, {1, 1, 1}, plan.sigma_mm, rng));
+      } else {
+        out.measurements.push_back(measure(pose.p_mm, utime, seq++, 0, {0, 1, 1}, plan.sigma_mm, rng));
+      }
+    }
+    if (plan.cameras == 2 && ms % 33 == 19 && unit(rng) >= plan.lost_share)
+      out.measurements.push_back(measure(pose.p_mm, utime, seq++, 1, {1, 0, 1}, plan.sigma_mm, rng));
+    model::step(pose, {plan.rate_mm_s * 1e-3, rate * 1e-3, {truth.curvature_per_mm, 0}}, slip);
+    rotation += rate * 1e-3;
+  }
+  return out;
+}
+
+// Truth drawn from the prior of the filter: pose at the entry and parameters, redrawn until valid.
+inline model::NeedleParameters draw_needle(const Prior& prior, std::mt19937_64& rng) {
+  std::normal_distribution<double> normal(0, 1);
+  for (;;) {
+    model::NeedleParameters needle = prior.needle;
+    needle.curvature_per_mm += prior.curvature_sd_per_mm * normal(rng);
+    needle.lambda1_per_rad += prior.lambda1_sd_per_rad * normal(rng);
+    needle.lambda2 += prior.lambda2_sd * normal(rng);
+    if (!model::find_domain_violation(needle)) return needle;
+  }
+}
+
+inline model::Pose draw_start(const Prior& prior, std::mt19937_64& rng) {
+  std::normal_distribution<double> normal(0, 1);
+  model::Vector6d error;
+  error << prior.position_sd_mm * normal(rng), prior.position_sd_mm * normal(rng), prior.position_sd_mm * normal(rng),
+      prior.tilt_sd_rad * normal(rng), prior.tilt_sd_rad * normal(rng), prior.roll_sd_rad * normal(rng);
+  return model::exp_se3(error);
+}
+
+}  // namespace bevel::estimator::testing
