@@ -1,0 +1,237 @@
+#include "io/checked_decode.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <utility>
+
+namespace bevel::io {
+namespace {
+
+constexpr std::size_t kFingerprintSize = 8;
+constexpr std::size_t kLongestText = 4096;
+
+std::uint64_t read_big_endian(const std::uint8_t* bytes, std::size_t count) {
+  std::uint64_t value = 0;
+  for (std::size_t i = 0; i < count; ++i) value = (value << 8U) | bytes[i];
+  return value;
+}
+
+// Encoded size of a message with these strings empty; each adds its length.
+template <class Message>
+std::size_t fixed_size() {
+  static const auto size = static_cast<std::size_t>(Message{}.getEncodedSize());
+  return size;
+}
+
+// Walks the fields without decoding, to find whether the strings' lengths fit the bytes exactly.
+class TextWalk {
+ public:
+  TextWalk(const std::uint8_t* bytes, std::size_t size) : bytes_(bytes), size_(size) {}
+  void time(const char*, const std::int64_t&) { skip(8); }
+  void count(const char*, const std::int64_t&) { skip(8); }
+  void code(const char*, const std::int32_t&, std::int32_t, std::int32_t) { skip(4); }
+  void number(const char*, const double*, std::size_t values, double) { skip(8 * values); }
+  void text(const char* name, const std::string&) {
+    if (error_ || !skip(4)) return;
+    const std::uint64_t length = read_big_endian(bytes_ + at_ - 4, 4);  // with the closing zero
+    if (length < 1 || length > kLongestText || length > size_ - at_ ||
+        std::find(bytes_ + at_, bytes_ + at_ + length, 0) != bytes_ + at_ + length - 1) {
+      error_ = DecodeError{DecodeFault::text, name};
+      return;
+    }
+    at_ += length;
+  }
+  std::optional<DecodeError> finish() const {
+    if (!error_ && at_ != size_) return DecodeError{DecodeFault::size, ""};
+    return error_;
+  }
+
+ private:
+  bool skip(std::size_t count) {
+    if (error_) return false;
+    if (count > size_ - at_) {
+      error_ = DecodeError{DecodeFault::size, ""};
+      return false;
+    }
+    at_ += count;
+    return true;
+  }
+  const std::uint8_t* bytes_;
+  std::size_t size_;
+  std::size_t at_ = kFingerprintSize;
+  std::optional<DecodeError> error_;
+};
+
+// First fault among the fields.
+class FieldCheck {
+ public:
+  explicit FieldCheck(const TimeBounds& bounds) : bounds_(bounds) {}
+  void time(const char* name, std::int64_t utime) {
+    if (utime <= 0) return fail(DecodeFault::time, name);
+    if (bounds_.reference_utime <= 0) return;
+    // Both are positive, so the difference cannot overflow.
+    const std::int64_t age_us = bounds_.reference_utime - utime;
+    if (age_us > bounds_.max_age_us || -age_us > bounds_.max_ahead_us) fail(DecodeFault::time, name);
+  }
+  void count(const char* name, std::int64_t value) {
+    if (value < 0) fail(DecodeFault::out_of_range, name);
+  }
+  void code(const char* name, std::int32_t value, std::int32_t lowest, std::int32_t highest) {
+    if (value < lowest || value > highest) fail(DecodeFault::out_of_range, name);
+  }
+  void number(const char* name, const double* values, std::size_t size, double largest) {
+    for (std::size_t i = 0; i < size; ++i) {
+      if (!std::isfinite(values[i])) return fail(DecodeFault::not_finite, name);
+      if (std::abs(values[i]) > largest) return fail(DecodeFault::out_of_range, name);
+    }
+  }
+  void text(const char* name, const std::string& value) {
+    if (value.size() >= kLongestText) fail(DecodeFault::text, name);
+  }
+  void fail(DecodeFault fault, const char* field) {
+    if (!error_) error_ = DecodeError{fault, field};
+  }
+  const std::optional<DecodeError>& error() const { return error_; }
+
+ private:
+  const TimeBounds& bounds_;
+  std::optional<DecodeError> error_;
+};
+
+// Symmetric to rounding and with no negative variance: what every covariance or information matrix satisfies.
+bool could_be_covariance(const double* matrix, std::size_t rows) {
+  for (std::size_t i = 0; i < rows; ++i) {
+    if (matrix[i * rows + i] < 0.0) return false;
+    for (std::size_t j = 0; j < i; ++j) {
+      const double above = matrix[j * rows + i];
+      const double below = matrix[i * rows + j];
+      const double scale = std::sqrt(matrix[i * rows + i]) * std::sqrt(matrix[j * rows + j]);
+      if (std::abs(above - below) > 1e-6 * scale + 1e-12) return false;
+      if (std::abs(above) > (1.0 + 1e-6) * scale + 1e-12) return false;  // a correlation beyond one
+    }
+  }
+  return true;
+}
+
+// What a field alone cannot tell.
+template <class Message>
+const char* find_inconsistency(const Message&) {
+  return nullptr;
+}
+template <>
+const char* find_inconsistency(const tip_measurement_t& m) {
+  return could_be_covariance(m.information_per_mm2, 3) ? nullptr : "information_per_mm2";
+}
+template <>
+const char* find_inconsistency(const needle_state_t& m) {
+  double squared = 0.0;
+  for (const double q : m.orientation_wxyz) squared += q * q;
+  if (std::abs(squared - 1.0) > 1e-3) return "orientation_wxyz";
+  return could_be_covariance(m.covariance, 9) ? nullptr : "covariance";
+}
+template <>
+const char* find_inconsistency(const steering_target_t& m) {
+  return m.tolerance_mm >= 0.0 ? nullptr : "tolerance_mm";
+}
+
+}  // namespace
+
+const char* name_of(DecodeFault fault) {
+  switch (fault) {
+    case DecodeFault::size:
+      return "size";
+    case DecodeFault::fingerprint:
+      return "fingerprint";
+    case DecodeFault::text:
+      return "text";
+    case DecodeFault::not_finite:
+      return "not finite";
+    case DecodeFault::out_of_range:
+      return "out of range";
+    case DecodeFault::inconsistent:
+      return "inconsistent";
+    case DecodeFault::time:
+      return "time";
+  }
+  return "unknown";
+}
+
+std::string describe(const DecodeError& error) {
+  return std::string(name_of(error.fault)) + (*error.field == '\0' ? "" : std::string(": ") + error.field);
+}
+
+template <class Message>
+std::optional<DecodeError> check_fields(const Message& message, const TimeBounds& bounds) noexcept {
+  FieldCheck check(bounds);
+  visit_fields(message, check);
+  if (check.error()) return check.error();
+  if (const char* field = find_inconsistency(message)) return DecodeError{DecodeFault::inconsistent, field};
+  return std::nullopt;
+}
+
+template <class Message>
+Decoded<Message> checked_decode(const void* data, std::size_t size, const TimeBounds& bounds) noexcept {
+  Decoded<Message> decoded;
+  constexpr bool has_text = std::is_same_v<Message, process_status_t>;
+  const bool size_possible = has_text ? size >= fixed_size<Message>() : size == fixed_size<Message>();
+  if (data == nullptr || !size_possible) {
+    decoded.error = DecodeError{DecodeFault::size, ""};
+    return decoded;
+  }
+  const auto* bytes = static_cast<const std::uint8_t*>(data);
+  if (read_big_endian(bytes, kFingerprintSize) != static_cast<std::uint64_t>(Message::getHash())) {
+    decoded.error = DecodeError{DecodeFault::fingerprint, ""};
+    return decoded;
+  }
+  if constexpr (has_text) {
+    TextWalk walk(bytes, size);
+    visit_fields(std::as_const(decoded.message), walk);
+    decoded.error = walk.finish();
+    if (decoded.error) return decoded;
+  }
+  // Size and lengths are proven; the generated decoder cannot fail or allocate beyond the message any more.
+  if (decoded.message.decode(data, 0, static_cast<int>(size)) != static_cast<int>(size)) {
+    decoded.error = DecodeError{DecodeFault::size, ""};
+  } else {
+    decoded.error = check_fields(decoded.message, bounds);
+  }
+  if (decoded.error) decoded.message = Message{};
+  return decoded;
+}
+
+template Decoded<tip_measurement_t> checked_decode(const void*, std::size_t, const TimeBounds&) noexcept;
+template Decoded<actuator_state_t> checked_decode(const void*, std::size_t, const TimeBounds&) noexcept;
+template Decoded<motion_command_t> checked_decode(const void*, std::size_t, const TimeBounds&) noexcept;
+template Decoded<needle_state_t> checked_decode(const void*, std::size_t, const TimeBounds&) noexcept;
+template Decoded<steering_target_t> checked_decode(const void*, std::size_t, const TimeBounds&) noexcept;
+template Decoded<process_status_t> checked_decode(const void*, std::size_t, const TimeBounds&) noexcept;
+template std::optional<DecodeError> check_fields(const tip_measurement_t&, const TimeBounds&) noexcept;
+template std::optional<DecodeError> check_fields(const actuator_state_t&, const TimeBounds&) noexcept;
+template std::optional<DecodeError> check_fields(const motion_command_t&, const TimeBounds&) noexcept;
+template std::optional<DecodeError> check_fields(const needle_state_t&, const TimeBounds&) noexcept;
+template std::optional<DecodeError> check_fields(const steering_target_t&, const TimeBounds&) noexcept;
+template std::optional<DecodeError> check_fields(const process_status_t&, const TimeBounds&) noexcept;
+
+SeqStep SeqWatch::step(std::int64_t seq, std::int64_t utime) noexcept {
+  if (!started_) {
+    started_ = true;
+    newest_seq_ = seq;
+    newest_utime_ = utime;
+    return SeqStep::first;
+  }
+  if (seq == newest_seq_) return SeqStep::duplicate;
+  if (seq < newest_seq_ && utime <= newest_utime_) return SeqStep::late;
+  SeqStep step = SeqStep::next;
+  if (seq < newest_seq_) {
+    step = SeqStep::restarted;
+    ++restarts_;
+  } else if (seq - newest_seq_ > 1) {
+    step = SeqStep::gap;
+    lost_ += seq - newest_seq_ - 1;
+  }
+  newest_seq_ = seq;
+  newest_utime_ = utime;
+  return step;
+}
+
+}  // namespace bevel::io
