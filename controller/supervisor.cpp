@@ -87,6 +87,8 @@ void Supervisor::request(Request request, const std::optional<Target>& target, s
     case Request::start:
       if (status_.state != State::armed && status_.state != State::hold) return;
       if (!target_ || !check_inputs(now_utime)) return;
+      for (const auto axis : actuator_->axis_status)  // not an error yet: the drives may still be switching on
+        if (axis != static_cast<std::int32_t>(model::AxisStatus::enabled)) return;
       reset_count_ = needle_state_->reset_count;
       tracking_bad_s_ = 0;
       status_.state = State::steering;

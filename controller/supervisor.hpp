@@ -70,7 +70,8 @@ class Supervisor {
   void set_actuator(const model::ActuatorState& state) { actuator_ = state; }
 
   // An operator's word. arm: takes the target and leaves off, hold or stopped; refused (reason latched) when out of
-  // reach. start: from armed or hold to steering. hold: stands still, may go on. stop: latched.
+  // reach. start: from armed or hold to steering, once
+  // both axes are enabled. hold: stands still, may go on. stop: latched.
   void request(Request request, const std::optional<Target>& target, std::int64_t now_utime);
   void report_overrun() { stop(Reason::overrun, 0, ""); }
 

@@ -1,0 +1,36 @@
+#include "io/estimator_config.hpp"
+
+namespace bevel::io {
+
+void read_estimator_config(Section section, estimator::EstimatorConfig& config) {
+  Section prior = section.section("prior", optional);
+  prior.read("curvature_sd_per_mm", config.prior.curvature_sd_per_mm, optional, in_range(0, 0.05));
+  prior.read("lambda1_sd_per_rad", config.prior.lambda1_sd_per_rad, optional, in_range(0, 5));
+  prior.read("lambda2_sd", config.prior.lambda2_sd, optional, in_range(0, 1));
+  prior.read("position_sd_mm", config.prior.position_sd_mm, optional, in_range(1e-4, 100));
+  prior.read("tilt_sd_rad", config.prior.tilt_sd_rad, optional, in_range(1e-5, 1));
+  prior.read("roll_sd_rad", config.prior.roll_sd_rad, optional, in_range(1e-5, 3.2));
+
+  Section process = section.section("process_noise", optional);
+  process.read("position_mm", config.process.position_mm, optional, in_range(0, 10));
+  process.read("tilt_rad", config.process.tilt_rad, optional, in_range(0, 1));
+  process.read("roll_rad", config.process.roll_rad, optional, in_range(0, 1));
+  process.read("roll_per_sqrt_rad", config.process.roll_per_sqrt_rad, optional, in_range(0, 1));
+  process.read("curvature_per_mm", config.process.curvature_per_mm, optional, in_range(0, 0.01));
+  process.read("lambda1_per_rad", config.process.lambda1_per_rad, optional, in_range(0, 1));
+  process.read("lambda2", config.process.lambda2, optional, in_range(0, 1));
+
+  Section gate = section.section("gate", optional);
+  gate.read("probability", config.gate.probability, optional, in_range(0.5, 0.9999999));
+  gate.read("rejects_before_unhealthy", config.gate.rejects_before_unhealthy, optional, in_range(1, 1000));
+  gate.read("rejects_before_reset", config.gate.rejects_before_reset, optional, in_range(1, 10000));
+  gate.read("reset_position_sd_mm", config.gate.reset_position_sd_mm, optional, in_range(0.01, 1000));
+  gate.read("reset_tilt_sd_rad", config.gate.reset_tilt_sd_rad, optional, in_range(1e-4, 3));
+
+  Section limits = section.section("limits", optional);
+  limits.read("measurement_age_s", config.limits.measurement_age_s, optional, above(0));
+  limits.read("actuator_age_s", config.limits.actuator_age_s, optional, above(0));
+  limits.read("position_sd_mm", config.limits.position_sd_mm, optional, above(0));
+}
+
+}  // namespace bevel::io

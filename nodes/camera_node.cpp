@@ -1,0 +1,43 @@
+#include "nodes/camera_node.hpp"
+
+#include <stdexcept>
+
+namespace bevel::nodes {
+
+CameraNode::CameraNode(lcm::LCM& lcm, const SystemConfig& config) : port_(lcm), status_(port_, "bevel-camera", 0) {
+  if (config.cameras.empty()) throw std::invalid_argument("no [[camera]] in the configuration: at least one is needed");
+  std::vector<camera::CameraSetup> setups;
+  for (const CameraViewConfig& c : config.cameras)
+    setups.push_back({c.camera, std::make_shared<camera::PlanarView>(c.view), c.tracker, {}});
+  pipeline_ = std::make_unique<camera::CameraPipeline>(camera::make_frame_source(config.source), setups);
+  port_.subscribe<needle_state_t>(
+      io::channel::kNeedleState,
+      [this](const needle_state_t& m) {
+        if (m.health == 0) pipeline_->predict({m.position_mm[0], m.position_mm[1], m.position_mm[2]});
+      },
+      2);
+}
+
+CameraNode::Outcome CameraNode::step(std::int64_t now_utime, int timeout_ms) {
+  const auto result = pipeline_->next(std::chrono::milliseconds(timeout_ms));
+  status_.report(now_utime, "running", "");
+  if (std::holds_alternative<camera::FrameTimeout>(result)) return Outcome::nothing;
+  if (std::holds_alternative<camera::EndOfFrames>(result)) return Outcome::ended;
+  if (const auto* failure = std::get_if<camera::SourceFailure>(&result)) {
+    failure_ = failure->text;
+    return Outcome::failed;
+  }
+  const auto& seen = std::get<camera::TipObservation>(result);
+  tip_measurement_t m{};
+  m.utime = seen.capture_utime;
+  m.seq = seq_++;
+  m.camera = seen.camera;
+  m.status = static_cast<std::int32_t>(seen.status);
+  for (std::size_t i = 0; i < 3; ++i) m.position_mm[i] = seen.position_mm[i];
+  for (std::size_t i = 0; i < 9; ++i) m.information_per_mm2[i] = seen.information_per_mm2[i];
+  port_.publish(io::channel::kTipMeasurement, m);
+  if (on_observation) on_observation(seen);
+  return Outcome::frame;
+}
+
+}  // namespace bevel::nodes

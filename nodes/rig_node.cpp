@@ -1,0 +1,94 @@
+#include "nodes/rig_node.hpp"
+
+#include <cmath>
+
+namespace bevel::nodes {
+namespace {
+
+constexpr std::int64_t kTruthPeriod_ns = 10'000'000;
+
+rig::SimulatedDriveConfig drive_config(const stepper::AxisConfig& axis) {
+  rig::SimulatedDriveConfig config;
+  config.node_id = axis.node_id;
+  config.counts_per_unit = axis.counts_per_unit;
+  return config;
+}
+
+}  // namespace
+
+RigNode::RigNode(lcm::LCM& lcm, can::Bus& insertion_bus, can::Bus& rotation_bus, const SystemConfig& config,
+                 rig::FrameServer* frames)
+    : config_(config), port_(lcm), status_(port_, "bevel-rig", 0.001), frames_(frames) {
+  drives_[0] = std::make_unique<rig::SimulatedDrive>(insertion_bus, drive_config(config.stepper.axes[0]));
+  drives_[1] = std::make_unique<rig::SimulatedDrive>(rotation_bus, drive_config(config.stepper.axes[1]));
+  plant_ = std::make_unique<rig::KinematicPlant>(config.rig.truth);
+  plant_->advance(0, config.rig.roll_error_rad, 0);
+  for (const CameraViewConfig& c : config.cameras) {
+    rig::SceneConfig scene;
+    scene.size_px = {c.width_px, c.height_px};
+    scene.needle_diameter_mm = c.tracker.needle_diameter_mm;
+    scene.bevel_length_mm = c.tracker.bevel_length_mm;
+    scene.noise_gray = config.rig.noise_gray;
+    scene.blur_px = config.rig.blur_px;
+    scene.seed = static_cast<std::uint64_t>(config.rig.seed + c.camera);
+    eyes_.push_back({c.camera, rig::NeedleRenderer(scene, camera::PlanarView(c.view))});
+  }
+}
+
+void RigNode::step(std::int64_t now_ns, std::int64_t now_utime) {
+  for (auto& drive : drives_) drive->step(now_ns);
+  move_plant(now_ns);
+  if (now_ns >= next_truth_ns_) {
+    next_truth_ns_ = now_ns + kTruthPeriod_ns;
+    publish_truth(now_utime);
+  }
+  if (frames_ && now_ns >= next_frame_ns_) {
+    const auto period_ns = std::llround(1e9 / config_.rig.frame_rate_hz);
+    next_frame_ns_ = std::max(next_frame_ns_ + period_ns, now_ns + period_ns / 2);
+    publish_frames(now_utime);
+  }
+  status_.report(now_utime, "running", "");
+}
+
+void RigNode::move_plant(std::int64_t now_ns) {
+  const double dt_s = last_ns_ ? static_cast<double>(now_ns - last_ns_) * 1e-9 : 0;
+  last_ns_ = now_ns;
+  const std::array<double, 2> at{drives_[0]->position_unit(), drives_[1]->position_unit()};
+  plant_->advance(at[0] - moved_[0], at[1] - moved_[1], dt_s);
+  moved_ = at;
+}
+
+void RigNode::publish_truth(std::int64_t now_utime) {
+  const model::Pose tip = plant_->tip();
+  needle_state_t m{};
+  m.utime = now_utime;
+  m.seq = truth_seq_++;
+  Eigen::Quaterniond q(tip.R);
+  q.normalize();
+  for (int i = 0; i < 3; ++i) m.position_mm[i] = tip.p_mm[i];
+  m.orientation_wxyz[0] = q.w(), m.orientation_wxyz[1] = q.x();
+  m.orientation_wxyz[2] = q.y(), m.orientation_wxyz[3] = q.z();
+  m.curvature_per_mm = plant_->needle().curvature_per_mm;
+  m.lambda1_per_rad = plant_->needle().lambda1_per_rad;
+  m.lambda2 = plant_->needle().lambda2;
+  port_.publish(io::channel::kNeedleTruth, m);
+}
+
+void RigNode::publish_frames(std::int64_t now_utime) {
+  std::vector<camera::Vector3> path;
+  for (const Eigen::Vector3d& p : plant_->shaft_mm()) path.push_back({p.x(), p.y(), p.z()});
+  const model::Pose tip = plant_->tip();
+  for (Eye& eye : eyes_) {
+    // Where body x points beside the heading: the roll that shapes the bevel's silhouette.
+    const double roll_rad = std::atan2(tip.R(1, 0), tip.R(0, 0));
+    camera::Frame frame;
+    frame.capture_utime = now_utime;
+    frame.seq = frame_seq_;
+    frame.camera = eye.camera;
+    frame.gray = eye.renderer.render(path, roll_rad).gray;
+    frames_->publish(frame);
+  }
+  ++frame_seq_;
+}
+
+}  // namespace bevel::nodes

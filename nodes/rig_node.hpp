@@ -1,0 +1,52 @@
+#pragma once
+// bevel-rig: a needle, two cameras and two drives that exist only as programs. Drives on a CAN bus, frames on a Unix
+// socket, the true tip on NEEDLE_TRUTH. The rest of the software cannot tell it from a bench.
+#include <memory>
+#include <vector>
+
+#include "drivers/can/bus.hpp"
+#include "nodes/lcm_port.hpp"
+#include "nodes/system_config.hpp"
+#include "rig/camera/frame_server.hpp"
+#include "rig/camera/needle_renderer.hpp"
+#include "rig/drives/simulated_drive.hpp"
+#include "rig/plant/plant.hpp"
+
+namespace bevel::nodes {
+
+class RigNode {
+ public:
+  // One bus for each drive: two on one would eat each other's frames. `frames` may be null: no pictures.
+  RigNode(lcm::LCM& lcm, can::Bus& insertion_bus, can::Bus& rotation_bus, const SystemConfig& config,
+          rig::FrameServer* frames);
+  // Call about every millisecond. now_ns: steady clock; now_utime: the same instant since the epoch.
+  void step(std::int64_t now_ns, std::int64_t now_utime);
+
+  const rig::Plant& plant() const { return *plant_; }
+  rig::SimulatedDrive& drive(std::size_t axis) { return *drives_[axis]; }
+
+ private:
+  struct Eye {
+    int camera;
+    rig::NeedleRenderer renderer;
+  };
+  void move_plant(std::int64_t now_ns);
+  void publish_truth(std::int64_t now_utime);
+  void publish_frames(std::int64_t now_utime);
+
+  SystemConfig config_;
+  LcmPort port_;
+  StatusReporter status_;
+  std::array<std::unique_ptr<rig::SimulatedDrive>, 2> drives_;
+  std::unique_ptr<rig::KinematicPlant> plant_;
+  rig::FrameServer* frames_;
+  std::vector<Eye> eyes_;
+  std::array<double, 2> moved_{};  // axis positions that the plant has followed
+  std::int64_t last_ns_ = 0;
+  std::int64_t next_truth_ns_ = 0;
+  std::int64_t next_frame_ns_ = 0;
+  std::int64_t truth_seq_ = 0;
+  std::int64_t frame_seq_ = 0;
+};
+
+}  // namespace bevel::nodes

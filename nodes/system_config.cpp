@@ -1,0 +1,173 @@
+#include "nodes/system_config.hpp"
+
+#include <cmath>
+
+#include "io/config.hpp"
+#include "io/estimator_config.hpp"
+
+namespace bevel::nodes {
+namespace {
+
+using io::above;
+using io::in_range;
+using io::optional;
+using io::required;
+using io::Section;
+
+void read_needle(Section s, model::NeedleParameters& needle, io::Presence presence) {
+  s.read("curvature_per_mm", needle.curvature_per_mm, presence, in_range(-0.05, 0.05));
+  s.read("wheelbase_mm", needle.wheelbase_mm, presence, in_range(1, 1000));
+  s.read("lambda1_per_rad", needle.lambda1_per_rad, presence, in_range(0, 5));
+  s.read("lambda2", needle.lambda2, presence, in_range(-2, 0.9));
+  s.read("slip", needle.slip, optional,
+         io::Choices<model::SlipDirection>{{"isotropic", model::SlipDirection::isotropic},
+                                           {"bevel-plane", model::SlipDirection::bevel_plane}});
+  s.read("front_wheel", needle.front_wheel, optional,
+         io::Choices<model::FrontWheel>{{"published", model::FrontWheel::published},
+                                        {"nonslip", model::FrontWheel::nonslip}});
+  if (!s.present()) return;
+  if (const auto violation = model::find_domain_violation(needle)) s.fail("", model::describe(*violation));
+}
+
+void read_controller(Section s, controller::ControllerConfig& c) {
+  s.read("period_s", c.period_s, optional, in_range(0.002, 0.2));
+  Section l = s.section("limits", optional);
+  l.read("insertion_rate_mm_s", c.limits.insertion_rate_mm_s, optional, in_range(0.01, 100));
+  l.read("insertion_rate_min_share", c.limits.insertion_rate_min_share, optional, in_range(0.01, 1));
+  l.read("rotation_rate_rad_s", c.limits.rotation_rate_rad_s, optional, in_range(0.01, 100));
+  l.read("rotation_acceleration_rad_s2", c.limits.rotation_acceleration_rad_s2, optional, in_range(0.1, 10000));
+  l.read("insertion_acceleration_mm_s2", c.limits.insertion_acceleration_mm_s2, optional, in_range(0.1, 10000));
+  l.read("total_rotation_rad", c.limits.total_rotation_rad, optional, in_range(6.2831853, 1e6));
+  Section g = s.section("gains", optional);
+  g.read("convergence_rad_s", c.gains.convergence_rad_s, optional, in_range(0.01, 100));
+  g.read("boundary_layer_rad", c.gains.boundary_layer_rad, optional, in_range(0.01, 3));
+  g.read("tolerance_mm", c.gains.tolerance_mm, optional, in_range(0, 10));
+  g.read("parameter_uncertainty", c.gains.parameter_uncertainty, optional, in_range(0, 2));
+  Section f = s.section("safety", optional);
+  f.read("state_age_s", c.safety.state_age_s, optional, in_range(0.005, 0.2));
+  f.read("actuator_age_s", c.safety.actuator_age_s, optional, in_range(0.005, 0.2));
+  f.read("position_sd_mm", c.safety.position_sd_mm, optional, above(0));
+  f.read("depth_min_mm", c.safety.depth_min_mm, optional, in_range(-1000, 1000));
+  f.read("depth_max_mm", c.safety.depth_max_mm, optional, in_range(-1000, 1000));
+  f.read("lateral_max_mm", c.safety.lateral_max_mm, optional, above(0));
+  f.read("tracking_error_mm_s", c.safety.tracking_error_mm_s, optional, above(0));
+  f.read("tracking_error_rad_s", c.safety.tracking_error_rad_s, optional, above(0));
+  f.read("tracking_error_s", c.safety.tracking_error_s, optional, above(0));
+  f.read("target_miss_max_mm", c.safety.target_miss_max_mm, optional, above(0));
+}
+
+void read_axis(Section s, stepper::AxisConfig& axis) {
+  int node_id = axis.node_id;
+  s.read("node_id", node_id, optional, in_range(1, 127));
+  axis.node_id = static_cast<std::uint8_t>(node_id);
+  s.read("counts_per_unit", axis.counts_per_unit, optional, in_range(-1e7, 1e7));
+  s.read("rate_limit_unit_s", axis.rate_limit_unit_s, optional, above(0));
+  s.read("acceleration_unit_s2", axis.acceleration_unit_s2, optional, above(0));
+  s.read("quick_stop_unit_s2", axis.quick_stop_unit_s2, optional, above(0));
+  s.read("position_min_unit", axis.position_min_unit, optional, io::any_finite());
+  s.read("position_max_unit", axis.position_max_unit, optional, io::any_finite());
+}
+
+void read_stepper(Section s, stepper::StepperConfig& c) {
+  read_axis(s.section("insertion", optional), c.axes[stepper::kInsertion]);
+  read_axis(s.section("rotation", optional), c.axes[stepper::kRotation]);
+  const auto read_ms = [&s](const char* key, std::int64_t& ns) {
+    double ms = static_cast<double>(ns) * 1e-6;
+    s.read(key, ms, optional, in_range(1, 10000));
+    ns = std::llround(ms * 1e6);
+  };
+  read_ms("period_ms", c.period_ns);
+  read_ms("setpoint_zero_age_ms", c.setpoint_zero_age_ns);
+  read_ms("setpoint_stop_age_ms", c.setpoint_stop_age_ns);
+  read_ms("drive_heartbeat_ms", c.drive_heartbeat_ns);
+  read_ms("drive_heartbeat_timeout_ms", c.drive_heartbeat_timeout_ns);
+  read_ms("master_heartbeat_ms", c.master_heartbeat_ns);
+  read_ms("master_heartbeat_timeout_ms", c.master_heartbeat_timeout_ns);
+  for (const std::string& problem : stepper::problems_of(c)) s.fail("", problem);
+}
+
+void read_source(Section s, camera::SourceConfig& source) {
+  s.read("kind", source.kind, optional,
+         io::Choices<camera::SourceKind>{{"folder", camera::SourceKind::folder},
+                                         {"video", camera::SourceKind::video},
+                                         {"device", camera::SourceKind::device},
+                                         {"stream", camera::SourceKind::stream}});
+  s.read("path", source.path, optional);
+  s.read("camera", source.camera, optional, in_range(0, 15));
+  double period_s = static_cast<double>(source.period_us) * 1e-6;
+  s.read("period_s", period_s, optional, in_range(1e-3, 3600));
+  source.period_us = std::llround(period_s * 1e6);
+  s.read("width_px", source.width_px, optional, in_range(16, 8192));
+  s.read("height_px", source.height_px, optional, in_range(16, 8192));
+  s.read("rate_hz", source.rate_hz, optional, in_range(0.1, 1000));
+  s.read("fourcc", source.fourcc, optional);
+}
+
+const io::Choices<camera::SignedAxis> kAxisChoices{
+    {"+x", {camera::WorldAxis::x, 1}},  {"-x", {camera::WorldAxis::x, -1}}, {"+y", {camera::WorldAxis::y, 1}},
+    {"-y", {camera::WorldAxis::y, -1}}, {"+z", {camera::WorldAxis::z, 1}},  {"-z", {camera::WorldAxis::z, -1}}};
+
+CameraViewConfig read_camera(Section s) {
+  CameraViewConfig c;
+  s.read("camera", c.camera, required, in_range(0, 15));
+  s.read("px_per_mm", c.view.px_per_mm, required, in_range(0.1, 1000));
+  std::array<double, 2> origin{0, 0};
+  s.read("origin_px", origin, required);
+  c.view.origin_px = {origin[0], origin[1]};
+  s.read("columns_carry", c.view.u_axis, required, kAxisChoices);
+  s.read("rows_carry", c.view.v_axis, required, kAxisChoices);
+  s.read("width_px", c.width_px, optional, in_range(16, 8192));
+  s.read("height_px", c.height_px, optional, in_range(16, 8192));
+  camera::TrackerConfig& t = c.tracker;
+  s.read("entry_side", t.entry_side, optional,
+         io::Choices<camera::EntrySide>{{"top", camera::EntrySide::top},
+                                        {"bottom", camera::EntrySide::bottom},
+                                        {"left", camera::EntrySide::left},
+                                        {"right", camera::EntrySide::right}});
+  std::array<double, 2> entry{t.entry_px.x, t.entry_px.y};
+  s.read("entry_px", entry, optional);
+  t.entry_px = {entry[0], entry[1]};
+  s.read("entry_half_width_px", t.entry_half_width_px, optional);
+  s.read("needle_diameter_mm", t.needle_diameter_mm, optional, in_range(0.05, 10));
+  s.read("bevel_length_mm", t.bevel_length_mm, optional, in_range(0, 50));
+  s.read("min_contrast_gray", t.min_contrast_gray, optional, in_range(1, 255));
+  s.read("min_length_mm", t.min_length_mm, optional, in_range(0.5, 1000));
+  s.read("floor_across_mm", t.floor_across_mm, optional, in_range(1e-4, 100));
+  s.read("floor_along_mm", t.floor_along_mm, optional, in_range(1e-4, 100));
+  return c;
+}
+
+void read_rig(Section s, RigConfig& c) {
+  if (Section truth = s.section("needle", optional); truth.present()) read_needle(truth, c.truth, required);
+  s.read("roll_error_rad", c.roll_error_rad, optional, in_range(-3.2, 3.2));
+  s.read("frames_socket", c.frames_socket, optional);
+  s.read("frame_rate_hz", c.frame_rate_hz, optional, in_range(1, 120));
+  s.read("noise_gray", c.noise_gray, optional, in_range(0, 50));
+  s.read("blur_px", c.blur_px, optional, in_range(0, 10));
+  s.read("seed", c.seed, optional, in_range(0, 1e15));
+}
+
+}  // namespace
+
+SystemConfig load_system_config(const std::string& path) {
+  io::ConfigFile file = io::ConfigFile::load(path);
+  SystemConfig c;
+  c.text = file.text();
+  Section system = file.section("system", optional);
+  system.read("lcm_url", c.lcm_url, optional);
+  system.read("can", c.can, optional);
+  system.read("realtime", c.realtime, optional);
+  read_needle(file.section("needle", required), c.needle, required);
+  c.estimator.prior.needle = c.needle;
+  io::read_estimator_config(file.section("estimator", optional), c.estimator);
+  read_controller(file.section("controller", optional), c.controller);
+  read_stepper(file.section("stepper", optional), c.stepper);
+  read_source(file.section("source", optional), c.source);
+  for (Section s : file.sections("camera", optional)) c.cameras.push_back(read_camera(s));
+  c.rig.truth = c.needle;
+  read_rig(file.section("rig", optional), c.rig);
+  file.finish();
+  return c;
+}
+
+}  // namespace bevel::nodes

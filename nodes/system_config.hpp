@@ -1,0 +1,52 @@
+#pragma once
+// One file for a whole rig: every process reads all of it, so that a wrong key is found by whichever starts first, and
+// uses its own part. Keys, ranges and defaults stand in system_config.cpp and in the structures named here.
+#include <array>
+#include <string>
+#include <vector>
+
+#include "controller/config.hpp"
+#include "drivers/camera/frame_source.hpp"
+#include "drivers/camera/planar_view.hpp"
+#include "drivers/camera/tracker_config.hpp"
+#include "drivers/stepper/stepper_config.hpp"
+#include "estimator/config.hpp"
+
+namespace bevel::nodes {
+
+struct CameraViewConfig {
+  int camera = 0;
+  camera::PlanarViewConfig view;
+  camera::TrackerConfig tracker;
+  int width_px = 640;  // of the rig's rendered picture
+  int height_px = 480;
+};
+
+struct RigConfig {
+  model::NeedleParameters truth;  // of the simulated needle; unlike [needle], which is what the software believes
+  double roll_error_rad = 0;      // the bevel's true roll at the start; the software believes zero
+  std::string frames_socket = "/tmp/bevel-rig-frames.sock";
+  double frame_rate_hz = 30;
+  double noise_gray = 2;
+  double blur_px = 0.8;
+  std::int64_t seed = 1;
+};
+
+struct SystemConfig {
+  std::string lcm_url;  // empty: LCM's default, or LCM_DEFAULT_URL
+  std::string can = "unix:/tmp/bevel-rig-can.sock";
+  bool realtime = false;  // SCHED_FIFO and locked memory for controller and stepper, where the system permits
+  model::NeedleParameters needle;
+  estimator::EstimatorConfig estimator;
+  controller::ControllerConfig controller;
+  stepper::StepperConfig stepper;
+  camera::SourceConfig source;
+  std::vector<CameraViewConfig> cameras;
+  RigConfig rig;
+  std::string text;  // the file as read, for the CONFIG channel
+};
+
+// Throws io::ConfigError with every fault of the file.
+SystemConfig load_system_config(const std::string& path);
+
+}  // namespace bevel::nodes

@@ -1,0 +1,35 @@
+// bevel-camera: frames in (the rig, a folder, a video file, a V4L2 device), TIP_MEASUREMENT out.
+#include "nodes/camera_node.hpp"
+#include "tools/processes/process_main.hpp"
+
+int main(int argc, char** argv) {
+  using namespace bevel;
+  CLI::App app("Finds the needle tip in pictures and publishes where it is.", "bevel-camera");
+  tools::ProcessOptions options;
+  tools::add_options(app, options);
+  std::string source;
+  bool print = false;
+  app.add_option("--source", source, "path instead of the file's source.path");
+  app.add_flag("--print", print, "print each observation as CSV");
+  return tools::process_main(argc, argv, app, options, [&](nodes::SystemConfig config, lcm::LCM& lcm) {
+    if (!source.empty()) config.source.path = source;
+    if (config.source.kind == camera::SourceKind::folder || config.source.kind == camera::SourceKind::video)
+      config.source.start_utime = nodes::now().utime;
+    nodes::CameraNode node(lcm, config);
+    if (print) {
+      std::puts("utime,seq,camera,status,x_mm,y_mm,z_mm,u_px,v_px,reason");
+      node.on_observation = [](const camera::TipObservation& o) {
+        std::printf("%lld,%lld,%d,%d,%.4f,%.4f,%.4f,%.2f,%.2f,%s\n", static_cast<long long>(o.capture_utime),
+                    static_cast<long long>(o.seq), o.camera, static_cast<int>(o.status), o.position_mm[0],
+                    o.position_mm[1], o.position_mm[2], o.tip_px.x, o.tip_px.y, std::string(o.reason).c_str());
+      };
+    }
+    while (!nodes::stop_requested()) {
+      nodes::pump(lcm);
+      const auto outcome = node.step(nodes::now().utime, 50);
+      if (outcome == nodes::CameraNode::Outcome::failed) throw std::runtime_error(node.failure());
+      if (outcome == nodes::CameraNode::Outcome::ended) break;
+    }
+    return 0;
+  });
+}

@@ -1,0 +1,21 @@
+// bevel-estimator: TIP_MEASUREMENT and ACTUATOR_STATE in, NEEDLE_STATE out.
+#include "nodes/estimator_node.hpp"
+#include "tools/processes/process_main.hpp"
+
+int main(int argc, char** argv) {
+  using namespace bevel;
+  CLI::App app("Estimates the needle's pose, curvature and lambda from tip measurements and axis positions.",
+               "bevel-estimator");
+  tools::ProcessOptions options;
+  tools::add_options(app, options);
+  return tools::process_main(argc, argv, app, options, [](const nodes::SystemConfig& config, lcm::LCM& lcm) {
+    nodes::claim_name("bevel-estimator");
+    nodes::EstimatorNode node(lcm, config.estimator);
+    // Messages are handled as they arrive; the period is that of the health checks.
+    nodes::run_periodic(lcm, 0.01, [&](const nodes::Now& now, double) {
+      node.step(now.utime);
+      return true;
+    });
+    return 0;
+  });
+}

@@ -1,0 +1,33 @@
+// bevel-rig: the simulated rig, two CiA 402 drives, a needle in tissue, and the cameras that look at it.
+#include <thread>
+
+#include "drivers/can/local_bus.hpp"
+#include "drivers/can/open_bus.hpp"
+#include "nodes/rig_node.hpp"
+#include "tools/processes/process_main.hpp"
+
+int main(int argc, char** argv) {
+  using namespace bevel;
+  CLI::App app("Simulates needle, cameras and drives; the other processes cannot tell.", "bevel-rig");
+  tools::ProcessOptions options;
+  tools::add_options(app, options);
+  return tools::process_main(argc, argv, app, options, [](const nodes::SystemConfig& config, lcm::LCM& lcm) {
+    nodes::claim_name("bevel-rig");
+    // On a local bus the rig is also the hub; a CAN interface needs none.
+    constexpr std::string_view kLocal = "unix:";
+    std::unique_ptr<can::LocalHub> hub;
+    std::jthread hub_thread;
+    if (config.can.starts_with(kLocal)) {
+      hub = std::make_unique<can::LocalHub>(config.can.substr(kLocal.size()));
+      hub_thread = std::jthread([&hub](const std::stop_token& stop) { hub->run(stop); });
+    }
+    const auto insertion = can::open_bus(config.can), rotation = can::open_bus(config.can);
+    rig::FrameServer frames(config.rig.frames_socket);
+    nodes::RigNode node(lcm, *insertion, *rotation, config, &frames);
+    nodes::run_periodic(lcm, 0.001, [&](const nodes::Now& now, double) {
+      node.step(now.ns, now.utime);
+      return true;
+    });
+    return 0;
+  });
+}
