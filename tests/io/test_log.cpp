@@ -1,0 +1,256 @@
+// Logs: written, read back, damaged at every byte, and read by LCM's own tools.
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <chrono>
+#include <cstdlib>
+#include <filesystem>
+#include <fstream>
+#include <random>
+#include <set>
+
+#include "io/log_reader.hpp"
+#include "io/log_writer.hpp"
+#include "io/messages.hpp"
+#include "io/recording.hpp"
+
+namespace bevel::io {
+namespace {
+
+using Bytes = std::vector<std::uint8_t>;
+
+class TemporaryLog {
+ public:
+  explicit TemporaryLog(const std::string& name)
+      : path_(std::filesystem::temp_directory_path() / ("bevel-test-" + std::to_string(::getpid()) + "-" + name)) {}
+  ~TemporaryLog() { std::filesystem::remove(path_); }
+  std::string path() const { return path_.string(); }
+  Bytes bytes() const {
+    std::ifstream file(path_, std::ios::binary);
+    return Bytes{std::istreambuf_iterator<char>(file), {}};
+  }
+
+ private:
+  std::filesystem::path path_;
+};
+
+actuator_state_t actuator(std::int64_t seq) {
+  actuator_state_t message{};
+  message.utime = 1'700'000'000'000'000 + 10'000 * seq;
+  message.seq = seq;
+  message.axis_status[0] = message.axis_status[1] = 2;
+  message.insertion_mm = 0.05 * static_cast<double>(seq);
+  return message;
+}
+
+tip_measurement_t tip(std::int64_t seq) {
+  tip_measurement_t message{};
+  message.utime = 1'700'000'000'000'000 + 33'000 * seq;
+  message.seq = seq;
+  message.position_mm[2] = static_cast<double>(seq);
+  for (int i = 0; i < 3; ++i) message.information_per_mm2[4 * i] = 100.0;
+  return message;
+}
+
+constexpr int kSmallLogEvents = 7;
+Bytes small_log() {
+  const TemporaryLog file("small.lcm");
+  LogWriter writer(file.path());
+  writer.write_text(1000, channel::kConfig, "[needle]\n");
+  for (std::int64_t i = 1; i <= 3; ++i) {
+    writer.write_message(1000 + 2 * i, channel::kActuatorState, actuator(i));
+    writer.write_message(1001 + 2 * i, channel::kTipMeasurement, tip(i));
+  }
+  writer.close();
+  return file.bytes();
+}
+
+std::vector<LogEvent> read_all(std::span<const std::uint8_t> bytes, LogDamage& damage) {
+  std::vector<LogEvent> events;
+  LogReader reader(bytes);
+  while (const auto event = reader.next()) events.push_back(*event);
+  damage = reader.damage();
+  return events;
+}
+
+// Bytes of all events, so that with the damage reported every byte of the file is accounted for.
+std::size_t size_of(const std::vector<LogEvent>& events) {
+  std::size_t size = 0;
+  for (const auto& event : events) size += 28 + event.channel.size() + event.data.size();
+  return size;
+}
+
+TEST(Log, reads_back_what_was_written) {
+  const Bytes log = small_log();
+  LogDamage damage;
+  const auto events = read_all(log, damage);
+  ASSERT_EQ(events.size(), kSmallLogEvents);
+  EXPECT_TRUE(damage.intact());
+  EXPECT_EQ(events[0].channel, "CONFIG");
+  EXPECT_EQ(events[2].channel, "TIP_MEASUREMENT");
+  EXPECT_EQ(events[2].number, 2);
+  EXPECT_EQ(events[2].timestamp_us, 1003);
+  EXPECT_EQ(Bytes(events[2].data.begin(), events[2].data.end()), encode(tip(1)));
+}
+
+TEST(Log, an_empty_log_is_intact_and_a_foreign_file_is_not) {
+  LogDamage damage;
+  EXPECT_TRUE(read_all({}, damage).empty());
+  EXPECT_TRUE(damage.intact());
+  const Bytes foreign(1000, 'x');
+  EXPECT_TRUE(read_all(foreign, damage).empty());
+  EXPECT_EQ(damage.skipped_bytes, 1000);
+}
+
+TEST(Log, cut_at_every_byte_gives_the_whole_events_and_a_torn_tail) {
+  const Bytes log = small_log();
+  LogDamage damage;
+  const auto whole = read_all(log, damage);
+  std::set<std::size_t> ends{0};
+  for (const auto& event : whole) ends.insert(event.offset + 28 + event.channel.size() + event.data.size());
+  for (std::size_t size = 0; size <= log.size(); ++size) {
+    const Bytes cut(log.begin(), log.begin() + static_cast<std::ptrdiff_t>(size));
+    const auto events = read_all(cut, damage);
+    const auto last_end = *std::prev(ends.upper_bound(size));
+    EXPECT_EQ(size_of(events), last_end) << "cut at " << size;
+    EXPECT_EQ(damage.torn_tail_bytes, static_cast<std::int64_t>(size - last_end)) << "cut at " << size;
+    EXPECT_EQ(damage.skipped_bytes, 0) << "cut at " << size;
+  }
+}
+
+// One flipped byte costs at most the event in which it lies, and nothing that is read is made up.
+TEST(Log, flipped_at_every_byte_costs_at_most_one_event) {
+  const Bytes log = small_log();
+  LogDamage damage;
+  const Recording original = read_recording(log);
+  ASSERT_TRUE(original.intact());
+  ASSERT_EQ(original.tips.size() + original.actuators.size(), 6U);
+  for (std::size_t at = 0; at < log.size(); ++at) {
+    for (const std::uint8_t mask : {0x01, 0x80, 0xff}) {
+      Bytes flipped = log;
+      flipped[at] ^= mask;
+      const auto events = read_all(flipped, damage);
+      EXPECT_GE(events.size(), kSmallLogEvents - 1U) << "byte " << at << " mask " << int{mask};
+      EXPECT_EQ(size_of(events) + static_cast<std::size_t>(damage.skipped_bytes + damage.torn_tail_bytes), log.size())
+          << "byte " << at << " mask " << int{mask};
+      const Recording recording = read_recording(flipped);
+      EXPECT_GE(recording.tips.size() + recording.actuators.size(), 5U) << "byte " << at << " mask " << int{mask};
+    }
+  }
+}
+
+TEST(Log, damage_of_several_bytes_and_rubbish_between_events_are_skipped_and_counted) {
+  const Bytes log = small_log();
+  LogDamage damage;
+  const auto whole = read_all(log, damage);
+  Bytes damaged(log.begin(), log.begin() + static_cast<std::ptrdiff_t>(whole[3].offset));
+  const Bytes rubbish(500, 0xED);  // the first byte of the magic, over and over
+  damaged.insert(damaged.end(), rubbish.begin(), rubbish.end());
+  damaged.insert(damaged.end(), log.begin() + static_cast<std::ptrdiff_t>(whole[3].offset), log.end());
+  // The event before the rubbish ends where nothing that may follow an event stands, so it is doubted too.
+  const auto events = read_all(damaged, damage);
+  EXPECT_EQ(events.size(), kSmallLogEvents - 1U);
+  EXPECT_EQ(damage.regions, 1);
+  EXPECT_EQ(damage.torn_tail_bytes, 0);
+  EXPECT_EQ(damage.skipped_bytes, static_cast<std::int64_t>(500 + whole[3].offset - whole[2].offset));
+  EXPECT_THAT(damage.describe(), ::testing::HasSubstr("1 damaged place"));
+}
+
+TEST(Log, a_data_length_of_2_to_the_31_is_damage_and_not_a_crash) {
+  Bytes log = small_log();
+  log[24] = 0x7f;
+  log[25] = log[26] = log[27] = 0xff;
+  LogDamage damage;
+  EXPECT_EQ(read_all(log, damage).size(), kSmallLogEvents - 1U);
+  EXPECT_FALSE(damage.intact());
+}
+
+TEST(Log, random_bytes_full_of_magics_are_read_in_linear_time) {
+  constexpr unsigned kSeed = 7;
+  std::mt19937 random(kSeed);
+  Bytes noise(1 << 20);
+  for (auto& byte : noise) byte = static_cast<std::uint8_t>(random());
+  for (std::size_t i = 0; i + 32 < noise.size(); i += 32) {
+    const Bytes magic{0xED, 0xA1, 0xDA, 0x01};
+    std::copy(magic.begin(), magic.end(), noise.begin() + static_cast<std::ptrdiff_t>(i));
+  }
+  LogDamage damage;
+  const auto events = read_all(noise, damage);
+  EXPECT_EQ(size_of(events) + static_cast<std::size_t>(damage.skipped_bytes + damage.torn_tail_bytes), noise.size());
+}
+
+TEST(Log, files_that_cannot_be_opened_are_named) {
+  EXPECT_THROW(MappedFile("/nonexistent.lcm"), std::runtime_error);
+  EXPECT_THROW(MappedFile("/tmp"), std::runtime_error);
+  EXPECT_THROW(LogWriter("/nonexistent/out.lcm"), std::runtime_error);
+}
+
+TEST(Recording, sorts_channels_counts_rejects_and_skips_what_it_does_not_know) {
+  const TemporaryLog file("recording.lcm");
+  {
+    LogWriter writer(file.path());
+    writer.write_text(1, channel::kConfig, "k = 1");
+    writer.write_text(2, "LCM_SELF_TEST", "lcm self test");
+    writer.write_message(3, channel::kTipMeasurement, tip(1));
+    auto bad = tip(2);
+    bad.position_mm[1] = std::numeric_limits<double>::quiet_NaN();
+    writer.write_message(4, channel::kTipMeasurement, bad);
+    writer.write_message(5, channel::kTipMeasurement, actuator(3));  // the wrong type on the channel
+    writer.write_message(6, channel::kActuatorState, actuator(4));
+    writer.close();
+  }
+  const Recording recording = read_recording(file.path());
+  EXPECT_EQ(recording.events, 6);
+  EXPECT_EQ(recording.config, "k = 1");
+  ASSERT_EQ(recording.tips.size(), 1U);
+  EXPECT_DOUBLE_EQ(recording.tips[0].information_per_mm2(1, 1), 100.0);
+  EXPECT_EQ(recording.actuators.size(), 1U);
+  EXPECT_EQ(recording.skipped_channels.at("LCM_SELF_TEST"), 1);
+  EXPECT_EQ(recording.rejected(), 2);
+  EXPECT_FALSE(recording.intact());
+  EXPECT_THAT(recording.describe_faults(), ::testing::HasSubstr("TIP_MEASUREMENT: 1 refused (not finite)"));
+  EXPECT_THAT(recording.describe_faults(), ::testing::HasSubstr("TIP_MEASUREMENT: 1 refused (size)"));
+}
+
+TEST(Recording, speed) {
+  const TemporaryLog file("speed.lcm");
+  constexpr int kEvents = 200'000;
+  {
+    LogWriter writer(file.path());
+    for (std::int64_t i = 1; i <= kEvents; ++i) writer.write_message(i, channel::kActuatorState, actuator(i));
+    writer.close();
+  }
+  const auto start = std::chrono::steady_clock::now();
+  const Recording recording = read_recording(file.path());
+  const std::chrono::duration<double> took = std::chrono::steady_clock::now() - start;
+  EXPECT_EQ(recording.actuators.size(), static_cast<std::size_t>(kEvents));
+  RecordProperty("million_events_per_s", std::to_string(1e-6 * kEvents / took.count()));
+  std::printf("decoded %.1f million events/s\n", 1e-6 * kEvents / took.count());
+}
+
+// Python's lcm.EventLog reads what we write, and the other way round.
+TEST(LogInterop, pythons_event_log_and_ours_agree) {
+  const std::string source = BEVEL_SOURCE_DIR;
+  const std::string environment =
+      "PYTHONPATH='" + source + "/.deps/lcm:" + BEVEL_BINARY_DIR + "/lcmtypes/python' python3 ";
+  if (std::system((environment + "-c 'import lcm' 2>/dev/null").c_str()) != 0) {
+    GTEST_SKIP() << "Python's lcm is not there; run tools/setup";
+  }
+  const TemporaryLog ours("ours.lcm");
+  const TemporaryLog theirs("theirs.lcm");
+  {
+    LogWriter writer(ours.path());
+    for (std::int64_t i = 1; i <= 3; ++i) writer.write_message(1000 + i, channel::kTipMeasurement, tip(i));
+    writer.close();
+  }
+  const std::string script = source + "/tests/io/event_log_interop.py";
+  ASSERT_EQ(std::system((environment + script + " " + ours.path() + " " + theirs.path()).c_str()), 0);
+  const Recording recording = read_recording(theirs.path());
+  EXPECT_TRUE(recording.intact()) << recording.describe_faults();
+  ASSERT_EQ(recording.tips.size(), 3U);
+  EXPECT_DOUBLE_EQ(recording.tips[2].position_mm.z(), 3.0);
+  EXPECT_EQ(recording.tips[2].utime, tip(3).utime);
+}
+
+}  // namespace
+}  // namespace bevel::io
