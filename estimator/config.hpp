@@ -34,7 +34,7 @@ struct Gate {
 };
 
 struct HealthLimits {
-  double measurement_age_s = 0.25;
+  double measurement_age_s = 0.13;  // 30 Hz and 50 ms of latency pass, one lost frame too; rest within 200 ms
   double actuator_age_s = 0.1;
   double position_sd_mm = 3.0;  // largest standard deviation along any axis
 };

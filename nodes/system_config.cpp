@@ -4,6 +4,7 @@
 
 #include "io/config.hpp"
 #include "io/estimator_config.hpp"
+#include "io/model_file.hpp"
 
 namespace bevel::nodes {
 namespace {
@@ -13,21 +14,6 @@ using io::in_range;
 using io::optional;
 using io::required;
 using io::Section;
-
-void read_needle(Section s, model::NeedleParameters& needle, io::Presence presence) {
-  s.read("curvature_per_mm", needle.curvature_per_mm, presence, in_range(-0.05, 0.05));
-  s.read("wheelbase_mm", needle.wheelbase_mm, presence, in_range(1, 1000));
-  s.read("lambda1_per_rad", needle.lambda1_per_rad, presence, in_range(0, 5));
-  s.read("lambda2", needle.lambda2, presence, in_range(-2, 0.9));
-  s.read("slip", needle.slip, optional,
-         io::Choices<model::SlipDirection>{{"isotropic", model::SlipDirection::isotropic},
-                                           {"bevel-plane", model::SlipDirection::bevel_plane}});
-  s.read("front_wheel", needle.front_wheel, optional,
-         io::Choices<model::FrontWheel>{{"published", model::FrontWheel::published},
-                                        {"nonslip", model::FrontWheel::nonslip}});
-  if (!s.present()) return;
-  if (const auto violation = model::find_domain_violation(needle)) s.fail("", model::describe(*violation));
-}
 
 void read_controller(Section s, controller::ControllerConfig& c) {
   s.read("period_s", c.period_s, optional, in_range(0.002, 0.2));
@@ -138,7 +124,7 @@ CameraViewConfig read_camera(Section s) {
 }
 
 void read_rig(Section s, RigConfig& c) {
-  if (Section truth = s.section("needle", optional); truth.present()) read_needle(truth, c.truth, required);
+  if (Section truth = s.section("needle", optional); truth.present()) c.truth = io::read_needle(truth);
   s.read("roll_error_rad", c.roll_error_rad, optional, in_range(-3.2, 3.2));
   s.read("frames_socket", c.frames_socket, optional);
   s.read("frame_rate_hz", c.frame_rate_hz, optional, in_range(1, 120));
@@ -157,7 +143,7 @@ SystemConfig load_system_config(const std::string& path) {
   system.read("lcm_url", c.lcm_url, optional);
   system.read("can", c.can, optional);
   system.read("realtime", c.realtime, optional);
-  read_needle(file.section("needle", required), c.needle, required);
+  c.needle = io::read_needle(file.section("needle", required));
   c.estimator.prior.needle = c.needle;
   io::read_estimator_config(file.section("estimator", optional), c.estimator);
   read_controller(file.section("controller", optional), c.controller);

@@ -46,8 +46,8 @@ class Loop : public ::testing::Test {
       drive_buses = {can::open_bus(can), can::open_bus(can)};
       start_ns = nodes::now().ns;
     } else {
-      stepper_bus = std::make_unique<can::MemoryBus>(network);
-      drive_buses = {std::make_unique<can::MemoryBus>(network), std::make_unique<can::MemoryBus>(network)};
+      stepper_bus = network.attach();
+      drive_buses = {network.attach(), network.attach()};
     }
     rig = std::make_unique<nodes::RigNode>(lcm, *drive_buses[0], *drive_buses[1], config, nullptr);
     stepper = std::make_unique<nodes::StepperNode>(lcm, *stepper_bus, config.stepper);
@@ -117,7 +117,8 @@ class Loop : public ::testing::Test {
   }
 
   void steer_to(const Eigen::Vector3d& target) {
-    ASSERT_TRUE(run(5, [this] { return stepper->report().state == stepper::DriverState::ready; }));
+    using enum stepper::DriverState;
+    ASSERT_TRUE(run(5, [this] { return stepper->report().state == ready || stepper->report().state == stopped; }));
     run(0.3);
     say(1, target);
     ASSERT_EQ(state(), controller::State::armed) << controller::to_string(reason());
@@ -169,7 +170,7 @@ TEST_F(Loop, ACameraThatFallsSilentStopsTheNeedleAndNothingRestartsByItself) {
   const std::int64_t silent_since = ms;
   ASSERT_TRUE(run(2, [this] { return speed() < 0.01; }));
   std::cout << "at rest " << ms - silent_since << " ms after the last picture was taken\n";
-  EXPECT_LT(ms - silent_since, 500);
+  EXPECT_LT(ms - silent_since, 200);
   EXPECT_EQ(reason(), controller::Reason::state_unhealthy);
   const Eigen::Vector3d stopped = tip();
   ON_CALL(camera, see).WillByDefault([this](const Eigen::Vector3d& t, std::int64_t u, int w) {

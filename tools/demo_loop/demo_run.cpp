@@ -1,0 +1,103 @@
+#include "tools/demo_loop/demo_run.hpp"
+
+#include <cstdio>
+#include <filesystem>
+#include <fstream>
+#include <stdexcept>
+
+#include "nodes/system_config.hpp"
+#include "tools/demo_loop/loop_figures.hpp"
+#include "tools/demo_loop/process_group.hpp"
+#include "tools/demo_loop/steering_session.hpp"
+
+namespace bevel::tools {
+namespace {
+
+constexpr const char* kPrograms[] = {"bevel-rig", "bevel-stepper", "bevel-camera", "bevel-estimator",
+                                     "bevel-controller"};
+
+std::string tail_of(const std::string& path) {
+  std::ifstream file(path);
+  std::string line, text;
+  while (std::getline(file, line)) text += "  | " + line + "\n";
+  return text;
+}
+
+enum class End { arrived, stopped, died, timed_out, interrupted };
+
+End steer(SteeringSession& session, ProcessGroup& processes, lcm::LCM& lcm, const DemoOptions& options) {
+  End end = End::interrupted;
+  const std::int64_t start_ns = nodes::now().ns;
+  nodes::run_periodic(lcm, 0.01, [&](const nodes::Now& now, double) {
+    const auto progress = session.step(now);
+    if (const auto death = processes.first_death()) {
+      const std::string name = death->substr(0, death->find(':'));
+      std::fprintf(stderr, "bevel-demo: a process died: %s\n%s", death->c_str(),
+                   tail_of(options.out + "/" + name + ".txt").c_str());
+      end = End::died;
+      return false;
+    }
+    if (progress == SteeringSession::Progress::arrived) end = End::arrived;
+    if (progress == SteeringSession::Progress::stopped) end = End::stopped;
+    const double elapsed_s = static_cast<double>(now.ns - start_ns) * 1e-9;
+    if (progress == SteeringSession::Progress::going_on && elapsed_s > options.time_limit_s) {
+      end = End::timed_out;
+      return false;
+    }
+    return progress == SteeringSession::Progress::going_on;
+  });
+  session.stop(nodes::now().utime);
+  return end;
+}
+
+}  // namespace
+
+int run_demo(const DemoOptions& options) {
+  const nodes::SystemConfig config = nodes::load_system_config(options.config_path);
+  std::filesystem::create_directories(options.out);
+  const std::string log_path = options.out + "/insertion.lcm";
+  lcm::LCM lcm(config.lcm_url);
+  if (!lcm.good()) throw std::runtime_error("LCM does not start; is multicast routed? (see docs/running.md)");
+  nodes::catch_signals();
+  const Eigen::Vector3d target(options.target_mm[0], options.target_mm[1], options.target_mm[2]);
+  SteeringSession session(lcm, log_path, target);
+  nodes::LcmPort(lcm).publish_text(io::channel::kConfig, config.text);
+
+  End end = End::interrupted;
+  bool clean = false;
+  {
+    ProcessGroup processes;
+    for (const char* program : kPrograms)
+      processes.start(program, {options.programs + "/" + program, "--config", options.config_path},
+                      options.out + "/" + program + ".txt");
+    end = steer(session, processes, lcm, options);
+    clean = processes.stop_all();
+  }
+  session.close_log();
+  if (!clean) std::fprintf(stderr, "bevel-demo: a process did not end when asked and was killed\n");
+  switch (end) {
+    case End::interrupted:
+      std::fprintf(stderr, "bevel-demo: interrupted; everything is stopped\n");
+      return 130;
+    case End::died:
+      return 1;
+    case End::timed_out:
+      std::fprintf(stderr, "bevel-demo: not there after %.0f s: %s\n", options.time_limit_s, session.reason().c_str());
+      return 1;
+    case End::stopped:
+      std::fprintf(stderr, "bevel-demo: the needle was stopped: %s\n", session.reason().c_str());
+      return 1;
+    case End::arrived:
+      break;
+  }
+  const LoopFigures figures = loop_figures(log_path);
+  std::printf("\n%s\n", to_text(figures).c_str());
+  write_loop_report(log_path, figures, options.out + "/report.html");
+  std::printf("report %s/report.html, log %s\n", options.out.c_str(), log_path.c_str());
+  if (figures.targeting_error_mm <= options.tolerance_mm) return clean ? 0 : 1;
+  std::fprintf(stderr, "bevel-demo: missed by %.2f mm, more than %.2f mm\n", figures.targeting_error_mm,
+               options.tolerance_mm);
+  return 1;
+}
+
+}  // namespace bevel::tools

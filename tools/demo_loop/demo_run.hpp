@@ -1,0 +1,20 @@
+#pragma once
+// The demo from start to end.
+#include <string>
+#include <vector>
+
+namespace bevel::tools {
+
+struct DemoOptions {
+  std::string config_path = "config/demo.toml";
+  std::string out = "out/demo";
+  std::string programs;  // folder of the five programs
+  std::vector<double> target_mm{6, -9, 100};
+  double tolerance_mm = 2;
+  double time_limit_s = 55;
+};
+
+// Exit status: 0 arrived within tolerance, 1 not, 130 interrupted. Throws for what keeps it from starting.
+int run_demo(const DemoOptions& options);
+
+}  // namespace bevel::tools

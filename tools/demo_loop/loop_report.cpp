@@ -1,0 +1,150 @@
+#include <Eigen/Geometry>
+#include <cmath>
+
+#include "io/html_report.hpp"
+#include "tools/demo_loop/loop_figures.hpp"
+
+namespace bevel::tools {
+namespace {
+
+using io::Plot;
+
+struct Column {
+  std::vector<double> t, x, y, z, sd_x, sd_y, sd_z;
+};
+
+// At most about `rows` of them: a page needs no more, and gnuplot draws each.
+template <class Messages>
+std::size_t stride(const Messages& messages, std::size_t rows = 800) {
+  return std::max<std::size_t>(1, messages.size() / rows);
+}
+
+Column column(const std::vector<needle_state_t>& states, std::int64_t start_utime) {
+  Column c;
+  for (std::size_t i = 0; i < states.size(); i += stride(states)) {
+    const needle_state_t& m = states[i];
+    c.t.push_back(static_cast<double>(m.utime - start_utime) * 1e-6);
+    c.x.push_back(m.position_mm[0]), c.y.push_back(m.position_mm[1]), c.z.push_back(m.position_mm[2]);
+    // The covariance is of the body frame; what a reader sees is {A}.
+    const Eigen::Matrix3d R =
+        Eigen::Quaterniond(m.orientation_wxyz[0], m.orientation_wxyz[1], m.orientation_wxyz[2], m.orientation_wxyz[3])
+            .normalized()
+            .toRotationMatrix();
+    Eigen::Matrix3d P;
+    for (int r = 0; r < 3; ++r)
+      for (int k = 0; k < 3; ++k) P(r, k) = m.covariance[9 * r + k];
+    const Eigen::Vector3d sd = (R * P * R.transpose()).diagonal().cwiseMax(0).cwiseSqrt();
+    c.sd_x.push_back(sd.x()), c.sd_y.push_back(sd.y()), c.sd_z.push_back(sd.z());
+  }
+  return c;
+}
+
+std::vector<double> shifted(const std::vector<double>& v, const std::vector<double>& sd, double by) {
+  std::vector<double> out(v);
+  for (std::size_t i = 0; i < v.size(); ++i) out[i] += by * sd[i];
+  return out;
+}
+
+Plot path_plot(const char* axis, const Column& truth, const Column& estimate, const std::vector<double>& true_lateral,
+               const std::vector<double>& lateral, const std::vector<double>& sd, double target_z,
+               double target_lateral) {
+  Plot plot;
+  plot.title = std::string("Path in the plane of ") + axis + " and depth";
+  plot.x_label = "depth z (mm)";
+  plot.y_label = std::string(axis) + " (mm)";
+  plot.legend = Plot::Legend::bottom_left;
+  plot.band("estimate, 2 sigma", estimate.z, shifted(lateral, sd, -2), shifted(lateral, sd, 2), 1);
+  plot.line("estimate", estimate.z, lateral, 1);
+  plot.dashed("true tip", truth.z, true_lateral, 0);
+  plot.points("target", {target_z}, {target_lateral}, 3);
+  return plot;
+}
+
+Plot error_plot(const Column& truth, const Column& estimate) {
+  Plot plot;
+  plot.title = "Estimate against truth";
+  plot.x_label = "time (s)";
+  plot.y_label = "error (mm)";
+  plot.legend = Plot::Legend::top_right;
+  std::vector<double> t, ex, ey, ez;
+  std::size_t j = 0;
+  for (std::size_t i = 0; i < estimate.t.size(); ++i) {
+    while (j + 1 < truth.t.size() && truth.t[j + 1] <= estimate.t[i]) ++j;
+    if (j + 1 >= truth.t.size() || truth.t[j] > estimate.t[i]) continue;
+    const double share = (estimate.t[i] - truth.t[j]) / (truth.t[j + 1] - truth.t[j]);
+    const auto at = [&](const std::vector<double>& v) { return v[j] + share * (v[j + 1] - v[j]); };
+    t.push_back(estimate.t[i]);
+    ex.push_back(estimate.x[i] - at(truth.x)), ey.push_back(estimate.y[i] - at(truth.y));
+    ez.push_back(estimate.z[i] - at(truth.z));
+  }
+  plot.line("x", t, ex).line("y", t, ey).line("z", t, ez);
+  return plot;
+}
+
+Plot command_plot(const io::Recording& log, std::int64_t start_utime) {
+  Plot plot;
+  plot.title = "Commands";
+  plot.x_label = "time (s)";
+  plot.y_label = "insertion (mm/s), rotation (rad/s)";
+  std::vector<double> t, u1, u2;
+  for (std::size_t i = 0; i < log.commands.size(); i += stride(log.commands, 1500)) {
+    t.push_back(static_cast<double>(log.commands[i].utime - start_utime) * 1e-6);
+    u1.push_back(log.commands[i].insertion_rate_mm_s);
+    u2.push_back(log.commands[i].rotation_rate_rad_s);
+  }
+  plot.step("insertion rate", t, u1, 0).step("rotation rate", t, u2, 1);
+  return plot;
+}
+
+Plot parameter_plot(const std::vector<needle_state_t>& states, std::int64_t start_utime, double truth, double truth2) {
+  Plot plot;
+  plot.title = "Slip parameters, with 2 sigma";
+  plot.x_label = "time (s)";
+  plot.y_label = "lambda1 (1/rad), lambda2";
+  std::vector<double> t, l1, l1_low, l1_high, l2, l2_low, l2_high;
+  for (std::size_t i = 0; i < states.size(); i += stride(states)) {
+    const needle_state_t& m = states[i];
+    const double s1 = std::sqrt(m.covariance[70]), s2 = std::sqrt(m.covariance[80]);
+    t.push_back(static_cast<double>(m.utime - start_utime) * 1e-6);
+    l1.push_back(m.lambda1_per_rad), l1_low.push_back(m.lambda1_per_rad - 2 * s1),
+        l1_high.push_back(m.lambda1_per_rad + 2 * s1);
+    l2.push_back(m.lambda2), l2_low.push_back(m.lambda2 - 2 * s2), l2_high.push_back(m.lambda2 + 2 * s2);
+  }
+  plot.band("", t, l1_low, l1_high, 0).band("", t, l2_low, l2_high, 1);
+  plot.line("lambda1", t, l1, 0).line("lambda2", t, l2, 1);
+  plot.references.push_back({io::ReferenceLine::Axis::horizontal, truth, "true lambda1"});
+  plot.references.push_back({io::ReferenceLine::Axis::horizontal, truth2, "true lambda2"});
+  return plot;
+}
+
+}  // namespace
+
+void write_loop_report(const std::string& log_path, const LoopFigures& f, const std::string& html_path) {
+  const io::Recording log = io::read_recording(log_path);
+  const std::int64_t start = log.actuators.front().utime;
+  const Column truth = column(log.truths, start), estimate = column(log.estimates, start);
+  io::HtmlReport report("One insertion");
+  char headline[160];
+  std::snprintf(headline, sizeof headline, "The tip came to rest %.2f mm from the target", f.targeting_error_mm);
+  report.callout(
+      f.targeting_error_mm <= 2 ? io::Tone::good : io::Tone::bad, headline,
+      "True tip of the simulated needle, whose curvature and lambda are not what the software believed at the "
+      "start; the camera's pictures were rendered and tracked.");
+  report.code(to_text(f));
+  report.heading("Path");
+  report.figure(path_plot("y", truth, estimate, truth.y, estimate.y, estimate.sd_y, f.target_mm.z(), f.target_mm.y()),
+                "Side view, the plane that camera 0 sees.");
+  report.figure(path_plot("x", truth, estimate, truth.x, estimate.x, estimate.sd_x, f.target_mm.z(), f.target_mm.x()),
+                "Top view, the plane that camera 1 sees.");
+  report.heading("Errors and parameters over time");
+  report.figure(error_plot(truth, estimate), "Estimate minus true tip, in {A}.");
+  report.figure(
+      parameter_plot(log.estimates, start, f.truth->lambda1_per_rad, f.truth->lambda2),
+      "What the filter believes of the slip. Curvature, lambda1 and lambda2 trade off along one insertion: the "
+      "bands stay wide where the data do not tell them apart.");
+  report.heading("Commands");
+  report.figure(command_plot(log, start), "Rates sent to the axes.");
+  report.save(html_path);
+}
+
+}  // namespace bevel::tools

@@ -1,0 +1,89 @@
+#include "tools/demo_loop/steering_session.hpp"
+
+#include <cstdio>
+
+namespace bevel::tools {
+namespace {
+constexpr std::int64_t kWordPeriod_ns = 300'000'000;
+constexpr std::int64_t kPrintPeriod_ns = 2'000'000'000;
+constexpr std::int64_t kSettle_ns = 500'000'000;
+}  // namespace
+
+SteeringSession::SteeringSession(lcm::LCM& lcm, const std::string& log_path, const Eigen::Vector3d& target_mm)
+    : lcm_(lcm), port_(lcm), log_(log_path), target_mm_(target_mm) {
+  everything_ = lcm_.subscribe(".*", &SteeringSession::on_any, this);
+  everything_->setQueueCapacity(2000);
+  port_.subscribe<process_status_t>(io::channel::kProcessStatus,
+                                    [this](const process_status_t& m) { processes_[m.process] = m; });
+  port_.subscribe<needle_state_t>(io::channel::kNeedleState, [this](const needle_state_t& m) { estimate_ = m; });
+  port_.subscribe<needle_state_t>(io::channel::kNeedleTruth, [this](const needle_state_t& m) { truth_ = m; });
+}
+
+SteeringSession::~SteeringSession() { lcm_.unsubscribe(everything_); }
+
+void SteeringSession::on_any(const lcm::ReceiveBuffer* buffer, const std::string& channel) {
+  log_.write(buffer->recv_utime, channel, {static_cast<const std::uint8_t*>(buffer->data), buffer->data_size});
+}
+
+void SteeringSession::say(int request, std::int64_t utime) {
+  steering_target_t m{};
+  m.utime = utime;
+  m.seq = seq_++;
+  m.request = request;
+  for (int i = 0; i < 3; ++i) m.position_mm[i] = target_mm_[i];
+  port_.publish(io::channel::kSteeringTarget, m);
+}
+
+void SteeringSession::stop(std::int64_t utime) { say(0, utime); }
+
+std::string SteeringSession::state_of(const std::string& process) const {
+  const auto found = processes_.find(process);
+  return found == processes_.end() ? "not heard of" : found->second.state;
+}
+
+std::string SteeringSession::reason() const {
+  std::string text;
+  for (const auto& [name, status] : processes_)
+    text += (text.empty() ? "" : "; ") + name + " " + status.state +
+            (status.reason.empty() ? "" : " (" + status.reason + ")");
+  return text.empty() ? "no process was heard of" : text;
+}
+
+SteeringSession::Progress SteeringSession::step(const nodes::Now& now) {
+  if (start_ns_ == 0) start_ns_ = now.ns;
+  print_progress(now);
+  const std::string controller = state_of("bevel-controller");
+  if (steering_seen_ && controller == "hold") {
+    if (arrived_ns_ == 0) arrived_ns_ = now.ns;
+    return now.ns - arrived_ns_ > kSettle_ns ? Progress::arrived : Progress::going_on;
+  }
+  if (controller == "steering") steering_seen_ = true;
+  if (steering_seen_ && (controller == "stopped" || controller == "fault")) return Progress::stopped;
+  if (steering_seen_ || now.ns < next_word_ns_) return Progress::going_on;
+  // The operator's words, repeated until they take effect.
+  next_word_ns_ = now.ns + kWordPeriod_ns;
+  const std::string stepper = state_of("bevel-stepper");
+  const bool seen = estimate_ && estimate_->health == 0;
+  if (controller == "armed" && stepper == "enabled") {
+    say(2, now.utime);
+  } else if (seen && controller != "armed" && (stepper == "ready" || stepper == "enabled")) {
+    say(1, now.utime);
+  }
+  return Progress::going_on;
+}
+
+void SteeringSession::print_progress(const nodes::Now& now) {
+  if (now.ns < next_print_ns_) return;
+  next_print_ns_ = now.ns + kPrintPeriod_ns;
+  const double t = static_cast<double>(now.ns - start_ns_) * 1e-9;
+  std::printf("%5.1f s  controller %-12s axes %-12s", t, state_of("bevel-controller").c_str(),
+              state_of("bevel-stepper").c_str());
+  if (estimate_) {
+    const Eigen::Vector3d at(estimate_->position_mm[0], estimate_->position_mm[1], estimate_->position_mm[2]);
+    std::printf(" tip %6.1f %6.1f %6.1f mm  to go %5.1f mm", at.x(), at.y(), at.z(), (target_mm_ - at).norm());
+  }
+  std::printf("\n");
+  std::fflush(stdout);
+}
+
+}  // namespace bevel::tools

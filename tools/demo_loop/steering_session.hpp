@@ -1,0 +1,51 @@
+#pragma once
+// One insertion from the operator's side: everything on LCM recorded to a log, the target armed and started as soon as
+// the processes are ready, progress printed, and the end recognised.
+#include <Eigen/Core>
+#include <map>
+#include <optional>
+#include <string>
+
+#include "io/log_writer.hpp"
+#include "nodes/lcm_port.hpp"
+#include "nodes/runtime.hpp"
+
+namespace bevel::tools {
+
+class SteeringSession {
+ public:
+  SteeringSession(lcm::LCM& lcm, const std::string& log_path, const Eigen::Vector3d& target_mm);
+  ~SteeringSession();
+
+  enum class Progress { going_on, arrived, stopped };
+  // Call about every 10 ms.
+  Progress step(const nodes::Now& now);
+  // The operator's stop, sent also when the session ends early.
+  void stop(std::int64_t utime);
+  // Why the needle was stopped, or what is still waited for.
+  std::string reason() const;
+  void close_log() { log_.close(); }
+
+ private:
+  void on_any(const lcm::ReceiveBuffer* buffer, const std::string& channel);
+  void say(int request, std::int64_t utime);
+  void print_progress(const nodes::Now& now);
+  std::string state_of(const std::string& process) const;
+
+  lcm::LCM& lcm_;
+  nodes::LcmPort port_;
+  io::LogWriter log_;
+  lcm::Subscription* everything_;
+  Eigen::Vector3d target_mm_;
+  std::map<std::string, process_status_t> processes_;
+  std::optional<needle_state_t> estimate_;
+  std::optional<needle_state_t> truth_;
+  std::int64_t start_ns_ = 0;
+  std::int64_t next_word_ns_ = 0;
+  std::int64_t next_print_ns_ = 0;
+  std::int64_t arrived_ns_ = 0;
+  std::int64_t seq_ = 0;
+  bool steering_seen_ = false;
+};
+
+}  // namespace bevel::tools
