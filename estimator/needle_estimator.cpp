@@ -74,7 +74,8 @@ void NeedleEstimator::add(const model::TipMeasurement& measurement) {
     return;
   }
   // A full history drops its oldest node; one full of measurements that wait for the axes must keep its anchor.
-  if (order_.empty() || measurement.utime < node(0).utime || (free_.empty() && (measurement.utime < node(1).utime || processed_ < 2))) {
+  if (order_.empty() || measurement.utime < node(0).utime ||
+      (free_.empty() && (measurement.utime < node(1).utime || processed_ < 2))) {
     ++counters_.too_old;
     return;
   }
@@ -113,7 +114,7 @@ void NeedleEstimator::process_from(std::size_t index) {
     filter_.predict(n.state, n.insertion_mm - previous.insertion_mm, n.rotation_rad - previous.rotation_rad);
     if (n.kind != Kind::measurement) continue;
     if (observer_ && !n.applied_before) {
-      Applied applied{n.utime, n.measurement.camera, n.state, {}};
+      Applied applied{n.utime, n.measurement.camera, n.state, {}, &n.measurement};
       n.update = filter_.update(n.state, n.measurement);
       applied.update = n.update;
       observer_(observer_context_, applied);

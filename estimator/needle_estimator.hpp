@@ -47,6 +47,7 @@ class NeedleEstimator {
     std::int32_t camera;
     FilterState state_before;
     Update update;
+    const model::TipMeasurement* measurement;  // valid during the call
   };
   using Observer = void (*)(void* context, const Applied&);
   void observe(Observer observer, void* context) { observer_ = observer, observer_context_ = context; }

@@ -1,0 +1,38 @@
+#pragma once
+// Many logs in parallel, and the table over folders of recordings that share a rig.
+#include <iosfwd>
+#include <string>
+#include <vector>
+
+#include "tools/replay/replay.hpp"
+
+namespace bevel::replay {
+
+struct BatchOptions {
+  std::string model_path;   // TOML model file
+  std::string config_path;  // TOML of the estimator; empty: defaults
+  std::string out_folder;   // empty: no files
+  double ahead_mm = 20;
+  bool bicycle = false;  // lambda = 0, held there: the plain bicycle
+  bool cases = false;    // each path is a folder of case folders with model.toml and logs
+  std::vector<std::string> paths;
+};
+
+// Files as they are, folders by the .lcm files in them, in the order of their names. Throws std::runtime_error naming
+// what is not there.
+std::vector<std::string> find_logs(const std::vector<std::string>& paths);
+
+estimator::EstimatorConfig load_config(const std::string& model_path, const std::string& config_path, bool bicycle);
+
+// The replays in the order of `logs`, on as many threads as the machine has.
+std::vector<Replay> replay_logs(const std::vector<std::string>& logs, const estimator::EstimatorConfig& config,
+                                const ReplayOptions& options = {});
+
+// Prints, writes, and returns the exit status: 1 if a log was damaged or a message refused.
+int run(const BatchOptions& options, std::ostream& out, std::ostream& speed);
+
+// For each case: the camera's noise measured without the model, innovations under that noise, and whether they are
+// what a complete model would leave.
+int run_cases(const BatchOptions& options, std::ostream& out);
+
+}  // namespace bevel::replay

@@ -1,0 +1,220 @@
+#include "tools/replay/replay.hpp"
+
+#include <algorithm>
+#include <chrono>
+#include <cmath>
+
+#include "io/checked_decode.hpp"
+#include "io/messages.hpp"
+
+namespace bevel::replay {
+namespace {
+
+double square(double x) { return x * x; }
+
+struct Sink {
+  std::vector<InnovationRow>* rows;
+
+  static void take(void* context, const estimator::NeedleEstimator::Applied& applied) {
+    const model::TipMeasurement& m = *applied.measurement;
+    InnovationRow row;
+    row.utime = m.utime;
+    row.seq = m.seq;
+    row.camera = m.camera;
+    row.accepted = applied.update.accepted;
+    row.rank = applied.update.rank;
+    row.mahalanobis2 = applied.update.mahalanobis2;
+    row.position_mm = m.position_mm;
+    row.innovation_mm = m.position_mm - applied.state_before.pose.p_mm;
+    const Eigen::Matrix3d& R = applied.state_before.pose.R;
+    row.state_variance_mm2 = (R * applied.state_before.covariance.topLeftCorner<3, 3>() * R.transpose()).diagonal();
+    for (int i = 0; i < 3; ++i) {
+      const double information = m.information_per_mm2(i, i);
+      row.sees[static_cast<std::size_t>(i)] = information > 0;
+      row.noise_variance_mm2[i] = information > 0 ? 1 / information : 0;
+    }
+    static_cast<Sink*>(context)->rows->push_back(row);
+  }
+};
+
+model::TipMeasurement with_noise(model::TipMeasurement m, const std::vector<NoiseColour>& noise) {
+  for (std::size_t i = 0; i < noise.size() && i < 3; ++i) {
+    const auto axis = static_cast<Eigen::Index>(i);
+    if (m.information_per_mm2(axis, axis) > 0 && noise[i].sd_mm > 0) {
+      m.information_per_mm2.row(axis).setZero();
+      m.information_per_mm2.col(axis).setZero();
+      // A filter for white noise learns as much from frames of correlated noise as they are worth when their white
+      // equivalent over many frames is put in: (1 + rho)/(1 - rho) times the variance.
+      m.information_per_mm2(axis, axis) = (1 - noise[i].rho) / (1 + noise[i].rho) / square(noise[i].sd_mm);
+    }
+  }
+  return m;
+}
+
+// The estimate at a truth's time: the state row before it, moved by the share of the increment.
+void compare(Replay& result, const std::vector<needle_state_t>& truths, const estimator::NeedleFilter& filter) {
+  double position2 = 0, lateral2 = 0, tilt2 = 0, roll2 = 0;
+  TruthFigures& figures = result.truth;
+  for (const needle_state_t& truth : truths) {
+    const auto after = std::lower_bound(result.states.begin(), result.states.end(), truth.utime,
+                                        [](const StateRow& row, std::int64_t utime) { return row.utime < utime; });
+    if (after == result.states.end() || (after == result.states.begin() && after->utime != truth.utime)) continue;
+    estimator::FilterState state = after->state;
+    if (after->utime != truth.utime) {
+      const StateRow& before = *(after - 1);
+      const double share =
+          static_cast<double>(truth.utime - before.utime) / static_cast<double>(after->utime - before.utime);
+      state = before.state;
+      filter.predict(state, share * (after->insertion_mm - before.insertion_mm),
+                     share * (after->rotation_rad - before.rotation_rad));
+    }
+    model::Pose pose;
+    pose.p_mm = {truth.position_mm[0], truth.position_mm[1], truth.position_mm[2]};
+    const double* q = truth.orientation_wxyz;
+    pose.R = Eigen::Quaterniond(q[0], q[1], q[2], q[3]).normalized().toRotationMatrix();
+    const model::Vector6d error = model::log_se3(state.pose.inverse() * pose);
+    const Eigen::Vector3d offset = pose.p_mm - state.pose.p_mm;
+    position2 += offset.squaredNorm();
+    lateral2 += offset.head<2>().squaredNorm();
+    tilt2 += error.segment<2>(3).squaredNorm();
+    roll2 += square(error[5]);
+    figures.pose_nees.add(error.dot(state.covariance.topLeftCorner<6, 6>().ldlt().solve(error)), 6);
+    figures.last_position_error_mm = offset.norm();
+    ++figures.count;
+  }
+  if (figures.count == 0) return;
+  const auto n = static_cast<double>(figures.count);
+  figures.position_rmse_mm = std::sqrt(position2 / n);
+  figures.lateral_rmse_mm = std::sqrt(lateral2 / n);
+  figures.tilt_rmse_rad = std::sqrt(tilt2 / n);
+  figures.roll_rmse_rad = std::sqrt(roll2 / n);
+}
+
+}  // namespace
+
+Replay replay_log(std::span<const std::uint8_t> log, const std::string& name, const estimator::EstimatorConfig& config,
+                  const ReplayOptions& options) {
+  Replay result;
+  result.name = name;
+  result.config = config;
+  // An actuator state takes about 100 bytes of a log, a measurement 170.
+  result.states.reserve(log.size() / 150 + 16);
+  result.innovations.reserve(log.size() / 250 + 16);
+  std::vector<needle_state_t> truths;
+  estimator::NeedleEstimator estimator(config, options.history);
+  Sink sink{&result.innovations};
+  estimator.observe(&Sink::take, &sink);
+
+  const auto start = std::chrono::steady_clock::now();
+  io::LogReader reader(log);
+  while (const auto event = reader.next()) {
+    if (event->channel == io::channel::kActuatorState) {
+      const auto message = io::checked_decode<actuator_state_t>(event->data.data(), event->data.size());
+      if (!message) {
+        ++result.refused_messages;
+        continue;
+      }
+      const model::ActuatorState actuator = io::to_sample(*message);
+      estimator.add(actuator);
+      const estimator::Estimate estimate = estimator.estimate(actuator.utime);
+      if (estimate.utime != actuator.utime) continue;
+      result.states.push_back({actuator.utime, actuator.insertion_mm, actuator.rotation_rad, estimate.state,
+                               estimate.newest_update.test_ratio, estimate.health});
+    } else if (event->channel == io::channel::kTipMeasurement) {
+      const auto message = io::checked_decode<tip_measurement_t>(event->data.data(), event->data.size());
+      if (!message) {
+        ++result.refused_messages;
+        continue;
+      }
+      estimator.add(with_noise(io::to_sample(*message), options.noise_by_axis));
+    } else if (event->channel == io::channel::kNeedleTruth) {
+      const auto message = io::checked_decode<needle_state_t>(event->data.data(), event->data.size());
+      message ? truths.push_back(*message) : void(++result.refused_messages);
+    }
+  }
+  result.run_s = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
+  result.damage = reader.damage();
+  result.counters = estimator.counters();
+  if (!result.states.empty())
+    result.log_s = static_cast<double>(result.states.back().utime - result.states.front().utime) * 1e-6;
+  compare(result, truths, estimator.filter());
+  return result;
+}
+
+Foretold foretell(const Replay& replay, double ahead_mm) {
+  const estimator::NeedleFilter filter(replay.config);
+  Foretold result;
+  double sum = 0;
+  // Position of both axes at any time, from the actuator states.
+  const auto axes_at = [&replay](std::int64_t utime) {
+    const auto after = std::lower_bound(replay.states.begin(), replay.states.end(), utime,
+                                        [](const StateRow& row, std::int64_t t) { return row.utime < t; });
+    if (after == replay.states.end())
+      return Eigen::Vector2d(replay.states.back().insertion_mm, replay.states.back().rotation_rad);
+    if (after == replay.states.begin()) return Eigen::Vector2d(after->insertion_mm, after->rotation_rad);
+    const StateRow& before = *(after - 1);
+    const double share = static_cast<double>(utime - before.utime) / static_cast<double>(after->utime - before.utime);
+    return Eigen::Vector2d(before.insertion_mm + share * (after->insertion_mm - before.insertion_mm),
+                           before.rotation_rad + share * (after->rotation_rad - before.rotation_rad));
+  };
+  for (auto from = replay.states.begin(); from != replay.states.end(); ++from) {
+    // The first accepted measurement that lies so far ahead of a state, and is not yet part of it.
+    const auto to = std::find_if(replay.innovations.begin(), replay.innovations.end(), [&](const InnovationRow& row) {
+      return row.accepted && row.utime > from->utime && axes_at(row.utime)[0] >= from->insertion_mm + ahead_mm;
+    });
+    if (to == replay.innovations.end()) break;
+    estimator::FilterState state = from->state;
+    Eigen::Vector2d axes(from->insertion_mm, from->rotation_rad);
+    for (auto row = from + 1; row != replay.states.end() && row->utime < to->utime; ++row) {
+      filter.predict(state, row->insertion_mm - axes[0], row->rotation_rad - axes[1]);
+      axes = {row->insertion_mm, row->rotation_rad};
+    }
+    const Eigen::Vector2d last = axes_at(to->utime) - axes;
+    filter.predict(state, last[0], last[1]);
+    sum += (to->position_mm - state.pose.p_mm).head<2>().squaredNorm();
+    ++result.count;
+  }
+  if (result.count > 0) result.lateral_rmse_mm = std::sqrt(sum / static_cast<double>(result.count));
+  return result;
+}
+
+InnovationFigures innovation_figures(const Replay& replay) {
+  InnovationFigures figures;
+  std::array<std::vector<double>, 3> series;
+  for (const InnovationRow& row : replay.innovations) {
+    ++figures.measurements;
+    if (!row.accepted) {
+      ++figures.rejected;
+      continue;
+    }
+    figures.nis.add(row.mahalanobis2, row.rank);
+    for (std::size_t i = 0; i < 3; ++i) {
+      if (!row.sees[i]) continue;
+      const auto axis = static_cast<Eigen::Index>(i);
+      const double standard =
+          row.innovation_mm[axis] / std::sqrt(row.state_variance_mm2[axis] + row.noise_variance_mm2[axis]);
+      series[i].push_back(standard);
+      figures.axis[i].add(standard * standard, 1);
+    }
+  }
+  for (std::size_t i = 0; i < 3; ++i) figures.whiteness[i] = ljung_box(series[i]);
+  if (!replay.states.empty()) figures.resets = replay.states.back().state.reset_count;
+  return figures;
+}
+
+std::vector<Innovation> axis_innovations(const Replay& replay, int axis) {
+  std::vector<Innovation> series;
+  for (const InnovationRow& row : replay.innovations)
+    if (row.accepted && row.sees[static_cast<std::size_t>(axis)])
+      series.push_back({row.seq, row.innovation_mm[axis], row.state_variance_mm2[axis]});
+  return series;
+}
+
+std::vector<AxisSample> axis_samples(const Replay& replay, int axis) {
+  std::vector<AxisSample> series;
+  for (const InnovationRow& row : replay.innovations)
+    if (row.sees[static_cast<std::size_t>(axis)]) series.push_back({row.seq, row.position_mm[axis]});
+  return series;
+}
+
+}  // namespace bevel::replay

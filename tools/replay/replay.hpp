@@ -1,0 +1,92 @@
+#pragma once
+// One log through the estimator: the same NeedleEstimator that runs live, fed in the log's order of arrival.
+#include <array>
+#include <cstdint>
+#include <string>
+#include <vector>
+
+#include "estimator/needle_estimator.hpp"
+#include "io/log_reader.hpp"
+#include "tools/replay/statistics.hpp"
+
+namespace bevel::replay {
+
+// The estimate at one actuator state.
+struct StateRow {
+  std::int64_t utime = 0;
+  double insertion_mm = 0;
+  double rotation_rad = 0;
+  estimator::FilterState state;
+  double test_ratio = 0;
+  std::int32_t health = 0;
+};
+
+// One measurement when it was first applied. Axes are those of {A}.
+struct InnovationRow {
+  std::int64_t utime = 0;
+  std::int64_t seq = 0;
+  std::int32_t camera = 0;
+  bool accepted = false;
+  int rank = 0;
+  double mahalanobis2 = 0;
+  Eigen::Vector3d position_mm;         // as measured
+  std::array<bool, 3> sees{};          // the camera has information along this axis
+  Eigen::Vector3d innovation_mm;       // measured - predicted
+  Eigen::Vector3d state_variance_mm2;  // of the predicted position
+  Eigen::Vector3d noise_variance_mm2;  // of the measurement, by its information matrix
+};
+
+struct TruthFigures {
+  std::int64_t count = 0;
+  double position_rmse_mm = 0;
+  double lateral_rmse_mm = 0;
+  double tilt_rmse_rad = 0;
+  double roll_rmse_rad = 0;
+  double last_position_error_mm = 0;
+  ChiSquareMean pose_nees;  // 6 degrees each
+};
+
+struct Replay {
+  std::string name;
+  std::vector<StateRow> states;
+  std::vector<InnovationRow> innovations;
+  estimator::Counters counters;
+  std::int64_t refused_messages = 0;  // by the checked decode
+  io::LogDamage damage;
+  TruthFigures truth;  // count 0: the log has no NEEDLE_TRUTH
+  double log_s = 0;    // newest minus oldest actuator state
+  double run_s = 0;    // wall time of decoding and estimating
+  estimator::EstimatorConfig config;
+};
+
+struct ReplayOptions {
+  std::size_t history = 256;
+  // Replaces each measurement's information by that of this noise, per axis; empty: as the camera says.
+  std::vector<NoiseColour> noise_by_axis;
+};
+
+Replay replay_log(std::span<const std::uint8_t> log, const std::string& name, const estimator::EstimatorConfig& config,
+                  const ReplayOptions& options = {});
+
+// How well the filter foretells measurements that it has not seen yet, at least `ahead_mm` further in: from its state
+// just after a measurement, by the model alone. Lateral (x, y) error in mm.
+struct Foretold {
+  std::int64_t count = 0;
+  double lateral_rmse_mm = 0;
+};
+Foretold foretell(const Replay& replay, double ahead_mm);
+
+// Figures over the innovations of one or more replays.
+struct InnovationFigures {
+  ChiSquareMean nis;                  // d^2 per axis seen, accepted measurements
+  std::array<ChiSquareMean, 3> axis;  // x, y, z on their own, standardised
+  std::array<LjungBox, 3> whiteness;  // of one replay (the first)
+  std::int64_t measurements = 0, rejected = 0, resets = 0;
+};
+InnovationFigures innovation_figures(const Replay& replay);
+
+// The innovations of accepted measurements along one axis, in order, and each axis's raw readings.
+std::vector<Innovation> axis_innovations(const Replay& replay, int axis);
+std::vector<AxisSample> axis_samples(const Replay& replay, int axis);
+
+}  // namespace bevel::replay

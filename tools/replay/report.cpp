@@ -1,0 +1,215 @@
+#include "tools/replay/report.hpp"
+
+#include <cmath>
+#include <cstdio>
+#include <filesystem>
+#include <memory>
+#include <ostream>
+#include <sstream>
+#include <stdexcept>
+
+#include "estimator/health.hpp"
+#include "io/html_report.hpp"
+
+namespace bevel::replay {
+namespace {
+
+constexpr const char* kAxisName[] = {"x", "y", "z"};
+
+template <class... Values>
+std::string text_of(const char* format, Values... values) {
+  char buffer[512];
+  std::snprintf(buffer, sizeof buffer, format, values...);
+  return buffer;
+}
+
+std::string with_band(const ChiSquareMean& mean) {
+  return text_of("%.3f  95 %% band [%.3f, %.3f]  %s", mean.mean(), mean.lowest(), mean.highest(),
+                 mean.in_band() ? "in" : "OUT");
+}
+
+double sd(const estimator::FilterState& state, Eigen::Index i) { return std::sqrt(state.covariance(i, i)); }
+
+// Standard deviation of the tip along the axes of {A}.
+Eigen::Vector3d position_sd_mm(const estimator::FilterState& state) {
+  const Eigen::Matrix3d& R = state.pose.R;
+  return (R * state.covariance.topLeftCorner<3, 3>() * R.transpose()).diagonal().cwiseSqrt();
+}
+
+class CsvFile {
+ public:
+  CsvFile(const std::string& path, const char* header) : file_(std::fopen(path.c_str(), "w")), path_(path) {
+    if (!file_) throw std::runtime_error(path + ": cannot be written");
+    std::fprintf(file_.get(), "%s\n", header);
+  }
+  template <class... Values>
+  void row(const char* format, Values... values) {
+    std::fprintf(file_.get(), format, values...);
+  }
+  void close() {
+    if (std::fflush(file_.get()) != 0) throw std::runtime_error(path_ + ": cannot be written to its end");
+  }
+
+ private:
+  struct Close {
+    void operator()(std::FILE* file) const { std::fclose(file); }
+  };
+  std::unique_ptr<std::FILE, Close> file_;
+  std::string path_;
+};
+
+void write_csv(const Replay& replay, const std::string& stem) {
+  CsvFile states(stem + ".states.csv",
+                 "utime,insertion_mm,rotation_rad,x_mm,y_mm,z_mm,qw,qx,qy,qz,curvature_per_mm,lambda1_per_rad,lambda2,"
+                 "x_sd_mm,y_sd_mm,z_sd_mm,tilt_x_sd_rad,tilt_y_sd_rad,roll_sd_rad,curvature_sd_per_mm,"
+                 "lambda1_sd_per_rad,lambda2_sd,test_ratio,health,resets");
+  for (const StateRow& row : replay.states) {
+    const auto& s = row.state;
+    const Eigen::Quaterniond q(s.pose.R);
+    const Eigen::Vector3d spread = position_sd_mm(s);
+    states.row("%lld,%.6f,%.6f,%.6f,%.6f,%.6f,%.9f,%.9f,%.9f,%.9f,%.9g,%.9g,%.9g,", static_cast<long long>(row.utime),
+               row.insertion_mm, row.rotation_rad, s.pose.p_mm.x(), s.pose.p_mm.y(), s.pose.p_mm.z(), q.w(), q.x(),
+               q.y(), q.z(), s.curvature_per_mm, s.lambda1_per_rad, s.lambda2);
+    states.row("%.6g,%.6g,%.6g,%.6g,%.6g,%.6g,%.6g,%.6g,%.6g,%.6g,%d,%d\n", spread.x(), spread.y(), spread.z(),
+               sd(s, 3), sd(s, 4), sd(s, 5), sd(s, 6), sd(s, 7), sd(s, 8), row.test_ratio, row.health, s.reset_count);
+  }
+  states.close();
+  CsvFile innovations(stem + ".innovations.csv",
+                      "utime,seq,camera,accepted,rank,mahalanobis2,x_mm,y_mm,z_mm,innovation_x_mm,innovation_y_mm,"
+                      "innovation_z_mm,state_variance_x_mm2,state_variance_y_mm2,state_variance_z_mm2");
+  for (const InnovationRow& row : replay.innovations)
+    innovations.row(
+        "%lld,%lld,%d,%d,%d,%.6g,%.6f,%.6f,%.6f,%.6f,%.6f,%.6f,%.6g,%.6g,%.6g\n", static_cast<long long>(row.utime),
+        static_cast<long long>(row.seq), row.camera, static_cast<int>(row.accepted), row.rank, row.mahalanobis2,
+        row.position_mm.x(), row.position_mm.y(), row.position_mm.z(), row.innovation_mm.x(), row.innovation_mm.y(),
+        row.innovation_mm.z(), row.state_variance_mm2.x(), row.state_variance_mm2.y(), row.state_variance_mm2.z());
+  innovations.close();
+}
+
+// A state over insertion with its 2-sigma band; `thin` keeps the page small.
+template <class Value, class Spread>
+io::Plot band_plot(const Replay& replay, const std::string& label, Value value, Spread spread) {
+  std::vector<double> x, y, low, high;
+  const std::size_t thin = std::max<std::size_t>(1, replay.states.size() / 400);
+  for (std::size_t i = 0; i < replay.states.size(); i += thin) {
+    const StateRow& row = replay.states[i];
+    x.push_back(static_cast<double>(row.utime - replay.states.front().utime) * 1e-6);
+    y.push_back(value(row));
+    low.push_back(y.back() - 2 * spread(row));
+    high.push_back(y.back() + 2 * spread(row));
+  }
+  io::Plot plot;
+  plot.title = label;
+  plot.x_label = "time (s)";
+  plot.y_label = label;
+  plot.height_px = 260;
+  plot.band("2 sigma", x, low, high, 0).line("estimate", x, y, 0);
+  return plot;
+}
+
+void add_state_plots(io::HtmlReport& page, const Replay& replay) {
+  for (const Eigen::Index i : {0, 1, 2}) {
+    io::Plot plot = band_plot(
+        replay, std::string(kAxisName[i]) + " (mm)", [i](const StateRow& r) { return r.state.pose.p_mm[i]; },
+        [i](const StateRow& r) { return position_sd_mm(r.state)[i]; });
+    std::vector<double> t, p;
+    const std::size_t thin = std::max<std::size_t>(1, replay.innovations.size() / 400);
+    for (std::size_t k = 0; k < replay.innovations.size(); k += thin) {
+      const InnovationRow& row = replay.innovations[k];
+      if (!row.sees[static_cast<std::size_t>(i)]) continue;
+      t.push_back(static_cast<double>(row.utime - replay.states.front().utime) * 1e-6);
+      p.push_back(row.position_mm[i]);
+    }
+    if (!t.empty()) plot.points("measured", t, p, 1);
+    page.figure(plot, "");
+  }
+  page.figure(band_plot(
+                  replay, "k (1/mm)", [](const StateRow& r) { return r.state.curvature_per_mm; },
+                  [](const StateRow& r) { return sd(r.state, 6); }),
+              "Curvature. A band as wide as the prior's says that the path so far does not show it.");
+  page.figure(band_plot(
+                  replay, "lambda1 (1/rad)", [](const StateRow& r) { return r.state.lambda1_per_rad; },
+                  [](const StateRow& r) { return sd(r.state, 7); }),
+              "");
+  page.figure(band_plot(
+                  replay, "lambda2", [](const StateRow& r) { return r.state.lambda2; },
+                  [](const StateRow& r) { return sd(r.state, 8); }),
+              "");
+  page.figure(band_plot(
+                  replay, "roll sd (rad)", [](const StateRow& r) { return sd(r.state, 5); },
+                  [](const StateRow&) { return 0.0; }),
+              "Roll is never measured: this is what the filter admits not to know of it.");
+}
+
+}  // namespace
+
+void print(std::ostream& out, const Replay& replay, double ahead_mm) {
+  const InnovationFigures figures = innovation_figures(replay);
+  const estimator::Counters& c = replay.counters;
+  out << replay.name << "\n";
+  out << text_of(
+      "  messages     %lld actuator states (%lld refused), %lld measurements: %lld not usable, %lld too old, "
+      "%lld duplicate, %lld late\n",
+      static_cast<long long>(c.actuators), static_cast<long long>(c.actuators_refused),
+      static_cast<long long>(c.measurements), static_cast<long long>(c.not_usable), static_cast<long long>(c.too_old),
+      static_cast<long long>(c.duplicate), static_cast<long long>(c.late));
+  if (replay.refused_messages > 0)
+    out << "  REFUSED      " << replay.refused_messages << " messages that do not decode\n";
+  if (!replay.damage.intact()) out << "  DAMAGED LOG  " << replay.damage.describe() << "\n";
+  if (replay.states.empty()) {
+    out << "  no actuator state: nothing to estimate\n";
+    return;
+  }
+  out << text_of("  gate         %lld of %lld rejected, %lld declared resets\n",
+                 static_cast<long long>(figures.rejected), static_cast<long long>(figures.measurements),
+                 static_cast<long long>(figures.resets));
+  if (figures.nis.degrees > 0) out << "  NIS / axis   " << with_band(figures.nis) << "\n";
+  for (std::size_t i = 0; i < 3; ++i) {
+    if (figures.axis[i].degrees == 0) continue;
+    const LjungBox& white = figures.whiteness[i];
+    out << "  " << kAxisName[i] << "            " << with_band(figures.axis[i])
+        << text_of("; Ljung-Box Q(%d) %.1f, p %.3g\n", white.lags, white.statistic, white.p_value);
+  }
+  const estimator::FilterState& last = replay.states.back().state;
+  out << text_of("  k            %.6f +- %.6f /mm\n  lambda1      %.4f +- %.4f /rad\n  lambda2      %.4f +- %.4f\n",
+                 last.curvature_per_mm, sd(last, 6), last.lambda1_per_rad, sd(last, 7), last.lambda2, sd(last, 8));
+  const Eigen::Vector3d spread = position_sd_mm(last);
+  out << text_of("  tip          %.3f %.3f %.3f +- %.3f %.3f %.3f mm, roll +- %.3f rad, %s\n", last.pose.p_mm.x(),
+                 last.pose.p_mm.y(), last.pose.p_mm.z(), spread.x(), spread.y(), spread.z(), sd(last, 5),
+                 estimator::describe_health(replay.states.back().health).c_str());
+  if (replay.truth.count > 0) {
+    out << text_of(
+        "  truth        RMSE position %.3f mm (lateral %.3f), tilt %.4f rad, roll %.4f rad; last %.3f mm; %lld "
+        "samples\n",
+        replay.truth.position_rmse_mm, replay.truth.lateral_rmse_mm, replay.truth.tilt_rmse_rad,
+        replay.truth.roll_rmse_rad, replay.truth.last_position_error_mm, static_cast<long long>(replay.truth.count));
+    // One insertion's errors hang together over time, so a band for independent ones would not hold.
+    out << text_of("  pose NEES/6  %.3f over the insertion (not independent samples)\n", replay.truth.pose_nees.mean());
+  }
+  const Foretold next = foretell(replay, 1e-6);
+  const Foretold ahead = foretell(replay, ahead_mm);
+  out << text_of("  foretold     lateral RMSE %.3f mm one measurement ahead, %.3f mm %g mm ahead (%lld)\n",
+                 next.lateral_rmse_mm, ahead.lateral_rmse_mm, ahead_mm, static_cast<long long>(ahead.count));
+}
+
+void print_speed(std::ostream& out, const std::vector<Replay>& replays) {
+  double log_s = 0, run_s = 0;
+  for (const Replay& r : replays) log_s += r.log_s, run_s += r.run_s;
+  out << text_of("%zu logs, %.1f s recorded, %.4f s decoding and estimating: %.0f times real time on one core\n",
+                 replays.size(), log_s, run_s, run_s > 0 ? log_s / run_s : 0.0);
+}
+
+void write_files(const Replay& replay, const std::string& folder) {
+  std::filesystem::create_directories(folder);
+  const std::string stem = (std::filesystem::path(folder) / replay.name).string();
+  write_csv(replay, stem);
+  if (replay.states.size() < 2) return;
+  io::HtmlReport page("Replay of " + replay.name);
+  std::ostringstream summary;
+  print(summary, replay, 20);
+  page.heading("Figures").code(summary.str()).heading("States with 2-sigma bands");
+  add_state_plots(page, replay);
+  page.save(stem + ".html");
+}
+
+}  // namespace bevel::replay

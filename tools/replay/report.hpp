@@ -1,0 +1,19 @@
+#pragma once
+// What bevel-replay prints, and the files that it writes. The same replay gives the same bytes, except for the speed,
+// which only print_speed() mentions.
+#include <iosfwd>
+#include <string>
+#include <vector>
+
+#include "tools/replay/replay.hpp"
+
+namespace bevel::replay {
+
+void print(std::ostream& out, const Replay& replay, double ahead_mm);
+void print_speed(std::ostream& out, const std::vector<Replay>& replays);
+
+// DIR/<name>.states.csv, DIR/<name>.innovations.csv and one page DIR/<name>.html. Throws std::runtime_error naming the
+// file.
+void write_files(const Replay& replay, const std::string& folder);
+
+}  // namespace bevel::replay
