@@ -52,7 +52,8 @@ Plot path_plot(const char* axis, const Column& truth, const Column& estimate, co
   plot.title = std::string("Path in the plane of ") + axis + " and depth";
   plot.x_label = "depth z (mm)";
   plot.y_label = std::string(axis) + " (mm)";
-  plot.legend = Plot::Legend::bottom_left;
+  plot.legend = target_lateral < 0 ? Plot::Legend::bottom_left : Plot::Legend::top_left;
+  plot.x_range = {{-2, std::max(target_z, truth.z.back()) * 1.05}};
   plot.band("estimate, 2 sigma", estimate.z, shifted(lateral, sd, -2), shifted(lateral, sd, 2), 1);
   plot.line("estimate", estimate.z, lateral, 1);
   plot.dashed("true tip", truth.z, true_lateral, 0);
