@@ -90,6 +90,18 @@ void compare(Replay& result, const std::vector<needle_state_t>& truths, const es
   figures.roll_rmse_rad = std::sqrt(roll2 / n);
 }
 
+// Insertion (mm) and rotation (rad) of the base at a time, between actuator states.
+Eigen::Vector2d axes_at(const Replay& replay, std::int64_t utime) {
+  const auto after = std::lower_bound(replay.states.begin(), replay.states.end(), utime,
+                                      [](const StateRow& row, std::int64_t t) { return row.utime < t; });
+  if (after == replay.states.end()) return {replay.states.back().insertion_mm, replay.states.back().rotation_rad};
+  if (after == replay.states.begin()) return {after->insertion_mm, after->rotation_rad};
+  const StateRow& before = *(after - 1);
+  const double share = static_cast<double>(utime - before.utime) / static_cast<double>(after->utime - before.utime);
+  return {before.insertion_mm + share * (after->insertion_mm - before.insertion_mm),
+          before.rotation_rad + share * (after->rotation_rad - before.rotation_rad)};
+}
+
 }  // namespace
 
 Replay replay_log(std::span<const std::uint8_t> log, const std::string& name, const estimator::EstimatorConfig& config,
@@ -145,22 +157,10 @@ Foretold foretell(const Replay& replay, double ahead_mm) {
   const estimator::NeedleFilter filter(replay.config);
   Foretold result;
   double sum = 0;
-  // Position of both axes at any time, from the actuator states.
-  const auto axes_at = [&replay](std::int64_t utime) {
-    const auto after = std::lower_bound(replay.states.begin(), replay.states.end(), utime,
-                                        [](const StateRow& row, std::int64_t t) { return row.utime < t; });
-    if (after == replay.states.end())
-      return Eigen::Vector2d(replay.states.back().insertion_mm, replay.states.back().rotation_rad);
-    if (after == replay.states.begin()) return Eigen::Vector2d(after->insertion_mm, after->rotation_rad);
-    const StateRow& before = *(after - 1);
-    const double share = static_cast<double>(utime - before.utime) / static_cast<double>(after->utime - before.utime);
-    return Eigen::Vector2d(before.insertion_mm + share * (after->insertion_mm - before.insertion_mm),
-                           before.rotation_rad + share * (after->rotation_rad - before.rotation_rad));
-  };
   for (auto from = replay.states.begin(); from != replay.states.end(); ++from) {
     // The first accepted measurement that lies so far ahead of a state, and is not yet part of it.
     const auto to = std::find_if(replay.innovations.begin(), replay.innovations.end(), [&](const InnovationRow& row) {
-      return row.accepted && row.utime > from->utime && axes_at(row.utime)[0] >= from->insertion_mm + ahead_mm;
+      return row.accepted && row.utime > from->utime && axes_at(replay, row.utime)[0] >= from->insertion_mm + ahead_mm;
     });
     if (to == replay.innovations.end()) break;
     estimator::FilterState state = from->state;
@@ -169,7 +169,7 @@ Foretold foretell(const Replay& replay, double ahead_mm) {
       filter.predict(state, row->insertion_mm - axes[0], row->rotation_rad - axes[1]);
       axes = {row->insertion_mm, row->rotation_rad};
     }
-    const Eigen::Vector2d last = axes_at(to->utime) - axes;
+    const Eigen::Vector2d last = axes_at(replay, to->utime) - axes;
     filter.predict(state, last[0], last[1]);
     sum += (to->position_mm - state.pose.p_mm).head<2>().squaredNorm();
     ++result.count;
@@ -213,7 +213,8 @@ std::vector<Innovation> axis_innovations(const Replay& replay, int axis) {
 std::vector<AxisSample> axis_samples(const Replay& replay, int axis) {
   std::vector<AxisSample> series;
   for (const InnovationRow& row : replay.innovations)
-    if (row.sees[static_cast<std::size_t>(axis)]) series.push_back({row.seq, row.position_mm[axis]});
+    if (row.sees[static_cast<std::size_t>(axis)])
+      series.push_back({row.seq, axes_at(replay, row.utime)[0], row.position_mm[axis]});
   return series;
 }
 

@@ -35,12 +35,14 @@ struct NoiseColour {
 // One reading of one axis; `frame` counts frames, so that a dropped one leaves a gap.
 struct AxisSample {
   std::int64_t frame = 0;
+  double insertion_mm = 0;  // of the base at that time
   double value_mm = 0;
 };
 
-// From second differences over 1 and 2 frames, where a smooth path cancels: no needle model takes part, so that a
-// model is judged against noise that it has not had a hand in. Variances by the median absolute value, because of
-// outliers.
+// From second differences over 1 to 10 frames, taken over the insertion, where a smooth path cancels: no needle model
+// takes part, so that a model is judged against noise that it has not had a hand in. Variances leave out
+// what lies beyond three standard deviations. Recordings of one axis of one camera; sd_mm is 0 where there are fewer
+// than 30.
 NoiseColour measure_noise(const std::vector<std::vector<AxisSample>>& recordings);
 
 // u_k = e_k - rho^g e_(k-1) over a gap of g frames, divided by its standard deviation if e is that noise plus an error
