@@ -4,14 +4,12 @@
 
 int main(int argc, char** argv) {
   using namespace bevel;
-  CLI::App app("Finds the needle tip in pictures and publishes where it is.", "bevel-camera");
-  tools::ProcessOptions options;
-  tools::add_options(app, options);
+  tools::CommandLine command_line("bevel-camera", "Finds the needle tip in pictures and publishes where it is.");
   std::string source;
   bool print = false;
-  app.add_option("--source", source, "path instead of the file's source.path");
-  app.add_flag("--print", print, "print each observation as CSV");
-  return tools::process_main(argc, argv, app, options, [&](nodes::SystemConfig config, lcm::LCM& lcm) {
+  command_line.option("--source", source, "path instead of the file's source.path");
+  command_line.flag("--print", print, "print each observation as CSV");
+  return tools::process_main(command_line, argc, argv, [&](nodes::SystemConfig& config, lcm::LCM& lcm) {
     if (!source.empty()) config.source.path = source;
     if (config.source.kind == camera::SourceKind::folder || config.source.kind == camera::SourceKind::video)
       config.source.start_utime = nodes::now().utime;

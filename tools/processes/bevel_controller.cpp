@@ -4,15 +4,11 @@
 
 int main(int argc, char** argv) {
   using namespace bevel;
-  CLI::App app("Steers the needle to the target on STEERING_TARGET, and stops it when anything is wrong.",
-               "bevel-controller");
-  tools::ProcessOptions options;
-  tools::add_options(app, options);
-  return tools::process_main(argc, argv, app, options, [](const nodes::SystemConfig& config, lcm::LCM& lcm) {
+  tools::CommandLine command_line(
+      "bevel-controller", "Steers the needle to the target on STEERING_TARGET, and stops it when anything is wrong.");
+  return tools::process_main(command_line, argc, argv, [](nodes::SystemConfig& config, lcm::LCM& lcm) {
     nodes::claim_name("bevel-controller");
-    if (config.realtime)
-      if (const std::string refused = nodes::try_realtime(40); !refused.empty())
-        std::fprintf(stderr, "bevel-controller: %s; running without\n", refused.c_str());
+    tools::go_realtime(config, "bevel-controller", 40);
     nodes::ControllerNode node(lcm, config.controller, config.needle);
     nodes::run_periodic(lcm, config.controller.period_s, [&](const nodes::Now& now, double late_s) {
       node.step(now.utime, late_s);

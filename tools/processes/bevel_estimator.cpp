@@ -4,11 +4,9 @@
 
 int main(int argc, char** argv) {
   using namespace bevel;
-  CLI::App app("Estimates the needle's pose, curvature and lambda from tip measurements and axis positions.",
-               "bevel-estimator");
-  tools::ProcessOptions options;
-  tools::add_options(app, options);
-  return tools::process_main(argc, argv, app, options, [](const nodes::SystemConfig& config, lcm::LCM& lcm) {
+  tools::CommandLine command_line(
+      "bevel-estimator", "Estimates the needle's pose, curvature and lambda from tip measurements and axis positions.");
+  return tools::process_main(command_line, argc, argv, [](nodes::SystemConfig& config, lcm::LCM& lcm) {
     nodes::claim_name("bevel-estimator");
     nodes::EstimatorNode node(lcm, config.estimator);
     // Messages are handled as they arrive; the period is that of the health checks.

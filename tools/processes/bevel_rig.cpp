@@ -8,10 +8,9 @@
 
 int main(int argc, char** argv) {
   using namespace bevel;
-  CLI::App app("Simulates needle, cameras and drives; the other processes cannot tell.", "bevel-rig");
-  tools::ProcessOptions options;
-  tools::add_options(app, options);
-  return tools::process_main(argc, argv, app, options, [](const nodes::SystemConfig& config, lcm::LCM& lcm) {
+  tools::CommandLine command_line("bevel-rig",
+                                  "Simulates needle, cameras and drives; the other processes cannot tell.");
+  return tools::process_main(command_line, argc, argv, [](nodes::SystemConfig& config, lcm::LCM& lcm) {
     nodes::claim_name("bevel-rig");
     // On a local bus the rig is also the hub; a CAN interface needs none.
     constexpr std::string_view kLocal = "unix:";

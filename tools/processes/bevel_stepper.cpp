@@ -5,16 +5,12 @@
 
 int main(int argc, char** argv) {
   using namespace bevel;
-  CLI::App app("Drives the insertion and rotation axes over CANopen.", "bevel-stepper");
-  tools::ProcessOptions options;
-  tools::add_options(app, options);
+  tools::CommandLine command_line("bevel-stepper", "Drives the insertion and rotation axes over CANopen.");
   std::string can;
-  app.add_option("--can", can, "bus instead of the file's: can0, or unix:/path for the rig's local bus");
-  return tools::process_main(argc, argv, app, options, [&](const nodes::SystemConfig& config, lcm::LCM& lcm) {
+  command_line.option("--can", can, "bus instead of the file's: can0, or unix:/path for the rig's local bus");
+  return tools::process_main(command_line, argc, argv, [&](nodes::SystemConfig& config, lcm::LCM& lcm) {
     nodes::claim_name("bevel-stepper");
-    if (config.realtime)
-      if (const std::string refused = nodes::try_realtime(50); !refused.empty())
-        std::fprintf(stderr, "bevel-stepper: %s; running without\n", refused.c_str());
+    tools::go_realtime(config, "bevel-stepper", 50);
     const auto bus = can::open_bus(can.empty() ? config.can : can, stepper::StepperDriver::listen_ids(config.stepper));
     nodes::StepperNode node(lcm, *bus, config.stepper);
     nodes::run_periodic(lcm, static_cast<double>(config.stepper.period_ns) * 1e-9, [&](const nodes::Now& now, double) {

@@ -1,0 +1,55 @@
+#!/usr/bin/env bash
+# The five processes for real, in a network namespace: an insertion that arrives, Ctrl-C, a process that dies, a second
+# controller. Usage: processes_test.sh BIN_DIR SOURCE_DIR CASE. Exit status 77: no network namespaces here, skipped.
+set -uo pipefail
+bin=$1 source=$2 case=$3
+if [ -z "${BEVEL_ISOLATED:-}" ]; then
+  if ! unshare -rn true 2>/dev/null; then echo "SKIPPED: no network namespaces here (unshare -rn)"; exit 77; fi
+  exec env BEVEL_ISOLATED=1 unshare -rn sh -c \
+    'ip link set lo up && ip link set lo multicast on && ip route add 224.0.0.0/4 dev lo && exec "$@"' sh "$0" "$@"
+fi
+work=$(mktemp -d)
+trap 'rm -rf "$work"' EXIT
+# Sockets of its own, so that a demo on the same machine is not disturbed.
+sed "s#/tmp/bevel-demo#$work/s#g" "$source/config/demo.toml" >"$work/demo.toml"
+demo=("$bin/bevel-demo" --config "$work/demo.toml" --out "$work/out")
+fail() { echo "FAILED: $*"; cat "$work"/*.txt "$work"/out/*.txt 2>/dev/null; exit 1; }
+# Children of ours that still run; nobody else's.
+left_over() { pgrep -f "$work/demo.toml" | grep -v "^$$\$"; }
+wait_for() { for _ in $(seq 100); do grep -q "$1" "$work/demo.txt" && return 0; sleep 0.1; done; fail "never saw '$1'"; }
+
+case $case in
+  arrives)
+    "${demo[@]}" >"$work/demo.txt" 2>&1 || fail "exit status $?"
+    cat "$work/demo.txt"
+    [ -s "$work/out/insertion.lcm" ] && grep -q "</html>" "$work/out/report.html" || fail "no log or no report"
+    ! grep -qE 'src="http|href="http' "$work/out/report.html" || fail "the report needs a network"
+    ;;
+  interrupted)
+    "${demo[@]}" >"$work/demo.txt" 2>&1 & pid=$!
+    wait_for steering
+    sleep 1
+    kill -INT $pid
+    wait $pid; status=$?
+    [ $status -eq 130 ] || fail "exit status $status, wanted 130"
+    ;;
+  process_dies)
+    "${demo[@]}" >"$work/demo.txt" 2>&1 & pid=$!
+    wait_for steering
+    sleep 1
+    kill -KILL "$(pgrep -f "bevel-camera --config $work/demo.toml")"
+    wait $pid; status=$?
+    [ $status -eq 1 ] || fail "exit status $status, wanted 1"
+    grep -q "bevel-camera: killed by" "$work/demo.txt" || fail "does not say who died"
+    ;;
+  second_controller)
+    "$bin/bevel-controller" --config "$work/demo.toml" >"$work/first.txt" 2>&1 & pid=$!
+    sleep 0.5
+    "$bin/bevel-controller" --config "$work/demo.toml" >"$work/second.txt" 2>&1 && fail "a second controller ran"
+    grep -q "another bevel-controller" "$work/second.txt" || fail "does not say why"
+    kill $pid; wait $pid || fail "the first ended with status $?"
+    ;;
+  *) fail "no case '$case'" ;;
+esac
+[ -z "$(left_over)" ] || fail "still running: $(left_over)"
+echo "ok: $case"

@@ -1,0 +1,69 @@
+#include "tools/common/command_line.hpp"
+
+#include <CLI/CLI.hpp>
+#include <cstdio>
+
+namespace bevel::tools {
+
+struct CommandLine::Impl {
+  Impl(const std::string& program, const std::string& description) : app(description, program) {}
+  CLI::App app;
+};
+
+CommandLine::CommandLine(const std::string& program, const std::string& description)
+    : impl_(std::make_unique<Impl>(program, description)) {
+  impl_->app.set_version_flag("--version", program + " " + BEVEL_VERSION);
+}
+
+CommandLine::~CommandLine() = default;
+
+CommandLine& CommandLine::option(const std::string& names, std::string& value, const std::string& help, bool required) {
+  CLI::Option* option = impl_->app.add_option(names, value, help)->required(required);
+  if (!value.empty()) option->capture_default_str();
+  return *this;
+}
+
+CommandLine& CommandLine::option(const std::string& names, double& value, const std::string& help, double lowest,
+                                 double highest) {
+  impl_->app.add_option(names, value, help)->check(CLI::Range(lowest, highest))->capture_default_str();
+  return *this;
+}
+
+CommandLine& CommandLine::option(const std::string& names, int& value, const std::string& help, int lowest,
+                                 int highest) {
+  impl_->app.add_option(names, value, help)->check(CLI::Range(lowest, highest))->capture_default_str();
+  return *this;
+}
+
+CommandLine& CommandLine::numbers(const std::string& names, std::vector<double>& value, const std::string& help,
+                                  int count) {
+  impl_->app.add_option(names, value, help)->delimiter(',')->expected(count)->capture_default_str();
+  return *this;
+}
+
+CommandLine& CommandLine::flag(const std::string& names, bool& value, const std::string& help) {
+  impl_->app.add_flag(names, value, help);
+  return *this;
+}
+
+CommandLine& CommandLine::arguments(const std::string& name, std::vector<std::string>& values, const std::string& help,
+                                    bool required) {
+  impl_->app.add_option(name, values, help)->required(required);
+  return *this;
+}
+
+int CommandLine::run(int argc, char** argv, const std::function<int()>& body) {
+  try {
+    impl_->app.parse(argc, argv);
+  } catch (const CLI::ParseError& e) {
+    return impl_->app.exit(e) == 0 ? 0 : 2;
+  }
+  try {
+    return body();
+  } catch (const std::exception& e) {
+    std::fprintf(stderr, "%s: %s\n", impl_->app.get_name().c_str(), e.what());
+    return 1;
+  }
+}
+
+}  // namespace bevel::tools
