@@ -36,6 +36,23 @@ Cubic cubic(double t) {
   return {2 * t3 - 3 * t2 + 1, t3 - 2 * t2 + t, -2 * t3 + 3 * t2, t3 - t2};
 }
 
+// Slopes of the Jacobian along the insertion, from the neighbouring nodes: a Jacobian may err a little, it steers the
+// fit and does not end it. The first leg holds the jump of a late entry (and is straight for it), and a leg without
+// insertion has no slope: there the side that has one counts.
+void find_slopes(const std::vector<Leg>& legs, std::vector<Path::Node>& nodes) {
+  for (std::size_t i = 0; i < nodes.size(); ++i) {
+    const double before_mm = i > 1 ? legs[i - 1].insertion_mm : 0;
+    const double after_mm = i < legs.size() ? legs[i].insertion_mm : 0;
+    auto& slope = nodes[i].slope_per_mm;
+    slope.setZero();
+    const bool both = before_mm * after_mm > 0;
+    if (before_mm != 0)
+      slope = (both ? after_mm / (before_mm + after_mm) : 1) * (nodes[i].jacobian - nodes[i - 1].jacobian) / before_mm;
+    if (after_mm != 0 && (both || before_mm == 0))
+      slope += (both ? before_mm / (before_mm + after_mm) : 1) * (nodes[i + 1].jacobian - nodes[i].jacobian) / after_mm;
+  }
+}
+
 }  // namespace
 
 bool integrate(const Insertion& insertion, const model::NeedleParameters& needle, const Entry& entry,
@@ -77,6 +94,7 @@ bool integrate(const Insertion& insertion, const model::NeedleParameters& needle
     nodes[i + 1].pose = pose;
   }
 
+  if (with_jacobian) find_slopes(insertion.legs, nodes);
   path.position_mm.resize(insertion.observations.size());
   if (with_jacobian) path.jacobian.resize(insertion.observations.size());
   for (std::size_t i = 0; i < insertion.observations.size(); ++i) {
@@ -86,11 +104,10 @@ bool integrate(const Insertion& insertion, const model::NeedleParameters& needle
     const Cubic c = cubic(seen.fraction);
     path.position_mm[i] = c.p0 * a.pose.p_mm + c.v0 * a.velocity_mm + c.p1 * b.pose.p_mm + c.v1 * b.arrival_mm;
     if (with_jacobian) {
-      // Slopes from the neighbours: a Jacobian may err a little, it steers the fit and does not end it.
-      const auto& before = nodes[seen.leg > 0 ? seen.leg - 1 : 0].jacobian;
-      const auto& after = nodes[std::min(seen.leg + 2, nodes.size() - 1)].jacobian;
-      path.jacobian[i] = (c.p0 - 0.5 * c.v1) * a.jacobian + (c.p1 + 0.5 * c.v0) * b.jacobian - 0.5 * c.v0 * before +
-                         0.5 * c.v1 * after;
+      path.jacobian[i] =
+          seen.leg == 0 ? (1 - seen.fraction) * a.jacobian + seen.fraction * b.jacobian
+                        : c.p0 * a.jacobian + c.p1 * b.jacobian +
+                              insertion.legs[seen.leg].insertion_mm * (c.v0 * a.slope_per_mm + c.v1 * b.slope_per_mm);
     }
   }
   return true;

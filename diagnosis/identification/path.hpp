@@ -2,7 +2,7 @@
 // The tip along one insertion by the model, with derivatives by the needle's and the entry's parameters.
 //
 // At the ends of a leg the pose comes from the Lie-group integrator (model/kinematics.hpp); within it the position is
-// the cubic with the positions and velocities of both ends (error h^4/384 of the fourth derivative: below 1e-6 mm for
+// the cubic with the positions and velocities of both ends (error h^4/384 of the fourth derivative: below 1e-5 mm for
 // 2.5 mm legs, tested).
 #include <Eigen/Core>
 #include <array>
@@ -39,6 +39,7 @@ struct Path {
     Eigen::Vector3d velocity_mm;  // per leg: at the start of the leg that begins here
     Eigen::Vector3d arrival_mm;   // per leg: at the end of the leg that ends here
     Eigen::Matrix<double, 3, kPathColumns> jacobian;
+    Eigen::Matrix<double, 3, kPathColumns> slope_per_mm;  // of the Jacobian, along the insertion
   };
   std::vector<Node> nodes;
 };
