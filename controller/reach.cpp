@@ -15,7 +15,8 @@ double closest_approach(model::Pose pose, const model::NeedleParameters& needle,
   const model::SlipParameters slip = model::slip_parameters(needle);
   double best = (target_mm - pose.p_mm).norm();
   const double longest = 1.5 * best + 10;
-  for (double travelled = 0; travelled < longest; travelled += kStep_mm) {
+  const int steps = static_cast<int>(longest / kStep_mm);
+  for (int i = 0; i < steps; ++i) {
     const double ahead = (pose.R.transpose() * (target_mm - pose.p_mm)).z();
     if (ahead <= 0) break;
     const double step = std::min(kStep_mm, std::max(ahead, 0.01));

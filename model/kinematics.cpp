@@ -104,7 +104,7 @@ bool step_impl(Pose& pose, const StepInput& input, const SlipParameters& slip, S
   }
   // A stage's rotation is the base's times exp(c): its perturbation is exp(-c) D_base + J_r(c) dc.
   const auto turn = [](const Vector3d& c, const Row3& D_base, const Row3& Dc, Row3& D_out) -> Matrix3d {
-    const Matrix3d back = exp_so3(-c);
+    Matrix3d back = exp_so3(-c);
     if constexpr (kWithJacobian) D_out = back * D_base + right_jacobian_so3(c) * Dc;
     return back;
   };

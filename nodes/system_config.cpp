@@ -149,7 +149,7 @@ SystemConfig load_system_config(const std::string& path) {
   read_controller(file.section("controller", optional), c.controller);
   read_stepper(file.section("stepper", optional), c.stepper);
   read_source(file.section("source", optional), c.source);
-  for (Section s : file.sections("camera", optional)) c.cameras.push_back(read_camera(s));
+  for (const Section& s : file.sections("camera", optional)) c.cameras.push_back(read_camera(s));
   c.rig.truth = c.needle;
   read_rig(file.section("rig", optional), c.rig);
   file.finish();

@@ -14,7 +14,7 @@ namespace {
 
 Eigen::Vector3d position(const needle_state_t& m) { return {m.position_mm[0], m.position_mm[1], m.position_mm[2]}; }
 
-double standard_deviation(const needle_state_t& m, int i) { return std::sqrt(m.covariance[10 * i]); }
+double standard_deviation(const needle_state_t& m, std::size_t i) { return std::sqrt(m.covariance[10 * i]); }
 
 // Truth between its samples; nothing outside them.
 std::optional<Eigen::Vector3d> truth_at(const std::vector<needle_state_t>& truths, std::int64_t utime) {
@@ -63,7 +63,7 @@ Percentiles percentiles(std::vector<double> values) {
   if (values.empty()) return {};
   std::sort(values.begin(), values.end());
   const auto at = [&](double share) {
-    return values[static_cast<std::size_t>(share * static_cast<double>(values.size() - 1) + 0.5)];
+    return values[static_cast<std::size_t>(std::llround(share * static_cast<double>(values.size() - 1)))];
   };
   return {at(0.5), at(0.99), values.size()};
 }

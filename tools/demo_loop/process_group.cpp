@@ -1,11 +1,11 @@
 #include "tools/demo_loop/process_group.hpp"
 
 #include <fcntl.h>
-#include <signal.h>
 #include <spawn.h>
 #include <sys/wait.h>
 #include <unistd.h>
 
+#include <csignal>
 #include <cstring>
 #include <stdexcept>
 
@@ -18,6 +18,7 @@ ProcessGroup::~ProcessGroup() { stop_all(); }
 void ProcessGroup::start(const std::string& name, const std::vector<std::string>& command,
                          const std::string& log_path) {
   std::vector<char*> argv;
+  argv.reserve(command.size() + 1);
   for (const std::string& word : command) argv.push_back(const_cast<char*>(word.c_str()));
   argv.push_back(nullptr);
   posix_spawn_file_actions_t files;
@@ -41,11 +42,11 @@ std::optional<std::string> ProcessGroup::first_death() {
   for (auto child = children_.begin(); child != children_.end(); ++child) {
     int status = 0;
     if (waitpid(child->pid, &status, WNOHANG) != child->pid) continue;
-    const std::string how = WIFSIGNALED(status) ? std::string("killed by ") + strsignal(WTERMSIG(status))
-                                                : "exit status " + std::to_string(WEXITSTATUS(status));
+    std::string how = "exit status " + std::to_string(WEXITSTATUS(status));
+    if (WIFSIGNALED(status)) how = std::string("killed by ").append(strsignal(WTERMSIG(status)));
     const std::string name = child->name;
     children_.erase(child);
-    return name + ": " + how;
+    return std::string(name).append(": ").append(how);
   }
   return std::nullopt;
 }
