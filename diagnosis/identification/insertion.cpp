@@ -9,7 +9,7 @@
 namespace bevel::diagnosis {
 namespace {
 
-constexpr double kMaxLeg_mm = 2.5;
+constexpr double kMaxLeg_mm = 5.0;
 constexpr double kMaxLeg_rad = 0.25;
 constexpr double kProportional_rad = 1e-3;  // roll may leave the straight line by this much within one leg
 constexpr double kStill = 1e-9;             // mm and rad

@@ -2,7 +2,7 @@
 // One insertion as identification sees it: what the two axes did, and where the tip was seen.
 //
 // The motion is cut into legs. Within a leg insertion and rotation are proportional to each other, which is all that
-// the kinematic models need to know: time does not enter them. A leg is as long as the integrator allows (2.5 mm,
+// the kinematic models need to know: time does not enter them. A leg is as long as the integrator allows (5 mm,
 // 0.25 rad), not as short as the measurements' spacing: the measurements are read off in between by interpolation,
 // which is where a fit's speed comes from.
 #include <cstddef>

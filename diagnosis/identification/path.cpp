@@ -104,10 +104,12 @@ bool integrate(const Insertion& insertion, const model::NeedleParameters& needle
     const Cubic c = cubic(seen.fraction);
     path.position_mm[i] = c.p0 * a.pose.p_mm + c.v0 * a.velocity_mm + c.p1 * b.pose.p_mm + c.v1 * b.arrival_mm;
     if (with_jacobian) {
-      path.jacobian[i] =
-          seen.leg == 0 ? (1 - seen.fraction) * a.jacobian + seen.fraction * b.jacobian
-                        : c.p0 * a.jacobian + c.p1 * b.jacobian +
-                              insertion.legs[seen.leg].insertion_mm * (c.v0 * a.slope_per_mm + c.v1 * b.slope_per_mm);
+      if (seen.leg == 0)
+        path.jacobian[i] = (1 - seen.fraction) * a.jacobian + seen.fraction * b.jacobian;
+      else
+        path.jacobian[i] =
+            c.p0 * a.jacobian + c.p1 * b.jacobian +
+            insertion.legs[seen.leg].insertion_mm * (c.v0 * a.slope_per_mm + c.v1 * b.slope_per_mm);
     }
   }
   return true;

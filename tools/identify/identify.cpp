@@ -1,0 +1,100 @@
+#include "tools/identify/identify.hpp"
+
+#include <algorithm>
+#include <filesystem>
+#include <fstream>
+#include <ostream>
+#include <stdexcept>
+
+#include "io/model_file.hpp"
+#include "io/recording.hpp"
+
+namespace bevel::identify {
+
+namespace fs = std::filesystem;
+using namespace bevel::diagnosis;  // NOLINT(google-build-using-namespace): the tool speaks of nothing else
+
+namespace {
+
+FitOptions fit_options(const Options& options, const model::NeedleParameters& start) {
+  FitOptions fit;
+  fit.start = start;
+  if (options.prior == "table1-agar") fit.priors = table_one_agar();
+  if (options.prior == "table1-plastisol") fit.priors = table_one_plastisol();
+  fit.fitted[kWheelbase] = options.fit_wheelbase;
+  if (options.square_loss) fit.loss = Loss::square;
+  fit.entry_sigma(kTiltX) = fit.entry_sigma(kTiltY) = options.entry_tilt_rad;
+  fit.entry_sigma(kRoll) = options.entry_roll_rad;
+  fit.entry_sigma(kOffsetX) = fit.entry_sigma(kOffsetY) = options.entry_offset_mm;
+  fit.entry_sigma(kLateEntry) = options.late_entry_mm;
+  return options.bicycle ? bicycle_options(fit) : fit;
+}
+
+Insertion read_insertion(const std::string& path, std::vector<std::string>& faults) {
+  io::Recording recording = io::read_recording(path);
+  const std::string name = fs::path(path).stem().string();
+  if (!recording.intact()) faults.push_back(name + ": " + recording.describe_faults());
+  const auto by_time = [](const auto& a, const auto& b) { return a.utime < b.utime; };
+  std::stable_sort(recording.actuators.begin(), recording.actuators.end(), by_time);
+  std::stable_sort(recording.tips.begin(), recording.tips.end(), by_time);
+  return make_insertion(name, recording.actuators, recording.tips);
+}
+
+void write_text(const fs::path& path, const std::string& text) {
+  std::ofstream file(path);
+  if (!(file << text << std::flush)) throw std::runtime_error(path.string() + ": cannot be written");
+}
+
+}  // namespace
+
+Identification identify(const Options& options) {
+  const io::ModelFile model = io::load_model_file(options.model_path);
+  if (!model.effects.empty())
+    throw std::runtime_error(options.model_path + ": has [[effect]] \"" + model.effects.front().name +
+                             "\"; identification fits [needle] alone, bevel-diagnose fits effects");
+  Identification result;
+  result.start = model.needle;
+  result.method = options.method;
+  result.prior = options.prior;
+  for (const auto& log : options.logs) result.insertions.push_back(read_insertion(log, result.faults));
+
+  const FitOptions fit = fit_options(options, model.needle);
+  result.fit = fit_from_many_starts(result.insertions, fit);
+  result.candidates = fit_candidates(result.insertions, fit);
+  result.chosen = result.fit.needle;
+  try {
+    result.angle_rate = fit_angle_rate(result.insertions, model.needle);
+  } catch (const std::invalid_argument& e) {
+    result.angle_rate_refusal = e.what();
+  }
+  if (options.method == "angle-rate") {
+    if (!result.angle_rate_refusal.empty()) throw std::runtime_error(result.angle_rate_refusal);
+    if (const auto violation = model::find_domain_violation(result.angle_rate.needle))
+      throw std::runtime_error("angle-rate fit leaves the model's domain: " + model::describe(*violation));
+    result.chosen = result.angle_rate.needle;
+  }
+  try {
+    result.before = error_figures(result.insertions, model.needle, Compare::same_insertion);
+  } catch (const std::domain_error&) {  // the start need not be able to follow the data
+  }
+  const bool trajectory = options.method == "trajectory";
+  result.after = error_figures(result.insertions, result.chosen, Compare::same_insertion,
+                               trajectory ? result.fit.entries : std::vector<Entry>{});
+  return result;
+}
+
+int run(const Options& options, std::ostream& out) {
+  const Identification result = identify(options);
+  print_table(out, result);
+  if (!options.out_folder.empty()) {
+    const fs::path folder(options.out_folder);
+    fs::create_directories(folder);
+    io::save_model_file({result.chosen, {}}, (folder / "model.toml").string());
+    write_text(folder / "figures.json", figures_json(result));
+    save_report(result, (folder / "report.html").string());
+    out << "\nwritten: " << (folder / "model.toml").string() << ", figures.json, report.html\n";
+  }
+  return result.fit.converged ? 0 : 1;
+}
+
+}  // namespace bevel::identify

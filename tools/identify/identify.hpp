@@ -1,0 +1,49 @@
+#pragma once
+// bevel-identify without its command line: logs and a starting model in, model.toml, figures.json, report.html out.
+#include <iosfwd>
+#include <string>
+#include <vector>
+
+#include "diagnosis/identification/angle_rate.hpp"
+#include "diagnosis/identification/candidates.hpp"
+
+namespace bevel::identify {
+
+struct Options {
+  std::vector<std::string> logs;
+  std::string model_path;
+  std::string out_folder;
+  std::string method = "trajectory";  // or "angle-rate"
+  std::string prior = "none";         // or "table1-agar", "table1-plastisol"
+  bool bicycle = false;               // lambda held at zero
+  bool fit_wheelbase = false;
+  bool square_loss = false;
+  double entry_tilt_rad = 0;  // standard deviations of each insertion's entry; 0 = nominal
+  double entry_roll_rad = 0;
+  double entry_offset_mm = 0;
+  double late_entry_mm = 0;
+};
+
+// What the report tells.
+struct Identification {
+  model::NeedleParameters start;
+  std::string method, prior;
+  std::vector<diagnosis::Insertion> insertions;
+  std::vector<std::string> faults;  // of the logs
+  diagnosis::FitResult fit;         // trajectory; for angle-rate: of the same data, to compare with
+  std::vector<diagnosis::Candidate> candidates;
+  diagnosis::AngleRateResult angle_rate;
+  std::string angle_rate_refusal;  // why there is none
+  model::NeedleParameters chosen;  // what goes into model.toml
+  diagnosis::ErrorFigures before, after;
+};
+
+Identification identify(const Options& options);
+void print_table(std::ostream& out, const Identification& result);
+std::string figures_json(const Identification& result);
+void save_report(const Identification& result, const std::string& path);
+
+// All of it; returns the exit status.
+int run(const Options& options, std::ostream& out);
+
+}  // namespace bevel::identify
