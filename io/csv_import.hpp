@@ -1,0 +1,58 @@
+// CSV recordings made elsewhere, by a column map, into the messages of the contract.
+//
+// The map (TOML; docs/import/bwh.toml is one):
+//   [time]       seconds = "..."  nanoseconds = "..." (optional), or rate_hz = 30.0 (rows are that far apart)
+//   [tip]        axes = ["Tip z", "-Tip x", "-Tip y"]: the column, with its sign, that each axis of {A} is
+//                origin = the same for the entry point (optional): its first row without a zero; default 0
+//                sigma_mm = [x, y, z]: standard deviations; 0 for an axis that was not measured
+//   [insertion]  column = "-Base y", settled = true: rows count only where this column has just changed (see below)
+//   [rotation]   column (optional), in rad unless scale says otherwise; default: no rotation
+//   [rows]       nonzero = ["Tip x", ...]: rows in which one of these is zero hold no data
+//
+// Stepwise insertions: a person pushes the needle by a step, and the insertion column takes its new value when the step
+// is done. In between nobody knows how deep the base was, so with settled = true only the first row of each new value
+// is used: one ACTUATOR_STATE and one TIP_MEASUREMENT each. A row with depth 0 at the entry point begins the log.
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include "io/config.hpp"
+#include "model/samples.hpp"
+
+namespace bevel::io {
+
+struct SignedColumn {
+  std::string name;
+  double sign = 1;
+};
+
+struct ColumnMap {
+  std::string seconds, nanoseconds;  // names; "" if absent
+  double rate_hz = 0;                // used if `seconds` is ""
+  std::array<SignedColumn, 3> tip;
+  std::vector<SignedColumn> origin;  // empty, or three
+  std::array<double, 3> sigma_mm{};
+  SignedColumn insertion;
+  bool settled = false;
+  std::vector<SignedColumn> rotation;  // empty, or one
+  double rotation_scale = 1;
+  std::vector<std::string> nonzero;
+};
+// Throws ConfigError with every fault.
+ColumnMap load_column_map(const std::string& path);
+
+struct ImportedRecording {
+  std::vector<model::ActuatorState> actuators;
+  std::vector<model::TipMeasurement> tips;
+  int rows = 0;
+  int rows_without_data = 0;
+  int rows_unsettled = 0;
+};
+// Throws std::runtime_error naming the file, the line and the column that is missing or not a number.
+ImportedRecording import_csv(const std::string& csv_path, const ColumnMap& map);
+
+// Both on their channels, in time order; receipt time is the sample's own.
+void write_log(const ImportedRecording& recording, const std::string& log_path);
+
+}  // namespace bevel::io
