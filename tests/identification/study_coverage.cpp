@@ -1,0 +1,69 @@
+// 200 simulated data sets: how often do the 95 % intervals contain the truth? Prints counts with Wilson's band and
+// writes a page with pictures: study_coverage [PAGE.html] [SETS].
+#include <algorithm>
+#include <cstdio>
+#include <cstdlib>
+
+#include "io/html_report.hpp"
+#include "tests/identification/coverage_study.hpp"
+
+int main(int argc, char** argv) {
+  using namespace bevel;
+  using namespace bevel::diagnosis;
+  constexpr std::uint64_t kSeed = 20150928;
+  const int sets = argc > 2 ? std::atoi(argv[2]) : 200;
+  bool good = true;
+  io::HtmlReport page("Coverage of the 95 % intervals");
+  std::printf("seed %llu, %d data sets of 6 trials, 195 measurements each, 0.2 mm\n",
+              static_cast<unsigned long long>(kSeed), sets);
+  struct Case {
+    const char* name;
+    double lambda1, lambda2, outliers;
+    Loss loss;
+  };
+  for (const Case& c : {Case{"agar, square loss", 0.49, 0.22, 0, Loss::square},
+                        Case{"agar, Huber's loss, 2 % outliers", 0.49, 0.22, 0.02, Loss::huber},
+                        Case{"plastisol, Huber's loss", 0.144, 0.032, 0, Loss::huber}}) {
+    model::NeedleParameters truth;
+    truth.lambda1_per_rad = c.lambda1;
+    truth.lambda2 = c.lambda2;
+    SimulatedInsertion plan;
+    plan.outlier_share = c.outliers;
+    FitOptions options;
+    options.start = truth;
+    options.start.curvature_per_mm = 0.0042;
+    options.loss = c.loss;
+    page.heading(c.name);
+    for (const auto& p : coverage_study(truth, sets, kSeed, plan, 6, options)) {
+      const auto band = p.wilson();
+      const bool inside = p.share() >= 0.93 && p.share() <= 0.97;
+      std::printf("%-34s %-18s %3d of %d = %.1f %%  (Wilson 95 %%: %.1f to %.1f) %s\n", c.name,
+                  kParameterNames[p.parameter], p.inside, p.sets, 100 * p.share(), 100 * band[0], 100 * band[1],
+                  inside ? "" : "outside 93-97 %");
+      good = good && band[0] <= 0.95 && 0.95 <= band[1];
+      std::vector<double> z = p.z, expected, order;
+      std::sort(z.begin(), z.end());
+      // Ordered errors against the standard normal's quantiles (Hastings' approximation is enough for a picture).
+      for (std::size_t i = 0; i < z.size(); ++i) {
+        const double u = (static_cast<double>(i) + 0.5) / static_cast<double>(z.size());
+        const double t = std::sqrt(-2 * std::log(std::min(u, 1 - u)));
+        const double q = t - (2.30753 + 0.27061 * t) / (1 + 0.99229 * t + 0.04481 * t * t);
+        expected.push_back(u < 0.5 ? -q : q);
+      }
+      io::Plot plot;
+      plot.x_label = "quantile of the standard normal";
+      plot.y_label = "(estimate - truth) / standard error";
+      plot.points("data sets", expected, z).line("as it should be", {-3, 3}, {-3, 3});
+      plot.references = {{io::ReferenceLine::Axis::horizontal, 1.96, "95 %"},
+                         {io::ReferenceLine::Axis::horizontal, -1.96, ""}};
+      plot.legend = io::Plot::Legend::top_left;
+      char caption[160];
+      std::snprintf(caption, sizeof caption,
+                    "%s: %d of %d intervals contain the truth (Wilson 95 %%: %.1f to %.1f %%).",
+                    kParameterNames[p.parameter], p.inside, p.sets, 100 * band[0], 100 * band[1]);
+      page.figure(plot, caption);
+    }
+  }
+  if (argc > 1) page.save(argv[1]);
+  return good ? 0 : 1;
+}
