@@ -8,10 +8,12 @@
 
 namespace bevel::estimator {
 
-NeedleEstimator::NeedleEstimator(const EstimatorConfig& config, std::size_t history) : filter_(config) {
+NeedleEstimator::NeedleEstimator(const EstimatorConfig& config, std::size_t history)
+    : filter_(config), past_needle_(config.prior.needle) {
   pool_.resize(std::max<std::size_t>(history, 8));
   order_.reserve(pool_.size());
   free_.reserve(pool_.size());
+  past_.reserve(static_cast<std::size_t>(std::max(config.relinearised_steps, 0)));
   for (std::size_t i = pool_.size(); i-- > 0;) free_.push_back(static_cast<std::uint32_t>(i));
 }
 
@@ -29,10 +31,8 @@ NeedleEstimator::Node* NeedleEstimator::insert(std::int64_t utime, Kind kind, st
   index = order_.size();
   while (index > 0 && key(node(index - 1)) > wanted) --index;
   if (index > 0 && key(node(index - 1)) == wanted) return nullptr;
-  if (free_.empty()) {  // drop the oldest; the next keeps its posterior and becomes the anchor
-    free_.push_back(order_.front());
-    order_.erase(order_.begin());
-    if (processed_ > 0) --processed_;
+  if (free_.empty()) {
+    drop_oldest();
     --index;
   }
   const std::uint32_t slot = free_.back();
@@ -43,6 +43,73 @@ NeedleEstimator::Node* NeedleEstimator::insert(std::int64_t utime, Kind kind, st
   made.kind = kind;
   made.applied_before = false;
   return &made;
+}
+
+// The next node keeps its posterior and becomes the anchor. Where only measurements wait for the axes, and none has a
+// posterior yet, the oldest of those goes: the anchor cannot.
+void NeedleEstimator::drop_oldest() {
+  const std::ptrdiff_t which = processed_ < 2 ? 1 : 0;
+  if (which == 1) {
+    ++counters_.too_old;
+  } else {
+    remember(node(0), node(1));
+    --processed_;
+  }
+  free_.push_back(order_[static_cast<std::size_t>(which)]);
+  order_.erase(order_.begin() + which);
+}
+
+void NeedleEstimator::remember(const Node& before, const Node& node) {
+  if (node.state.reset_count != before.state.reset_count) {
+    past_.clear();
+    past_start_ = node.state;
+    past_due_ = kFirstRelinearisation;
+    past_complete_ = true;
+    return;
+  }
+  if (past_.empty()) past_start_ = before.state;
+  PastStep step;
+  step.insertion_mm = node.insertion_mm - before.insertion_mm;
+  step.rotation_rad = node.rotation_rad - before.rotation_rad;
+  step.measured = node.kind == Kind::measurement && node.update.accepted;
+  if (step.measured) {
+    step.position_mm = node.measurement.position_mm;
+    step.information_per_mm2 = node.measurement.information_per_mm2;
+  }
+  // Short moves between measurements are one step: within it the rates count as constant.
+  constexpr double kMerged_mm = 1.0;
+  constexpr double kMerged_rad = 0.05;
+  if (!past_.empty() && !past_.back().measured && past_.back().insertion_mm * step.insertion_mm >= 0 &&
+      past_.back().rotation_rad * step.rotation_rad >= 0 &&
+      std::abs(past_.back().insertion_mm + step.insertion_mm) <= kMerged_mm &&
+      std::abs(past_.back().rotation_rad + step.rotation_rad) <= kMerged_rad) {
+    step.insertion_mm += past_.back().insertion_mm;
+    step.rotation_rad += past_.back().rotation_rad;
+    past_.back() = step;
+  } else if (past_.size() < past_.capacity()) {
+    past_.push_back(step);
+  } else {
+    past_complete_ = false;
+  }
+}
+
+void NeedleEstimator::relinearise_if_due() {
+  if (!past_complete_ || past_.size() < past_due_) return;
+  FilterState& anchor = node(0).state;
+  const Prior& prior = filter_.config().prior;
+  const auto moved = [](double now, double then, double sd) { return std::abs(now - then) > kMovedShare * sd; };
+  if (!moved(anchor.curvature_per_mm, past_needle_.curvature_per_mm, prior.curvature_sd_per_mm) &&
+      !moved(anchor.lambda1_per_rad, past_needle_.lambda1_per_rad, prior.lambda1_sd_per_rad) &&
+      !moved(anchor.lambda2, past_needle_.lambda2, prior.lambda2_sd)) {
+    past_due_ = past_.size() + past_.size() / 8;
+    return;
+  }
+  past_due_ = past_.size() + past_.size() / 4;
+  past_needle_ = {anchor.curvature_per_mm, prior.needle.wheelbase_mm, anchor.lambda1_per_rad,
+                  anchor.lambda2,          prior.needle.slip,         prior.needle.front_wheel};
+  if (!filter_.relinearise(anchor, past_start_, past_)) return;
+  ++counters_.relinearised;
+  process_from(1);
 }
 
 void NeedleEstimator::add(const model::ActuatorState& actuator) {
@@ -65,6 +132,7 @@ void NeedleEstimator::add(const model::ActuatorState& actuator) {
   std::size_t from = index;
   while (from > 1 && node(from - 1).kind == Kind::measurement) --from;
   process_from(from);
+  relinearise_if_due();
 }
 
 void NeedleEstimator::add(const model::TipMeasurement& measurement) {
@@ -88,15 +156,21 @@ void NeedleEstimator::add(const model::TipMeasurement& measurement) {
   made->measurement = measurement;
   if (index < processed_) ++counters_.late;
   process_from(index);
+  relinearise_if_due();
 }
 
 void NeedleEstimator::interpolate(std::size_t index) {
   Node& n = node(index);
   std::size_t before = index - 1;
   while (before > 0 && node(before).kind != Kind::actuator) --before;
+  const Node& a = node(before);
+  if (n.utime == a.utime) {  // needs no later actuator state
+    n.insertion_mm = a.insertion_mm;
+    n.rotation_rad = a.rotation_rad;
+    return;
+  }
   std::size_t after = index + 1;
   while (node(after).kind != Kind::actuator) ++after;
-  const Node& a = node(before);
   const Node& b = node(after);
   const double share = static_cast<double>(n.utime - a.utime) / static_cast<double>(b.utime - a.utime);
   n.insertion_mm = a.insertion_mm + share * (b.insertion_mm - a.insertion_mm);
@@ -106,6 +180,7 @@ void NeedleEstimator::interpolate(std::size_t index) {
 void NeedleEstimator::process_from(std::size_t index) {
   std::size_t end = order_.size();
   while (end > 0 && node(end - 1).kind != Kind::actuator) --end;
+  while (end > 0 && end < order_.size() && node(end).utime == node(end - 1).utime) ++end;
   for (std::size_t i = std::max<std::size_t>(index, 1); i < end; ++i) {
     Node& n = node(i);
     const Node& previous = node(i - 1);

@@ -16,6 +16,7 @@ struct Counters {
   std::int64_t not_usable = 0;    // status other than 0, or no axis seen
   std::int64_t too_old = 0;       // older than the history
   std::int64_t duplicate = 0;
+  std::int64_t relinearised = 0;
   std::int64_t late = 0;       // arrived behind a newer node: the history was rolled back
   std::int64_t actuators = 0;  // offered
   std::int64_t actuators_refused = 0;
@@ -56,6 +57,8 @@ class NeedleEstimator {
   const NeedleFilter& filter() const { return filter_; }
 
  private:
+  static constexpr std::size_t kFirstRelinearisation = 64;
+  static constexpr double kMovedShare = 0.4;  // of a parameter's prior standard deviation since it was last done
   enum class Kind : std::uint8_t { actuator, measurement };
   struct Node {
     std::int64_t utime = 0;
@@ -72,13 +75,21 @@ class NeedleEstimator {
   const Node& node(std::size_t i) const { return pool_[order_[i]]; }
   Node* insert(std::int64_t utime, Kind kind, std::int32_t camera, std::int64_t seq, std::size_t& index);
   void process_from(std::size_t index);
+  void drop_oldest();
+  void remember(const Node& before, const Node& node);
+  void relinearise_if_due();
   void interpolate(std::size_t index);
 
   NeedleFilter filter_;
   std::vector<Node> pool_;            // sized once
   std::vector<std::uint32_t> order_;  // indices into the pool, by time; reserved once
   std::vector<std::uint32_t> free_;
-  std::size_t processed_ = 0;  // nodes before this index hold a posterior
+  std::size_t processed_ = 0;   // nodes before this index hold a posterior
+  FilterState past_start_;      // before the first step of past_
+  std::vector<PastStep> past_;  // what has left the history, from its start or the last reset; reserved once
+  std::size_t past_due_ = kFirstRelinearisation;  // number of steps at which they are run again
+  model::NeedleParameters past_needle_;           // of the newest linearisation
+  bool past_complete_ = true;                     // false once past_ was full
   Counters counters_;
   Update newest_update_;
   std::int64_t newest_update_utime_ = 0;

@@ -100,17 +100,20 @@ void NeedleFilter::predict(FilterState& state, double insertion_mm, double rotat
   state.covariance.topRightCorner<6, 3>() = FP.rightCols<3>();
   state.covariance.bottomLeftCorner<3, 6>() = FP.rightCols<3>().transpose();
 
+  state.covariance.diagonal() += process_variance(state.covariance, insertion_mm, rotation_rad);
+}
+
+Vector9d NeedleFilter::process_variance(const Matrix9d& covariance, double insertion_mm, double rotation_rad) const {
   const ProcessNoise& noise = config_.process;
-  const double length_mm = std::abs(insertion_mm);
   Vector9d added;
   added << Eigen::Vector3d::Constant(square(noise.position_mm)), square(noise.tilt_rad), square(noise.tilt_rad),
       square(noise.roll_rad), square(noise.curvature_per_mm), square(noise.lambda1_per_rad), square(noise.lambda2);
-  added *= length_mm;
+  added *= std::abs(insertion_mm);
   added[5] += square(noise.roll_per_sqrt_rad) * std::abs(rotation_rad);
   // A parameter that the prior holds fixed (standard deviation zero) stays fixed: no walk is added to it.
   for (int i = 6; i < 9; ++i)
-    if (state.covariance(i, i) == 0) added[i] = 0;
-  state.covariance.diagonal() += added;
+    if (covariance(i, i) == 0) added[i] = 0;
+  return added;
 }
 
 Update NeedleFilter::update(FilterState& state, const model::TipMeasurement& measurement) const {

@@ -7,6 +7,7 @@
 #include <Eigen/Core>
 #include <array>
 #include <cstdint>
+#include <span>
 
 #include "estimator/config.hpp"
 #include "model/kinematics.hpp"
@@ -40,6 +41,15 @@ struct Update {
       Eigen::Vector3d::Zero();  // L^-1 innovation, S = L L^T: unit variance if all is right
 };
 
+// One step of the past, as relinearise() needs it: increments since the step before it, then perhaps a measurement.
+struct PastStep {
+  double insertion_mm = 0;
+  double rotation_rad = 0;
+  bool measured = false;  // and accepted by the gate at its time
+  Eigen::Vector3d position_mm = Eigen::Vector3d::Zero();
+  Eigen::Matrix3d information_per_mm2 = Eigen::Matrix3d::Zero();
+};
+
 class NeedleFilter {
  public:
   explicit NeedleFilter(const EstimatorConfig& config);
@@ -54,9 +64,20 @@ class NeedleFilter {
   // Applies one measurement; its status must be 0 and its values finite (the checked decode sees to that).
   Update update(FilterState& state, const model::TipMeasurement& measurement) const;
 
+  // An extended filter keeps the derivatives that it took while it knew little of k and lambda, and is too sure for
+  // it. This runs the steps since `start` (the state before the first of them) again, with all derivatives taken on
+  // the path which leads, by the model with the parameters of `state`, to the pose of `state`; `state` is the estimate
+  // after the last step and is replaced by the result. False, and nothing changed, where the model has no answer or the
+  // path would not come nearer to the measurements.
+  // Iterated Kalman filter over a window, cf. Bell and Cathey 1993, IEEE TAC 38(2): a Gauss-Newton step of the batch.
+  bool relinearise(FilterState& state, const FilterState& start, std::span<const PastStep> steps) const;
+
   const EstimatorConfig& config() const { return config_; }
 
  private:
+  double path_cost(const FilterState& state, const FilterState& start, std::span<const PastStep> steps,
+                   model::Pose& entry) const;
+  Vector9d process_variance(const Matrix9d& covariance, double insertion_mm, double rotation_rad) const;
   void keep_in_domain(FilterState& state) const;
   void declare_reset(FilterState& state) const;
 

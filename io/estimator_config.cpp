@@ -27,6 +27,8 @@ void read_estimator_config(Section section, estimator::EstimatorConfig& config) 
   gate.read("reset_position_sd_mm", config.gate.reset_position_sd_mm, optional, in_range(0.01, 1000));
   gate.read("reset_tilt_sd_rad", config.gate.reset_tilt_sd_rad, optional, in_range(1e-4, 3));
 
+  section.read("relinearised_steps", config.relinearised_steps, optional, in_range(0, 100000));
+
   Section limits = section.section("limits", optional);
   limits.read("measurement_age_s", config.limits.measurement_age_s, optional, above(0));
   limits.read("actuator_age_s", config.limits.actuator_age_s, optional, above(0));

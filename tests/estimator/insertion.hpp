@@ -6,6 +6,7 @@
 #include "estimator/config.hpp"
 #include "model/kinematics.hpp"
 #include "model/samples.hpp"
+#include "model/slip.hpp"
 
 namespace bevel::estimator::testing {
 
@@ -13,6 +14,9 @@ struct Insertion {
   std::vector<model::ActuatorState> actuators;
   std::vector<model::TipMeasurement> measurements;
   model::Pose final_pose;  // at the newest actuator state
+  // The direction of motion stayed within the range for which the parameters were found valid. Where it does not, the
+  // model says nothing, and a truth made of it is none: near 90 degrees the simulated tip would stand still.
+  bool in_domain = true;
 };
 
 struct InsertionPlan {
@@ -75,7 +79,10 @@ inline Insertion insert(const model::NeedleParameters& truth, const model::Pose&
     }
     if (plan.cameras == 2 && ms % 33 == 19 && unit(rng) >= plan.lost_share)
       out.measurements.push_back(measure(pose.p_mm, utime, seq++, 1, {1, 0, 1}, plan.sigma_mm, rng));
-    model::step(pose, {plan.rate_mm_s * 1e-3, rate * 1e-3, {truth.curvature_per_mm, 0}}, slip);
+    if (!model::step(pose, {plan.rate_mm_s * 1e-3, rate * 1e-3, {truth.curvature_per_mm, 0}}, slip) ||
+        model::evaluate_slip(model::tilt_rad(pose), slip.lambda1_per_rad, slip.lambda2).gamma_rad >
+            model::kDefaultGammaMax_rad)
+      out.in_domain = false;
     rotation += rate * 1e-3;
   }
   return out;

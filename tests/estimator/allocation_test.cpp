@@ -1,0 +1,52 @@
+// No allocation in a step, late measurements, resets and relinearisation included: operator new is counted.
+#include <gtest/gtest.h>
+
+#include <atomic>
+#include <cstdlib>
+#include <new>
+
+#include "estimator/needle_estimator.hpp"
+#include "tests/estimator/insertion.hpp"
+
+namespace {
+std::atomic<long> allocations{0};
+}  // namespace
+
+void* operator new(std::size_t size) {
+  ++allocations;
+  if (void* memory = std::malloc(size)) return memory;
+  throw std::bad_alloc();
+}
+void operator delete(void* memory) noexcept { std::free(memory); }
+void operator delete(void* memory, std::size_t) noexcept { std::free(memory); }
+
+namespace bevel::estimator {
+namespace {
+
+TEST(NeedleEstimator, AllocatesNothingInAStep) {
+  std::mt19937_64 rng(21);
+  EstimatorConfig config;
+  config.prior.needle.lambda1_per_rad = 0.49;
+  config.prior.needle.lambda2 = 0.22;
+  testing::InsertionPlan plan;
+  plan.cameras = 2;
+  testing::Insertion data = testing::insert(config.prior.needle, {}, plan, rng);
+  for (std::size_t i = 300; i < 340; ++i)
+    data.measurements[i].position_mm += Eigen::Vector3d(10, 10, 0);  // brings a reset
+  NeedleEstimator estimator(config);
+  std::size_t next = 0;
+  const long before = allocations;
+  for (const auto& actuator : data.actuators) {
+    estimator.add(actuator);
+    while (next < data.measurements.size() && data.measurements[next].utime + 60'000 < actuator.utime)
+      estimator.add(data.measurements[next++]);
+    (void)estimator.estimate(actuator.utime);
+  }
+  EXPECT_EQ(allocations - before, 0);
+  EXPECT_GT(estimator.counters().late, 100);
+  EXPECT_GT(estimator.counters().relinearised, 0);
+  EXPECT_GT(estimator.estimate(data.actuators.back().utime).state.reset_count, 0);
+}
+
+}  // namespace
+}  // namespace bevel::estimator

@@ -1,0 +1,96 @@
+// Cost of predict + update, of the whole estimator per message, and of a plain dense product-sum of the same flops.
+#include <benchmark/benchmark.h>
+
+#include "estimator/needle_estimator.hpp"
+#include "tests/estimator/insertion.hpp"
+
+namespace bevel::estimator {
+namespace {
+
+EstimatorConfig agar() {
+  EstimatorConfig config;
+  config.prior.needle.lambda1_per_rad = 0.49;
+  config.prior.needle.lambda2 = 0.22;
+  return config;
+}
+
+void BM_predict_update(benchmark::State& bench) {
+  const NeedleFilter filter(agar());
+  FilterState state = filter.initial();
+  model::TipMeasurement m;
+  m.information_per_mm2 = Eigen::Vector3d(0, 44, 44).asDiagonal();  // one camera
+  long i = 0;
+  for (auto _ : bench) {
+    filter.predict(state, (i++ / 500) % 2 ? -0.1 : 0.1, 0.006);
+    m.position_mm = state.pose.p_mm;
+    benchmark::DoNotOptimize(filter.update(state, m));
+  }
+}
+BENCHMARK(BM_predict_update);
+
+void BM_predict(benchmark::State& bench) {
+  const NeedleFilter filter(agar());
+  FilterState state = filter.initial();
+  long i = 0;
+  for (auto _ : bench) {
+    filter.predict(state, (i++ / 500) % 2 ? -0.1 : 0.1, 0.006);
+    if (i % 1000 == 0) state = filter.initial();
+    benchmark::DoNotOptimize(state.pose.p_mm[0]);
+  }
+}
+BENCHMARK(BM_predict);
+
+void BM_model_step_with_jacobian(benchmark::State& bench) {
+  model::Pose pose;
+  model::StepJacobian jacobian;
+  const auto slip = model::slip_parameters(agar().prior.needle);
+  long i = 0;
+  for (auto _ : bench) {
+    benchmark::DoNotOptimize(model::step(pose, {(i++ / 500) % 2 ? -0.1 : 0.1, 0.006, {0.0047, 0}}, slip, jacobian));
+    benchmark::DoNotOptimize(jacobian.pose(0, 0));
+  }
+}
+BENCHMARK(BM_model_step_with_jacobian);
+
+// F P F^T + Q and the Joseph form of rank 2 as plain dense 9 x 9 arithmetic: four products and three sums.
+void BM_floor_dense_9x9(benchmark::State& bench) {
+  Matrix9d P = Matrix9d::Identity();
+  Matrix9d F = Matrix9d::Identity() + 1e-3 * Matrix9d::Ones();
+  const Matrix9d Q = 1e-6 * Matrix9d::Identity();
+  for (auto _ : bench) {
+    benchmark::DoNotOptimize(F.data());
+    Matrix9d A;
+    A.noalias() = F * P;
+    P.noalias() = A * F.transpose();
+    P += Q;
+    A.noalias() = F * P;
+    P.noalias() = A * F.transpose();
+    P = 0.4 * (P + P.transpose()) + Q;
+    benchmark::DoNotOptimize(P.data());
+  }
+}
+BENCHMARK(BM_floor_dense_9x9);
+
+void BM_whole_insertion_per_message(benchmark::State& bench) {
+  std::mt19937_64 rng(1);
+  const auto config = agar();
+  const testing::Insertion data = testing::insert(config.prior.needle, {}, {}, rng);
+  for (auto _ : bench) {
+    NeedleEstimator estimator(config);
+    std::size_t next = 0;
+    for (const auto& actuator : data.actuators) {
+      while (next < data.measurements.size() && data.measurements[next].utime < actuator.utime)
+        estimator.add(data.measurements[next++]);
+      estimator.add(actuator);
+    }
+    benchmark::DoNotOptimize(estimator.counters().late);
+  }
+  bench.SetItemsProcessed(bench.iterations() *
+                          static_cast<std::int64_t>(data.actuators.size() + data.measurements.size()));
+}
+BENCHMARK(BM_whole_insertion_per_message)->Unit(benchmark::kMillisecond);
+
+}  // namespace
+}  // namespace bevel::estimator
+
+BENCHMARK_MAIN();
