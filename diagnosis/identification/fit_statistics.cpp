@@ -60,6 +60,29 @@ double robust_scale(std::vector<double>& residuals) {
   return 1.4826 * *middle;
 }
 
+double deviance(const std::vector<double>& residuals, double threshold) {
+  const double n = static_cast<double>(residuals.size());
+  double s2 = 0;
+  for (const double r : residuals) s2 += r * r / n;
+  if (!(s2 > 0)) return -1e300;
+  double loss = 0;
+  // Stationary where s^2 = mean(min(r^2, c s |r|)): each pass moves s toward it from above.
+  for (int pass = 0; pass < 30; ++pass) {
+    const double limit = threshold * std::sqrt(s2);
+    double next = 0;
+    loss = 0;
+    for (const double r : residuals) {
+      const double size = std::abs(r);
+      const bool inside = size <= limit;
+      next += (inside ? size * size : limit * size) / n;
+      loss += inside ? 0.5 * size * size / s2 : threshold * (size / std::sqrt(s2) - 0.5 * threshold);
+    }
+    if (std::abs(next - s2) < 1e-10 * s2) break;
+    s2 = next;
+  }
+  return 0.5 * n * std::log(s2) + loss;
+}
+
 void fill_uncertainty(const Eigen::MatrixXd& data_information, const std::vector<Parameter>& parameters,
                       const std::vector<bool>& free, const Priors& priors, FitResult& result) {
   const auto n = static_cast<Eigen::Index>(parameters.size());

@@ -19,6 +19,9 @@ double lag1_correlation(const std::vector<double>& residuals, const std::vector<
 // 1.4826 times the median absolute value: the standard deviation of Gaussian noise, deaf to outliers. Reorders.
 double robust_scale(std::vector<double>& residuals);
 
+// min over s of n log s + sum rho(r/s), rho Huber's loss (an infinite threshold: the square).
+double deviance(const std::vector<double>& residuals, double threshold);
+
 // From the information of the data (entry parameters already marginalised out) fills covariance, correlation,
 // directions and the parameters' errors. `free[i]` is false for a parameter at a bound.
 void fill_uncertainty(const Eigen::MatrixXd& data_information, const std::vector<Parameter>& parameters,

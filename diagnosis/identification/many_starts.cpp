@@ -1,3 +1,4 @@
+#include <algorithm>
 #include <cmath>
 #include <stdexcept>
 
@@ -6,14 +7,11 @@
 namespace bevel::diagnosis {
 
 FitResult fit_from_many_starts(const std::vector<Insertion>& insertions, const FitOptions& options) {
-  std::optional<FitResult> best;
+  std::vector<FitResult> fits;
   std::string refusal;
   const auto attempt = [&](const FitOptions& from) {
     try {
-      FitResult r = fit_trajectory(insertions, from);
-      // The scale is fitted too: compare by likelihood, n log s + cost.
-      const auto badness = [](const FitResult& f) { return f.residual_count * std::log(f.noise_scale) + f.cost; };
-      if (!best || badness(r) < badness(*best)) best = std::move(r);
+      fits.push_back(fit_trajectory(insertions, from));
     } catch (const std::invalid_argument& e) {
       refusal = e.what();
     }
@@ -26,8 +24,24 @@ FitResult fit_from_many_starts(const std::vector<Insertion>& insertions, const F
       from.start.lambda2 = priors[kLambda2]->mean;
       attempt(from);
     }
-  if (!best) throw std::invalid_argument(refusal);
-  return *best;
+  // The bicycle is a corner of the extended model's domain: what it fits, the extended model must fit as well.
+  if (options.fitted[kCurvature] && options.fitted[kLambda1]) {
+    FitOptions bicycle = options;
+    bicycle.start.lambda1_per_rad = bicycle.start.lambda2 = 0;
+    bicycle.fitted[kLambda1] = bicycle.fitted[kLambda2] = bicycle.fitted[kWheelbase] = false;
+    FitOptions from = options;
+    from.start.curvature_per_mm = fit_trajectory(insertions, bicycle).needle.curvature_per_mm;
+    from.start.lambda1_per_rad = 0.01;
+    if (options.fitted[kLambda2]) from.start.lambda2 = 0;
+    if (!model::find_domain_violation(from.start)) attempt(from);
+  }
+  if (fits.empty()) throw std::invalid_argument(refusal);
+  // Correlated residuals count less against the priors; by how much is taken from the least correlated fit, for all.
+  double rho = 1;
+  for (const auto& fit : fits) rho = std::min(rho, std::max(fit.lag1_correlation, 0.0));
+  const auto badness = [&](const FitResult& f) { return f.deviance * (1 - rho) / (1 + rho) + f.prior_cost; };
+  return *std::min_element(fits.begin(), fits.end(),
+                           [&](const FitResult& a, const FitResult& b) { return badness(a) < badness(b); });
 }
 
 namespace {

@@ -107,9 +107,8 @@ bool integrate(const Insertion& insertion, const model::NeedleParameters& needle
       if (seen.leg == 0)
         path.jacobian[i] = (1 - seen.fraction) * a.jacobian + seen.fraction * b.jacobian;
       else
-        path.jacobian[i] =
-            c.p0 * a.jacobian + c.p1 * b.jacobian +
-            insertion.legs[seen.leg].insertion_mm * (c.v0 * a.slope_per_mm + c.v1 * b.slope_per_mm);
+        path.jacobian[i] = c.p0 * a.jacobian + c.p1 * b.jacobian +
+                           insertion.legs[seen.leg].insertion_mm * (c.v0 * a.slope_per_mm + c.v1 * b.slope_per_mm);
     }
   }
   return true;

@@ -3,8 +3,8 @@
 //
 // At the ends of a leg the pose comes from the Lie-group integrator (model/kinematics.hpp); within it the position is
 // the cubic with the positions and velocities of both ends (error h^4/384 of the fourth derivative: below 1e-5 mm for
-// 5 mm legs, tested). The Jacobian in between errs by up to 1 %, at the legs' ends it is exact: an estimate moves by less
-// than 1 % of its standard error for it.
+// 5 mm legs, tested). The Jacobian in between errs by up to 1 %, at the legs' ends it is exact: an estimate moves by
+// less than 1 % of its standard error for it.
 #include <Eigen/Core>
 #include <array>
 #include <vector>

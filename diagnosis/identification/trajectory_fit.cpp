@@ -3,6 +3,7 @@
 #include <Eigen/Dense>
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <numbers>
 #include <stdexcept>
 #include <thread>
@@ -377,6 +378,10 @@ FitResult TrajectoryFit::result(const VectorXd& x, const std::vector<Block>& blo
   r.noise_scale = scale_;
   r.lag1_correlation = correlation(blocks);
   r.cost = cost(x, blocks);
+  const VectorXd off = as_parameters(x, parameters_, r.needle) - prior_mean_;
+  r.prior_cost = 0.5 * off.cwiseAbs2().dot(prior_weight_);
+  r.deviance = deviance(all_residuals(blocks), options_.loss == Loss::huber ? options_.huber_threshold
+                                                                            : std::numeric_limits<double>::infinity());
   r.residual_count = residual_count_;
   for (const auto& b : blocks) r.squares += b.residual.squaredNorm();
   if (globals_ == 0) return r;
@@ -400,8 +405,13 @@ FitResult TrajectoryFit::result(const VectorXd& x, const std::vector<Block>& blo
   }
   MatrixXd to_coordinates = MatrixXd::Identity(globals_, globals_);  // d(coordinates)/d(parameters)
   std::vector<bool> free;
+  // (23) binds both lambdas together; steps across it were refused, so the fit ends where it met it.
+  const bool at_slip_limit =
+      model::find_domain_violation(r.needle, 1.01 * model::kDefaultGammaMax_rad).has_value() &&
+      r.needle.lambda1_per_rad > 1.01 * r.needle.lambda2 * r.needle.lambda2 / (2 * std::numbers::pi);
   for (Eigen::Index i = 0; i < globals_; ++i) {
-    free.push_back(x(i) > low_(i) && x(i) < high_(i));
+    const Parameter p = parameters_[static_cast<std::size_t>(i)];
+    free.push_back(x(i) > low_(i) && x(i) < high_(i) && !(at_slip_limit && (p == kLambda1 || p == kLambda2)));
     if (parameters_[static_cast<std::size_t>(i)] == kLambda1)
       for (Eigen::Index j = 0; j < globals_; ++j)
         if (parameters_[static_cast<std::size_t>(j)] == kLambda2)

@@ -77,6 +77,8 @@ struct FitResult {
   double noise_scale = 1;             // s
   double lag1_correlation = 0;        // of the whitened residuals in time
   double cost = 0;                    // as in the problem above
+  double prior_cost = 0;              // the part of it that is the priors
+  double deviance = 0;                // min over s of n log s + sum rho(r/s): what compares fits of the same data
   double squares = 0;                 // sum of squared whitened residuals
   int residual_count = 0;
   int iterations = 0;
@@ -90,8 +92,8 @@ struct FitResult {
 // start from which the model cannot follow the insertions.
 FitResult fit_trajectory(const std::vector<Insertion>& insertions, const FitOptions& options);
 
-// The same from several starts (the options' and Table I's two), the best of them: with lambda the likelihood can have
-// more than one hill.
+// The same from several starts (the options', Table I's two, the fitted bicycle), the best of them: with lambda the
+// likelihood can have more than one hill.
 FitResult fit_from_many_starts(const std::vector<Insertion>& insertions, const FitOptions& options);
 
 }  // namespace bevel::diagnosis
