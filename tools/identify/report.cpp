@@ -239,8 +239,12 @@ std::string figures_json(const Identification& r) {
 void save_report(const Identification& r, const std::string& path) {
   io::HtmlReport page("Identification of the needle");
   const bool open = r.fit.unfixed_directions() > 0;
-  page.callout(open ? io::Tone::warning : io::Tone::good,
-               open ? "The recordings leave a direction open" : "Every fitted parameter is fixed by the recordings",
+  bool bound = false;
+  for (const auto& p : r.fit.parameters) bound |= p.at_bound;
+  page.callout(open || bound ? io::Tone::warning : io::Tone::good,
+               bound  ? "A parameter ran to the bound of the model's domain"
+               : open ? "The recordings leave a direction open"
+                      : "Every fitted parameter is fixed by the recordings",
                "RMS error " + number(r.after.rms_mm, 3) + " mm, largest " + number(r.after.largest_mm, 3) +
                    " mm over " + std::to_string(r.insertions.size()) + " insertions; method " + r.method + ", prior " +
                    r.prior + ".");
