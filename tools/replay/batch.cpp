@@ -57,6 +57,13 @@ estimator::EstimatorConfig load_config(const std::string& model_path, const std:
 std::vector<Replay> replay_logs(const std::vector<std::string>& logs, const estimator::EstimatorConfig& config,
                                 const ReplayOptions& options) {
   std::vector<Replay> replays(logs.size());
+  // Logs of one name in several folders are told apart by the folder.
+  const auto name_of = [&logs](const fs::path& log) {
+    const auto same = std::count_if(logs.begin(), logs.end(),
+                                    [&log](const std::string& other) { return fs::path(other).stem() == log.stem(); });
+    const std::string stem = log.stem().string();
+    return same == 1 ? stem : log.parent_path().filename().string() + "_" + stem;
+  };
   std::atomic<std::size_t> next{0};
   std::exception_ptr failure;
   std::mutex failure_mutex;
@@ -64,7 +71,7 @@ std::vector<Replay> replay_logs(const std::vector<std::string>& logs, const esti
     for (std::size_t i = next++; i < logs.size(); i = next++) {
       try {
         const io::MappedFile file(logs[i]);
-        replays[i] = replay_log(file.bytes(), fs::path(logs[i]).stem().string(), config, options);
+        replays[i] = replay_log(file.bytes(), name_of(logs[i]), config, options);
       } catch (...) {
         const std::lock_guard lock(failure_mutex);
         failure = std::current_exception();

@@ -1,7 +1,6 @@
 #include <algorithm>
 #include <array>
 #include <boost/math/distributions/binomial.hpp>
-#include <cmath>
 #include <cstdio>
 #include <filesystem>
 #include <ostream>
@@ -20,7 +19,6 @@ struct CaseFigures {
   ChiSquareMean white;  // after its measured colour and size
   int series = 0, coloured = 0;
   std::int64_t rejected = 0, measurements = 0;
-  double largest_scale_sd = 0;
 };
 
 CaseFigures figures_of(const std::string& folder, const BatchOptions& options) {
@@ -31,6 +29,7 @@ CaseFigures figures_of(const std::string& folder, const BatchOptions& options) {
   ReplayOptions calibrated;
   for (int axis = 0; axis < 3; ++axis) {
     std::vector<std::vector<AxisSample>> readings;
+    readings.reserve(first.size());
     for (const Replay& replay : first) readings.push_back(axis_samples(replay, axis));
     result.noise[static_cast<std::size_t>(axis)] = measure_noise(readings);
   }
