@@ -80,8 +80,8 @@ std::string data_block(const Series& series, std::size_t place) {
   text.append(std::to_string(place)).append(" << EOD\n");
   for (std::size_t i = 0; i < series.x.size(); ++i) {
     text += format_number(series.x[i]) + " " + format_number(series.y[i]);
-    if (series.kind == Series::Kind::band) text += " " + format_number(series.y_high[i]);
-    text += "\n";
+    if (series.kind == Series::Kind::band) text.append(" ").append(format_number(series.y_high[i]));
+    text += '\n';
   }
   return text + "EOD\n";
 }
@@ -138,6 +138,16 @@ std::string with_unique_ids(std::string svg) {
   return svg;
 }
 
+// Browsers show an SVG title when the pointer rests on the part; gnuplot's are its own names for the series.
+std::string without_titles(std::string svg) {
+  const std::string open = "<title>";
+  const std::string close = "</title>";
+  for (std::size_t at = svg.find(open); at != std::string::npos; at = svg.find(open, at)) {
+    svg.erase(at, svg.find(close, at) + close.size() - at);
+  }
+  return svg;
+}
+
 class TemporaryFile {
  public:
   explicit TemporaryFile(const std::string& text) {
@@ -155,6 +165,10 @@ class TemporaryFile {
   TemporaryFile(const TemporaryFile&) = delete;
   TemporaryFile& operator=(const TemporaryFile&) = delete;
   const std::string& path() const { return path_; }
+  std::string text() const {
+    std::ifstream file(path_);
+    return {std::istreambuf_iterator<char>(file), {}};
+  }
 
  private:
   std::string path_;
@@ -189,7 +203,8 @@ std::string gnuplot_script(const Plot& plot) {
 
 std::string render_svg(const Plot& plot) {
   const TemporaryFile script(gnuplot_script(plot));
-  const std::string command = "gnuplot '" + script.path() + "' 2>&1";
+  const TemporaryFile errors("");  // apart from the drawing: a warning in its middle would spoil it
+  const std::string command = "gnuplot '" + script.path() + "' 2>'" + errors.path() + "'";
   std::unique_ptr<std::FILE, int (*)(std::FILE*)> pipe(::popen(command.c_str(), "r"), ::pclose);
   if (!pipe) throw std::runtime_error("gnuplot cannot be started");
   std::string output;
@@ -200,9 +215,9 @@ std::string render_svg(const Plot& plot) {
   const int status = ::pclose(pipe.release());
   const std::size_t start = output.find("<svg");
   if (!WIFEXITED(status) || WEXITSTATUS(status) != 0 || start == std::string::npos) {
-    throw std::runtime_error("gnuplot failed on plot \"" + plot.title + "\": " + output.substr(0, 500));
+    throw std::runtime_error("gnuplot failed on plot \"" + plot.title + "\": " + errors.text().substr(0, 500));
   }
-  return with_unique_ids(output.substr(start));
+  return with_unique_ids(without_titles(output.substr(start)));
 }
 
 Plot& Plot::line(std::string label, std::vector<double> x, std::vector<double> y, int colour) {
