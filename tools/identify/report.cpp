@@ -60,8 +60,9 @@ std::vector<std::string> statements(const Identification& r) {
 std::vector<std::vector<std::string>> parameter_rows(const FitResult& fit) {
   std::vector<std::vector<std::string>> rows;
   for (const auto& p : fit.parameters)
-    rows.push_back({kParameterNames[p.parameter], number(p.value), number(p.std_error, 2),
-                    number(p.low95) + " to " + number(p.high95), number(100 * p.prior_share, 2),
+    // At a bound the curvature of the likelihood says nothing of the error: no figure rather than a tiny one.
+    rows.push_back({kParameterNames[p.parameter], number(p.value), p.at_bound ? "-" : number(p.std_error, 2),
+                    p.at_bound ? "-" : number(p.low95) + " to " + number(p.high95), number(100 * p.prior_share, 2),
                     p.at_bound ? "at its bound" : ""});
   return rows;
 }
