@@ -31,7 +31,8 @@ if(BEVEL_SANITIZE)
 endif()
 if(BEVEL_TIDY)
   find_program(CLANG_TIDY NAMES clang-tidy clang-tidy-14 REQUIRED)
-  set(CMAKE_CXX_CLANG_TIDY ${CLANG_TIDY} --quiet)
+  # It reads GCC's command lines, in which some warnings are GCC's own.
+  set(CMAKE_CXX_CLANG_TIDY ${CLANG_TIDY} --quiet --extra-arg=-Wno-unknown-warning-option)
 endif()
 
 # bevel_library(NAME SOURCES... [LINK libs...]): target bevel_NAME; with no sources a header-only one.

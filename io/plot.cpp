@@ -1,12 +1,12 @@
 #include "io/plot.hpp"
 
-#include <stdlib.h>  // mkstemp
 #include <sys/wait.h>
 #include <unistd.h>
 
 #include <array>
 #include <cmath>
 #include <cstdio>
+#include <cstdlib>  // mkstemp
 #include <filesystem>
 #include <fstream>
 #include <functional>

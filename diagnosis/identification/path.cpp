@@ -118,7 +118,8 @@ std::vector<Vector3d> straight_insertion(const model::NeedleParameters& needle, 
   std::vector<Vector3d> points{Vector3d::Zero()};
   model::Pose pose;
   const model::StepInput input{spacing_mm, 0, {needle.curvature_per_mm, 0}};
-  for (double s = spacing_mm; s < length_mm + 1e-9; s += spacing_mm) {
+  const auto steps = static_cast<int>((length_mm + 1e-9) / spacing_mm);
+  for (int i = 0; i < steps; ++i) {
     if (!model::step(pose, input, model::slip_parameters(needle))) break;
     points.push_back(pose.p_mm);
   }

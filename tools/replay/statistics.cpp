@@ -94,7 +94,8 @@ NoiseColour measure_noise(const std::vector<std::vector<AxisSample>>& recordings
   // logarithm is a mean; rho by search.
   NoiseColour best;
   double least = std::numeric_limits<double>::infinity();
-  for (double rho = 0; rho < 0.985; rho += 0.005) {
+  for (int step = 0; step <= 196; ++step) {
+    const double rho = 0.005 * step;
     double mean = 0;
     double squares = 0;
     for (std::size_t l = 0; l < kLags.size(); ++l) {
