@@ -26,8 +26,8 @@ struct TrackerConfig {
   double min_length_mm = 6.0;        ///< shorter visible needles are reported as `too_short`
   // What is fitted
   /// Piece behind the tip which fixes direction and curvature. A needle whose bevel is turned changes its curvature by
-  /// up to 2 k at once, and a parabola cannot follow that: its end is then wrong by about k length^2 / 10, slowly, and a
-  /// controller in the loop answers with a weave. 25 mm gave errors of 0.15 mm; noise is no problem at 10 mm.
+  /// up to 2 k at once, and a parabola cannot follow that: its end is then wrong by about k length^2 / 10, slowly, and
+  /// a controller in the loop answers with a weave. 25 mm gave errors of 0.15 mm; noise is no problem at 10 mm.
   double fit_length_mm = 10.0;
   double curvature_sigma_per_mm = 0.01;  ///< curvatures expected; twice the 0.0047 / mm of the model's needle
   // Region of interest
