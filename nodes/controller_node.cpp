@@ -3,6 +3,8 @@
 #include <Eigen/Eigenvalues>
 #include <cstdio>
 
+#include "nodes/needle_pose.hpp"
+
 namespace bevel::nodes {
 namespace {
 // A loop this late has lost the needle: at 5 mm/s it is half a millimetre.
@@ -12,11 +14,7 @@ constexpr double kLateStop_s = 0.1;
 controller::NeedleView to_view(const needle_state_t& m) {
   controller::NeedleView v;
   v.utime = m.utime;
-  v.pose.p_mm = Eigen::Vector3d(m.position_mm[0], m.position_mm[1], m.position_mm[2]);
-  v.pose.R =
-      Eigen::Quaterniond(m.orientation_wxyz[0], m.orientation_wxyz[1], m.orientation_wxyz[2], m.orientation_wxyz[3])
-          .normalized()
-          .toRotationMatrix();
+  v.pose = read_pose(m);
   v.curvature_per_mm = m.curvature_per_mm;
   v.lambda1_per_rad = m.lambda1_per_rad;
   v.lambda2 = m.lambda2;

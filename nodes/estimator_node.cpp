@@ -1,6 +1,7 @@
 #include "nodes/estimator_node.hpp"
 
 #include "estimator/health.hpp"
+#include "nodes/needle_pose.hpp"
 
 namespace bevel::nodes {
 
@@ -10,11 +11,7 @@ needle_state_t to_message(const estimator::Estimate& estimate, std::int64_t seq)
   m.utime = estimate.utime;
   m.seq = seq;
   m.measurement_utime = s.measurement_utime;
-  Eigen::Quaterniond q(s.pose.R);
-  q.normalize();
-  for (int i = 0; i < 3; ++i) m.position_mm[i] = s.pose.p_mm[i];
-  m.orientation_wxyz[0] = q.w(), m.orientation_wxyz[1] = q.x();
-  m.orientation_wxyz[2] = q.y(), m.orientation_wxyz[3] = q.z();
+  write_pose(s.pose, m);
   m.curvature_per_mm = s.curvature_per_mm;
   m.lambda1_per_rad = s.lambda1_per_rad;
   m.lambda2 = s.lambda2;

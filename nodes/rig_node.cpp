@@ -2,6 +2,8 @@
 
 #include <cmath>
 
+#include "nodes/needle_pose.hpp"
+
 namespace bevel::nodes {
 namespace {
 
@@ -63,11 +65,7 @@ void RigNode::publish_truth(std::int64_t now_utime) {
   needle_state_t m{};
   m.utime = now_utime;
   m.seq = truth_seq_++;
-  Eigen::Quaterniond q(tip.R);
-  q.normalize();
-  for (int i = 0; i < 3; ++i) m.position_mm[i] = tip.p_mm[i];
-  m.orientation_wxyz[0] = q.w(), m.orientation_wxyz[1] = q.x();
-  m.orientation_wxyz[2] = q.y(), m.orientation_wxyz[3] = q.z();
+  write_pose(tip, m);
   m.curvature_per_mm = plant_->needle().curvature_per_mm;
   m.lambda1_per_rad = plant_->needle().lambda1_per_rad;
   m.lambda2 = plant_->needle().lambda2;

@@ -5,23 +5,10 @@
 #include <chrono>
 #include <cmath>
 #include <cstdio>
-#include <cstdlib>
-#include <new>
 #include <vector>
 
 #include "model/beam/beam_plant.hpp"
-
-namespace {
-std::size_t allocations = 0;  // one thread
-}
-
-void* operator new(std::size_t size) {
-  ++allocations;
-  if (void* memory = std::malloc(size)) return memory;
-  throw std::bad_alloc();
-}
-void operator delete(void* memory) noexcept { std::free(memory); }
-void operator delete(void* memory, std::size_t) noexcept { std::free(memory); }
+#include "tests/support/count_allocations.hpp"
 
 namespace bevel::model {
 namespace {
@@ -116,9 +103,9 @@ TEST(BeamPlantFigures, AdvanceDoesNotAllocate) {
   config.relaxing_fraction = 0.4;
   config.windup_at_100mm_rad = 0.5;
   BeamPlant plant(config);
-  const std::size_t before = allocations;
+  const long before = bevel::testing::allocations;
   for (int i = 0; i < 300; ++i) plant.advance(i < 240 ? 0.5 : -0.5, 0.1, 0.025);
-  EXPECT_EQ(allocations, before);
+  EXPECT_EQ(bevel::testing::allocations, before);
   EXPECT_GT(before, 0U);  // the counter is in place
 }
 

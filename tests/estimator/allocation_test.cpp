@@ -1,24 +1,9 @@
 // No allocation in a step, late measurements, resets and relinearisation included: operator new is counted.
 #include <gtest/gtest.h>
 
-#include <atomic>
-#include <cstdlib>
-#include <new>
-
 #include "estimator/needle_estimator.hpp"
 #include "tests/estimator/insertion.hpp"
-
-namespace {
-std::atomic<long> allocations{0};
-}  // namespace
-
-void* operator new(std::size_t size) {
-  ++allocations;
-  if (void* memory = std::malloc(size)) return memory;
-  throw std::bad_alloc();
-}
-void operator delete(void* memory) noexcept { std::free(memory); }
-void operator delete(void* memory, std::size_t) noexcept { std::free(memory); }
+#include "tests/support/count_allocations.hpp"
 
 namespace bevel::estimator {
 namespace {
@@ -35,14 +20,14 @@ TEST(NeedleEstimator, AllocatesNothingInAStep) {
     data.measurements[i].position_mm += Eigen::Vector3d(10, 10, 0);  // brings a reset
   NeedleEstimator estimator(config);
   std::size_t next = 0;
-  const long before = allocations;
+  const long before = bevel::testing::allocations;
   for (const auto& actuator : data.actuators) {
     estimator.add(actuator);
     while (next < data.measurements.size() && data.measurements[next].utime + 60'000 < actuator.utime)
       estimator.add(data.measurements[next++]);
     (void)estimator.estimate(actuator.utime);
   }
-  EXPECT_EQ(allocations - before, 0);
+  EXPECT_EQ(bevel::testing::allocations - before, 0);
   EXPECT_GT(estimator.counters().late, 100);
   EXPECT_GT(estimator.counters().relinearised, 0);
   EXPECT_GT(estimator.estimate(data.actuators.back().utime).state.reset_count, 0);

@@ -8,6 +8,7 @@ namespace bevel::tools {
 struct CommandLine::Impl {
   Impl(const std::string& program, const std::string& description) : app(description, program) {}
   CLI::App app;
+  std::vector<std::function<std::string()>> checks;
 };
 
 CommandLine::CommandLine(const std::string& program, const std::string& description)
@@ -35,9 +36,30 @@ CommandLine& CommandLine::option(const std::string& names, int& value, const std
   return *this;
 }
 
+CommandLine& CommandLine::positive(const std::string& names, double& value, const std::string& help) {
+  impl_->app.add_option(names, value, help)->check(CLI::PositiveNumber);
+  return *this;
+}
+
+CommandLine& CommandLine::non_negative(const std::string& names, double& value, const std::string& help) {
+  impl_->app.add_option(names, value, help)->check(CLI::NonNegativeNumber);
+  return *this;
+}
+
 CommandLine& CommandLine::numbers(const std::string& names, std::vector<double>& value, const std::string& help,
                                   int count) {
   impl_->app.add_option(names, value, help)->delimiter(',')->expected(count)->capture_default_str();
+  return *this;
+}
+
+CommandLine& CommandLine::choice(const std::string& names, std::string& value, const std::string& help,
+                                 const std::vector<std::string>& allowed) {
+  impl_->app.add_option(names, value, help)->check(CLI::IsMember(allowed));
+  return *this;
+}
+
+CommandLine& CommandLine::check(std::function<std::string()> problem) {
+  impl_->checks.push_back(std::move(problem));
   return *this;
 }
 
@@ -55,6 +77,8 @@ CommandLine& CommandLine::arguments(const std::string& name, std::vector<std::st
 int CommandLine::run(int argc, char** argv, const std::function<int()>& body) {
   try {
     impl_->app.parse(argc, argv);
+    for (const auto& check : impl_->checks)
+      if (const std::string problem = check(); !problem.empty()) throw CLI::ValidationError(problem);
   } catch (const CLI::ParseError& e) {
     return impl_->app.exit(e) == 0 ? 0 : 2;
   }

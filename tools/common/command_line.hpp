@@ -20,11 +20,18 @@ class CommandLine {
   CommandLine& option(const std::string& names, std::string& value, const std::string& help, bool required = false);
   CommandLine& option(const std::string& names, double& value, const std::string& help, double lowest, double highest);
   CommandLine& option(const std::string& names, int& value, const std::string& help, int lowest, int highest);
+  CommandLine& positive(const std::string& names, double& value, const std::string& help);
+  CommandLine& non_negative(const std::string& names, double& value, const std::string& help);
   CommandLine& numbers(const std::string& names, std::vector<double>& value, const std::string& help, int count);
+  CommandLine& choice(const std::string& names, std::string& value, const std::string& help,
+                      const std::vector<std::string>& allowed);
   CommandLine& flag(const std::string& names, bool& value, const std::string& help);
   // Arguments without a name, at least one of them if required.
   CommandLine& arguments(const std::string& name, std::vector<std::string>& values, const std::string& help,
                          bool required = true);
+
+  // For what one option alone cannot say: `problem` is asked after parsing; text it returns is a usage error.
+  CommandLine& check(std::function<std::string()> problem);
 
   // Parses, then runs `body`, whose exceptions become one message on stderr and status 1. Returns the exit status.
   int run(int argc, char** argv, const std::function<int()>& body);

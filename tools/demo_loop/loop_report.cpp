@@ -1,7 +1,7 @@
-#include <Eigen/Geometry>
 #include <cmath>
 
 #include "io/html_report.hpp"
+#include "nodes/needle_pose.hpp"
 #include "tools/demo_loop/loop_figures.hpp"
 
 namespace bevel::tools {
@@ -26,10 +26,7 @@ Column column(const std::vector<needle_state_t>& states, std::int64_t start_utim
     c.t.push_back(static_cast<double>(m.utime - start_utime) * 1e-6);
     c.x.push_back(m.position_mm[0]), c.y.push_back(m.position_mm[1]), c.z.push_back(m.position_mm[2]);
     // The covariance is of the body frame; what a reader sees is {A}.
-    const Eigen::Matrix3d R =
-        Eigen::Quaterniond(m.orientation_wxyz[0], m.orientation_wxyz[1], m.orientation_wxyz[2], m.orientation_wxyz[3])
-            .normalized()
-            .toRotationMatrix();
+    const Eigen::Matrix3d R = nodes::read_pose(m).R;
     Eigen::Matrix3d P;
     for (int r = 0; r < 3; ++r)
       for (int k = 0; k < 3; ++k) P(r, k) = m.covariance[9 * r + k];

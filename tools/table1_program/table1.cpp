@@ -1,22 +1,15 @@
 // bevel-table1: the paper's Table I and Figures 5, 7, 8 on simulated plants, beside the paper's figures.
-#include <CLI/CLI.hpp>
-#include <cstdio>
 #include <filesystem>
 #include <iostream>
 
+#include "tools/common/command_line.hpp"
 #include "tools/table1_program/table1_report.hpp"
 
 int main(int argc, char** argv) {
-  CLI::App app("Table I and Figures 5, 7 and 8, beside the paper's.", "bevel-table1");
   std::string out;
-  app.set_version_flag("--version", BEVEL_VERSION);
-  app.add_option("-o,--out", out, "folder for report.html");
-  try {
-    app.parse(argc, argv);
-  } catch (const CLI::ParseError& e) {
-    return app.exit(e) == 0 ? 0 : 2;
-  }
-  try {
+  bevel::tools::CommandLine command_line("bevel-table1", "Table I and Figures 5, 7 and 8, beside the paper's.");
+  command_line.option("-o,--out", out, "folder for report.html");
+  return command_line.run(argc, argv, [&] {
     const auto study = bevel::table1::run_study();
     bevel::table1::print(std::cout, study);
     if (out.empty()) return 0;
@@ -24,8 +17,5 @@ int main(int argc, char** argv) {
     bevel::table1::save_report(study, out + "/report.html");
     std::cout << "\nwritten: " << out << "/report.html\n";
     return 0;
-  } catch (const std::exception& e) {
-    std::fprintf(stderr, "bevel-table1: %s\n", e.what());
-    return 1;
-  }
+  });
 }
