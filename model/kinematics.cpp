@@ -2,7 +2,9 @@
 
 #include <algorithm>
 #include <cmath>
+#include <numbers>
 
+#include "model/angle_functions.hpp"
 #include "model/slip.hpp"
 
 namespace bevel::model {
@@ -15,128 +17,275 @@ using Eigen::Vector3d;
 constexpr double kMaxStep_mm = 2.5;
 constexpr double kMaxStep_rad = 0.25;
 
-// Columns of a stage's Jacobian: initial body rotation (3), insertion, rotation, kappa_x, kappa_y, lambda1, lambda2,
-// ell.
-constexpr int kColumns = 10;
-using Row2 = Eigen::Matrix<double, 2, kColumns>;
-using Row3 = Eigen::Matrix<double, 3, kColumns>;
-using Row6 = Eigen::Matrix<double, 6, kColumns>;
-enum Column { kInsertion = 3, kRotation, kKappaX, kKappaY, kLambda1, kLambda2, kWheelbase };
+// Columns of a stage's Jacobian. Slip depends on the pose only through the insertion axis n seen in the body, a point
+// of the unit sphere, so that two columns stand for the pose; kNeedle columns are all that a filter needs, kAll are
+// all inputs of a step as well (and one more, which keeps rows even in length).
+enum Column { kTilt, kAcross, kKappaX, kLambda1, kLambda2, kWheelbase, kInsertion, kRotation, kKappaY };
+constexpr int kNone = 0;
+constexpr int kNeedle = 6;
+constexpr int kAll = 10;
+template <int kColumns>
+using Row = Eigen::Matrix<double, 1, kColumns, Eigen::RowMajor>;
+template <int kRows, int kColumns>
+using Rows = Eigen::Matrix<double, kRows, kColumns, Eigen::RowMajor>;
 
 double front_wheel_sign(const SlipParameters& slip) { return slip.front_wheel == FrontWheel::published ? 1.0 : -1.0; }
 
-// f as a vector in the body's xy plane, and its derivatives, for the insertion axis n = R^T z_A seen in the body.
-struct SlipVector {
-  Vector2d f;
-  Eigen::Matrix<double, 2, 3> by_axis;  // by n, along the sphere |n| = 1
-  Vector2d by_lambda1, by_lambda2;
+// The insertion axis n = R^T z_A seen in the body, in polar form about the heading.
+struct Axis {
+  Vector3d n;
+  double q;    // sine of the tilt
+  Vector2d e;  // direction of n's part across the heading
+  bool tilted;
+
+  explicit Axis(const Vector3d& axis) : n(axis), q(axis.head<2>().norm()), tilted(q > 1e-12) {
+    // Along z_A the direction of the tilt is undefined and f is zero: any unit vector serves, f/q tends to df/dtheta.
+    e = tilted ? Vector2d(n.head<2>() / q) : Vector2d(1, 0);
+  }
 };
 
-template <bool kWithJacobian>
-bool slip_vector(const Vector3d& n, const SlipParameters& slip, SlipVector& out) {
-  const double q = n.head<2>().norm();
-  const Slip law = evaluate_slip(std::atan2(q, n.z()), slip.lambda1_per_rad, slip.lambda2);
-  if (!law.in_domain) return false;
-  // Along z_A the direction of the tilt is undefined and f is zero: any unit vector serves, f/q tends to df/dtheta.
-  const bool tilted = q > 1e-12;
-  const Vector2d e = tilted ? Vector2d(n.head<2>() / q) : Vector2d(1, 0);
-  out.f = -law.f * e;
-  if constexpr (kWithJacobian) {
-    const double radial = law.f_by_tilt_per_rad * n.z();
-    const double across = tilted ? law.f / q : law.f_by_tilt_per_rad;
-    out.by_axis.leftCols<2>() = -(radial - across) * e * e.transpose() - across * Eigen::Matrix2d::Identity();
-    out.by_axis.col(2) = law.f_by_tilt_per_rad * q * e;
-    out.by_lambda1 = -law.f_by_lambda1_rad * e;
-    out.by_lambda2 = -law.f_by_lambda2 * e;
+// The slip law at a tilt that is near one already evaluated: stages of a step lie within a degree of each other, and
+// the angle between them and the change of tan(alpha) are short series. To rounding the same as evaluate_slip().
+Slip slip_near(const Axis& axis, const Axis& known, const Slip& at, const SlipParameters& slip) {
+  constexpr double kNear = 0.03;
+  const double sine = axis.q * known.n.z() - axis.n.z() * known.q;
+  if (!(std::abs(sine) < kNear) || axis.n.z() * known.n.z() + axis.q * known.q < 0)
+    return evaluate_slip(std::atan2(axis.q, axis.n.z()), slip.lambda1_per_rad, slip.lambda2);
+  const double s2 = sine * sine;
+  const double tilt = at.gamma_rad - at.alpha_rad + sine * (1 + s2 * (1.0 / 6 + s2 * (3.0 / 40 + s2 * (15.0 / 336))));
+  if (slip.lambda1_per_rad == 0 && slip.lambda2 == 0) return evaluate_slip(tilt, 0, 0);
+  const double b = 1 - slip.lambda2;
+  const double root = std::sqrt(b * b + 4 * slip.lambda1_per_rad * tilt);
+  const double gamma = 2 * tilt / (b + root);
+  const double alpha = gamma - tilt;
+  const double change = alpha - at.alpha_rad;
+  if (!(gamma < std::numbers::pi / 2) || !(std::abs(change) < kNear))  // false for a NaN too
+    return evaluate_slip(tilt, slip.lambda1_per_rad, slip.lambda2);
+  const double c2 = change * change;
+  const double tangent = change * (1 + c2 * (1.0 / 3 + c2 * (2.0 / 15 + c2 * (17.0 / 315))));
+  const double f = (at.f + tangent) / (1 - at.f * tangent);
+  const double f_by_alpha = 1 + f * f;
+  const double by_root = f_by_alpha / root;
+  return {gamma, alpha, f, by_root - f_by_alpha, -by_root * gamma * gamma, by_root * gamma, true};
+}
+
+// f as a vector in the body's xy plane at one stage, with its derivatives by the columns.
+template <int kColumns>
+struct Stage {
+  Vector2d f;
+  Rows<2, kColumns> D;
+};
+template <>
+struct Stage<kNone> {
+  Vector2d f;
+};
+
+// `Dn` is the stage's derivative of the axis by the columns.
+template <int kColumns>
+void set_stage(const Axis& axis, const Slip& law, const Rows<3, kColumns>& Dn, const SlipParameters& slip,
+               Stage<kColumns>& stage) {
+  stage.f = -law.f * axis.e;
+  if constexpr (kColumns != kNone) {
+    const Vector2d& e = axis.e;
+    const double radial = law.f_by_tilt_per_rad * axis.n.z();
+    const double across = axis.tilted ? law.f / axis.q : law.f_by_tilt_per_rad;
+    Rows<2, 3> by_axis;  // along the sphere |n| = 1
+    const double xy = (across - radial) * e.x() * e.y();
+    const double z = law.f_by_tilt_per_rad * axis.q;
+    by_axis << (across - radial) * e.x() * e.x() - across, xy, z * e.x(), xy,
+        (across - radial) * e.y() * e.y() - across, z * e.y();
+    stage.D.noalias() = by_axis.lazyProduct(Dn);
+    stage.D.col(kLambda1) -= law.f_by_lambda1_rad * e;
+    stage.D.col(kLambda2) -= law.f_by_lambda2 * e;
   }
   if (slip.direction == SlipDirection::bevel_plane) {
-    out.f.x() = 0;
-    if constexpr (kWithJacobian) {
-      out.by_axis.row(0).setZero();
-      out.by_lambda1.x() = 0;
-      out.by_lambda2.x() = 0;
+    stage.f.x() = 0;
+    if constexpr (kColumns != kNone) stage.D.row(0).setZero();
+  }
+}
+
+// What all stages of one step share.
+template <int kColumns>
+class Stepper {
+ public:
+  Stepper(const StepInput& input, const SlipParameters& slip)
+      : input_(input), slip_(slip), ds_(input.insertion_mm), turn_per_mm_(front_wheel_sign(slip) / slip.wheelbase_mm) {}
+
+  Vector6d twist(const Vector2d& f) const {
+    Vector6d F;
+    F << ds_ * f.x(), ds_ * f.y(), ds_, ds_ * (input_.curvature_per_mm.x() - turn_per_mm_ * f.y()),
+        ds_ * (input_.curvature_per_mm.y() + turn_per_mm_ * f.x()), input_.rotation_rad;
+    return F;
+  }
+
+  // The derivative of the two rates of turn across the heading that f goes with; `share` is the sum of the weights of
+  // the stages that f and Df are made of.
+  Rows<2, kColumns> turn_by_columns(const Vector2d& f, const Rows<2, kColumns>& Df, double share) const {
+    Rows<2, kColumns> D;
+    D.row(0) = (-turn_per_mm_ * ds_) * Df.row(1);
+    D.row(1) = (turn_per_mm_ * ds_) * Df.row(0);
+    D(0, kKappaX) += share * ds_;
+    D(0, kWheelbase) += turn_per_mm_ / slip_.wheelbase_mm * ds_ * f.y();
+    D(1, kWheelbase) -= turn_per_mm_ / slip_.wheelbase_mm * ds_ * f.x();
+    if constexpr (kColumns == kAll) {
+      D(1, kKappaY) += share * ds_;
+      D(0, kInsertion) += share * input_.curvature_per_mm.x() - turn_per_mm_ * f.y();
+      D(1, kInsertion) += share * input_.curvature_per_mm.y() + turn_per_mm_ * f.x();
     }
+    return D;
   }
-  return true;
-}
 
-// One stage: the twist F at the insertion axis n, and its Jacobian given that of the stage's body rotation.
-template <bool kWithJacobian>
-bool evaluate_stage(const Vector3d& n, const Row3& rotation, const StepInput& input, const SlipParameters& slip,
-                    Vector6d& F, Row6& DF) {
-  SlipVector s;
-  if (!slip_vector<kWithJacobian>(n, slip, s)) return false;
+  // The axis after a rotation exp(c) of the body, exp(-c) n; D becomes its derivative, exp(-c) Dn + n_after x (J_r(c)
+  // dc). `share` as above, for the rotation about the heading.
+  Vector3d turned(const Vector3d& n, const Vector3d& c, const Rows<3, kColumns>& Dn, const Rows<2, kColumns>& Dc,
+                  double share, Rows<3, kColumns>& D) const {
+    const AngleFunctions f = angle_functions(c.squaredNorm());
+    const Vector3d cn = c.cross(n);
+    const Vector3d after = n - f.a * cn + f.b * c.cross(cn);
+    if constexpr (kColumns != kNone) {
+      const Matrix3d C = hat(c);
+      const Matrix3d C2 = C * C;
+      const Matrix3d back = Matrix3d::Identity() - f.a * C + f.b * C2;
+      const Matrix3d J = Matrix3d::Identity() - f.b * C + f.c * C2;
+      Matrix3d by_c;
+      for (int i = 0; i < 3; ++i) by_c.col(i) = after.cross(J.col(i));
+      D.noalias() = back.lazyProduct(Dn);
+      D.noalias() += by_c.template leftCols<2>().lazyProduct(Dc);
+      if constexpr (kColumns == kAll) D.col(kRotation) += share * by_c.col(2);
+    }
+    return after;
+  }
+
+ private:
+  const StepInput& input_;
+  const SlipParameters& slip_;
+  double ds_;
+  double turn_per_mm_;
+};
+
+// Exponential of a twist and the blocks of its right Jacobian [J Q; 0 J], which share their functions.
+struct ExpWithJacobian {
+  Pose pose;
+  Matrix3d J, Q;
+
+  explicit ExpWithJacobian(const Vector6d& twist) {
+    const Vector3d v = twist.head<3>();
+    const Vector3d w = twist.tail<3>();
+    const double t2 = w.squaredNorm();
+    const AngleFunctions f = angle_functions(t2);
+    const Matrix3d W = hat(w);
+    Matrix3d ww = w * w.transpose();
+    Matrix3d W2 = ww;
+    W2.diagonal().array() -= t2;
+    pose.R = Matrix3d::Identity() + f.a * W + f.b * W2;
+    const Vector3d wxv = w.cross(v);
+    pose.p_mm = v + f.b * wxv + f.c * w.cross(wxv);
+    J = Matrix3d::Identity() - f.b * W + f.c * W2;
+    // As right_jacobian_se3(), where its products of hats are explained.
+    const double wv = w.dot(v);
+    const Matrix3d vw = v * w.transpose();
+    Q = hat((f.d * t2 - 0.5) * v - ((2 * f.d - f.c) * wv) * w) + f.c * (vw + vw.transpose()) - (2 * f.e * wv) * ww;
+    Q.diagonal().array() += 2 * wv * (f.e * t2 - f.c);
+  }
+};
+
+// Derivative of the pose after a step, by the pose before and by the columns.
+template <int kColumns>
+struct StepDerivative {
+  Matrix6d pose;
+  Rows<6, kColumns> columns;
+};
+
+template <int kColumns>
+bool step_impl(Pose& pose, const StepInput& input, const SlipParameters& slip, StepDerivative<kColumns>* derivative) {
+  constexpr bool kWithJacobian = kColumns != kNone;
+  const Stepper<kColumns> stepper(input, slip);
   const double ds = input.insertion_mm;
-  const double turn_per_mm = front_wheel_sign(slip) / slip.wheelbase_mm;
-  const double omega_x = input.curvature_per_mm.x() - turn_per_mm * s.f.y();
-  const double omega_y = input.curvature_per_mm.y() + turn_per_mm * s.f.x();
-  F << ds * s.f.x(), ds * s.f.y(), ds, ds * omega_x, ds * omega_y, input.rotation_rad;
-  if constexpr (kWithJacobian) {
-    // n = R^T z_A moves by n x delta under a body rotation delta.
-    Row2 Df = (s.by_axis * hat(n)) * rotation;
-    Df.col(kLambda1) += s.by_lambda1;
-    Df.col(kLambda2) += s.by_lambda2;
-    DF.row(0) = ds * Df.row(0);
-    DF.row(1) = ds * Df.row(1);
-    DF.row(2).setZero();
-    DF.row(3) = -turn_per_mm * ds * Df.row(1);
-    DF.row(4) = turn_per_mm * ds * Df.row(0);
-    DF.row(5).setZero();
-    DF.col(kInsertion) += (Vector6d() << s.f, 1, omega_x, omega_y, 0).finished();
-    DF(5, kRotation) += 1;
-    DF(3, kKappaX) += ds;
-    DF(4, kKappaY) += ds;
-    DF(3, kWheelbase) += turn_per_mm / slip.wheelbase_mm * ds * s.f.y();
-    DF(4, kWheelbase) -= turn_per_mm / slip.wheelbase_mm * ds * s.f.x();
-  }
-  return true;
-}
 
-template <bool kWithJacobian>
-bool step_impl(Pose& pose, const StepInput& input, const SlipParameters& slip, StepJacobian* jacobian) {
-  const Vector3d n1 = pose.R.row(2).transpose();
-  Vector6d F1, F2, F3, F4;
-  Row3 D1, D2, D3, D4;
-  Row6 DF1, DF2, DF3, DF4;
+  const Axis axis1(pose.R.row(2).transpose());
+  const Slip law1 = evaluate_slip(std::atan2(axis1.q, axis1.n.z()), slip.lambda1_per_rad, slip.lambda2);
+  if (!law1.in_domain) return false;
+  // A body rotation delta moves n by n x delta: along b for one about a, along -a for one about b.
+  const Vector3d a(-axis1.e.y(), axis1.e.x(), 0);
+  const Vector3d b = axis1.n.cross(a);
+  Rows<3, kColumns> Dn1, Dn2, Dn3, Dn4;
+  Rows<2, kColumns> Dw1, Dw2, Dw3;
   if constexpr (kWithJacobian) {
-    D1.setZero();
-    D1.leftCols<3>().setIdentity();
+    Dn1.setZero();
+    Dn1.col(kTilt) = b;
+    Dn1.col(kAcross) = -a;
   }
-  // A stage's rotation is the base's times exp(c): its perturbation is exp(-c) D_base + J_r(c) dc.
-  const auto turn = [](const Vector3d& c, const Row3& D_base, const Row3& Dc, Row3& D_out) -> Matrix3d {
-    Matrix3d back = exp_so3(-c);
-    if constexpr (kWithJacobian) D_out = back * D_base + right_jacobian_so3(c) * Dc;
-    return back;
+
+  Stage<kColumns> s1, s2, s3, s4;
+  set_stage(axis1, law1, Dn1, slip, s1);
+  const Vector3d w1 = stepper.twist(s1.f).template tail<3>();
+  if constexpr (kWithJacobian) Dw1 = 0.5 * stepper.turn_by_columns(s1.f, s1.D, 1);
+  const Axis axis2(stepper.turned(axis1.n, 0.5 * w1, Dn1, Dw1, 0.5, Dn2));
+  const Slip law2 = slip_near(axis2, axis1, law1, slip);
+  if (!law2.in_domain) return false;
+  set_stage(axis2, law2, Dn2, slip, s2);
+  const Vector3d w2 = stepper.twist(s2.f).template tail<3>();
+  if constexpr (kWithJacobian) Dw2 = 0.5 * stepper.turn_by_columns(s2.f, s2.D, 1);
+  const Axis axis3(stepper.turned(axis1.n, 0.5 * w2, Dn1, Dw2, 0.5, Dn3));
+  const Slip law3 = slip_near(axis3, axis1, law1, slip);
+  if (!law3.in_domain) return false;
+  set_stage(axis3, law3, Dn3, slip, s3);
+  const Vector3d w3 = stepper.twist(s3.f).template tail<3>();
+  if constexpr (kWithJacobian) Dw3 = stepper.turn_by_columns(s3.f, s3.D, 1) - Dw1;
+  const Axis axis4(stepper.turned(axis2.n, w3 - 0.5 * w1, Dn2, Dw3, 0.5, Dn4));
+  const Slip law4 = slip_near(axis4, axis1, law1, slip);
+  if (!law4.in_domain) return false;
+  set_stage(axis4, law4, Dn4, slip, s4);
+
+  // Two half steps, with the weights of either: the twist is linear in f but for what does not change within a step.
+  const Vector2d fA = (3 * s1.f + 2 * s2.f + 2 * s3.f - s4.f) / 12;
+  const Vector2d fB = (-s1.f + 2 * s2.f + 2 * s3.f + 3 * s4.f) / 12;
+  const auto half = [&](const Vector2d& f) {
+    Vector6d twist = stepper.twist(2 * f);
+    twist *= 0.5;
+    return twist;
   };
-
-  if (!evaluate_stage<kWithJacobian>(n1, D1, input, slip, F1, DF1)) return false;
-  const Vector3d n2 = turn(0.5 * F1.tail<3>(), D1, 0.5 * DF1.bottomRows<3>(), D2) * n1;
-  if (!evaluate_stage<kWithJacobian>(n2, D2, input, slip, F2, DF2)) return false;
-  const Vector3d n3 = turn(0.5 * F2.tail<3>(), D1, 0.5 * DF2.bottomRows<3>(), D3) * n1;
-  if (!evaluate_stage<kWithJacobian>(n3, D3, input, slip, F3, DF3)) return false;
-  const Vector3d n4 =
-      turn(F3.tail<3>() - 0.5 * F1.tail<3>(), D2, DF3.bottomRows<3>() - 0.5 * DF1.bottomRows<3>(), D4) * n2;
-  if (!evaluate_stage<kWithJacobian>(n4, D4, input, slip, F4, DF4)) return false;
-
-  const Vector6d A = (3 * F1 + 2 * F2 + 2 * F3 - F4) / 12;
-  const Vector6d B = (-F1 + 2 * F2 + 2 * F3 + 3 * F4) / 12;
-  const Pose exp_A = exp_se3(A);
-  const Pose exp_B = exp_se3(B);
   if constexpr (kWithJacobian) {
-    const Row6 DA = (3 * DF1 + 2 * DF2 + 2 * DF3 - DF4) / 12;
-    const Row6 DB = (-DF1 + 2 * DF2 + 2 * DF3 + 3 * DF4) / 12;
-    const Matrix6d back_A = adjoint(exp_A.inverse());
-    const Matrix6d back_B = adjoint(exp_B.inverse());
-    Row6 total = right_jacobian_se3(A) * DA;
-    total.leftCols<3>() += back_A.rightCols<3>();
-    total = (back_B * total).eval();
-    total += right_jacobian_se3(B) * DB;
-    jacobian->pose.leftCols<3>() = back_B * back_A.leftCols<3>();
-    jacobian->pose.rightCols<3>() = total.leftCols<3>();
-    jacobian->input = total.middleCols<4>(kInsertion);
-    jacobian->slip = total.middleCols<3>(kLambda1);
+    const ExpWithJacobian A(half(fA)), B(half(fB));
+    const Rows<2, kColumns> DfA = (3 * s1.D + 2 * s2.D + 2 * s3.D - s4.D) / 12;
+    const Rows<2, kColumns> DfB = (-s1.D + 2 * s2.D + 2 * s3.D + 3 * s4.D) / 12;
+    // pose exp(A) exp(B): what A does is seen through Ad(exp(-B)).
+    const Matrix3d Bt = B.pose.R.transpose();
+    const Matrix3d KA = Bt * A.J;
+    const Matrix3d LA = Bt * (A.Q - hat(B.pose.p_mm) * A.J);
+    // Velocities v = (v_x, v_y) and rates of turn w = (w_x, w_y) of both halves, stacked.
+    Rows<8, kColumns> D;
+    D.template middleRows<2>(0) = ds * DfA;
+    D.template middleRows<2>(2) = stepper.turn_by_columns(fA, DfA, 0.5);
+    D.template middleRows<2>(4) = ds * DfB;
+    D.template middleRows<2>(6) = stepper.turn_by_columns(fB, DfB, 0.5);
+    if constexpr (kColumns == kAll) {
+      D.template block<2, 1>(0, kInsertion) += fA;
+      D.template block<2, 1>(4, kInsertion) += fB;
+    }
+    Eigen::Matrix<double, 3, 8> top;
+    top << KA.leftCols<2>(), LA.leftCols<2>(), B.J.leftCols<2>(), B.Q.leftCols<2>();
+    derivative->columns.template topRows<3>().noalias() = top.lazyProduct(D);
+    derivative->columns.template bottomRows<3>().noalias() = KA.leftCols<2>().lazyProduct(D.template middleRows<2>(2));
+    derivative->columns.template bottomRows<3>().noalias() +=
+        B.J.leftCols<2>().lazyProduct(D.template middleRows<2>(6));
+    if constexpr (kColumns == kAll) {
+      derivative->columns.template block<3, 1>(0, kInsertion) += 0.5 * (KA.col(2) + B.J.col(2));
+      derivative->columns.template block<3, 1>(0, kRotation) += 0.5 * (LA.col(2) + B.Q.col(2));
+      derivative->columns.template block<3, 1>(3, kRotation) += 0.5 * (KA.col(2) + B.J.col(2));
+    }
+    const Pose total = A.pose * B.pose;
+    const Matrix3d back = total.R.transpose();
+    derivative->pose.topLeftCorner<3, 3>() = back;
+    derivative->pose.bottomLeftCorner<3, 3>().setZero();
+    derivative->pose.rightCols<3>() = derivative->columns.col(kTilt) * a.transpose();
+    derivative->pose.rightCols<3>() += derivative->columns.col(kAcross) * b.transpose();
+    derivative->pose.topRightCorner<3, 3>() -= back * hat(total.p_mm);
+    derivative->pose.bottomRightCorner<3, 3>() += back;
+    pose = pose * total;
+  } else {
+    pose = pose * exp_se3(half(fA)) * exp_se3(half(fB));
   }
-  pose = pose * exp_A * exp_B;
   return true;
 }
 
@@ -146,6 +295,39 @@ int substeps(const StepInput& input) {
   return std::clamp(static_cast<int>(std::ceil(count)), 1, 1 << 20);
 }
 
+// Cuts an increment into steps and chains their derivatives.
+template <int kColumns>
+bool advance_impl(Pose& pose, const StepInput& input, const SlipParameters& slip,
+                  StepDerivative<kColumns>* derivative) {
+  const int count = substeps(input);
+  if (count == 1) return step_impl(pose, input, slip, derivative);
+  const StepInput part{input.insertion_mm / count, input.rotation_rad / count, input.curvature_per_mm};
+  Pose trial = pose;
+  StepDerivative<kColumns> last;
+  for (int i = 0; i < count; ++i) {
+    if (!step_impl(trial, part, slip, &last)) return false;
+    if constexpr (kColumns != kNone) {
+      // The increments of a part are 1/count of the whole's.
+      if constexpr (kColumns == kAll) last.columns.template middleCols<2>(kInsertion) /= count;
+      if (i == 0) {
+        *derivative = last;
+      } else {
+        derivative->pose = last.pose * derivative->pose;
+        derivative->columns = last.pose * derivative->columns + last.columns;
+      }
+    }
+  }
+  pose = trial;
+  return true;
+}
+
+void unpack(const StepDerivative<kAll>& from, StepJacobian& to) {
+  to.pose = from.pose;
+  to.input << from.columns.col(kInsertion), from.columns.col(kRotation), from.columns.col(kKappaX),
+      from.columns.col(kKappaY);
+  to.slip = from.columns.middleCols<3>(kLambda1);
+}
+
 }  // namespace
 
 SlipParameters slip_parameters(const NeedleParameters& needle) {
@@ -153,47 +335,42 @@ SlipParameters slip_parameters(const NeedleParameters& needle) {
 }
 
 bool body_twist(const Matrix3d& R, const StepInput& input, const SlipParameters& slip, Vector6d& twist) {
-  Row6 unused;
-  return evaluate_stage<false>(R.row(2).transpose(), {}, input, slip, twist, unused);
-}
-
-bool step(Pose& pose, const StepInput& input, const SlipParameters& slip) {
-  return step_impl<false>(pose, input, slip, nullptr);
-}
-
-bool step(Pose& pose, const StepInput& input, const SlipParameters& slip, StepJacobian& jacobian) {
-  return step_impl<true>(pose, input, slip, &jacobian);
-}
-
-bool advance(Pose& pose, const StepInput& input, const SlipParameters& slip) {
-  const int count = substeps(input);
-  if (count == 1) return step(pose, input, slip);
-  const StepInput part{input.insertion_mm / count, input.rotation_rad / count, input.curvature_per_mm};
-  Pose trial = pose;
-  for (int i = 0; i < count; ++i)
-    if (!step(trial, part, slip)) return false;
-  pose = trial;
+  const Axis axis(R.row(2).transpose());
+  const Slip law = evaluate_slip(std::atan2(axis.q, axis.n.z()), slip.lambda1_per_rad, slip.lambda2);
+  if (!law.in_domain) return false;
+  Stage<kNone> stage;
+  set_stage<kNone>(axis, law, {}, slip, stage);
+  twist = Stepper<kNone>(input, slip).twist(stage.f);
   return true;
 }
 
+bool step(Pose& pose, const StepInput& input, const SlipParameters& slip) {
+  return step_impl<kNone>(pose, input, slip, nullptr);
+}
+
+bool step(Pose& pose, const StepInput& input, const SlipParameters& slip, StepJacobian& jacobian) {
+  StepDerivative<kAll> derivative;
+  if (!step_impl<kAll>(pose, input, slip, &derivative)) return false;
+  unpack(derivative, jacobian);
+  return true;
+}
+
+bool advance(Pose& pose, const StepInput& input, const SlipParameters& slip) {
+  return advance_impl<kNone>(pose, input, slip, nullptr);
+}
+
 bool advance(Pose& pose, const StepInput& input, const SlipParameters& slip, StepJacobian& jacobian) {
-  const int count = substeps(input);
-  if (count == 1) return step(pose, input, slip, jacobian);
-  const StepInput part{input.insertion_mm / count, input.rotation_rad / count, input.curvature_per_mm};
-  Pose trial = pose;
-  StepJacobian last;
-  jacobian.pose.setIdentity();
-  jacobian.input.setZero();
-  jacobian.slip.setZero();
-  for (int i = 0; i < count; ++i) {
-    if (!step(trial, part, slip, last)) return false;
-    // The increments of a part are 1/count of the whole's.
-    last.input.leftCols<2>() /= count;
-    jacobian.pose = last.pose * jacobian.pose;
-    jacobian.input = last.pose * jacobian.input + last.input;
-    jacobian.slip = last.pose * jacobian.slip + last.slip;
-  }
-  pose = trial;
+  StepDerivative<kAll> derivative;
+  if (!advance_impl<kAll>(pose, input, slip, &derivative)) return false;
+  unpack(derivative, jacobian);
+  return true;
+}
+
+bool advance(Pose& pose, const StepInput& input, const SlipParameters& slip, NeedleJacobian& jacobian) {
+  StepDerivative<kNeedle> derivative;
+  if (!advance_impl<kNeedle>(pose, input, slip, &derivative)) return false;
+  jacobian.pose = derivative.pose;
+  jacobian.needle = derivative.columns.middleCols<4>(kKappaX);
   return true;
 }
 

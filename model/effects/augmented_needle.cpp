@@ -1,0 +1,158 @@
+#include "model/effects/augmented_needle.hpp"
+
+#include <algorithm>
+#include <stdexcept>
+#include <string>
+
+namespace bevel::model {
+namespace {
+
+std::size_t registry_index(const Effect* effect) {
+  const auto all = all_effects();
+  return static_cast<std::size_t>(std::find(all.begin(), all.end(), effect) - all.begin());
+}
+
+Dual3 to_dual(const TipReading& reading) {
+  Dual3 point;
+  for (int i = 0; i < 3; ++i) {
+    auto& x = point[static_cast<std::size_t>(i)];
+    x.value = reading.position_mm[i];
+    x.slope.head(reading.D.cols()) = reading.D.row(i).transpose().array();
+  }
+  return point;
+}
+
+void from_dual(const Dual3& point, TipReading& reading) {
+  for (int i = 0; i < 3; ++i) {
+    const auto& x = point[static_cast<std::size_t>(i)];
+    reading.position_mm[i] = x.value;
+    reading.D.row(i) = x.slope.head(reading.D.cols()).matrix().transpose();
+  }
+}
+
+}  // namespace
+
+AugmentedNeedle::AugmentedNeedle(const NeedleParameters& needle, std::vector<ActiveEffect> effects, int columns,
+                                 const NeedleColumns& needle_columns)
+    : needle_(needle), effects_(std::move(effects)), columns_(columns), needle_columns_(needle_columns) {
+  if (effects_.size() > kMaxEffects)
+    throw std::invalid_argument("a model has " + std::to_string(effects_.size()) + " effects; at most " +
+                                std::to_string(kMaxEffects) + " are supported");
+  if (columns < 0 || columns > kMaxColumns)
+    throw std::invalid_argument(std::to_string(columns) + " sensitivities asked; 0 to " + std::to_string(kMaxColumns) +
+                                " are supported");
+  std::stable_sort(effects_.begin(), effects_.end(), [](const ActiveEffect& a, const ActiveEffect& b) {
+    return registry_index(a.effect) < registry_index(b.effect);
+  });
+  for (const auto& active : effects_) active.effect->change_needle(needle_);
+  slip_ = slip_parameters(needle_);
+}
+
+void AugmentedNeedle::set_needle(double curvature_per_mm, double lambda1_per_rad, double lambda2) {
+  needle_.curvature_per_mm = curvature_per_mm;
+  slip_.lambda1_per_rad = needle_.lambda1_per_rad = lambda1_per_rad;
+  slip_.lambda2 = needle_.lambda2 = lambda2;
+}
+
+AugmentedState AugmentedNeedle::entry(const BaseMotion& base) const {
+  AugmentedState state;
+  state.entry = state.base = base;
+  state.D.setZero(6, columns_);
+  EntryPose pose;
+  for (const auto& active : effects_) active.effect->enter(parameters(active), pose);
+  const Eigen::Vector3d tilt(pose.tilt_x_rad.value, pose.tilt_y_rad.value, 0);
+  if (!effects_.empty()) {
+    const Eigen::Matrix3d unroll = exp_so3({0, 0, -pose.roll_rad.value});
+    state.pose.R = exp_so3(tilt) * unroll.transpose();
+    const Eigen::Matrix<double, 3, 2> by_tilt = (unroll * right_jacobian_so3(tilt)).leftCols<2>();
+    state.D.bottomRows<3>() = by_tilt.col(0) * pose.tilt_x_rad.slope.head(columns_).matrix().transpose() +
+                              by_tilt.col(1) * pose.tilt_y_rad.slope.head(columns_).matrix().transpose();
+    state.D.row(5) += pose.roll_rad.slope.head(columns_).matrix().transpose();
+  }
+  state.tip_insertion_mm = base.insertion_mm;
+  state.tip_rotation_rad = base.rotation_rad;
+  return state;
+}
+
+bool AugmentedNeedle::advance(AugmentedState& state, const BaseMotion& to) const {
+  Dual insertion_mm(to.insertion_mm);
+  Dual rotation_rad(to.rotation_rad);
+  Dual2 kappa = {Dual::unknown(needle_.curvature_per_mm, needle_columns_.curvature), Dual()};
+  LegView leg;
+  auto& memory = state.memory;
+  if (!effects_.empty()) {
+    leg.entry = state.entry;
+    leg.from = state.base;
+    leg.to = to;
+    leg.R = state.pose.R;
+    leg.R_body.setZero();
+    leg.R_body.leftCols(columns_) = state.D.bottomRows<3>();
+    leg.tip_depth_mm = state.pose.p_mm.z();
+    leg.tip_depth_mm.slope.head(columns_) = (state.pose.R.row(2) * state.D.topRows<3>()).transpose().array();
+    // n = R^T z_A; its z moves by (n x delta)_z.
+    leg.heading_z = state.pose.R(2, 2);
+    leg.heading_z.slope =
+        (state.pose.R(2, 0) * leg.R_body.row(1) - state.pose.R(2, 1) * leg.R_body.row(0)).transpose().array();
+    leg.tip_rotation_rad = state.tip_rotation_rad;
+    for (std::size_t i = 0; i < effects_.size(); ++i)
+      effects_[i].effect->axes(parameters(effects_[i]), leg, memory[i], insertion_mm, rotation_rad);
+    leg.insertion_mm = insertion_mm - state.tip_insertion_mm;
+    leg.rotation_rad = rotation_rad - state.tip_rotation_rad;
+    for (std::size_t i = 0; i < effects_.size(); ++i)
+      effects_[i].effect->curvature(parameters(effects_[i]), leg, memory[i], kappa);
+  } else {
+    leg.insertion_mm = insertion_mm - state.tip_insertion_mm;
+    leg.rotation_rad = rotation_rad - state.tip_rotation_rad;
+  }
+
+  const StepInput input{leg.insertion_mm.value, leg.rotation_rad.value, {kappa[0].value, kappa[1].value}};
+  if (columns_ == 0) {
+    if (!model::advance(state.pose, input, slip_)) return false;
+  } else {
+    StepJacobian J;
+    if (!model::advance(state.pose, input, slip_, J)) return false;
+    Eigen::Matrix<double, 4, Eigen::Dynamic, Eigen::ColMajor, 4, kMaxColumns> inputs(4, columns_);
+    inputs.row(0) = leg.insertion_mm.slope.head(columns_).matrix().transpose();
+    inputs.row(1) = leg.rotation_rad.slope.head(columns_).matrix().transpose();
+    inputs.row(2) = kappa[0].slope.head(columns_).matrix().transpose();
+    inputs.row(3) = kappa[1].slope.head(columns_).matrix().transpose();
+    const BodyColumns before = state.D;
+    state.D.noalias() = J.pose.lazyProduct(before);
+    state.D.noalias() += J.input.lazyProduct(inputs);
+    if (needle_columns_.lambda1 >= 0) state.D.col(needle_columns_.lambda1) += J.slip.col(0);
+    if (needle_columns_.lambda2 >= 0) state.D.col(needle_columns_.lambda2) += J.slip.col(1);
+    if (needle_columns_.wheelbase >= 0) state.D.col(needle_columns_.wheelbase) += J.slip.col(2);
+  }
+  for (std::size_t i = 0; i < effects_.size(); ++i)
+    effects_[i].effect->settle(parameters(effects_[i]), leg, kappa, memory[i]);
+  state.base = to;
+  state.tip_insertion_mm = insertion_mm;
+  state.tip_rotation_rad = rotation_rad;
+  return true;
+}
+
+void AugmentedNeedle::point(const AugmentedState& state, TipReading& reading) const {
+  reading.position_mm = state.pose.p_mm;
+  reading.D.resize(3, columns_);
+  reading.D.noalias() = state.pose.R.lazyProduct(state.D.topRows<3>());
+  if (effects_.empty()) return;
+  Dual3 p = to_dual(reading);
+  for (std::size_t i = 0; i < effects_.size(); ++i)
+    effects_[i].effect->offset(parameters(effects_[i]), state.memory[i], state.base.time_s, p);
+  from_dual(p, reading);
+}
+
+void AugmentedNeedle::through_cameras(TipReading& reading) const {
+  if (effects_.empty()) return;
+  Dual3 p = to_dual(reading);
+  for (const auto& active : effects_) active.effect->camera(parameters(active), p);
+  from_dual(p, reading);
+}
+
+Dual AugmentedNeedle::latency_s() const {
+  Dual sum;
+  for (const auto& active : effects_) sum += active.effect->latency_s(parameters(active));
+  return sum;
+}
+
+}  // namespace bevel::model

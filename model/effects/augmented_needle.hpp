@@ -1,0 +1,80 @@
+#pragma once
+// The needle with the effects of a model file: open-loop propagation from the base's motion, with sensitivities by any
+// of its parameters in the same pass. Without effects it is model/kinematics.hpp, bit for bit (tested).
+// Source: shared definitions in effect.hpp; sensitivities by the chain rule through StepJacobian.
+#include <array>
+#include <vector>
+
+#include "model/effects/effect.hpp"
+#include "model/kinematics.hpp"
+
+namespace bevel::model {
+
+struct ActiveEffect {
+  const Effect* effect = nullptr;
+  std::array<Dual, kMaxEffectParameters> parameters;  // in the order of effect->parameters()
+};
+
+// In which column of the sensitivities a needle parameter stands; -1: not wanted.
+struct NeedleColumns {
+  int curvature = -1;
+  int lambda1 = -1;
+  int lambda2 = -1;
+  int wheelbase = -1;
+};
+
+using BodyColumns = Eigen::Matrix<double, 6, Eigen::Dynamic, Eigen::ColMajor, 6, kMaxColumns>;
+using PointColumns = Eigen::Matrix<double, 3, Eigen::Dynamic, Eigen::ColMajor, 3, kMaxColumns>;
+
+// Everything that an insertion carries from leg to leg. Copyable, no heap.
+struct AugmentedState {
+  Pose pose;
+  BodyColumns D;  // d(body perturbation of the pose)/d(columns), 6 x columns
+  BaseMotion entry, base;
+  Dual tip_insertion_mm, tip_rotation_rad;
+  std::array<EffectMemory, kMaxEffects> memory;
+};
+
+// A point the cameras see, and its derivatives.
+struct TipReading {
+  Eigen::Vector3d position_mm;
+  PointColumns D;  // 3 x columns
+};
+
+class AugmentedNeedle {
+ public:
+  // columns: how many sensitivities are carried (0 to kMaxColumns). Effects are put into the order of the registry.
+  // At most kMaxEffects; throws std::invalid_argument past that.
+  AugmentedNeedle(const NeedleParameters& needle, std::vector<ActiveEffect> effects = {}, int columns = 0,
+                  const NeedleColumns& needle_columns = {});
+
+  // At the entry point, unrolled, along z_A but for what the effects say; the base as it stands then.
+  AugmentedState entry(const BaseMotion& base) const;
+  // Moves the base. False outside the domain of the slip law; pose and base are then unchanged. Does not allocate.
+  bool advance(AugmentedState& state, const BaseMotion& to) const;
+  // Where the tip is, as a point in {A} before the cameras: effects with an offset included.
+  void point(const AugmentedState& state, TipReading& reading) const;
+  // What the cameras make of such a point.
+  void through_cameras(TipReading& reading) const;
+  // By how much readings are late; zero without camera_latency.
+  Dual latency_s() const;
+
+  const NeedleParameters& needle() const { return needle_; }
+  std::span<const ActiveEffect> effects() const { return effects_; }
+  int columns() const { return columns_; }
+  // For a filter, whose curvature and lambda are states.
+  void set_needle(double curvature_per_mm, double lambda1_per_rad, double lambda2);
+
+ private:
+  Parameters parameters(const ActiveEffect& active) const {
+    return {active.parameters.data(), active.effect->parameters().size()};
+  }
+
+  NeedleParameters needle_;
+  SlipParameters slip_;
+  std::vector<ActiveEffect> effects_;
+  int columns_;
+  NeedleColumns needle_columns_;
+};
+
+}  // namespace bevel::model

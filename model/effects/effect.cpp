@@ -1,0 +1,76 @@
+#include "model/effects/effect.hpp"
+
+#include <cmath>
+
+namespace bevel::model {
+
+std::string_view name_of(Covariate covariate) {
+  switch (covariate) {
+    case Covariate::time_s:
+      return "time_s";
+    case Covariate::depth_mm:
+      return "depth_mm";
+    case Covariate::speed_mm_s:
+      return "speed_mm_s";
+    case Covariate::turn_rate_rad_s:
+      return "turn_rate_rad_s";
+    case Covariate::since_stop_s:
+      return "since_stop_s";
+    case Covariate::since_reversal_mm:
+      return "since_reversal_mm";
+    case Covariate::roll_rad:
+      return "roll_rad";
+  }
+  return "time_s";
+}
+
+Dual2 LegView::lateral_in_body(const Dual2& world) const {
+  // v_B = R^T v moves by v_B x delta under a body rotation delta of R.
+  const Eigen::Vector3d v = R.transpose() * Eigen::Vector3d(world[0].value, world[1].value, 0);
+  Dual2 body;
+  for (int i = 0; i < 2; ++i) {
+    auto& out = body[static_cast<std::size_t>(i)];
+    out.value = v[i];
+    out.slope = R(0, i) * world[0].slope + R(1, i) * world[1].slope;
+  }
+  body[0].slope += (v.y() * R_body.row(2) - v.z() * R_body.row(1)).array().transpose();
+  body[1].slope += (v.z() * R_body.row(0) - v.x() * R_body.row(2)).array().transpose();
+  return turned(body, rotation_rad * -0.5);
+}
+
+Dual2 LegView::lateral_in_world(const Dual2& body) const {
+  // R u moves by R (delta x u).
+  const Eigen::Vector3d u(body[0].value, body[1].value, 0);
+  Dual2 world;
+  const Eigen::Matrix<double, 3, kMaxColumns> du =
+      (Eigen::Matrix<double, 3, kMaxColumns>() << -R_body.row(2) * u.y(), R_body.row(2) * u.x(),
+       R_body.row(0) * u.y() - R_body.row(1) * u.x())
+          .finished();
+  for (int i = 0; i < 2; ++i) {
+    auto& out = world[static_cast<std::size_t>(i)];
+    out.value = R.row(i).dot(u);
+    out.slope = R(i, 0) * body[0].slope + R(i, 1) * body[1].slope + (R.row(i) * du).array().transpose();
+  }
+  return world;
+}
+
+std::span<const std::uint32_t> Effect::variants() const {
+  static constexpr std::uint32_t kAll[] = {~0U};
+  return kAll;
+}
+
+int find_parameter_violation(const Effect& effect, std::span<const double> values) {
+  for (std::size_t i = 0; i < effect.parameters().size(); ++i) {
+    const auto& parameter = effect.parameters()[i];
+    if (!(values[i] >= parameter.lower && values[i] <= parameter.upper)) return static_cast<int>(i);
+  }
+  return -1;
+}
+
+const Effect* find_effect(std::string_view name) {
+  for (const Effect* effect : all_effects())
+    if (effect->name() == name) return effect;
+  return nullptr;
+}
+
+}  // namespace bevel::model

@@ -1,0 +1,135 @@
+#pragma once
+// One piece of physics that the bicycle model leaves out, as a set of hooks into the integrator. An effect is one file:
+// a class without state, derived from Effect, that states its equation in dual numbers (dual.hpp) and so yields its
+// sensitivities; and one line in registry.cpp. docs/adding-an-effect.md walks through it.
+//
+// Order within a leg (augmented_needle.hpp): axes -> curvature -> the integrator -> settle; then, for a measurement:
+// offset -> camera. Several effects act in the order of the registry, motor first, camera last.
+#include <cstdint>
+#include <limits>
+#include <span>
+#include <string_view>
+#include <utility>
+#include <vector>
+
+#include "model/effects/dual.hpp"
+#include "model/needle.hpp"
+
+namespace bevel::model {
+
+inline constexpr int kMaxEffectParameters = 4;
+inline constexpr int kMaxEffects = 8;
+
+enum class Scope {
+  rig,        // the same in all recordings
+  recording,  // a phase or an instant of its own in each
+};
+
+struct EffectParameter {
+  std::string_view name;  // a contract, with the unit: verdict.json, model.toml
+  double lower, upper;    // of the model file and of a fit
+  double none;            // where the effect vanishes; NaN: it does not vanish by this parameter (a layer's depth)
+  // Where fits begin: one value if the likelihood has one valley, a grid if several (a depth, a frequency).
+  std::vector<double> starts;
+  Scope scope = Scope::rig;
+  bool periodic = false;  // an angle: the bounds are one period apart
+};
+inline constexpr double kNoNone = std::numeric_limits<double>::quiet_NaN();
+
+// Against what the effect is to be looked at: where it shows.
+enum class Covariate { time_s, depth_mm, speed_mm_s, turn_rate_rad_s, since_stop_s, since_reversal_mm, roll_rad };
+std::string_view name_of(Covariate covariate);
+
+// What an effect remembers between legs of one insertion. Slopes come with it.
+struct EffectMemory {
+  std::array<Dual, 3> slot;
+  int phase = 0;  // 0 until it has seen a leg
+};
+
+// The base, as the encoders say, at the ends of a leg; t counts from the start of the recording.
+struct BaseMotion {
+  double time_s = 0;
+  double insertion_mm = 0;
+  double rotation_rad = 0;
+};
+
+// What a leg looks like to an effect.
+struct LegView {
+  BaseMotion entry, from, to;  // of the insertion, of this leg
+  Dual tip_depth_mm;           // z of the tip at the start of the leg
+  Dual heading_z;              // cosine of the tilt there
+  Eigen::Matrix3d R;           // orientation of {B} at the start, and its derivatives as body rotations:
+  Eigen::Matrix<double, 3, kMaxColumns> R_body;  // d(rotation vector in {B})/d(column)
+  // Known from `axes` on:
+  Dual insertion_mm, rotation_rad;  // increments of the tip
+  Dual tip_rotation_rad;            // of the tip at the start of the leg
+
+  double duration_s() const { return to.time_s - from.time_s; }
+  double base_insertion_mm() const { return to.insertion_mm - from.insertion_mm; }
+  double base_rotation_rad() const { return to.rotation_rad - from.rotation_rad; }
+  // |u1|, |u2|
+  double speed_mm_s() const { return duration_s() > 0 ? std::abs(base_insertion_mm()) / duration_s() : 0; }
+  double turn_rate_rad_s() const { return duration_s() > 0 ? std::abs(base_rotation_rad()) / duration_s() : 0; }
+  // A vector of {A} seen in {B} halfway through the leg's own rotation.
+  Dual2 lateral_in_body(const Dual2& world) const;
+  // A lateral vector of {B} at the start of the leg, as its x and y in {A}.
+  Dual2 lateral_in_world(const Dual2& body) const;
+};
+
+struct EntryPose {
+  Dual tilt_x_rad, tilt_y_rad;  // rotation vector of the heading
+  Dual roll_rad;                // about the heading, after the tilt
+};
+
+using Parameters = std::span<const Dual>;
+
+struct EffectDescription {
+  std::string_view name;     // a contract: verdict.json, model.toml
+  std::string_view meaning;  // one clause for the report: what is going on in the rig
+  Covariate covariate;
+  std::vector<EffectParameter> parameters;
+};
+
+class Effect {
+ public:
+  explicit Effect(EffectDescription description) : description_(std::move(description)) {}
+  Effect(const Effect&) = delete;
+  Effect& operator=(const Effect&) = delete;
+  virtual ~Effect() = default;
+
+  std::string_view name() const { return description_.name; }
+  std::string_view meaning() const { return description_.meaning; }
+  Covariate covariate() const { return description_.covariate; }
+  const std::vector<EffectParameter>& parameters() const { return description_.parameters; }
+
+  virtual void change_needle(NeedleParameters&) const {}
+  virtual void enter(Parameters, EntryPose&) const {}
+  // Positions of the tip's axes at the end of the leg; come in as those of the base.
+  virtual void axes(Parameters, const LegView&, EffectMemory&, Dual& /*insertion_mm*/, Dual& /*rotation_rad*/) const {}
+  // Curvature in {B} over the leg; comes in as (k, 0).
+  virtual void curvature(Parameters, const LegView&, EffectMemory&, Dual2& /*kappa_per_mm*/) const {}
+  // After the leg has been integrated: memory that an offset needs. leg.R is still that of its start.
+  virtual void settle(Parameters, const LegView&, const Dual2& /*kappa_per_mm*/, EffectMemory&) const {}
+  // Moves the point that the cameras see, in {A}.
+  virtual void offset(Parameters, const EffectMemory&, double /*time_s*/, Dual3& /*position_mm*/) const {}
+  // What the cameras make of the point.
+  virtual void camera(Parameters, Dual3& /*position_mm*/) const {}
+  // The reading shows the needle as it was so much earlier.
+  virtual Dual latency_s(Parameters) const { return {}; }
+
+  // Which parameters are fitted together: bit i for parameter i. More than one where the effect comes in kinds.
+  virtual std::span<const std::uint32_t> variants() const;
+
+ private:
+  EffectDescription description_;
+};
+
+// Every effect there is, in the order in which they act.
+std::span<const Effect* const> all_effects();
+// Null if there is none of that name.
+const Effect* find_effect(std::string_view name);
+
+// First parameter outside its bounds, or not finite: index, or -1.
+int find_parameter_violation(const Effect& effect, std::span<const double> values);
+
+}  // namespace bevel::model

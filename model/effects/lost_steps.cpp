@@ -1,0 +1,48 @@
+#include "model/effects/effect.hpp"
+
+namespace bevel::model {
+namespace {
+
+// A motor stalls for an instant: from at_s on the axis stands elsewhere than its counter says. The jump takes
+// kStall_s, so that a fit can move its instant. at_s = 0: not in this recording.
+class LostSteps final : public Effect {
+ public:
+  LostSteps()
+      : Effect({.name = "lost_steps",
+                .meaning = "a motor lost steps that its counter did not see",
+                .covariate = Covariate::time_s,
+                .parameters = {
+                    {.name = "rotation_rad", .lower = -7, .upper = 7, .none = 0, .starts = {-1.6, -0.8, 0.8, 1.6}},
+                    {.name = "insertion_mm", .lower = -30, .upper = 30, .none = 0, .starts = {-3.0, 3.0}},
+                    {.name = "at_s",
+                     .lower = 0,
+                     .upper = 10000.0,
+                     .none = 0,
+                     .starts = {0.0},
+                     .scope = Scope::recording}}}) {}
+
+  void axes(Parameters p, const LegView& leg, EffectMemory& /*memory*/, Dual& insertion_mm,
+            Dual& rotation_rad) const override {
+    if (p[2].value <= 0) return;
+    const Dual share = clamp((leg.to.time_s - p[2]) / kStall_s + 0.5, 0, 1);
+    insertion_mm += share * p[1];
+    rotation_rad += share * p[0];
+  }
+  // One axis stalls, not both.
+  std::span<const std::uint32_t> variants() const override {
+    static constexpr std::uint32_t kOneAxis[] = {0b101, 0b110};
+    return kOneAxis;
+  }
+
+ private:
+  static constexpr double kStall_s = 0.1;
+};
+
+}  // namespace
+
+const Effect& lost_steps() {
+  static const LostSteps effect;
+  return effect;
+}
+
+}  // namespace bevel::model

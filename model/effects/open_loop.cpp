@@ -1,0 +1,119 @@
+#include "model/effects/open_loop.hpp"
+
+#include <algorithm>
+#include <stdexcept>
+
+namespace bevel::model {
+namespace {
+
+constexpr double kLongestLeg_mm = 1.0;
+constexpr double kLongestLeg_rad = 0.2;
+// A rate that changes by more between two actuator samples is a corner of the motion.
+constexpr double kCorner_mm_s = 1.0;
+constexpr double kCorner_rad_s = 0.5;
+
+BaseMotion to_base(const ActuatorState& state, std::int64_t start_utime) {
+  return {static_cast<double>(state.utime - start_utime) * 1e-6, state.insertion_mm, state.rotation_rad};
+}
+
+BaseMotion between(const BaseMotion& a, const BaseMotion& b, double time_s) {
+  const double share = b.time_s > a.time_s ? (time_s - a.time_s) / (b.time_s - a.time_s) : 1;
+  return {time_s, a.insertion_mm + share * (b.insertion_mm - a.insertion_mm),
+          a.rotation_rad + share * (b.rotation_rad - a.rotation_rad)};
+}
+
+bool is_corner(const BaseMotion& a, const BaseMotion& b, const BaseMotion& c) {
+  const double before_s = b.time_s - a.time_s;
+  const double after_s = c.time_s - b.time_s;
+  if (!(before_s > 0 && after_s > 0)) return false;
+  const double jump_mm_s = (c.insertion_mm - b.insertion_mm) / after_s - (b.insertion_mm - a.insertion_mm) / before_s;
+  const double jump_rad_s = (c.rotation_rad - b.rotation_rad) / after_s - (b.rotation_rad - a.rotation_rad) / before_s;
+  return std::abs(jump_mm_s) > kCorner_mm_s || std::abs(jump_rad_s) > kCorner_rad_s;
+}
+
+bool is_long(const BaseMotion& a, const BaseMotion& b) {
+  return std::abs(b.insertion_mm - a.insertion_mm) > kLongestLeg_mm ||
+         std::abs(b.rotation_rad - a.rotation_rad) > kLongestLeg_rad;
+}
+
+}  // namespace
+
+Motion make_motion(std::span<const ActuatorState> actuators, std::span<const std::int64_t> reading_utimes) {
+  if (actuators.size() < 2) throw std::invalid_argument("fewer than two actuator samples: there is no motion");
+  const auto backwards = [](const auto& a, const auto& b) { return b.utime < a.utime; };
+  if (std::adjacent_find(actuators.begin(), actuators.end(), backwards) != actuators.end())
+    throw std::invalid_argument("actuator samples run backwards in time");
+  if (std::adjacent_find(reading_utimes.begin(), reading_utimes.end(), std::greater<>()) != reading_utimes.end())
+    throw std::invalid_argument("tip measurements run backwards in time");
+
+  Motion motion;
+  motion.start_utime = actuators.front().utime;
+  auto& nodes = motion.nodes;
+  nodes.push_back(to_base(actuators.front(), motion.start_utime));
+  std::size_t reading = 0;
+  const auto add_readings_until = [&](const BaseMotion& a, const BaseMotion& b, bool last) {
+    while (reading < reading_utimes.size()) {
+      const double time_s = static_cast<double>(reading_utimes[reading] - motion.start_utime) * 1e-6;
+      if (time_s > b.time_s && !last) return;
+      // Before the first sample and after the last the base stands.
+      if (time_s > nodes.back().time_s)
+        nodes.push_back(time_s >= b.time_s ? BaseMotion{time_s, b.insertion_mm, b.rotation_rad}
+                                           : between(a, b, time_s));
+      motion.at.push_back(nodes.size() - 1);
+      ++reading;
+    }
+  };
+  for (std::size_t i = 1; i < actuators.size(); ++i) {
+    const BaseMotion a = to_base(actuators[i - 1], motion.start_utime);
+    const BaseMotion b = to_base(actuators[i], motion.start_utime);
+    add_readings_until(a, b, i + 1 == actuators.size());
+    const bool corner = i + 1 < actuators.size() && is_corner(a, b, to_base(actuators[i + 1], motion.start_utime));
+    if (b.time_s > nodes.back().time_s && (corner || is_long(nodes.back(), b))) nodes.push_back(b);
+  }
+  return motion;
+}
+
+bool predict(const AugmentedNeedle& needle, const Motion& motion, OpenLoop& out) {
+  const Eigen::Index columns = needle.columns();
+  const std::size_t count = motion.nodes.size();
+  out.node_position_mm.resize(count);
+  out.node_jacobian.resize(static_cast<Eigen::Index>(3 * count), columns);
+  AugmentedState state = needle.entry(motion.nodes.front());
+  TipReading reading;
+  for (std::size_t i = 0; i < count; ++i) {
+    if (i > 0 && !needle.advance(state, motion.nodes[i])) return false;
+    needle.point(state, reading);
+    out.node_position_mm[i] = reading.position_mm;
+    if (columns > 0) out.node_jacobian.middleRows<3>(static_cast<Eigen::Index>(3 * i)) = reading.D;
+  }
+
+  const Dual latency_s = needle.latency_s();
+  const bool late = latency_s.value != 0 || (latency_s.slope != 0).any();
+  out.position_mm.resize(motion.at.size());
+  out.jacobian.resize(static_cast<Eigen::Index>(3 * motion.at.size()), columns);
+  const auto node_D = [&](std::size_t i) { return out.node_jacobian.middleRows<3>(static_cast<Eigen::Index>(3 * i)); };
+  for (std::size_t r = 0; r < motion.at.size(); ++r) {
+    std::size_t i = motion.at[r];
+    reading.position_mm = out.node_position_mm[i];
+    if (columns > 0) reading.D = node_D(i);
+    if (late && i > 0) {
+      const double time_s = motion.nodes[i].time_s - latency_s.value;
+      while (i > 1 && motion.nodes[i - 1].time_s > time_s) --i;
+      const double span_s = motion.nodes[i].time_s - motion.nodes[i - 1].time_s;
+      const double share = std::max(0.0, (time_s - motion.nodes[i - 1].time_s) / span_s);
+      const Eigen::Vector3d step = out.node_position_mm[i] - out.node_position_mm[i - 1];
+      reading.position_mm = out.node_position_mm[i - 1] + share * step;
+      if (columns > 0) {
+        reading.D = (1 - share) * node_D(i - 1) + share * node_D(i);
+        if (time_s > motion.nodes.front().time_s)
+          reading.D -= step / span_s * latency_s.slope.head(columns).matrix().transpose();
+      }
+    }
+    needle.through_cameras(reading);
+    out.position_mm[r] = reading.position_mm;
+    if (columns > 0) out.jacobian.middleRows<3>(static_cast<Eigen::Index>(3 * r)) = reading.D;
+  }
+  return true;
+}
+
+}  // namespace bevel::model

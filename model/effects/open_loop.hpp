@@ -1,0 +1,36 @@
+#pragma once
+// The tip along a recording from the base's motion alone, as the cameras would report it, with sensitivities.
+#include <cstdint>
+#include <span>
+#include <vector>
+
+#include "model/effects/augmented_needle.hpp"
+#include "model/samples.hpp"
+
+namespace bevel::model {
+
+// The base's motion cut into legs: at every moment at which a reading is wanted, where a rate jumps, and so often that
+// no leg is longer than 1 mm or 0.2 rad. Times count from the first actuator sample.
+struct Motion {
+  std::vector<BaseMotion> nodes;  // the first is the entry
+  std::vector<std::size_t> at;    // node of each reading
+  std::int64_t start_utime = 0;
+};
+
+// Both in order of time. Positions between actuator samples are interpolated linearly; outside their span the base
+// stands. Throws std::invalid_argument for fewer than two actuator samples, or times that run backwards.
+Motion make_motion(std::span<const ActuatorState> actuators, std::span<const std::int64_t> reading_utimes);
+
+struct OpenLoop {
+  std::vector<Eigen::Vector3d> position_mm;  // one per reading
+  Eigen::MatrixXd jacobian;                  // 3 rows per reading, by the needle's columns
+
+  // Room for predict(), kept from one call to the next.
+  std::vector<Eigen::Vector3d> node_position_mm;
+  Eigen::MatrixXd node_jacobian;
+};
+
+// False where the tip leaves the domain of the slip law. A late camera sees the path between two nodes as straight.
+bool predict(const AugmentedNeedle& needle, const Motion& motion, OpenLoop& out);
+
+}  // namespace bevel::model

@@ -1,0 +1,62 @@
+#include "model/effects/effect.hpp"
+
+namespace bevel::model {
+namespace {
+
+// A membrane at z = depth: the tip stalls there while the base goes on by the indentation, then breaks through and
+// catches up within kCatchUp_mm of the base. Memory: how far the base was when the tip touched.
+class Puncture final : public Effect {
+ public:
+  Puncture()
+      : Effect({.name = "puncture",
+                .meaning = "a membrane holds the tip back until it breaks through",
+                .covariate = Covariate::depth_mm,
+                .parameters = {
+                    {.name = "depth_mm",
+                     .lower = 0,
+                     .upper = 300,
+                     .none = kNoNone,
+                     .starts = {7.5, 15, 22.5, 30, 37.5, 45, 52.5, 60, 67.5, 75, 82.5, 90, 97.5, 105, 112.5, 120}},
+                    {.name = "indentation_mm", .lower = 0, .upper = 15, .none = 0, .starts = {2.0}}}}) {}
+
+  void axes(Parameters p, const LegView& leg, EffectMemory& memory, Dual& insertion_mm,
+            Dual& /*rotation_rad*/) const override {
+    enum Phase { kUnseen, kFree, kTouching, kThrough };
+    if (memory.phase == kUnseen) {
+      memory.phase = kFree;
+      memory.slot[1] = leg.entry.insertion_mm;  // of the tip's axis, at the start of the leg
+    }
+    Dual& touched_mm = memory.slot[0];
+    if (memory.phase == kFree) {
+      const Dual reach_mm = leg.tip_depth_mm + (insertion_mm - memory.slot[1]) * leg.heading_z;
+      if (reach_mm.value > p[0].value && leg.tip_depth_mm.value <= p[0].value) {
+        touched_mm = memory.slot[1] + (p[0] - leg.tip_depth_mm) / leg.heading_z;
+        memory.phase = kTouching;
+      }
+    }
+    memory.slot[1] = insertion_mm;
+    if (memory.phase != kTouching) return;
+    const Dual pushed_mm = insertion_mm - touched_mm;
+    if (pushed_mm.value > p[1].value + kCatchUp_mm) {
+      memory.phase = kThrough;
+    } else if (pushed_mm.value > p[1].value) {
+      insertion_mm = touched_mm + (pushed_mm - p[1]) * (p[1] + kCatchUp_mm) / kCatchUp_mm;
+    } else if (pushed_mm.value > 0) {
+      insertion_mm = touched_mm;
+    } else {
+      memory.phase = kFree;
+    }
+  }
+
+ private:
+  static constexpr double kCatchUp_mm = 0.4;
+};
+
+}  // namespace
+
+const Effect& puncture() {
+  static const Puncture effect;
+  return effect;
+}
+
+}  // namespace bevel::model

@@ -1,0 +1,50 @@
+#include "model/effects/effect.hpp"
+
+#include <numbers>
+
+namespace bevel::model {
+namespace {
+
+// Breathing, or a rig that sways: p += A sin(2 pi f t + phase), along one lateral direction.
+class TissueMotion final : public Effect {
+ public:
+  TissueMotion()
+      : Effect({.name = "tissue_motion",
+                .meaning = "tissue or camera swings periodically",
+                .covariate = Covariate::time_s,
+                .parameters = {{.name = "amplitude_mm", .lower = 0, .upper = 40, .none = 0, .starts = {0.4}},
+                               {.name = "frequency_hz",
+                                .lower = 0.05,
+                                .upper = 2,
+                                .none = kNoNone,
+                                .starts = {0.12, 0.15, 0.18, 0.21, 0.24, 0.27, 0.30, 0.33, 0.36, 0.39, 0.42, 0.46, 0.5,
+                                           0.55, 0.6}},
+                               {.name = "direction_rad",
+                                .lower = 0,
+                                .upper = std::numbers::pi,
+                                .none = kNoNone,
+                                .starts = {0, 0.8, 1.6, 2.4},
+                                .periodic = true},
+                               {.name = "phase_rad",
+                                .lower = 0,
+                                .upper = 2 * std::numbers::pi,
+                                .none = kNoNone,
+                                .starts = {0, 0.8, 1.6, 2.4, 3.2, 4.0, 4.8, 5.6},
+                                .scope = Scope::recording,
+                                .periodic = true}}}) {}
+
+  void offset(Parameters p, const EffectMemory& /*memory*/, double time_s, Dual3& position_mm) const override {
+    const Dual swing = p[0] * sin(2 * std::numbers::pi * time_s * p[1] + p[3]);
+    position_mm[0] += swing * cos(p[2]);
+    position_mm[1] += swing * sin(p[2]);
+  }
+};
+
+}  // namespace
+
+const Effect& tissue_motion() {
+  static const TissueMotion effect;
+  return effect;
+}
+
+}  // namespace bevel::model
