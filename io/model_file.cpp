@@ -2,8 +2,11 @@
 
 #include <algorithm>
 #include <cerrno>
+#include <cmath>
 #include <cstring>
+#include <filesystem>
 #include <fstream>
+#include <limits>
 
 namespace bevel::io {
 namespace {
@@ -19,21 +22,61 @@ std::string name_in(const Choices<Enum>& choices, Enum value) {
       ->first;
 }
 
-EffectEntry read_effect(Section section) {
-  EffectEntry effect;
-  section.read("name", effect.name, required);
-  const auto& known = known_effect_names();
-  if (!effect.name.empty() && std::find(known.begin(), known.end(), effect.name) == known.end()) {
-    section.fail_unknown("name", "effect", effect.name, known);
+std::vector<std::string> known_effect_names() {
+  std::vector<std::string> names;
+  for (const model::Effect* effect : model::all_effects()) names.emplace_back(effect->name());
+  return names;
+}
+
+void read_parameter(Section& section, const model::EffectParameter& parameter, Presence presence,
+                    std::map<std::string, double>& values) {
+  double value = std::numeric_limits<double>::quiet_NaN();
+  section.read(parameter.name, value, presence, in_range(parameter.lower, parameter.upper));
+  if (std::isfinite(value)) values.emplace(parameter.name, value);
+}
+
+// An effect at whose every size it vanishes says nothing: that is a parameter forgotten.
+void refuse_empty(Section& section, const model::Effect& effect) {
+  std::string sizes;
+  for (const auto& parameter : effect.parameters()) {
+    if (parameter.scope == model::Scope::recording || std::isnan(parameter.none)) continue;
+    if (section.has(parameter.name)) return;
+    sizes += (sizes.empty() ? "" : " or ") + std::string(parameter.name);
   }
-  effect.parameters = section.read_remaining_numbers();
-  return effect;
+  if (!sizes.empty()) section.fail("", std::string(effect.name()) + " has no size; " + sizes + " is required");
+}
+
+EffectEntry read_effect(Section section) {
+  EffectEntry entry;
+  section.read("name", entry.name, required);
+  const model::Effect* effect = model::find_effect(entry.name);
+  if (effect == nullptr) {
+    if (!entry.name.empty()) section.fail_unknown("name", "effect", entry.name, known_effect_names());
+    section.read_remaining_numbers();  // whose keys these are nobody knows: one fault is enough
+    return entry;
+  }
+  bool by_recording = false;
+  for (const auto& parameter : effect->parameters()) {
+    const bool of_recording = parameter.scope == model::Scope::recording;
+    by_recording |= of_recording;
+    read_parameter(section, parameter, std::isnan(parameter.none) && !of_recording ? required : optional,
+                   entry.parameters);
+  }
+  refuse_empty(section, *effect);
+  if (!by_recording) return entry;
+  Section recordings = section.section("recordings", optional);
+  for (Section& recording : recordings.children()) {
+    auto& values = entry.recordings[recording.path().substr(recordings.path().size() + 1)];
+    for (const auto& parameter : effect->parameters())
+      if (parameter.scope == model::Scope::recording) read_parameter(recording, parameter, optional, values);
+  }
+  return entry;
 }
 
 ModelFile read_model(ConfigFile file) {
   ModelFile model;
   model.needle = read_needle(file.section("needle", required));
-  for (const Section& section : file.sections("effect", optional)) model.effects.push_back(read_effect(section));
+  model.effects = read_effects(file.root());
   file.finish();
   return model;
 }
@@ -44,32 +87,32 @@ std::string toml_number(double value) {
   return text.find_first_of(".en") == std::string::npos ? text + ".0" : text;
 }
 
-}  // namespace
-
-const std::vector<std::string>& known_effect_names() {
-  static const std::vector<std::string> names{"rotation_backlash",
-                                              "torsional_windup",
-                                              "insertion_backlash",
-                                              "insertion_scale",
-                                              "lost_steps",
-                                              "rate_dependence",
-                                              "layer",
-                                              "depth_dependence",
-                                              "drilling",
-                                              "flip_transient",
-                                              "relaxation",
-                                              "puncture",
-                                              "tissue_motion",
-                                              "lateral_bias",
-                                              "bevel_offset",
-                                              "entry_angle",
-                                              "camera_latency",
-                                              "camera_scale",
-                                              "camera_rotation",
-                                              "refraction",
-                                              "slip_direction"};
-  return names;
+std::string toml_numbers(const std::map<std::string, double>& values) {
+  std::string text;
+  for (const auto& [key, value] : values) text += key + " = " + toml_number(value) + "\n";
+  return text;
 }
+
+std::string toml_text(std::string_view plain) {
+  constexpr std::string_view kHex = "0123456789abcdef";
+  std::string text = "\"";
+  for (const char c : plain) {
+    const auto byte = static_cast<unsigned char>(c);
+    if (c == '"' || c == '\\') {
+      text += '\\';
+      text += c;
+    } else if (byte < 0x20 || byte == 0x7f) {
+      text += "\\u00";
+      text += kHex[byte >> 4U];
+      text += kHex[byte & 15U];
+    } else {
+      text += c;
+    }
+  }
+  return text + '"';
+}
+
+}  // namespace
 
 model::NeedleParameters read_needle(Section section) {
   model::NeedleParameters needle;
@@ -81,6 +124,43 @@ model::NeedleParameters read_needle(Section section) {
   section.read("front_wheel", needle.front_wheel, optional, kFrontWheelChoices);
   if (const auto violation = model::find_domain_violation(needle)) section.fail("", model::describe(*violation));
   return needle;
+}
+
+std::vector<EffectEntry> read_effects(Section parent) {
+  std::vector<EffectEntry> effects;
+  for (const Section& section : parent.sections("effect", optional)) effects.push_back(read_effect(section));
+  if (effects.size() > model::kMaxEffects)
+    parent.fail("effect", "there are " + std::to_string(effects.size()) + "; at most " +
+                              std::to_string(model::kMaxEffects) + " are allowed");
+  return effects;
+}
+
+std::vector<model::ActiveEffect> active_effects(const std::vector<EffectEntry>& effects,
+                                                std::string_view recording_name) {
+  const std::string recording = std::filesystem::path(recording_name).filename().string();
+  std::vector<model::ActiveEffect> active;
+  for (const auto& entry : effects) {
+    model::ActiveEffect one{.effect = model::find_effect(entry.name), .parameters = {}};
+    if (one.effect == nullptr) throw std::invalid_argument("there is no effect \"" + entry.name + "\"");
+    std::map<std::string, double> values;
+    if (const auto own = entry.recordings.find(recording); own != entry.recordings.end()) values = own->second;
+    values.insert(entry.parameters.begin(), entry.parameters.end());  // the recording's own come first
+    for (std::size_t i = 0; const auto& parameter : one.effect->parameters()) {
+      const auto given = values.extract(std::string(parameter.name));
+      const double otherwise = parameter.scope == model::Scope::recording ? 0 : parameter.none;
+      one.parameters[i++] = given.empty() ? otherwise : given.mapped();
+      if (given.empty() && std::isnan(otherwise))
+        throw std::invalid_argument(entry.name + "." + std::string(parameter.name) + " is missing and is required");
+    }
+    if (!values.empty())
+      throw std::invalid_argument(entry.name + " has no parameter \"" + values.begin()->first + "\"");
+    active.push_back(one);
+  }
+  return active;
+}
+
+std::vector<model::ActiveEffect> active_effects(const ModelFile& model, std::string_view recording_name) {
+  return active_effects(model.effects, recording_name);
 }
 
 ModelFile load_model_file(const std::string& path) { return read_model(ConfigFile::load(path)); }
@@ -100,7 +180,9 @@ std::string to_toml(const ModelFile& model) {
   text += "front_wheel = \"" + name_in(kFrontWheelChoices, needle.front_wheel) + "\"\n";
   for (const auto& effect : model.effects) {
     text += "\n[[effect]]\nname = \"" + effect.name + "\"\n";
-    for (const auto& [key, value] : effect.parameters) text += key + " = " + toml_number(value) + "\n";
+    text += toml_numbers(effect.parameters);
+    for (const auto& [recording, values] : effect.recordings)
+      text += "[effect.recordings." + toml_text(recording) + "]\n" + toml_numbers(values);
   }
   return text;
 }

@@ -3,8 +3,12 @@
 //   [needle]                      # curvature_per_mm, wheelbase_mm, lambda1_per_rad, lambda2 are required;
 //   ...                           # slip = "isotropic", front_wheel = "published" unless given
 //   [[effect]]                    # zero or more
-//   name = "torsional_windup"     # one of known_effect_names()
-//   lag_at_100mm_rad = 0.6        # the effect's own parameters, all numbers
+//   name = "lost_steps"           # one of model/effects/registry.cpp
+//   rotation_rad = 0.8            # its parameters; one left out has the value at which the effect vanishes, and is
+//                                 # required where there is no such value (a layer's depth)
+//   [effect.recordings."rec03.lcm"]  # unknowns of one recording (an instant, a phase), by the log's file name; for
+//   at_s = 3.31                      # recordings without such a table they stand in [[effect]] itself, and are 0 if
+//   not
 #pragma once
 
 #include <map>
@@ -13,13 +17,15 @@
 #include <vector>
 
 #include "io/config.hpp"
+#include "model/effects/augmented_needle.hpp"
 #include "model/needle.hpp"
 
 namespace bevel::io {
 
 struct EffectEntry {
   std::string name;
-  std::map<std::string, double> parameters;
+  std::map<std::string, double> parameters{};                         // as given, defaults not filled in
+  std::map<std::string, std::map<std::string, double>> recordings{};  // log file name -> parameters of Scope::recording
 
   bool operator==(const EffectEntry&) const = default;
 };
@@ -31,14 +37,19 @@ struct ModelFile {
   bool operator==(const ModelFile&) const = default;
 };
 
-const std::vector<std::string>& known_effect_names();
-
 // Throw ConfigError with every fault, the model's own domain (23), (24), (26) included.
 ModelFile load_model_file(const std::string& path);
 ModelFile parse_model_file(std::string_view text, const std::string& name);
 
-// The [needle] section alone, for files that hold a needle among other things.
+// Parts of it, for files that hold a needle among other things: the [needle] section, and the [[effect]]s of a section.
 model::NeedleParameters read_needle(Section needle);
+std::vector<EffectEntry> read_effects(Section parent);
+
+// The effects with all their parameters, as model::AugmentedNeedle takes them, for one recording: the path or the name
+// of its log, empty if there is none. Throws std::invalid_argument for an effect or a parameter that does not exist.
+std::vector<model::ActiveEffect> active_effects(const std::vector<EffectEntry>& effects,
+                                                std::string_view recording_name);
+std::vector<model::ActiveEffect> active_effects(const ModelFile& model, std::string_view recording_name);
 
 // Reads back as the same values, to the last bit.
 std::string to_toml(const ModelFile& model);
