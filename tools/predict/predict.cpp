@@ -1,0 +1,75 @@
+#include "tools/predict/predict.hpp"
+
+#include <algorithm>
+#include <array>
+#include <cstdio>
+#include <numbers>
+#include <numeric>
+#include <ostream>
+#include <stdexcept>
+
+#include "io/model_file.hpp"
+#include "io/recording.hpp"
+
+namespace bevel::predict {
+namespace {
+
+// For the message alone: how far the needle gets.
+[[noreturn]] void fail_in_domain(const model::AugmentedNeedle& needle, const model::Motion& motion) {
+  model::AugmentedState state = needle.entry(motion.nodes.front());
+  std::size_t i = 1;
+  while (i < motion.nodes.size() && needle.advance(state, motion.nodes[i])) ++i;
+  std::array<char, 160> text{};
+  std::snprintf(text.data(), text.size(),
+                "the needle leaves the domain of the slip law (25) %.3f s after the first actuator sample, at "
+                "%.1f mm of insertion with its heading %.0f degrees off z",
+                state.base.time_s, state.base.insertion_mm, model::tilt_rad(state.pose) * 180 / std::numbers::pi);
+  throw std::domain_error(text.data());
+}
+
+}  // namespace
+
+std::vector<Prediction> predict(const model::AugmentedNeedle& needle, std::span<const model::ActuatorState> actuators,
+                                std::span<const model::TipMeasurement> tips) {
+  if (actuators.empty()) throw std::invalid_argument("no ACTUATOR_STATE: nothing tells how the base moved");
+  if (tips.empty()) throw std::invalid_argument("no TIP_MEASUREMENT: nothing tells for when to predict");
+  const auto by_utime = [](const auto& a, const auto& b) { return a.utime < b.utime; };
+  std::vector<model::ActuatorState> sorted(actuators.begin(), actuators.end());
+  std::stable_sort(sorted.begin(), sorted.end(), by_utime);
+  std::vector<std::size_t> order(tips.size());
+  std::iota(order.begin(), order.end(), 0);
+  std::stable_sort(order.begin(), order.end(), [&](auto a, auto b) { return by_utime(tips[a], tips[b]); });
+  std::vector<std::int64_t> utimes;
+  for (const auto i : order) utimes.push_back(tips[i].utime);
+
+  const model::Motion motion = model::make_motion(sorted, utimes);
+  model::OpenLoop path;
+  if (!model::predict(needle, motion, path)) fail_in_domain(needle, motion);
+  std::vector<Prediction> predictions(tips.size());
+  for (std::size_t i = 0; i < order.size(); ++i) predictions[order[i]] = {utimes[i], path.position_mm[i]};
+  return predictions;
+}
+
+int run(const std::string& model_path, const std::string& log_path, std::ostream& out, std::ostream& err) {
+  const io::ModelFile model = io::load_model_file(model_path);
+  const io::Recording recording = io::read_recording(log_path);
+  if (!recording.intact()) err << log_path << ": damaged; " << recording.describe_faults() << '\n';
+  const model::AugmentedNeedle needle(model.needle, io::active_effects(model, log_path));
+  std::vector<Prediction> predictions;
+  try {
+    predictions = predict(needle, recording.actuators, recording.tips);
+  } catch (const std::exception& e) {
+    throw std::runtime_error(log_path + ": " + e.what());
+  }
+  out << "utime,x_mm,y_mm,z_mm\n";
+  std::array<char, 128> line{};
+  for (const auto& p : predictions) {
+    std::snprintf(line.data(), line.size(), "%lld,%.6f,%.6f,%.6f\n", static_cast<long long>(p.utime), p.position_mm.x(),
+                  p.position_mm.y(), p.position_mm.z());
+    out << line.data();
+  }
+  if (!(out << std::flush)) throw std::runtime_error("the output cannot be written");
+  return recording.intact() ? 0 : 1;
+}
+
+}  // namespace bevel::predict
