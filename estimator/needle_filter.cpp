@@ -6,6 +6,8 @@
 #include <cmath>
 #include <numbers>
 
+#include "estimator/propagate.hpp"
+
 namespace bevel::estimator {
 namespace {
 
@@ -15,6 +17,39 @@ constexpr double kLambda2Max = 0.9;  // (24) with room: 1 - lambda2 stays away f
 constexpr double kVarianceFloor = 1e-14;
 
 double square(double x) { return x * x; }
+
+// The axes along which a measurement has information, in the last `rank` columns, and its variance along them.
+struct SeenAxes {
+  Eigen::Matrix3d axes;
+  Eigen::Vector3d variance = Eigen::Vector3d::Zero();
+  int rank = 0;
+};
+
+SeenAxes seen_axes(const Eigen::Matrix3d& information) {
+  SeenAxes seen;
+  Eigen::Vector3d values = information.diagonal();
+  // Cameras that look along an axis of {A}, and most do, need no search for eigenvectors.
+  if (information(0, 1) == 0 && information(0, 2) == 0 && information(1, 2) == 0) {
+    seen.axes.setIdentity();
+    for (int i = 0; i < 2; ++i)  // ascending, by two passes of a bubble
+      for (int j = 0; j < 2 - i; ++j)
+        if (values[j] > values[j + 1]) {
+          std::swap(values[j], values[j + 1]);
+          seen.axes.col(j).swap(seen.axes.col(j + 1));
+        }
+  } else {
+    Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> eigen;
+    eigen.computeDirect(information);
+    values = eigen.eigenvalues();
+    seen.axes = eigen.eigenvectors();
+  }
+  for (int i = 0; i < 3; ++i)
+    if (values[i] > kRankTolerance * values[2] && values[i] > 0) {
+      seen.variance[i] = 1 / values[i];
+      ++seen.rank;
+    }
+  return seen;
+}
 
 template <int kRank>
 Update update_rank(FilterState& state, const Eigen::Matrix3d& axes, const Eigen::Vector3d& variance,
@@ -41,12 +76,12 @@ Update update_rank(FilterState& state, const Eigen::Matrix3d& axes, const Eigen:
 
   const Eigen::Matrix<double, 9, kRank> K = llt.solve(PHt.transpose()).transpose();
   const Vector9d correction = K * y;
-  // Joseph form, (I - K H) P (I - K H)^T + K R K^T, with H only in the first three columns.
+  // Joseph form, (I - K H) P (I - K H)^T + K R K^T, with H only in the first three columns; small products written out.
   Matrix9d P = state.covariance;
-  P.noalias() -= K * PHt.transpose();
-  const Eigen::Matrix<double, 9, kRank> PHt2 = P.leftCols<3>() * H.transpose();
-  P.noalias() -= PHt2 * K.transpose();
-  P.noalias() += K * variance.tail<kRank>().asDiagonal() * K.transpose();
+  P.noalias() -= K.lazyProduct(PHt.transpose());
+  Eigen::Matrix<double, 9, kRank> PHt2 = P.leftCols<3>().lazyProduct(H.transpose());
+  PHt2 -= K * variance.tail<kRank>().asDiagonal();
+  P.noalias() -= PHt2.lazyProduct(K.transpose());
   state.covariance = 0.5 * (P + P.transpose());
   state.pose = state.pose * model::exp_se3(correction.head<6>());
   state.pose.R = model::orthonormalised(state.pose.R);
@@ -82,24 +117,14 @@ void NeedleFilter::predict(FilterState& state, double insertion_mm, double rotat
   model::SlipParameters slip = slip_;
   slip.lambda1_per_rad = state.lambda1_per_rad;
   slip.lambda2 = state.lambda2;
-  model::StepJacobian jacobian;
+  model::NeedleJacobian jacobian;
   if (!model::advance(state.pose, {insertion_mm, rotation_rad, {state.curvature_per_mm, 0}}, slip, jacobian)) {
     state.outside_model = true;
     return;
   }
   state.outside_model = false;
 
-  // F = [Phi G; 0 I]: pose by pose, and by (k, lambda1, lambda2).
-  Eigen::Matrix<double, 6, 3> G;
-  G << jacobian.input.col(2), jacobian.slip.leftCols<2>();
-  Eigen::Matrix<double, 6, 9> F;
-  F << jacobian.pose, G;
-  const Eigen::Matrix<double, 6, 9> FP = F * state.covariance;
-  const model::Matrix6d pose_block = FP * F.transpose();
-  state.covariance.topLeftCorner<6, 6>() = 0.5 * (pose_block + pose_block.transpose());
-  state.covariance.topRightCorner<6, 3>() = FP.rightCols<3>();
-  state.covariance.bottomLeftCorner<3, 6>() = FP.rightCols<3>().transpose();
-
+  propagate<9>(state.covariance, jacobian.pose, jacobian.needle.leftCols<3>());
   state.covariance.diagonal() += process_variance(state.covariance, insertion_mm, rotation_rad);
 }
 
@@ -117,27 +142,18 @@ Vector9d NeedleFilter::process_variance(const Matrix9d& covariance, double inser
 }
 
 Update NeedleFilter::update(FilterState& state, const model::TipMeasurement& measurement) const {
-  Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> eigen;
-  eigen.computeDirect(measurement.information_per_mm2);
-  const Eigen::Vector3d information = eigen.eigenvalues();  // ascending
-  int rank = 0;
-  Eigen::Vector3d variance = Eigen::Vector3d::Zero();
-  for (int i = 0; i < 3; ++i)
-    if (information[i] > kRankTolerance * information[2] && information[i] > 0) {
-      variance[i] = 1 / information[i];
-      ++rank;
-    }
+  const SeenAxes seen = seen_axes(measurement.information_per_mm2);
   const Eigen::Vector3d residual = measurement.position_mm - state.pose.p_mm;
   Update result;
-  switch (rank) {
+  switch (seen.rank) {
     case 1:
-      result = update_rank<1>(state, eigen.eigenvectors(), variance, residual, gate_[0]);
+      result = update_rank<1>(state, seen.axes, seen.variance, residual, gate_[0]);
       break;
     case 2:
-      result = update_rank<2>(state, eigen.eigenvectors(), variance, residual, gate_[1]);
+      result = update_rank<2>(state, seen.axes, seen.variance, residual, gate_[1]);
       break;
     case 3:
-      result = update_rank<3>(state, eigen.eigenvectors(), variance, residual, gate_[2]);
+      result = update_rank<3>(state, seen.axes, seen.variance, residual, gate_[2]);
       break;
     default:
       return result;  // sees nothing: no rejection either

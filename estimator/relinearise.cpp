@@ -4,6 +4,7 @@
 #include <limits>
 
 #include "estimator/needle_filter.hpp"
+#include "estimator/propagate.hpp"
 
 namespace bevel::estimator {
 namespace {
@@ -16,25 +17,22 @@ struct LinearFilter {
   Vector9d error;
   Matrix9d covariance;
 
-  void predict(const model::StepJacobian& j, const Vector9d& added) {
-    Eigen::Matrix<double, 6, 9> F;
-    F << j.pose, j.input.col(2), j.slip.leftCols<2>();
-    error.head<6>() = (F * error).eval();
-    const Eigen::Matrix<double, 6, 9> FP = F * covariance;
-    const Matrix6d pose_block = FP * F.transpose();
-    covariance.topLeftCorner<6, 6>() = 0.5 * (pose_block + pose_block.transpose());
-    covariance.topRightCorner<6, 3>() = FP.rightCols<3>();
-    covariance.bottomLeftCorner<3, 6>() = FP.rightCols<3>().transpose();
+  void predict(const model::NeedleJacobian& j, const Vector9d& added) {
+    const Vector6d moved = j.pose * error.head<6>();
+    error.head<6>() = moved + j.needle.leftCols<3>() * error.tail<3>();
+    propagate<9>(covariance, j.pose, j.needle.leftCols<3>());
     covariance.diagonal() += added;
   }
 
   // In information form on the seen axes, whatever the rank: S^-1 = (I + W H P H^T)^-1 W with W the information.
   void update(const Eigen::Matrix3d& R, const Eigen::Vector3d& residual, const Eigen::Matrix3d& information) {
-    const Eigen::Matrix<double, 9, 3> PHt = covariance.leftCols<3>() * R.transpose();
+    const Eigen::Matrix<double, 9, 3> PHt = covariance.leftCols<3>().lazyProduct(R.transpose());
     const Eigen::Matrix3d HPHt = R * PHt.topRows<3>();
     const Eigen::Matrix3d weight = (Eigen::Matrix3d::Identity() + information * HPHt).inverse() * information;
     error += PHt * (weight * (residual - R * error.head<3>()));
-    const Matrix9d P = covariance - PHt * weight * PHt.transpose();
+    const Eigen::Matrix<double, 9, 3> gain = PHt * weight;
+    Matrix9d P = covariance;
+    P.noalias() -= gain.lazyProduct(PHt.transpose());
     covariance = 0.5 * (P + P.transpose());
   }
 };
@@ -84,7 +82,7 @@ bool NeedleFilter::relinearise(FilterState& state, const FilterState& start, std
   to_path.topLeftCorner<6, 6>() = model::right_jacobian_se3(linear.error.head<6>()).inverse();
   linear.covariance = to_path * start.covariance * to_path.transpose();
   for (const PastStep& step : steps) {
-    model::StepJacobian jacobian;
+    model::NeedleJacobian jacobian;
     if (step.insertion_mm != 0 || step.rotation_rad != 0) {
       if (!model::advance(pose, {step.insertion_mm, step.rotation_rad, curvature}, slip, jacobian)) return false;
       linear.predict(jacobian, process_variance(linear.covariance, step.insertion_mm, step.rotation_rad));

@@ -276,12 +276,12 @@ bool step_impl(Pose& pose, const StepInput& input, const SlipParameters& slip, S
     }
     const Pose total = A.pose * B.pose;
     const Matrix3d back = total.R.transpose();
-    derivative->pose.topLeftCorner<3, 3>() = back;
-    derivative->pose.bottomLeftCorner<3, 3>().setZero();
-    derivative->pose.rightCols<3>() = derivative->columns.col(kTilt) * a.transpose();
-    derivative->pose.rightCols<3>() += derivative->columns.col(kAcross) * b.transpose();
-    derivative->pose.topRightCorner<3, 3>() -= back * hat(total.p_mm);
-    derivative->pose.bottomRightCorner<3, 3>() += back;
+    derivative->pose.template topLeftCorner<3, 3>() = back;
+    derivative->pose.template bottomLeftCorner<3, 3>().setZero();
+    derivative->pose.template rightCols<3>() = derivative->columns.col(kTilt) * a.transpose();
+    derivative->pose.template rightCols<3>() += derivative->columns.col(kAcross) * b.transpose();
+    derivative->pose.template topRightCorner<3, 3>() -= back * hat(total.p_mm);
+    derivative->pose.template bottomRightCorner<3, 3>() += back;
     pose = pose * total;
   } else {
     pose = pose * exp_se3(half(fA)) * exp_se3(half(fB));

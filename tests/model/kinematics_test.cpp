@@ -98,6 +98,15 @@ TEST_P(Jacobians, AgreeWithPerturbationOnRandomStates) {
     Pose end = start;
     StepJacobian jacobian;
     ASSERT_TRUE(advance(end, input, slip, jacobian));
+    Pose again = start, plain = start;
+    NeedleJacobian needle_jacobian;
+    ASSERT_TRUE(advance(again, input, slip, needle_jacobian));
+    ASSERT_TRUE(advance(plain, input, slip));
+    EXPECT_LT((again.p_mm - end.p_mm).norm() + (plain.p_mm - end.p_mm).norm(), 1e-13);
+    EXPECT_LT((again.R - end.R).norm() + (plain.R - end.R).norm(), 1e-13);
+    EXPECT_LT((needle_jacobian.pose - jacobian.pose).norm(), 1e-13);
+    EXPECT_LT((needle_jacobian.needle.col(0) - jacobian.input.col(2)).norm(), 1e-13);
+    EXPECT_LT((needle_jacobian.needle.rightCols<3>() - jacobian.slip).norm(), 1e-13);
 
     const auto difference = [&](auto&& perturb, double h) {
       Pose plus = start, minus = start;
