@@ -1,0 +1,228 @@
+#include "proof/needle_path.hpp"
+
+#include <Eigen/Geometry>
+#include <algorithm>
+#include <cmath>
+#include <numbers>
+#include <stdexcept>
+
+namespace bevel::proof {
+namespace {
+
+using Eigen::Vector2d;
+using Eigen::Vector3d;
+
+struct Tip {
+  Vector3d p = Vector3d::Zero();
+  Vector3d h = Vector3d::UnitZ();
+  Vector3d e1 = Vector3d::UnitX();
+
+  Vector3d e2() const { return h.cross(e1); }
+};
+
+struct Rate {  // per mm of advance
+  Vector3d dp, dh, de1;
+};
+
+// tan(alpha) at a lean theta >= 0 of the heading from z, (25) solved for gamma.
+double slip_tangent(const BaseNeedle& needle, double lean_rad) {
+  const double b = 1.0 - needle.lambda2;
+  const double root = b * b + 4.0 * needle.lambda1_per_rad * lean_rad;
+  if (root < 0.0) throw std::domain_error("the tip leans too far for the slip law");
+  return std::tan(2.0 * lean_rad / (b + std::sqrt(root)) - lean_rad);
+}
+
+class Tissue {
+ public:
+  Tissue(const BaseNeedle& needle, const HiddenPhysics& physics) : needle_(needle), physics_(physics) {
+    tip_.h = Eigen::AngleAxisd(physics.entry_about_y_rad, Vector3d::UnitY()) *
+             (Eigen::AngleAxisd(physics.entry_about_x_rad, Vector3d::UnitX()) * Vector3d::UnitZ());
+    tip_.e1 = (Vector3d::UnitX() - Vector3d::UnitX().dot(tip_.h) * tip_.h).normalized();
+  }
+
+  double depth_mm() const { return tip_.p.z(); }
+
+  void advance(double time_s, double advance_mm, double roll_before_rad, double roll_after_rad) {
+    const double roll_rad = 0.5 * (roll_before_rad + roll_after_rad);
+    const double speed_mm_s = std::abs(advance_mm) / kStep_s;
+    const double turn_rad_s = std::abs(roll_after_rad - roll_before_rad) / kStep_s;
+    relax(advance_mm, speed_mm_s, roll_rad);
+    if (std::abs(advance_mm) < 1e-12) return;
+    advanced_mm_ += advance_mm;
+    const double k = needle_.curvature_per_mm * softening(time_s, speed_mm_s, turn_rad_s, std::abs(advance_mm));
+    const Vector2d bevel = k * Vector2d(std::cos(roll_rad), std::sin(roll_rad));
+    const Vector2d curvature = recover(bevel, std::max(advance_mm, 0.0));
+    const Rate first = rate(tip_, curvature, roll_rad);
+    Tip middle = tip_;
+    move(middle, first, 0.5 * advance_mm);
+    move(tip_, rate(middle, curvature, roll_rad), advance_mm);
+  }
+
+  Vector3d tip_mm(double time_s, int recording) const {
+    Vector3d p = tip_.p + offset_mm_.x() * tip_.e1 + offset_mm_.y() * tip_.e2();
+    if (physics_.motion_mm > 0.0) {
+      const double phase = 2.0 * std::numbers::pi * physics_.motion_hz * time_s +
+                           physics_.motion_phase_rad.at(static_cast<std::size_t>(recording));
+      // Breathing is not quite a sine.
+      const double a = physics_.motion_mm * (std::sin(phase) + 0.03 * physics_.departure * std::sin(2.0 * phase));
+      p += a * Vector3d(std::cos(physics_.motion_direction_rad), std::sin(physics_.motion_direction_rad), 0);
+    }
+    return p;
+  }
+
+ private:
+  Rate rate(const Tip& tip, const Vector2d& curvature, double roll_rad) const {
+    const double sine = std::hypot(tip.h.x(), tip.h.y());
+    const double lean = std::atan2(sine, tip.h.z());
+    Vector3d f = Vector3d::Zero();
+    if (sine > 1e-12) {
+      const Vector3d t = (tip.h * tip.h.z() - Vector3d::UnitZ()) / sine;
+      f = slip_tangent(needle_, lean) * t;
+    }
+    if (physics_.other_slip != 0.0) {
+      const Vector3d bevel = -std::sin(roll_rad) * tip.e1 + std::cos(roll_rad) * tip.e2();
+      f = f.dot(bevel) * bevel;
+    }
+    Vector3d omega = curvature.x() * tip.e1 + curvature.y() * tip.e2() + tip.h.cross(f) / needle_.wheelbase_mm;
+    if (physics_.bias_x_per_mm != 0.0 || physics_.bias_y_per_mm != 0.0) {
+      const double growth = 1.0 + 0.2 * physics_.departure * (advanced_mm_ / 50.0 - 0.5);
+      omega += growth * tip.h.cross(Vector3d(physics_.bias_x_per_mm, physics_.bias_y_per_mm, 0));
+    }
+    return {tip.h + f, omega.cross(tip.h), omega.cross(tip.e1)};
+  }
+
+  static void move(Tip& tip, const Rate& rate, double advance_mm) {
+    tip.p += advance_mm * rate.dp;
+    tip.h = (tip.h + advance_mm * rate.dh).normalized();
+    tip.e1 += advance_mm * rate.de1;
+    tip.e1 = (tip.e1 - tip.e1.dot(tip.h) * tip.h).normalized();
+  }
+
+  // Everything that changes the curvature's size.
+  double softening(double time_s, double speed_mm_s, double turn_rad_s, double travel_mm) {
+    double factor = 1.0 + physics_.curvature_drift_per_s * time_s;
+    const double z = tip_.p.z();
+    const double round = physics_.departure;
+    if (physics_.rate_exponent != 0.0)
+      factor *= std::pow(std::hypot(speed_mm_s, 0.3 * round) / 10.0, -physics_.rate_exponent);
+    if (physics_.layer_ratio != 1.0) {
+      const double width_mm = 1.5 * round;
+      const double share = width_mm > 0.0 ? 0.5 * (1.0 + std::tanh((z - physics_.layer_depth_mm) / width_mm))
+                                          : (z > physics_.layer_depth_mm ? 1.0 : 0.0);
+      factor *= 1.0 + (physics_.layer_ratio - 1.0) * share;
+    }
+    // The shaft's elasticity knows its length rather than the depth.
+    factor *= 1.0 + physics_.curvature_per_100mm * ((1.0 - round) * z + round * advanced_mm_) / 100.0;
+    if (physics_.fibre_share != 0.0)
+      factor *= 1.0 + physics_.fibre_share * std::sin(2.0 * std::numbers::pi * z / physics_.fibre_period_mm);
+    if (physics_.drilling_mm_per_rad != 0.0) {
+      // The cutting face needs a little way to feel the change.
+      const double wanted = 1.0 / (1.0 + physics_.drilling_mm_per_rad * turn_rad_s / speed_mm_s);
+      const double way_mm = 0.8 * round;
+      const double keep = way_mm > 0.0 ? std::exp(-travel_mm / way_mm) : 0.0;
+      drilled_ = keep * drilled_ + (1.0 - keep) * wanted;
+      factor *= drilled_;
+    }
+    return factor;
+  }
+
+  // Curvature follows the bevel over a length, in two stages of which the second is short.
+  Vector2d recover(const Vector2d& bevel, double cut_mm) {
+    const double length_mm = physics_.flip_length_mm;
+    if (length_mm <= 0.0) return bevel;
+    if (!recovering_) first_ = second_ = bevel;
+    recovering_ = true;
+    const double short_mm = 0.15 * physics_.departure * length_mm;
+    first_ = bevel + (first_ - bevel) * std::exp(-cut_mm / (length_mm - short_mm));
+    second_ = short_mm > 0.0 ? Vector2d(first_ + (second_ - first_) * std::exp(-cut_mm / short_mm)) : first_;
+    return second_;
+  }
+
+  // An elastic offset toward the bevel: builds while the tip cuts, goes at rest.
+  void relax(double advance_mm, double speed_mm_s, double roll_rad) {
+    if (physics_.relaxation_mm <= 0.0) return;
+    constexpr double kBuild_mm = 3.0;
+    const Vector2d full = physics_.relaxation_mm * Vector2d(std::sin(roll_rad), -std::cos(roll_rad));
+    if (advance_mm > 0.0) {
+      const Vector2d missing = full - offset_mm_;
+      // From proportional to ever slower near the end.
+      const double slowing =
+          1.0 - 0.35 * physics_.departure * std::min(1.0, offset_mm_.norm() / physics_.relaxation_mm);
+      offset_mm_ += missing * std::min(1.0, slowing * advance_mm / kBuild_mm);
+    }
+    if (speed_mm_s < 0.3) offset_mm_ *= std::exp(-kStep_s / physics_.relaxation_tau_s);
+  }
+
+  BaseNeedle needle_;
+  const HiddenPhysics& physics_;
+  Tip tip_;
+  double advanced_mm_ = 0;
+  double drilled_ = 1;
+  Vector2d first_ = Vector2d::Zero();
+  Vector2d second_ = Vector2d::Zero();
+  Vector2d offset_mm_ = Vector2d::Zero();
+  bool recovering_ = false;
+};
+
+Vector3d at(const TipPath& path, double time_s) {
+  const double place = std::clamp(time_s / kStep_s, 0.0, static_cast<double>(path.size() - 1));
+  const std::size_t before = std::min(static_cast<std::size_t>(place), path.size() - 2);
+  const double share = place - static_cast<double>(before);
+  return (1.0 - share) * path[before] + share * path[before + 1];
+}
+
+// The first camera, which looks along x and gives y and z.
+void distort(Vector3d& tip, const HiddenPhysics& physics) {
+  if (physics.refraction != 0.0) {
+    const double z = tip.z() - physics.refraction_centre_mm;
+    const double square = (tip.y() * tip.y() + z * z) / 2500.0;
+    const double stretch = 1.0 + physics.refraction * square * (1.0 + 0.15 * physics.departure * (square - 0.4));
+    tip.y() *= stretch;
+    tip.z() = physics.refraction_centre_mm + z * stretch;
+  }
+  const double c = std::cos(physics.camera_about_x_rad);
+  const double s = std::sin(physics.camera_about_x_rad);
+  const double y = physics.camera_ratio * (c * tip.y() + s * tip.z());
+  const double z = physics.camera_ratio * (c * tip.z() - s * tip.y());
+  tip.y() = y;
+  tip.z() = z;
+}
+
+}  // namespace
+
+TipPath travel(const BaseNeedle& needle, const AxisMotion& motion, const HiddenPhysics& physics,
+               const DriveRipple& ripple, int recording) {
+  DriveTrain drive(physics, ripple, recording);
+  Tissue tissue(needle, physics);
+  TipPath path;
+  path.reserve(motion.size());
+  DriveTrain::Tip before = drive.step(0.0, motion.insertion_mm[0], motion.rotation_rad[0], 0.0);
+  path.push_back(tissue.tip_mm(0.0, recording));
+  for (std::size_t i = 1; i < motion.size(); ++i) {
+    const double time_s = kStep_s * static_cast<double>(i);
+    const auto now = drive.step(time_s, motion.insertion_mm[i], motion.rotation_rad[i], tissue.depth_mm());
+    tissue.advance(time_s, now.advance_mm - before.advance_mm, before.roll_rad, now.roll_rad);
+    path.push_back(tissue.tip_mm(time_s, recording));
+    before = now;
+  }
+  return path;
+}
+
+Eigen::Matrix3Xd view(const TipPath& path, const std::vector<double>& times_s, const HiddenPhysics& physics) {
+  Eigen::Matrix3Xd seen(3, static_cast<Eigen::Index>(times_s.size()));
+  // The shutter is open for a while.
+  const double half_exposure_s = physics.latency_s > 0.0 ? 0.006 * physics.departure : 0.0;
+  LooseGear sag(30.0, 6.0);
+  for (std::size_t i = 0; i < times_s.size(); ++i) {
+    const double t = times_s[i] - physics.latency_s;
+    Eigen::Vector3d tip = 0.5 * at(path, t) + 0.25 * (at(path, t - half_exposure_s) + at(path, t + half_exposure_s));
+    const double z = tip.z();
+    distort(tip, physics);
+    if (physics.camera_hysteresis_mm != 0.0) tip.y() += physics.camera_hysteresis_mm * (z - sag.follow(z)) / 15.0;
+    tip.y() += physics.camera_drift_mm_per_s * times_s[i];
+    seen.col(static_cast<Eigen::Index>(i)) = tip;
+  }
+  return seen;
+}
+
+}  // namespace bevel::proof

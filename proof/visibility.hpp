@@ -1,0 +1,45 @@
+#pragma once
+// How much of what is concealed can be seen at all: the part of its change of the paths that k, lambda1 and lambda2
+// cannot absorb, in standard deviations of the coloured noise, summed over a trial (the root of the sum of squares of
+// the whitened difference).
+#include <Eigen/Core>
+#include <vector>
+
+#include "proof/camera_noise.hpp"
+#include "proof/needle_path.hpp"
+
+namespace bevel::proof {
+
+// The recordings of a trial, but for the noise.
+struct Setting {
+  std::vector<AxisMotion> motions;
+  std::vector<Frames> frames;
+  std::vector<Whitener> whiteners;
+  DriveRipple ripple;
+};
+
+using Views = std::vector<Eigen::Matrix3Xd>;  // one a recording
+
+Views views_of(const Setting& setting, const BaseNeedle& needle, const HiddenPhysics& physics);
+Eigen::VectorXd whitened_difference(const Setting& setting, const Views& a, const Views& b);
+
+struct Refit {
+  BaseNeedle needle;  // k, lambda1, lambda2 refitted, ell as it was
+  double sigmas = 0;  // what is left
+  bool converged = false;
+};
+// Gauss-Newton with finite differences: the needle that comes closest to `seen`, `known` physics given.
+Refit refit_base(const Setting& setting, const Views& seen, const BaseNeedle& start, const HiddenPhysics& known);
+
+// Part of a whitened difference that no small change of k, lambda1, lambda2 makes.
+class BaseTangent {
+ public:
+  BaseTangent(const Setting& setting, const BaseNeedle& needle, const HiddenPhysics& physics);
+  void also(const Eigen::VectorXd& direction);  // takes another direction out as well
+  double norm_beyond(const Eigen::VectorXd& difference) const;
+
+ private:
+  std::vector<Eigen::VectorXd> basis_;  // orthonormal
+};
+
+}  // namespace bevel::proof

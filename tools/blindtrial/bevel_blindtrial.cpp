@@ -1,0 +1,43 @@
+// bevel-blindtrial: puts a mismatch tool before needles with concealed physics and scores its verdicts.
+// Exit status: 0 finished, 1 failed, 2 usage, 130 interrupted (the same command goes on).
+#include <iostream>
+
+#include "proof/campaign.hpp"
+#include "proof/trial.hpp"
+#include "tools/common/command_line.hpp"
+
+int main(int argc, char** argv) {
+  bevel::proof::CampaignOptions o;
+  std::string out;
+  std::string diagnose;
+  int seed = 1;
+  bool describe = false;
+  bevel::tools::CommandLine command_line(
+      "bevel-blindtrial",
+      "A blind trial of a mismatch tool: physics concealed and sealed, verdicts hashed, then scored.");
+  command_line.option("--trials", o.trials, "number of trials", 1, 10000)
+      .option("--seed", seed, "the same seed draws the same trials", 0, 2147483647)
+      .option("--out", out, "folder for trials and results; what is there already is not done again")
+      .option("--diagnose", diagnose, "the tool under test: PATH --model M.toml --out DIR LOG...")
+      .arguments("--also-readable", o.also_readable, "further folders that the tool may read", false)
+      .option("--jobs", o.jobs, "trials at a time", 1, 64)
+      .option("--limit-s", o.limit_s, "a trial that takes longer counts as an abstention, s", 1, 86400)
+      .flag("--generate-only", o.generate_only, "draw and seal the trials, run nothing")
+      .flag("--unsealed", o.unsealed, "run the tool without namespaces; the result says so")
+      .flag("--describe", describe, "print the distribution that trials are drawn from")
+      .check([&]() -> std::string {
+        if (describe) return "";
+        if (out.empty()) return "--out is required: the folder for trials and results";
+        return diagnose.empty() && !o.generate_only ? "--diagnose is required, or --generate-only" : "";
+      });
+  return command_line.run(argc, argv, [&] {
+    if (describe) {
+      std::cout << bevel::proof::describe_distribution();
+      return 0;
+    }
+    o.out = out;
+    o.diagnose = diagnose;
+    o.seed = static_cast<std::uint64_t>(seed);
+    return bevel::proof::run_campaign(o, std::cout);
+  });
+}
