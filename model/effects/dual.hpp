@@ -62,6 +62,10 @@ inline Dual exp(const Dual& a) {
   const double e = std::exp(a.value);
   return {e, a.slope * e};
 }
+inline Dual sqrt(const Dual& a) {
+  const double root = std::sqrt(a.value);
+  return {root, a.slope * (0.5 / root)};
+}
 inline Dual sin(const Dual& a) { return {std::sin(a.value), a.slope * std::cos(a.value)}; }
 inline Dual cos(const Dual& a) { return {std::cos(a.value), a.slope * -std::sin(a.value)}; }
 

@@ -17,13 +17,14 @@ class Relaxation final : public Effect {
 
   void settle(Parameters p, const LegView& leg, const Dual2& kappa_per_mm, EffectMemory& memory) const override {
     memory.phase = 1;
-    const double cut_mm = leg.insertion_mm.value;
-    if (cut_mm > kRest_mm_s * leg.duration_s()) {
+    if (leg.insertion_mm.value > kRest_mm_s * leg.duration_s()) {
       // The bevel's side: the heading turns toward kappa x e3, body -y for k > 0.
-      const double size = std::hypot(kappa_per_mm[0].value, kappa_per_mm[1].value);
-      if (size == 0) return;
-      const Dual2 side = leg.lateral_in_world({kappa_per_mm[1].value / size, -kappa_per_mm[0].value / size});
-      const double built = 1 - std::exp(-cut_mm / kBuild_mm);
+      const Dual& kx = kappa_per_mm[0];
+      const Dual& ky = kappa_per_mm[1];
+      if (kx.value == 0 && ky.value == 0) return;
+      const Dual share = 1.0 / sqrt(kx * kx + ky * ky);
+      const Dual2 side = leg.lateral_in_world({ky * share, -kx * share});
+      const Dual built = 1.0 - exp(leg.insertion_mm * (-1 / kBuild_mm));
       for (std::size_t i = 0; i < 2; ++i) memory.slot[i] += (p[0] * side[i] - memory.slot[i]) * built;
     } else {
       const Dual left = exp(-leg.duration_s() / p[1]);

@@ -1,0 +1,74 @@
+// Effects of the cameras: maps of the point seen, and its stamp.
+#include <gtest/gtest.h>
+
+#include <cmath>
+
+#include "tests/effects/script.hpp"
+
+namespace bevel::model::testing {
+namespace {
+
+using Eigen::Vector3d;
+
+Vector3d seen(const ActiveEffect& effect, const Vector3d& point_mm) {
+  const AugmentedNeedle needle(agar(), {effect});
+  TipReading reading{point_mm, PointColumns(3, 0)};
+  needle.through_cameras(reading);
+  return reading.position_mm;
+}
+
+TEST(CameraScale, StretchesTheImagePlane) {
+  EXPECT_LT((seen(active("camera_scale", {1.04}), {7, -12, 60}) - Vector3d(7, -12.48, 62.4)).norm(), 1e-12);
+}
+
+TEST(CameraRotation, TurnsTheImageTheOtherWay) {
+  // A camera turned by +a about x sees the world turned by -a: z_A leans toward +y in its picture.
+  const Vector3d p = seen(active("camera_rotation", {0.03}), {7, 0, 60});
+  EXPECT_LT((p - Vector3d(7, 60 * std::sin(0.03), 60 * std::cos(0.03))).norm(), 1e-12);
+}
+
+TEST(Refraction, IsCubicAboutItsCentre) {
+  const auto effect = active("refraction", {0.03, 40});
+  EXPECT_LT((seen(effect, {7, 0, 90}) - Vector3d(7, 0, 40 + 50 * 1.03)).norm(), 1e-12);
+  EXPECT_LT(
+      (seen(effect, {7, -3, 36}) - Vector3d(7, -3 * (1 + 0.03 * 25 / 2500), 40 - 4 * (1 + 0.03 * 25 / 2500))).norm(),
+      1e-12);
+  EXPECT_LT((seen(effect, {7, 0, 40}) - Vector3d(7, 0, 40)).norm(), 1e-12);
+}
+
+TEST(Cameras, ActInTheOrderOfTheRegistry) {  // the frame is turned, then its scale, then the window
+  const AugmentedNeedle needle(
+      agar(), {active("refraction", {0.03, 40}), active("camera_scale", {1.04}), active("camera_rotation", {0.03})});
+  TipReading reading{Vector3d(7, -5, 60), PointColumns(3, 0)};
+  needle.through_cameras(reading);
+  Vector3d by_hand = seen(active("camera_rotation", {0.03}), {7, -5, 60});
+  by_hand = seen(active("refraction", {0.03, 40}), seen(active("camera_scale", {1.04}), by_hand));
+  EXPECT_EQ(reading.position_mm, by_hand);
+}
+
+TEST(CameraLatency, ShowsThePathAsItWas) {
+  const Script script = rich_script();
+  Motion motion = script.fine();
+  const auto late = path_of(agar(), {active("camera_latency", {0.08})}, motion);
+  for (auto& node : motion.at) node -= std::min<std::size_t>(node, 80);  // legs of 1 ms
+  EXPECT_LT(largest_distance_mm(late, path_of(agar(), {}, motion)), 1e-9);
+  EXPECT_GT(largest_distance_mm(late, path_of(agar(), {}, script.fine())), 1);
+}
+
+TEST(CameraLatency, IsRightBetweenTheLegsOfARecording) {
+  const Script script = rich_script();
+  const auto late = path_of(agar(), {active("camera_latency", {0.1234})}, script.recorded());
+  const auto samples = script.actuators(0.01);
+  std::vector<std::int64_t> earlier;
+  for (std::size_t i = 0; i < late.size(); ++i)
+    earlier.push_back(samples.front().utime + 33'333 * static_cast<std::int64_t>(i) - 123'400);
+  EXPECT_LT(largest_distance_mm(late, path_of(agar(), {}, make_motion(samples, earlier))), 0.02);
+}
+
+TEST(CameraLatency, LeavesTheEntryWhereItIs) {
+  const auto late = path_of(agar(), {active("camera_latency", {0.5})}, Script{{0.4, 10, 0}}.recorded());
+  for (const auto& p : late) EXPECT_EQ(p, Vector3d::Zero());
+}
+
+}  // namespace
+}  // namespace bevel::model::testing
