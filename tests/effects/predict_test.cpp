@@ -1,0 +1,198 @@
+// bevel-predict as a program: its lines against a peer in Python, its messages and its exit status.
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <sys/wait.h>
+#include <unistd.h>
+
+#include <cstdlib>
+#include <filesystem>
+#include <fstream>
+#include <sstream>
+
+#include "io/log_writer.hpp"
+#include "io/messages.hpp"
+#include "io/model_file.hpp"
+#include "tests/effects/script.hpp"
+#include "tools/predict/predict.hpp"
+
+namespace bevel::model::testing {
+namespace {
+
+namespace fs = std::filesystem;
+using ::testing::HasSubstr;
+using ::testing::StartsWith;
+
+constexpr const char* kAgar =
+    "[needle]\ncurvature_per_mm = 0.0047\nwheelbase_mm = 20.0\nlambda1_per_rad = 0.49\nlambda2 = 0.22\n";
+
+struct Said {
+  int status;
+  std::string out, err;
+};
+
+struct Predict : ::testing::Test {
+  fs::path folder = fs::temp_directory_path() / ("bevel_predict_" + std::to_string(::getpid()));
+
+  void SetUp() override { fs::create_directories(folder); }
+  void TearDown() override { fs::remove_all(folder); }
+
+  std::string write(const std::string& name, const std::string& text) const {
+    std::ofstream(folder / name, std::ios::binary) << text;
+    return (folder / name).string();
+  }
+  static std::string read(const fs::path& path) {
+    std::ostringstream text;
+    text << std::ifstream(path, std::ios::binary).rdbuf();
+    return text.str();
+  }
+  // The script as a rig logs it: states at 50 Hz, tips at 30 Hz, each the newest at its time.
+  std::string write_log(const std::string& name, bool states = true, bool tips = true) const {
+    const Script script = rich_script();
+    const std::string path = (folder / name).string();
+    io::LogWriter log(path);
+    std::int64_t next_tip = 0;
+    for (const ActuatorState& a : script.actuators(0.02)) {
+      if (states) log.write_message(a.utime, io::channel::kActuatorState, io::to_message(a));
+      TipMeasurement tip;
+      for (; tips && next_tip * 33'333 <= a.seq * 20'000; ++next_tip) {
+        tip.utime = a.utime - a.seq * 20'000 + next_tip * 33'333;
+        tip.seq = next_tip;
+        tip.information_per_mm2 = Eigen::Matrix3d::Identity();
+        log.write_message(a.utime, io::channel::kTipMeasurement, io::to_message(tip));
+      }
+    }
+    log.close();
+    return path;
+  }
+  Said run(const std::string& arguments) const {
+    const std::string command = std::string(BEVEL_BINARY_DIR) + "/bin/bevel-predict " + arguments + " >" +
+                                (folder / "out").string() + " 2>" + (folder / "err").string();
+    const int status = std::system(command.c_str());
+    return {WEXITSTATUS(status), read(folder / "out"), read(folder / "err")};
+  }
+  void expect_peer_agrees(const std::string& model, double largest_mm) const {
+    const std::string model_path = write("m.toml", model);
+    const std::string log = write_log("rec01.lcm");
+    const Said said = run("--model " + model_path + " " + log);
+    ASSERT_EQ(said.status, 0) << said.err;
+    EXPECT_EQ(said.err, "");
+    const std::string command = std::string("python3 ") + BEVEL_SOURCE_DIR + "/tests/effects/predict_peer.py " +
+                                model_path + " " + log + " " + write("predicted.csv", said.out) + " " +
+                                std::to_string(largest_mm);
+    const int status = WEXITSTATUS(std::system(command.c_str()));
+    if (status == 77 || status == 127) GTEST_SKIP() << "no python3 with tomllib (3.11 or newer)";
+    EXPECT_EQ(status, 0);
+  }
+};
+
+TEST_F(Predict, APeerFindsTheSamePathWithoutEffects) {
+  expect_peer_agrees(kAgar, 0.01);
+  expect_peer_agrees(std::string(kAgar) + "slip = \"bevel-plane\"\nfront_wheel = \"nonslip\"\n", 0.01);
+}
+
+TEST_F(Predict, APeerFindsTheSamePathWithEffectsOfShaftTissueAndCamera) {
+  expect_peer_agrees(std::string(kAgar) + R"(
+[[effect]]
+name = "camera_latency"
+latency_s = 0.08
+[[effect]]
+name = "torsional_windup"
+lag_at_100mm_rad = 0.9
+[[effect]]
+name = "lateral_bias"
+x_per_mm = 0.001
+y_per_mm = -0.0007
+[[effect]]
+name = "camera_scale"
+ratio = 1.03
+[[effect]]
+name = "tissue_motion"
+amplitude_mm = 1.5
+frequency_hz = 0.3
+direction_rad = 0.7
+phase_rad = 0.4
+[effect.recordings."rec01.lcm"]
+phase_rad = 2.0
+)",
+                     0.05);
+}
+
+TEST_F(Predict, APeerFindsTheSamePathWithGapAndLayer) {
+  expect_peer_agrees(std::string(kAgar) + R"(
+[[effect]]
+name = "insertion_backlash"
+width_mm = 1.2
+[[effect]]
+name = "drilling"
+coefficient_mm_per_rad = 1.5
+[[effect]]
+name = "layer"
+depth_mm = 30.0
+curvature_ratio = 0.6
+)",
+                     0.05);
+}
+
+TEST_F(Predict, PrintsALineForEachMeasurementInTheOrderOfTheLog) {
+  const auto actuators = rich_script().actuators(0.02);
+  std::vector<TipMeasurement> tips(4);
+  for (std::size_t i = 0; i < tips.size(); ++i)
+    tips[i].utime = actuators.front().utime + std::array{2'000'000, -500'000, 60'000'000, 1'000'000}.at(i);
+  const AugmentedNeedle needle(agar());
+  const auto lines = predict::predict(needle, actuators, tips);
+  ASSERT_EQ(lines.size(), 4U);
+  for (std::size_t i = 0; i < 4; ++i) EXPECT_EQ(lines[i].utime, tips[i].utime);
+  EXPECT_EQ(lines[1].position_mm, Eigen::Vector3d::Zero());  // before the motion
+  EXPECT_LT(lines[3].position_mm.z(), lines[0].position_mm.z());
+  auto shuffled = actuators;
+  std::reverse(shuffled.begin(), shuffled.end());
+  const auto again = predict::predict(needle, shuffled, tips);
+  for (std::size_t i = 0; i < 4; ++i) EXPECT_EQ(again[i].position_mm, lines[i].position_mm);
+}
+
+TEST_F(Predict, SaysWhatIsWrong) {
+  const std::string model = "--model " + write("m.toml", kAgar) + " ";
+  const auto expect = [this](const std::string& arguments, int status, const std::string& message) {
+    const Said said = run(arguments);
+    EXPECT_EQ(said.status, status) << said.err;
+    EXPECT_THAT(said.err, HasSubstr(message));
+    EXPECT_EQ(said.out, "");  // no half of an answer
+  };
+  expect(model + write_log("a.lcm", false, true), 1, "no ACTUATOR_STATE");
+  expect(model + write_log("b.lcm", true, false), 1, "no TIP_MEASUREMENT");
+  expect(model + (folder / "none.lcm").string(), 1, "none.lcm");
+  expect(model + write("noise.lcm", std::string(5000, '\x17')), 1, "damaged");
+  expect("--model " +
+             write("sharp.toml",
+                   "[needle]\ncurvature_per_mm = 0.045\nwheelbase_mm = 20.0\n"
+                   "lambda1_per_rad = 0.144\nlambda2 = 0.032\n") +
+             " " + write_log("c.lcm"),
+         1, "leaves the domain of the slip law");
+  expect("--model " + write("layer.toml", std::string(kAgar) + "[[effect]]\nname = \"layer\"\n") + " " +
+             write_log("c.lcm"),
+         1, "effect[0].depth_mm is missing");
+  expect(write_log("c.lcm"), 2, "--model is required");
+  expect(model + write_log("c.lcm") + " " + write_log("d.lcm"), 2, "one LOG");
+  expect(model, 2, "LOG");
+  EXPECT_EQ(run("--help").status, 0);
+  EXPECT_EQ(run("--version").status, 0);
+}
+
+TEST_F(Predict, PredictsWhatIsReadableOfADamagedLogAndFails) {
+  const std::string model = "--model " + write("m.toml", kAgar) + " ";
+  const std::string whole = write_log("whole.lcm");
+  std::string bytes = read(whole);
+  const auto lines = [](const std::string& csv) { return std::count(csv.begin(), csv.end(), '\n'); };
+  const Said before = run(model + whole);
+  bytes.replace(bytes.size() / 2, 100, std::string(100, '\0'));
+  const Said said = run(model + write("torn.lcm", bytes.substr(0, bytes.size() - 30)));
+  EXPECT_EQ(said.status, 1);
+  EXPECT_THAT(said.err, HasSubstr("damaged"));
+  EXPECT_THAT(said.out, StartsWith("utime,x_mm,y_mm,z_mm\n"));
+  EXPECT_GT(lines(said.out), lines(before.out) - 5);
+  EXPECT_LT(lines(said.out), lines(before.out));
+}
+
+}  // namespace
+}  // namespace bevel::model::testing
