@@ -1,0 +1,355 @@
+#include "diagnosis/mismatch/dictionary.hpp"
+
+#include <Eigen/Cholesky>
+#include <Eigen/QR>
+#include <algorithm>
+#include <cmath>
+#include <random>
+
+#include "diagnosis/mismatch/parallel.hpp"
+
+namespace bevel::diagnosis {
+namespace {
+
+using Eigen::Index;
+using Eigen::MatrixXd;
+using Eigen::VectorXd;
+
+constexpr int kInstants = 14;         // of a jump, over a recording
+constexpr double kOnPenalty = 8.0;    // chi2 that a jump has to bring in a recording: 2 log of the instants and more
+constexpr double kFarthest = 4.0;     // amplitudes promised reach to so many times their start
+constexpr double kQuantile = 0.99;
+
+// Whitened prediction of one recording with the effect added at these values; empty outside the model's domain.
+VectorXd path_with(const Evidence& evidence, const Hypothesis& hypothesis, const VectorXd& values, std::size_t r,
+                   Workspace& workspace) {
+  if (!evaluate(evidence, hypothesis, r, values, false, workspace)) return {};
+  return -workspace.residuals.white;  // plus the whitened measurement, which cancels in differences
+}
+
+class SignatureMaker {
+ public:
+  SignatureMaker(const Evidence& evidence, const Fit& fit, const Ground& ground, const Candidate& candidate)
+      : evidence_(evidence), ground_(ground), candidate_(candidate), hypothesis_(extended(evidence, fit, candidate)) {
+    base_ = hypothesis_.start_from(fit.hypothesis, fit.values);
+  }
+
+  // False where the effect leaves the model's domain or does nothing at all.
+  bool make(Signature& signature) {
+    const auto& parameters = candidate_.member.effect->parameters();
+    if (candidate_.local >= 0) return make_choices(signature);
+    std::vector<std::vector<double>> settings;
+    for (int a : candidate_.amplitudes) {
+      auto one = signature.shape;
+      for (int other : candidate_.amplitudes)
+        if (other != a) one[static_cast<std::size_t>(other)] = parameters[static_cast<std::size_t>(other)].none;
+      settings.push_back(one);
+    }
+    if (settings.empty()) settings.push_back(signature.shape);
+    signature.columns.resize(ground_.residual.size(), static_cast<Index>(settings.size()));
+    for (std::size_t s = 0; s < settings.size(); ++s)
+      for (std::size_t r = 0; r + 1 < ground_.rows.size(); ++r) {
+        const VectorXd change = change_of(r, settings[s], 0);
+        if (change.size() == 0) return false;
+        signature.columns.col(static_cast<Index>(s)).segment(ground_.rows[r], change.size()) = change;
+      }
+    signature.columns -= ground_.Q * (ground_.Q.transpose() * signature.columns).eval();
+    const MatrixXd gram = signature.columns.transpose() * signature.columns;
+    if (!(gram.diagonal().minCoeff() > 1e-12)) return false;
+    signature.gram_inverse = gram.completeOrthogonalDecomposition().pseudoInverse();
+    return true;
+  }
+
+ private:
+  static Hypothesis extended(const Evidence& evidence, const Fit& fit, const Candidate& candidate) {
+    EffectSet set = fit.hypothesis.set();
+    set.push_back(candidate.member);
+    return Hypothesis(evidence.belief, set, *evidence.recorded);
+  }
+
+  VectorXd change_of(std::size_t r, const std::vector<double>& parameters, double local) {
+    VectorXd values = base_;
+    const std::size_t m = hypothesis_.set().size() - 1;
+    for (std::size_t p = 0; p < parameters.size(); ++p) {
+      const int i = hypothesis_.find(m, p, static_cast<int>(r));
+      if (i >= 0) values[i] = static_cast<int>(p) == candidate_.local ? local : parameters[p];
+    }
+    VectorXd path = path_with(evidence_, hypothesis_, values, r, workspace_);
+    if (path.size() != 0) path -= ground_.path_white[r];
+    return path;
+  }
+
+  bool make_choices(Signature& signature) {
+    const auto& parameter = candidate_.member.effect->parameters()[static_cast<std::size_t>(candidate_.local)];
+    signature.choices.resize(ground_.rows.size() - 1);
+    for (std::size_t r = 0; r < signature.choices.size(); ++r) {
+      std::vector<double> values = parameter.starts;
+      if (!parameter.periodic) {
+        values.clear();
+        const double duration_s = evidence_.recorded->recordings[r].duration_s();
+        for (int i = 0; i < kInstants; ++i) values.push_back(duration_s * (i + 0.5) / kInstants);
+      }
+      const Index rows = ground_.rows[r + 1] - ground_.rows[r];
+      for (double value : values) {
+        VectorXd change = change_of(r, signature.shape, value);
+        if (change.size() == 0) continue;
+        const double absorbed = (ground_.Q.middleRows(ground_.rows[r], rows).transpose() * change).squaredNorm();
+        const double squared = change.squaredNorm() - absorbed;
+        signature.choices[r].push_back({value, std::move(change), squared});
+      }
+    }
+    return std::any_of(signature.choices.begin(), signature.choices.end(), [](const auto& c) {
+      return std::any_of(c.begin(), c.end(), [](const auto& choice) { return choice.squared > 1e-12; });
+    });
+  }
+
+  const Evidence& evidence_;
+  const Ground& ground_;
+  const Candidate& candidate_;
+  Hypothesis hypothesis_;
+  VectorXd base_;
+  Workspace workspace_;
+};
+
+// Every combination of starts of the parameters that all recordings share.
+std::vector<std::vector<double>> starts_of(const Candidate& candidate) {
+  std::vector<std::vector<double>> all = {{}};
+  const auto& parameters = candidate.member.effect->parameters();
+  for (std::size_t p = 0; p < parameters.size(); ++p) {
+    std::vector<double> values = parameters[p].starts;
+    if (!candidate.member.fits(p)) values = {parameters[p].none};
+    if (static_cast<int>(p) == candidate.local) values = {0.0};
+    std::vector<std::vector<double>> longer;
+    for (const auto& head : all)
+      for (double value : values) {
+        longer.push_back(head);
+        longer.back().push_back(value);
+      }
+    all = std::move(longer);
+  }
+  return all;
+}
+
+Candidate candidate_for(const Member& member) {
+  Candidate candidate{.member = member, .amplitudes = {}, .signatures = {}};
+  const auto& parameters = member.effect->parameters();
+  for (std::size_t p = 0; p < parameters.size(); ++p) {
+    if (!member.fits(p)) continue;
+    if (parameters[p].scope == model::Scope::recording) {
+      candidate.local = static_cast<int>(p);
+      candidate.local_may_be_off = !parameters[p].periodic;
+    } else if (!std::isnan(parameters[p].none)) {
+      candidate.amplitudes.push_back(static_cast<int>(p));
+    }
+  }
+  return candidate;
+}
+
+// Amplitudes as shares of the start, back to parameters; a share below zero is no effect where `none` is the bound.
+bool apply_shares(const Candidate& candidate, const VectorXd& shares, std::vector<double>& parameters) {
+  for (std::size_t a = 0; a < candidate.amplitudes.size(); ++a) {
+    const auto p = static_cast<std::size_t>(candidate.amplitudes[a]);
+    const auto& info = candidate.member.effect->parameters()[p];
+    const double share = std::clamp(shares[static_cast<Index>(a)], -kFarthest, kFarthest);
+    const double value = info.none + share * (parameters[p] - info.none);
+    if (info.none <= info.lower && value <= info.lower) return false;
+    parameters[p] = std::clamp(value, info.lower, info.upper);
+  }
+  return true;
+}
+
+Promise promise_of_choices(const Candidate& candidate, const Signature& signature, const Ground& ground,
+                           const VectorXd& residual) {
+  const std::size_t recordings = signature.choices.size();
+  std::vector<std::vector<double>> pull(recordings);
+  std::vector<double> shares;
+  for (std::size_t r = 0; r < recordings; ++r) {
+    double best = 0, share = 0;
+    const auto part = residual.segment(ground.rows[r], ground.rows[r + 1] - ground.rows[r]);
+    for (const auto& choice : signature.choices[r]) {
+      const double b = choice.column.dot(part);
+      pull[r].push_back(b);
+      if (choice.squared > 1e-9 && b > 0 && b * b / choice.squared > best)
+        best = b * b / choice.squared, share = b / choice.squared;
+    }
+    if (share > 0) shares.push_back(std::min(share, kFarthest));
+  }
+  Promise promise;
+  double best_share = 0;
+  const auto gain_at = [&](double share, std::vector<double>* chosen) {
+    double sum = 0;
+    for (std::size_t r = 0; r < recordings; ++r) {
+      double best = candidate.local_may_be_off ? 0 : -1e300;
+      double value = 0;
+      for (std::size_t j = 0; j < pull[r].size(); ++j) {
+        const double gain = 2 * share * pull[r][j] - share * share * signature.choices[r][j].squared -
+                            (candidate.local_may_be_off ? kOnPenalty : 0);
+        if (gain > best) best = gain, value = signature.choices[r][j].value;
+      }
+      if (!pull[r].empty()) sum += best;
+      if (chosen) chosen->push_back(value);
+    }
+    return sum;
+  };
+  for (std::size_t i = 0, n = shares.size(); i < n; ++i) shares.push_back(0.5 * shares[i]);
+  for (double share : shares) {
+    const double gain = gain_at(share, nullptr);
+    if (gain > promise.gain) promise.gain = gain, best_share = share;
+  }
+  gain_at(best_share, &promise.local_by_recording);
+  promise.parameters = signature.shape;
+  apply_shares(candidate, VectorXd::Constant(static_cast<Index>(candidate.amplitudes.size()), best_share),
+               promise.parameters);
+  return promise;
+}
+
+}  // namespace
+
+Ground make_ground(const Evidence& evidence, const Fit& fit) {
+  Ground ground;
+  ground.rows = {0};
+  std::vector<Residuals> parts;
+  Workspace workspace;
+  for (std::size_t r = 0; r < evidence.recorded->recordings.size(); ++r) {
+    evaluate(evidence, fit.hypothesis, r, fit.values, true, workspace);
+    parts.push_back(workspace.residuals);
+    ground.rows.push_back(ground.rows.back() + workspace.residuals.white.size());
+    ground.path_white.emplace_back(-workspace.residuals.white);
+  }
+  MatrixXd J = MatrixXd::Zero(ground.rows.back(), fit.hypothesis.size());
+  ground.residual.resize(ground.rows.back());
+  for (std::size_t r = 0; r < parts.size(); ++r) {
+    ground.residual.segment(ground.rows[r], parts[r].white.size()) = parts[r].white;
+    for (std::size_t i = 0; i < fit.hypothesis.columns(r).size(); ++i)
+      J.col(fit.hypothesis.columns(r)[i]).segment(ground.rows[r], parts[r].white.size()) =
+          parts[r].jacobian.col(static_cast<Index>(i));
+  }
+  for (Index i = 0; i < J.cols(); ++i) {
+    const double norm = J.col(i).norm();
+    if (norm > 0) J.col(i) /= norm;
+  }
+  const Eigen::ColPivHouseholderQR<MatrixXd> qr(J);
+  Index rank = 0;
+  for (Index i = 0; i < J.cols(); ++i)
+    if (std::abs(qr.matrixR()(i, i)) > 1e-6) ++rank;
+  ground.Q = qr.householderQ() * MatrixXd::Identity(J.rows(), rank);
+  ground.residual -= ground.Q * (ground.Q.transpose() * ground.residual).eval();
+  return ground;
+}
+
+std::vector<Member> members_of_library(const EffectSet& but) {
+  std::vector<Member> members;
+  for (const model::Effect* effect : model::all_effects()) {
+    if (std::any_of(but.begin(), but.end(), [&](const Member& m) { return m.effect == effect; })) continue;
+    for (const std::uint32_t variant : effect->variants()) members.push_back({effect, variant});
+  }
+  return members;
+}
+
+std::vector<Candidate> make_dictionary(const Evidence& evidence, const Fit& fit, const Ground& ground,
+                                       const std::vector<Member>& members, int threads) {
+  std::vector<Candidate> dictionary(members.size());
+  std::vector<std::pair<std::size_t, std::size_t>> work;
+  for (std::size_t m = 0; m < members.size(); ++m) {
+    dictionary[m] = candidate_for(members[m]);
+    for (auto& shape : starts_of(dictionary[m])) {
+      dictionary[m].signatures.push_back({.shape = std::move(shape), .columns = {}, .gram_inverse = {}, .choices = {}});
+      work.emplace_back(m, dictionary[m].signatures.size() - 1);
+    }
+  }
+  std::vector<char> good(work.size(), 0);
+  parallel_for(work.size(), threads, [&](std::size_t i) {
+    Candidate& candidate = dictionary[work[i].first];
+    good[i] = SignatureMaker(evidence, fit, ground, candidate).make(candidate.signatures[work[i].second]) ? 1 : 0;
+  });
+  for (std::size_t i = work.size(); i-- > 0;)
+    if (!good[i]) {
+      auto& signatures = dictionary[work[i].first].signatures;
+      signatures.erase(signatures.begin() + static_cast<std::ptrdiff_t>(work[i].second));
+    }
+  return dictionary;
+}
+
+Promise promise_of(const Candidate& candidate, const Signature& signature, const Ground& ground,
+                   const VectorXd& residual) {
+  if (candidate.local >= 0) return promise_of_choices(candidate, signature, ground, residual);
+  Promise promise;
+  promise.parameters = signature.shape;
+  const VectorXd b = signature.columns.transpose() * residual;
+  if (candidate.amplitudes.empty()) {
+    promise.gain = 2 * b[0] - signature.columns.col(0).squaredNorm();
+    return promise;
+  }
+  const VectorXd shares = signature.gram_inverse * b;
+  if (apply_shares(candidate, shares, promise.parameters)) promise.gain = b.dot(shares);
+  return promise;
+}
+
+std::vector<Promise> best_promises(const Candidate& candidate, const Ground& ground, std::size_t count) {
+  std::vector<Promise> promises;
+  for (const auto& signature : candidate.signatures)
+    promises.push_back(promise_of(candidate, signature, ground, ground.residual));
+  std::stable_sort(promises.begin(), promises.end(), [](const auto& a, const auto& b) { return a.gain > b.gain; });
+  if (promises.size() > count) promises.resize(count);
+  return promises;
+}
+
+double visible_per_unit(const Candidate& candidate, std::size_t amplitude) {
+  double best = 0;
+  const auto p = static_cast<std::size_t>(candidate.amplitudes[amplitude]);
+  const double none = candidate.member.effect->parameters()[p].none;
+  for (const auto& signature : candidate.signatures) {
+    double squared = 0;
+    if (candidate.local < 0) {
+      squared = 1 / std::max(signature.gram_inverse(static_cast<Index>(amplitude), static_cast<Index>(amplitude)), 1e-300);
+    } else {
+      for (const auto& choices : signature.choices) {
+        double largest = 0;
+        for (const auto& choice : choices) largest = std::max(largest, choice.squared);
+        squared += largest;
+      }
+    }
+    best = std::max(best, std::sqrt(std::max(squared, 0.0)) / std::abs(signature.shape[p] - none));
+  }
+  return best;
+}
+
+NullGains bootstrap_null(const std::vector<Candidate>& dictionary, const Ground& ground, int draws, std::uint64_t seed,
+                         int threads) {
+  NullGains out{.mean = std::vector<double>(dictionary.size(), 0),
+                .threshold = std::vector<double>(dictionary.size(), 0),
+                .draws = draws,
+                .seed = seed};
+  const auto count = static_cast<std::size_t>(draws);
+  MatrixXd gains(static_cast<Index>(dictionary.size()), draws);
+  parallel_for(count, threads, [&](std::size_t d) {
+    std::mt19937_64 random(seed + 0x9E3779B97F4A7C15ULL * (d + 1));
+    std::normal_distribution<double> normal;
+    VectorXd noise(ground.residual.size());
+    for (double& x : noise) x = normal(random);
+    noise -= ground.Q * (ground.Q.transpose() * noise).eval();
+    for (std::size_t e = 0; e < dictionary.size(); ++e) {
+      double best = 0;
+      for (const auto& signature : dictionary[e].signatures)
+        best = std::max(best, promise_of(dictionary[e], signature, ground, noise).gain);
+      gains(static_cast<Index>(e), static_cast<Index>(d)) = best;
+    }
+  });
+  // Gains are sums of squares: their cube roots are near normal (Wilson and Hilferty 1931), so that effects of many
+  // starts and of few can be held to one standard.
+  const MatrixXd roots = gains.array().pow(1.0 / 3).matrix();
+  const VectorXd mean = roots.rowwise().mean();
+  const VectorXd sd = ((roots.colwise() - mean).array().square().rowwise().mean()).sqrt().max(1e-6);
+  std::vector<double> largest(count);
+  for (std::size_t d = 0; d < count; ++d)
+    largest[d] = ((roots.col(static_cast<Index>(d)) - mean).array() / sd.array()).maxCoeff();
+  std::sort(largest.begin(), largest.end());
+  const double limit = largest[std::min(count - 1, static_cast<std::size_t>(kQuantile * static_cast<double>(count)))];
+  for (std::size_t e = 0; e < dictionary.size(); ++e) {
+    out.mean[e] = gains.row(static_cast<Index>(e)).mean();
+    out.threshold[e] = std::pow(mean[static_cast<Index>(e)] + limit * sd[static_cast<Index>(e)], 3);
+  }
+  return out;
+}
+
+}  // namespace bevel::diagnosis

@@ -1,0 +1,57 @@
+#include "diagnosis/mismatch/local_unknowns.hpp"
+
+#include <cmath>
+
+namespace bevel::diagnosis {
+namespace {
+constexpr double kInstantSpacing_s = 0.3;
+constexpr int kPhases = 12;
+
+bool is_instant(const Hypothesis& hypothesis, const Unknown& unknown) {
+  return unknown.recording >= 0 && !unknown.periodic &&
+         hypothesis.set()[static_cast<std::size_t>(unknown.member)]
+                 .effect->parameters()[static_cast<std::size_t>(unknown.parameter)]
+                 .none == 0;
+}
+}  // namespace
+
+Eigen::VectorXd scan_local_unknowns(const Evidence& evidence, const Hypothesis& hypothesis,
+                                    const Eigen::VectorXd& values) {
+  Eigen::VectorXd best = values;
+  Workspace workspace;
+  for (std::size_t i = 0; i < hypothesis.unknowns().size(); ++i) {
+    const Unknown& unknown = hypothesis.unknowns()[i];
+    if (unknown.recording < 0) continue;
+    const auto r = static_cast<std::size_t>(unknown.recording);
+    const auto column = static_cast<Eigen::Index>(i);
+    const bool instant = is_instant(hypothesis, unknown);
+    const double span = unknown.upper - unknown.lower;
+    const int count = instant ? std::max(4, static_cast<int>(std::lround(span / kInstantSpacing_s))) : kPhases;
+    const auto cost_at = [&](double value) {
+      Eigen::VectorXd trial = best;
+      trial[column] = value;
+      if (!evaluate(evidence, hypothesis, r, trial, false, workspace)) return 1e300;
+      return workspace.residuals.white.squaredNorm() + (instant && value > 0 ? kInstantCost : 0);
+    };
+    double value = best[column];
+    double least = cost_at(value);
+    if (instant && cost_at(0) <= least) least = cost_at(0), value = 0;
+    for (int k = 0; k < count; ++k) {
+      const double candidate = unknown.lower + span * (k + 0.5) / count;
+      const double cost = cost_at(candidate);
+      if (cost < least) least = cost, value = candidate;
+    }
+    best[column] = value;
+  }
+  return best;
+}
+
+int instants_in_use(const Fit& fit) {
+  int count = 0;
+  for (std::size_t i = 0; i < fit.hypothesis.unknowns().size(); ++i)
+    if (is_instant(fit.hypothesis, fit.hypothesis.unknowns()[i]) && fit.values[static_cast<Eigen::Index>(i)] > 0)
+      ++count;
+  return count;
+}
+
+}  // namespace bevel::diagnosis

@@ -1,0 +1,17 @@
+#pragma once
+// Instants and phases that each recording has for itself have many valleys: they are scanned, not descended.
+#include "diagnosis/mismatch/likelihood.hpp"
+
+namespace bevel::diagnosis {
+
+// chi2 that an instant has to bring in a recording, or it is set to 0, "not in this one": 2 log of the instants that
+// are tried, and room.
+inline constexpr double kInstantCost = 12.0;
+
+// Values with every local unknown at the best of a grid, all else as it is.
+Eigen::VectorXd scan_local_unknowns(const Evidence& evidence, const Hypothesis& hypothesis, const Eigen::VectorXd& values);
+
+// How many instants are not "off".
+int instants_in_use(const Fit& fit);
+
+}  // namespace bevel::diagnosis

@@ -1,0 +1,229 @@
+#include "diagnosis/mismatch/noise.hpp"
+
+#include <Eigen/Cholesky>
+#include <Eigen/QR>
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+namespace bevel::diagnosis {
+namespace {
+
+constexpr double kLargestAr1 = 0.98;
+// Sum over a message's axes of squared errors against its neighbours, each in standard deviations. A Gaussian message
+// of three axes passes this once in 3e5.
+constexpr double kOutlier = 28.0;
+constexpr int kOutlierPasses = 6;
+
+struct Whitened {
+  double rss = 0;
+  double dof = 0;
+  double log_terms = 0;  // log|V| + log|X^T V^-1 X|, for sigma = 1
+};
+
+Whitened project(const Series& series, const Eigen::VectorXd& error, const Eigen::MatrixXd* basis, const Noise& noise) {
+  const Whitening whitening = make_whitening(series, noise, 1.0);
+  Eigen::VectorXd e = error;
+  whiten(whitening, e);
+  Whitened out;
+  out.dof = static_cast<double>(e.size());
+  for (double weight : whitening.weight) out.log_terms -= 2 * std::log(weight);
+  if (basis) {
+    Eigen::MatrixXd X = *basis;
+    whiten(whitening, X);
+    const Eigen::HouseholderQR<Eigen::MatrixXd> qr(X);
+    const Eigen::VectorXd rotated = qr.householderQ().transpose() * e;
+    out.rss = rotated.tail(rotated.size() - X.cols()).squaredNorm();
+    out.dof -= static_cast<double>(X.cols());
+    for (Eigen::Index i = 0; i < X.cols(); ++i)
+      out.log_terms += 2 * std::log(std::max(std::abs(qr.matrixQR()(i, i)), 1e-12));
+  } else {
+    out.rss = e.squaredNorm();
+  }
+  return out;
+}
+
+// Minus twice the restricted log-likelihood at this ar1, with each channel's sigma at its best.
+double deviance(const RecordedCase& recorded, const Errors& errors, const std::vector<std::vector<Eigen::MatrixXd>>* bases,
+                Noise& noise) {
+  double sum = 0;
+  noise.sigma_mm.assign(recorded.channels.size(), 0);
+  for (std::size_t c = 0; c < recorded.channels.size(); ++c) {
+    Whitened total;
+    for (std::size_t r = 0; r < recorded.recordings.size(); ++r) {
+      const Series& series = recorded.recordings[r].series[c];
+      if (series.time_s.empty()) continue;
+      const Whitened one = project(series, errors[r][c], bases ? &(*bases)[r][c] : nullptr, noise);
+      total.rss += one.rss;
+      total.dof += one.dof;
+      total.log_terms += one.log_terms;
+    }
+    const double variance = std::max(total.rss / std::max(total.dof, 1.0), 1e-18);
+    noise.sigma_mm[c] = std::sqrt(variance);
+    sum += total.dof * std::log(variance) + total.log_terms;
+  }
+  return sum;
+}
+
+// Errors of readings against what their neighbours (and the curve) foretell, squared in standard deviations.
+Eigen::VectorXd surprise(const Series& series, Eigen::VectorXd error, const Noise& noise, double sigma_mm) {
+  const Eigen::Index n = error.size();
+  const Whitening whitening = make_whitening(series, noise, 1.0);
+  Eigen::MatrixXd X = spline_basis(series, kKnot_s);
+  const Eigen::MatrixXd curve = X;
+  Eigen::VectorXd e = error;
+  whiten(whitening, X);
+  whiten(whitening, e);
+  error -= curve * X.householderQr().solve(e).eval();
+  for (Eigen::Index i = 0; i < n; ++i) error[i] /= series.relative_sd[static_cast<std::size_t>(i)];
+  Eigen::VectorXd squared(n);
+  for (Eigen::Index i = 0; i < n; ++i) {
+    // Conditional mean and variance given the neighbours, of a Markov process: precision is tridiagonal.
+    double precision = 1, pull = 0;
+    const auto join = [&](Eigen::Index j, double carry) {
+      precision += carry * carry / (1 - carry * carry);
+      pull += carry / (1 - carry * carry) * error[j];
+    };
+    if (i > 0) join(i - 1, whitening.carry[static_cast<std::size_t>(i)] * series.relative_sd[static_cast<std::size_t>(i - 1)] / series.relative_sd[static_cast<std::size_t>(i)]);
+    if (i + 1 < n) join(i + 1, whitening.carry[static_cast<std::size_t>(i + 1)] * series.relative_sd[static_cast<std::size_t>(i)] / series.relative_sd[static_cast<std::size_t>(i + 1)]);
+    const double residual = error[i] - pull / precision;
+    squared[i] = residual * residual * precision / (sigma_mm * sigma_mm);
+  }
+  return squared;
+}
+
+}  // namespace
+
+Whitening make_whitening(const Series& series, const Noise& noise, double sigma_mm) {
+  Whitening out;
+  const std::size_t n = series.time_s.size();
+  out.carry.assign(n, 0);
+  out.weight.resize(n);
+  for (std::size_t i = 0; i < n; ++i) {
+    double left = 1;
+    if (i > 0 && noise.ar1 > 0) {
+      const double kept = std::pow(noise.ar1, (series.time_s[i] - series.time_s[i - 1]) / noise.frame_s);
+      left = 1 - kept * kept;
+      // The process is of errors in units of their claimed standard deviations.
+      out.carry[i] = kept * series.relative_sd[i] / series.relative_sd[i - 1];
+    }
+    out.weight[i] = 1 / (sigma_mm * series.relative_sd[i] * std::sqrt(left));
+  }
+  return out;
+}
+
+Eigen::MatrixXd spline_basis(const Series& series, double knot_s) {
+  const auto n = static_cast<Eigen::Index>(series.time_s.size());
+  const double start_s = series.time_s.front();
+  const double span_s = std::max(series.time_s.back() - start_s, 1e-9);
+  // No more curve than a quarter of the readings can bear.
+  const auto intervals = std::max<Eigen::Index>(1, std::min(static_cast<Eigen::Index>(std::lround(span_s / knot_s)), n / 4 - 3));
+  Eigen::MatrixXd X = Eigen::MatrixXd::Zero(n, intervals + 3);
+  for (Eigen::Index i = 0; i < n; ++i) {
+    const double x = (series.time_s[static_cast<std::size_t>(i)] - start_s) / span_s * static_cast<double>(intervals);
+    const auto k = std::clamp<Eigen::Index>(static_cast<Eigen::Index>(x), 0, intervals - 1);
+    const double t = x - static_cast<double>(k);
+    const double u = 1 - t;
+    X(i, k) = u * u * u / 6;
+    X(i, k + 1) = (3 * t * t * t - 6 * t * t + 4) / 6;
+    X(i, k + 2) = (-3 * t * t * t + 3 * t * t + 3 * t + 1) / 6;
+    X(i, k + 3) = t * t * t / 6;
+  }
+  return X;
+}
+
+Noise estimate_noise(const RecordedCase& recorded, const Errors& errors, bool flexible) {
+  std::vector<std::vector<Eigen::MatrixXd>> bases(recorded.recordings.size());
+  for (std::size_t r = 0; flexible && r < bases.size(); ++r)
+    for (const auto& series : recorded.recordings[r].series)
+      bases[r].push_back(series.time_s.empty() ? Eigen::MatrixXd() : spline_basis(series, kKnot_s));
+  const auto* in_use = flexible ? &bases : nullptr;
+  Noise noise;
+  noise.frame_s = recorded.frame_s;
+  const auto at = [&](double ar1) {
+    noise.ar1 = ar1;
+    return deviance(recorded, errors, in_use, noise);
+  };
+  // The deviance in ar1 has one valley: a coarse scan, then golden-section steps.
+  double best = 0, best_value = std::numeric_limits<double>::infinity();
+  for (int i = 0; i <= 12; ++i) {
+    const double ar1 = kLargestAr1 * i / 12;
+    const double value = at(ar1);
+    if (value < best_value) best = ar1, best_value = value;
+  }
+  double low = std::max(0.0, best - kLargestAr1 / 12), high = std::min(kLargestAr1, best + kLargestAr1 / 12);
+  constexpr double kGolden = 0.6180339887498949;
+  double a = high - kGolden * (high - low), b = low + kGolden * (high - low);
+  double fa = at(a), fb = at(b);
+  while (high - low > 0.004) {
+    if (fa < fb) {
+      high = b, b = a, fb = fa, a = high - kGolden * (high - low), fa = at(a);
+    } else {
+      low = a, a = b, fa = fb, b = low + kGolden * (high - low), fb = at(b);
+    }
+  }
+  at(0.5 * (low + high) < 0.004 ? 0.0 : 0.5 * (low + high));
+  return noise;
+}
+
+RecordedCase without(const RecordedCase& recorded, const std::vector<std::vector<std::size_t>>& readings) {
+  RecordedCase out = recorded;
+  for (std::size_t r = 0; r < out.recordings.size(); ++r)
+    for (Series& series : out.recordings[r].series) {
+      Series kept;
+      for (std::size_t i = 0; i < series.reading.size(); ++i) {
+        if (std::find(readings[r].begin(), readings[r].end(), series.reading[i]) != readings[r].end()) continue;
+        kept.reading.push_back(series.reading[i]);
+        kept.time_s.push_back(series.time_s[i]);
+        kept.measured_mm.push_back(series.measured_mm[i]);
+        kept.relative_sd.push_back(series.relative_sd[i]);
+      }
+      series = std::move(kept);
+    }
+  return out;
+}
+
+Calibration calibrate_noise(const RecordedCase& recorded, const Errors& errors, bool flexible) {
+  Calibration out;
+  out.outliers.resize(recorded.recordings.size());
+  RecordedCase now = recorded;
+  Errors left = errors;
+  std::size_t messages = 0, dropped = 0;
+  for (const auto& recording : recorded.recordings) messages += recording.motion.at.size();
+  for (int pass = 0; pass < kOutlierPasses; ++pass) {
+    out.noise = estimate_noise(now, left, flexible);
+    bool found = false;
+    for (std::size_t r = 0; r < now.recordings.size(); ++r) {
+      const auto& recording = now.recordings[r];
+      std::vector<double> sum(recording.motion.at.size(), 0);
+      for (std::size_t c = 0; c < now.channels.size(); ++c) {
+        const Series& series = recording.series[c];
+        if (series.time_s.size() < 8) continue;
+        const Eigen::VectorXd squared = surprise(series, left[r][c], out.noise, out.noise.sigma_mm[c]);
+        for (std::size_t i = 0; i < series.reading.size(); ++i) sum[series.reading[i]] += squared[static_cast<Eigen::Index>(i)];
+      }
+      for (std::size_t i = 0; i < sum.size(); ++i) {
+        // An outlier makes its neighbours look bad too: only the worst of three goes, the others are looked at again.
+        const bool worst = (i == 0 || sum[i] >= sum[i - 1]) && (i + 1 == sum.size() || sum[i] >= sum[i + 1]);
+        if (sum[i] > kOutlier && worst) out.outliers[r].push_back(i), ++dropped, found = true;
+      }
+    }
+    if (!found) break;
+    now = without(recorded, out.outliers);
+    for (std::size_t r = 0; r < now.recordings.size(); ++r)
+      for (std::size_t c = 0; c < now.channels.size(); ++c) {
+        const auto& all = recorded.recordings[r].series[c].reading;
+        const auto& kept = now.recordings[r].series[c].reading;
+        left[r][c].resize(static_cast<Eigen::Index>(kept.size()));
+        for (std::size_t i = 0, j = 0; i < kept.size(); ++i, ++j) {
+          while (all[j] != kept[i]) ++j;
+          left[r][c][static_cast<Eigen::Index>(i)] = errors[r][c][static_cast<Eigen::Index>(j)];
+        }
+      }
+  }
+  out.noise = estimate_noise(now, left, flexible);
+  out.noise.outlier_share = static_cast<double>(dropped) / static_cast<double>(std::max<std::size_t>(messages, 1));
+  return out;
+}
+
+}  // namespace bevel::diagnosis

@@ -1,0 +1,56 @@
+#pragma once
+// The cameras' noise: first-order coloured, one standard deviation per channel, and a share of outliers. It is found
+// before any physics is named, from what a flexible curve leaves of the residuals, so that missing physics does not
+// pass for noise; it is then held fixed while structures are compared.
+// Source: restricted maximum likelihood, Harville 1977, JASA 72; AR(1) over gaps as an Ornstein-Uhlenbeck process.
+#include <span>
+#include <vector>
+
+#include "diagnosis/mismatch/recorded_case.hpp"
+
+namespace bevel::diagnosis {
+
+struct Noise {
+  std::vector<double> sigma_mm;  // per channel, of one reading (the coloured process's own)
+  double ar1 = 0;                // correlation of readings one frame apart
+  double outlier_share = 0;      // of messages
+  double frame_s = 1.0 / 30;
+};
+
+// Coefficients that turn a series of errors into independent ones of unit variance:
+// white_i = (e_i - carry_i e_(i-1)) * weight_i.
+struct Whitening {
+  std::vector<double> carry, weight;
+};
+Whitening make_whitening(const Series& series, const Noise& noise, double sigma_mm);
+
+// In place, on each column; rows are the series in time.
+template <class Matrix>
+void whiten(const Whitening& whitening, Matrix&& rows) {
+  for (Eigen::Index i = rows.rows() - 1; i > 0; --i)
+    rows.row(i) = (rows.row(i) - whitening.carry[static_cast<std::size_t>(i)] * rows.row(i - 1)) *
+                  whitening.weight[static_cast<std::size_t>(i)];
+  if (rows.rows() > 0) rows.row(0) *= whitening.weight[0];
+}
+
+// Errors of a model per recording and channel, in mm.
+using Errors = std::vector<std::vector<Eigen::VectorXd>>;
+
+// Cubic B-splines over a series with a knot about every knot_s seconds: the flexible curve. Rows are readings.
+Eigen::MatrixXd spline_basis(const Series& series, double knot_s);
+inline constexpr double kKnot_s = 1.0;
+
+struct Calibration {
+  Noise noise;
+  std::vector<std::vector<std::size_t>> outliers;  // per recording: readings (indices into motion.at)
+};
+
+// errors: of the model in use. With flexible = false the model is trusted and no curve is taken out.
+Calibration calibrate_noise(const RecordedCase& recorded, const Errors& errors, bool flexible = true);
+// sigma and ar1 alone, of the readings as they are.
+Noise estimate_noise(const RecordedCase& recorded, const Errors& errors, bool flexible);
+
+// The case without those readings.
+RecordedCase without(const RecordedCase& recorded, const std::vector<std::vector<std::size_t>>& readings);
+
+}  // namespace bevel::diagnosis

@@ -1,0 +1,65 @@
+#pragma once
+// The recordings of one rig, as the mismatch tool sees them: the base's motion, and for each camera axis a series of
+// readings. Everything later works on these.
+#include <string>
+#include <vector>
+
+#include "model/effects/open_loop.hpp"
+
+namespace bevel::diagnosis {
+
+// One direction in which one camera sees. A camera's information matrix gives them: its eigenvectors of nonzero
+// information.
+struct Channel {
+  int camera = 0;
+  Eigen::Vector3d axis;  // unit vector in {A}
+  std::string name;      // "tip.y"; "tip[2].(0.71 0 0.71)" for a second camera or an oblique axis
+  double claimed_sigma_mm = 0;  // median of what the messages say
+};
+
+// One channel in one recording, in order of time.
+struct Series {
+  std::vector<std::size_t> reading;  // index into the recording's motion.at
+  std::vector<double> time_s;        // from the recording's start
+  std::vector<double> measured_mm;   // along the channel's axis
+  std::vector<double> relative_sd;   // claimed standard deviation over the channel's median
+};
+
+struct Recording {
+  std::string name;
+  model::Motion motion;
+  std::vector<Series> series;  // one per channel of the case; may be empty
+  std::vector<Eigen::Vector3d> position_mm;  // raw readings, one per motion.at, for pictures
+  std::size_t skipped = 0;     // measurements not used: status not 0, or no axis seen
+  double duration_s() const { return motion.nodes.back().time_s; }
+};
+
+struct RecordedCase {
+  std::vector<Channel> channels;
+  std::vector<Recording> recordings;
+  double frame_s = 0;  // median time between readings of a channel
+  std::size_t measurements() const;  // scalar readings in use
+};
+
+struct RawRecording {
+  std::string name;
+  std::vector<model::ActuatorState> actuators;
+  std::vector<model::TipMeasurement> tips;
+};
+
+// Throws std::invalid_argument, naming the recording and what is wrong: no usable tip measurement, no motion, clocks of
+// camera and axes apart, fewer than two recordings, recordings of different rigs (cameras that see other axes, or frame
+// periods or claimed noise that differ more than threefold).
+RecordedCase make_case(std::vector<RawRecording> raw);
+
+// What a reading was taken at, for tables and pictures.
+struct Covariates {
+  double time_s = 0, depth_mm = 0, speed_mm_s = 0, turn_rate_rad_s = 0, since_stop_s = 0, since_reversal_mm = 0,
+         roll_rad = 0;
+  double operator[](model::Covariate covariate) const;
+};
+// One per node of the motion. depth is the base's insertion; since_stop counts seconds from the moment at which
+// insertion last ended (0 while inserting), since_reversal the insertion since the last change of roll.
+std::vector<Covariates> find_covariates(const model::Motion& motion);
+
+}  // namespace bevel::diagnosis

@@ -1,0 +1,196 @@
+#include "diagnosis/mismatch/selection.hpp"
+
+#include <algorithm>
+#include <cmath>
+
+#include "diagnosis/mismatch/local_unknowns.hpp"
+#include "diagnosis/mismatch/parallel.hpp"
+
+namespace bevel::diagnosis {
+namespace {
+constexpr int kScans = 2;
+constexpr double kSettled = 0.5;  // chi2
+
+bool has_local(const Hypothesis& hypothesis) {
+  return std::any_of(hypothesis.unknowns().begin(), hypothesis.unknowns().end(),
+                     [](const Unknown& u) { return u.recording >= 0; });
+}
+
+std::string member_key(const Member& member) {
+  return std::string(member.effect->name()) + "/" + std::to_string(member.variant);
+}
+}  // namespace
+
+std::string key_of(const EffectSet& set) {
+  std::vector<std::string> names;
+  for (const auto& member : set) names.push_back(member_key(member));
+  std::sort(names.begin(), names.end());
+  std::string key;
+  for (const auto& name : names) key += name + ";";
+  return key;
+}
+
+EffectSet without_member(const EffectSet& set, std::size_t index) {
+  EffectSet rest = set;
+  rest.erase(rest.begin() + static_cast<std::ptrdiff_t>(index));
+  return rest;
+}
+
+std::shared_ptr<const Fit> fit_addition(const Evidence& evidence, const Fit& from, const Candidate& candidate,
+                                        const std::vector<Promise>& promises) {
+  EffectSet set = from.hypothesis.set();
+  set.push_back(candidate.member);
+  const Hypothesis hypothesis(evidence.belief, set, *evidence.recorded);
+  const std::size_t m = set.size() - 1;
+  std::shared_ptr<Fit> best;
+  for (const auto& promise : promises) {
+    Eigen::VectorXd values = hypothesis.start_from(from.hypothesis, from.values);
+    for (std::size_t p = 0; p < promise.parameters.size(); ++p)
+      for (std::size_t r = 0; r < evidence.recorded->recordings.size(); ++r) {
+        const int i = hypothesis.find(m, p, static_cast<int>(r));
+        if (i < 0) continue;
+        const bool local = static_cast<int>(p) == candidate.local && r < promise.local_by_recording.size();
+        values[i] = local ? promise.local_by_recording[r] : promise.parameters[p];
+      }
+    auto one = std::make_shared<Fit>(fit(evidence, hypothesis, values));
+    for (int scan = 0; scan < kScans && one->valid && has_local(hypothesis); ++scan) {
+      auto again =
+          std::make_shared<Fit>(fit(evidence, hypothesis, scan_local_unknowns(evidence, hypothesis, one->values)));
+      const auto cost = [](const Fit& f) { return f.penalised + kInstantCost * instants_in_use(f); };
+      const bool better = again->valid && cost(*again) < cost(*one);
+      const bool settled = cost(*again) > cost(*one) - kSettled;
+      if (better) one = again;
+      if (settled) break;
+    }
+    if (one->valid && (!best || one->penalised < best->penalised)) best = one;
+  }
+  return best;
+}
+
+Selection::Selection(const Evidence& evidence, const Fit& base, const SelectionRules& rules, Progress progress)
+    : evidence_(evidence), rules_(rules), progress_(std::move(progress)) {
+  known_[key_of({})] = {{}, std::make_shared<Fit>(base), 0};
+  ground_ = make_ground(evidence_, base);
+  dictionary_ = make_dictionary(evidence_, base, ground_, members_of_library({}), rules_.threads);
+  null_gains_ = bootstrap_null(dictionary_, ground_, rules_.bootstrap_draws, rules_.seed, rules_.threads);
+  for (std::size_t e = 0; e < dictionary_.size(); ++e) chance_[member_key(dictionary_[e].member)] = null_gains_.mean[e];
+}
+
+const NullGains& Selection::null_gains() { return null_gains_; }
+const std::vector<Candidate>& Selection::dictionary() { return dictionary_; }
+const Ground& Selection::ground() { return ground_; }
+
+void Selection::say(const std::string& text) const {
+  if (progress_) progress_(text);
+}
+
+Selection::Known& Selection::known(const EffectSet& set) {
+  const auto at = known_.find(key_of(set));
+  if (at != known_.end()) return at->second;
+  // Not fitted on the way here: from its largest known part.
+  const EffectSet rest = without_member(set, set.size() - 1);
+  additions(rest);
+  const auto now = known_.find(key_of(set));
+  if (now != known_.end()) return now->second;
+  return known_[key_of(set)] = {set, known(rest).fit, known(rest).evidence};  // it cannot be fitted
+}
+
+std::shared_ptr<const Fit> Selection::fit_of(const EffectSet& set) { return known(set).fit; }
+double Selection::evidence_of(const EffectSet& set) { return known(set).evidence; }
+
+double Selection::cost_of(const EffectSet& set, const Fit& fit) {
+  double cost = kInstantCost * instants_in_use(fit);
+  for (const auto& member : set) cost += chance_[member_key(member)];
+  return cost;
+}
+
+const std::vector<Trial>& Selection::additions(const EffectSet& to) {
+  const std::string key = key_of(to);
+  if (const auto at = additions_.find(key); at != additions_.end()) return at->second;
+  const std::shared_ptr<const Fit> from = known(to).fit;
+  const double base = known_.at(key_of({})).fit->penalised;
+  Ground ground;
+  std::vector<Candidate> dictionary;
+  NullGains chance;
+  const bool first = to.empty();
+  if (!first) {
+    ground = make_ground(evidence_, *from);
+    dictionary = make_dictionary(evidence_, *from, ground, members_of_library(to), rules_.threads);
+    chance = bootstrap_null(dictionary, ground, rules_.bootstrap_draws, rules_.seed, rules_.threads);
+  }
+  const Ground& g = first ? ground_ : ground;
+  const auto& candidates = first ? dictionary_ : dictionary;
+  const NullGains& null_gains = first ? null_gains_ : chance;
+  std::vector<Trial> trials(candidates.size());
+  parallel_for(candidates.size(), rules_.threads, [&](std::size_t e) {
+    Trial& trial = trials[e];
+    trial.set = to;
+    trial.set.push_back(candidates[e].member);
+    trial.chance = null_gains.mean[e];
+    trial.threshold = null_gains.threshold[e];
+    trial.fit = fit_addition(evidence_, *from, candidates[e],
+                             best_promises(candidates[e], g, rules_.starts_fitted));
+  });
+  for (Trial& trial : trials) {
+    if (!trial.fit) continue;
+    trial.gain = from->penalised - trial.fit->penalised -
+                 kInstantCost * (instants_in_use(*trial.fit) - instants_in_use(*from));
+    trial.evidence = base - trial.fit->penalised - cost_of(trial.set, *trial.fit);
+    Known& slot = known_[key_of(trial.set)];
+    if (!slot.fit || trial.evidence > slot.evidence) slot = {trial.set, trial.fit, trial.evidence};
+  }
+  std::stable_sort(trials.begin(), trials.end(), [](const Trial& a, const Trial& b) {
+    if (!a.fit || !b.fit) return a.fit && !b.fit;
+    return a.evidence > b.evidence;
+  });
+  if (!trials.empty() && trials.front().fit)
+    say("tried every effect beside " + describe(to) + ": best " + std::string(trials.front().set.back().effect->name()) +
+        ", chi2 falls by " + std::to_string(static_cast<int>(trials.front().gain)));
+  return additions_[key] = std::move(trials);
+}
+
+EffectSet Selection::select() {
+  EffectSet now;
+  for (int round = 0; round < 12; ++round) {
+    bool changed = false;
+    if (static_cast<int>(now.size()) < rules_.largest_set) {
+      for (const Trial& trial : additions(now)) {
+        if (!trial.fit || !trial.passes()) continue;
+        now = trial.set;
+        changed = true;
+        break;
+      }
+    }
+    // Swap: a member for the best other one beside the rest.
+    for (std::size_t m = 0; m < now.size() && now.size() > 1; ++m) {
+      const auto& others = additions(without_member(now, m));
+      if (!others.empty() && others.front().fit && others.front().evidence > evidence_of(now) + 1e-6 &&
+          key_of(others.front().set) != key_of(now)) {
+        now = others.front().set;
+        changed = true;
+        break;
+      }
+    }
+    // Backward: a member that the others have made superfluous goes.
+    for (std::size_t m = 0; m < now.size() && now.size() > 1; ++m) {
+      const EffectSet rest = without_member(now, m);
+      const auto& trials = additions(rest);
+      const auto same = std::find_if(trials.begin(), trials.end(),
+                                     [&](const Trial& t) { return key_of(t.set) == key_of(now); });
+      if (same != trials.end() && same->passes()) continue;
+      now = rest;
+      changed = true;
+      break;
+    }
+    if (!changed) break;
+  }
+  return now;
+}
+
+std::vector<std::pair<EffectSet, double>> Selection::visited() const {
+  std::vector<std::pair<EffectSet, double>> all;
+  for (const auto& [key, known] : known_) all.emplace_back(known.set, known.evidence);
+  return all;
+}
+
+}  // namespace bevel::diagnosis

@@ -1,0 +1,87 @@
+#pragma once
+// Which effects are missing: full nonlinear fits of sets of effects, grown, shrunk and swapped until none is better.
+//
+// An effect enters when the fall of chi2 that it brings exceeds what the maximum over the whole library brings by
+// chance in 1 of 100 bootstrap draws, and when it is visible: kVisibleSigmas standard deviations above the mean of
+// chance. Sets are compared by evidence: the fall of chi2 less what chance brings to each member.
+#include <functional>
+#include <map>
+#include <memory>
+#include <string>
+
+#include "diagnosis/mismatch/dictionary.hpp"
+
+namespace bevel::diagnosis {
+
+inline constexpr double kVisibleSigmas = 5.0;
+
+struct SelectionRules {
+  int bootstrap_draws = 400;
+  std::uint64_t seed = 1;
+  int threads = 2;
+  int largest_set = 4;
+  std::size_t starts_fitted = 3;  // the most promising of a candidate's starts
+};
+
+// One set that was fitted, as an addition to a smaller one.
+struct Trial {
+  EffectSet set;
+  std::shared_ptr<const Fit> fit;
+  double gain = 0;       // fall of chi2 (belief included) against the set without the last member
+  double chance = 0;     // mean of what noise brings
+  double threshold = 0;  // exceeded by chance, over the library, in 1 of 100
+  double evidence = 0;   // against no effect at all
+  bool passes() const { return gain > threshold && gain > chance + kVisibleSigmas * kVisibleSigmas; }
+};
+
+class Selection {
+ public:
+  using Progress = std::function<void(const std::string&)>;
+  Selection(const Evidence& evidence, const Fit& base, const SelectionRules& rules, Progress progress = {});
+
+  // Every effect added to a set, best evidence first. Fitted once, then remembered.
+  const std::vector<Trial>& additions(const EffectSet& to);
+  // The best set found.
+  EffectSet select();
+
+  std::shared_ptr<const Fit> fit_of(const EffectSet& set);
+  double evidence_of(const EffectSet& set);
+  // All sets fitted so far.
+  std::vector<std::pair<EffectSet, double>> visited() const;
+  const Evidence& evidence() const { return evidence_; }
+  const SelectionRules& rules() const { return rules_; }
+  // Gains that chance brings to each library member, for the base hypothesis.
+  const NullGains& null_gains();
+  const std::vector<Candidate>& dictionary();
+  const Ground& ground();
+
+ private:
+  struct Known {
+    EffectSet set;
+    std::shared_ptr<const Fit> fit;
+    double evidence = 0;
+  };
+  Known& known(const EffectSet& set);
+  double cost_of(const EffectSet& set, const Fit& fit);
+  void say(const std::string& text) const;
+
+  const Evidence& evidence_;
+  SelectionRules rules_;
+  Progress progress_;
+  std::map<std::string, Known> known_;  // by sorted names
+  std::map<std::string, std::vector<Trial>> additions_;
+  Ground ground_;
+  std::vector<Candidate> dictionary_;
+  NullGains null_gains_;
+  std::map<std::string, double> chance_;  // per member, at the base
+};
+
+// The best of several fits of set + member, begun where a linear model promises most; local unknowns (instants,
+// phases) scanned anew with the full model in between.
+std::shared_ptr<const Fit> fit_addition(const Evidence& evidence, const Fit& from, const Candidate& candidate,
+                                        const std::vector<Promise>& promises);
+
+EffectSet without_member(const EffectSet& set, std::size_t index);
+std::string key_of(const EffectSet& set);
+
+}  // namespace bevel::diagnosis
