@@ -10,6 +10,9 @@
 #include <stdexcept>
 #include <thread>
 
+#include "proof/commitment.hpp"
+#include "proof/page.hpp"
+#include "proof/tool_run.hpp"
 #include "proof/trial_files.hpp"
 
 namespace bevel::proof {
@@ -89,6 +92,112 @@ void write_commitments(const CampaignOptions& options) {
   write_atomically(options.out / "commitments.json", all.dump(1) + "\n");
 }
 
+// Results of two tools must not mix.
+std::string claim_tool(const CampaignOptions& options) {
+  const std::string sha256 = sha256_of_file(options.diagnose.string());
+  const fs::path path = options.out / "tool.json";
+  if (fs::exists(path)) {
+    const std::string before = json::parse(read_text(path)).at("sha256");
+    if (before != sha256)
+      throw std::runtime_error(options.out.string() + ": holds verdicts of another program (sha256 " +
+                               before.substr(0, 12) + "..., now " + sha256.substr(0, 12) +
+                               "...); take another --out, or remove tool.json and trials/*/run.json there");
+  } else {
+    write_atomically(path, json{{"sha256", sha256}}.dump(1) + "\n");
+  }
+  return sha256;
+}
+
+void check_inputs(const TrialFolders& folders) {
+  const json commitment = json::parse(read_text(folders.commitment));
+  for (const auto& [name, sha256] : commitment.at("sha256_of_inputs").items())
+    if (sha256_of_file((folders.given / name).string()) != sha256)
+      throw std::runtime_error((folders.given / name).string() + ": changed since it was sealed");
+}
+
+// False if interrupted before the end: nothing is kept of it then.
+bool examine(const CampaignOptions& options, const fs::path& program, int number, const std::string& tool_sha256) {
+  const TrialFolders folders(options.out, number);
+  check_inputs(folders);
+  const fs::path unfinished = folders.trial / "out.unfinished";
+  fs::remove_all(unfinished);
+  fs::create_directories(unfinished);
+  ToolRun run{program,
+              fs::absolute(folders.given),
+              fs::absolute(unfinished),
+              fs::absolute(options.out / "sealed"),
+              fs::absolute(folders.trial / "console.txt"),
+              {},
+              options.limit_s,
+              !options.unsealed};
+  for (const std::string& folder : options.also_readable) run.readable.push_back(fs::canonical(folder));
+  const ToolEnd end = run_tool(run, interrupted);
+  if (end.stopped) {
+    fs::remove_all(unfinished);
+    return false;
+  }
+  fs::remove_all(folders.tool_output);
+  fs::rename(unfinished, folders.tool_output);
+  const fs::path verdict = folders.tool_output / "verdict.json";
+  write_atomically(folders.run, json{{"exit_status", end.exit_status},
+                                     {"seconds", end.seconds},
+                                     {"out_of_time", end.out_of_time},
+                                     {"sealed", !options.unsealed},
+                                     {"tool_sha256", tool_sha256},
+                                     {"verdict_sha256", fs::is_regular_file(fs::symlink_status(verdict))
+                                                            ? json(sha256_of_file(verdict.string()))
+                                                            : json(nullptr)}}
+                                        .dump(1) +
+                                    "\n");
+  return true;
+}
+
+// All verdicts in one file, before any truth is opened.
+std::string write_verdicts(const CampaignOptions& options) {
+  json all = json::object();
+  for (int i = 0; i < options.trials; ++i) {
+    const TrialFolders folders(options.out, i);
+    const json run = json::parse(read_text(folders.run));
+    const fs::path verdict = folders.tool_output / "verdict.json";
+    all[trial_name(i)] = {{"sha256", run.at("verdict_sha256")}, {"verdict", nullptr}};
+    if (!run.at("verdict_sha256").is_null())
+      all[trial_name(i)]["verdict"] = json::parse(read_text(verdict), nullptr, false);
+    if (all[trial_name(i)]["verdict"].is_discarded()) all[trial_name(i)]["verdict"] = "not JSON";
+  }
+  const std::string text = all.dump(1) + "\n";
+  write_atomically(options.out / "verdicts.json", text);
+  return sha256_hex(text);
+}
+
+TrialScore score_trial(const CampaignOptions& options, int number) {
+  const TrialFolders folders(options.out, number);
+  const OpenedTruth truth = parse_truth(open_truth(folders));
+  const json run = json::parse(read_text(folders.run));
+  const auto judge = [&]() -> TrialScore {
+    if (run.at("out_of_time")) return score_abstention(truth, "out of time");
+    if (run.at("exit_status") != 0) return score_abstention(truth, "exit status " + run.at("exit_status").dump());
+    if (run.at("verdict_sha256").is_null()) return score_abstention(truth, "no verdict.json");
+    const fs::path path = folders.tool_output / "verdict.json";
+    if (sha256_of_file(path.string()) != run.at("verdict_sha256"))
+      throw std::runtime_error(path.string() + ": changed since the tool wrote it");
+    try {
+      return score_verdict(truth, parse_verdict(read_text(path)));
+    } catch (const std::runtime_error& e) {
+      return score_abstention(truth, e.what());
+    }
+  };
+  TrialScore score = judge();
+  score.seconds = run.at("seconds");
+  write_atomically(folders.score, as_json(score).dump(1) + "\n");
+  return score;
+}
+
+bool all_sealed(const CampaignOptions& options) {
+  for (int i = 0; i < options.trials; ++i)
+    if (!json::parse(read_text(TrialFolders(options.out, i).run)).at("sealed")) return false;
+  return true;
+}
+
 }  // namespace
 
 int run_campaign(const CampaignOptions& options, std::ostream& progress) {
@@ -100,14 +209,47 @@ int run_campaign(const CampaignOptions& options, std::ostream& progress) {
     const std::scoped_lock lock(mutex);
     progress << line << std::endl;
   };
+  const auto stopped = [&] {
+    if (interrupted != 0) say("interrupted; the same command goes on from here");
+    return interrupted != 0;
+  };
   in_parallel(options.trials, options.jobs, [&](int i) {
     if (prepare_trial(options.out, options.seed, i)) say(trial_name(i) + " drawn and sealed");
   });
-  if (interrupted != 0) {
-    say("interrupted; the same command goes on from here");
-    return 130;
-  }
+  if (stopped()) return 130;
   write_commitments(options);
+  if (options.generate_only) return 0;
+
+  CampaignFacts facts;
+  facts.seed = options.seed;
+  facts.commitments_sha256 = sha256_of_file((options.out / "commitments.json").string());
+  facts.tool_sha256 = claim_tool(options);
+  const fs::path program = fs::canonical(options.diagnose);
+  in_parallel(options.trials, options.jobs, [&](int i) {
+    if (fs::exists(TrialFolders(options.out, i).run)) return;
+    if (examine(options, program, i, facts.tool_sha256)) say(trial_name(i) + " examined");
+  });
+  if (stopped()) return 130;
+
+  facts.verdicts_sha256 = write_verdicts(options);
+  facts.sealed = all_sealed(options);
+  std::vector<TrialScore> scores;
+  for (int i = 0; i < options.trials; ++i) scores.push_back(score_trial(options, i));
+  const Tally sums = tally(scores);
+  json results{{"seed", options.seed},
+               {"sealed", facts.sealed},
+               {"tool_sha256", facts.tool_sha256},
+               {"commitments_sha256", facts.commitments_sha256},
+               {"verdicts_sha256", facts.verdicts_sha256},
+               {"summary", as_json(sums)},
+               {"trials", json::array()}};
+  for (const TrialScore& score : scores) results["trials"].push_back(as_json(score));
+  write_atomically(options.out / "results.json", results.dump(1) + "\n");
+  write_atomically(options.out / "results.html", results_page(facts, sums, scores));
+  const Share visible = sums.strict.contains("visible") ? sums.strict.at("visible") : Share{};
+  say(std::to_string(visible.hits) + " of " + std::to_string(visible.of) + " visible sets exactly right, " +
+      std::to_string(sums.false_alarms.hits) + " false alarms in " + std::to_string(sums.false_alarms.of) + " nulls, " +
+      std::to_string(sums.abstentions) + " abstentions: " + (options.out / "results.html").string());
   return 0;
 }
 

@@ -1,0 +1,240 @@
+#include "proof/page.hpp"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <cstdio>
+#include <numbers>
+
+#include "io/html_report.hpp"
+#include "proof/page_figures.hpp"
+#include "proof/trial.hpp"
+#include "proof/trial_files.hpp"
+
+namespace bevel::proof {
+namespace {
+
+std::string digits(double value, int count = 3) { return io::format_significant(value, count); }
+
+std::string percent(double share) { return digits(100 * share, 3) + " %"; }
+
+std::string words(const std::vector<std::string>& names) {
+  std::string text;
+  for (const auto& name : names) text += (text.empty() ? "" : " + ") + name;
+  return text.empty() ? "nothing" : text;
+}
+
+Share at(const std::map<std::string, Share>& shares, const std::string& name) {
+  const auto found = shares.find(name);
+  return found == shares.end() ? Share{} : found->second;
+}
+
+void headline(io::HtmlReport& page, const Tally& t, const CampaignFacts& facts) {
+  const Share visible = at(t.strict, "visible");
+  const Interval w = wilson95(visible);
+  const bool good = visible.of > 0 && visible.value() >= 0.9 && t.false_alarms.hits == 0;
+  page.callout(good ? io::Tone::good : io::Tone::warning,
+               "Exactly the right physics in " + std::to_string(visible.hits) + " of " + std::to_string(visible.of) +
+                   " trials in which all of it could be seen (" + percent(visible.value()) + ", 95 % interval " +
+                   percent(w.low) + " to " + percent(w.high) + ")",
+               std::to_string(t.false_alarms.hits) + " false alarms in " + std::to_string(t.false_alarms.of) +
+                   " trials with nothing missing: the rate is below " +
+                   percent(clopper_pearson_upper95(t.false_alarms)) + " (95 %, one-sided). " +
+                   std::to_string(t.unknown_called_unknown.hits) + " of " +
+                   std::to_string(t.unknown_called_unknown.of) + " effects on no list were called unknown. " +
+                   (facts.sealed ? "" : "The tool ran WITHOUT being sealed off from the truths."));
+  page.paragraph(std::to_string(t.trials) + " trials, seed " + std::to_string(facts.seed) +
+                 ". In each, eight recordings of a needle in tissue with nothing, one or two effects concealed, or one "
+                 "that is on no list, by a simulator that shares no code with the tool under test. The truth was "
+                 "sealed with SHA-256 before the tool ran" +
+                 (facts.sealed ? " in namespaces from which only the logs could be read" : "") +
+                 "; the verdicts were hashed before the truths were opened.");
+}
+
+void shares(io::HtmlReport& page, const Tally& t) {
+  page.heading("Verdicts");
+  std::vector<ShareLine> lines{{"exact set, all of it visible", at(t.strict, "visible"), 0.9},
+                               {"the same, counting ambiguous_with", at(t.lenient, "visible"), -1},
+                               {"one of two visible: that one", at(t.strict, "partly"), -1},
+                               {"nothing visible: silence", at(t.strict, "invisible"), -1},
+                               {"nothing concealed: silence", at(t.strict, "null"), 1.0},
+                               {"all trials", at(t.strict, "all"), -1},
+                               {"on no list: called unknown", t.unknown_called_unknown, 0.8},
+                               {"truth within the 95 % intervals", t.covered, 0.95},
+                               {"place within 0.2 s or 3 mm", t.located, -1},
+                               {"held-out chi-square within 10 % of 1", t.chi2_at_floor, -1}};
+  page.figure_svg(share_figure(lines),
+                  "Shares with 95 % Wilson intervals; red ticks are goals. The right answer names "
+                  "what could be seen: an effect of which less than 5 standard deviations remain "
+                  "beyond k, lambda1 and lambda2 is to go unnamed. Abstentions count as wrong.");
+  std::vector<std::vector<std::string>> rows;
+  for (const auto& [name, share] : t.strict_by_class) {
+    const Interval w = wilson95(share);
+    rows.push_back({name, std::to_string(share.hits), std::to_string(share.of), percent(share.value()),
+                    percent(w.low) + " to " + percent(w.high)});
+  }
+  if (!rows.empty())
+    page.table(
+        {"concealed, all visible", "right", "of", "share", "95 %"}, rows,
+        "Exact sets by class. The beam is a mechanical plant which no bicycle describes: counted as on no list.");
+  page.paragraph("Mean probability given to the truth " + digits(t.mean_probability_of_truth) + "; abstentions " +
+                 std::to_string(t.abstentions) + "; \"unknown\" where nothing unlisted was concealed " +
+                 std::to_string(t.unknown_alarms.hits) + " of " + std::to_string(t.unknown_alarms.of) + ".");
+}
+
+void sensitivity(io::HtmlReport& page, const Tally& t) {
+  io::Plot plot;
+  plot.x_label = "visible size (standard deviations of the coloured noise)";
+  plot.y_label = "share";
+  plot.log_x = true;
+  plot.y_range = {{0.0, 1.05}};
+  plot.legend = io::Plot::Legend::bottom_right;
+  plot.references.push_back({io::ReferenceLine::Axis::vertical, kVisible_sigmas, "visible from here"});
+  std::vector<double> x, named, low, high, alarmed_x, alarmed;
+  for (const SensitivityBin& bin : t.sensitivity) {
+    const double middle = std::isfinite(bin.high_sigmas) ? std::sqrt(std::max(bin.low_sigmas, 1.0) * bin.high_sigmas)
+                                                         : 1.7 * bin.low_sigmas;
+    if (bin.named.of > 0) {
+      const Interval w = wilson95(bin.named);
+      x.push_back(middle);
+      named.push_back(bin.named.value());
+      low.push_back(w.low);
+      high.push_back(w.high);
+    }
+    if (bin.alarmed.of > 0) {
+      alarmed_x.push_back(middle);
+      alarmed.push_back(bin.alarmed.value());
+    }
+  }
+  if (x.empty()) return;
+  page.heading("Sensitivity");
+  plot.band("95 %", x, low, high, 0).line("effect named", x, named, 0);
+  if (!alarmed_x.empty()) plot.dashed("anything said", alarmed_x, alarmed, 1);
+  page.figure(plot, "Effects named, against how much of them could be seen at all. Binned; the band is Wilson's.");
+}
+
+void confusion(io::HtmlReport& page, const Tally& t) {
+  if (t.confusion.empty()) return;
+  page.heading("What was taken for what");
+  page.figure_svg(confusion_figure(t.confusion),
+                  "Each effect that could be seen against what was named for it. Blue is right. The row \"none\" holds "
+                  "what was named beyond the truth; the column \"none\" what was missed. Depth of colour: share of the "
+                  "row.");
+}
+
+void parameters(io::HtmlReport& page, const Tally& t) {
+  if (t.z.empty()) return;
+  page.heading("Parameters");
+  constexpr int kBins = 24;
+  constexpr double kReach = 6.0;
+  std::vector<double> x, count, bell;
+  const double width = 2 * kReach / kBins;
+  for (int i = 0; i < kBins; ++i) {
+    const double from = -kReach + width * i;
+    const auto inside = std::ranges::count_if(t.z, [&](double z) {
+      const double clipped = std::clamp(z, -kReach, kReach - 1e-9);
+      return from <= clipped && clipped < from + width;
+    });
+    const double middle = from + 0.5 * width;
+    x.push_back(middle);
+    count.push_back(static_cast<double>(inside));
+    bell.push_back(static_cast<double>(t.z.size()) * width * std::exp(-0.5 * middle * middle) /
+                   std::sqrt(2 * std::numbers::pi));
+  }
+  std::vector<double> edges, heights;
+  for (std::size_t i = 0; i < x.size(); ++i) {
+    edges.insert(edges.end(), {x[i] - 0.5 * width, x[i] + 0.5 * width});
+    heights.insert(heights.end(), {count[i], count[i]});
+  }
+  io::Plot plot;
+  plot.x_label = "(value - truth) / std_error";
+  plot.y_label = "parameters";
+  plot.band("", edges, std::vector<double>(edges.size(), 0.0), heights, 0);
+  plot.line("parameters named rightly", edges, heights, 0).dashed("standard normal", x, bell, 1);
+  page.figure(plot,
+              "Errors of the parameters of effects named rightly, in their own standard errors. The outermost "
+              "columns hold everything beyond.");
+  const Interval w = wilson95(t.covered);
+  page.paragraph(std::to_string(t.z.size()) + " parameters: mean " + digits(t.z_mean) + ", spread " +
+                 digits(t.z_spread) + " (right are 0 and 1); the 95 % intervals hold the truth in " +
+                 percent(t.covered.value()) + " (" + percent(w.low) + " to " + percent(w.high) + ").");
+}
+
+void fits(io::HtmlReport& page, const Tally& t, const std::vector<TrialScore>& scores) {
+  std::vector<double> x, before, after_x, after;
+  for (const TrialScore& s : scores) {
+    const double place = std::max(s.visible_sigmas, 0.5);
+    if (s.chi2_before && *s.chi2_before > 0) {
+      x.push_back(place);
+      before.push_back(*s.chi2_before);
+    }
+    if (s.chi2_after && *s.chi2_after > 0) {
+      after_x.push_back(place);
+      after.push_back(*s.chi2_after);
+    }
+  }
+  if (after.empty() || x.empty()) return;
+  page.heading("Held-out fit");
+  io::Plot plot;
+  plot.x_label = "visible size of what was concealed (standard deviations; nulls at 0.5)";
+  plot.y_label = "held-out chi-square per measurement";
+  plot.log_x = plot.log_y = true;
+  plot.legend = io::Plot::Legend::top_left;
+  plot.references.push_back({io::ReferenceLine::Axis::horizontal, 1.0, "noise floor"});
+  plot.points("before", x, before, 1).points("after", after_x, after, 0);
+  page.figure(plot, "As the tool reports it, leaving out one recording at a time. Median before " +
+                        digits(median(t.chi2_before)) + ", after " + digits(median(t.chi2_after)) + ".");
+}
+
+void failures(io::HtmlReport& page, const std::vector<TrialScore>& scores) {
+  std::vector<std::vector<std::string>> wrong;
+  std::vector<std::vector<std::string>> all;
+  for (const TrialScore& s : scores) {
+    std::vector<std::string> row{trial_name(s.trial),
+                                 words(s.concealed) + (s.plant == "beam" ? " (plant)" : ""),
+                                 digits(s.visible_sigmas),
+                                 words(s.expected),
+                                 s.abstained ? "abstained: " + s.abstention : words(s.named),
+                                 s.strict    ? "right"
+                                 : s.lenient ? "ambiguous"
+                                             : "wrong",
+                                 digits(s.seconds)};
+    if (!s.strict) wrong.push_back(row);
+    all.push_back(std::move(row));
+  }
+  const std::vector<std::string> header{"trial", "concealed", "visible", "right answer", "verdict", "", "s"};
+  page.heading("Failures");
+  if (wrong.empty())
+    page.paragraph("None.");
+  else
+    page.table(header, wrong);
+  page.heading("Every trial");
+  page.table(header, all, "Visible: standard deviations beyond k, lambda1 and lambda2, of all that was concealed.");
+}
+
+}  // namespace
+
+std::string results_page(const CampaignFacts& facts, const Tally& t, const std::vector<TrialScore>& scores) {
+  io::HtmlReport page("Blind trial of the mismatch tool");
+  headline(page, t, facts);
+  shares(page, t);
+  sensitivity(page, t);
+  confusion(page, t);
+  parameters(page, t);
+  fits(page, t, scores);
+  if (!t.seconds.empty()) {
+    page.heading("Time");
+    page.paragraph("Median " + digits(median(t.seconds)) + " s a trial, longest " + digits(t.seconds.back()) +
+                   " s, wall clock, with as many trials at a time as the run was given.");
+  }
+  failures(page, scores);
+  page.heading("What binds this page");
+  page.code("tool under test   sha256 " + facts.tool_sha256 + "\ncommitments.json  sha256 " + facts.commitments_sha256 +
+            "\nverdicts.json     sha256 " + facts.verdicts_sha256);
+  page.paragraph(
+      "commitments.json was written before the tool first ran, verdicts.json before a truth was opened. To "
+      "check: SHA-256 of salt and truth, as text, one after the other, both in sealed/.");
+  return page.html();
+}
+
+}  // namespace bevel::proof

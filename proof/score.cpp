@@ -1,0 +1,193 @@
+#include "proof/score.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <nlohmann/json.hpp>
+#include <numbers>
+#include <set>
+#include <stdexcept>
+
+namespace bevel::proof {
+
+using nlohmann::json;
+
+namespace {
+
+using Names = std::vector<std::string>;
+
+bool holds(const Names& names, const std::string& name) { return std::ranges::find(names, name) != names.end(); }
+
+// Every expected id has a named effect of its own, by name or by ambiguous_with, and no named effect is left over.
+bool matches_leniently(const Names& expected, const Verdict& verdict) {
+  Names wanted = expected;
+  if (holds(wanted, "unknown") != (verdict.kind == "unknown-effect")) return false;
+  std::erase(wanted, "unknown");
+  if (wanted.size() != verdict.effects.size()) return false;
+  std::ranges::sort(wanted);
+  do {
+    bool all = true;
+    for (std::size_t i = 0; i < wanted.size(); ++i) {
+      const NamedEffect& effect = verdict.effects[i];
+      all = all && (effect.name == wanted[i] || holds(effect.ambiguous_with, wanted[i]));
+    }
+    if (all) return true;
+  } while (std::ranges::next_permutation(wanted).found);
+  return false;
+}
+
+double probability_of(const Names& expected, const Verdict& verdict) {
+  if (holds(expected, "unknown") != (verdict.kind == "unknown-effect")) return 0.0;
+  double p = 1.0;
+  for (const std::string& name : expected)
+    if (name != "unknown" && std::ranges::none_of(verdict.effects, [&](const auto& e) { return e.name == name; }))
+      return 0.0;
+  for (const NamedEffect& effect : verdict.effects)
+    p *= holds(expected, effect.name) ? effect.probability : 1.0 - effect.probability;
+  return p;
+}
+
+// A direction of motion is a line, not an arrow.
+double difference(const std::string& parameter, double value, double truth) {
+  double d = value - truth;
+  if (parameter == "direction_rad") d = std::remainder(d, std::numbers::pi);
+  return d;
+}
+
+void score_parameters(const OpenedEffect& truth, const NamedEffect& named, TrialScore& score) {
+  for (const auto& [name, true_value] : truth.parameters) {
+    const auto found = named.parameters.find(name);
+    if (found == named.parameters.end()) continue;
+    const Estimate& estimate = found->second;
+    ParameterScore p{truth.name, name, true_value, estimate.value, {}, {}};
+    const double d = difference(name, estimate.value, true_value);
+    if (estimate.std_error && *estimate.std_error > 0.0) p.z = d / *estimate.std_error;
+    // The interval moves with the estimate where a direction is turned to the truth's side.
+    const double shift = true_value + d - estimate.value;
+    if (estimate.low95 && estimate.high95)
+      p.covered = *estimate.low95 + shift <= true_value && true_value <= *estimate.high95 + shift;
+    score.parameters.push_back(p);
+  }
+}
+
+std::optional<double> nearest_instant(const Verdict& verdict, const NamedEffect& named, const std::string& log,
+                                      double at_s) {
+  if (const auto own = named.at_s.find(log); own != named.at_s.end() && own->second > 0)
+    return std::abs(own->second - at_s);
+  std::optional<double> best;
+  for (const Location& location : verdict.where)
+    if (location.log == log && location.from_s) {
+      const double error = std::abs(*location.from_s - at_s);
+      if (!best || error < *best) best = error;
+    }
+  return best;
+}
+
+void score_location(const OpenedEffect& truth, const NamedEffect& named, const Verdict& verdict, TrialScore& score) {
+  for (std::size_t i = 0; i < truth.at_s.size(); ++i) {
+    if (truth.at_s[i] <= 0.0) continue;
+    const std::string log = "rec0" + std::to_string(i + 1) + ".lcm";
+    if (const auto error = nearest_instant(verdict, named, log, truth.at_s[i]))
+      score.locations.push_back({truth.name, *error, true});
+  }
+  const auto depth = truth.parameters.find("depth_mm");
+  if (depth == truth.parameters.end()) return;
+  std::optional<double> error;
+  if (const auto own = named.parameters.find("depth_mm"); own != named.parameters.end())
+    error = std::abs(own->second.value - depth->second);
+  else
+    for (const Location& location : verdict.where)
+      if (location.covariate == "depth_mm" && location.range_low) {
+        const double e = std::abs(*location.range_low - depth->second);
+        if (!error || e < *error) error = e;
+      }
+  if (error) score.locations.push_back({truth.name, *error, false});
+}
+
+TrialScore begin(const OpenedTruth& truth) {
+  TrialScore score;
+  score.trial = truth.trial;
+  score.trial_class = truth.trial_class;
+  score.plant = truth.plant;
+  score.visible_sigmas = truth.visible_sigmas;
+  score.expected = truth.expected;
+  std::set<std::string> concealed;
+  for (const OpenedEffect& effect : truth.effects) {
+    score.concealed.push_back(effect.kind.empty() ? effect.name : effect.kind);
+    concealed.insert(effect.name);
+    score.found.push_back({effect.name, effect.visible_sigmas, false});
+  }
+  score.visibility = truth.effects.empty()                      ? Visibility::null
+                     : truth.expected.empty()                   ? Visibility::invisible
+                     : truth.expected.size() < concealed.size() ? Visibility::partly
+                                                                : Visibility::visible;
+  return score;
+}
+
+}  // namespace
+
+const char* name_of(Visibility visibility) {
+  switch (visibility) {
+    case Visibility::null:
+      return "null";
+    case Visibility::invisible:
+      return "invisible";
+    case Visibility::partly:
+      return "partly";
+    case Visibility::visible:
+      break;
+  }
+  return "visible";
+}
+
+OpenedTruth parse_truth(std::string_view text) {
+  try {
+    const json j = json::parse(text);
+    OpenedTruth truth;
+    truth.trial = j.at("trial");
+    truth.trial_class = j.at("class");
+    truth.plant = j.at("plant");
+    truth.rich_scripts = j.at("rich_scripts");
+    truth.visible_sigmas = j.at("visible_sigmas");
+    truth.expected = j.at("expected").get<Names>();
+    for (const json& e : j.at("effects")) {
+      OpenedEffect effect{e.at("name"), e.value("kind", ""), e.at("visible_sigmas"), e.at("parameters"), {}};
+      if (e.contains("per_recording") && e.at("per_recording").contains("at_s"))
+        effect.at_s = e.at("per_recording").at("at_s").get<std::vector<double>>();
+      truth.effects.push_back(std::move(effect));
+    }
+    return truth;
+  } catch (const json::exception& e) {
+    throw std::runtime_error(std::string("a truth cannot be read: ") + e.what());
+  }
+}
+
+TrialScore score_verdict(const OpenedTruth& truth, const Verdict& verdict) {
+  TrialScore score = begin(truth);
+  score.named = verdict.named();
+  score.strict = score.named == truth.expected;
+  score.lenient = score.strict || matches_leniently(truth.expected, verdict);
+  score.probability_of_truth = probability_of(truth.expected, verdict);
+  for (FoundEffect& found : score.found) found.named = holds(score.named, found.name);
+  for (const OpenedEffect& effect : truth.effects) {
+    if (!holds(truth.expected, effect.name)) continue;
+    for (const NamedEffect& named : verdict.effects)
+      if (named.name == effect.name) {
+        score_parameters(effect, named, score);
+        score_location(effect, named, verdict, score);
+      }
+  }
+  score.chi2_before = verdict.chi2_before;
+  score.chi2_after = verdict.chi2_after;
+  score.rmse_before_mm = verdict.rmse_before_mm;
+  score.rmse_after_mm = verdict.rmse_after_mm;
+  return score;
+}
+
+TrialScore score_abstention(const OpenedTruth& truth, const std::string& why) {
+  TrialScore score = begin(truth);
+  score.abstained = true;
+  score.abstention = why;
+  return score;
+}
+
+}  // namespace bevel::proof

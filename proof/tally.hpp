@@ -1,0 +1,50 @@
+#pragma once
+// All trials together: the figures of the proof.
+#include <map>
+#include <nlohmann/json_fwd.hpp>
+#include <vector>
+
+#include "proof/intervals.hpp"
+#include "proof/score.hpp"
+
+namespace bevel::proof {
+
+struct SensitivityBin {
+  double low_sigmas;
+  double high_sigmas;  // infinity in the last
+  Share named;         // effects of this visible size that were named (unknown ones: called unknown)
+  Share alarmed;       // trials of this visible size in which anything was named
+};
+
+struct Tally {
+  int trials = 0;
+  int abstentions = 0;
+  std::map<std::string, Share> strict;           // by visibility, and "all"; abstentions count as wrong
+  std::map<std::string, Share> lenient;          // the same
+  std::map<std::string, Share> strict_by_class;  // visible trials only, by class; the beam as a class of its own
+  Share false_alarms;                            // of nulls
+  Share unknown_called_unknown;                  // of visible unlisted effects
+  Share unknown_alarms;                          // "unknown" called where nothing unlisted was concealed
+  double mean_probability_of_truth = 0;
+  std::vector<SensitivityBin> sensitivity;
+  std::map<std::string, std::map<std::string, int>> confusion;  // [truth][named]; "none" on either side
+  std::vector<double> z;
+  double z_mean = 0;
+  double z_spread = 0;
+  Share covered;
+  std::vector<double> location_errors_s, location_errors_mm;
+  Share located;  // within 0.2 s or 3 mm
+  std::vector<double> chi2_before, chi2_after;
+  Share chi2_at_floor;          // after within 10 % of one, in visible listed trials named rightly and in nulls
+  std::vector<double> seconds;  // sorted
+};
+
+Tally tally(const std::vector<TrialScore>& scores);
+
+double median(std::vector<double> values);  // 0 of none
+
+nlohmann::json as_json(const TrialScore& score);
+TrialScore trial_score_of(const nlohmann::json& j);
+nlohmann::json as_json(const Tally& tally);
+
+}  // namespace bevel::proof
