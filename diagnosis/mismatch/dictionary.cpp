@@ -15,9 +15,9 @@ using Eigen::Index;
 using Eigen::MatrixXd;
 using Eigen::VectorXd;
 
-constexpr int kInstants = 14;         // of a jump, over a recording
-constexpr double kOnPenalty = 8.0;    // chi2 that a jump has to bring in a recording: 2 log of the instants and more
-constexpr double kFarthest = 4.0;     // amplitudes promised reach to so many times their start
+constexpr int kInstants = 14;       // of a jump, over a recording
+constexpr double kOnPenalty = 8.0;  // chi2 that a jump has to bring in a recording: 2 log of the instants and more
+constexpr double kFarthest = 4.0;   // amplitudes promised reach to so many times their start
 constexpr double kQuantile = 0.99;
 
 // Whitened prediction of one recording with the effect added at these values; empty outside the model's domain.
@@ -301,7 +301,8 @@ double visible_per_unit(const Candidate& candidate, std::size_t amplitude) {
   for (const auto& signature : candidate.signatures) {
     double squared = 0;
     if (candidate.local < 0) {
-      squared = 1 / std::max(signature.gram_inverse(static_cast<Index>(amplitude), static_cast<Index>(amplitude)), 1e-300);
+      squared =
+          1 / std::max(signature.gram_inverse(static_cast<Index>(amplitude), static_cast<Index>(amplitude)), 1e-300);
     } else {
       for (const auto& choices : signature.choices) {
         double largest = 0;

@@ -13,9 +13,9 @@ namespace bevel::diagnosis {
 
 // The fitted hypothesis, linearised: whitened residuals of all recordings, and the span of its sensitivities.
 struct Ground {
-  Eigen::VectorXd residual;        // projected: Q^T residual = 0
-  Eigen::MatrixXd Q;               // orthonormal columns
-  std::vector<Eigen::Index> rows;  // first row of each recording; one more at the end
+  Eigen::VectorXd residual;                 // projected: Q^T residual = 0
+  Eigen::MatrixXd Q;                        // orthonormal columns
+  std::vector<Eigen::Index> rows;           // first row of each recording; one more at the end
   std::vector<Eigen::VectorXd> path_white;  // whitened prediction per recording
 };
 Ground make_ground(const Evidence& evidence, const Fit& fit);
@@ -49,7 +49,7 @@ std::vector<Member> members_of_library(const EffectSet& but);
 // What a linear model promises: the fall of chi2, and the amplitudes (and local values) at which.
 struct Promise {
   double gain = 0;
-  std::vector<double> parameters;           // all of the effect's
+  std::vector<double> parameters;  // all of the effect's
   std::vector<double> local_by_recording;
 };
 Promise promise_of(const Candidate& candidate, const Signature& signature, const Ground& ground,

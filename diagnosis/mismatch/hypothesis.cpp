@@ -28,7 +28,7 @@ Hypothesis::Hypothesis(const model::NeedleParameters& needle, EffectSet set, con
     const auto& parameters = set_[m].effect->parameters();
     for (std::size_t p = 0; p < parameters.size(); ++p) {
       if (!set_[m].fits(p)) continue;
-      Unknown unknown{static_cast<int>(m), static_cast<int>(p),  -1,
+      Unknown unknown{static_cast<int>(m), static_cast<int>(p), -1,
                       parameters[p].lower, parameters[p].upper, parameters[p].periodic};
       if (parameters[p].scope == model::Scope::rig) {
         for (auto& columns : columns_) columns.push_back(static_cast<int>(unknowns_.size()));
@@ -83,8 +83,8 @@ Eigen::VectorXd Hypothesis::start_from(const Hypothesis& other, const Eigen::Vec
     const Unknown& u = unknowns_[i];
     const auto same = std::find(other.set_.begin(), other.set_.end(), set_[static_cast<std::size_t>(u.member)]);
     if (same == other.set_.end()) continue;
-    const int j = other.find(static_cast<std::size_t>(same - other.set_.begin()),
-                             static_cast<std::size_t>(u.parameter), u.recording);
+    const int j = other.find(static_cast<std::size_t>(same - other.set_.begin()), static_cast<std::size_t>(u.parameter),
+                             u.recording);
     if (j >= 0) values[static_cast<Eigen::Index>(i)] = theirs[j];
   }
   return values;
@@ -127,9 +127,8 @@ model::AugmentedNeedle Hypothesis::make_needle(std::size_t recording, const Eige
       const int unknown = find(m, p, static_cast<int>(recording));
       const auto column = std::find(columns.begin(), columns.end(), unknown);
       const bool moves = with_columns && unknown >= 0 && column != columns.end();
-      effects[m].parameters[p] =
-          model::Dual::unknown(parameter(values, m, p, static_cast<int>(recording)),
-                               moves ? static_cast<int>(column - columns.begin()) : -1);
+      effects[m].parameters[p] = model::Dual::unknown(parameter(values, m, p, static_cast<int>(recording)),
+                                                      moves ? static_cast<int>(column - columns.begin()) : -1);
     }
   }
   if (!with_columns) return model::AugmentedNeedle(needle(values), std::move(effects));

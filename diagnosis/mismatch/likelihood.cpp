@@ -134,16 +134,19 @@ Eigen::MatrixXd Fit::covariance() const {
   const auto n = static_cast<Index>(moved.size());
   MatrixXd part(n, n);
   VectorXd scale(n);
-  for (Index i = 0; i < n; ++i) scale[i] = 1 / std::sqrt(information(moved[static_cast<std::size_t>(i)], moved[static_cast<std::size_t>(i)]));
+  for (Index i = 0; i < n; ++i)
+    scale[i] = 1 / std::sqrt(information(moved[static_cast<std::size_t>(i)], moved[static_cast<std::size_t>(i)]));
   for (Index i = 0; i < n; ++i)
     for (Index j = 0; j < n; ++j)
-      part(i, j) = information(moved[static_cast<std::size_t>(i)], moved[static_cast<std::size_t>(j)]) * scale[i] * scale[j];
+      part(i, j) =
+          information(moved[static_cast<std::size_t>(i)], moved[static_cast<std::size_t>(j)]) * scale[i] * scale[j];
   part.diagonal().array() += 1e-12;
   const MatrixXd inverse = part.ldlt().solve(MatrixXd::Identity(n, n));
   MatrixXd covariance = MatrixXd::Zero(information.rows(), information.cols());
   for (Index i = 0; i < n; ++i)
     for (Index j = 0; j < n; ++j)
-      covariance(moved[static_cast<std::size_t>(i)], moved[static_cast<std::size_t>(j)]) = inverse(i, j) * scale[i] * scale[j];
+      covariance(moved[static_cast<std::size_t>(i)], moved[static_cast<std::size_t>(j)]) =
+          inverse(i, j) * scale[i] * scale[j];
   return covariance;
 }
 
@@ -163,7 +166,8 @@ Fit fit(const Evidence& evidence, const Hypothesis& hypothesis, const VectorXd& 
     VectorXd b(n);
     for (Index i = 0; i < n; ++i) {
       b[i] = now.b[free[static_cast<std::size_t>(i)]];
-      for (Index j = 0; j < n; ++j) A(i, j) = now.A(free[static_cast<std::size_t>(i)], free[static_cast<std::size_t>(j)]);
+      for (Index j = 0; j < n; ++j)
+        A(i, j) = now.A(free[static_cast<std::size_t>(i)], free[static_cast<std::size_t>(j)]);
     }
     bool moved = false, small = false;
     while (damping < 1e8) {

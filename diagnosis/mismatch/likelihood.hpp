@@ -41,7 +41,7 @@ struct Fit {
   explicit Fit(const Hypothesis& h) : hypothesis(h) {}
   Hypothesis hypothesis;
   Eigen::VectorXd values;
-  double chi2 = 0;  // without the belief's part
+  double chi2 = 0;       // without the belief's part
   double penalised = 0;  // with it
   std::vector<double> chi2_by_recording;
   std::vector<std::size_t> count_by_recording;

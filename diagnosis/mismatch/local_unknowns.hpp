@@ -9,7 +9,8 @@ namespace bevel::diagnosis {
 inline constexpr double kInstantCost = 12.0;
 
 // Values with every local unknown at the best of a grid, all else as it is.
-Eigen::VectorXd scan_local_unknowns(const Evidence& evidence, const Hypothesis& hypothesis, const Eigen::VectorXd& values);
+Eigen::VectorXd scan_local_unknowns(const Evidence& evidence, const Hypothesis& hypothesis,
+                                    const Eigen::VectorXd& values);
 
 // How many instants are not "off".
 int instants_in_use(const Fit& fit);

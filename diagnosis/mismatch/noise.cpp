@@ -44,8 +44,8 @@ Whitened project(const Series& series, const Eigen::VectorXd& error, const Eigen
 }
 
 // Minus twice the restricted log-likelihood at this ar1, with each channel's sigma at its best.
-double deviance(const RecordedCase& recorded, const Errors& errors, const std::vector<std::vector<Eigen::MatrixXd>>* bases,
-                Noise& noise) {
+double deviance(const RecordedCase& recorded, const Errors& errors,
+                const std::vector<std::vector<Eigen::MatrixXd>>* bases, Noise& noise) {
   double sum = 0;
   noise.sigma_mm.assign(recorded.channels.size(), 0);
   for (std::size_t c = 0; c < recorded.channels.size(); ++c) {
@@ -84,8 +84,12 @@ Eigen::VectorXd surprise(const Series& series, Eigen::VectorXd error, const Nois
       precision += carry * carry / (1 - carry * carry);
       pull += carry / (1 - carry * carry) * error[j];
     };
-    if (i > 0) join(i - 1, whitening.carry[static_cast<std::size_t>(i)] * series.relative_sd[static_cast<std::size_t>(i - 1)] / series.relative_sd[static_cast<std::size_t>(i)]);
-    if (i + 1 < n) join(i + 1, whitening.carry[static_cast<std::size_t>(i + 1)] * series.relative_sd[static_cast<std::size_t>(i)] / series.relative_sd[static_cast<std::size_t>(i + 1)]);
+    if (i > 0)
+      join(i - 1, whitening.carry[static_cast<std::size_t>(i)] * series.relative_sd[static_cast<std::size_t>(i - 1)] /
+                      series.relative_sd[static_cast<std::size_t>(i)]);
+    if (i + 1 < n)
+      join(i + 1, whitening.carry[static_cast<std::size_t>(i + 1)] * series.relative_sd[static_cast<std::size_t>(i)] /
+                      series.relative_sd[static_cast<std::size_t>(i + 1)]);
     const double residual = error[i] - pull / precision;
     squared[i] = residual * residual * precision / (sigma_mm * sigma_mm);
   }
@@ -117,7 +121,8 @@ Eigen::MatrixXd spline_basis(const Series& series, double knot_s) {
   const double start_s = series.time_s.front();
   const double span_s = std::max(series.time_s.back() - start_s, 1e-9);
   // No more curve than a quarter of the readings can bear.
-  const auto intervals = std::max<Eigen::Index>(1, std::min(static_cast<Eigen::Index>(std::lround(span_s / knot_s)), n / 4 - 3));
+  const auto intervals =
+      std::max<Eigen::Index>(1, std::min(static_cast<Eigen::Index>(std::lround(span_s / knot_s)), n / 4 - 3));
   Eigen::MatrixXd X = Eigen::MatrixXd::Zero(n, intervals + 3);
   for (Eigen::Index i = 0; i < n; ++i) {
     const double x = (series.time_s[static_cast<std::size_t>(i)] - start_s) / span_s * static_cast<double>(intervals);
@@ -200,7 +205,8 @@ Calibration calibrate_noise(const RecordedCase& recorded, const Errors& errors, 
         const Series& series = recording.series[c];
         if (series.time_s.size() < 8) continue;
         const Eigen::VectorXd squared = surprise(series, left[r][c], out.noise, out.noise.sigma_mm[c]);
-        for (std::size_t i = 0; i < series.reading.size(); ++i) sum[series.reading[i]] += squared[static_cast<Eigen::Index>(i)];
+        for (std::size_t i = 0; i < series.reading.size(); ++i)
+          sum[series.reading[i]] += squared[static_cast<Eigen::Index>(i)];
       }
       for (std::size_t i = 0; i < sum.size(); ++i) {
         // An outlier makes its neighbours look bad too: only the worst of three goes, the others are looked at again.

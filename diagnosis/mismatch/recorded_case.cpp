@@ -12,9 +12,9 @@ namespace bevel::diagnosis {
 namespace {
 
 constexpr double kRankTolerance = 1e-9;
-constexpr double kSameAxis = 0.99;          // cosine
+constexpr double kSameAxis = 0.99;  // cosine
 constexpr double kClocksApart_s = 1.0;
-constexpr double kDifferentRig = 3.0;       // ratio of frame periods or of claimed noise
+constexpr double kDifferentRig = 3.0;  // ratio of frame periods or of claimed noise
 constexpr double kMoving_mm_s = 0.05;
 constexpr double kTurning_rad_s = 0.02;
 
@@ -87,10 +87,11 @@ Recording make_recording(RawRecording& raw, std::vector<Channel>& channels) {
   const double end_s = seconds(raw.actuators.back().utime);
   const double middle_s = seconds(usable[usable.size() / 2].utime);
   if (middle_s < -kClocksApart_s || middle_s > end_s + kClocksApart_s)
-    throw std::invalid_argument(
-        raw.name + ": the clocks of camera and axes are apart: half of the tip measurements lie " +
-        std::to_string(std::abs(middle_s < 0 ? middle_s : middle_s - end_s)) + " s outside the actuators' time; at most " +
-        std::to_string(kClocksApart_s) + " s is allowed. Set both clocks by the same source and record again");
+    throw std::invalid_argument(raw.name +
+                                ": the clocks of camera and axes are apart: half of the tip measurements lie " +
+                                std::to_string(std::abs(middle_s < 0 ? middle_s : middle_s - end_s)) +
+                                " s outside the actuators' time; at most " + std::to_string(kClocksApart_s) +
+                                " s is allowed. Set both clocks by the same source and record again");
 
   std::vector<std::int64_t> utimes;
   for (const auto& tip : usable) utimes.push_back(tip.utime);
@@ -127,8 +128,8 @@ void check_same_rig(const RecordedCase& recorded) {
       const double a_s = period(recording.series[c]);
       const double b_s = period(first.series[c]);
       if (differ(a_s, b_s))
-        throw std::invalid_argument(where + "a reading of " + channel + " every " + std::to_string(a_s) + " s and every " +
-                                    std::to_string(b_s) + " s");
+        throw std::invalid_argument(where + "a reading of " + channel + " every " + std::to_string(a_s) +
+                                    " s and every " + std::to_string(b_s) + " s");
       const double a_mm = median(recording.series[c].relative_sd);
       const double b_mm = median(first.series[c].relative_sd);
       if (differ(a_mm, b_mm))
@@ -148,8 +149,9 @@ std::size_t RecordedCase::measurements() const {
 
 RecordedCase make_case(std::vector<RawRecording> raw) {
   if (raw.size() < 2)
-    throw std::invalid_argument(std::to_string(raw.size()) +
-                                " recording given; at least two are needed: what is found in one has to foretell another");
+    throw std::invalid_argument(
+        std::to_string(raw.size()) +
+        " recording given; at least two are needed: what is found in one has to foretell another");
   RecordedCase recorded;
   for (auto& one : raw) recorded.recordings.push_back(make_recording(one, recorded.channels));
   for (auto& recording : recorded.recordings) recording.series.resize(recorded.channels.size());

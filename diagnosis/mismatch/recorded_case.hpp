@@ -12,8 +12,8 @@ namespace bevel::diagnosis {
 // information.
 struct Channel {
   int camera = 0;
-  Eigen::Vector3d axis;  // unit vector in {A}
-  std::string name;      // "tip.y"; "tip[2].(0.71 0 0.71)" for a second camera or an oblique axis
+  Eigen::Vector3d axis;         // unit vector in {A}
+  std::string name;             // "tip.y"; "tip[2].(0.71 0 0.71)" for a second camera or an oblique axis
   double claimed_sigma_mm = 0;  // median of what the messages say
 };
 
@@ -28,16 +28,16 @@ struct Series {
 struct Recording {
   std::string name;
   model::Motion motion;
-  std::vector<Series> series;  // one per channel of the case; may be empty
+  std::vector<Series> series;                // one per channel of the case; may be empty
   std::vector<Eigen::Vector3d> position_mm;  // raw readings, one per motion.at, for pictures
-  std::size_t skipped = 0;     // measurements not used: status not 0, or no axis seen
+  std::size_t skipped = 0;                   // measurements not used: status not 0, or no axis seen
   double duration_s() const { return motion.nodes.back().time_s; }
 };
 
 struct RecordedCase {
   std::vector<Channel> channels;
   std::vector<Recording> recordings;
-  double frame_s = 0;  // median time between readings of a channel
+  double frame_s = 0;                // median time between readings of a channel
   std::size_t measurements() const;  // scalar readings in use
 };
 

@@ -128,13 +128,12 @@ const std::vector<Trial>& Selection::additions(const EffectSet& to) {
     trial.set.push_back(candidates[e].member);
     trial.chance = null_gains.mean[e];
     trial.threshold = null_gains.threshold[e];
-    trial.fit = fit_addition(evidence_, *from, candidates[e],
-                             best_promises(candidates[e], g, rules_.starts_fitted));
+    trial.fit = fit_addition(evidence_, *from, candidates[e], best_promises(candidates[e], g, rules_.starts_fitted));
   });
   for (Trial& trial : trials) {
     if (!trial.fit) continue;
-    trial.gain = from->penalised - trial.fit->penalised -
-                 kInstantCost * (instants_in_use(*trial.fit) - instants_in_use(*from));
+    trial.gain =
+        from->penalised - trial.fit->penalised - kInstantCost * (instants_in_use(*trial.fit) - instants_in_use(*from));
     trial.evidence = base - trial.fit->penalised - cost_of(trial.set, *trial.fit);
     Known& slot = known_[key_of(trial.set)];
     if (!slot.fit || trial.evidence > slot.evidence) slot = {trial.set, trial.fit, trial.evidence};
@@ -144,8 +143,9 @@ const std::vector<Trial>& Selection::additions(const EffectSet& to) {
     return a.evidence > b.evidence;
   });
   if (!trials.empty() && trials.front().fit)
-    say("tried every effect beside " + describe(to) + ": best " + std::string(trials.front().set.back().effect->name()) +
-        ", chi2 falls by " + std::to_string(static_cast<int>(trials.front().gain)));
+    say("tried every effect beside " + describe(to) + ": best " +
+        std::string(trials.front().set.back().effect->name()) + ", chi2 falls by " +
+        std::to_string(static_cast<int>(trials.front().gain)));
   return additions_[key] = std::move(trials);
 }
 
@@ -175,8 +175,8 @@ EffectSet Selection::select() {
     for (std::size_t m = 0; m < now.size() && now.size() > 1; ++m) {
       const EffectSet rest = without_member(now, m);
       const auto& trials = additions(rest);
-      const auto same = std::find_if(trials.begin(), trials.end(),
-                                     [&](const Trial& t) { return key_of(t.set) == key_of(now); });
+      const auto same =
+          std::find_if(trials.begin(), trials.end(), [&](const Trial& t) { return key_of(t.set) == key_of(now); });
       if (same != trials.end() && same->passes()) continue;
       now = rest;
       changed = true;
