@@ -23,8 +23,8 @@ RigNode::RigNode(lcm::LCM& lcm, can::Bus& insertion_bus, can::Bus& rotation_bus,
     : config_(config), port_(lcm), status_(port_, "bevel-rig", 0.001), frames_(frames) {
   drives_[0] = std::make_unique<rig::SimulatedDrive>(insertion_bus, drive_config(config.stepper.axes[0]));
   drives_[1] = std::make_unique<rig::SimulatedDrive>(rotation_bus, drive_config(config.stepper.axes[1]));
-  plant_ = std::make_unique<rig::KinematicPlant>(config.rig.truth);
-  plant_->advance(0, config.rig.roll_error_rad, 0);
+  plant_ = std::make_unique<rig::KinematicPlant>(config.rig.truth, io::active_effects(config.rig.effects, ""),
+                                                 config.rig.roll_error_rad);
   for (const CameraViewConfig& c : config.cameras) {
     rig::SceneConfig scene;
     scene.size_px = {c.width_px, c.height_px};
@@ -33,7 +33,8 @@ RigNode::RigNode(lcm::LCM& lcm, can::Bus& insertion_bus, can::Bus& rotation_bus,
     scene.noise_gray = config.rig.noise_gray;
     scene.blur_px = config.rig.blur_px;
     scene.seed = static_cast<std::uint64_t>(config.rig.seed + c.camera);
-    eyes_.push_back({c.camera, rig::NeedleRenderer(scene, camera::PlanarView(c.view))});
+    const bool along_x = c.view.u_axis.axis != camera::WorldAxis::x && c.view.v_axis.axis != camera::WorldAxis::x;
+    eyes_.push_back({c.camera, along_x, rig::NeedleRenderer(scene, camera::PlanarView(c.view))});
   }
 }
 
@@ -47,8 +48,9 @@ void RigNode::step(std::int64_t now_ns, std::int64_t now_utime) {
   if (frames_ && now_ns >= next_frame_ns_) {
     const auto period_ns = std::llround(1e9 / config_.rig.frame_rate_hz);
     next_frame_ns_ = std::max(next_frame_ns_ + period_ns, now_ns + period_ns / 2);
-    publish_frames(now_utime);
+    take_frames(now_utime);
   }
+  publish_frames(now_utime);
   status_.report(now_utime, "running", "");
 }
 
@@ -66,27 +68,39 @@ void RigNode::publish_truth(std::int64_t now_utime) {
   m.utime = now_utime;
   m.seq = truth_seq_++;
   write_pose(tip, m);
-  m.curvature_per_mm = plant_->needle().curvature_per_mm;
-  m.lambda1_per_rad = plant_->needle().lambda1_per_rad;
-  m.lambda2 = plant_->needle().lambda2;
+  const model::NeedleParameters& needle = plant_->model().needle();
+  m.curvature_per_mm = needle.curvature_per_mm;
+  m.lambda1_per_rad = needle.lambda1_per_rad;
+  m.lambda2 = needle.lambda2;
   port_.publish(io::channel::kNeedleTruth, m);
 }
 
-void RigNode::publish_frames(std::int64_t now_utime) {
-  std::vector<camera::Vector3> path;
-  for (const Eigen::Vector3d& p : plant_->shaft_mm()) path.push_back({p.x(), p.y(), p.z()});
+void RigNode::take_frames(std::int64_t now_utime) {
+  const auto late_us = std::llround(1e6 * plant_->model().latency_s().value);
+  const auto to_camera = [](const std::vector<Eigen::Vector3d>& shaft_mm) {
+    std::vector<camera::Vector3> path;
+    for (const Eigen::Vector3d& p : shaft_mm) path.push_back({p.x(), p.y(), p.z()});
+    return path;
+  };
+  const auto path = to_camera(plant_->shaft_mm());
+  const auto path_along_x = to_camera(rig::shaft_seen_along_x(*plant_));
   const model::Pose tip = plant_->tip();
   for (Eye& eye : eyes_) {
     // Where body x points beside the heading: the roll that shapes the bevel's silhouette.
     const double roll_rad = std::atan2(tip.R(1, 0), tip.R(0, 0));
     camera::Frame frame;
-    frame.capture_utime = now_utime;
+    frame.capture_utime = now_utime + late_us;
     frame.seq = frame_seq_;
     frame.camera = eye.camera;
-    frame.gray = eye.renderer.render(path, roll_rad).gray;
-    frames_->publish(frame);
+    frame.gray = eye.renderer.render(eye.along_x ? path_along_x : path, roll_rad).gray;
+    taken_.push_back(std::move(frame));
   }
   ++frame_seq_;
+}
+
+void RigNode::publish_frames(std::int64_t now_utime) {
+  for (; !taken_.empty() && taken_.front().capture_utime <= now_utime; taken_.pop_front())
+    frames_->publish(taken_.front());
 }
 
 }  // namespace bevel::nodes

@@ -1,6 +1,7 @@
 #pragma once
 // bevel-rig: a needle, two cameras and two drives that exist only as programs. Drives on a CAN bus, frames on a Unix
 // socket, the true tip on NEEDLE_TRUTH. The rest of the software cannot tell it from a bench.
+#include <deque>
 #include <memory>
 #include <vector>
 
@@ -28,10 +29,12 @@ class RigNode {
  private:
   struct Eye {
     int camera;
+    bool along_x;  // it looks along x, and so is the one that effects of a camera concern
     rig::NeedleRenderer renderer;
   };
   void move_plant(std::int64_t now_ns);
   void publish_truth(std::int64_t now_utime);
+  void take_frames(std::int64_t now_utime);
   void publish_frames(std::int64_t now_utime);
 
   SystemConfig config_;
@@ -41,7 +44,8 @@ class RigNode {
   std::unique_ptr<rig::KinematicPlant> plant_;
   rig::FrameServer* frames_;
   std::vector<Eye> eyes_;
-  std::array<double, 2> moved_{};  // axis positions that the plant has followed
+  std::deque<camera::Frame> taken_;  // a late camera's, stamped with the time at which they arrive
+  std::array<double, 2> moved_{};    // axis positions that the plant has followed
   std::int64_t last_ns_ = 0;
   std::int64_t next_truth_ns_ = 0;
   std::int64_t next_frame_ns_ = 0;

@@ -1,10 +1,10 @@
 #include "nodes/system_config.hpp"
 
 #include <cmath>
+#include <filesystem>
 
 #include "io/config.hpp"
 #include "io/estimator_config.hpp"
-#include "io/model_file.hpp"
 
 namespace bevel::nodes {
 namespace {
@@ -123,8 +123,23 @@ CameraViewConfig read_camera(Section s) {
   return c;
 }
 
-void read_rig(Section s, RigConfig& c) {
+void read_model(Section& s, const std::filesystem::path& path, RigConfig& c) {
+  if (s.has("needle") || s.has("effect")) return s.fail("model", "stands for needle and effect; one or the other");
+  try {
+    const io::ModelFile model = io::load_model_file(path.string());
+    c.truth = model.needle;
+    c.effects = model.effects;
+  } catch (const io::ConfigError& e) {
+    s.fail("model", e.what());
+  }
+}
+
+void read_rig(Section s, const std::filesystem::path& folder, RigConfig& c) {
   if (Section truth = s.section("needle", optional); truth.present()) c.truth = io::read_needle(truth);
+  c.effects = io::read_effects(s);
+  std::string model_path;
+  s.read("model", model_path, optional);
+  if (!model_path.empty()) read_model(s, folder / model_path, c);
   s.read("roll_error_rad", c.roll_error_rad, optional, in_range(-3.2, 3.2));
   s.read("frames_socket", c.frames_socket, optional);
   s.read("frame_rate_hz", c.frame_rate_hz, optional, in_range(1, 120));
@@ -151,7 +166,7 @@ SystemConfig load_system_config(const std::string& path) {
   read_source(file.section("source", optional), c.source);
   for (const Section& s : file.sections("camera", optional)) c.cameras.push_back(read_camera(s));
   c.rig.truth = c.needle;
-  read_rig(file.section("rig", optional), c.rig);
+  read_rig(file.section("rig", optional), std::filesystem::path(path).parent_path(), c.rig);
   file.finish();
   return c;
 }

@@ -11,6 +11,7 @@
 #include "drivers/camera/tracker_config.hpp"
 #include "drivers/stepper/stepper_config.hpp"
 #include "estimator/config.hpp"
+#include "io/model_file.hpp"
 
 namespace bevel::nodes {
 
@@ -23,8 +24,11 @@ struct CameraViewConfig {
 };
 
 struct RigConfig {
-  model::NeedleParameters truth;  // of the simulated needle; unlike [needle], which is what the software believes
-  double roll_error_rad = 0;      // the bevel's true roll at the start; the software believes zero
+  // Of the simulated needle: [rig.needle] and [[rig.effect]]s, or the model file `model`; unlike [needle], which is
+  // what the software believes. What an effect has for single recordings is as in its own table.
+  model::NeedleParameters truth;
+  std::vector<io::EffectEntry> effects;
+  double roll_error_rad = 0;  // the bevel's true roll at the start; the software believes zero
   std::string frames_socket = "/tmp/bevel-rig-frames.sock";
   double frame_rate_hz = 30;
   double noise_gray = 2;

@@ -1,32 +1,65 @@
 #include "rig/plant/plant.hpp"
 
+#include <algorithm>
+
 namespace bevel::rig {
 namespace {
 constexpr double kShaftSpacing_mm = 1.0;
 }
 
-KinematicPlant::KinematicPlant(const model::NeedleParameters& needle) : needle_(needle) {
-  shaft_mm_ = {Eigen::Vector3d(0, 0, -1), pose_.p_mm};
-  shaft_depth_mm_ = {-1, 0};
+KinematicPlant::KinematicPlant(const model::NeedleParameters& needle, std::vector<model::ActiveEffect> effects,
+                               double roll_rad)
+    : needle_(needle, std::move(effects)), state_(needle_.entry({})) {
+  state_.pose.R = state_.pose.R * model::exp_so3({0, 0, roll_rad});
+  path_mm_ = {-state_.pose.R.col(2), state_.pose.p_mm};
+  path_depth_mm_ = {-1, 0};
+  follow_path();
 }
 
-void KinematicPlant::advance(double insertion_mm, double rotation_rad, double /*dt_s*/) {
-  // Outside the domain of the slip law the tip stays: the rig has no needle that bends past 90 degrees.
-  if (!model::advance(pose_, {insertion_mm, rotation_rad, {needle_.curvature_per_mm, 0}},
-                      model::slip_parameters(needle_)))
-    return;
-  pose_.R = model::orthonormalised(pose_.R);
-  inserted_mm_ += insertion_mm;
-  while (shaft_mm_.size() > 2 && shaft_depth_mm_[shaft_depth_mm_.size() - 2] >= inserted_mm_) {
-    shaft_mm_.pop_back();
-    shaft_depth_mm_.pop_back();
+void KinematicPlant::advance(double insertion_mm, double rotation_rad, double dt_s) {
+  const model::BaseMotion& base = state_.base;
+  const model::BaseMotion to{base.time_s + dt_s, base.insertion_mm + insertion_mm, base.rotation_rad + rotation_rad};
+  // Outside the domain of the slip law the tip stays: the rig has no needle that bends past 90 degrees. Time goes on.
+  if (needle_.advance(state_, to))
+    state_.pose.R = model::orthonormalised(state_.pose.R);
+  else
+    state_.base.time_s = to.time_s;
+  follow_path();
+}
+
+void KinematicPlant::follow_path() {
+  const double inserted_mm = state_.tip_insertion_mm.value;
+  while (path_mm_.size() > 2 && path_depth_mm_[path_depth_mm_.size() - 2] >= inserted_mm) {
+    path_mm_.pop_back();
+    path_depth_mm_.pop_back();
   }
-  if (inserted_mm_ - shaft_depth_mm_[shaft_depth_mm_.size() - 2] > kShaftSpacing_mm) {
-    shaft_mm_.push_back(pose_.p_mm);
-    shaft_depth_mm_.push_back(inserted_mm_);
+  if (inserted_mm - path_depth_mm_[path_depth_mm_.size() - 2] > kShaftSpacing_mm) {
+    path_mm_.push_back(state_.pose.p_mm);
+    path_depth_mm_.push_back(inserted_mm);
   }
-  shaft_mm_.back() = pose_.p_mm;
-  shaft_depth_mm_.back() = inserted_mm_;
+  path_mm_.back() = state_.pose.p_mm;
+  path_depth_mm_.back() = inserted_mm;
+
+  model::TipReading reading;
+  needle_.point(state_, reading);
+  tip_ = {state_.pose.R, reading.position_mm};
+  // An offset of the tip bends the shaft, evenly from the entry on.
+  const Eigen::Vector3d offset_mm = tip_.p_mm - state_.pose.p_mm;
+  shaft_mm_ = path_mm_;
+  for (std::size_t i = 0; i < shaft_mm_.size(); ++i)
+    shaft_mm_[i] += std::max(0.0, path_depth_mm_[i] / std::max(inserted_mm, kShaftSpacing_mm)) * offset_mm;
+  shaft_mm_.back() = tip_.p_mm;
+}
+
+std::vector<Eigen::Vector3d> shaft_seen_along_x(const KinematicPlant& plant) {
+  std::vector<Eigen::Vector3d> seen = plant.shaft_mm();
+  model::TipReading reading{{}, model::PointColumns(3, 0)};
+  for (Eigen::Vector3d& p : seen) {
+    reading.position_mm = p;
+    plant.model().through_cameras(reading);
+    p = reading.position_mm;
+  }
+  return seen;
 }
 
 }  // namespace bevel::rig

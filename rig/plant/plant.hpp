@@ -2,7 +2,7 @@
 // The needle in its tissue, as the simulated rig moves it: axis increments in, tip and shaft out.
 #include <vector>
 
-#include "model/kinematics.hpp"
+#include "model/effects/augmented_needle.hpp"
 
 namespace bevel::rig {
 
@@ -16,21 +16,30 @@ class Plant {
   virtual const std::vector<Eigen::Vector3d>& shaft_mm() const = 0;
 };
 
-// The extended bicycle itself: the shaft lies where the tip has passed. Retraction draws the tip back along that path.
+// The extended bicycle itself, with what a model file's effects make of it: the shaft lies where the tip has passed.
+// Retraction draws the tip back along that path. What a camera makes of it is not in here.
 class KinematicPlant : public Plant {
  public:
-  explicit KinematicPlant(const model::NeedleParameters& needle);
+  // roll_rad: of the bevel at the start. Throws std::invalid_argument for more effects than a model holds.
+  explicit KinematicPlant(const model::NeedleParameters& needle, std::vector<model::ActiveEffect> effects = {},
+                          double roll_rad = 0);
   void advance(double insertion_mm, double rotation_rad, double dt_s) override;
-  model::Pose tip() const override { return pose_; }
+  model::Pose tip() const override { return tip_; }
   const std::vector<Eigen::Vector3d>& shaft_mm() const override { return shaft_mm_; }
-  const model::NeedleParameters& needle() const { return needle_; }
+  const model::AugmentedNeedle& model() const { return needle_; }
 
  private:
-  model::NeedleParameters needle_;
-  model::Pose pose_;
-  std::vector<Eigen::Vector3d> shaft_mm_;  // last point is the tip
-  std::vector<double> shaft_depth_mm_;     // inserted length at each point
-  double inserted_mm_ = 0;
+  void follow_path();
+
+  model::AugmentedNeedle needle_;
+  model::AugmentedState state_;
+  model::Pose tip_;                       // with its elastic offset
+  std::vector<Eigen::Vector3d> path_mm_;  // where the tip has passed; last point is the tip, without offset
+  std::vector<double> path_depth_mm_;     // inserted length at each point
+  std::vector<Eigen::Vector3d> shaft_mm_;
 };
+
+// The shaft as it appears to the camera that looks along x, the one that effects of a camera concern.
+std::vector<Eigen::Vector3d> shaft_seen_along_x(const KinematicPlant& plant);
 
 }  // namespace bevel::rig

@@ -1,0 +1,142 @@
+// The simulated rig with the effects of a model file: its plant, its pictures, its configuration.
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <unistd.h>
+
+#include <filesystem>
+#include <fstream>
+#include <thread>
+
+#include "drivers/camera/frame_source.hpp"
+#include "drivers/can/memory_bus.hpp"
+#include "nodes/rig_node.hpp"
+#include "tests/effects/script.hpp"
+
+namespace bevel::model::testing {
+namespace {
+
+namespace fs = std::filesystem;
+using Eigen::Vector3d;
+using ::testing::HasSubstr;
+
+// All that act between base and tip, two by two.
+std::vector<std::vector<ActiveEffect>> all_pairs_of_interest() {
+  return {{},
+          {active("rotation_backlash", {0.37}), active("flip_transient", {6})},
+          {active("torsional_windup", {0.8}), active("drilling", {1.7})},
+          {active("insertion_backlash", {1.1}), active("layer", {30, 0.7})},
+          {active("insertion_scale", {0.93}), active("lateral_bias", {7e-4, -1e-3})},
+          {active("puncture", {21.7, 2.3}), active("depth_dependence", {0.5})},
+          {active("lost_steps", {0.8, 0, 3.3}), active("rate_dependence", {0.2})},
+          {active("entry_angle", {0.05, -0.03}), active("slip_direction", {})},
+          {active("bevel_offset", {0.3}), active("relaxation", {1.1, 2.2})},
+          {active("tissue_motion", {1.2, 0.27, 0.9, 2.0})}};
+}
+
+TEST(PlantWithEffects, IsTheModelAlongTheSameMotion) {
+  const Motion motion = rich_script().fine();
+  for (const auto& effects : all_pairs_of_interest()) {
+    const auto path = path_of(agar(), effects, motion);
+    rig::KinematicPlant plant(agar(), effects);
+    std::size_t reading = 1;
+    for (std::size_t i = 1; i < motion.nodes.size(); ++i) {
+      const BaseMotion &a = motion.nodes[i - 1], &b = motion.nodes[i];
+      plant.advance(b.insertion_mm - a.insertion_mm, b.rotation_rad - a.rotation_rad, b.time_s - a.time_s);
+      if (reading == path.size() || motion.at[reading] != i) continue;
+      ASSERT_LT((plant.tip().p_mm - path[reading]).norm(), 1e-8) << b.time_s;
+      ++reading;
+    }
+    EXPECT_EQ(reading, path.size());
+    EXPECT_EQ(plant.shaft_mm().back(), plant.tip().p_mm);
+    for (std::size_t i = 1; i < plant.shaft_mm().size(); ++i)  // no kinks where an offset begins
+      EXPECT_LT((plant.shaft_mm()[i] - plant.shaft_mm()[i - 1]).norm(), 2.6);
+  }
+}
+
+TEST(PlantWithEffects, RollErrorIsNotTakenUpByAGap) {
+  rig::KinematicPlant plant(bicycle(), {active("rotation_backlash", {0.4})}, 0.1);
+  plant.advance(50, 0, 5);
+  EXPECT_NEAR(std::atan2(plant.tip().p_mm.x(), -plant.tip().p_mm.y()), 0.1, 1e-9);
+}
+
+TEST(PlantWithEffects, CameraAlongXSeesItsOwnPicture) {
+  rig::KinematicPlant plant(agar(), {active("camera_scale", {1.05})});
+  for (int i = 0; i < 600; ++i) plant.advance(0.1, 0, 0.01);
+  const auto seen = rig::shaft_seen_along_x(plant);
+  ASSERT_EQ(seen.size(), plant.shaft_mm().size());
+  for (std::size_t i = 0; i < seen.size(); ++i)
+    EXPECT_LT((seen[i] - plant.shaft_mm()[i].cwiseProduct(Vector3d(1, 1.05, 1.05))).norm(), 1e-12);
+}
+
+TEST(RigWithEffects, FramesOfALateCameraComeLateAndAreStampedThen) {
+  nodes::SystemConfig config;
+  config.cameras.resize(1);
+  config.cameras[0].view.origin_px = {240, 40};
+  config.rig.effects = {{.name = "camera_latency", .parameters = {{"latency_s", 0.1}}}};
+  const std::string socket = (fs::temp_directory_path() / ("bevel_rig_" + std::to_string(::getpid()))).string();
+  rig::FrameServer frames(socket);
+  const auto source = camera::make_frame_source({.kind = camera::SourceKind::stream, .path = socket});
+  for (int i = 0; i < 5000 && frames.clients() < 1; ++i) std::this_thread::sleep_for(std::chrono::milliseconds(1));
+  lcm::LCM lcm("memq://");
+  can::MemoryNetwork network;
+  const auto insertion = network.attach(), rotation = network.attach();
+  nodes::RigNode rig(lcm, *insertion, *rotation, config, &frames);
+  const std::int64_t start = 1'700'000'000'000'000;
+  using namespace std::chrono_literals;
+  for (int ms = 1; ms < 101; ++ms) rig.step(ms * 1'000'000, start + ms * 1000);
+  EXPECT_TRUE(std::holds_alternative<camera::FrameTimeout>(source->next(20ms)));
+  rig.step(101 * 1'000'000, start + 101'000);
+  const auto got = source->next(5000ms);
+  ASSERT_TRUE(std::holds_alternative<camera::Frame>(got));
+  EXPECT_EQ(std::get<camera::Frame>(got).capture_utime, start + 101'000);  // taken at 1 ms
+}
+
+struct RigConfigFile : ::testing::Test {
+  fs::path folder = fs::temp_directory_path() / ("bevel_rig_config_" + std::to_string(::getpid()));
+  void SetUp() override { fs::create_directories(folder); }
+  void TearDown() override { fs::remove_all(folder); }
+  nodes::RigConfig load(const std::string& rig) const {
+    std::ofstream(folder / "rig.toml") << kNeedle << rig;
+    return nodes::load_system_config((folder / "rig.toml").string()).rig;
+  }
+  std::string fault_of(const std::string& rig) const {
+    try {
+      load(rig);
+    } catch (const io::ConfigError& error) {
+      return error.what();
+    }
+    return "";
+  }
+  static constexpr const char* kNeedle =
+      "[needle]\ncurvature_per_mm = 0.0047\nwheelbase_mm = 20.0\nlambda1_per_rad = 0.49\nlambda2 = 0.22\n";
+  static constexpr const char* kWindup = "name = \"torsional_windup\"\nlag_at_100mm_rad = 0.6\n";
+};
+
+TEST_F(RigConfigFile, TakesEffectsBesideItsNeedle) {
+  const auto rig = load(std::string("[rig]\nseed = 3\n[[rig.effect]]\n") + kWindup);
+  ASSERT_EQ(rig.effects.size(), 1U);
+  EXPECT_EQ(rig.effects[0].parameters.at("lag_at_100mm_rad"), 0.6);
+  EXPECT_EQ(rig.truth.lambda1_per_rad, 0.49);  // what the software believes, unless said
+}
+
+TEST_F(RigConfigFile, TakesAModelFileBesideIt) {
+  io::ModelFile model;
+  model.needle.curvature_per_mm = 0.0052;
+  model.effects = {{.name = "torsional_windup", .parameters = {{"lag_at_100mm_rad", 0.6}}}};
+  io::save_model_file(model, (folder / "truth.toml").string());
+  const auto rig = load("[rig]\nmodel = \"truth.toml\"\n");
+  EXPECT_EQ(rig.truth, model.needle);
+  EXPECT_EQ(rig.effects, model.effects);
+}
+
+TEST_F(RigConfigFile, MistakesAreNamed) {
+  EXPECT_THAT(fault_of("[rig]\nmodel = \"none.toml\"\n"), HasSubstr("none.toml: cannot be read"));
+  EXPECT_THAT(fault_of(std::string("[rig]\nmodel = \"m.toml\"\n[[rig.effect]]\n") + kWindup),
+              HasSubstr("rig.model: stands for needle and effect; one or the other"));
+  EXPECT_THAT(fault_of("[[rig.effect]]\nname = \"layer\"\ncurvature_ratio = 0.5\n"),
+              HasSubstr("rig.effect[0].depth_mm is missing"));
+}
+
+}  // namespace
+}  // namespace bevel::model::testing
