@@ -203,6 +203,8 @@ bool all_sealed(const CampaignOptions& options) {
 int run_campaign(const CampaignOptions& options, std::ostream& progress) {
   interrupted = 0;
   const SignalGuard guard;
+  if (!options.generate_only && !fs::is_regular_file(options.diagnose))
+    throw std::runtime_error(options.diagnose.string() + ": there is no such program (the tool under test)");
   claim_folder(options);
   std::mutex mutex;
   const auto say = [&](const std::string& line) {

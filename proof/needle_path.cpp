@@ -59,7 +59,8 @@ class Tissue {
   }
 
   Vector3d tip_mm(double time_s, int recording) const {
-    Vector3d p = tip_.p + offset_mm_.x() * tip_.e1 + offset_mm_.y() * tip_.e2();
+    Vector3d p = tip_.p;
+    p.head<2>() += (offset_mm_.x() * tip_.e1 + offset_mm_.y() * tip_.e2()).head<2>();  // tissue yields sideways
     if (physics_.motion_mm > 0.0) {
       const double phase = 2.0 * std::numbers::pi * physics_.motion_hz * time_s +
                            physics_.motion_phase_rad.at(static_cast<std::size_t>(recording));

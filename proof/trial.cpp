@@ -7,24 +7,11 @@
 #include <set>
 
 #include "proof/beam_path.hpp"
+#include "proof/distribution.hpp"
 
 namespace bevel::proof {
 namespace {
 
-// Each block of this many trials holds exactly these shares, shuffled.
-struct Share {
-  TrialClass trial_class;
-  int count;
-};
-constexpr std::array<Share, 4> kBlock{
-    {{TrialClass::nothing, 8}, {TrialClass::unlisted, 4}, {TrialClass::two, 5}, {TrialClass::one, 8}}};
-constexpr int kBlockSize = 25;
-constexpr double kPoorShare = 0.12;         // of trials, with scripts that excite little
-constexpr double kBeamShare = 0.3;          // of unlisted trials
-constexpr double kUnlistedAndListed = 0.2;  // of unlisted trials that are not the beam
-constexpr double kNaturalShare = 0.5;       // sizes as the field reports them; else scaled to a drawn visibility
-constexpr double kRipple_sigmas = 1.0;      // at most
-constexpr double kDeparture_sigmas = 3.0;   // at most
 constexpr std::uint64_t kClassStream = 1ULL << 40U;
 
 BaseNeedle draw_needle(Random& random) {
@@ -198,7 +185,8 @@ std::vector<std::string> Truth::concealed() const { return ids(*this, 0.0); }
 
 TrialClass class_of(std::uint64_t seed, int number) {
   std::vector<TrialClass> block;
-  for (const Share& share : kBlock) block.insert(block.end(), static_cast<std::size_t>(share.count), share.trial_class);
+  for (const ClassShare& share : kBlock)
+    block.insert(block.end(), static_cast<std::size_t>(share.count), share.trial_class);
   Random random = Random::stream(seed, kClassStream + static_cast<std::uint64_t>(number / kBlockSize));
   for (std::size_t i = block.size(); i-- > 1;) std::swap(block[i], block[random.index(i + 1)]);
   return block[static_cast<std::size_t>(number % kBlockSize)];

@@ -15,12 +15,38 @@ constexpr std::array<double BaseNeedle::*, 3> kFree{&BaseNeedle::curvature_per_m
                                                     &BaseNeedle::lambda2};
 constexpr std::array<double, 3> kProbe{2e-6, 2e-4, 2e-4};
 
-// Into the set where the model is defined, (26) and (24) of the paper.
-void keep_in_domain(BaseNeedle& needle) {
-  needle.lambda2 = std::clamp(needle.lambda2, -0.6, 0.6);
-  const double least = needle.lambda2 * needle.lambda2 / (2.0 * std::numbers::pi) + 1e-3;
-  needle.lambda1_per_rad = std::clamp(needle.lambda1_per_rad, least, 2.5);
-  needle.curvature_per_mm = std::clamp(needle.curvature_per_mm, 1e-4, 0.03);
+// The box in which the refit moves: k, lambda1 above the least that (26) of the paper allows, lambda2.
+using Point = Eigen::Vector3d;
+const Point kLowest(1e-4, 0.0, -0.6);
+const Point kHighest(0.03, 2.5, 0.6);
+
+double least_lambda1(double lambda2) { return lambda2 * lambda2 / (2.0 * std::numbers::pi) + 1e-3; }
+
+Point point_of(const BaseNeedle& needle) {
+  const Point p(needle.curvature_per_mm, needle.lambda1_per_rad - least_lambda1(needle.lambda2), needle.lambda2);
+  return p.cwiseMax(kLowest).cwiseMin(kHighest);
+}
+
+BaseNeedle needle_at(const Point& p, const BaseNeedle& like) {
+  BaseNeedle needle = like;
+  needle.curvature_per_mm = p(0);
+  needle.lambda1_per_rad = least_lambda1(p(2)) + p(1);
+  needle.lambda2 = p(2);
+  return needle;
+}
+
+// The damped step; what stands at a bound and wants beyond stays there.
+Point step_from(const Point& p, Eigen::Matrix3d normal, Point gradient, double damping) {
+  normal.diagonal() *= 1.0 + damping;
+  for (Eigen::Index j = 0; j < 3; ++j) {
+    const bool stays = (p(j) <= kLowest(j) && gradient(j) > 0) || (p(j) >= kHighest(j) && gradient(j) < 0);
+    if (!stays) continue;
+    normal.row(j).setZero();
+    normal.col(j).setZero();
+    normal(j, j) = 1.0;
+    gradient(j) = 0.0;
+  }
+  return (p - normal.ldlt().solve(gradient)).cwiseMax(kLowest).cwiseMin(kHighest);
 }
 
 std::optional<Eigen::VectorXd> misfit(const Setting& setting, const Views& seen, const BaseNeedle& needle,
@@ -57,47 +83,42 @@ Eigen::VectorXd whitened_difference(const Setting& setting, const Views& a, cons
 }
 
 Refit refit_base(const Setting& setting, const Views& seen, const BaseNeedle& start, const HiddenPhysics& known) {
-  Refit fit{start, 0, false};
-  keep_in_domain(fit.needle);
-  auto residual = misfit(setting, seen, fit.needle, known);
+  Point point = point_of(start);
+  const auto misfit_at = [&](const Point& p) { return misfit(setting, seen, needle_at(p, start), known); };
+  auto residual = misfit_at(point);
   if (!residual) throw std::domain_error("the refit starts outside the model's domain");
+  bool converged = false;
   double damping = 1e-6;
-  for (int iteration = 0; iteration < 25; ++iteration) {
+  for (int iteration = 0; iteration < 40 && !converged; ++iteration) {
     Eigen::MatrixXd jacobian(residual->size(), 3);
-    for (std::size_t j = 0; j < kFree.size(); ++j) {
-      BaseNeedle moved = fit.needle;
-      moved.*kFree[j] += kProbe[j];
-      const auto there = misfit(setting, seen, moved, known);
-      if (!there) return fit;
-      jacobian.col(static_cast<Eigen::Index>(j)) = (*there - *residual) / kProbe[j];
+    for (Eigen::Index j = 0; j < 3; ++j) {
+      Point moved = point;
+      const double probe = kProbe[static_cast<std::size_t>(j)] * (point(j) >= kHighest(j) ? -1.0 : 1.0);
+      moved(j) += probe;
+      const auto there = misfit_at(moved);
+      if (!there) return {needle_at(point, start), residual->norm(), false};
+      jacobian.col(j) = (*there - *residual) / probe;
     }
     const Eigen::Matrix3d normal = jacobian.transpose() * jacobian;
-    const Eigen::Vector3d gradient = jacobian.transpose() * *residual;
-    const double now = residual->squaredNorm();
+    const Point gradient = jacobian.transpose() * *residual;
+    const double before = residual->squaredNorm();
     bool better = false;
-    for (int attempt = 0; attempt < 8 && !better; ++attempt, damping *= 10) {
-      Eigen::Matrix3d damped = normal;
-      damped.diagonal() *= 1.0 + damping;
-      const Eigen::Vector3d step = damped.ldlt().solve(gradient);
-      BaseNeedle moved = fit.needle;
-      for (std::size_t j = 0; j < kFree.size(); ++j) moved.*kFree[j] -= step(static_cast<Eigen::Index>(j));
-      keep_in_domain(moved);
-      const auto there = misfit(setting, seen, moved, known);
-      if (!there || there->squaredNorm() >= now) continue;
-      better = true;
-      fit.needle = moved;
-      residual = there;
+    for (int attempt = 0; attempt < 12 && !better; ++attempt) {
+      const Point moved = step_from(point, normal, gradient, damping);
+      const auto there = misfit_at(moved);
+      better = there && there->squaredNorm() < before;
+      if (better) {
+        point = moved;
+        residual = there;
+      } else {
+        damping *= 10.0;
+      }
     }
-    damping = std::max(damping * 1e-2, 1e-9);
-    fit.sigmas = residual->norm();
-    // A hundredth of a unit of chi-square is nothing to anybody.
-    if (!better || now - residual->squaredNorm() < 1e-2) {
-      fit.converged = true;
-      break;
-    }
+    // A hundredth of a unit of chi-square is nothing to anybody; of a step held short it says nothing.
+    converged = !better || (before - residual->squaredNorm() < 1e-2 && damping < 1e-2);
+    damping = std::max(damping * 0.03, 1e-9);
   }
-  fit.sigmas = residual->norm();
-  return fit;
+  return {needle_at(point, start), residual->norm(), converged};
 }
 
 BaseTangent::BaseTangent(const Setting& setting, const BaseNeedle& needle, const HiddenPhysics& physics) {

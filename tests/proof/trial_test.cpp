@@ -1,0 +1,128 @@
+// What is drawn, and what of it gets onto the disk.
+#include "proof/trial.hpp"
+
+#include <gmock/gmock.h>
+
+#include <map>
+#include <nlohmann/json.hpp>
+
+#include "io/model_file.hpp"
+#include "io/recording.hpp"
+#include "proof/score.hpp"
+#include "proof/trial_files.hpp"
+#include "tests/proof/temporary_folder.hpp"
+
+namespace bevel::proof {
+namespace {
+
+// First trial of the class, of seed 4.
+int first_of(TrialClass wanted) {
+  int number = 0;
+  while (class_of(4, number) != wanted) ++number;
+  return number;
+}
+
+TEST(Trial, EveryBlockHoldsThePublishedShares) {
+  for (const std::uint64_t seed : {1U, 2U, 77U}) {
+    std::map<TrialClass, int> count;
+    for (int i = 0; i < 100; ++i) ++count[class_of(seed, i)];
+    EXPECT_GE(count[TrialClass::nothing], 30);
+    EXPECT_GE(count[TrialClass::unlisted], 15);
+    EXPECT_EQ(count[TrialClass::two], 20);
+    EXPECT_EQ(count[TrialClass::one], 100 - 20 - count[TrialClass::nothing] - count[TrialClass::unlisted]);
+  }
+}
+
+TEST(Trial, IsTheSameForItsSeedAndNumber) {
+  const int number = first_of(TrialClass::one);
+  const Trial a = draw_trial(4, number);
+  const Trial b = draw_trial(4, number);
+  EXPECT_EQ(truth_json(a.truth), truth_json(b.truth));
+  EXPECT_EQ(a.recordings[5].reported_mm, b.recordings[5].reported_mm);
+  EXPECT_NE(truth_json(a.truth), truth_json(draw_trial(5, number).truth));
+}
+
+TEST(Trial, StatesWhatItConceals) {
+  const Trial null = draw_trial(4, first_of(TrialClass::nothing));
+  EXPECT_TRUE(null.truth.expected().empty());
+  EXPECT_EQ(null.truth.visible_sigmas, 0.0);
+  EXPECT_LE(null.truth.ripple_sigmas, 1.0 + 1e-9);
+
+  const Trial two = draw_trial(4, first_of(TrialClass::two));
+  ASSERT_EQ(two.truth.entries.size(), 2U);
+  EXPECT_NE(two.truth.entries[0].effect.name, two.truth.entries[1].effect.name);
+  EXPECT_LE(two.truth.departure_sigmas, 3.0);
+
+  const OpenedTruth opened = parse_truth(truth_json(two.truth));
+  EXPECT_EQ(opened.expected, two.truth.expected());
+  ASSERT_EQ(opened.effects.size(), 2U);
+  EXPECT_EQ(opened.effects[0].visible_sigmas, two.truth.entries[0].visible_sigmas);
+}
+
+TEST(Trial, AnEffectBelowTheLimitIsNotExpected) {
+  Truth truth;
+  truth.entries = {{{"layer", "", {}, {}}, 4.9}, {{"unknown", "screw", {}, {}}, 5.1}};
+  EXPECT_THAT(truth.expected(), testing::ElementsAre("unknown"));
+  EXPECT_THAT(truth.concealed(), testing::ElementsAre("layer", "unknown"));
+}
+
+TEST(Trial, TheLabsModelFileIsWrongButValidAndLogsAreWhole) {
+  const TemporaryFolder out;
+  const Trial trial = draw_trial(4, first_of(TrialClass::nothing));
+  write_trial(out.path(), trial);
+  const TrialFolders folders(out.path(), trial.truth.trial);
+
+  const io::ModelFile model = io::load_model_file((folders.given / "model.toml").string());
+  EXPECT_TRUE(model.effects.empty());
+  EXPECT_NE(model.needle.curvature_per_mm, trial.truth.needle.curvature_per_mm);
+  EXPECT_NEAR(model.needle.curvature_per_mm, trial.truth.needle.curvature_per_mm,
+              0.11 * trial.truth.needle.curvature_per_mm);
+  EXPECT_NEAR(model.needle.wheelbase_mm, trial.truth.needle.wheelbase_mm, 1e-3);
+
+  for (std::size_t i = 0; i < trial.recordings.size(); ++i) {
+    const auto recording = io::read_recording((folders.given / ("rec0" + std::to_string(i + 1) + ".lcm")).string());
+    EXPECT_TRUE(recording.intact()) << recording.describe_faults();
+    const double duration_s = trial.recordings[i].motion.duration_s();
+    EXPECT_EQ(recording.tips.size(), trial.recordings[i].frames.size());
+    EXPECT_NEAR(static_cast<double>(recording.tips.size()) / duration_s, 30, 3);
+    EXPECT_NEAR(static_cast<double>(recording.actuators.size()) / duration_s, 50, 1);
+    EXPECT_GT(recording.commands.size(), 10U);
+    EXPECT_NEAR(recording.tips.front().position_mm.norm(), 0, 8.0);  // at the origin, but for noise or a wild value
+    EXPECT_TRUE(recording.config.empty());
+  }
+}
+
+TEST(Trial, NothingTheToolSeesHoldsTheTruth) {
+  const TemporaryFolder out;
+  const int number = first_of(TrialClass::one);
+  const Trial trial = draw_trial(4, number);
+  write_trial(out.path(), trial);
+  const TrialFolders folders(out.path(), number);
+  const std::string& name = trial.truth.entries[0].effect.name;
+  for (const auto& entry : fs::directory_iterator(folders.given))
+    EXPECT_EQ(read_text(entry.path()).find(name), std::string::npos) << entry.path();
+  EXPECT_EQ(read_text(folders.commitment).find(name), std::string::npos);
+  EXPECT_NE(open_truth(folders).find(name), std::string::npos);  // the search would find it
+}
+
+TEST(Trial, ATruthThatWasChangedDoesNotOpen) {
+  const TemporaryFolder out;
+  write_trial(out.path(), draw_trial(4, first_of(TrialClass::nothing)));
+  const TrialFolders folders(out.path(), first_of(TrialClass::nothing));
+  EXPECT_NO_THROW(open_truth(folders));
+  nlohmann::json sealed = nlohmann::json::parse(read_text(folders.truth));
+  std::string truth = sealed["truth"];
+  truth.back() = ' ';
+  sealed["truth"] = truth;
+  write_atomically(folders.truth, sealed.dump());
+  EXPECT_THAT([&] { open_truth(folders); },
+              testing::ThrowsMessage<std::runtime_error>(testing::HasSubstr("commits to")));
+}
+
+TEST(Trial, TheDistributionIsDescribedInFull) {
+  const std::string text = describe_distribution();
+  for (const EffectKind& kind : catalogue()) EXPECT_THAT(text, testing::HasSubstr(kind.name));
+}
+
+}  // namespace
+}  // namespace bevel::proof

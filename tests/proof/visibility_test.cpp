@@ -1,0 +1,114 @@
+// Visible size, where it is known in closed form.
+#include "proof/visibility.hpp"
+
+#include <gmock/gmock.h>
+
+#include <cmath>
+
+namespace bevel::proof {
+namespace {
+
+Setting straight_setting(const CameraNoise& noise) {
+  Random random(21);
+  Setting setting;
+  for (int i = 0; i < 3; ++i) {
+    setting.motions.push_back(follow({"plain", {{4.0 + i, 10, 0}, {0.5, 0, 0}}}));
+    setting.frames.push_back(draw_frames(noise, setting.motions.back().duration_s(), random));
+    setting.whiteners.emplace_back(noise, setting.frames.back());
+  }
+  return setting;
+}
+
+Views shifted(Views views, const Eigen::Vector3d& by_mm) {
+  for (auto& v : views) v.colwise() += by_mm;
+  return views;
+}
+
+TEST(Visibility, AConstantShiftInWhiteAndInColouredNoise) {
+  for (const double rho : {0.0, 0.6, 0.9}) {
+    CameraNoise noise;
+    noise.sigma_mm = 0.2;
+    noise.ar1 = rho;
+    const Setting setting = straight_setting(noise);
+    const Views bare = views_of(setting, {}, {});
+    // A shift d in AR(1) noise: (d / sigma)^2 (1 + (n - 1) (1 - rho)^2 / (1 - rho^2)) of each recording.
+    double squares = 0;
+    for (const Frames& frames : setting.frames)
+      squares += std::pow(0.1 / 0.2, 2) *
+                 (1 + (static_cast<double>(frames.size()) - 1) * (1 - rho) * (1 - rho) / (1 - rho * rho));
+    const Eigen::VectorXd difference = whitened_difference(setting, shifted(bare, {0.1, 0, 0}), bare);
+    EXPECT_NEAR(difference.norm(), std::sqrt(squares), 1e-6 * std::sqrt(squares)) << rho;
+    // The needle moves in the y-z plane here: nothing of a shift along x is absorbed.
+    EXPECT_NEAR(BaseTangent(setting, {}, {}).norm_beyond(difference), difference.norm(), 1e-6 * difference.norm());
+    EXPECT_NEAR(refit_base(setting, shifted(bare, {0.1, 0, 0}), {}, {}).sigmas, difference.norm(), 1e-3);
+  }
+}
+
+TEST(Visibility, TheBaseParametersAbsorbThemselves) {
+  CameraNoise noise;
+  noise.ar1 = 0.6;
+  const Setting setting = straight_setting(noise);
+  const BaseNeedle start{0.0047, 22, 0.3, 0.1};
+  const BaseNeedle other{0.0056, 22, 0.42, 0.05};
+  const Views seen = views_of(setting, other, {});
+  EXPECT_GT(whitened_difference(setting, seen, views_of(setting, start, {})).norm(), 10);
+  const Refit refit = refit_base(setting, seen, start, {});
+  EXPECT_TRUE(refit.converged);
+  EXPECT_LT(refit.sigmas, 0.2);
+  EXPECT_NEAR(refit.needle.curvature_per_mm, other.curvature_per_mm, 3e-4);
+  EXPECT_EQ(refit.needle.wheelbase_mm, start.wheelbase_mm);
+}
+
+// Without rotation, a rotation backlash cannot show, and a change of curvature with depth is largely absorbed.
+TEST(Visibility, DependsOnWhatTheRecordingsExcite) {
+  const Setting setting = straight_setting({});
+  const BaseNeedle needle;
+  HiddenPhysics backlash;
+  backlash.rotation_backlash_rad = 0.5;
+  EXPECT_LT(refit_base(setting, views_of(setting, needle, backlash), needle, {}).sigmas, 1e-6);
+  HiddenPhysics depth;
+  depth.curvature_per_100mm = 0.4;
+  const Views seen = views_of(setting, needle, depth);
+  const double all = whitened_difference(setting, seen, views_of(setting, needle, {})).norm();
+  EXPECT_LT(refit_base(setting, seen, needle, {}).sigmas, 0.1 * all);
+}
+
+// The linear figure, by which sizes are chosen, and the nonlinear one, which the truth states, agree for small effects.
+TEST(Visibility, LinearAndNonlinearAgreeForSmallEffects) {
+  const Setting setting = straight_setting({});
+  const BaseNeedle needle;
+  HiddenPhysics entry;
+  entry.entry_about_x_rad = 0.0005;
+  const Views seen = views_of(setting, needle, entry);
+  const double linear =
+      BaseTangent(setting, needle, {}).norm_beyond(whitened_difference(setting, seen, views_of(setting, needle, {})));
+  const double nonlinear = refit_base(setting, seen, needle, {}).sigmas;
+  EXPECT_GT(nonlinear, 0.1);
+  EXPECT_NEAR(nonlinear, linear, 0.15 * linear);
+}
+
+// At the edge of the model's domain (lambda1 above lambda2^2 / (2 pi)) the refit moves along it rather than stopping.
+TEST(Visibility, TheRefitFollowsTheEdgeOfTheDomain) {
+  const Setting setting = straight_setting({});
+  const BaseNeedle needle;
+  HiddenPhysics entry;
+  entry.entry_about_x_rad = 0.004;
+  const Views seen = views_of(setting, needle, entry);
+  const Refit refit = refit_base(setting, seen, needle, {});
+  EXPECT_TRUE(refit.converged);
+  EXPECT_LT(refit.needle.lambda1_per_rad, 0.02);  // it is at the edge here
+  for (const double change : {-0.02, 0.02}) {
+    BaseNeedle near = refit.needle;
+    near.lambda2 += change;
+    near.lambda1_per_rad = near.lambda2 * near.lambda2 / 6.28318 + 1e-3;
+    double best = 1e300;
+    for (double k = 0.92; k < 1.08; k += 0.004) {
+      near.curvature_per_mm = k * refit.needle.curvature_per_mm;
+      best = std::min(best, whitened_difference(setting, seen, views_of(setting, near, {})).norm());
+    }
+    EXPECT_GT(best, refit.sigmas - 0.01) << change;
+  }
+}
+
+}  // namespace
+}  // namespace bevel::proof
