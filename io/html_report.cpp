@@ -27,6 +27,11 @@ pre { background: #f6f6f6; padding: .8rem 1rem; overflow-x: auto; font-size: .85
 .callout { border-left: 5px solid #777; background: #f6f6f6; padding: .7rem 1rem; margin: 1rem 0; }
 .callout strong { display: block; } .callout.good { border-color: #2a8c6b; background: #eef7f3; }
 .callout.warning { border-color: #b8912a; background: #fbf6e8; } .callout.bad { border-color: #b23a2e; background: #fbeeec; }
+.facts { display: flex; flex-wrap: wrap; gap: .7rem; margin: 1.1rem 0; }
+.facts div { flex: 1 1 8rem; border: 1px solid var(--line); border-radius: 6px; padding: .55rem .8rem; }
+.facts span { display: block; color: var(--soft); font-size: .82rem; line-height: 1.35; }
+.facts b { display: block; font-size: 1.25rem; font-weight: 600; line-height: 1.4; }
+details { margin: .8rem 0; } summary { cursor: pointer; color: #1f5f99; }
 @media print { body { margin: 0; max-width: none; } figure, table { break-inside: avoid; } }
 )";
 
@@ -118,6 +123,22 @@ HtmlReport& HtmlReport::code(std::string_view text) {
 HtmlReport& HtmlReport::callout(Tone tone, std::string_view headline, std::string_view text) {
   body_ += std::string("<div class=\"callout") + class_of(tone) + "\"><strong>" + escape_html(headline) + "</strong>" +
            escape_html(text) + "</div>\n";
+  return *this;
+}
+
+HtmlReport& HtmlReport::facts(const std::vector<Fact>& facts) {
+  body_ += "<div class=\"facts\">\n";
+  for (const auto& fact : facts)
+    body_ += "<div><span>" + escape_html(fact.label) + "</span><b>" + escape_html(fact.value) + "</b><span>" +
+             escape_html(fact.note) + "</span></div>\n";
+  body_ += "</div>\n";
+  return *this;
+}
+
+HtmlReport& HtmlReport::folded(std::string_view line, const std::function<void(HtmlReport&)>& fill) {
+  body_ += "<details><summary>" + escape_html(line) + "</summary>\n";
+  fill(*this);
+  body_ += "</details>\n";
   return *this;
 }
 

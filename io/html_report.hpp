@@ -1,6 +1,7 @@
 // One self-contained page: text, tables and plots, no network, no script. All text given is escaped here.
 #pragma once
 
+#include <functional>
 #include <string>
 #include <string_view>
 #include <vector>
@@ -10,6 +11,11 @@
 namespace bevel::io {
 
 enum class Tone { plain, good, warning, bad };
+
+// One figure that matters, large, between what it is and a remark on it.
+struct Fact {
+  std::string label, value, note;
+};
 
 class HtmlReport {
  public:
@@ -21,6 +27,9 @@ class HtmlReport {
   HtmlReport& list(const std::vector<std::string>& items);
   HtmlReport& code(std::string_view text);                                           // kept as it is, line by line
   HtmlReport& callout(Tone tone, std::string_view headline, std::string_view text);  // the verdict, at a glance
+  HtmlReport& facts(const std::vector<Fact>& facts);  // side by side
+  // What `fill` adds stands behind a line that unfolds it.
+  HtmlReport& folded(std::string_view line, const std::function<void(HtmlReport&)>& fill);
   // A column whose cells are all numbers is set flush right. Throws std::invalid_argument on a row of another length.
   HtmlReport& table(const std::vector<std::string>& header, const std::vector<std::vector<std::string>>& rows,
                     std::string_view caption = "");

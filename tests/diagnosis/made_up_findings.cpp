@@ -1,0 +1,224 @@
+#include "tests/diagnosis/made_up_findings.hpp"
+
+#include <cmath>
+#include <limits>
+#include <random>
+
+#include "diagnosis/mismatch/recorded_case.hpp"
+#include "tests/effects/script.hpp"
+
+namespace bevel::diagnosis::testing {
+namespace {
+
+using model::testing::active;
+using model::testing::path_of;
+using model::testing::Script;
+
+constexpr double kNone = std::numeric_limits<double>::quiet_NaN();
+constexpr double kSigma_mm = 0.15;
+
+Script script_of(int recording) {
+  const double turn = 2.0 + 0.4 * recording;
+  return {{1.0, 10, 0.4}, {0.4, 10, turn}, {1.6, 8, 0},  {0.6, 0, -turn},     {2.0, 12, 0}, {0.3, 6, turn},
+          {0.9, 6, 0},    {1.5, 0, 0},     {1.2, 10, 0}, {0.5, 9, -2 * turn}, {1.6, 10, 0}, {0.5, -10, 0}};
+}
+
+Trace trace_of(int recording, const model::NeedleParameters& needle, const std::vector<model::ActiveEffect>& effects,
+               bool explained, std::mt19937_64& random) {
+  const model::Motion motion = script_of(recording).recorded();
+  Trace trace;
+  trace.log = "rec0" + std::to_string(recording + 1) + ".lcm";
+  const auto covariates = find_covariates(motion);
+  for (const std::size_t i : motion.at) {
+    trace.covariates.push_back(covariates[i]);
+    trace.time_s.push_back(covariates[i].time_s);
+  }
+  const auto truth = path_of(needle, effects, motion);
+  trace.before_mm = path_of(needle, {}, motion);
+  trace.after_mm = explained ? truth : trace.before_mm;
+  auto given = needle;
+  given.curvature_per_mm *= 0.8;
+  trace.model_file_mm = path_of(given, {}, motion);
+  trace.white_before.assign(3, {});
+  trace.white_after.assign(3, {});
+  std::normal_distribution<double> normal;
+  Eigen::Vector3d error = Eigen::Vector3d::Zero();
+  for (std::size_t i = 0; i < truth.size(); ++i) {
+    error = 0.6 * error + 0.8 * kSigma_mm * Eigen::Vector3d(normal(random), normal(random), normal(random));
+    const bool outlier = random() % 60 == 0;
+    trace.measured_mm.push_back(truth[i] + (outlier ? 20.0 : 1.0) * error);
+    trace.outlier.push_back(outlier ? 1 : 0);
+    for (int c = 0; c < 3; ++c) {
+      const auto channel = static_cast<std::size_t>(c);
+      const bool missing = i % 50 == 7;
+      trace.white_before[channel].push_back(missing ? kNone
+                                                    : (trace.measured_mm[i][c] - trace.before_mm[i][c]) / kSigma_mm);
+      trace.white_after[channel].push_back(missing ? kNone
+                                                   : (trace.measured_mm[i][c] - trace.after_mm[i][c]) / kSigma_mm);
+    }
+  }
+  return trace;
+}
+
+std::vector<model::ActiveEffect> truth_of(Verdict verdict) {
+  if (verdict == Verdict::nothing_missing) return {};
+  if (verdict == Verdict::effects_found)
+    return {active("torsional_windup", {0.82}), active("lost_steps", {1.39, 0, 3.3})};
+  return {active("torsional_windup", {0.82}), active("lateral_bias", {0.0009, -0.0006})};
+}
+
+FoundEffect windup() {
+  FoundEffect effect;
+  effect.name = "torsional_windup";
+  effect.meaning = "friction on the inserted shaft holds its tip back when the base turns";
+  effect.probability = 0.971;
+  effect.ambiguous_with = {"rotation_backlash"};
+  effect.parameters = {{"lag_at_100mm_rad", 0.8234, 0.031, {0.763, 0.889}, false}};
+  effect.gain = 312;
+  effect.threshold = 14.2;
+  effect.visible_sigmas = 17;
+  return effect;
+}
+
+FoundEffect lost_steps() {
+  FoundEffect effect;
+  effect.name = "lost_steps";
+  effect.meaning = "the motor lost steps that its encoder did not see";
+  effect.probability = 0.99994;
+  effect.parameters = {{"rotation_rad", 1.394, 0.022, {1.351, 1.437}, false}};
+  effect.recordings = {{"rec03.lcm", {{"at_s", 3.309, 0.02, {3.27, 3.35}, false}}},
+                       {"rec04.lcm", {{"at_s", 2.411, 0.03, {2.36, 2.47}, false}}}};
+  effect.gain = 2204;
+  effect.threshold = 17;
+  effect.visible_sigmas = 47;
+  return effect;
+}
+
+void add_ranking(Findings& findings) {
+  double gain = findings.verdict == Verdict::nothing_missing ? 11.2 : 4312.7;
+  for (const model::Effect* effect : model::all_effects()) {
+    TriedEffect tried;
+    tried.name = effect->name();
+    tried.gain = gain;
+    tried.chance = 1.7;
+    tried.threshold = 14.3;
+    for (const auto& p : effect->parameters()) tried.parameters.emplace_back(p.name, 0.5 * (p.lower + p.upper));
+    tried.evidence = gain - tried.chance;
+    tried.passes = gain > 27;
+    findings.tried.push_back(tried);
+    tried.beside = "torsional_windup + lost_steps";
+    tried.gain = std::min(gain, 9.0);
+    tried.passes = false;
+    if (!findings.effects.empty()) findings.beside.push_back(tried);
+    gain = 0.62 * gain - 0.1;
+  }
+}
+
+void add_reach(Findings& findings) {
+  const auto& all = model::all_effects();
+  findings.confusion =
+      Eigen::MatrixXd::Identity(static_cast<Eigen::Index>(all.size()), static_cast<Eigen::Index>(all.size()));
+  for (std::size_t i = 0; i < all.size(); ++i) {
+    findings.confusion_names.emplace_back(all[i]->name());
+    for (std::size_t k = 0; k < i; ++k) {
+      const double cosine = std::abs(std::sin(1.7 * static_cast<double>(i * k + i)));
+      const auto row = static_cast<Eigen::Index>(i);
+      const auto column = static_cast<Eigen::Index>(k);
+      findings.confusion(row, column) = findings.confusion(column, row) = k == 3 ? kNone : cosine;
+    }
+    for (const auto& p : all[i]->parameters()) {
+      if (p.scope == model::Scope::recording || std::isnan(p.none)) continue;
+      DetectableSize size;
+      size.effect = all[i]->name();
+      size.parameter = p.name;
+      size.typical = p.starts.empty() ? 1 : p.starts.front();
+      size.size = i % 7 == 3 ? std::numeric_limits<double>::infinity() : std::abs(size.typical) * 0.137;
+      size.absorbed = i % 7 == 3 ? 1 : 0.04 * static_cast<double>(i);
+      if (i % 7 == 3) size.experiment = "insert 60 mm at 5 mm/s, hold 20 s, insert 40 mm at 20 mm/s";
+      findings.detectable.push_back(size);
+    }
+  }
+}
+
+}  // namespace
+
+Findings made_up(Verdict verdict) {
+  Findings f;
+  f.verdict = verdict;
+  std::mt19937_64 random(7);
+  const auto needle = model::testing::agar();
+  f.model_file = f.base.value = f.needle.value = needle;
+  f.model_file.curvature_per_mm *= 0.8;
+  for (NeedleEstimate* n : {&f.base, &f.needle}) {
+    n->curvature_sd_per_mm = 0.000021;
+    n->lambda1_sd_per_rad = 0.013;
+    n->lambda2_sd = 0.008;
+  }
+  f.channels = {"tip.x", "tip.y", "tip.z"};
+  f.noise = {{0.151, 0.149, 0.26}, 0.6, 0.0167, 1.0 / 30};
+  const auto truth = truth_of(verdict);
+  const bool explained = verdict == Verdict::effects_found;
+  for (int i = 0; i < 8; ++i) {
+    f.traces.push_back(trace_of(i, needle, truth, explained, random));
+    f.readings += f.traces.back().time_s.size();
+    const double before = verdict == Verdict::nothing_missing ? 0.2 : 0.7 + 0.21 * i;
+    const double after = explained ? 0.2 + 0.01 * i : before * 0.8;
+    f.held_out.recordings.push_back(
+        {f.traces.back().log, {before, 3 * before, before * before / 0.04}, {after, 3 * after, after * after / 0.04}});
+  }
+  f.outliers = 41;
+  f.held_out.before = {1.21, 3.42, 15.2};
+  f.held_out.after = {0.264, 0.91, 1.012};
+  f.held_out.gain = 5321;
+  f.checks = {1.004, {0.965, 1.036}, 0.41, 0.7, 0.003, true};
+  f.sentence =
+      "The tip lags behind the base when it turns, by more the deeper the needle, and rotation steps were lost.";
+  f.effects = {windup(), lost_steps()};
+  f.where = {{"rec03.lcm", "tip.y", 3.1, 5.0, "depth_mm", {30, 52}, 0.42},
+             {"rec07.lcm", "tip.x", 7.1, 8.3, "since_reversal_mm", {2, 9}, 0.13},
+             {"rec05.lcm", "tip.y", 9.0, 10.4, "depth_mm", {52, 60}, 0.08}};
+  f.next_experiment = {"insert 10 mm at 10 mm/s\nthen 6 times: turn +2 rad, -2 rad; insert 10 mm",
+                       {"torsional_windup", "rotation_backlash"},
+                       38.4};
+  if (verdict == Verdict::nothing_missing) {
+    f.sentence = "These recordings show no missing physics.";
+    f.effects.clear();
+    f.where.clear();
+    f.next_experiment.reset();
+    f.held_out.before = f.held_out.after = {0.249, 0.88, 1.008};
+  }
+  if (verdict == Verdict::unknown_effect) {
+    f.sentence = "Something is missing that no listed effect explains: the curvature depends on time.";
+    f.effects.pop_back();
+    f.held_out.after = {0.82, 2.71, 9.4};
+    f.checks = {7.4, {0.965, 1.036}, 1e-14, 214, 0.61, false};
+    f.corrections = {{"curvature toward the bevel",
+                      "1/mm",
+                      "time_s",
+                      {0, 2, 4, 6, 8, 10, 12},
+                      {0, 1e-4, 3e-4, 4e-4, 6e-4, 8e-4, 9e-4},
+                      {4e-5, 3e-5, 3e-5, 3e-5, 4e-5, 6e-5, 9e-5},
+                      2310,
+                      31},
+                     {"drift along x",
+                      "mm/s",
+                      "since_stop_s",
+                      {0, 1, 2, 4},
+                      {0.1, 0.05, -0.02, -0.04},
+                      {0.02, 0.02, 0.03, kNone},
+                      96,
+                      31},
+                     {"tip advance", "mm/mm", "depth_mm", {0, 30, 60}, {0.0, 0.01, 0.03}, {0.01, 0.01, 0.01}, 41, 31}};
+  }
+  add_ranking(f);
+  add_reach(f);
+  f.remarks = {"rec05.lcm: damaged (log: 1 region, 120 bytes skipped); what is left of it was used.",
+               "camera_rotation and entry_angle leave the same mark in these recordings."};
+  f.bootstrap_draws = 400;
+  f.seed = 1;
+  f.times = {
+      {"reading the logs", 0.05}, {"noise", 1.31}, {"effects alone", 4.2}, {"bootstrap", 8.7}, {"selection", 12.9}};
+  return f;
+}
+
+}  // namespace bevel::diagnosis::testing

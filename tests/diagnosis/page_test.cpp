@@ -1,0 +1,72 @@
+// The page and the files from findings of each verdict. That the page looks right is for eyes; here: complete,
+// self-contained, no figure that is none.
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <filesystem>
+#include <fstream>
+#include <regex>
+
+#include "tests/diagnosis/made_up_findings.hpp"
+#include "tools/diagnose/report.hpp"
+
+namespace bevel::diagnose {
+namespace {
+
+using diagnosis::Verdict;
+using diagnosis::testing::made_up;
+using ::testing::HasSubstr;
+using ::testing::Not;
+
+std::string page_of(Verdict verdict, const std::string& name) {
+  const std::string html = report_html(made_up(verdict), "rig/model.toml");
+  std::ofstream(std::filesystem::path(BEVEL_BINARY_DIR) / name) << html;
+  return html;
+}
+
+void expect_sound(const std::string& html) {
+  EXPECT_FALSE(std::regex_search(html, std::regex("(src|href)=[\"'](https?:)?//|url\\(http|@import|<script")));
+  EXPECT_FALSE(std::regex_search(html, std::regex("[\" >M]-?(nan|inf)[\" <,]")));
+  EXPECT_LT(html.size(), 1'500'000U);
+  for (const char* heading : {"What to do", "Parameters", "before and after", "Paths", "Every effect", "foretold",
+                              "could have shown", "next experiment", "Noise and checks", "How this was made"})
+    EXPECT_THAT(html, HasSubstr(heading));
+}
+
+TEST(Page, effects_found_names_them_with_sizes_and_rivals) {
+  const std::string html = page_of(Verdict::effects_found, "page-effects-found.html");
+  expect_sound(html);
+  EXPECT_THAT(html, HasSubstr("torsional_windup: lag at 100mm 0.823 ± 0.031 rad"));
+  EXPECT_THAT(html, HasSubstr("or rotation_backlash"));
+  EXPECT_THAT(html, HasSubstr("1.21 → 0.264 mm"));
+  EXPECT_THAT(html, HasSubstr("at (s), rec03.lcm"));
+  EXPECT_THAT(html, Not(HasSubstr("The unknown part")));
+}
+
+TEST(Page, nothing_missing_points_to_what_would_have_been_seen) {
+  const std::string html = page_of(Verdict::nothing_missing, "page-nothing-missing.html");
+  expect_sound(html);
+  EXPECT_THAT(html, HasSubstr("cannot be shown by these recordings"));
+  EXPECT_THAT(html, HasSubstr("Nothing above the sizes listed"));
+  EXPECT_THAT(html, Not(HasSubstr("Where it goes wrong</h2>")));
+}
+
+TEST(Page, unknown_effect_shows_curves_and_no_name) {
+  const std::string html = page_of(Verdict::unknown_effect, "page-unknown-effect.html");
+  expect_sound(html);
+  EXPECT_THAT(html, HasSubstr("curvature toward the bevel"));
+  EXPECT_THAT(html, HasSubstr("The unknown part, described"));
+}
+
+// Figures that the diagnosis may leave empty.
+TEST(Page, holds_when_findings_are_bare) {
+  diagnosis::Findings bare;
+  bare.sentence = "Nothing <b>at all</b>.";
+  bare.held_out.before.rmse_mm = std::nan("");
+  const std::string html = report_html(bare, "model.toml");
+  EXPECT_THAT(html, HasSubstr("Nothing &lt;b&gt;at all"));
+  EXPECT_FALSE(std::regex_search(html, std::regex("[\" >M]-?(nan|inf)[\" <,]")));
+}
+
+}  // namespace
+}  // namespace bevel::diagnose

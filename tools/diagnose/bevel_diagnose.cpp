@@ -1,0 +1,25 @@
+// bevel-diagnose: what physics the model in use leaves out, from recordings.
+#include <algorithm>
+#include <iostream>
+#include <limits>
+#include <thread>
+
+#include "tools/common/command_line.hpp"
+#include "tools/diagnose/diagnose_tool.hpp"
+#include "tools/diagnose/result_files.hpp"
+
+int main(int argc, char** argv) {
+  bevel::diagnose::Options o;
+  o.threads = std::clamp(static_cast<int>(std::thread::hardware_concurrency()), 1, 64);
+  bevel::tools::CommandLine command_line(
+      "bevel-diagnose", "Where the model in use goes wrong, what physics it leaves out, and the model with it.");
+  command_line.arguments("LOG", o.logs, "logs of one rig, at least two")
+      .option("-m,--model", o.model_path, "the model in use (TOML, [needle] alone)", true)
+      .option("-o,--out", o.out_folder, "folder for verdict.json, report.html and model.toml", true)
+      .option("--seed", o.seed, "of the bootstrap; the same seed gives the same verdict", 0,
+              std::numeric_limits<int>::max())
+      .option("--threads", o.threads, "at work at once; the verdict does not depend on it", 1, 64)
+      .flag("-q,--quiet", o.quiet, "no progress on stderr");
+  bevel::diagnose::end_on_signals("bevel-diagnose");
+  return command_line.run(argc, argv, [&] { return bevel::diagnose::run(o, std::cout); });
+}

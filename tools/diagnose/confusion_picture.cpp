@@ -1,0 +1,88 @@
+#include <algorithm>
+#include <cmath>
+#include <cstdio>
+#include <map>
+
+#include "tools/diagnose/drawing.hpp"
+#include "tools/diagnose/figures.hpp"
+#include "tools/diagnose/pictures.hpp"
+
+namespace bevel::diagnose {
+
+using namespace bevel::diagnosis;  // NOLINT(google-build-using-namespace)
+
+namespace {
+
+constexpr double kNames = 145;
+constexpr double kLeaning = 72;  // how far the last column's name leans to the right
+constexpr double kWorthANumber = 0.5;
+
+// White to dark blue.
+std::string shade(double share) {
+  const double s = std::clamp(share, 0.0, 1.0);
+  const auto mix = [s](int light, int dark) { return light + static_cast<int>(std::lround(s * s * (dark - light))); };
+  char text[8];
+  std::snprintf(text, sizeof text, "#%02x%02x%02x", mix(246, 24), mix(248, 84), mix(250, 148));
+  return text;
+}
+
+// The least absorbed of an effect's parameters: that by which it can be seen.
+std::map<std::string, double> absorbed_shares(const Findings& findings) {
+  std::map<std::string, double> shares;
+  for (const auto& d : findings.detectable) {
+    if (!std::isfinite(d.absorbed)) continue;
+    const auto [at, is_new] = shares.emplace(d.effect, d.absorbed);
+    if (!is_new) at->second = std::min(at->second, d.absorbed);
+  }
+  return shares;
+}
+
+void draw_cell(Drawing& drawing, const Box& cell, double value, const std::string& hint) {
+  if (!std::isfinite(value)) {
+    drawing.text({cell.left + cell.width / 2, cell.top + cell.height / 2 + 4}, "-",
+                 {.anchor = Lettering::Anchor::middle, .colour = ink::kFaint});
+    return;
+  }
+  drawing.rectangle({cell.left + 0.5, cell.top + 0.5, cell.width - 1, cell.height - 1}, shade(value), 1, hint);
+  if (value < kWorthANumber) return;
+  // ".97": the zero would not fit.
+  const std::string text = value >= 0.995 ? "1" : number(value, 2).substr(1);
+  drawing.text({cell.left + cell.width / 2, cell.top + cell.height / 2 + 4}, text,
+               {.anchor = Lettering::Anchor::middle, .size = 10, .colour = value > 0.65 ? "#ffffff" : ink::kText});
+}
+
+}  // namespace
+
+// Upper triangle, names along the diagonal's rows and above the columns; in front, what the needle absorbs.
+std::string confusion_picture(const Findings& findings) {
+  const auto count = static_cast<Eigen::Index>(findings.confusion_names.size());
+  if (count < 2 || findings.confusion.rows() != count || findings.confusion.cols() != count) return "";
+  const auto shares = absorbed_shares(findings);
+  const double left = kNames + 50;
+  const double cell = std::min((832 - left - kLeaning) / static_cast<double>(count), 34.0);
+  const double height = std::min(cell, 24.0);
+  const double top = 118;
+  Drawing drawing(832, top + height * static_cast<double>(count) + 12);
+  drawing.text({kNames + 24, top - 8}, "absorbed", {.size = 11, .colour = ink::kSoft, .turned_deg = -50});
+  for (Eigen::Index i = 0; i < count; ++i) {
+    const std::string& name = findings.confusion_names[static_cast<std::size_t>(i)];
+    const bool found =
+        std::any_of(findings.effects.begin(), findings.effects.end(), [&](const auto& e) { return e.name == name; });
+    const double y = top + static_cast<double>(i) * height;
+    drawing.text({kNames - 8, y + height / 2 + 4}, name, {.anchor = Lettering::Anchor::end, .bold = found});
+    const auto share = shares.find(name);
+    if (share != shares.end())
+      draw_cell(drawing, {kNames, y, 38, height}, share->second,
+                name + ": " + percent(share->second) + " absorbed by k, lambda1, lambda2");
+    if (i > 0)
+      drawing.text({left + (static_cast<double>(i) + 0.5) * cell, top - 8}, name,
+                   {.size = 11, .bold = found, .turned_deg = -50});
+    for (Eigen::Index j = i + 1; j < count; ++j)
+      draw_cell(drawing, {left + static_cast<double>(j) * cell, y, cell, height}, findings.confusion(i, j),
+                name + " and " + findings.confusion_names[static_cast<std::size_t>(j)] + ": " +
+                    number(findings.confusion(i, j), 2));
+  }
+  return drawing.svg();
+}
+
+}  // namespace bevel::diagnose

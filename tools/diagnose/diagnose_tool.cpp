@@ -1,0 +1,98 @@
+#include "tools/diagnose/diagnose_tool.hpp"
+
+#include <chrono>
+#include <cmath>
+#include <cstdio>
+#include <ostream>
+#include <stdexcept>
+
+#include "diagnosis/mismatch/diagnose.hpp"
+#include "io/model_file.hpp"
+#include "tools/diagnose/figures.hpp"
+#include "tools/diagnose/progress.hpp"
+#include "tools/diagnose/read_case.hpp"
+#include "tools/diagnose/report.hpp"
+#include "tools/diagnose/result_files.hpp"
+#include "tools/diagnose/verdict_json.hpp"
+
+namespace bevel::diagnose {
+
+using namespace bevel::diagnosis;  // NOLINT(google-build-using-namespace): the tool speaks of nothing else
+
+namespace {
+
+io::ModelFile load_model(const std::string& path) {
+  io::ModelFile model = io::load_model_file(path);
+  if (!model.effects.empty())
+    throw std::runtime_error(path + ": has [[effect]] \"" + model.effects.front().name +
+                             "\"; effects are looked for beside a bare [needle]: give the model file without them, " +
+                             "what is there will be found again");
+  return model;
+}
+
+void print_parameter(std::ostream& out, const FoundParameter& p, const std::string& log) {
+  out << "    " << in_words(p.name) << (log.empty() ? "" : " in " + log) << ": " << with_error(p.value, p.std_error)
+      << ", 95 % " << interval(p.ci95) << (p.at_bound ? ", at its bound" : "") << '\n';
+}
+
+std::string listed(const std::vector<std::string>& names) {
+  std::string text;
+  for (const auto& name : names) text += (text.empty() ? "" : ", ") + name;
+  return text;
+}
+
+}  // namespace
+
+Findings find(const Options& options) {
+  Progress progress(options.quiet ? nullptr : stderr);
+  const auto began = std::chrono::steady_clock::now();
+  const io::ModelFile model = load_model(options.model_path);
+  progress.stage("reading " + std::to_string(options.logs.size()) + " logs");
+  ReadCase input = read_case(options.logs);
+  const std::chrono::duration<double> reading = std::chrono::steady_clock::now() - began;
+  DiagnosisOptions how;
+  how.seed = static_cast<std::uint64_t>(options.seed);
+  how.threads = options.threads;
+  how.bootstrap_draws = options.bootstrap_draws;
+  how.progress = [&](const std::string& text) { progress.stage(text); };
+  Findings findings = diagnosis::diagnose(input.recorded, model.needle, how);
+  findings.remarks.insert(findings.remarks.begin(), input.remarks.begin(), input.remarks.end());
+  findings.times.insert(findings.times.begin(), {"reading the logs", reading.count()});
+  return findings;
+}
+
+void print_verdict(std::ostream& out, const Findings& f) {
+  out << headline_of(f.verdict) << ": " << f.sentence << "\n\n";
+  for (const auto& effect : f.effects) {
+    out << "  " << effect.name << "  probability " << percent(effect.probability)
+        << (effect.ambiguous_with.empty() ? "" : ", or " + listed(effect.ambiguous_with)) << '\n';
+    for (const auto& p : effect.parameters) print_parameter(out, p, "");
+    for (const auto& r : effect.recordings)
+      for (const auto& p : r.parameters) print_parameter(out, p, r.log);
+  }
+  const auto& n = f.needle;
+  out << "  needle: k " << with_error(n.value.curvature_per_mm, n.curvature_sd_per_mm) << " 1/mm, lambda1 "
+      << with_error(n.value.lambda1_per_rad, n.lambda1_sd_per_rad) << ", lambda2 "
+      << with_error(n.value.lambda2, n.lambda2_sd) << '\n';
+  out << "  held-out error: " << number(f.held_out.before.rmse_mm) << " -> " << number(f.held_out.after.rmse_mm)
+      << " mm rms, chi2 per reading " << number(f.held_out.before.chi2_per_dof) << " -> "
+      << number(f.held_out.after.chi2_per_dof) << '\n';
+  for (std::size_t i = 0; i < f.where.size() && i < 3; ++i)
+    out << "  " << (i == 0 ? "worst: " : "       ") << f.where[i].log << " " << f.where[i].channel << ", "
+        << number(f.where[i].from_s) << " to " << number(f.where[i].to_s) << " s\n";
+  for (const auto& remark : f.remarks) out << "  - " << remark << '\n';
+  out << "  seed " << f.seed << '\n';
+}
+
+int run(const Options& options, std::ostream& out) {
+  check_writable(options.out_folder);
+  const Findings findings = find(options);
+  write_together(options.out_folder, {{"report.html", report_html(findings, options.model_path)},
+                                      {"model.toml", io::to_toml(model_of(findings))},
+                                      {"verdict.json", verdict_json(findings)}});
+  print_verdict(out, findings);
+  out << "\nwritten: " << options.out_folder << "/verdict.json, report.html, model.toml\n";
+  return 0;
+}
+
+}  // namespace bevel::diagnose

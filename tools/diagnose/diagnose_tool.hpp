@@ -1,0 +1,30 @@
+// bevel-diagnose: from logs and the model in use to verdict.json, report.html and model.toml.
+#pragma once
+
+#include <iosfwd>
+#include <string>
+#include <vector>
+
+#include "diagnosis/mismatch/findings.hpp"
+
+namespace bevel::diagnose {
+
+struct Options {
+  std::string model_path, out_folder;
+  std::vector<std::string> logs;
+  int seed = 1;
+  int threads = 2;
+  int bootstrap_draws = 400;
+  bool quiet = false;  // no progress on stderr
+};
+
+// Throws std::runtime_error or std::invalid_argument with one sentence for input that cannot be diagnosed. Writes
+// nothing.
+diagnosis::Findings find(const Options& options);
+
+void print_verdict(std::ostream& out, const diagnosis::Findings& findings);
+
+// All of it; returns the exit status.
+int run(const Options& options, std::ostream& out);
+
+}  // namespace bevel::diagnose

@@ -1,0 +1,115 @@
+// Pictures of several panels as inline SVG, drawn straight: small multiples, bars and heat maps with thousands of
+// points take a tenth of the bytes and none of the processes that a general plotting program needs for them.
+#pragma once
+
+#include <string>
+#include <string_view>
+#include <vector>
+
+namespace bevel::diagnose {
+
+// The page's colours. Before and after keep theirs through the whole page.
+namespace ink {
+inline constexpr const char* kBefore = "#d1622b";
+inline constexpr const char* kAfter = "#1f6fb2";
+inline constexpr const char* kGood = "#2a8c6b";
+inline constexpr const char* kText = "#333333";
+inline constexpr const char* kSoft = "#6b6b6b";
+inline constexpr const char* kFaint = "#b5b5b5";
+inline constexpr const char* kGrid = "#e6e6e6";
+inline constexpr const char* kSpan = "#f6e3a8";
+}  // namespace ink
+
+struct Point {
+  double x = 0, y = 0;
+};
+
+struct Box {
+  double left = 0, top = 0, width = 0, height = 0;
+  double right() const { return left + width; }
+  double bottom() const { return top + height; }
+};
+
+struct Stroke {
+  std::string_view colour = ink::kText;
+  double width = 1;
+  std::string_view dashes = "";  // "5,4"
+  double opacity = 1;
+};
+
+struct Lettering {
+  enum class Anchor { start, middle, end };
+  Anchor anchor = Anchor::start;
+  double size = 12;
+  std::string_view colour = ink::kText;
+  bool bold = false;
+  double turned_deg = 0;
+};
+
+// Coordinates are pixels of a page 832 wide, y downwards. A point that is not finite breaks a line and is no dot.
+class Drawing {
+ public:
+  Drawing(double width, double height) : width_(width), height_(height) {}
+
+  Drawing& line(Point from, Point to, const Stroke& stroke = {});
+  Drawing& curve(const std::vector<Point>& points, const Stroke& stroke);
+  Drawing& area(const std::vector<Point>& outline, std::string_view colour, double opacity = 1);
+  Drawing& dots(const std::vector<Point>& points, double radius, std::string_view colour, double opacity = 1);
+  Drawing& rectangle(const Box& box, std::string_view colour, double opacity = 1, std::string_view hint = "");
+  Drawing& text(Point at, std::string_view words, const Lettering& lettering = {});
+
+  double width() const { return width_; }
+  std::string svg() const;
+
+ private:
+  double width_, height_;
+  std::string body_;
+};
+
+// About how wide words are set, for margins.
+double width_of(std::string_view words, double size = 12);
+
+struct Axis {
+  double low = 0, high = 1;
+  std::string label;
+  bool logarithmic = false;
+  bool numbered = true;
+};
+// Around all finite values, with a little room; of equal values, around them.
+Axis axis_around(const std::vector<double>& values, std::string label);
+// Round numbers within the axis: about `count`, or powers of ten on a logarithmic one.
+std::vector<double> ticks(const Axis& axis, int count = 4);
+
+// One panel of a picture: a frame, ticks and labels, and what is drawn into it, cut off at its edges.
+class Panel {
+ public:
+  // The box is the plotting area; ticks and labels stand outside it, left and below.
+  Panel(Drawing& drawing, const Box& box, Axis x, Axis y, std::string_view title = "");
+
+  // Lighter than what is drawn afterwards, so first.
+  Panel& span(double from, double to);
+  Panel& band(const std::vector<double>& x, const std::vector<double>& low, const std::vector<double>& high,
+              std::string_view colour);
+  Panel& level(double y, const Stroke& stroke);
+  Panel& points(const std::vector<double>& x, const std::vector<double>& y, std::string_view colour, double opacity,
+                double radius = 1.1);
+  Panel& curve(const std::vector<double>& x, const std::vector<double>& y, const Stroke& stroke);
+
+  Point at(double x, double y) const;
+
+ private:
+  double fraction(double value, const Axis& axis) const;
+  Drawing& drawing_;
+  Box box_;
+  Axis x_, y_;
+};
+
+// Coloured marks and their names in a row.
+struct Key {
+  std::string_view colour;
+  std::string name;
+  bool dashed = false;
+};
+void draw_keys(Drawing& drawing, Point at, const std::vector<Key>& keys);
+
+}  // namespace bevel::diagnose

@@ -1,0 +1,100 @@
+#include "tools/diagnose/figures.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <cstdio>
+#include <utility>
+
+namespace bevel::diagnose {
+namespace {
+
+std::string fixed(double value, int decimals) {
+  char text[64];
+  std::snprintf(text, sizeof text, "%.*f", decimals, value);
+  // "-0.00" says nothing that "0.00" does not.
+  if (text[0] == '-' && std::string_view(text).find_first_not_of("-0.") == std::string_view::npos) return text + 1;
+  return text;
+}
+
+int decimals_for(double size, int digits) {
+  if (!(std::abs(size) > 0)) return 0;
+  return std::clamp(digits - 1 - static_cast<int>(std::floor(std::log10(std::abs(size)) + 1e-9)), 0, 9);
+}
+
+constexpr std::pair<std::string_view, std::string_view> kUnits[] = {{"_mm_per_rad", "mm/rad"},
+                                                                    {"_per_100mm", "per 100 mm"},
+                                                                    {"_per_mm", "1/mm"},
+                                                                    {"_per_rad", "1/rad"},
+                                                                    {"_rad_s", "rad/s"},
+                                                                    {"_mm_s", "mm/s"},
+                                                                    {"_mm", "mm"},
+                                                                    {"_rad", "rad"},
+                                                                    {"_hz", "Hz"},
+                                                                    {"_s", "s"}};
+
+std::pair<std::string_view, std::string_view> split(std::string_view name) {
+  for (const auto& [suffix, unit] : kUnits)
+    if (name.ends_with(suffix)) return {name.substr(0, name.size() - suffix.size()), unit};
+  if (name == "per_100mm") return {"slope", "per 100 mm"};
+  return {name, ""};
+}
+
+}  // namespace
+
+std::string number(double value, int digits) {
+  if (!std::isfinite(value)) return "-";
+  if (value == 0) return "0";
+  std::string text = fixed(value, decimals_for(value, digits));
+  if (text.find('.') != std::string::npos) {
+    text.erase(text.find_last_not_of('0') + 1);
+    if (text.ends_with('.')) text.pop_back();
+  }
+  return text;
+}
+
+std::string with_error(double value, double std_error) {
+  if (!std::isfinite(value)) return "-";
+  if (!std::isfinite(std_error) || std_error <= 0) return number(value, 4);
+  const int decimals = decimals_for(std_error, 2);
+  return fixed(value, decimals) + " ± " + fixed(std_error, decimals);
+}
+
+std::string interval(const std::array<double, 2>& ends) {
+  if (!std::isfinite(ends[0]) && !std::isfinite(ends[1])) return "open";
+  if (!std::isfinite(ends[0])) return "up to " + number(ends[1]);
+  if (!std::isfinite(ends[1])) return "from " + number(ends[0]);
+  const double width = ends[1] - ends[0];
+  const int decimals = decimals_for(width > 0 ? width / 4 : ends[0], 2);
+  return fixed(ends[0], decimals) + " to " + fixed(ends[1], decimals);
+}
+
+std::string percent(double share) {
+  if (!std::isfinite(share)) return "-";
+  const double value = 100 * share;
+  if (value > 99.9 && value < 100) return "> 99.9 %";
+  if (value > 0 && value < 0.1) return "< 0.1 %";
+  return number(value, value >= 99 ? 3 : 2) + " %";
+}
+
+std::string unit_of(std::string_view name) { return std::string(split(name).second); }
+
+std::string in_words(std::string_view name) {
+  const auto [stem, unit] = split(name);
+  std::string words(stem);
+  std::replace(words.begin(), words.end(), '_', ' ');
+  return unit.empty() ? words : words + " (" + std::string(unit) + ")";
+}
+
+std::string headline_of(diagnosis::Verdict verdict) {
+  switch (verdict) {
+    case diagnosis::Verdict::nothing_missing:
+      return "Nothing missing";
+    case diagnosis::Verdict::effects_found:
+      return "Effects found";
+    case diagnosis::Verdict::unknown_effect:
+      return "Unknown effect";
+  }
+  return "";
+}
+
+}  // namespace bevel::diagnose

@@ -1,0 +1,26 @@
+// Numbers as the tool prints them, on the page and on the terminal.
+#pragma once
+
+#include <string>
+#include <string_view>
+
+#include "diagnosis/mismatch/findings.hpp"
+
+namespace bevel::diagnose {
+
+// So many significant digits, never an exponent; "-" where there is no finite value.
+std::string number(double value, int digits = 3);
+// Rounded to two digits of its error: "0.823 ± 0.031".
+std::string with_error(double value, double std_error);
+// Both ends rounded alike: "0.76 to 0.89".
+std::string interval(const std::array<double, 2>& ends);
+std::string percent(double share);
+
+// The unit at the end of a name: "mm" of "depth_mm", "rad/s" of "turn_rate_rad_s"; "" if it has none.
+std::string unit_of(std::string_view name);
+// The name in words, its unit behind: "lag at 100mm (rad)", "depth (mm)".
+std::string in_words(std::string_view name);
+
+std::string headline_of(diagnosis::Verdict verdict);  // "Effects found", ...
+
+}  // namespace bevel::diagnose

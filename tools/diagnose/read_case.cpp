@@ -1,0 +1,110 @@
+#include "tools/diagnose/read_case.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <filesystem>
+#include <map>
+#include <stdexcept>
+
+#include "io/log_reader.hpp"
+#include "tools/diagnose/figures.hpp"
+
+namespace bevel::diagnose {
+namespace fs = std::filesystem;
+namespace {
+
+constexpr double kLargestLoss = 0.2;  // of a log's bytes, or of a channel's messages
+// Between two actuator samples further apart than this, a motion of more than that is not known well enough.
+constexpr double kGap_s = 0.5;
+constexpr double kUnseen_mm = 1.0;
+constexpr double kUnseen_rad = 0.2;
+
+std::string one_line(std::string text) {
+  while (text.ends_with('\n')) text.pop_back();
+  for (std::size_t at = 0; (at = text.find('\n', at)) != std::string::npos;) text.replace(at, 1, "; ");
+  return text;
+}
+
+bool lost_much(std::int64_t refused, std::size_t kept) {
+  return static_cast<double>(refused) > kLargestLoss * static_cast<double>(refused + static_cast<std::int64_t>(kept));
+}
+
+std::int64_t refused_on(const io::Recording& recording, const std::string& channel) {
+  const auto found = recording.rejects.find(channel);
+  std::int64_t sum = 0;
+  if (found != recording.rejects.end())
+    for (const auto count : found->second) sum += count;
+  return sum;
+}
+
+void check_motion_known(const std::string& name, std::vector<model::ActuatorState> states) {
+  std::stable_sort(states.begin(), states.end(), [](const auto& a, const auto& b) { return a.utime < b.utime; });
+  for (std::size_t i = 1; i < states.size(); ++i) {
+    const double gap_s = static_cast<double>(states[i].utime - states[i - 1].utime) * 1e-6;
+    const double moved_mm = std::abs(states[i].insertion_mm - states[i - 1].insertion_mm);
+    const double turned_rad = std::abs(states[i].rotation_rad - states[i - 1].rotation_rad);
+    if (gap_s > kGap_s && (moved_mm > kUnseen_mm || turned_rad > kUnseen_rad))
+      throw std::runtime_error(
+          name + ": no ACTUATOR_STATE for " + number(gap_s) + " s, " +
+          number(static_cast<double>(states[i - 1].utime - states.front().utime) * 1e-6) +
+          " s after its first, while the base moved by " + number(moved_mm) + " mm and " + number(turned_rad) +
+          " rad: how it moved is not known, and missing physics would be blamed for it. Allowed are gaps up to " +
+          number(kGap_s) + " s, or longer ones with less than " + number(kUnseen_mm) + " mm and " +
+          number(kUnseen_rad) + " rad of motion");
+  }
+}
+
+void check_each_once(const std::vector<std::string>& logs) {
+  std::map<std::string, std::string> by_name;
+  for (const auto& log : logs) {
+    if (fs::is_directory(log)) throw std::runtime_error(log + ": a folder; give the logs in it, " + log + "/*.lcm");
+    const auto [known, is_new] = by_name.emplace(fs::path(log).filename().string(), log);
+    if (is_new) continue;
+    std::error_code ignored;
+    if (fs::equivalent(known->second, log, ignored)) throw std::runtime_error(log + ": given twice");
+    throw std::runtime_error(known->second + " and " + log +
+                             ": two logs of one name; a verdict names a recording by its file name, so rename one");
+  }
+}
+
+}  // namespace
+
+std::string judge_damage(const std::string& name, const io::Recording& recording, std::size_t bytes) {
+  const std::string faults = one_line(recording.describe_faults());
+  if (recording.events == 0)
+    throw std::runtime_error(name + ": no LCM event in its " + std::to_string(bytes) + " bytes; " +
+                             (bytes == 0 ? "the file is empty" : "not a log, or damaged throughout"));
+  const double lost = static_cast<double>(recording.damage.skipped_bytes + recording.damage.torn_tail_bytes);
+  if (lost > kLargestLoss * static_cast<double>(bytes) ||
+      lost_much(refused_on(recording, "TIP_MEASUREMENT"), recording.tips.size()) ||
+      lost_much(refused_on(recording, "ACTUATOR_STATE"), recording.actuators.size()))
+    throw std::runtime_error(name + ": damaged beyond use (" + faults + "); at most " + percent(kLargestLoss) +
+                             " of a log, and of the messages of a channel, may be lost");
+  check_motion_known(name, recording.actuators);
+  if (recording.intact()) return "";
+  return name + ": damaged (" + faults + "); what is left of it was used.";
+}
+
+ReadCase read_case(const std::vector<std::string>& logs) {
+  check_each_once(logs);
+  ReadCase result;
+  std::vector<diagnosis::RawRecording> raw;
+  std::vector<std::unique_ptr<io::MappedFile>> files;
+  for (std::size_t i = 0; i < logs.size(); ++i) {
+    files.push_back(std::make_unique<io::MappedFile>(logs[i]));
+    const auto bytes = files.back()->bytes();
+    for (std::size_t k = 0; k < i; ++k)
+      if (!bytes.empty() && std::ranges::equal(bytes, files[k]->bytes()))
+        throw std::runtime_error(logs[i] + ": the same recording as " + logs[k] +
+                                 "; counted twice it would make everything look surer than it is");
+    io::Recording recording = io::read_recording(bytes);
+    const std::string name = fs::path(logs[i]).filename().string();
+    const std::string remark = judge_damage(name, recording, bytes.size());
+    if (!remark.empty()) result.remarks.push_back(remark);
+    raw.push_back({name, std::move(recording.actuators), std::move(recording.tips)});
+  }
+  result.recorded = diagnosis::make_case(std::move(raw));
+  return result;
+}
+
+}  // namespace bevel::diagnose

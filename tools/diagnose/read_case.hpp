@@ -1,0 +1,25 @@
+// Logs into a case, or one sentence that says why not.
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include "diagnosis/mismatch/recorded_case.hpp"
+#include "io/recording.hpp"
+
+namespace bevel::diagnose {
+
+struct ReadCase {
+  diagnosis::RecordedCase recorded;
+  std::vector<std::string> remarks;  // on damage that does not stand in the way
+};
+
+// A recording is named by its log's file name. Throws std::runtime_error for a log that cannot be read or lost too
+// much, for a log given twice, for two of one name, and with what diagnosis::make_case says of the rest.
+ReadCase read_case(const std::vector<std::string>& logs);
+
+// What of a log is missing: "" if nothing, a remark if it does not matter; throws if it does, a motion unknown for a
+// while above all: physics would be blamed for it.
+std::string judge_damage(const std::string& name, const io::Recording& recording, std::size_t bytes);
+
+}  // namespace bevel::diagnose

@@ -1,0 +1,260 @@
+#include "tools/diagnose/report.hpp"
+
+#include <algorithm>
+#include <cmath>
+
+#include "tools/diagnose/figures.hpp"
+#include "tools/diagnose/pictures.hpp"
+
+namespace bevel::diagnose {
+
+using namespace bevel::diagnosis;  // NOLINT(google-build-using-namespace)
+
+namespace {
+
+std::string listed(const std::vector<std::string>& names, const std::string& last = " and ") {
+  std::string text;
+  for (std::size_t i = 0; i < names.size(); ++i) text += (i == 0 ? "" : i + 1 == names.size() ? last : ", ") + names[i];
+  return text;
+}
+
+std::vector<std::string> names_of(const std::vector<FoundEffect>& effects) {
+  std::vector<std::string> names;
+  for (const auto& effect : effects) names.push_back(effect.name);
+  return names;
+}
+
+// "torsional_windup: lag at 100mm 0.823 ± 0.031 rad"
+std::string sizes_of(const FoundEffect& effect) {
+  std::string text = effect.name;
+  std::string between = ": ";
+  for (const auto& p : effect.parameters) {
+    const std::string unit = unit_of(p.name);
+    std::string words = in_words(p.name);
+    words = words.substr(0, words.find(" ("));
+    text += between + words + " " + with_error(p.value, p.std_error) + (unit.empty() ? "" : " " + unit);
+    between = ", ";
+  }
+  return text;
+}
+
+std::string held_out_sentence(const HeldOut& h) {
+  return "On recordings that it was not fitted to, the model is off by " + number(h.before.rmse_mm) +
+         " mm rms as it stands and by " + number(h.after.rmse_mm) +
+         " mm with what was found; chi2 per reading falls from " + number(h.before.chi2_per_dof) + " to " +
+         number(h.after.chi2_per_dof) + " (1 is noise alone).";
+}
+
+io::Tone tone_of(Verdict verdict) {
+  switch (verdict) {
+    case Verdict::nothing_missing:
+      return io::Tone::good;
+    case Verdict::effects_found:
+      return io::Tone::plain;
+    case Verdict::unknown_effect:
+      return io::Tone::warning;
+  }
+  return io::Tone::plain;
+}
+
+bool has_rivals(const Findings& f) {
+  return std::any_of(f.effects.begin(), f.effects.end(), [](const auto& e) { return !e.ambiguous_with.empty(); });
+}
+
+}  // namespace
+
+void add_verdict(io::HtmlReport& page, const Findings& f) {
+  std::string consequences;
+  for (const auto& effect : f.effects) consequences += sizes_of(effect) + ". ";
+  if (f.verdict == Verdict::nothing_missing)
+    consequences +=
+        "With its needle refitted, the model is off by " + number(f.held_out.before.rmse_mm) +
+        " mm rms on recordings that it was not fitted to, chi2 per reading " + number(f.held_out.before.chi2_per_dof) +
+        " (1 is noise alone). Nothing above the sizes listed under \"What these recordings could have shown\".";
+  else
+    consequences += held_out_sentence(f.held_out);
+  page.callout(tone_of(f.verdict), headline_of(f.verdict) + ". " + f.sentence, consequences);
+
+  std::vector<io::Fact> facts;
+  for (const auto& effect : f.effects)
+    facts.push_back({effect.name, percent(effect.probability),
+                     effect.ambiguous_with.empty() ? "probability; no rival"
+                                                   : "probability; or " + listed(effect.ambiguous_with, " or ")});
+  facts.push_back(
+      {"held-out error",
+       number(f.held_out.before.rmse_mm) + (f.effects.empty() ? "" : " → " + number(f.held_out.after.rmse_mm)) + " mm",
+       "rms, largest " + number(f.effects.empty() ? f.held_out.before.max_mm : f.held_out.after.max_mm) + " mm"});
+  facts.push_back({"held-out chi2 per reading",
+                   number(f.held_out.before.chi2_per_dof) +
+                       (f.effects.empty() ? "" : " → " + number(f.held_out.after.chi2_per_dof)),
+                   "1 is noise alone"});
+  if (f.verdict == Verdict::unknown_effect)
+    facts.push_back({"unexplained", percent(f.checks.unexplained_share), "of the mismatch"});
+  facts.push_back({"evidence", std::to_string(f.readings) + " readings",
+                   std::to_string(f.traces.size()) + " recordings, " + std::to_string(f.outliers) + " outliers"});
+  page.facts(facts);
+}
+
+void add_what_to_do(io::HtmlReport& page, const Findings& f) {
+  std::vector<std::string> todo;
+  for (const auto& effect : f.effects)
+    if (!effect.meaning.empty()) todo.push_back(effect.name + " means: " + effect.meaning + ".");
+  switch (f.verdict) {
+    case Verdict::nothing_missing:
+      todo.emplace_back("Keep the physics of the model. Its needle refitted to these recordings is in model.toml.");
+      todo.emplace_back(
+          "Read the table of detectable sizes before you rule anything out: an effect below its size there may well be "
+          "present.");
+      break;
+    case Verdict::effects_found:
+      todo.emplace_back(
+          "Put model.toml in place of the model in use (simulator, estimator and bevel-predict read it), or mend the "
+          "rig and record again.");
+      if (has_rivals(f))
+        todo.emplace_back(
+            "Before you name the cause, record the next experiment below: these recordings cannot tell the named "
+            "effect from its rivals, though either model predicts equally well.");
+      break;
+    case Verdict::unknown_effect:
+      todo.emplace_back(
+          "Do not trust the model where the pictures below mark it: something acts there that is not on the list of "
+          "effects.");
+      todo.emplace_back("model.toml carries " +
+                        std::string(f.effects.empty() ? "the needle refitted, and no effect"
+                                                      : "the known part, " + listed(names_of(f.effects))) +
+                        "; the rest is described by curves, under no name.");
+      todo.emplace_back(
+          "Look for a cause that depends on what the curves are drawn against; docs/adding-an-effect.md tells how to "
+          "put an equation for it to the test.");
+      break;
+  }
+  page.heading("What to do").list(todo);
+}
+
+void add_parameters(io::HtmlReport& page, const Findings& f) {
+  page.heading("Parameters");
+  const std::string picture = interval_picture(f);
+  if (!picture.empty())
+    page.figure_svg(picture,
+                    "What was found, with 95 % intervals from the profile likelihood (everything else refitted at each "
+                    "value). An interval that reaches the diamond would be no evidence of an effect.");
+  const auto& a = f.model_file;
+  const auto& b = f.base;
+  const auto& c = f.needle;
+  page.table(
+      {"needle", "model file", "refitted alone", "with what was found"},
+      {{"k (1/mm)", number(a.curvature_per_mm, 4), with_error(b.value.curvature_per_mm, b.curvature_sd_per_mm),
+        with_error(c.value.curvature_per_mm, c.curvature_sd_per_mm)},
+       {"lambda1 (1/rad)", number(a.lambda1_per_rad, 4), with_error(b.value.lambda1_per_rad, b.lambda1_sd_per_rad),
+        with_error(c.value.lambda1_per_rad, c.lambda1_sd_per_rad)},
+       {"lambda2", number(a.lambda2, 4), with_error(b.value.lambda2, b.lambda2_sd),
+        with_error(c.value.lambda2, c.lambda2_sd)},
+       {"wheelbase (mm), not fitted", number(a.wheelbase_mm, 4), number(b.value.wheelbase_mm, 4),
+        number(c.value.wheelbase_mm, 4)}},
+      "Value ± standard error. A wrong k, lambda1 or lambda2 is no missing physics: they are refitted before anything "
+      "is named.");
+}
+
+void add_location(io::HtmlReport& page, const Findings& f) {
+  if (f.where.empty()) return;
+  page.heading("Where it goes wrong");
+  page.paragraph(
+      "The spans in which the model in use, its needle refitted, misses most. Look there first: what did the base do, "
+      "and what came before it?");
+  std::vector<std::vector<std::string>> rows;
+  for (const auto& w : f.where)
+    rows.push_back(
+        {w.log, w.channel, number(w.from_s) + " to " + number(w.to_s),
+         w.covariate.empty() ? "-" : in_words(w.covariate) + " " + number(w.range[0]) + " to " + number(w.range[1]),
+         percent(w.share)});
+  page.table({"recording", "channel", "time (s)", "there", "share of the mismatch"}, rows);
+  const std::string picture = located_picture(f, 2);
+  if (!picture.empty())
+    page.figure_svg(picture,
+                    "The worst spans in their recordings: what was measured less what was predicted, and below it what "
+                    "the base did at that time.");
+}
+
+void add_unknown_part(io::HtmlReport& page, const Findings& f) {
+  if (f.corrections.empty()) return;
+  page.heading("The unknown part, described");
+  page.paragraph(
+      "No effect on the list explains this. Each curve says by how much a quantity of the motion would have to be off, "
+      "and against what it varies, for the model to fit: zero is the model as it is. The curve is a description, not a "
+      "cause.");
+  page.figure_svg(correction_picture(f.corrections), "Fitted corrections with bands of two standard errors.");
+  std::vector<std::vector<std::string>> rows;
+  for (const auto& c : f.corrections) {
+    double largest = 0;
+    for (const double v : c.values) largest = std::abs(v) > std::abs(largest) ? v : largest;
+    rows.push_back(
+        {c.component, in_words(c.covariate), number(largest) + " " + c.unit, number(c.gain, 4), number(c.threshold)});
+  }
+  page.table({"what is off", "against", "largest", "fall of chi2", "by chance, 1 of 100"}, rows);
+}
+
+void add_residuals(io::HtmlReport& page, const Findings& f) {
+  std::vector<std::pair<double, std::size_t>> order;
+  for (std::size_t c = 0; c < f.channels.size(); ++c) {
+    double sum = 0;
+    for (const auto& trace : f.traces)
+      if (c < trace.white_before.size())
+        for (const double v : trace.white_before[c])
+          if (std::isfinite(v)) sum += v * v;
+    order.emplace_back(-sum, c);
+  }
+  std::sort(order.begin(), order.end());
+  const auto add = [&](io::HtmlReport& to, std::size_t c) {
+    const std::string picture = residual_picture(f, c);
+    if (!picture.empty())
+      to.figure_svg(picture, "Channel " + f.channels[c] +
+                                 ", measured less predicted, all recordings; outliers left out. Where the orange line "
+                                 "leaves zero and the blue one does not, what was found explains it.");
+  };
+  if (order.empty() || f.traces.empty()) return;
+  page.heading("What is left over, before and after");
+  page.paragraph(
+      "Residuals against seven quantities. Missing physics shows as a line that leaves zero in an orderly way against "
+      "one of them; noise has no order. After a complete model the blue line stays at zero in every panel.");
+  add(page, order.front().second);
+  if (order.size() > 1) add(page, order[1].second);
+  if (order.size() > 2)
+    page.folded("the other channels", [&](io::HtmlReport& inside) {
+      for (std::size_t i = 2; i < order.size(); ++i) add(inside, order[i].second);
+    });
+}
+
+void add_paths(io::HtmlReport& page, const Findings& f) {
+  constexpr std::size_t kShown = 3;
+  const auto order = worst_first(f);
+  if (order.empty()) return;
+  const auto middle = order.begin() + static_cast<std::ptrdiff_t>(std::min(kShown, order.size()));
+  page.heading("Paths, measured and predicted");
+  page.figure_svg(path_picture(f, {order.begin(), middle}),
+                  "The recordings that the model before gets worst, seen from two sides: x over z on the left, y over "
+                  "z on the right. Lateral axes are stretched. The blue line should run through the grey dots.");
+  if (middle != order.end())
+    page.folded("the other recordings", [&](io::HtmlReport& inside) {
+      inside.figure_svg(path_picture(f, {middle, order.end()}), "The other recordings.");
+    });
+}
+
+std::string report_html(const Findings& findings, const std::string& model_path) {
+  io::HtmlReport page("What the model leaves out");
+  add_verdict(page, findings);
+  add_what_to_do(page, findings);
+  add_parameters(page, findings);
+  add_location(page, findings);
+  add_unknown_part(page, findings);
+  add_residuals(page, findings);
+  add_paths(page, findings);
+  add_evidence(page, findings);
+  add_held_out(page, findings);
+  add_reach(page, findings);
+  add_next_experiment(page, findings);
+  add_noise_and_checks(page, findings);
+  add_making(page, findings, model_path);
+  return page.html();
+}
+
+}  // namespace bevel::diagnose

@@ -1,0 +1,146 @@
+#include <algorithm>
+#include <cmath>
+#include <map>
+
+#include "tools/diagnose/figures.hpp"
+#include "tools/diagnose/pictures.hpp"
+#include "tools/diagnose/report.hpp"
+
+namespace bevel::diagnose {
+
+using namespace bevel::diagnosis;  // NOLINT(google-build-using-namespace)
+
+namespace {
+
+// What the diagnosis says of a size: what is ruled out, and what is not.
+std::string reach_of(const DetectableSize& d) {
+  if (!std::isfinite(d.size)) return "cannot be shown by these recordings";
+  const std::string unit = unit_of(d.parameter);
+  return number(d.size, 2) + (unit.empty() ? "" : " " + unit);
+}
+
+}  // namespace
+
+void add_evidence(io::HtmlReport& page, const Findings& f) {
+  if (f.tried.empty()) return;
+  page.heading("Every effect that was tried");
+  page.paragraph(
+      "Each effect was fitted alone, all its parameters and the needle's together, through the whole of every "
+      "recording. The bar is how much better it then explains them. The black mark is what the luckiest of all these "
+      "effects reaches by chance in 1 of 100 recordings without any effect, by simulation: only a bar beyond it "
+      "counts.");
+  page.figure_svg(ranking_picture(f, f.tried),
+                  "Effects fitted alone, best first. Several may pass because they look alike; the best explanation is "
+                  "kept and the others are then tried beside it.");
+  if (!f.beside.empty()) {
+    const std::string beside = f.beside.front().beside;
+    page.figure_svg(ranking_picture(f, f.beside),
+                    "The same beside what was found" + (beside.empty() ? std::string() : " (" + beside + ")") +
+                        ": no bar should be left beyond its mark, or it would have been taken in.");
+  }
+  std::vector<std::vector<std::string>> rows;
+  for (const auto& t : f.tried) {
+    std::string sizes;
+    for (const auto& [name, value] : t.parameters)
+      sizes += (sizes.empty() ? "" : ", ") + in_words(name) + " " + number(value);
+    rows.push_back({t.name, number(t.gain, t.gain < 1000 ? 3 : 6), number(t.chance, 2), number(t.threshold, 3), sizes});
+  }
+  page.folded("the figures", [&](io::HtmlReport& inside) {
+    inside.table({"effect, alone", "fall of chi2", "mean of chance", "1 of 100", "fitted"}, rows);
+  });
+}
+
+void add_held_out(io::HtmlReport& page, const Findings& f) {
+  if (f.held_out.recordings.empty()) return;
+  page.heading("Recordings foretold");
+  page.paragraph(
+      "The proof that a name is more than a fit: each recording in turn is put aside, everything is fitted to the "
+      "others, and the one put aside is predicted. An effect of the wrong name fits what it has seen and gets the rest "
+      "wrong.");
+  page.figure_svg(held_out_picture(f.held_out),
+                  "Each recording predicted from the others, before and after. Blue should lie left of orange, and on "
+                  "the right picture near the line of noise alone.");
+}
+
+void add_reach(io::HtmlReport& page, const Findings& f) {
+  if (f.detectable.empty() && f.confusion_names.empty()) return;
+  page.heading("What these recordings could have shown");
+  if (!f.detectable.empty()) {
+    page.paragraph(
+        "The smallest size of each effect that would have been seen: an absence is ruled out only above it. "
+        "\"Absorbed\" is the share of an effect's mark on the path that a slightly different k, lambda1 and lambda2 "
+        "would leave as well; what they absorb nobody can see.");
+    std::vector<std::vector<std::string>> rows;
+    std::vector<std::string> experiments;
+    for (const auto& d : f.detectable) {
+      rows.push_back({d.effect, in_words(d.parameter), reach_of(d), number(d.typical), percent(d.absorbed)});
+      if (!d.experiment.empty()) experiments.push_back(d.effect + " (" + in_words(d.parameter) + "): " + d.experiment);
+    }
+    page.table({"effect", "parameter", "nothing above", "typical", "absorbed"}, rows);
+    if (!experiments.empty()) {
+      page.paragraph("Effects that these recordings could not show at their usual size, and motions that would:");
+      std::sort(experiments.begin(), experiments.end());
+      page.list(experiments);
+    }
+  }
+  const std::string picture = confusion_picture(f);
+  if (picture.empty()) return;
+  page.subheading("Which effects look alike here");
+  page.figure_svg(picture,
+                  "How alike two effects look in these recordings once k, lambda1 and lambda2 have absorbed what they "
+                  "can: 0 altogether different, 1 the same. Above 0.95 they cannot be told apart and the verdict names "
+                  "both. The first column is what the needle absorbs.");
+}
+
+void add_next_experiment(io::HtmlReport& page, const Findings& f) {
+  page.heading("The next experiment");
+  if (!f.next_experiment) {
+    page.paragraph(
+        "None is needed to tell rivals apart: no two explanations are left that these recordings leave open.");
+    return;
+  }
+  const auto& next = *f.next_experiment;
+  page.paragraph("Of the safe motions that were simulated, this one tells " + next.separates[0] + " from " +
+                 next.separates[1] + " best, each refitted to explain the other away.");
+  page.code(next.script);
+  page.paragraph("One recording of it should separate them by " + number(next.expected_gain, 2) +
+                 " in chi2 (10 is convincing, 25 settles it).");
+}
+
+void add_noise_and_checks(io::HtmlReport& page, const Findings& f) {
+  page.heading("Noise and checks");
+  std::vector<std::vector<std::string>> rows;
+  for (std::size_t c = 0; c < f.channels.size() && c < f.noise.sigma_mm.size(); ++c)
+    rows.push_back({f.channels[c], number(f.noise.sigma_mm[c])});
+  page.table({"channel", "noise (mm, 1 sd)"}, rows,
+             "Successive readings correlate by " + number(f.noise.ar1, 2) + " (" + number(1 / f.noise.frame_s, 3) +
+                 " readings a second); " + percent(f.noise.outlier_share) +
+                 " outliers. The noise is found before anything is named, and held fixed.");
+  const auto& c = f.checks;
+  page.table({"check of the final model", "found", "passed if"},
+             {{"chi2 per reading", number(c.chi2_per_dof, 4), number(c.band[0], 4) + " to " + number(c.band[1], 4)},
+              {"correlation left in the residuals (Ljung-Box p)", number(c.ljung_box_p, 2), "above 0.01"},
+              {"slow structure left (standard deviations of chance)", number(c.remaining_sigmas, 2), "near 0"},
+              {"share of the mismatch unexplained", percent(c.unexplained_share), "small"}},
+             c.clean ? "What is left is noise." : "What is left is more than noise: something is still missing.");
+  if (!f.remarks.empty()) page.subheading("Remarks").list(f.remarks);
+}
+
+void add_making(io::HtmlReport& page, const Findings& f, const std::string& model_path) {
+  page.heading("How this was made");
+  std::vector<std::vector<std::string>> rows;
+  double total = 0;
+  for (const auto& t : f.times) {
+    rows.push_back({t.stage, number(t.seconds, 2)});
+    total += t.seconds;
+  }
+  rows.push_back({"all", number(total, 3)});
+  page.table({"stage", "seconds"}, rows);
+  std::string logs;
+  for (const auto& trace : f.traces) logs += (logs.empty() ? "" : ", ") + trace.log;
+  page.paragraph("Model in use: " + model_path + ". Recordings: " + logs + ". Seed " + std::to_string(f.seed) + ", " +
+                 std::to_string(f.bootstrap_draws) +
+                 " bootstrap draws; the same input and seed give the same verdict.");
+}
+
+}  // namespace bevel::diagnose

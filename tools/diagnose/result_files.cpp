@@ -1,0 +1,138 @@
+#include "tools/diagnose/result_files.hpp"
+
+#include <sys/stat.h>
+#include <unistd.h>
+
+#include <array>
+#include <cerrno>
+#include <csignal>
+#include <cstring>
+#include <stdexcept>
+#include <system_error>
+#include <utility>
+
+namespace bevel::diagnose {
+namespace fs = std::filesystem;
+namespace {
+
+[[noreturn]] void fail(const fs::path& path, const std::string& what) {
+  throw std::runtime_error(path.string() + ": " + what + ": " + std::strerror(errno));
+}
+
+// What the handler says; made beforehand, a handler may not allocate.
+std::array<char, 160> parting_words{};
+std::string program_name;
+
+void say_on_signal(const std::string& what) {
+  parting_words = {};
+  const std::string words = "\n" + program_name + ": stopped; " + what + "\n";
+  words.copy(parting_words.data(), parting_words.size() - 1);
+}
+
+extern "C" void end_now(int) {
+  [[maybe_unused]] const auto written = ::write(STDERR_FILENO, parting_words.data(), std::strlen(parting_words.data()));
+  ::_exit(1);
+}
+
+// Signals wait for as long as this lives. Results are written by the main thread after the others have ended.
+class SignalsWait {
+ public:
+  SignalsWait() {
+    sigset_t both;
+    sigemptyset(&both);
+    sigaddset(&both, SIGINT);
+    sigaddset(&both, SIGTERM);
+    ::pthread_sigmask(SIG_BLOCK, &both, &before_);
+  }
+  ~SignalsWait() { ::pthread_sigmask(SIG_SETMASK, &before_, nullptr); }
+  SignalsWait(const SignalsWait&) = delete;
+  SignalsWait& operator=(const SignalsWait&) = delete;
+
+ private:
+  sigset_t before_{};
+};
+
+// A file beside its place; gone with its owner unless it took the place.
+class Pending {
+ public:
+  Pending(const fs::path& folder, const ResultFile& file) : place_(folder / file.name) {
+    std::string pattern = (folder / ("." + file.name + ".XXXXXX")).string();
+    const int descriptor = ::mkstemp(pattern.data());
+    if (descriptor < 0) fail(folder, "no file can be made in it");
+    path_ = pattern;
+    const mode_t mask = ::umask(0);  // mkstemp gives a file to its owner alone
+    ::umask(mask);
+    std::size_t done = 0;
+    while (done < file.text.size()) {
+      const ssize_t size = ::write(descriptor, file.text.data() + done, file.text.size() - done);
+      if (size < 0 && errno != EINTR) break;
+      if (size > 0) done += static_cast<std::size_t>(size);
+    }
+    const bool whole = done == file.text.size() && ::fchmod(descriptor, 0666 & ~mask) == 0 && ::fsync(descriptor) == 0;
+    const int reason = errno;
+    ::close(descriptor);
+    if (whole) return;
+    ::unlink(path_.c_str());  // a constructor that throws has no destructor
+    errno = reason;
+    fail(place_, "cannot be written");
+  }
+  ~Pending() {
+    if (!path_.empty()) ::unlink(path_.c_str());
+  }
+  Pending(Pending&& other) noexcept : place_(std::move(other.place_)), path_(std::exchange(other.path_, {})) {}
+  Pending(const Pending&) = delete;
+  Pending& operator=(const Pending&) = delete;
+  Pending& operator=(Pending&&) = delete;
+
+  void take_place() {
+    if (::rename(path_.c_str(), place_.c_str()) != 0) fail(place_, "cannot be put in place");
+    path_.clear();
+  }
+
+ private:
+  fs::path place_, path_;
+};
+
+}  // namespace
+
+void check_writable(const fs::path& folder) {
+  fs::path there = folder.lexically_normal();
+  std::error_code ignored;
+  while (!there.empty() && !fs::exists(there, ignored) && there.has_relative_path()) there = there.parent_path();
+  if (there.empty()) there = ".";
+  if (!fs::is_directory(there, ignored)) {
+    errno = ENOTDIR;
+    fail(folder, "cannot hold the results; " + there.string());
+  }
+  if (::access(there.c_str(), W_OK | X_OK) != 0) fail(folder, "no file can be made in " + there.string());
+}
+
+void write_together(const fs::path& folder, const std::vector<ResultFile>& files) {
+  const SignalsWait wait;
+  std::error_code error;
+  fs::create_directories(folder, error);
+  if (error) throw std::runtime_error(folder.string() + ": cannot be made: " + error.message());
+  std::vector<Pending> pending;
+  pending.reserve(files.size());
+  for (const auto& file : files) {
+    if (fs::is_directory(folder / file.name)) {
+      errno = EISDIR;
+      fail(folder / file.name, "cannot be replaced");
+    }
+    pending.emplace_back(folder, file);
+  }
+  if (!files.empty()) fs::remove(folder / files.back().name);
+  for (auto& one : pending) one.take_place();
+  say_on_signal("the results had been written");
+}
+
+void end_on_signals(const char* program) {
+  program_name = program;
+  say_on_signal("nothing was written");
+  struct sigaction action {};
+  action.sa_handler = end_now;
+  ::sigaction(SIGINT, &action, nullptr);
+  ::sigaction(SIGTERM, &action, nullptr);
+}
+
+}  // namespace bevel::diagnose

@@ -1,0 +1,188 @@
+#include "tools/diagnose/verdict_json.hpp"
+
+#include <cmath>
+#include <nlohmann/json.hpp>
+
+namespace bevel::diagnose {
+
+using namespace bevel::diagnosis;  // NOLINT(google-build-using-namespace): the tool speaks of nothing else
+// Keys in the order in which they are read.
+using json = nlohmann::ordered_json;
+
+namespace {
+
+json figure(double value) { return std::isfinite(value) ? json(value) : json(nullptr); }
+
+json figures(const std::vector<double>& values) {
+  json list = json::array();
+  for (const double v : values) list.push_back(figure(v));
+  return list;
+}
+
+json as_json(const std::vector<FoundParameter>& parameters) {
+  json all = json::object();
+  for (const auto& p : parameters)
+    all[p.name] = {{"value", figure(p.value)},
+                   {"std_error", figure(p.std_error)},
+                   {"ci95", {figure(p.ci95[0]), figure(p.ci95[1])}},
+                   {"at_bound", p.at_bound}};
+  return all;
+}
+
+json as_json(const FoundEffect& effect) {
+  json one = {{"name", effect.name},
+              {"probability", figure(effect.probability)},
+              {"ambiguous_with", effect.ambiguous_with},
+              {"parameters", as_json(effect.parameters)}};
+  for (const auto& r : effect.recordings) one["recordings"][r.log] = as_json(r.parameters);
+  one["meaning"] = effect.meaning;
+  one["gain"] = figure(effect.gain);
+  one["threshold"] = figure(effect.threshold);
+  one["visible_sigmas"] = figure(effect.visible_sigmas);
+  return one;
+}
+
+json as_json(const Location& w) {
+  return {{"log", w.log},
+          {"channel", w.channel},
+          {"from_s", figure(w.from_s)},
+          {"to_s", figure(w.to_s)},
+          {"covariate", w.covariate},
+          {"range", {figure(w.range[0]), figure(w.range[1])}},
+          {"share", figure(w.share)}};
+}
+
+json as_json(const FitFigures& f) {
+  return {{"rmse_mm", figure(f.rmse_mm)}, {"max_mm", figure(f.max_mm)}, {"chi2_per_dof", figure(f.chi2_per_dof)}};
+}
+
+json as_json(const HeldOut& held_out) {
+  json fit = {{"held_out", "leave-one-recording-out"},
+              {"before", as_json(held_out.before)},
+              {"after", as_json(held_out.after)},
+              {"gain", figure(held_out.gain)},
+              {"recordings", json::object()}};
+  for (const auto& r : held_out.recordings)
+    fit["recordings"][r.log] = {{"before", as_json(r.before)}, {"after", as_json(r.after)}};
+  return fit;
+}
+
+json as_json(const NeedleEstimate& n) {
+  return {{"curvature_per_mm", {{"value", n.value.curvature_per_mm}, {"std_error", figure(n.curvature_sd_per_mm)}}},
+          {"lambda1_per_rad", {{"value", n.value.lambda1_per_rad}, {"std_error", figure(n.lambda1_sd_per_rad)}}},
+          {"lambda2", {{"value", n.value.lambda2}, {"std_error", figure(n.lambda2_sd)}}},
+          {"wheelbase_mm", n.value.wheelbase_mm}};
+}
+
+json as_json(const std::vector<TriedEffect>& tried) {
+  json all = json::array();
+  for (const auto& t : tried) {
+    json parameters = json::object();
+    for (const auto& [name, value] : t.parameters) parameters[name] = figure(value);
+    all.push_back({{"name", t.name},
+                   {"beside", t.beside},
+                   {"gain", figure(t.gain)},
+                   {"chance", figure(t.chance)},
+                   {"threshold", figure(t.threshold)},
+                   {"evidence", figure(t.evidence)},
+                   {"passes", t.passes},
+                   {"parameters", parameters}});
+  }
+  return all;
+}
+
+json detectable_json(const std::vector<DetectableSize>& sizes) {
+  json all = json::object();
+  for (const auto& d : sizes) all[d.effect][d.parameter] = figure(d.size);
+  return all;
+}
+
+json absorption_json(const std::vector<DetectableSize>& sizes) {
+  json all = json::object();
+  for (const auto& d : sizes) {
+    all[d.effect][d.parameter] = {{"absorbed", figure(d.absorbed)}, {"typical", figure(d.typical)}};
+    if (!d.experiment.empty()) all[d.effect][d.parameter]["experiment"] = d.experiment;
+  }
+  return all;
+}
+
+json as_json(const std::vector<Correction>& corrections) {
+  json all = json::array();
+  for (const auto& c : corrections)
+    all.push_back({{"component", c.component},
+                   {"unit", c.unit},
+                   {"covariate", c.covariate},
+                   {"at", figures(c.at)},
+                   {"values", figures(c.values)},
+                   {"std_errors", figures(c.std_errors)},
+                   {"gain", figure(c.gain)},
+                   {"threshold", figure(c.threshold)}});
+  return all;
+}
+
+json experiment_json(const std::optional<NextExperiment>& next) {
+  if (!next) return nullptr;
+  return {{"script", next->script},
+          {"separates", {next->separates[0], next->separates[1]}},
+          {"expected_gain", figure(next->expected_gain)}};
+}
+
+json confusion_json(const Findings& f) {
+  json rows = json::array();
+  for (Eigen::Index i = 0; i < f.confusion.rows(); ++i)
+    rows.push_back(figures({f.confusion.row(i).begin(), f.confusion.row(i).end()}));
+  return {{"names", f.confusion_names}, {"cosine", rows}};
+}
+
+json checks_json(const Checks& c) {
+  return {{"chi2_per_dof", figure(c.chi2_per_dof)},
+          {"band99", {figure(c.band[0]), figure(c.band[1])}},
+          {"ljung_box_p", figure(c.ljung_box_p)},
+          {"remaining_sigmas", figure(c.remaining_sigmas)},
+          {"unexplained_share", figure(c.unexplained_share)},
+          {"clean", c.clean}};
+}
+
+}  // namespace
+
+std::string verdict_json(const Findings& f) {
+  json j = {
+      {"verdict", name_of(f.verdict)}, {"sentence", f.sentence}, {"effects", json::array()}, {"where", json::array()}};
+  for (const auto& effect : f.effects) j["effects"].push_back(as_json(effect));
+  for (const auto& location : f.where) j["where"].push_back(as_json(location));
+  j["noise"] = {{"sigma_mm", figures(f.noise.sigma_mm)},
+                {"ar1", figure(f.noise.ar1)},
+                {"outlier_share", figure(f.noise.outlier_share)},
+                {"channels", f.channels},
+                {"frame_s", figure(f.noise.frame_s)}};
+  j["fit"] = as_json(f.held_out);
+  j["detectable"] = detectable_json(f.detectable);
+  j["next_experiment"] = experiment_json(f.next_experiment);
+  j["needle"] = {{"before", as_json(f.base)}, {"after", as_json(f.needle)}};
+  j["corrections"] = as_json(f.corrections);
+  j["checks"] = checks_json(f.checks);
+  j["tried"] = as_json(f.tried);
+  j["tried_beside"] = as_json(f.beside);
+  j["absorption"] = absorption_json(f.detectable);
+  j["confusion"] = confusion_json(f);
+  j["remarks"] = f.remarks;
+  j["measurements"] = {{"used", f.readings}, {"outliers", f.outliers}};
+  j["seed"] = f.seed;
+  j["bootstrap_draws"] = f.bootstrap_draws;
+  // Clock times are not here but on the page: the same input and seed give the same file, to the last bit.
+  return j.dump(2, ' ', false, json::error_handler_t::replace) + "\n";
+}
+
+io::ModelFile model_of(const Findings& findings) {
+  io::ModelFile model{findings.needle.value, {}};
+  for (const auto& effect : findings.effects) {
+    io::EffectEntry entry{.name = effect.name};
+    for (const auto& p : effect.parameters) entry.parameters[p.name] = p.value;
+    for (const auto& r : effect.recordings)
+      for (const auto& p : r.parameters) entry.recordings[r.log][p.name] = p.value;
+    model.effects.push_back(entry);
+  }
+  return model;
+}
+
+}  // namespace bevel::diagnose

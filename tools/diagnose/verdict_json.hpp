@@ -1,0 +1,17 @@
+// verdict.json. Its keys are a contract (docs/verdict.schema.json); figures that are not finite become null.
+#pragma once
+
+#include <string>
+
+#include "diagnosis/mismatch/findings.hpp"
+#include "io/model_file.hpp"
+
+namespace bevel::diagnose {
+
+std::string verdict_json(const diagnosis::Findings& findings);
+
+// What was found as a model that the rig, the estimator and bevel-predict accept. Of an unknown effect it carries the
+// known part alone: a name is never invented.
+io::ModelFile model_of(const diagnosis::Findings& findings);
+
+}  // namespace bevel::diagnose
