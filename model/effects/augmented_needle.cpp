@@ -75,53 +75,76 @@ AugmentedState AugmentedNeedle::entry(const BaseMotion& base) const {
 }
 
 bool AugmentedNeedle::advance(AugmentedState& state, const BaseMotion& to) const {
-  Dual insertion_mm(to.insertion_mm);
-  Dual rotation_rad(to.rotation_rad);
-  Dual2 kappa = {Dual::unknown(needle_.curvature_per_mm, needle_columns_.curvature), Dual()};
-  LegView leg;
+  return effects_.empty() ? advance_plain(state, to) : advance_with_effects(state, to);
+}
+
+bool AugmentedNeedle::integrate(AugmentedState& state, const StepInput& input, StepJacobian& J) const {
+  if (columns_ == 0) return model::advance(state.pose, input, slip_);
+  if (!model::advance(state.pose, input, slip_, J)) return false;
+  const BodyColumns before = state.D;
+  // Where the tip was does not matter to where it turns.
+  state.D.topRows<3>().noalias() = J.pose.topRows<3>().lazyProduct(before);
+  state.D.bottomRows<3>().noalias() = J.pose.bottomRightCorner<3, 3>().lazyProduct(before.bottomRows<3>());
+  if (needle_columns_.lambda1 >= 0) state.D.col(needle_columns_.lambda1) += J.slip.col(0);
+  if (needle_columns_.lambda2 >= 0) state.D.col(needle_columns_.lambda2) += J.slip.col(1);
+  if (needle_columns_.wheelbase >= 0) state.D.col(needle_columns_.wheelbase) += J.slip.col(2);
+  return true;
+}
+
+bool AugmentedNeedle::advance_plain(AugmentedState& state, const BaseMotion& to) const {
+  StepJacobian J;
+  if (!integrate(state,
+                 {to.insertion_mm - state.base.insertion_mm,
+                  to.rotation_rad - state.base.rotation_rad,
+                  {needle_.curvature_per_mm, 0}},
+                 J))
+    return false;
+  if (needle_columns_.curvature >= 0) state.D.col(needle_columns_.curvature) += J.input.col(2);
+  state.base = to;
+  state.tip_insertion_mm.value = to.insertion_mm;
+  state.tip_rotation_rad.value = to.rotation_rad;
+  return true;
+}
+
+bool AugmentedNeedle::advance_with_effects(AugmentedState& state, const BaseMotion& to) const {
   auto& memory = state.memory;
-  if (!effects_.empty()) {
-    leg.entry = state.entry;
-    leg.from = state.base;
-    leg.to = to;
-    leg.R = state.pose.R;
-    leg.R_body.setZero();
+  LegView leg;
+  leg.entry = state.entry;
+  leg.from = state.base;
+  leg.to = to;
+  leg.R = state.pose.R;
+  for (int i = 0; i < 3; ++i) leg.R_body.row(i) = kNoSlope.matrix().transpose();
+  leg.tip_depth_mm.value = state.pose.p_mm.z();
+  leg.heading_z.value = state.pose.R(2, 2);
+  if (columns_ > 0) {
     leg.R_body.leftCols(columns_) = state.D.bottomRows<3>();
-    leg.tip_depth_mm = state.pose.p_mm.z();
-    leg.tip_depth_mm.slope.head(columns_) = (state.pose.R.row(2) * state.D.topRows<3>()).transpose().array();
+    leg.tip_depth_mm.slope.head(columns_) = state.pose.R.row(2).lazyProduct(state.D.topRows<3>()).transpose().array();
     // n = R^T z_A; its z moves by (n x delta)_z.
-    leg.heading_z = state.pose.R(2, 2);
     leg.heading_z.slope =
         (state.pose.R(2, 0) * leg.R_body.row(1) - state.pose.R(2, 1) * leg.R_body.row(0)).transpose().array();
-    leg.tip_rotation_rad = state.tip_rotation_rad;
-    for (std::size_t i = 0; i < effects_.size(); ++i)
-      effects_[i].effect->axes(parameters(effects_[i]), leg, memory[i], insertion_mm, rotation_rad);
-    leg.insertion_mm = insertion_mm - state.tip_insertion_mm;
-    leg.rotation_rad = rotation_rad - state.tip_rotation_rad;
-    for (std::size_t i = 0; i < effects_.size(); ++i)
-      effects_[i].effect->curvature(parameters(effects_[i]), leg, memory[i], kappa);
-  } else {
-    leg.insertion_mm = insertion_mm - state.tip_insertion_mm;
-    leg.rotation_rad = rotation_rad - state.tip_rotation_rad;
   }
+  leg.tip_rotation_rad = state.tip_rotation_rad;
 
-  const StepInput input{leg.insertion_mm.value, leg.rotation_rad.value, {kappa[0].value, kappa[1].value}};
-  if (columns_ == 0) {
-    if (!model::advance(state.pose, input, slip_)) return false;
-  } else {
-    StepJacobian J;
-    if (!model::advance(state.pose, input, slip_, J)) return false;
-    Eigen::Matrix<double, 4, Eigen::Dynamic, Eigen::ColMajor, 4, kMaxColumns> inputs(4, columns_);
+  Dual insertion_mm(to.insertion_mm);
+  Dual rotation_rad(to.rotation_rad);
+  for (std::size_t i = 0; i < effects_.size(); ++i)
+    effects_[i].effect->axes(parameters(effects_[i]), leg, memory[i], insertion_mm, rotation_rad);
+  leg.insertion_mm = insertion_mm - state.tip_insertion_mm;
+  leg.rotation_rad = rotation_rad - state.tip_rotation_rad;
+  Dual2 kappa = {Dual::unknown(needle_.curvature_per_mm, needle_columns_.curvature), Dual()};
+  for (std::size_t i = 0; i < effects_.size(); ++i)
+    effects_[i].effect->curvature(parameters(effects_[i]), leg, memory[i], kappa);
+
+  StepJacobian J;
+  if (!integrate(state, {leg.insertion_mm.value, leg.rotation_rad.value, {kappa[0].value, kappa[1].value}}, J))
+    return false;
+  if (columns_ > 0) {
+    Eigen::Matrix<double, 4, Eigen::Dynamic, Eigen::RowMajor, 4, kMaxColumns> inputs(4, columns_);
     inputs.row(0) = leg.insertion_mm.slope.head(columns_).matrix().transpose();
     inputs.row(1) = leg.rotation_rad.slope.head(columns_).matrix().transpose();
     inputs.row(2) = kappa[0].slope.head(columns_).matrix().transpose();
     inputs.row(3) = kappa[1].slope.head(columns_).matrix().transpose();
-    const BodyColumns before = state.D;
-    state.D.noalias() = J.pose.lazyProduct(before);
     state.D.noalias() += J.input.lazyProduct(inputs);
-    if (needle_columns_.lambda1 >= 0) state.D.col(needle_columns_.lambda1) += J.slip.col(0);
-    if (needle_columns_.lambda2 >= 0) state.D.col(needle_columns_.lambda2) += J.slip.col(1);
-    if (needle_columns_.wheelbase >= 0) state.D.col(needle_columns_.wheelbase) += J.slip.col(2);
   }
   for (std::size_t i = 0; i < effects_.size(); ++i)
     effects_[i].effect->settle(parameters(effects_[i]), leg, kappa, memory[i]);

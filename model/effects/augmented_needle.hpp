@@ -23,8 +23,9 @@ struct NeedleColumns {
   int wheelbase = -1;
 };
 
-using BodyColumns = Eigen::Matrix<double, 6, Eigen::Dynamic, Eigen::ColMajor, 6, kMaxColumns>;
-using PointColumns = Eigen::Matrix<double, 3, Eigen::Dynamic, Eigen::ColMajor, 3, kMaxColumns>;
+// Row by row, as slopes lie in a dual number.
+using BodyColumns = Eigen::Matrix<double, 6, Eigen::Dynamic, Eigen::RowMajor, 6, kMaxColumns>;
+using PointColumns = Eigen::Matrix<double, 3, Eigen::Dynamic, Eigen::RowMajor, 3, kMaxColumns>;
 
 // Everything that an insertion carries from leg to leg. Copyable, no heap.
 struct AugmentedState {
@@ -66,6 +67,10 @@ class AugmentedNeedle {
   void set_needle(double curvature_per_mm, double lambda1_per_rad, double lambda2);
 
  private:
+  bool advance_plain(AugmentedState& state, const BaseMotion& to) const;
+  bool advance_with_effects(AugmentedState& state, const BaseMotion& to) const;
+  // The pose over a leg, and its derivatives but for those that come in through the leg's own increments and curvature.
+  bool integrate(AugmentedState& state, const StepInput& input, StepJacobian& J) const;
   Parameters parameters(const ActiveEffect& active) const {
     return {active.parameters.data(), active.effect->parameters().size()};
   }

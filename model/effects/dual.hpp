@@ -11,9 +11,13 @@ namespace bevel::model {
 inline constexpr int kMaxColumns = 16;
 using Slope = Eigen::Array<double, kMaxColumns, 1>;
 
+// Copied from rather than set to zero: GCC sets 128 bytes by "rep stos", whose start alone costs more than most
+// effects.
+inline const Slope kNoSlope = Slope::Zero();
+
 struct Dual {
   double value = 0;
-  Slope slope = Slope::Zero();
+  Slope slope = kNoSlope;
 
   Dual() = default;
   Dual(double v) : value(v) {}  // NOLINT(google-explicit-constructor): a constant is a number without slope

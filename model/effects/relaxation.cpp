@@ -36,7 +36,7 @@ class Relaxation final : public Effect {
   }
 
  private:
-  static constexpr double kBuild_mm = 5.0;  // "a few mm": 5 to 6 fits recorded decays best
+  static constexpr double kBuild_mm = 5.0;    // "a few mm": 5 to 6 fits recorded decays best
   static constexpr double kRest_mm_s = 0.05;  // slower is rest
 };
 

@@ -13,6 +13,8 @@ namespace {
 using Eigen::Vector2d;
 using Eigen::Vector3d;
 
+constexpr double kBuild_mm = 5;  // as in model/effects/relaxation.cpp: the offset builds over it
+
 TEST(Relaxation, BuildsWhileCuttingAndDecaysAtRest) {
   const auto effect = active("relaxation", {1.2, 2.5});
   const Script script{{2, 15, 0}, {6, 0, 0}};
@@ -24,7 +26,7 @@ TEST(Relaxation, BuildsWhileCuttingAndDecaysAtRest) {
     const BaseMotion& base = motion.nodes[motion.at[i]];
     const double cut_mm = std::min(base.insertion_mm, 30.0);
     const double rest_s = std::max(0.0, base.time_s - 2);
-    const double expected = -1.2 * (1 - std::exp(-cut_mm / 3)) * std::exp(-rest_s / 2.5);
+    const double expected = -1.2 * (1 - std::exp(-cut_mm / kBuild_mm)) * std::exp(-rest_s / 2.5);
     const double tilt_rad = bicycle().curvature_per_mm * cut_mm;
     EXPECT_NEAR((path[i] - nominal[i]).y(), expected, 1.2 * (1 - std::cos(tilt_rad)) + 1e-9);
     EXPECT_EQ(path[i].z(), nominal[i].z());
@@ -39,7 +41,7 @@ TEST(Relaxation, FollowsTheBevelAndStaysInTheWorldAtRest) {
   brute.after = [seen, offset = Vector2d(0, 0)](const Instant& now) mutable {
     const Vector2d side = (now.R * Vector3d(0, -1, 0)).head<2>();  // where a needle with k > 0 bends
     if (now.ds_mm > 0)
-      offset += (1.2 * side - offset) * now.ds_mm / 3.0;
+      offset += (1.2 * side - offset) * now.ds_mm / kBuild_mm;
     else
       offset -= offset * now.step_s / 2.5;
     seen->push_back(offset);
