@@ -94,7 +94,7 @@ void write_commitments(const CampaignOptions& options) {
 
 // Results of two tools must not mix.
 std::string claim_tool(const CampaignOptions& options) {
-  const std::string sha256 = sha256_of_file(options.diagnose.string());
+  std::string sha256 = sha256_of_file(options.diagnose.string());
   const fs::path path = options.out / "tool.json";
   if (fs::exists(path)) {
     const std::string before = json::parse(read_text(path)).at("sha256");

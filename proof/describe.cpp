@@ -146,6 +146,9 @@ std::string describe_distribution() {
          number(kVisible_sigmas) +
          " on. The right answer names exactly the visible effects, \"unknown\" for those on no list, and nothing where "
          "none is visible.\n\n"
+         "An unlisted effect alone in its trial is also fitted by every listed one (plain form, its parameters and k, "
+         "lambda1, lambda2 free; not lost_steps and tissue_motion). Those that come closer than the limit are its "
+         "rivals: no tool can know better from these recordings, and naming one counts as ambiguous, apart.\n\n"
          "## What binds whom\n\n"
          "A truth is bound by SHA-256 of a random salt and its text before the tool runs on its trial; so are the "
          "inputs. The tool runs in namespaces of its own: it sees the system's programs and libraries, the case "

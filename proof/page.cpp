@@ -54,19 +54,22 @@ void headline(io::HtmlReport& page, const Tally& t, const CampaignFacts& facts) 
 void shares(io::HtmlReport& page, const Tally& t) {
   page.heading("Verdicts");
   std::vector<ShareLine> lines{{"exact set, all of it visible", at(t.strict, "visible"), 0.9},
-                               {"the same, counting ambiguous_with", at(t.lenient, "visible"), -1},
+                               {"the same, counting ambiguous ones", at(t.lenient, "visible"), -1},
                                {"one of two visible: that one", at(t.strict, "partly"), -1},
                                {"nothing visible: silence", at(t.strict, "invisible"), -1},
                                {"nothing concealed: silence", at(t.strict, "null"), 1.0},
                                {"all trials", at(t.strict, "all"), -1},
                                {"on no list: called unknown", t.unknown_called_unknown, 0.8},
+                               {"the same, imitated by none listed", t.unknown_distinct, -1},
                                {"truth within the 95 % intervals", t.covered, 0.95},
                                {"place within 0.2 s or 3 mm", t.located, -1},
                                {"held-out chi-square within 10 % of 1", t.chi2_at_floor, -1}};
   page.figure_svg(share_figure(lines),
                   "Shares with 95 % Wilson intervals; red ticks are goals. The right answer names "
                   "what could be seen: an effect of which less than 5 standard deviations remain "
-                  "beyond k, lambda1 and lambda2 is to go unnamed. Abstentions count as wrong.");
+                  "beyond k, lambda1 and lambda2 is to go unnamed. Abstentions count as wrong. Ambiguous: the truth "
+                  "stands in ambiguous_with, or "
+                  "an effect on no list is imitated below the limit by the listed one that was named.");
   std::vector<std::vector<std::string>> rows;
   for (const auto& [name, share] : t.strict_by_class) {
     const Interval w = wilson95(share);
@@ -87,7 +90,7 @@ void sensitivity(io::HtmlReport& page, const Tally& t) {
   plot.x_label = "visible size (standard deviations of the coloured noise)";
   plot.y_label = "share";
   plot.log_x = true;
-  plot.y_range = {{0.0, 1.05}};
+  plot.y_range = {{0.0, 1.15}};
   plot.legend = io::Plot::Legend::bottom_right;
   plot.references.push_back({io::ReferenceLine::Axis::vertical, kVisible_sigmas, "visible from here"});
   std::vector<double> x, named, low, high, alarmed_x, alarmed;

@@ -110,6 +110,7 @@ TrialScore begin(const OpenedTruth& truth) {
   score.plant = truth.plant;
   score.visible_sigmas = truth.visible_sigmas;
   score.expected = truth.expected;
+  score.rivals = truth.rivals;
   std::set<std::string> concealed;
   for (const OpenedEffect& effect : truth.effects) {
     score.concealed.push_back(effect.kind.empty() ? effect.name : effect.kind);
@@ -155,6 +156,7 @@ OpenedTruth parse_truth(std::string_view text) {
         effect.at_s = e.at("per_recording").at("at_s").get<std::vector<double>>();
       truth.effects.push_back(std::move(effect));
     }
+    for (const json& rival : j.at("rivals")) truth.rivals.push_back(rival.at("name"));
     return truth;
   } catch (const json::exception& e) {
     throw std::runtime_error(std::string("a truth cannot be read: ") + e.what());
@@ -165,7 +167,8 @@ TrialScore score_verdict(const OpenedTruth& truth, const Verdict& verdict) {
   TrialScore score = begin(truth);
   score.named = verdict.named();
   score.strict = score.named == truth.expected;
-  score.lenient = score.strict || matches_leniently(truth.expected, verdict);
+  const bool imitated = score.named.size() == 1 && holds(truth.rivals, score.named[0]);
+  score.lenient = score.strict || imitated || matches_leniently(truth.expected, verdict);
   score.probability_of_truth = probability_of(truth.expected, verdict);
   for (FoundEffect& found : score.found) found.named = holds(score.named, found.name);
   for (const OpenedEffect& effect : truth.effects) {

@@ -25,6 +25,7 @@ struct OpenedTruth {
   double visible_sigmas = 0;
   std::vector<std::string> expected;
   std::vector<OpenedEffect> effects;
+  std::vector<std::string> rivals;  // listed effects that these recordings cannot tell from the unlisted one
 };
 OpenedTruth parse_truth(std::string_view text);  // throws std::runtime_error
 
@@ -66,10 +67,11 @@ struct TrialScore {
   std::vector<std::string> expected;
   std::vector<std::string> concealed;  // kinds of unknown ones in place of "unknown"
   std::vector<std::string> named;
+  std::vector<std::string> rivals;
   bool abstained = false;
   std::string abstention;  // why there is no verdict
   bool strict = false;     // named is exactly what was expected
-  bool lenient = false;    // so it is, with names out of ambiguous_with
+  bool lenient = false;    // so it is, with names out of ambiguous_with, or of a rival
   double probability_of_truth = 0;
   std::vector<FoundEffect> found;
   std::vector<ParameterScore> parameters;

@@ -53,6 +53,7 @@ json as_json(const TrialScore& s) {
          {"expected", s.expected},
          {"concealed", s.concealed},
          {"named", s.named},
+         {"rivals", s.rivals},
          {"abstained", s.abstained},
          {"abstention", s.abstention},
          {"strict", s.strict},
@@ -90,6 +91,7 @@ TrialScore trial_score_of(const json& j) {
   s.expected = j.at("expected").get<std::vector<std::string>>();
   s.concealed = j.at("concealed").get<std::vector<std::string>>();
   s.named = j.at("named").get<std::vector<std::string>>();
+  s.rivals = j.at("rivals").get<std::vector<std::string>>();
   s.abstained = j.at("abstained");
   s.abstention = j.at("abstention");
   s.strict = j.at("strict");
@@ -128,6 +130,7 @@ json as_json(const Tally& t) {
           {"exact_set_strict_visible_by_class", shares_json(t.strict_by_class)},
           {"false_alarms_in_nulls", false_alarms},
           {"unknown_called_unknown", share_json(t.unknown_called_unknown)},
+          {"unknown_called_unknown_without_rival", share_json(t.unknown_distinct)},
           {"unknown_called_without_cause", share_json(t.unknown_alarms)},
           {"mean_probability_of_truth", t.mean_probability_of_truth},
           {"sensitivity", sensitivity},

@@ -48,6 +48,7 @@ void note_shares(const TrialScore& score, Tally& tally) {
   if (score.visibility == Visibility::visible) tally.strict_by_class[kind].add(score.strict);
   const bool unlisted = holds(score.expected, "unknown");
   if (unlisted) tally.unknown_called_unknown.add(holds(score.named, "unknown"));
+  if (unlisted && score.rivals.empty()) tally.unknown_distinct.add(holds(score.named, "unknown"));
   const bool none_unlisted = std::ranges::none_of(score.found, [](const auto& f) { return f.name == "unknown"; });
   if (none_unlisted && !score.abstained) tally.unknown_alarms.add(holds(score.named, "unknown"));
   if (score.visibility == Visibility::null && !score.abstained) tally.false_alarms.add(!score.named.empty());

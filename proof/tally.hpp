@@ -24,6 +24,7 @@ struct Tally {
   std::map<std::string, Share> strict_by_class;  // visible trials only, by class; the beam as a class of its own
   Share false_alarms;                            // of nulls
   Share unknown_called_unknown;                  // of visible unlisted effects
+  Share unknown_distinct;                        // of those that no listed effect imitates
   Share unknown_alarms;                          // "unknown" called where nothing unlisted was concealed
   double mean_probability_of_truth = 0;
   std::vector<SensitivityBin> sensitivity;

@@ -132,7 +132,7 @@ Views conceal_in_kinematics(Truth& truth, Setting& setting, Random& random) {
     }
     choose_departure(truth, setting, effects);
   }
-  const Views seen = views_of(setting, truth.needle, physics_of(effects, truth.departure));
+  Views seen = views_of(setting, truth.needle, physics_of(effects, truth.departure));
   for (std::size_t i = 0; i < effects.size(); ++i) {
     auto others = effects;
     others.erase(others.begin() + static_cast<std::ptrdiff_t>(i));
@@ -215,6 +215,8 @@ Trial draw_trial(std::uint64_t seed, int number) {
   }
   const Views seen =
       truth.beam ? conceal_in_beam(truth, setting, random) : conceal_in_kinematics(truth, setting, random);
+  if (truth.entries.size() == 1 && truth.entries[0].effect.name == "unknown" && truth.visible_sigmas >= kVisible_sigmas)
+    truth.rivals = find_rivals(setting, seen, truth.needle, kVisible_sigmas);
   truth.believed = mistaken(truth.needle, random);
   for (std::size_t i = 0; i < seen.size(); ++i)
     trial.recordings[i].reported_mm = seen[i] + trial.recordings[i].frames.noise_mm;

@@ -27,6 +27,7 @@ struct Truth {
   bool rich = true;   // scripts that excite everything
   std::vector<TruthEntry> entries;
   double visible_sigmas = 0;    // of all together
+  std::vector<Rival> rivals;    // listed effects that imitate the one unlisted, below kVisible_sigmas of difference
   double departure = 1;         // of the forms, see HiddenPhysics
   double departure_sigmas = 0;  // what of it could be seen
   double ripple_sigmas = 0;     // what of the drives' periodic errors could be seen

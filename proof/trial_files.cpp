@@ -69,9 +69,9 @@ void add_commands(std::vector<Event>& events, const Script& script) {
   std::int64_t seq = 0;
   double start_s = 0;
   for (const Segment& segment : script.segments) {
-    for (double t = 0; t < segment.duration_s; t += kCommandPeriod_s) {
+    for (int i = 0; i * kCommandPeriod_s < segment.duration_s; ++i) {
       model::MotionCommand command;
-      command.utime = kFirst_utime + microseconds(start_s + t);
+      command.utime = kFirst_utime + microseconds(start_s + i * kCommandPeriod_s);
       command.seq = seq++;
       command.mode = 1;
       command.insertion_rate_mm_s = segment.insertion_rate_mm_s;
@@ -176,8 +176,10 @@ std::string truth_json(const Truth& truth) {
          {"believed", as_json(truth.believed)},
          {"noise", as_json(truth.noise)},
          {"ripple", as_json(truth.ripple)},
-         {"effects", json::array()}};
+         {"effects", json::array()},
+         {"rivals", json::array()}};
   for (const TruthEntry& entry : truth.entries) j["effects"].push_back(as_json(entry));
+  for (const Rival& rival : truth.rivals) j["rivals"].push_back({{"name", rival.name}, {"sigmas", rival.sigmas}});
   if (truth.beam_config)
     j["beam"] = {{"foundation_modulus_kPa", truth.beam_config->foundation_modulus_kPa},
                  {"bevel_force_N", truth.beam_config->bevel_force_N},
@@ -234,7 +236,7 @@ bool prepare_trial(const fs::path& out, std::uint64_t seed, int number) {
 std::string open_truth(const TrialFolders& folders) {
   const json sealed = json::parse(read_text(folders.truth));
   const json commitment = json::parse(read_text(folders.commitment));
-  const std::string truth = sealed.at("truth");
+  std::string truth = sealed.at("truth");
   if (commitment_to(sealed.at("salt").get<std::string>(), truth) != commitment.at("sha256_of_salt_and_truth"))
     throw std::runtime_error(folders.truth.string() + ": not the truth that " + folders.commitment.string() +
                              " commits to");

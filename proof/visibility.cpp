@@ -1,12 +1,14 @@
 #include "proof/visibility.hpp"
 
-#include <Eigen/Cholesky>
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <limits>
 #include <numbers>
 #include <optional>
 #include <stdexcept>
+
+#include "proof/bounded_fit.hpp"
 
 namespace bevel::proof {
 namespace {
@@ -27,26 +29,12 @@ Point point_of(const BaseNeedle& needle) {
   return p.cwiseMax(kLowest).cwiseMin(kHighest);
 }
 
-BaseNeedle needle_at(const Point& p, const BaseNeedle& like) {
+BaseNeedle needle_at(const Eigen::VectorXd& p, const BaseNeedle& like) {
   BaseNeedle needle = like;
   needle.curvature_per_mm = p(0);
   needle.lambda1_per_rad = least_lambda1(p(2)) + p(1);
   needle.lambda2 = p(2);
   return needle;
-}
-
-// The damped step; what stands at a bound and wants beyond stays there.
-Point step_from(const Point& p, Eigen::Matrix3d normal, Point gradient, double damping) {
-  normal.diagonal() *= 1.0 + damping;
-  for (Eigen::Index j = 0; j < 3; ++j) {
-    const bool stays = (p(j) <= kLowest(j) && gradient(j) > 0) || (p(j) >= kHighest(j) && gradient(j) < 0);
-    if (!stays) continue;
-    normal.row(j).setZero();
-    normal.col(j).setZero();
-    normal(j, j) = 1.0;
-    gradient(j) = 0.0;
-  }
-  return (p - normal.ldlt().solve(gradient)).cwiseMax(kLowest).cwiseMin(kHighest);
 }
 
 std::optional<Eigen::VectorXd> misfit(const Setting& setting, const Views& seen, const BaseNeedle& needle,
@@ -83,42 +71,51 @@ Eigen::VectorXd whitened_difference(const Setting& setting, const Views& a, cons
 }
 
 Refit refit_base(const Setting& setting, const Views& seen, const BaseNeedle& start, const HiddenPhysics& known) {
-  Point point = point_of(start);
-  const auto misfit_at = [&](const Point& p) { return misfit(setting, seen, needle_at(p, start), known); };
-  auto residual = misfit_at(point);
-  if (!residual) throw std::domain_error("the refit starts outside the model's domain");
-  bool converged = false;
-  double damping = 1e-6;
-  for (int iteration = 0; iteration < 40 && !converged; ++iteration) {
-    Eigen::MatrixXd jacobian(residual->size(), 3);
-    for (Eigen::Index j = 0; j < 3; ++j) {
-      Point moved = point;
-      const double probe = kProbe[static_cast<std::size_t>(j)] * (point(j) >= kHighest(j) ? -1.0 : 1.0);
-      moved(j) += probe;
-      const auto there = misfit_at(moved);
-      if (!there) return {needle_at(point, start), residual->norm(), false};
-      jacobian.col(j) = (*there - *residual) / probe;
+  const BoundedProblem problem{
+      [&](const Eigen::VectorXd& x) { return misfit(setting, seen, needle_at(x, start), known); }, kLowest, kHighest,
+      Point(kProbe.data())};
+  const BoundedFit fit = fit_in_box(problem, point_of(start), 40, std::numeric_limits<double>::infinity());
+  return {needle_at(fit.point, start), fit.norm, fit.converged};
+}
+
+std::vector<Rival> find_rivals(const Setting& setting, const Views& seen, const BaseNeedle& start,
+                               double limit_sigmas) {
+  std::vector<Rival> rivals;
+  for (const EffectKind& kind : catalogue()) {
+    // Instants and phases of single recordings are not searched: neither imitates what lasts through all recordings.
+    const std::string name = kind.name;
+    if (!kind.listed || name == "lost_steps" || name == "tissue_motion") continue;
+    const auto& parameters = kind.parameters;
+    const auto own = static_cast<Eigen::Index>(name == "slip_direction" ? 0 : parameters.size());
+    const auto physics_at = [&](const Eigen::VectorXd& x) {
+      HiddenPhysics physics;
+      physics.departure = 0;
+      if (own == 0) physics.other_slip = 1;
+      for (Eigen::Index j = 0; j < own; ++j) physics.*parameters[static_cast<std::size_t>(j)].slot = x(3 + j);
+      return physics;
+    };
+    BoundedProblem problem{
+        [&](const Eigen::VectorXd& x) { return misfit(setting, seen, needle_at(x.head<3>(), start), physics_at(x)); },
+        Eigen::VectorXd(3 + own), Eigen::VectorXd(3 + own), Eigen::VectorXd(3 + own)};
+    problem.lowest.head<3>() = kLowest;
+    problem.highest.head<3>() = kHighest;
+    problem.probe.head<3>() = Point(kProbe.data());
+    Eigen::VectorXd from(3 + own);
+    from.head<3>() = point_of(start);
+    for (Eigen::Index j = 0; j < own; ++j) {
+      const ParameterRange& range = parameters[static_cast<std::size_t>(j)];
+      const double reach = std::max(std::abs(range.high - range.neutral), std::abs(range.low - range.neutral));
+      const bool from_zero = range.is_size && !range.either_sign && range.neutral == 0;
+      problem.lowest(3 + j) = !range.is_size ? 0.3 * range.low : from_zero ? 0.0 : range.neutral - 3 * reach;
+      problem.highest(3 + j) = range.is_size ? range.neutral + 3 * reach : 2 * range.high;
+      if (range.neutral == 1) problem.lowest(3 + j) = std::max(problem.lowest(3 + j), 0.2);
+      problem.probe(3 + j) = 2e-3 * (range.is_size ? reach : range.high);
+      from(3 + j) = range.is_size ? range.neutral + 0.2 * reach : 0.5 * (range.low + range.high);
     }
-    const Eigen::Matrix3d normal = jacobian.transpose() * jacobian;
-    const Point gradient = jacobian.transpose() * *residual;
-    const double before = residual->squaredNorm();
-    bool better = false;
-    for (int attempt = 0; attempt < 12 && !better; ++attempt) {
-      const Point moved = step_from(point, normal, gradient, damping);
-      const auto there = misfit_at(moved);
-      better = there && there->squaredNorm() < before;
-      if (better) {
-        point = moved;
-        residual = there;
-      } else {
-        damping *= 10.0;
-      }
-    }
-    // A hundredth of a unit of chi-square is nothing to anybody; of a step held short it says nothing.
-    converged = !better || (before - residual->squaredNorm() < 1e-2 && damping < 1e-2);
-    damping = std::max(damping * 0.03, 1e-9);
+    const BoundedFit fit = fit_in_box(problem, from, 15, 6 * limit_sigmas);
+    if (fit.norm < limit_sigmas) rivals.push_back({name, fit.norm});
   }
-  return {needle_at(point, start), residual->norm(), converged};
+  return rivals;
 }
 
 BaseTangent::BaseTangent(const Setting& setting, const BaseNeedle& needle, const HiddenPhysics& physics) {

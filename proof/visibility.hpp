@@ -3,6 +3,7 @@
 // cannot absorb, in standard deviations of the coloured noise, summed over a trial (the root of the sum of squares of
 // the whitened difference).
 #include <Eigen/Core>
+#include <string>
 #include <vector>
 
 #include "proof/camera_noise.hpp"
@@ -30,6 +31,14 @@ struct Refit {
 };
 // Gauss-Newton with finite differences: the needle that comes closest to `seen`, `known` physics given.
 Refit refit_base(const Setting& setting, const Views& seen, const BaseNeedle& start, const HiddenPhysics& known);
+
+// A listed effect (plain form, k, lambda1, lambda2 refitted along with its own parameters) that comes closer to `seen`
+// than `limit_sigmas`: from these recordings nobody can tell it from what was really concealed.
+struct Rival {
+  std::string name;
+  double sigmas;
+};
+std::vector<Rival> find_rivals(const Setting& setting, const Views& seen, const BaseNeedle& start, double limit_sigmas);
 
 // Part of a whitened difference that no small change of k, lambda1, lambda2 makes.
 class BaseTangent {

@@ -93,6 +93,20 @@ TEST(Score, UnknownEffects) {
   EXPECT_FALSE(score(truth_of({}), "unknown-effect", {}).strict);
 }
 
+// What no tool could know better counts apart, and only if nothing else was said.
+TEST(Score, ARivalOfAnUnlistedEffect) {
+  OpenedTruth unlisted = truth_of({screw()});
+  unlisted.rivals = {"camera_latency"};
+  const TrialScore s = score(unlisted, "effects-found", {effect("camera_latency")});
+  EXPECT_FALSE(s.strict);
+  EXPECT_TRUE(s.lenient);
+  EXPECT_FALSE(score(unlisted, "effects-found", {effect("layer")}).lenient);
+  EXPECT_FALSE(score(unlisted, "effects-found", {effect("camera_latency"), effect("layer")}).lenient);
+  EXPECT_FALSE(score(unlisted, "nothing-missing", {}).lenient);
+  EXPECT_EQ(tally({s}).unknown_called_unknown.of, 1);
+  EXPECT_EQ(tally({s}).unknown_distinct.of, 0);
+}
+
 TEST(Score, ProbabilityOfTheTruth) {
   const OpenedTruth one = truth_of({windup()});
   EXPECT_NEAR(score(one, "effects-found", {effect("torsional_windup", 0.8)}).probability_of_truth, 0.8, 1e-12);

@@ -4,6 +4,9 @@
 #include <gmock/gmock.h>
 
 #include <cmath>
+#include <map>
+
+#include "proof/bounded_fit.hpp"
 
 namespace bevel::proof {
 namespace {
@@ -108,6 +111,36 @@ TEST(Visibility, TheRefitFollowsTheEdgeOfTheDomain) {
     }
     EXPECT_GT(best, refit.sigmas - 0.01) << change;
   }
+}
+
+// min (x - 3)^2 + (x + y)^2 with x <= 2: x at its bound, y = -2.
+TEST(BoundedFit, MovesAlongABound) {
+  BoundedProblem problem{
+      [](const Eigen::VectorXd& x) -> std::optional<Eigen::VectorXd> { return Eigen::Vector2d(x(0) - 3, x(0) + x(1)); },
+      Eigen::Vector2d(-5, -5), Eigen::Vector2d(2, 5), Eigen::Vector2d(1e-4, 1e-4)};
+  const BoundedFit fit = fit_in_box(problem, Eigen::Vector2d(0, 4), 30, 1e9);
+  EXPECT_TRUE(fit.converged);
+  EXPECT_NEAR(fit.point(0), 2, 1e-6);
+  EXPECT_NEAR(fit.point(1), -2, 1e-4);
+  EXPECT_NEAR(fit.norm, 1, 1e-6);
+}
+
+// What is a listed effect imitates itself, to nothing left; what does not turn cannot be backlash.
+TEST(Rivals, AListedEffectIsItsOwnRival) {
+  Setting setting = straight_setting({});
+  setting.motions.pop_back();
+  setting.frames.pop_back();
+  setting.whiteners.pop_back();
+  HiddenPhysics slip;
+  slip.departure = 0;
+  slip.insertion_ratio = 0.96;
+  const auto rivals = find_rivals(setting, views_of(setting, {}, slip), {}, 5.0);
+  std::map<std::string, double> by_name;
+  for (const Rival& rival : rivals) by_name[rival.name] = rival.sigmas;
+  ASSERT_TRUE(by_name.contains("insertion_scale"));
+  EXPECT_LT(by_name["insertion_scale"], 0.5);
+  EXPECT_FALSE(by_name.contains("rotation_backlash"));
+  EXPECT_FALSE(by_name.contains("camera_latency"));
 }
 
 }  // namespace
