@@ -32,8 +32,8 @@ struct Estimate {
 
 class NeedleEstimator {
  public:
-  // history: number of nodes kept; at 100 Hz of actuators and 2 x 30 Hz of cameras 256 nodes are 1.6 s.
-  explicit NeedleEstimator(const EstimatorConfig& config, std::size_t history = 256);
+  // history: number of nodes kept; at 100 Hz of actuators and 2 x 30 Hz of cameras 128 nodes are 0.8 s.
+  explicit NeedleEstimator(const EstimatorConfig& config, std::size_t history = 128);
 
   void add(const model::ActuatorState& actuator);
   void add(const model::TipMeasurement& measurement);
@@ -57,8 +57,8 @@ class NeedleEstimator {
   const NeedleFilter& filter() const { return filter_; }
 
  private:
-  static constexpr std::size_t kFirstRelinearisation = 64;
-  static constexpr double kMovedShare = 0.4;  // of a parameter's prior standard deviation since it was last done
+  static constexpr std::size_t kFirstRelinearisation = 20;
+  static constexpr double kMovedShare = 0.3;  // of a parameter's prior standard deviation since it was last done
   enum class Kind : std::uint8_t { actuator, measurement };
   struct Node {
     std::int64_t utime = 0;
@@ -66,6 +66,7 @@ class NeedleEstimator {
     bool applied_before = false;
     double insertion_mm = 0;
     double rotation_rad = 0;
+    Eigen::Vector3d moved_mm = Eigen::Vector3d::Zero();  // of the tip since the node before, by the model
     model::TipMeasurement measurement;
     FilterState state;
     Update update;
@@ -77,6 +78,7 @@ class NeedleEstimator {
   void process_from(std::size_t index);
   void drop_oldest();
   void remember(const Node& before, const Node& node);
+  static bool merge(PastStep& last, const PastStep& step, const Eigen::Matrix3d& R_before, const Node& node);
   void relinearise_if_due();
   void interpolate(std::size_t index);
 
@@ -87,6 +89,7 @@ class NeedleEstimator {
   std::size_t processed_ = 0;   // nodes before this index hold a posterior
   FilterState past_start_;      // before the first step of past_
   std::vector<PastStep> past_;  // what has left the history, from its start or the last reset; reserved once
+  std::vector<Eigen::Vector3d> past_room_;        // for NeedleFilter::relinearise
   std::size_t past_due_ = kFirstRelinearisation;  // number of steps at which they are run again
   model::NeedleParameters past_needle_;           // of the newest linearisation
   bool past_complete_ = true;                     // false once past_ was full

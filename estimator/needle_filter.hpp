@@ -41,12 +41,14 @@ struct Update {
       Eigen::Vector3d::Zero();  // L^-1 innovation, S = L L^T: unit variance if all is right
 };
 
-// One step of the past, as relinearise() needs it: increments since the step before it, then perhaps a measurement.
+// One step of the past, as relinearise() needs it: increments since the step before it, then perhaps what was measured
+// on the way, as one reading of a point that stands still in the body.
 struct PastStep {
   double insertion_mm = 0;
   double rotation_rad = 0;
   bool measured = false;  // and accepted by the gate at its time
   Eigen::Vector3d position_mm = Eigen::Vector3d::Zero();
+  Eigen::Vector3d point_mm = Eigen::Vector3d::Zero();  // in {B} at the end of the step: where the tip was when measured
   Eigen::Matrix3d information_per_mm2 = Eigen::Matrix3d::Zero();
 };
 
@@ -68,15 +70,23 @@ class NeedleFilter {
   // it. This runs the steps since `start` (the state before the first of them) again, with all derivatives taken on
   // the path which leads, by the model with the parameters of `state`, to the pose of `state`; `state` is the estimate
   // after the last step and is replaced by the result. False, and nothing changed, where the model has no answer or the
-  // path would not come nearer to the measurements.
+  // path would not come nearer to the measurements. `room` has a place for each step and is written over.
   // Iterated Kalman filter over a window, cf. Bell and Cathey 1993, IEEE TAC 38(2): a Gauss-Newton step of the batch.
-  bool relinearise(FilterState& state, const FilterState& start, std::span<const PastStep> steps) const;
+  // The posterior is a bent ridge where data leave k and lambda to trade off: mean and covariance follow the bend to
+  // second order along its length, as a second-order filter's do (Jazwinski 1970, section 9.3).
+  bool relinearise(FilterState& state, const FilterState& start, std::span<const PastStep> steps,
+                   std::span<Eigen::Vector3d> room) const;
 
   const EstimatorConfig& config() const { return config_; }
 
  private:
+  template <class Visit>
+  bool walk_back(const FilterState& state, std::span<const PastStep> steps, model::Pose& entry, Visit&& visit) const;
   double path_cost(const FilterState& state, const FilterState& start, std::span<const PastStep> steps,
                    model::Pose& entry) const;
+  bool bend(const FilterState& state, const FilterState& start, std::span<const PastStep> steps,
+            std::span<Eigen::Vector3d> room, Vector9d& along, Vector9d& start_bend) const;
+  void shift(FilterState& state, const Vector9d& error, const Matrix9d& covariance) const;
   Vector9d process_variance(const Matrix9d& covariance, double insertion_mm, double rotation_rad) const;
   void keep_in_domain(FilterState& state) const;
   void declare_reset(FilterState& state) const;

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <chrono>
 #include <cmath>
+#include <ctime>
 
 #include "io/checked_decode.hpp"
 #include "io/messages.hpp"
@@ -11,6 +12,13 @@ namespace bevel::replay {
 namespace {
 
 double square(double x) { return x * x; }
+
+// Of this thread: what the work costs, whatever else the machine does.
+double processor_s() {
+  timespec now{};
+  clock_gettime(CLOCK_THREAD_CPUTIME_ID, &now);
+  return static_cast<double>(now.tv_sec) + 1e-9 * static_cast<double>(now.tv_nsec);
+}
 
 struct Sink {
   std::vector<InnovationRow>* rows;
@@ -118,6 +126,7 @@ Replay replay_log(std::span<const std::uint8_t> log, const std::string& name, co
   estimator.observe(&Sink::take, &sink);
 
   const auto start = std::chrono::steady_clock::now();
+  const double start_processor_s = processor_s();
   io::LogReader reader(log);
   while (const auto event = reader.next()) {
     if (event->channel == io::channel::kActuatorState) {
@@ -144,6 +153,7 @@ Replay replay_log(std::span<const std::uint8_t> log, const std::string& name, co
       message ? truths.push_back(*message) : void(++result.refused_messages);
     }
   }
+  result.processor_s = processor_s() - start_processor_s;
   result.run_s = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
   result.damage = reader.damage();
   result.counters = estimator.counters();

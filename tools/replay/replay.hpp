@@ -56,11 +56,12 @@ struct Replay {
   TruthFigures truth;  // count 0: the log has no NEEDLE_TRUTH
   double log_s = 0;    // newest minus oldest actuator state
   double run_s = 0;    // wall time of decoding and estimating
+  double processor_s = 0;
   estimator::EstimatorConfig config;
 };
 
 struct ReplayOptions {
-  std::size_t history = 256;
+  std::size_t history = 128;
   // Replaces each measurement's information by that of this noise, per axis; empty: as the camera says.
   std::vector<NoiseColour> noise_by_axis;
 };

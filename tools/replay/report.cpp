@@ -193,10 +193,13 @@ void print(std::ostream& out, const Replay& replay, double ahead_mm) {
 }
 
 void print_speed(std::ostream& out, const std::vector<Replay>& replays) {
-  double log_s = 0, run_s = 0;
-  for (const Replay& r : replays) log_s += r.log_s, run_s += r.run_s;
-  out << text_of("%zu logs, %.1f s recorded, %.4f s decoding and estimating: %.0f times real time on one core\n",
-                 replays.size(), log_s, run_s, run_s > 0 ? log_s / run_s : 0.0);
+  double log_s = 0, run_s = 0, processor_s = 0;
+  for (const Replay& r : replays) log_s += r.log_s, run_s += r.run_s, processor_s += r.processor_s;
+  const auto times = [log_s](double s) { return s > 0 ? log_s / s : 0.0; };
+  out << text_of(
+      "%zu logs, %.1f s recorded, %.4f s decoding and estimating: %.0f times real time on one core (%.0f by processor "
+      "time)\n",
+      replays.size(), log_s, run_s, times(run_s), times(processor_s));
 }
 
 void write_files(const Replay& replay, const std::string& folder) {
