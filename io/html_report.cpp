@@ -24,13 +24,13 @@ table { border-collapse: collapse; margin: 1rem 0; font-size: .92rem; font-varia
 th, td { padding: .3rem .8rem; border-bottom: 1px solid var(--line); text-align: left; vertical-align: top; }
 th { border-bottom: 2px solid #999; font-weight: 600; } .number { text-align: right; }
 pre { background: #f6f6f6; padding: .8rem 1rem; overflow-x: auto; font-size: .85rem; line-height: 1.4; }
-.callout { border-left: 5px solid #777; background: #f6f6f6; padding: .7rem 1rem; margin: 1rem 0; }
+.callout { border-left: 5px solid #1f6fb2; background: #f0f5fa; padding: .7rem 1rem; margin: 1rem 0; }
 .callout strong { display: block; } .callout.good { border-color: #2a8c6b; background: #eef7f3; }
 .callout.warning { border-color: #b8912a; background: #fbf6e8; } .callout.bad { border-color: #b23a2e; background: #fbeeec; }
 .facts { display: flex; flex-wrap: wrap; gap: .7rem; margin: 1.1rem 0; }
-.facts div { flex: 1 1 8rem; border: 1px solid var(--line); border-radius: 6px; padding: .55rem .8rem; }
+.facts div { flex: 1 1 6.5rem; border: 1px solid var(--line); border-radius: 6px; padding: .55rem .8rem; }
 .facts span { display: block; color: var(--soft); font-size: .82rem; line-height: 1.35; }
-.facts b { display: block; font-size: 1.25rem; font-weight: 600; line-height: 1.4; }
+.facts b { display: block; font-size: 1.12rem; font-weight: 600; line-height: 1.5; white-space: nowrap; }
 details { margin: .8rem 0; } summary { cursor: pointer; color: #1f5f99; }
 @media print { body { margin: 0; max-width: none; } figure, table { break-inside: avoid; } }
 )";

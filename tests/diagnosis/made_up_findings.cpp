@@ -5,23 +5,16 @@
 #include <random>
 
 #include "diagnosis/mismatch/recorded_case.hpp"
-#include "tests/effects/script.hpp"
+#include "tests/diagnosis/recorded_logs.hpp"
 
 namespace bevel::diagnosis::testing {
 namespace {
 
 using model::testing::active;
 using model::testing::path_of;
-using model::testing::Script;
 
 constexpr double kNone = std::numeric_limits<double>::quiet_NaN();
 constexpr double kSigma_mm = 0.15;
-
-Script script_of(int recording) {
-  const double turn = 2.0 + 0.4 * recording;
-  return {{1.0, 10, 0.4}, {0.4, 10, turn}, {1.6, 8, 0},  {0.6, 0, -turn},     {2.0, 12, 0}, {0.3, 6, turn},
-          {0.9, 6, 0},    {1.5, 0, 0},     {1.2, 10, 0}, {0.5, 9, -2 * turn}, {1.6, 10, 0}, {0.5, -10, 0}};
-}
 
 Trace trace_of(int recording, const model::NeedleParameters& needle, const std::vector<model::ActiveEffect>& effects,
                bool explained, std::mt19937_64& random) {

@@ -46,7 +46,7 @@ TEST(Page, effects_found_names_them_with_sizes_and_rivals) {
 TEST(Page, nothing_missing_points_to_what_would_have_been_seen) {
   const std::string html = page_of(Verdict::nothing_missing, "page-nothing-missing.html");
   expect_sound(html);
-  EXPECT_THAT(html, HasSubstr("cannot be shown by these recordings"));
+  EXPECT_THAT(html, HasSubstr("no size in reach"));
   EXPECT_THAT(html, HasSubstr("Nothing above the sizes listed"));
   EXPECT_THAT(html, Not(HasSubstr("Where it goes wrong</h2>")));
 }

@@ -45,8 +45,8 @@ void draw_cell(Drawing& drawing, const Box& cell, double value, const std::strin
   }
   drawing.rectangle({cell.left + 0.5, cell.top + 0.5, cell.width - 1, cell.height - 1}, shade(value), 1, hint);
   if (value < kWorthANumber) return;
-  // ".97": the zero would not fit.
-  const std::string text = value >= 0.995 ? "1" : number(value, 2).substr(1);
+  const int hundredths = static_cast<int>(std::lround(100 * value));  // ".97": the zero would not fit
+  const std::string text = hundredths >= 100 ? "1" : "." + std::to_string(hundredths);
   drawing.text({cell.left + cell.width / 2, cell.top + cell.height / 2 + 4}, text,
                {.anchor = Lettering::Anchor::middle, .size = 10, .colour = value > 0.65 ? "#ffffff" : ink::kText});
 }

@@ -128,14 +128,17 @@ std::vector<double> ticks(const Axis& axis, int count) {
     for (double power = low; power <= high; power += step) all.push_back(std::pow(10.0, power));
     return all;
   }
-  const double rough = (axis.high - axis.low) / count;
-  const double power = std::pow(10.0, std::floor(std::log10(rough)));
-  double step = 10 * power;
-  for (const double nice : {1.0, 2.0, 5.0})
-    if (nice * power >= rough * 0.9) {
+  // Of the round steps, the one whose number of ticks comes nearest.
+  const double power = std::pow(10.0, std::floor(std::log10((axis.high - axis.low) / count)));
+  double step = power;
+  double miss = INFINITY;
+  for (const double nice : {1.0, 2.0, 5.0, 10.0}) {
+    const double fits = (axis.high - axis.low) / (nice * power);
+    if (const double off = std::abs(std::log(fits / count)); off < miss) {
+      miss = off;
       step = nice * power;
-      break;
     }
+  }
   for (double i = std::ceil(axis.low / step - 1e-9); i * step <= axis.high + 1e-9 * step; ++i) all.push_back(i * step);
   return all;
 }
@@ -143,17 +146,19 @@ std::vector<double> ticks(const Axis& axis, int count) {
 Panel::Panel(Drawing& drawing, const Box& box, Axis x, Axis y, std::string_view title)
     : drawing_(drawing), box_(box), x_(std::move(x)), y_(std::move(y)) {
   const Lettering small{.anchor = Lettering::Anchor::middle, .size = 11, .colour = ink::kSoft};
-  const int across = std::max(2, static_cast<int>(box_.width / 60));
-  const int upward = std::max(2, static_cast<int>(box_.height / 36));
+  const int across = std::max(3, static_cast<int>(box_.width / 60));
+  const int upward = std::max(3, static_cast<int>(box_.height / 32));
   for (const double v : ticks(x_, across)) {
     const double left = at(v, y_.low).x;
     drawing_.line({left, box_.top}, {left, box_.bottom()}, {.colour = ink::kGrid});
     drawing_.text({left, box_.bottom() + 14}, number(v, 4), small);
   }
-  for (const double v : ticks(y_, upward)) {
+  double widest = 0;
+  for (const double v : y_.ruled ? ticks(y_, upward) : std::vector<double>{}) {
     const double top = at(x_.low, v).y;
     drawing_.line({box_.left, top}, {box_.right(), top}, {.colour = ink::kGrid});
     if (!y_.numbered) continue;
+    widest = std::max(widest, width_of(number(v, 4), 11));
     drawing_.text({box_.left - 5, top + 4}, number(v, 4),
                   {.anchor = Lettering::Anchor::end, .size = 11, .colour = ink::kSoft});
   }
@@ -163,7 +168,7 @@ Panel::Panel(Drawing& drawing, const Box& box, Axis x, Axis y, std::string_view 
   if (!y_.label.empty()) {
     Lettering turned = small;
     turned.turned_deg = -90;
-    drawing_.text({box_.left - 36, box_.top + box_.height / 2}, y_.label, turned);
+    drawing_.text({box_.left - 13 - widest, box_.top + box_.height / 2}, y_.label, turned);
   }
   if (!title.empty()) drawing_.text({box_.left, box_.top - 7}, title, {.size = 12, .bold = true});
 }

@@ -74,6 +74,7 @@ struct Axis {
   std::string label;
   bool logarithmic = false;
   bool numbered = true;
+  bool ruled = true;  // lines across the panel at its ticks; numbers go with them
 };
 // Around all finite values, with a little room; of equal values, around them.
 Axis axis_around(const std::vector<double>& values, std::string label);

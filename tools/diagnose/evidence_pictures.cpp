@@ -1,6 +1,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "diagnosis/mismatch/selection.hpp"
 #include "model/effects/effect.hpp"
 #include "tools/diagnose/drawing.hpp"
 #include "tools/diagnose/figures.hpp"
@@ -23,6 +24,9 @@ bool was_found(const Findings& findings, const std::string& name) {
   return std::any_of(findings.effects.begin(), findings.effects.end(), [&](const auto& e) { return e.name == name; });
 }
 
+// What an addition has to bring: more than the luckiest by chance, and enough to be visible.
+double mark_of(const TriedEffect& t) { return std::max(t.threshold, t.chance + kVisibleSigmas * kVisibleSigmas); }
+
 // Below one the logarithm says nothing: a bar that short is none.
 double shown(double gain) { return std::isfinite(gain) ? std::max(gain, 1.0) : 1.0; }
 
@@ -32,18 +36,18 @@ std::string ranking_picture(const Findings& findings, const std::vector<TriedEff
   if (tried.empty()) return "";
   constexpr double kRow = 22;
   double most = 100;
-  for (const auto& t : tried) most = std::max({most, shown(t.gain), shown(t.threshold)});
+  for (const auto& t : tried) most = std::max({most, shown(t.gain), shown(mark_of(t))});
   const Axis gain{1, std::pow(10.0, std::ceil(std::log10(most * 1.05))), "fall of chi2 (logarithmic)", true};
   const double height = kRow * static_cast<double>(tried.size());
   Drawing drawing(832, 34 + height + 40);
   draw_keys(drawing, {kNames, 14},
             {{ink::kAfter, "found"},
-             {"#8db8dc", "better than chance, but another explains more"},
-             {"#c9c9c9", "no better than chance"},
-             {"#111111", "chance reaches this in 1 of 100"}});
+             {"#8db8dc", "passes, but another explains more"},
+             {"#c9c9c9", "does not pass"},
+             {"#111111", "mark: to be passed"}});
   const Box box{kNames, 30, 590, height};
   Axis upward{0, 1, ""};
-  upward.numbered = false;
+  upward.ruled = false;
   const Panel panel(drawing, box, gain, upward);
   for (std::size_t i = 0; i < tried.size(); ++i) {
     const TriedEffect& t = tried[i];
@@ -54,16 +58,14 @@ std::string ranking_picture(const Findings& findings, const std::vector<TriedEff
                       found      ? ink::kAfter
                       : t.passes ? "#8db8dc"
                                  : "#c9c9c9",
-                      1, t.name + ": gain " + number(t.gain, 4) + ", threshold " + number(t.threshold, 3));
-    if (t.threshold > 1) {
-      const double mark = panel.at(shown(t.threshold), 0).x;
+                      1, t.name + ": fall of chi2 " + number(t.gain) + ", to be passed " + number(mark_of(t)));
+    if (mark_of(t) > 1) {
+      const double mark = panel.at(mark_of(t), 0).x;
       drawing.line({mark, top + 2}, {mark, top + kRow - 2}, {.colour = "#111111", .width = 2});
     }
     drawing.text({box.left - 8, top + 16}, t.name, name_lettering(found));
-    drawing.text({box.right() + 10, top + 16}, number(t.gain, t.gain < 1000 ? 3 : 6),
-                 {.size = 11, .colour = ink::kSoft});
+    drawing.text({box.right() + 10, top + 16}, number(t.gain), {.size = 11, .colour = ink::kSoft});
   }
-  drawing.text({box.right() + 10, box.top - 8}, "fall", {.size = 11, .colour = ink::kSoft});
   return drawing.svg();
 }
 
@@ -85,7 +87,7 @@ void draw_pairs(Drawing& drawing, const Box& box, const HeldOut& held_out, doubl
   // Recordings that differ by decades are told apart on a logarithm only.
   if (most > 30 * least) across = {least / 1.5, most * 1.5, label + ", logarithmic", true};
   Axis upward{0, 1, ""};
-  upward.numbered = false;
+  upward.ruled = false;
   const Panel panel(drawing, box, across, upward);
   const double row = box.height / static_cast<double>(held_out.recordings.size());
   for (std::size_t i = 0; i < held_out.recordings.size(); ++i) {
@@ -160,7 +162,7 @@ std::vector<IntervalRow> interval_rows(const Findings& findings) {
 std::string interval_picture(const Findings& findings) {
   const auto rows = interval_rows(findings);
   if (rows.empty()) return "";
-  constexpr double kRow = 42;
+  constexpr double kRow = 46;
   constexpr double kLeft = 330;
   constexpr double kWide = 300;
   Drawing drawing(832, 24 + kRow * static_cast<double>(rows.size()));
@@ -168,7 +170,7 @@ std::string interval_picture(const Findings& findings) {
   for (std::size_t i = 0; i < rows.size(); ++i) {
     const auto& [effect, name, p, none] = rows[i];
     const double y = 40 + kRow * static_cast<double>(i);
-    if (i > 0 && !effect.empty()) drawing.line({0, y - kRow / 2 - 4}, {832, y - kRow / 2 - 4}, {.colour = ink::kGrid});
+    if (i > 0 && !effect.empty()) drawing.line({0, y - 17}, {832, y - 17}, {.colour = ink::kGrid});
     drawing.text({0, y + 4}, effect, {.size = kNameSize, .bold = true});
     drawing.text({kLeft - 14, y + 4}, name, name_lettering());
     std::vector<double> ends{p.value, p.ci95[0], p.ci95[1]};
@@ -191,7 +193,8 @@ std::string interval_picture(const Findings& findings) {
     for (const double end : {low, high})
       drawing.line({x_of(end), y - 5}, {x_of(end), y + 5}, {.colour = ink::kAfter, .width = 1.5});
     drawing.dots({{x_of(p.value), y}}, 4.5, ink::kAfter);
-    drawing.text({kLeft + kWide + 16, y + 4}, with_error(p.value, p.std_error) + (p.at_bound ? "  at its bound" : ""));
+    drawing.text({kLeft + kWide + 16, y}, with_error(p.value, p.std_error) + (p.at_bound ? "  at its bound" : ""));
+    drawing.text({kLeft + kWide + 16, y + 15}, "95 %: " + interval(p.ci95), {.size = 11, .colour = ink::kSoft});
   }
   return drawing.svg();
 }

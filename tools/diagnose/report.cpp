@@ -84,14 +84,15 @@ void add_verdict(io::HtmlReport& page, const Findings& f) {
       {"held-out error",
        number(f.held_out.before.rmse_mm) + (f.effects.empty() ? "" : " → " + number(f.held_out.after.rmse_mm)) + " mm",
        "rms, largest " + number(f.effects.empty() ? f.held_out.before.max_mm : f.held_out.after.max_mm) + " mm"});
-  facts.push_back({"held-out chi2 per reading",
+  facts.push_back({"chi2 per reading",
                    number(f.held_out.before.chi2_per_dof) +
                        (f.effects.empty() ? "" : " → " + number(f.held_out.after.chi2_per_dof)),
-                   "1 is noise alone"});
+                   "held out; 1 is noise alone"});
   if (f.verdict == Verdict::unknown_effect)
     facts.push_back({"unexplained", percent(f.checks.unexplained_share), "of the mismatch"});
-  facts.push_back({"evidence", std::to_string(f.readings) + " readings",
-                   std::to_string(f.traces.size()) + " recordings, " + std::to_string(f.outliers) + " outliers"});
+  facts.push_back(
+      {"readings", std::to_string(f.readings),
+       "in " + std::to_string(f.traces.size()) + " recordings; " + std::to_string(f.outliers) + " outliers"});
   page.facts(facts);
 }
 

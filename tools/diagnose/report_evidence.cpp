@@ -1,7 +1,7 @@
 #include <algorithm>
 #include <cmath>
-#include <map>
 
+#include "model/effects/effect.hpp"
 #include "tools/diagnose/figures.hpp"
 #include "tools/diagnose/pictures.hpp"
 #include "tools/diagnose/report.hpp"
@@ -12,11 +12,34 @@ using namespace bevel::diagnosis;  // NOLINT(google-build-using-namespace)
 
 namespace {
 
-// What the diagnosis says of a size: what is ruled out, and what is not.
+// "0.055 rad"; "1 ± 0.13" where an effect vanishes at one.
 std::string reach_of(const DetectableSize& d) {
-  if (!std::isfinite(d.size)) return "cannot be shown by these recordings";
+  if (!std::isfinite(d.size)) return "no size in reach";
+  const model::Effect* effect = model::find_effect(d.effect);
+  double none = 0;
+  if (effect != nullptr)
+    for (const auto& p : effect->parameters())
+      if (p.name == d.parameter && std::isfinite(p.none)) none = p.none;
   const std::string unit = unit_of(d.parameter);
-  return number(d.size, 2) + (unit.empty() ? "" : " " + unit);
+  return (none == 0 ? "" : number(none) + " ± ") + number(d.size, 2) + (unit.empty() ? "" : " " + unit);
+}
+
+// The same motion often shows several effects: said once.
+std::vector<std::string> experiments_of(const std::vector<DetectableSize>& sizes) {
+  std::vector<std::pair<std::string, std::vector<std::string>>> by_motion;
+  for (const auto& d : sizes) {
+    if (d.experiment.empty()) continue;
+    auto at = std::find_if(by_motion.begin(), by_motion.end(), [&](const auto& m) { return m.first == d.experiment; });
+    if (at == by_motion.end()) at = by_motion.insert(by_motion.end(), {d.experiment, {}});
+    if (std::find(at->second.begin(), at->second.end(), d.effect) == at->second.end()) at->second.push_back(d.effect);
+  }
+  std::vector<std::string> lines;
+  for (const auto& [motion, effects] : by_motion) {
+    std::string line;
+    for (const auto& effect : effects) line += (line.empty() ? "" : ", ") + effect;
+    lines.push_back(line + ": " + motion);
+  }
+  return lines;
 }
 
 }  // namespace
@@ -26,24 +49,26 @@ void add_evidence(io::HtmlReport& page, const Findings& f) {
   page.heading("Every effect that was tried");
   page.paragraph(
       "Each effect was fitted alone, all its parameters and the needle's together, through the whole of every "
-      "recording. The bar is how much better it then explains them. The black mark is what the luckiest of all these "
-      "effects reaches by chance in 1 of 100 recordings without any effect, by simulation: only a bar beyond it "
-      "counts.");
+      "recording. The bar is how much better it then explains them. The black mark is what it has to pass: what the "
+      "luckiest of all these effects reaches by chance in 1 of 100 simulated cases without any effect, and at least "
+      "five standard deviations.");
   page.figure_svg(ranking_picture(f, f.tried),
                   "Effects fitted alone, best first. Several may pass because they look alike; the best explanation is "
                   "kept and the others are then tried beside it.");
   if (!f.beside.empty()) {
     const std::string beside = f.beside.front().beside;
-    page.figure_svg(ranking_picture(f, f.beside),
-                    "The same beside what was found" + (beside.empty() ? std::string() : " (" + beside + ")") +
-                        ": no bar should be left beyond its mark, or it would have been taken in.");
+    const auto shown = static_cast<std::ptrdiff_t>(std::min<std::size_t>(f.beside.size(), 8));
+    page.figure_svg(ranking_picture(f, {f.beside.begin(), f.beside.begin() + shown}),
+                    "The best of the others, tried beside what was found" +
+                        (beside.empty() ? std::string() : " (" + beside + ")") +
+                        ". No bar should reach its mark, or it would have been taken in.");
   }
   std::vector<std::vector<std::string>> rows;
   for (const auto& t : f.tried) {
     std::string sizes;
     for (const auto& [name, value] : t.parameters)
       sizes += (sizes.empty() ? "" : ", ") + in_words(name) + " " + number(value);
-    rows.push_back({t.name, number(t.gain, t.gain < 1000 ? 3 : 6), number(t.chance, 2), number(t.threshold, 3), sizes});
+    rows.push_back({t.name, number(t.gain), number(t.chance, 2), number(t.threshold, 3), sizes});
   }
   page.folded("the figures", [&](io::HtmlReport& inside) {
     inside.table({"effect, alone", "fall of chi2", "mean of chance", "1 of 100", "fitted"}, rows);
@@ -71,17 +96,13 @@ void add_reach(io::HtmlReport& page, const Findings& f) {
         "\"Absorbed\" is the share of an effect's mark on the path that a slightly different k, lambda1 and lambda2 "
         "would leave as well; what they absorb nobody can see.");
     std::vector<std::vector<std::string>> rows;
-    std::vector<std::string> experiments;
-    for (const auto& d : f.detectable) {
+    for (const auto& d : f.detectable)
       rows.push_back({d.effect, in_words(d.parameter), reach_of(d), number(d.typical), percent(d.absorbed)});
-      if (!d.experiment.empty()) experiments.push_back(d.effect + " (" + in_words(d.parameter) + "): " + d.experiment);
-    }
-    page.table({"effect", "parameter", "nothing above", "typical", "absorbed"}, rows);
-    if (!experiments.empty()) {
-      page.paragraph("Effects that these recordings could not show at their usual size, and motions that would:");
-      std::sort(experiments.begin(), experiments.end());
-      page.list(experiments);
-    }
+    page.table({"effect", "parameter", "seen from", "typical", "absorbed"}, rows);
+    const auto experiments = experiments_of(f.detectable);
+    if (!experiments.empty())
+      page.paragraph("Effects that these recordings could not show at their usual size, and motions that would:")
+          .list(experiments);
   }
   const std::string picture = confusion_picture(f);
   if (picture.empty()) return;
@@ -112,14 +133,16 @@ void add_noise_and_checks(io::HtmlReport& page, const Findings& f) {
   std::vector<std::vector<std::string>> rows;
   for (std::size_t c = 0; c < f.channels.size() && c < f.noise.sigma_mm.size(); ++c)
     rows.push_back({f.channels[c], number(f.noise.sigma_mm[c])});
-  page.table({"channel", "noise (mm, 1 sd)"}, rows,
-             "Successive readings correlate by " + number(f.noise.ar1, 2) + " (" + number(1 / f.noise.frame_s, 3) +
-                 " readings a second); " + percent(f.noise.outlier_share) +
-                 " outliers. The noise is found before anything is named, and held fixed.");
+  page.paragraph(
+      "Noise of one reading, found before anything is named and held fixed from then on. Successive readings, " +
+      number(1 / f.noise.frame_s, 3) + " a second, correlate by " + number(f.noise.ar1, 2) + "; " +
+      percent(f.noise.outlier_share) + " of them are outliers.");
+  page.table({"channel", "standard deviation (mm)"}, rows);
   const auto& c = f.checks;
   page.table({"check of the final model", "found", "passed if"},
              {{"chi2 per reading", number(c.chi2_per_dof, 4), number(c.band[0], 4) + " to " + number(c.band[1], 4)},
-              {"correlation left in the residuals (Ljung-Box p)", number(c.ljung_box_p, 2), "above 0.01"},
+              {"correlation left in the residuals (Ljung-Box p)",
+               c.ljung_box_p < 0.001 ? "< 0.001" : number(c.ljung_box_p, 2), "above 0.01"},
               {"slow structure left (standard deviations of chance)", number(c.remaining_sigmas, 2), "near 0"},
               {"share of the mismatch unexplained", percent(c.unexplained_share), "small"}},
              c.clean ? "What is left is noise." : "What is left is more than noise: something is still missing.");

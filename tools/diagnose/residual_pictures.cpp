@@ -94,14 +94,16 @@ constexpr int kColumns = 4;
 constexpr double kPanelWidth = 181;
 constexpr double kPanelHeight = 120;
 
-// So that the picture tells of the bulk; a point outside is cut off.
-double half_range(const std::vector<double>& before, const std::vector<double>& after) {
-  std::vector<double> sizes;
+// So that the picture tells of the bulk, and zero is in it; a point outside is cut off.
+Axis residual_axis(const std::vector<double>& before, const std::vector<double>& after, std::string label) {
+  std::vector<double> all;
   for (const auto* list : {&before, &after})
     for (const double v : *list)
-      if (std::isfinite(v)) sizes.push_back(std::abs(v));
-  const double size = quantile(sizes, 0.99);
-  return size > 0 ? 1.15 * size : 1;
+      if (std::isfinite(v)) all.push_back(v);
+  const double low = std::min(quantile(all, 0.005), 0.0);
+  const double high = std::max(quantile(all, 0.995), 0.0);
+  const double room = high > low ? 0.08 * (high - low) : 1;
+  return {low - room, high + room, std::move(label)};
 }
 
 }  // namespace
@@ -136,7 +138,6 @@ std::string residual_picture(const Findings& findings, std::size_t channel) {
     taken_at.insert(taken_at.end(), trace.covariates.begin(), trace.covariates.end());
   }
   if (std::none_of(before.begin(), before.end(), [](double v) { return std::isfinite(v); })) return "";
-  const double half = half_range(before, after);
   Drawing drawing(832, 390);
   int place = 0;
   for (const Against& against : kAgainst) {
@@ -159,7 +160,7 @@ std::string residual_picture(const Findings& findings, std::size_t channel) {
       continue;
     }
     const Axis across = axis_around(x, against.label);
-    Axis upward{-half, half, leftmost ? "residual (" + residual_unit(findings, channel) + ")" : ""};
+    Axis upward = residual_axis(before, after, leftmost ? "residual (" + residual_unit(findings, channel) + ")" : "");
     upward.numbered = leftmost;
     Panel panel(drawing, box, across, upward, against.title);
     for (const auto& where : findings.where)
@@ -194,7 +195,6 @@ void draw_location(Drawing& drawing, double left, const Findings& findings, cons
   if (trace == findings.traces.end() || channel == findings.channels.end()) return;
   const auto c = static_cast<std::size_t>(channel - findings.channels.begin());
   const Residuals r = residuals_of(findings, *trace, c);
-  const double half = half_range(r.before, r.after);
   const Axis time = axis_around(trace->time_s, "");
   const auto draw_strip = [&](double top, double height, const std::string& label, double Covariates::*quantity,
                               const std::string& below) {
@@ -206,7 +206,8 @@ void draw_location(Drawing& drawing, double left, const Findings& findings, cons
     panel.span(where.from_s, where.to_s).curve(trace->time_s, values, {.colour = "#4d4d4d", .width = 1.5});
   };
   {
-    Panel panel(drawing, {left, 50, 335, 150}, time, {-half, half, "residual (" + residual_unit(findings, c) + ")"},
+    Panel panel(drawing, {left, 50, 335, 150}, time,
+                residual_axis(r.before, r.after, "residual (" + residual_unit(findings, c) + ")"),
                 where.log + ", " + where.channel + ": " + number(where.from_s) + " to " + number(where.to_s) + " s");
     panel.span(where.from_s, where.to_s).level(0, {.colour = ink::kSoft});
     panel.points(trace->time_s, r.before, ink::kBefore, 0.75, 1.5);

@@ -1,0 +1,158 @@
+// bevel-diagnose as a program: its files, its messages, its exit status, and an end from outside.
+#include <fcntl.h>
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+#include <sys/wait.h>
+#include <unistd.h>
+
+#include <chrono>
+#include <csignal>
+#include <filesystem>
+#include <fstream>
+#include <nlohmann/json.hpp>
+#include <thread>
+
+#include "io/model_file.hpp"
+#include "tests/diagnosis/recorded_logs.hpp"
+
+namespace bevel::diagnose {
+namespace {
+
+namespace fs = std::filesystem;
+using model::testing::active;
+using ::testing::AllOf;
+using ::testing::HasSubstr;
+using ::testing::IsEmpty;
+using ::testing::Not;
+
+std::string text_of(const fs::path& path) {
+  std::ifstream file(path, std::ios::binary);
+  return {std::istreambuf_iterator<char>(file), {}};
+}
+
+struct Said {
+  int status = -1;
+  std::string out, err;
+};
+
+struct Program : ::testing::Test {
+  fs::path folder = fs::temp_directory_path() / ("bevel_diagnose_" + std::to_string(::getpid()));
+  std::vector<std::string> logs;
+  std::string model_path = (folder / "model.toml").string();
+
+  void SetUp() override {
+    fs::create_directories(folder);
+    io::save_model_file({model::testing::agar(), {}}, model_path);
+  }
+  void TearDown() override { fs::remove_all(folder); }
+
+  void write_logs(const std::vector<model::ActiveEffect>& effects) {
+    for (int i = 0; i < 4; ++i) {
+      const fs::path path = folder / ("rec0" + std::to_string(i + 1) + ".lcm");
+      diagnosis::testing::write_log(path, {.script = i, .effects = effects});
+      logs.push_back(path.string());
+    }
+  }
+
+  pid_t start(std::vector<std::string> words) const {
+    words.insert(words.begin(), std::string(BEVEL_BINARY_DIR) + "/bin/bevel-diagnose");
+    std::vector<char*> pointers;
+    for (auto& word : words) pointers.push_back(word.data());
+    pointers.push_back(nullptr);
+    const pid_t child = ::fork();
+    if (child != 0) return child;
+    const auto redirect = [&](int to, const char* name) {
+      ::dup2(::open((folder / name).c_str(), O_WRONLY | O_CREAT | O_TRUNC, 0600), to);  // NOLINT(*-vararg)
+    };
+    redirect(STDOUT_FILENO, "stdout");
+    redirect(STDERR_FILENO, "stderr");
+    ::execv(pointers[0], pointers.data());
+    ::_exit(127);
+  }
+  Said wait_for(pid_t child) const {
+    int status = 0;
+    ::waitpid(child, &status, 0);
+    return {WIFEXITED(status) ? WEXITSTATUS(status) : 128 + WTERMSIG(status), text_of(folder / "stdout"),
+            text_of(folder / "stderr")};
+  }
+  Said run(const std::vector<std::string>& words) const { return wait_for(start(words)); }
+  std::vector<std::string> usual(const std::string& out, std::vector<std::string> more = {}) const {
+    more.insert(more.end(), {"--model", model_path, "--out", (folder / out).string()});
+    more.insert(more.end(), logs.begin(), logs.end());
+    return more;
+  }
+};
+
+TEST_F(Program, FindsAConcealedEffectAndWritesAllThreeFiles) {
+  write_logs({active("insertion_scale", {0.92})});
+  const Said said = run(usual("out"));
+  ASSERT_EQ(said.status, 0) << said.err;
+  EXPECT_THAT(said.out, AllOf(HasSubstr("insertion_scale"), HasSubstr("ratio"), HasSubstr("held-out error")));
+  EXPECT_THAT(said.err, HasSubstr(" s reading 4 logs"));
+  const auto verdict = nlohmann::json::parse(text_of(folder / "out/verdict.json"));
+  EXPECT_EQ(verdict["verdict"], "effects-found");
+  const auto& ratio = verdict["effects"][0]["parameters"]["ratio"];
+  EXPECT_NEAR(ratio["value"].get<double>(), 0.92, 5 * ratio["std_error"].get<double>());
+  const auto model = io::load_model_file((folder / "out/model.toml").string());
+  ASSERT_EQ(model.effects.size(), 1U);
+  EXPECT_DOUBLE_EQ(model.effects[0].parameters.at("ratio"), ratio["value"].get<double>());
+  EXPECT_GT(fs::file_size(folder / "out/report.html"), 50'000U);
+
+  // The same input and seed: the same verdict, whatever the number of threads.
+  ASSERT_EQ(run(usual("again", {"--threads", "1", "--quiet"})).status, 0);
+  EXPECT_EQ(text_of(folder / "again/verdict.json"), text_of(folder / "out/verdict.json"));
+}
+
+TEST_F(Program, EndedFromOutsideItLeavesNothing) {
+  write_logs({});
+  for (const int signal : {SIGINT, SIGTERM}) {
+    const pid_t child = start(usual("out"));
+    std::this_thread::sleep_for(std::chrono::milliseconds(500));
+    ::kill(child, signal);
+    const Said said = wait_for(child);
+    EXPECT_EQ(said.status, 1);
+    EXPECT_THAT(said.err, HasSubstr("bevel-diagnose: stopped; nothing was written"));
+    EXPECT_FALSE(fs::exists(folder / "out"));
+  }
+}
+
+TEST_F(Program, BadInputIsOneMessageAndStatusOne) {
+  write_logs({});
+  const auto expect_refused = [&](const std::vector<std::string>& words, const std::string& because) {
+    const Said said = run(words);
+    EXPECT_EQ(said.status, 1) << because;
+    EXPECT_THAT(said.err, HasSubstr(because));
+    EXPECT_THAT(said.err, HasSubstr("bevel-diagnose: "));
+    EXPECT_THAT(said.out, IsEmpty());
+    EXPECT_FALSE(fs::exists(folder / "out"));
+  };
+  expect_refused({"-m", model_path, "-o", (folder / "out").string(), logs[0]}, "at least two are needed");
+  expect_refused({"-m", (folder / "no.toml").string(), "-o", (folder / "out").string(), logs[0]}, "no.toml");
+  expect_refused({"-m", model_path, "-o", logs[0] + "/out", logs[0], logs[1]}, "cannot hold the results");
+
+  std::ofstream(folder / "wild.toml") << "[needle]\ncurvature_per_mm = 0.0047\nwheelbase_mm = 20.0\n"
+                                      << "lambda1_per_rad = 0.01\nlambda2 = 0.9\n";
+  expect_refused({"-m", (folder / "wild.toml").string(), "-o", (folder / "out").string(), logs[0], logs[1]},
+                 "wild.toml");
+  io::save_model_file({model::testing::agar(), {{"drilling", {{"coefficient_mm_per_rad", 1.5}}, {}}}},
+                      (folder / "with.toml").string());
+  expect_refused({"-m", (folder / "with.toml").string(), "-o", (folder / "out").string(), logs[0], logs[1]},
+                 "has [[effect]] \"drilling\"");
+}
+
+TEST_F(Program, UsageErrorsAreStatusTwo) {
+  for (const std::vector<std::string>& words : {std::vector<std::string>{},
+                                                {"--model", model_path, "--out", "x"},
+                                                {"--out", "x", "a.lcm"},
+                                                usual("out", {"--threads", "0", "a.lcm"}),
+                                                usual("out", {"--seed", "-1", "a.lcm"})}) {
+    const Said said = run(words);
+    EXPECT_EQ(said.status, 2) << said.err;
+    EXPECT_THAT(said.err, Not(IsEmpty()));
+  }
+  EXPECT_EQ(run({"--help"}).status, 0);
+  EXPECT_THAT(run({"--version"}).out, HasSubstr("bevel-diagnose"));
+}
+
+}  // namespace
+}  // namespace bevel::diagnose

@@ -1,0 +1,141 @@
+// Results: what is in them, all of them or none, and the schema.
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+#include <sys/resource.h>
+#include <sys/wait.h>
+#include <unistd.h>
+
+#include <csignal>
+#include <cstdlib>
+#include <filesystem>
+#include <fstream>
+#include <limits>
+#include <nlohmann/json.hpp>
+
+#include "tests/diagnosis/made_up_findings.hpp"
+#include "tools/diagnose/result_files.hpp"
+#include "tools/diagnose/verdict_json.hpp"
+
+namespace bevel::diagnose {
+namespace {
+
+namespace fs = std::filesystem;
+using diagnosis::Verdict;
+using diagnosis::testing::made_up;
+using ::testing::HasSubstr;
+using ::testing::UnorderedElementsAre;
+
+struct Results : ::testing::Test {
+  fs::path folder = fs::temp_directory_path() / ("bevel_results_" + std::to_string(::getpid()));
+  void SetUp() override { fs::create_directories(folder); }
+  void TearDown() override { fs::remove_all(folder); }
+
+  std::vector<std::string> names_in(const fs::path& where) const {
+    std::vector<std::string> names;
+    for (const auto& entry : fs::directory_iterator(where)) names.push_back(entry.path().filename().string());
+    return names;
+  }
+  static std::string text_of(const fs::path& path) {
+    std::ifstream file(path);
+    return {std::istreambuf_iterator<char>(file), {}};
+  }
+};
+
+TEST_F(Results, VerdictsFollowTheSchema) {
+  const std::string validate = "python3 -c 'import jsonschema' 2>/dev/null";
+  if (std::system(validate.c_str()) != 0) GTEST_SKIP() << "no python3-jsonschema (tools/setup installs it)";
+  auto odd = made_up(Verdict::nothing_missing);
+  odd.held_out.before.chi2_per_dof = std::numeric_limits<double>::infinity();
+  odd.noise.sigma_mm = {};
+  write_together(folder, {{"found.json", verdict_json(made_up(Verdict::effects_found))},
+                          {"nothing.json", verdict_json(made_up(Verdict::nothing_missing))},
+                          {"unknown.json", verdict_json(made_up(Verdict::unknown_effect))},
+                          {"odd.json", verdict_json(odd)}});
+  const std::string check = std::string("python3 ") + BEVEL_SOURCE_DIR + "/tests/diagnosis/validate_verdict.py ";
+  for (const char* name : {"found", "nothing", "unknown", "odd"})
+    EXPECT_EQ(std::system((check + (folder / name).string() + ".json").c_str()), 0) << name;
+  // A schema that lets everything pass would prove nothing.
+  auto broken = nlohmann::json::parse(text_of(folder / "found.json"));
+  broken["effects"][0].erase("probability");
+  std::ofstream(folder / "broken.json") << broken;
+  EXPECT_NE(std::system((check + (folder / "broken.json").string() + " 2>/dev/null").c_str()), 0);
+}
+
+TEST_F(Results, TheVerdictSaysWhatWasFound) {
+  const auto j = nlohmann::json::parse(verdict_json(made_up(Verdict::effects_found)));
+  EXPECT_EQ(j["verdict"], "effects-found");
+  EXPECT_EQ(j["effects"][0]["name"], "torsional_windup");
+  EXPECT_EQ(j["effects"][0]["ambiguous_with"][0], "rotation_backlash");
+  EXPECT_DOUBLE_EQ(j["effects"][0]["parameters"]["lag_at_100mm_rad"]["value"], 0.8234);
+  EXPECT_DOUBLE_EQ(j["effects"][1]["recordings"]["rec03.lcm"]["at_s"]["value"], 3.309);
+  EXPECT_EQ(j["where"][0]["range"][1], 52);
+  EXPECT_EQ(j["fit"]["held_out"], "leave-one-recording-out");
+  EXPECT_DOUBLE_EQ(j["fit"]["after"]["chi2_per_dof"], 1.012);
+  EXPECT_TRUE(j["detectable"]["rate_dependence"]["exponent"].is_null());  // infinite
+  EXPECT_TRUE(nlohmann::json::parse(verdict_json(made_up(Verdict::nothing_missing)))["next_experiment"].is_null());
+}
+
+TEST_F(Results, TheModelReadsBackWithItsUnknownsOfSingleRecordings) {
+  const auto model = model_of(made_up(Verdict::effects_found));
+  const auto again = io::parse_model_file(io::to_toml(model), "model.toml");
+  EXPECT_EQ(again, model);
+  ASSERT_EQ(again.effects.size(), 2U);
+  EXPECT_DOUBLE_EQ(again.effects[1].recordings.at("rec04.lcm").at("at_s"), 2.411);
+  // The unknown part has no name.
+  EXPECT_EQ(model_of(made_up(Verdict::unknown_effect)).effects.size(), 1U);
+}
+
+TEST_F(Results, TakeThePlaceOfOlderOnesTogether) {
+  write_together(folder / "new" / "deep", {{"a", "1"}, {"b", "2"}});
+  write_together(folder / "new" / "deep", {{"a", "3"}, {"b", "4"}});
+  EXPECT_THAT(names_in(folder / "new" / "deep"), UnorderedElementsAre("a", "b"));
+  EXPECT_EQ(text_of(folder / "new" / "deep" / "b"), "4");
+}
+
+TEST_F(Results, NoneIsTouchedIfOneCannotBe) {
+  write_together(folder, {{"a", "old"}, {"b", "old"}});
+  fs::create_directories(folder / "c" / "full");
+  EXPECT_THROW(write_together(folder, {{"a", "new"}, {"c", "new"}, {"b", "new"}}), std::runtime_error);
+  EXPECT_EQ(text_of(folder / "a"), "old");
+  EXPECT_EQ(text_of(folder / "b"), "old");
+  EXPECT_THAT(names_in(folder), UnorderedElementsAre("a", "b", "c"));
+}
+
+TEST_F(Results, AFullDiskLeavesTheOldOnes) {
+  write_together(folder, {{"a", "old"}});
+  const pid_t child = ::fork();
+  if (child == 0) {
+    ::signal(SIGXFSZ, SIG_IGN);
+    const rlimit small{1000, 1000};  // a write beyond fails as on a full disk
+    ::setrlimit(RLIMIT_FSIZE, &small);
+    try {
+      write_together(folder, {{"a", std::string(5000, 'n')}});
+    } catch (const std::runtime_error& e) {
+      ::_exit(std::string(e.what()).find("cannot be written") == std::string::npos ? 2 : 0);
+    }
+    ::_exit(1);
+  }
+  int status = 0;
+  ::waitpid(child, &status, 0);
+  EXPECT_EQ(WEXITSTATUS(status), 0);
+  EXPECT_EQ(text_of(folder / "a"), "old");
+  EXPECT_THAT(names_in(folder), UnorderedElementsAre("a"));
+}
+
+TEST_F(Results, AFolderThatCannotHoldThemIsSaidBeforehandAndNothingMade) {
+  std::ofstream(folder / "file") << "x";
+  for (const auto& place : {folder / "file", folder / "file" / "below"}) {
+    try {
+      check_writable(place);
+      ADD_FAILURE() << place;
+    } catch (const std::runtime_error& e) {
+      EXPECT_THAT(e.what(), HasSubstr("cannot hold the results"));
+    }
+  }
+  EXPECT_NO_THROW(check_writable(folder / "not" / "yet"));
+  EXPECT_NO_THROW(check_writable("not-yet"));
+  EXPECT_FALSE(fs::exists(folder / "not"));
+}
+
+}  // namespace
+}  // namespace bevel::diagnose
