@@ -13,7 +13,7 @@ namespace {
 
 // Base and tip joined by a gap that is open by `half_width(inserted)` to either side: the tip is carried where it is
 // shut. Written with the gap's state, not with the product's play operator.
-auto gap(std::function<double(double)> half_width, bool rotation) {
+auto gap(const std::function<double(double)>& half_width, bool rotation) {
   return [half_width, rotation, open = 0.0, base = 0.0](const Instant& now, double& s_mm, double& r_rad) mutable {
     double& axis = rotation ? r_rad : s_mm;
     open += axis - base;

@@ -49,7 +49,7 @@ struct Predict : ::testing::Test {
   // The script as a rig logs it: states at 50 Hz, tips at 30 Hz, each the newest at its time.
   std::string write_log(const std::string& name, bool states = true, bool tips = true,
                         const Script& script = rich_script()) const {
-    const std::string path = (folder / name).string();
+    std::string path = (folder / name).string();
     io::LogWriter log(path);
     std::int64_t next_tip = 0;
     for (const ActuatorState& a : script.actuators(0.02)) {
