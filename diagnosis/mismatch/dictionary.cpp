@@ -4,6 +4,8 @@
 #include <Eigen/QR>
 #include <algorithm>
 #include <cmath>
+#include <functional>
+#include <numeric>
 #include <random>
 
 #include "diagnosis/mismatch/parallel.hpp"
@@ -53,9 +55,11 @@ class SignatureMaker {
         if (change.size() == 0) return false;
         signature.columns.col(static_cast<Index>(s)).segment(ground_.rows[r], change.size()) = change;
       }
+    const double whole = signature.columns.squaredNorm();
     signature.columns -= ground_.Q * (ground_.Q.transpose() * signature.columns).eval();
     const MatrixXd gram = signature.columns.transpose() * signature.columns;
-    if (!(gram.diagonal().minCoeff() > 1e-12)) return false;
+    if (!(gram.diagonal().maxCoeff() > 1e-12)) return false;
+    signature.absorbed = 1 - gram.trace() / whole;
     signature.gram_inverse = gram.completeOrthogonalDecomposition().pseudoInverse();
     return true;
   }
@@ -82,6 +86,7 @@ class SignatureMaker {
   bool make_choices(Signature& signature) {
     const auto& parameter = candidate_.member.effect->parameters()[static_cast<std::size_t>(candidate_.local)];
     signature.choices.resize(ground_.rows.size() - 1);
+    double whole = 0, left = 0;
     for (std::size_t r = 0; r < signature.choices.size(); ++r) {
       std::vector<double> values = parameter.starts;
       if (!parameter.periodic) {
@@ -95,12 +100,13 @@ class SignatureMaker {
         if (change.size() == 0) continue;
         const double absorbed = (ground_.Q.middleRows(ground_.rows[r], rows).transpose() * change).squaredNorm();
         const double squared = change.squaredNorm() - absorbed;
+        whole += change.squaredNorm();
+        left += squared;
         signature.choices[r].push_back({value, std::move(change), squared});
       }
     }
-    return std::any_of(signature.choices.begin(), signature.choices.end(), [](const auto& c) {
-      return std::any_of(c.begin(), c.end(), [](const auto& choice) { return choice.squared > 1e-12; });
-    });
+    signature.absorbed = whole > 0 ? 1 - left / whole : 0;
+    return left > 1e-12;
   }
 
   const Evidence& evidence_;
@@ -177,7 +183,7 @@ Promise promise_of_choices(const Candidate& candidate, const Signature& signatur
   Promise promise;
   double best_share = 0;
   const auto gain_at = [&](double share, std::vector<double>* chosen) {
-    double sum = 0;
+    std::vector<double> gains;
     for (std::size_t r = 0; r < recordings; ++r) {
       double best = candidate.local_may_be_off ? 0 : -1e300;
       double value = 0;
@@ -186,10 +192,15 @@ Promise promise_of_choices(const Candidate& candidate, const Signature& signatur
                             (candidate.local_may_be_off ? kOnPenalty : 0);
         if (gain > best) best = gain, value = signature.choices[r][j].value;
       }
-      if (!pull[r].empty()) sum += best;
+      gains.push_back(pull[r].empty() ? 0 : best);
       if (chosen) chosen->push_back(value);
     }
-    return sum;
+    // An instant in most recordings is no accident: only the half that gains most counts.
+    if (candidate.local_may_be_off) {
+      std::sort(gains.begin(), gains.end(), std::greater<>());
+      gains.resize(std::max<std::size_t>(recordings / 2, 1));
+    }
+    return std::accumulate(gains.begin(), gains.end(), 0.0);
   };
   for (std::size_t i = 0, n = shares.size(); i < n; ++i) shares.push_back(0.5 * shares[i]);
   for (double share : shares) {
@@ -294,25 +305,66 @@ std::vector<Promise> best_promises(const Candidate& candidate, const Ground& gro
   return promises;
 }
 
+namespace {
+double median(std::vector<double> values) {
+  if (values.empty()) return 0;
+  const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
+  std::nth_element(values.begin(), middle, values.end());
+  return *middle;
+}
+}  // namespace
+
 double visible_per_unit(const Candidate& candidate, std::size_t amplitude) {
-  double best = 0;
   const auto p = static_cast<std::size_t>(candidate.amplitudes[amplitude]);
   const double none = candidate.member.effect->parameters()[p].none;
+  std::vector<double> sizes;
   for (const auto& signature : candidate.signatures) {
     double squared = 0;
     if (candidate.local < 0) {
-      squared =
-          1 / std::max(signature.gram_inverse(static_cast<Index>(amplitude), static_cast<Index>(amplitude)), 1e-300);
+      // One amplitude with the effect's others free.
+      const auto a = static_cast<Index>(amplitude);
+      if (signature.gram_inverse(a, a) > 0) squared = 1 / signature.gram_inverse(a, a);
+    } else if (candidate.local_may_be_off) {
+      // In one recording, at an instant like any other.
+      std::vector<double> all;
+      for (const auto& choices : signature.choices)
+        for (const auto& choice : choices) all.push_back(choice.squared);
+      squared = median(all);
     } else {
-      for (const auto& choices : signature.choices) {
-        double largest = 0;
-        for (const auto& choice : choices) largest = std::max(largest, choice.squared);
-        squared += largest;
-      }
+      for (const auto& choices : signature.choices)
+        if (!choices.empty()) squared += choices.front().squared;
     }
-    best = std::max(best, std::sqrt(std::max(squared, 0.0)) / std::abs(signature.shape[p] - none));
+    sizes.push_back(std::sqrt(std::max(squared, 0.0)) / std::abs(signature.shape[p] - none));
   }
-  return best;
+  return median(sizes);
+}
+
+double absorbed_share(const Candidate& candidate) {
+  std::vector<double> shares;
+  for (const auto& signature : candidate.signatures) shares.push_back(signature.absorbed);
+  return median(shares);
+}
+
+MatrixXd visible_basis(const Candidate& candidate, const Ground& ground) {
+  const Signature* best = nullptr;
+  Promise promise;
+  for (const auto& signature : candidate.signatures) {
+    Promise one = promise_of(candidate, signature, ground, ground.residual);
+    if (!best || one.gain > promise.gain) best = &signature, promise = std::move(one);
+  }
+  if (!best) return {};
+  MatrixXd columns = best->columns;
+  if (candidate.local >= 0) {
+    columns = MatrixXd::Zero(ground.residual.size(), 1);
+    for (std::size_t r = 0; r < best->choices.size(); ++r)
+      for (const auto& choice : best->choices[r])
+        if (r < promise.local_by_recording.size() && choice.value == promise.local_by_recording[r])
+          columns.col(0).segment(ground.rows[r], choice.column.size()) = choice.column;
+    columns -= ground.Q * (ground.Q.transpose() * columns).eval();
+  }
+  const Eigen::ColPivHouseholderQR<MatrixXd> qr(columns);
+  const Index rank = columns.squaredNorm() > 1e-12 ? qr.rank() : 0;
+  return qr.householderQ() * MatrixXd::Identity(columns.rows(), rank);
 }
 
 NullGains bootstrap_null(const std::vector<Candidate>& dictionary, const Ground& ground, int draws, std::uint64_t seed,

@@ -25,6 +25,7 @@ struct Signature {
   std::vector<double> shape;  // values of all its parameters, amplitudes at their starts
   Eigen::MatrixXd columns;    // projected; one per amplitude (none: one, of the effect as it is)
   Eigen::MatrixXd gram_inverse;
+  double absorbed = 0;  // share of the whole signature's square that the projection took
   struct Choice {
     double value;            // of the per-recording parameter
     Eigen::VectorXd column;  // rows of that recording
@@ -41,7 +42,6 @@ struct Candidate {
   std::vector<Signature> signatures;
 };
 
-// All effects but those of the hypothesis itself; `only` restricts it to some.
 std::vector<Candidate> make_dictionary(const Evidence& evidence, const Fit& fit, const Ground& ground,
                                        const std::vector<Member>& members, int threads);
 std::vector<Member> members_of_library(const EffectSet& but);
@@ -56,9 +56,13 @@ Promise promise_of(const Candidate& candidate, const Signature& signature, const
                    const Eigen::VectorXd& residual);
 std::vector<Promise> best_promises(const Candidate& candidate, const Ground& ground, std::size_t count);
 
-// Largest |projected signature| of one unit of each amplitude over the signatures: 1 / that is the size of one standard
+// |projected signature| of one unit of an amplitude, the median over the starts: 1 / that is the size of one standard
 // deviation. Zero where these recordings cannot show it.
 double visible_per_unit(const Candidate& candidate, std::size_t amplitude);
+// The same signatures' median share that the hypothesis's own parameters absorb.
+double absorbed_share(const Candidate& candidate);
+// Orthonormal basis of the visible part of a candidate at its most promising start; no columns if there is none.
+Eigen::MatrixXd visible_basis(const Candidate& candidate, const Ground& ground);
 
 // Gains that noise alone brings, by parametric bootstrap of the fitted hypothesis: white residuals drawn anew, each
 // candidate at its best start.

@@ -1,6 +1,8 @@
 #include "diagnosis/mismatch/local_unknowns.hpp"
 
+#include <algorithm>
 #include <cmath>
+#include <functional>
 
 namespace bevel::diagnosis {
 namespace {
@@ -13,12 +15,20 @@ bool is_instant(const Hypothesis& hypothesis, const Unknown& unknown) {
                  .effect->parameters()[static_cast<std::size_t>(unknown.parameter)]
                  .none == 0;
 }
+// An instant in most recordings is no accident: those that bring least are switched off.
+void keep_the_exceptions(std::size_t recordings, std::vector<std::pair<double, Eigen::Index>>& brought,
+                         Eigen::VectorXd& values) {
+  std::sort(brought.begin(), brought.end(), std::greater<>());
+  for (std::size_t i = std::max<std::size_t>(recordings / 2, 1); i < brought.size(); ++i) values[brought[i].second] = 0;
+}
+
 }  // namespace
 
 Eigen::VectorXd scan_local_unknowns(const Evidence& evidence, const Hypothesis& hypothesis,
                                     const Eigen::VectorXd& values) {
   Eigen::VectorXd best = values;
   Workspace workspace;
+  std::vector<std::pair<double, Eigen::Index>> brought;
   for (std::size_t i = 0; i < hypothesis.unknowns().size(); ++i) {
     const Unknown& unknown = hypothesis.unknowns()[i];
     if (unknown.recording < 0) continue;
@@ -42,7 +52,9 @@ Eigen::VectorXd scan_local_unknowns(const Evidence& evidence, const Hypothesis& 
       if (cost < least) least = cost, value = candidate;
     }
     best[column] = value;
+    if (instant && value > 0) brought.emplace_back(cost_at(0) - least, column);
   }
+  keep_the_exceptions(evidence.recorded->recordings.size(), brought, best);
   return best;
 }
 

@@ -3,13 +3,17 @@
 #include <algorithm>
 #include <cmath>
 
+#include "diagnosis/mismatch/gates.hpp"
 #include "diagnosis/mismatch/local_unknowns.hpp"
 #include "diagnosis/mismatch/parallel.hpp"
 
 namespace bevel::diagnosis {
 namespace {
 constexpr int kScans = 2;
-constexpr double kSettled = 0.5;  // chi2
+constexpr double kSettled = 0.5;         // chi2
+constexpr double kCorrectionChance = 4;  // mean gain of a correction of four knots under noise
+constexpr std::size_t kCorrectionsFitted = 3;
+constexpr int kLargestCorrections = 2;
 
 bool has_local(const Hypothesis& hypothesis) {
   return std::any_of(hypothesis.unknowns().begin(), hypothesis.unknowns().end(),
@@ -68,7 +72,7 @@ std::shared_ptr<const Fit> fit_addition(const Evidence& evidence, const Fit& fro
 }
 
 Selection::Selection(const Evidence& evidence, const Fit& base, const SelectionRules& rules, Progress progress)
-    : evidence_(evidence), rules_(rules), progress_(std::move(progress)) {
+    : evidence_(evidence), rules_(rules), progress_(std::move(progress)), corrections_(*evidence.recorded) {
   known_[key_of({})] = {{}, std::make_shared<Fit>(base), 0};
   ground_ = make_ground(evidence_, base);
   dictionary_ = make_dictionary(evidence_, base, ground_, members_of_library({}), rules_.threads);
@@ -100,7 +104,7 @@ double Selection::evidence_of(const EffectSet& set) { return known(set).evidence
 
 double Selection::cost_of(const EffectSet& set, const Fit& fit) {
   double cost = kInstantCost * instants_in_use(fit);
-  for (const auto& member : set) cost += chance_[member_key(member)];
+  for (const auto& member : set) cost += is_correction(member) ? kCorrectionChance : chance_[member_key(member)];
   return cost;
 }
 
@@ -149,40 +153,121 @@ const std::vector<Trial>& Selection::additions(const EffectSet& to) {
   return additions_[key] = std::move(trials);
 }
 
+const Trial& Selection::best_correction(const EffectSet& beside) {
+  const std::string key = key_of(beside);
+  if (const auto at = best_corrections_.find(key); at != best_corrections_.end()) return at->second;
+  const std::shared_ptr<const Fit> from = known(beside).fit;
+  const Ground ground = make_ground(evidence_, *from);
+  std::vector<Member> members = corrections_.members();
+  std::erase_if(members, [&](const Member& m) { return std::find(beside.begin(), beside.end(), m) != beside.end(); });
+  const auto dictionary = make_dictionary(evidence_, *from, ground, members, rules_.threads);
+  const NullGains chance = bootstrap_null(dictionary, ground, rules_.bootstrap_draws, rules_.seed, rules_.threads);
+  std::vector<std::pair<double, std::size_t>> order;
+  for (std::size_t e = 0; e < dictionary.size(); ++e)
+    for (const auto& promise : best_promises(dictionary[e], ground, 1)) order.emplace_back(-promise.gain, e);
+  std::sort(order.begin(), order.end());
+  if (order.size() > kCorrectionsFitted) order.resize(kCorrectionsFitted);
+  std::vector<Trial> trials(order.size());
+  parallel_for(order.size(), rules_.threads, [&](std::size_t i) {
+    const std::size_t e = order[i].second;
+    trials[i].set = beside;
+    trials[i].set.push_back(dictionary[e].member);
+    trials[i].chance = chance.mean[e];
+    trials[i].threshold = chance.threshold[e];
+    trials[i].fit = fit_addition(evidence_, *from, dictionary[e], best_promises(dictionary[e], ground, 1));
+  });
+  Trial best;
+  const double base = known_.at(key_of({})).fit->penalised;
+  for (Trial& trial : trials) {
+    if (!trial.fit) continue;
+    trial.gain = from->penalised - trial.fit->penalised;
+    trial.evidence = base - trial.fit->penalised - cost_of(trial.set, *trial.fit);
+    known_[key_of(trial.set)] = {trial.set, trial.fit, trial.evidence};
+    if (!best.fit || trial.evidence > best.evidence) best = trial;
+  }
+  say("looked for what no effect explains beside " + describe(beside));
+  return best_corrections_[key] = std::move(best);
+}
+
+Correction Selection::describe_correction(const EffectSet& set, std::size_t member) {
+  const std::shared_ptr<const Fit> fit = fit_of(set);
+  const auto& members = fit->hypothesis.set();
+  const auto at = std::find(members.begin(), members.end(), set[member]);
+  Correction out = corrections_.describe(*fit, static_cast<std::size_t>(at - members.begin()));
+  const EffectSet rest = without_member(set, member);
+  out.gain = fit_of(rest)->penalised - fit->penalised;
+  const Trial& best = best_correction(rest);
+  out.threshold = std::max(best.threshold, best.chance + kVisibleSigmas * kVisibleSigmas);
+  return out;
+}
+
+// Forward: the best effect that passes.
+bool Selection::grow(EffectSet& set) {
+  if (static_cast<int>(set.size()) >= rules_.largest_set) return false;
+  for (const Trial& trial : additions(set))
+    if (trial.fit && trial.passes()) {
+      set = trial.set;
+      return true;
+    }
+  return false;
+}
+
+// A member for the best other one beside the rest.
+bool Selection::swap(EffectSet& set) {
+  for (std::size_t m = 0; m < set.size() && set.size() > 1; ++m) {
+    if (is_correction(set[m])) continue;
+    const auto& others = additions(without_member(set, m));
+    if (others.empty() || !others.front().fit || key_of(others.front().set) == key_of(set)) continue;
+    if (others.front().evidence <= evidence_of(set) + 1e-6) continue;
+    set = others.front().set;
+    return true;
+  }
+  return false;
+}
+
+// Backward: a member that the others have made superfluous goes.
+bool Selection::shrink(EffectSet& set) {
+  for (std::size_t m = 0; m < set.size() && set.size() > 1; ++m) {
+    const EffectSet rest = without_member(set, m);
+    if (is_correction(set[m])) continue;
+    const auto& trials = additions(rest);
+    const auto same =
+        std::find_if(trials.begin(), trials.end(), [&](const Trial& t) { return key_of(t.set) == key_of(set); });
+    if (same == trials.end() || same->passes()) continue;
+    set = rest;
+    return true;
+  }
+  return false;
+}
+
+// A name has to fit better than a nameless curve in its place: an effect that is on no list often looks somewhat like
+// one that is.
+bool Selection::give_up_names(EffectSet& set) {
+  const auto corrections = std::count_if(set.begin(), set.end(), is_correction);
+  if (corrections >= kLargestCorrections) return false;
+  for (std::size_t m = 0; m < set.size(); ++m) {
+    if (is_correction(set[m])) continue;
+    const Trial& nameless = best_correction(without_member(set, m));
+    if (!nameless.fit || nameless.evidence < evidence_of(set) + kNamelessMargin) continue;
+    set = nameless.set;
+    return true;
+  }
+  // Nothing of the library passes any more: is what remains noise?
+  const Trial& rest = best_correction(set);
+  if (!rest.fit || !rest.passes()) return false;
+  if (!set.empty() && examine_remains(evidence_, *fit_of(set)).structure_sigmas < kStructureSigmas) return false;
+  set = rest.set;
+  return true;
+}
+
 EffectSet Selection::select() {
   EffectSet now;
   for (int round = 0; round < 12; ++round) {
-    bool changed = false;
-    if (static_cast<int>(now.size()) < rules_.largest_set) {
-      for (const Trial& trial : additions(now)) {
-        if (!trial.fit || !trial.passes()) continue;
-        now = trial.set;
-        changed = true;
-        break;
-      }
-    }
-    // Swap: a member for the best other one beside the rest.
-    for (std::size_t m = 0; m < now.size() && now.size() > 1; ++m) {
-      const auto& others = additions(without_member(now, m));
-      if (!others.empty() && others.front().fit && others.front().evidence > evidence_of(now) + 1e-6 &&
-          key_of(others.front().set) != key_of(now)) {
-        now = others.front().set;
-        changed = true;
-        break;
-      }
-    }
-    // Backward: a member that the others have made superfluous goes.
-    for (std::size_t m = 0; m < now.size() && now.size() > 1; ++m) {
-      const EffectSet rest = without_member(now, m);
-      const auto& trials = additions(rest);
-      const auto same =
-          std::find_if(trials.begin(), trials.end(), [&](const Trial& t) { return key_of(t.set) == key_of(now); });
-      if (same != trials.end() && same->passes()) continue;
-      now = rest;
-      changed = true;
-      break;
-    }
-    if (!changed) break;
+    const bool grown = grow(now);
+    const bool changed = swap(now) || shrink(now) || grown;
+    // Names are put to the question as soon as there are any, so that a wrong one does not draw others after it.
+    if (!changed || now.size() == 1)
+      if (!give_up_names(now) && !changed) break;
   }
   return now;
 }

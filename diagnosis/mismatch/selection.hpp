@@ -9,11 +9,16 @@
 #include <memory>
 #include <string>
 
+#include "diagnosis/mismatch/corrections.hpp"
 #include "diagnosis/mismatch/dictionary.hpp"
 
 namespace bevel::diagnosis {
 
 inline constexpr double kVisibleSigmas = 5.0;
+// Evidence by which a nameless correction has to beat a named effect: it has more freedom, and there are many.
+inline constexpr double kNamelessMargin = 16.0;
+// Slow structure left beside named effects, in standard deviations of what noise leaves, from which something remains.
+inline constexpr double kStructureSigmas = 4.0;
 
 struct SelectionRules {
   int bootstrap_draws = 400;
@@ -41,8 +46,14 @@ class Selection {
 
   // Every effect added to a set, best evidence first. Fitted once, then remembered.
   const std::vector<Trial>& additions(const EffectSet& to);
-  // The best set found.
+  // The best set found. A correction among its members says that something is missing that no effect of the library
+  // explains: it fits better than the best effect did, or something remains beside the effects.
   EffectSet select();
+  // The best nameless correction beside a set; its fit is null if there is none.
+  const Trial& best_correction(const EffectSet& beside);
+
+  // A correction of a set, as data, with its gain over the set without it.
+  Correction describe_correction(const EffectSet& set, std::size_t member);
 
   std::shared_ptr<const Fit> fit_of(const EffectSet& set);
   double evidence_of(const EffectSet& set);
@@ -64,6 +75,10 @@ class Selection {
   Known& known(const EffectSet& set);
   double cost_of(const EffectSet& set, const Fit& fit);
   void say(const std::string& text) const;
+  bool grow(EffectSet& set);
+  bool swap(EffectSet& set);
+  bool shrink(EffectSet& set);
+  bool give_up_names(EffectSet& set);
 
   const Evidence& evidence_;
   SelectionRules rules_;
@@ -74,6 +89,8 @@ class Selection {
   std::vector<Candidate> dictionary_;
   NullGains null_gains_;
   std::map<std::string, double> chance_;  // per member, at the base
+  CorrectionLibrary corrections_;
+  std::map<std::string, Trial> best_corrections_;
 };
 
 // The best of several fits of set + member, begun where a linear model promises most; local unknowns (instants,
