@@ -152,6 +152,7 @@ void parameters(io::HtmlReport& page, const Tally& t) {
   io::Plot plot;
   plot.x_label = "(value - truth) / std_error";
   plot.y_label = "parameters";
+  plot.y_range = {{0.0, 1.4 * std::max(*std::ranges::max_element(count), *std::ranges::max_element(bell))}};  // legend
   plot.band("", edges, std::vector<double>(edges.size(), 0.0), heights, 0);
   plot.line("parameters named rightly", edges, heights, 0).dashed("standard normal", x, bell, 1);
   page.figure(plot,
