@@ -25,7 +25,8 @@ struct CameraViewConfig {
 
 struct RigConfig {
   // Of the simulated needle: [rig.needle] and [[rig.effect]]s, or the model file `model`; unlike [needle], which is
-  // what the software believes. What an effect has for single recordings is as in its own table.
+  // what the software believes. Unknowns of single recordings are as in the effect's own table; time counts from the
+  // start.
   model::NeedleParameters truth;
   std::vector<io::EffectEntry> effects;
   double roll_error_rad = 0;  // the bevel's true roll at the start; the software believes zero
