@@ -88,7 +88,7 @@ TEST_F(Program, FindsAConcealedEffectAndWritesAllThreeFiles) {
   const Said said = run(usual("out"));
   ASSERT_EQ(said.status, 0) << said.err;
   EXPECT_THAT(said.out, AllOf(HasSubstr("insertion_scale"), HasSubstr("ratio"), HasSubstr("held-out error")));
-  EXPECT_THAT(said.err, HasSubstr(" s reading 4 logs"));
+  EXPECT_THAT(said.err, HasSubstr(" s  reading 4 logs"));
   const auto verdict = nlohmann::json::parse(text_of(folder / "out/verdict.json"));
   EXPECT_EQ(verdict["verdict"], "effects-found");
   const auto& ratio = verdict["effects"][0]["parameters"]["ratio"];
@@ -106,8 +106,11 @@ TEST_F(Program, FindsAConcealedEffectAndWritesAllThreeFiles) {
 TEST_F(Program, EndedFromOutsideItLeavesNothing) {
   write_logs({});
   for (const int signal : {SIGINT, SIGTERM}) {
+    fs::remove(folder / "stderr");
     const pid_t child = start(usual("out"));
-    std::this_thread::sleep_for(std::chrono::milliseconds(500));
+    while (text_of(folder / "stderr").find("reading") == std::string::npos)
+      std::this_thread::sleep_for(std::chrono::milliseconds(5));
+    std::this_thread::sleep_for(std::chrono::milliseconds(200));  // into the work
     ::kill(child, signal);
     const Said said = wait_for(child);
     EXPECT_EQ(said.status, 1);

@@ -94,11 +94,15 @@ TEST(HtmlReport, is_self_contained_and_escapes_its_text) {
       .table({"trial", "rms (mm)"}, {{"a", "0.31"}, {"b", "0.28"}}, "Errors")
       .list({"first", "second"})
       .code("[needle]\nwheelbase_mm = 20.0")
+      .facts({{"held-out error", "1.21 < 3", "rms & largest"}, {"readings", "2912", ""}})
+      .folded("the rest & more", [](HtmlReport& inside) { inside.paragraph("behind the fold"); })
       .figure(example(), "Deflection over depth.");
   const std::string html = report.html();
   EXPECT_THAT(html, HasSubstr("<title>Needle &lt;1&gt; &amp; tissue</title>"));
   EXPECT_THAT(html, Not(HasSubstr("<script>")));
   EXPECT_THAT(html, HasSubstr("<td class=\"number\">0.31</td>"));
+  EXPECT_THAT(html, HasSubstr("<span>held-out error</span><b>1.21 &lt; 3</b><span>rms &amp; largest</span>"));
+  EXPECT_THAT(html, HasSubstr("<summary>the rest &amp; more</summary>\n<p>behind the fold</p>\n</details>"));
   EXPECT_THAT(html, HasSubstr("<td>0.6</td>"));  // not a column of numbers only
   EXPECT_THAT(html, HasSubstr("Figure 1. Deflection over depth."));
   // Nothing is fetched: the only addresses are the names of XML name spaces.

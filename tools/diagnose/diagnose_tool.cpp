@@ -1,6 +1,5 @@
 #include "tools/diagnose/diagnose_tool.hpp"
 
-#include <chrono>
 #include <cmath>
 #include <cstdio>
 #include <ostream>
@@ -45,19 +44,18 @@ std::string listed(const std::vector<std::string>& names) {
 
 Findings find(const Options& options) {
   Progress progress(options.quiet ? nullptr : stderr);
-  const auto began = std::chrono::steady_clock::now();
   const io::ModelFile model = load_model(options.model_path);
-  progress.stage("reading " + std::to_string(options.logs.size()) + " logs");
+  progress.say("reading " + std::to_string(options.logs.size()) + " logs");
   ReadCase input = read_case(options.logs);
-  const std::chrono::duration<double> reading = std::chrono::steady_clock::now() - began;
+  const double reading_s = progress.seconds();
   DiagnosisOptions how;
   how.seed = static_cast<std::uint64_t>(options.seed);
   how.threads = options.threads;
   how.bootstrap_draws = options.bootstrap_draws;
-  how.progress = [&](const std::string& text) { progress.stage(text); };
+  how.progress = [&](const std::string& text) { progress.say(text); };
   Findings findings = diagnosis::diagnose(input.recorded, model.needle, how);
   findings.remarks.insert(findings.remarks.begin(), input.remarks.begin(), input.remarks.end());
-  findings.times.insert(findings.times.begin(), {"reading the logs", reading.count()});
+  findings.times.insert(findings.times.begin(), {"reading the logs", reading_s});
   return findings;
 }
 
@@ -74,9 +72,9 @@ void print_verdict(std::ostream& out, const Findings& f) {
   out << "  needle: k " << with_error(n.value.curvature_per_mm, n.curvature_sd_per_mm) << " 1/mm, lambda1 "
       << with_error(n.value.lambda1_per_rad, n.lambda1_sd_per_rad) << ", lambda2 "
       << with_error(n.value.lambda2, n.lambda2_sd) << '\n';
-  out << "  held-out error: " << number(f.held_out.before.rmse_mm) << " -> " << number(f.held_out.after.rmse_mm)
-      << " mm rms, chi2 per reading " << number(f.held_out.before.chi2_per_dof) << " -> "
-      << number(f.held_out.after.chi2_per_dof) << '\n';
+  out << "  held-out error: " << measured(f.held_out.before.rmse_mm) << " -> " << measured(f.held_out.after.rmse_mm)
+      << " mm rms, chi2 per reading " << measured(f.held_out.before.chi2_per_dof) << " -> "
+      << measured(f.held_out.after.chi2_per_dof) << '\n';
   for (std::size_t i = 0; i < f.where.size() && i < 3; ++i)
     out << "  " << (i == 0 ? "worst: " : "       ") << f.where[i].log << " " << f.where[i].channel << ", "
         << number(f.where[i].from_s) << " to " << number(f.where[i].to_s) << " s\n";

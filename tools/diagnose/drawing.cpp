@@ -122,10 +122,10 @@ Axis axis_around(const std::vector<double>& values, std::string label) {
 std::vector<double> ticks(const Axis& axis, int count) {
   std::vector<double> all;
   if (axis.logarithmic) {
-    const double low = std::ceil(std::log10(axis.low) - 1e-9);
-    const double high = std::floor(std::log10(axis.high) + 1e-9);
-    const double step = std::max(1.0, std::ceil((high - low) / count));
-    for (double power = low; power <= high; power += step) all.push_back(std::pow(10.0, power));
+    const int low = static_cast<int>(std::ceil(std::log10(axis.low) - 1e-9));
+    const int high = static_cast<int>(std::floor(std::log10(axis.high) + 1e-9));
+    const int step = std::max(1, (high - low + count - 1) / count);
+    for (int power = low; power <= high; power += step) all.push_back(std::pow(10.0, power));
     return all;
   }
   // Of the round steps, the one whose number of ticks comes nearest.

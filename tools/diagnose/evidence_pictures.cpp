@@ -215,7 +215,8 @@ std::string correction_picture(const std::vector<Correction>& corrections) {
       high.push_back(c.values[k] + error);
       all.insert(all.end(), {low.back(), high.back()});
     }
-    const Box box{62 + static_cast<double>(i % 2) * 425, 26 + static_cast<double>(i / 2) * kRow, 335, kRow - 76};
+    const std::size_t row = i / 2;
+    const Box box{62 + static_cast<double>(i % 2) * 425, 26 + static_cast<double>(row) * kRow, 335, kRow - 76};
     Panel panel(drawing, box, axis_around(c.at, in_words(c.covariate)), axis_around(all, c.unit), c.component);
     panel.level(0, {.colour = ink::kSoft}).band(c.at, low, high, ink::kAfter);
     panel.curve(c.at, c.values, {.colour = ink::kAfter, .width = 2}).points(c.at, c.values, ink::kAfter, 1, 3);

@@ -52,6 +52,10 @@ std::string number(double value, int digits) {
   return text;
 }
 
+std::string measured(double value, int digits) {
+  return std::isfinite(value) ? fixed(value, decimals_for(value, digits)) : "-";
+}
+
 std::string with_error(double value, double std_error) {
   if (!std::isfinite(value)) return "-";
   if (!std::isfinite(std_error) || std_error <= 0) return number(value, 4);

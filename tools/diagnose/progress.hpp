@@ -1,5 +1,4 @@
-// What the tool is at, for someone who waits: a line per stage with its seconds. In a terminal the stage at work stands
-// in the last line.
+// What the tool is at, for someone who waits: a line at a time, with the seconds since it began.
 #pragma once
 
 #include <chrono>
@@ -11,20 +10,18 @@ namespace bevel::diagnose {
 class Progress {
  public:
   // Null says nothing.
-  explicit Progress(std::FILE* out);
-  ~Progress() { done(); }
-  Progress(const Progress&) = delete;
-  Progress& operator=(const Progress&) = delete;
+  explicit Progress(std::FILE* out) : out_(out) {}
 
-  void stage(const std::string& text);  // ends the one before
-  void done();
+  void say(const std::string& text) const {
+    if (out_ == nullptr || text.empty()) return;
+    std::fprintf(out_, "%6.1f s  %s\n", seconds(), text.c_str());
+    std::fflush(out_);
+  }
+  double seconds() const { return std::chrono::duration<double>(std::chrono::steady_clock::now() - began_).count(); }
 
  private:
-  using Clock = std::chrono::steady_clock;
   std::FILE* out_;
-  bool terminal_;
-  std::string at_;
-  Clock::time_point began_;
+  std::chrono::steady_clock::time_point began_ = std::chrono::steady_clock::now();
 };
 
 }  // namespace bevel::diagnose

@@ -39,10 +39,10 @@ std::string sizes_of(const FoundEffect& effect) {
 }
 
 std::string held_out_sentence(const HeldOut& h) {
-  return "On recordings that it was not fitted to, the model is off by " + number(h.before.rmse_mm) +
-         " mm rms as it stands and by " + number(h.after.rmse_mm) +
-         " mm with what was found; chi2 per reading falls from " + number(h.before.chi2_per_dof) + " to " +
-         number(h.after.chi2_per_dof) + " (1 is noise alone).";
+  return "On recordings that it was not fitted to, the model is off by " + measured(h.before.rmse_mm) +
+         " mm rms as it stands and by " + measured(h.after.rmse_mm) +
+         " mm with what was found; chi2 per reading falls from " + measured(h.before.chi2_per_dof) + " to " +
+         measured(h.after.chi2_per_dof) + " (1 is noise alone).";
 }
 
 io::Tone tone_of(Verdict verdict) {
@@ -68,8 +68,9 @@ void add_verdict(io::HtmlReport& page, const Findings& f) {
   for (const auto& effect : f.effects) consequences += sizes_of(effect) + ". ";
   if (f.verdict == Verdict::nothing_missing)
     consequences +=
-        "With its needle refitted, the model is off by " + number(f.held_out.before.rmse_mm) +
-        " mm rms on recordings that it was not fitted to, chi2 per reading " + number(f.held_out.before.chi2_per_dof) +
+        "With its needle refitted, the model is off by " + measured(f.held_out.before.rmse_mm) +
+        " mm rms on recordings that it was not fitted to, chi2 per reading " +
+        measured(f.held_out.before.chi2_per_dof) +
         " (1 is noise alone). Nothing above the sizes listed under \"What these recordings could have shown\".";
   else
     consequences += held_out_sentence(f.held_out);
@@ -82,11 +83,12 @@ void add_verdict(io::HtmlReport& page, const Findings& f) {
                                                    : "probability; or " + listed(effect.ambiguous_with, " or ")});
   facts.push_back(
       {"held-out error",
-       number(f.held_out.before.rmse_mm) + (f.effects.empty() ? "" : " → " + number(f.held_out.after.rmse_mm)) + " mm",
+       measured(f.held_out.before.rmse_mm) + (f.effects.empty() ? "" : " → " + measured(f.held_out.after.rmse_mm)) +
+           " mm",
        "rms, largest " + number(f.effects.empty() ? f.held_out.before.max_mm : f.held_out.after.max_mm) + " mm"});
   facts.push_back({"chi2 per reading",
-                   number(f.held_out.before.chi2_per_dof) +
-                       (f.effects.empty() ? "" : " → " + number(f.held_out.after.chi2_per_dof)),
+                   measured(f.held_out.before.chi2_per_dof) +
+                       (f.effects.empty() ? "" : " → " + measured(f.held_out.after.chi2_per_dof)),
                    "held out; 1 is noise alone"});
   if (f.verdict == Verdict::unknown_effect)
     facts.push_back({"unexplained", percent(f.checks.unexplained_share), "of the mismatch"});

@@ -132,20 +132,21 @@ void add_noise_and_checks(io::HtmlReport& page, const Findings& f) {
   page.heading("Noise and checks");
   std::vector<std::vector<std::string>> rows;
   for (std::size_t c = 0; c < f.channels.size() && c < f.noise.sigma_mm.size(); ++c)
-    rows.push_back({f.channels[c], number(f.noise.sigma_mm[c])});
+    rows.push_back({f.channels[c], measured(f.noise.sigma_mm[c])});
   page.paragraph(
       "Noise of one reading, found before anything is named and held fixed from then on. Successive readings, " +
       number(1 / f.noise.frame_s, 3) + " a second, correlate by " + number(f.noise.ar1, 2) + "; " +
       percent(f.noise.outlier_share) + " of them are outliers.");
   page.table({"channel", "standard deviation (mm)"}, rows);
   const auto& c = f.checks;
-  page.table({"check of the final model", "found", "passed if"},
-             {{"chi2 per reading", number(c.chi2_per_dof, 4), number(c.band[0], 4) + " to " + number(c.band[1], 4)},
-              {"correlation left in the residuals (Ljung-Box p)",
-               c.ljung_box_p < 0.001 ? "< 0.001" : number(c.ljung_box_p, 2), "above 0.01"},
-              {"slow structure left (standard deviations of chance)", number(c.remaining_sigmas, 2), "near 0"},
-              {"share of the mismatch unexplained", percent(c.unexplained_share), "small"}},
-             c.clean ? "What is left is noise." : "What is left is more than noise: something is still missing.");
+  page.table(
+      {"check of the final model", "found", "passed if"},
+      {{"chi2 per reading", measured(c.chi2_per_dof, 4), measured(c.band[0], 4) + " to " + measured(c.band[1], 4)},
+       {"correlation left in the residuals (Ljung-Box p)", c.ljung_box_p < 0.001 ? "< 0.001" : number(c.ljung_box_p, 2),
+        "above 0.01"},
+       {"slow structure left (standard deviations of chance)", number(c.remaining_sigmas, 2), "near 0"},
+       {"share of the mismatch unexplained", percent(c.unexplained_share), "small"}},
+      c.clean ? "What is left is noise." : "What is left is more than noise: something is still missing.");
   if (!f.remarks.empty()) page.subheading("Remarks").list(f.remarks);
 }
 
@@ -154,7 +155,7 @@ void add_making(io::HtmlReport& page, const Findings& f, const std::string& mode
   std::vector<std::vector<std::string>> rows;
   double total = 0;
   for (const auto& t : f.times) {
-    rows.push_back({t.stage, number(t.seconds, 2)});
+    rows.push_back({t.stage, measured(t.seconds, 2)});
     total += t.seconds;
   }
   rows.push_back({"all", number(total, 3)});

@@ -141,8 +141,10 @@ std::string residual_picture(const Findings& findings, std::size_t channel) {
   Drawing drawing(832, 390);
   int place = 0;
   for (const Against& against : kAgainst) {
-    const Box box{44 + (place % kColumns) * 199.0, 24 + (place / kColumns) * 195.0, kPanelWidth, kPanelHeight};
-    const bool leftmost = place++ % kColumns == 0;
+    const int column = place % kColumns;
+    const int row = place++ / kColumns;
+    const Box box{44 + column * 199.0, 24 + row * 195.0, kPanelWidth, kPanelHeight};
+    const bool leftmost = column == 0;
     std::vector<double> x;
     std::vector<double> y_before;
     std::vector<double> y_after;
