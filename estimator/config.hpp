@@ -1,6 +1,8 @@
 #pragma once
 // What the estimator believes before it has seen anything, and how much it lets the model err.
-#include "model/needle.hpp"
+#include <vector>
+
+#include "model/effects/augmented_needle.hpp"
 
 namespace bevel::estimator {
 
@@ -44,8 +46,12 @@ struct EstimatorConfig {
   ProcessNoise process;
   Gate gate;
   HealthLimits limits;
+  // What the model file says that the bicycle leaves out, with its parameters held: applied in propagation, and in the
+  // measurement (offset, camera, latency). None: the plain model, bit for bit.
+  std::vector<model::ActiveEffect> effects;
   // Steps that are kept of what has left the history, to run again with better derivatives (NeedleFilter::relinearise)
   // each time their number has grown by a quarter; the whole costs about 1.5 us a step each time. 0: never.
+  // With effects, whose memory cannot be walked back, always 0.
   int relinearised_steps = 2048;
 };
 

@@ -13,7 +13,7 @@ NeedleEstimator::NeedleEstimator(const EstimatorConfig& config, std::size_t hist
   pool_.resize(std::max<std::size_t>(history, 8));
   order_.reserve(pool_.size());
   free_.reserve(pool_.size());
-  past_.reserve(static_cast<std::size_t>(std::max(config.relinearised_steps, 0)));
+  past_.reserve(static_cast<std::size_t>(config.effects.empty() ? std::max(config.relinearised_steps, 0) : 0));
   past_room_.resize(past_.capacity());
   for (std::size_t i = pool_.size(); i-- > 0;) free_.push_back(static_cast<std::uint32_t>(i));
 }
@@ -153,7 +153,7 @@ void NeedleEstimator::add(const model::ActuatorState& actuator) {
   }
   made->insertion_mm = actuator.insertion_mm;
   made->rotation_rad = actuator.rotation_rad;
-  if (index == 0) made->state = filter_.initial();
+  if (index == 0) made->state = filter_.initial(made->insertion_mm, made->rotation_rad);
   // Measurements since the previous actuator state are interpolated anew.
   std::size_t from = index;
   while (from > 1 && node(from - 1).kind == Kind::measurement) --from;
@@ -161,15 +161,16 @@ void NeedleEstimator::add(const model::ActuatorState& actuator) {
   relinearise_if_due();
 }
 
-void NeedleEstimator::add(const model::TipMeasurement& measurement) {
+void NeedleEstimator::add(const model::TipMeasurement& stamped) {
   ++counters_.measurements;
+  model::TipMeasurement measurement = stamped;
+  measurement.utime -= filter_.latency_us();  // a camera known to stamp late saw the tip so much earlier
   if (measurement.status != 0 || !(measurement.information_per_mm2.trace() > 0)) {
     ++counters_.not_usable;
     return;
   }
-  // A full history drops its oldest node; one full of measurements that wait for the axes must keep its anchor.
-  if (order_.empty() || measurement.utime < node(0).utime ||
-      (free_.empty() && (measurement.utime < node(1).utime || processed_ < 2))) {
+  // A full history drops its oldest node, or of measurements that wait for the axes the oldest: not the new one.
+  if (order_.empty() || measurement.utime < node(0).utime || (free_.empty() && measurement.utime < node(1).utime)) {
     ++counters_.too_old;
     return;
   }
@@ -212,7 +213,8 @@ void NeedleEstimator::process_from(std::size_t index) {
     const Node& previous = node(i - 1);
     if (n.kind == Kind::measurement) interpolate(i);
     n.state = previous.state;
-    filter_.predict(n.state, n.insertion_mm - previous.insertion_mm, n.rotation_rad - previous.rotation_rad);
+    filter_.predict(n.state, n.insertion_mm - previous.insertion_mm, n.rotation_rad - previous.rotation_rad,
+                    static_cast<double>(n.utime - previous.utime) * 1e-6);
     n.moved_mm = n.state.pose.p_mm - previous.state.pose.p_mm;
     if (n.kind != Kind::measurement) continue;
     if (observer_ && !n.applied_before) {

@@ -51,15 +51,15 @@ SeenAxes seen_axes(const Eigen::Matrix3d& information) {
   return seen;
 }
 
-template <int kRank>
-Update update_rank(FilterState& state, const Eigen::Matrix3d& axes, const Eigen::Vector3d& variance,
-                   const Eigen::Vector3d& residual, double gate) {
+// `by_state`: derivative of what is seen by the first columns of the error; R of the pose if it is the tip itself.
+template <int kRank, int kColumns>
+Update update_rank(FilterState& state, const Eigen::Matrix<double, 3, kColumns>& by_state, const Eigen::Matrix3d& axes,
+                   const Eigen::Vector3d& variance, const Eigen::Vector3d& residual, double gate) {
   using Vec = Eigen::Matrix<double, kRank, 1>;
   using Mat = Eigen::Matrix<double, kRank, kRank>;
-  // h = axes^T p; p moves by R delta_p under a body-frame error.
-  const Eigen::Matrix<double, kRank, 3> H = axes.rightCols<kRank>().transpose() * state.pose.R;
-  const Eigen::Matrix<double, 9, kRank> PHt = state.covariance.leftCols<3>() * H.transpose();
-  Mat S = H * PHt.template topRows<3>();
+  const Eigen::Matrix<double, kRank, kColumns> H = axes.rightCols<kRank>().transpose() * by_state;
+  const Eigen::Matrix<double, 9, kRank> PHt = state.covariance.leftCols<kColumns>() * H.transpose();
+  Mat S = H * PHt.template topRows<kColumns>();
   S.diagonal() += variance.tail<kRank>();
   const Eigen::LLT<Mat> llt(S);
   const Vec y = axes.rightCols<kRank>().transpose() * residual;
@@ -76,10 +76,10 @@ Update update_rank(FilterState& state, const Eigen::Matrix3d& axes, const Eigen:
 
   const Eigen::Matrix<double, 9, kRank> K = llt.solve(PHt.transpose()).transpose();
   const Vector9d correction = K * y;
-  // Joseph form, (I - K H) P (I - K H)^T + K R K^T, with H only in the first three columns; small products written out.
+  // Joseph form, (I - K H) P (I - K H)^T + K R K^T, with H only in its first columns; small products written out.
   Matrix9d P = state.covariance;
   P.noalias() -= K.lazyProduct(PHt.transpose());
-  Eigen::Matrix<double, 9, kRank> PHt2 = P.leftCols<3>().lazyProduct(H.transpose());
+  Eigen::Matrix<double, 9, kRank> PHt2 = P.leftCols<kColumns>().lazyProduct(H.transpose());
   PHt2 -= K * variance.tail<kRank>().asDiagonal();
   P.noalias() -= PHt2.lazyProduct(K.transpose());
   state.covariance = 0.5 * (P + P.transpose());
@@ -91,16 +91,33 @@ Update update_rank(FilterState& state, const Eigen::Matrix3d& axes, const Eigen:
   return result;
 }
 
+template <int kColumns>
+Update update_seen(FilterState& state, const Eigen::Matrix<double, 3, kColumns>& by_state, const SeenAxes& seen,
+                   const Eigen::Vector3d& residual, const std::array<double, 3>& gate) {
+  switch (seen.rank) {
+    case 1:
+      return update_rank<1, kColumns>(state, by_state, seen.axes, seen.variance, residual, gate[0]);
+    case 2:
+      return update_rank<2, kColumns>(state, by_state, seen.axes, seen.variance, residual, gate[1]);
+    case 3:
+      return update_rank<3, kColumns>(state, by_state, seen.axes, seen.variance, residual, gate[2]);
+    default:
+      return {};
+  }
+}
+
 }  // namespace
 
 NeedleFilter::NeedleFilter(const EstimatorConfig& config)
-    : config_(config), slip_(model::slip_parameters(config.prior.needle)) {
+    : config_(config),
+      slip_(model::slip_parameters(config.prior.needle)),
+      needle_(config.prior.needle, config.effects, 9, {.curvature = 6, .lambda1 = 7, .lambda2 = 8}) {
   for (int rank = 1; rank <= 3; ++rank)
     gate_[static_cast<std::size_t>(rank - 1)] =
         boost::math::quantile(boost::math::chi_squared(rank), config.gate.probability);
 }
 
-FilterState NeedleFilter::initial() const {
+FilterState NeedleFilter::initial(double insertion_mm, double rotation_rad) const {
   const Prior& prior = config_.prior;
   FilterState state;
   state.curvature_per_mm = prior.needle.curvature_per_mm;
@@ -109,10 +126,20 @@ FilterState NeedleFilter::initial() const {
   state.covariance.diagonal() << Eigen::Vector3d::Constant(square(prior.position_sd_mm)), square(prior.tilt_sd_rad),
       square(prior.tilt_sd_rad), square(prior.roll_sd_rad), square(prior.curvature_sd_per_mm),
       square(prior.lambda1_sd_per_rad), square(prior.lambda2_sd);
+  if (config_.effects.empty()) return state;
+  const model::AugmentedState entry = needle_.entry({0, insertion_mm, rotation_rad});
+  state.pose = entry.pose;
+  state.effects.entry = state.effects.base = entry.base;
+  state.effects.tip_insertion_mm = insertion_mm;
+  state.effects.tip_rotation_rad = rotation_rad;
   return state;
 }
 
-void NeedleFilter::predict(FilterState& state, double insertion_mm, double rotation_rad) const {
+void NeedleFilter::predict(FilterState& state, double insertion_mm, double rotation_rad, double duration_s) const {
+  if (!config_.effects.empty()) {
+    state.outside_model = !predict_with_effects(state, {duration_s, insertion_mm, rotation_rad});
+    return;
+  }
   if (insertion_mm == 0 && rotation_rad == 0) return;
   model::SlipParameters slip = slip_;
   slip.lambda1_per_rad = state.lambda1_per_rad;
@@ -143,20 +170,13 @@ Vector9d NeedleFilter::process_variance(const Matrix9d& covariance, double inser
 
 Update NeedleFilter::update(FilterState& state, const model::TipMeasurement& measurement) const {
   const SeenAxes seen = seen_axes(measurement.information_per_mm2);
-  const Eigen::Vector3d residual = measurement.position_mm - state.pose.p_mm;
+  if (seen.rank == 0) return {};  // sees nothing: no rejection either
   Update result;
-  switch (seen.rank) {
-    case 1:
-      result = update_rank<1>(state, seen.axes, seen.variance, residual, gate_[0]);
-      break;
-    case 2:
-      result = update_rank<2>(state, seen.axes, seen.variance, residual, gate_[1]);
-      break;
-    case 3:
-      result = update_rank<3>(state, seen.axes, seen.variance, residual, gate_[2]);
-      break;
-    default:
-      return result;  // sees nothing: no rejection either
+  if (config_.effects.empty()) {
+    result = update_seen<3>(state, state.pose.R, seen, measurement.position_mm - state.pose.p_mm, gate_);
+  } else {
+    const model::TipReading at = reading(state);
+    result = update_seen<9>(state, at.D, seen, measurement.position_mm - at.position_mm, gate_);
   }
   if (result.accepted) {
     state.measurement_utime = measurement.utime;

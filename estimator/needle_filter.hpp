@@ -18,6 +18,15 @@ namespace bevel::estimator {
 using Vector9d = Eigen::Matrix<double, 9, 1>;
 using Matrix9d = Eigen::Matrix<double, 9, 9>;
 
+// Where the base and the effects of the model file stand; not in use without effects. Values only: that what an effect
+// remembers depends on the estimate is not followed.
+struct EffectState {
+  model::BaseMotion entry, base;
+  double tip_insertion_mm = 0, tip_rotation_rad = 0;
+  std::array<std::array<double, 3>, model::kMaxEffects> slot{};
+  std::array<int, model::kMaxEffects> phase{};
+};
+
 struct FilterState {
   model::Pose pose;
   double curvature_per_mm = 0;
@@ -28,6 +37,7 @@ struct FilterState {
   std::int32_t rejects_in_row = 0;
   std::int32_t reset_count = 0;
   bool outside_model = false;
+  EffectState effects;
 };
 
 struct Update {
@@ -56,12 +66,17 @@ class NeedleFilter {
  public:
   explicit NeedleFilter(const EstimatorConfig& config);
 
-  // The prior at the entry point: heading along z_A, bevel as the model file says.
-  FilterState initial() const;
+  // The prior at the entry point: heading along z_A but for what effects say, bevel as the model file says, the base
+  // where it stands then.
+  FilterState initial(double insertion_mm = 0, double rotation_rad = 0) const;
 
-  // Moves the state by increments of the two axes. Where the model has no answer the pose stays, and outside_model is
-  // set.
-  void predict(FilterState& state, double insertion_mm, double rotation_rad) const;
+  // Moves the state by increments of the two axes in so much time (which only effects ask for). Where the model has no
+  // answer the pose stays, and outside_model is set.
+  void predict(FilterState& state, double insertion_mm, double rotation_rad, double duration_s = 0) const;
+
+  // Where the cameras see the tip of a state, and by how much they are late.
+  Eigen::Vector3d seen_position_mm(const FilterState& state) const;
+  std::int64_t latency_us() const;
 
   // Applies one measurement; its status must be 0 and its values finite (the checked decode sees to that).
   Update update(FilterState& state, const model::TipMeasurement& measurement) const;
@@ -87,6 +102,9 @@ class NeedleFilter {
   bool bend(const FilterState& state, const FilterState& start, std::span<const PastStep> steps,
             std::span<Eigen::Vector3d> room, Vector9d& along, Vector9d& start_bend) const;
   void shift(FilterState& state, const Vector9d& error, const Matrix9d& covariance) const;
+  bool predict_with_effects(FilterState& state, const model::BaseMotion& increment) const;
+  model::AugmentedState augmented(const FilterState& state) const;
+  model::TipReading reading(const FilterState& state) const;
   Vector9d process_variance(const Matrix9d& covariance, double insertion_mm, double rotation_rad) const;
   void keep_in_domain(FilterState& state) const;
   void declare_reset(FilterState& state) const;
@@ -94,6 +112,8 @@ class NeedleFilter {
   EstimatorConfig config_;
   std::array<double, 3> gate_{};  // chi-square quantile by rank
   model::SlipParameters slip_;    // ell and the variants; lambda comes from the state
+  // Its k and lambda are set to those of the state in each step: one filter serves one thread.
+  mutable model::AugmentedNeedle needle_;
 };
 
 }  // namespace bevel::estimator

@@ -99,9 +99,9 @@ TEST(NeedleEstimator, TwoHundredInsertionsAreConsistent) {
   EXPECT_GT(nis / axes, nis_band.first);
   EXPECT_LT(nis / axes, nis_band.second);
   EXPECT_LT(std::sqrt(squares / batch_squares), 1.05);
-  // Not in its band: with a prior this wide the posterior of (k, lambda1, lambda2) is curved, so that even the batch
+  // Not in its band: with a prior this wide the posterior of (k, lambda1, lambda2) is bent, so that even the batch
   // solution's covariance is too small by what it prints above. See docs/estimator.md; this holds what was reached.
-  EXPECT_LT(nees / (9.0 * kRuns), 1.22);
+  EXPECT_LT(nees / (9.0 * kRuns), 1.15);
   EXPECT_GT(nees / (9.0 * kRuns), nees_band.first);
 }
 
@@ -246,6 +246,28 @@ TEST(NeedleEstimator, AMeasurementOfTheNewestActuatorStatesOwnInstantIsAppliedAt
   estimator.add(testing::measure({0, 0, 0}, a.utime, 1, 1, {1, 0, 1}, 0.1, rng));
   EXPECT_EQ(estimator.estimate(a.utime).state.measurement_utime, a.utime);
   EXPECT_EQ(estimator.estimate(a.utime).newest_update.rank, 2);
+}
+
+TEST(NeedleEstimator, AnActuatorStateThatFindsTheHistoryFullOfWaitingMeasurementsIsTaken) {
+  std::mt19937_64 rng(16);
+  constexpr std::size_t kHistory = 16;
+  NeedleEstimator estimator(agar_config(), kHistory);
+  model::ActuatorState a;
+  a.utime = testing::kStart_utime;
+  estimator.add(a);
+  // More measurements than there is room for, all newer than the axes: the oldest of them go, the anchor stays.
+  for (int i = 1; i <= 40; ++i)
+    estimator.add(testing::measure({0, 0, 0.1 * i}, a.utime + 1000 * i, i, 0, {1, 1, 1}, 0.1, rng));
+  EXPECT_EQ(estimator.estimate(a.utime).state.measurement_utime, 0);
+  a.utime += 40'000;
+  a.insertion_mm = 4;
+  estimator.add(a);
+  const Estimate estimate = estimator.estimate(a.utime);
+  EXPECT_EQ(estimate.utime, a.utime);
+  EXPECT_EQ(estimate.state.measurement_utime, a.utime);
+  EXPECT_NEAR(estimate.state.pose.p_mm.z(), 4, 0.1);
+  EXPECT_EQ(estimator.counters().actuators_refused, 0);
+  EXPECT_GT(estimator.counters().too_old, 20);
 }
 
 TEST(NeedleEstimator, ZeroWidthPriorsKeepTheBicycle) {

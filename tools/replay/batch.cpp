@@ -43,9 +43,6 @@ estimator::EstimatorConfig load_config(const std::string& model_path, const std:
     file.finish();
   }
   const io::ModelFile model = io::load_model_file(model_path);
-  if (!model.effects.empty())
-    throw std::runtime_error(model_path + ": has [[effect]] \"" + model.effects.front().name +
-                             "\", which the estimator does not apply; take it out to replay without it");
   config.prior.needle = model.needle;
   if (bicycle) {
     config.prior.needle.lambda1_per_rad = config.prior.needle.lambda2 = 0;
@@ -71,7 +68,9 @@ std::vector<Replay> replay_logs(const std::vector<std::string>& logs, const esti
     for (std::size_t i = next++; i < logs.size(); i = next++) {
       try {
         const io::MappedFile file(logs[i]);
-        replays[i] = replay_log(file.bytes(), name_of(logs[i]), config, options);
+        estimator::EstimatorConfig own = config;
+        own.effects = io::active_effects(options.effects, logs[i]);
+        replays[i] = replay_log(file.bytes(), name_of(logs[i]), own, options);
       } catch (...) {
         const std::lock_guard lock(failure_mutex);
         failure = std::current_exception();
@@ -87,8 +86,10 @@ std::vector<Replay> replay_logs(const std::vector<std::string>& logs, const esti
 }
 
 int run(const BatchOptions& options, std::ostream& out, std::ostream& speed) {
-  const auto replays =
-      replay_logs(find_logs(options.paths), load_config(options.model_path, options.config_path, options.bicycle));
+  ReplayOptions with_effects;
+  with_effects.effects = io::load_model_file(options.model_path).effects;
+  const auto replays = replay_logs(find_logs(options.paths),
+                                   load_config(options.model_path, options.config_path, options.bicycle), with_effects);
   bool intact = true;
   for (const Replay& replay : replays) {
     print(out, replay, options.ahead_mm);

@@ -6,6 +6,7 @@
 #include <ostream>
 #include <stdexcept>
 
+#include "io/model_file.hpp"
 #include "tools/replay/batch.hpp"
 
 namespace bevel::replay {
@@ -25,8 +26,9 @@ CaseFigures figures_of(const std::string& folder, const BatchOptions& options) {
   const auto logs = find_logs({folder});
   const auto config = load_config((fs::path(folder) / "model.toml").string(), options.config_path, options.bicycle);
   CaseFigures result;
-  const auto first = replay_logs(logs, config);
   ReplayOptions calibrated;
+  calibrated.effects = io::load_model_file((fs::path(folder) / "model.toml").string()).effects;
+  const auto first = replay_logs(logs, config, calibrated);
   for (int axis = 0; axis < 3; ++axis) {
     std::vector<std::vector<AxisSample>> readings;
     readings.reserve(first.size());

@@ -4,6 +4,7 @@
 #include <chrono>
 #include <cmath>
 #include <ctime>
+#include <utility>
 
 #include "io/checked_decode.hpp"
 #include "io/messages.hpp"
@@ -22,6 +23,7 @@ double processor_s() {
 
 struct Sink {
   std::vector<InnovationRow>* rows;
+  const estimator::NeedleFilter* filter;
 
   static void take(void* context, const estimator::NeedleEstimator::Applied& applied) {
     const model::TipMeasurement& m = *applied.measurement;
@@ -33,7 +35,8 @@ struct Sink {
     row.rank = applied.update.rank;
     row.mahalanobis2 = applied.update.mahalanobis2;
     row.position_mm = m.position_mm;
-    row.innovation_mm = m.position_mm - applied.state_before.pose.p_mm;
+    const Sink& sink = *static_cast<Sink*>(context);
+    row.innovation_mm = m.position_mm - sink.filter->seen_position_mm(applied.state_before);
     const Eigen::Matrix3d& R = applied.state_before.pose.R;
     row.state_variance_mm2 = (R * applied.state_before.covariance.topLeftCorner<3, 3>() * R.transpose()).diagonal();
     for (int i = 0; i < 3; ++i) {
@@ -41,7 +44,7 @@ struct Sink {
       row.sees[static_cast<std::size_t>(i)] = information > 0;
       row.noise_variance_mm2[i] = information > 0 ? 1 / information : 0;
     }
-    static_cast<Sink*>(context)->rows->push_back(row);
+    sink.rows->push_back(row);
   }
 };
 
@@ -74,7 +77,8 @@ void compare(Replay& result, const std::vector<needle_state_t>& truths, const es
           static_cast<double>(truth.utime - before.utime) / static_cast<double>(after->utime - before.utime);
       state = before.state;
       filter.predict(state, share * (after->insertion_mm - before.insertion_mm),
-                     share * (after->rotation_rad - before.rotation_rad));
+                     share * (after->rotation_rad - before.rotation_rad),
+                     static_cast<double>(truth.utime - before.utime) * 1e-6);
     }
     model::Pose pose;
     pose.p_mm = {truth.position_mm[0], truth.position_mm[1], truth.position_mm[2]};
@@ -122,7 +126,7 @@ Replay replay_log(std::span<const std::uint8_t> log, const std::string& name, co
   result.innovations.reserve(log.size() / 250 + 16);
   std::vector<needle_state_t> truths;
   estimator::NeedleEstimator estimator(config, options.history);
-  Sink sink{&result.innovations};
+  Sink sink{&result.innovations, &estimator.filter()};
   estimator.observe(&Sink::take, &sink);
 
   const auto start = std::chrono::steady_clock::now();
@@ -175,13 +179,17 @@ Foretold foretell(const Replay& replay, double ahead_mm) {
     if (to == replay.innovations.end()) break;
     estimator::FilterState state = from->state;
     Eigen::Vector2d axes(from->insertion_mm, from->rotation_rad);
+    std::int64_t utime = from->utime;
+    const auto seconds_to = [&utime](std::int64_t later) {
+      return static_cast<double>(later - std::exchange(utime, later)) * 1e-6;
+    };
     for (auto row = from + 1; row != replay.states.end() && row->utime < to->utime; ++row) {
-      filter.predict(state, row->insertion_mm - axes[0], row->rotation_rad - axes[1]);
+      filter.predict(state, row->insertion_mm - axes[0], row->rotation_rad - axes[1], seconds_to(row->utime));
       axes = {row->insertion_mm, row->rotation_rad};
     }
     const Eigen::Vector2d last = axes_at(replay, to->utime) - axes;
-    filter.predict(state, last[0], last[1]);
-    sum += (to->position_mm - state.pose.p_mm).head<2>().squaredNorm();
+    filter.predict(state, last[0], last[1], seconds_to(to->utime));
+    sum += (to->position_mm - filter.seen_position_mm(state)).head<2>().squaredNorm();
     ++result.count;
   }
   if (result.count > 0) result.lateral_rmse_mm = std::sqrt(sum / static_cast<double>(result.count));

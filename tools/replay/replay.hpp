@@ -7,6 +7,7 @@
 
 #include "estimator/needle_estimator.hpp"
 #include "io/log_reader.hpp"
+#include "io/model_file.hpp"
 #include "tools/replay/statistics.hpp"
 
 namespace bevel::replay {
@@ -64,6 +65,7 @@ struct ReplayOptions {
   std::size_t history = 128;
   // Replaces each measurement's information by that of this noise, per axis; empty: as the camera says.
   std::vector<NoiseColour> noise_by_axis;
+  std::vector<io::EffectEntry> effects;  // of the model file, for replay_logs: some are a recording's own
 };
 
 Replay replay_log(std::span<const std::uint8_t> log, const std::string& name, const estimator::EstimatorConfig& config,

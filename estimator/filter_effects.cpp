@@ -1,0 +1,63 @@
+// The filter's propagation and measurement with the effects of a model file.
+#include <cmath>
+
+#include "estimator/needle_filter.hpp"
+#include "estimator/propagate.hpp"
+
+namespace bevel::estimator {
+
+model::AugmentedState NeedleFilter::augmented(const FilterState& state) const {
+  const EffectState& effects = state.effects;
+  model::AugmentedState augmented;
+  augmented.pose = state.pose;
+  // Sensitivities of one step: by the error of the pose before it, and by the parameters.
+  augmented.D.setIdentity(6, 9);
+  augmented.entry = effects.entry;
+  augmented.base = effects.base;
+  augmented.tip_insertion_mm = effects.tip_insertion_mm;
+  augmented.tip_rotation_rad = effects.tip_rotation_rad;
+  for (std::size_t i = 0; i < config_.effects.size(); ++i) {
+    for (std::size_t k = 0; k < 3; ++k) augmented.memory[i].slot[k] = effects.slot[i][k];
+    augmented.memory[i].phase = effects.phase[i];
+  }
+  return augmented;
+}
+
+bool NeedleFilter::predict_with_effects(FilterState& state, const model::BaseMotion& increment) const {
+  if (increment.insertion_mm == 0 && increment.rotation_rad == 0 && increment.time_s == 0) return true;
+  const model::BaseMotion& base = state.effects.base;
+  model::AugmentedState moved = augmented(state);
+  needle_.set_needle(state.curvature_per_mm, state.lambda1_per_rad, state.lambda2);
+  if (!needle_.advance(moved, {base.time_s + increment.time_s, base.insertion_mm + increment.insertion_mm,
+                               base.rotation_rad + increment.rotation_rad}))
+    return false;
+  propagate<9>(state.covariance, moved.D.leftCols<6>(), moved.D.middleCols<3>(6));
+  state.covariance.diagonal() += process_variance(state.covariance, increment.insertion_mm, increment.rotation_rad);
+  state.pose = moved.pose;
+  EffectState& effects = state.effects;
+  effects.base = moved.base;
+  effects.tip_insertion_mm = moved.tip_insertion_mm.value;
+  effects.tip_rotation_rad = moved.tip_rotation_rad.value;
+  for (std::size_t i = 0; i < config_.effects.size(); ++i) {
+    for (std::size_t k = 0; k < 3; ++k) effects.slot[i][k] = moved.memory[i].slot[k].value;
+    effects.phase[i] = moved.memory[i].phase;
+  }
+  return true;
+}
+
+model::TipReading NeedleFilter::reading(const FilterState& state) const {
+  model::TipReading at;
+  needle_.point(augmented(state), at);
+  needle_.through_cameras(at);
+  return at;
+}
+
+Eigen::Vector3d NeedleFilter::seen_position_mm(const FilterState& state) const {
+  return config_.effects.empty() ? state.pose.p_mm : reading(state).position_mm;
+}
+
+std::int64_t NeedleFilter::latency_us() const {
+  return config_.effects.empty() ? 0 : std::llround(1e6 * needle_.latency_s().value);
+}
+
+}  // namespace bevel::estimator

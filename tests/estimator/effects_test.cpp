@@ -1,0 +1,124 @@
+// Effects of a model file in the filter, on data simulated with them: innovations are what they should be with the
+// effect in the model and not without.
+#include <gtest/gtest.h>
+
+#include <iostream>
+
+#include "estimator/needle_estimator.hpp"
+#include "model/effects/open_loop.hpp"
+#include "tests/estimator/insertion.hpp"
+#include "tools/replay/statistics.hpp"
+
+namespace bevel::estimator {
+namespace {
+
+constexpr unsigned kSeed = 31;
+constexpr double kSigma_mm = 0.1;
+
+model::ActiveEffect effect(std::string_view name, std::initializer_list<double> values) {
+  model::ActiveEffect active;
+  active.effect = model::find_effect(name);
+  if (active.effect) std::copy(values.begin(), values.end(), active.parameters.begin());
+  return active;
+}
+
+EstimatorConfig config_with(std::vector<model::ActiveEffect> effects) {
+  EstimatorConfig config;
+  config.prior.needle.lambda1_per_rad = 0.49;
+  config.prior.needle.lambda2 = 0.22;
+  config.prior.position_sd_mm = 0.05;
+  config.prior.tilt_sd_rad = 2e-3;
+  config.prior.roll_sd_rad = 5e-3;
+  config.process = {1e-4, 1e-6, 1e-6, 1e-6, 1e-8, 1e-6, 1e-6};
+  config.effects = std::move(effects);
+  return config;
+}
+
+// 100 mm with two turns of the shaft by half a turn and a stop, read every 33 ms.
+testing::Insertion simulate(const EstimatorConfig& truth, std::mt19937_64& rng) {
+  testing::Insertion data;
+  std::vector<std::int64_t> times;
+  double insertion_mm = 0, rotation_rad = 0;
+  for (int ms = 0; ms <= 11'000; ++ms) {
+    const bool rest = ms >= 6000 && ms < 7000;
+    const bool turning = (ms >= 3000 && ms < 4000) || (ms >= 8000 && ms < 9000);
+    if (ms % 10 == 0) {
+      model::ActuatorState a;
+      a.utime = testing::kStart_utime + ms * 1000;
+      a.insertion_mm = insertion_mm;
+      a.rotation_rad = rotation_rad;
+      data.actuators.push_back(a);
+    }
+    if (ms % 33 == 7 && ms > 400) times.push_back(testing::kStart_utime + ms * 1000);
+    insertion_mm += rest ? 0 : 0.01;
+    rotation_rad += turning ? EIGEN_PI * 1e-3 : 0;
+  }
+  const model::AugmentedNeedle needle(truth.prior.needle, truth.effects);
+  model::OpenLoop path;
+  EXPECT_TRUE(model::predict(needle, model::make_motion(data.actuators, times), path));
+  for (std::size_t i = 0; i < times.size(); ++i)
+    data.measurements.push_back(
+        testing::measure(path.position_mm[i], times[i], static_cast<std::int64_t>(i), 0, {1, 1, 1}, kSigma_mm, rng));
+  return data;
+}
+
+replay::ChiSquareMean innovations(const EstimatorConfig& config, const testing::Insertion& data) {
+  NeedleEstimator estimator(config);
+  replay::ChiSquareMean nis;
+  estimator.observe(
+      [](void* context, const NeedleEstimator::Applied& a) {
+        static_cast<replay::ChiSquareMean*>(context)->add(a.update.mahalanobis2, a.update.rank);
+      },
+      &nis);
+  std::size_t next = 0;
+  for (const auto& actuator : data.actuators) {
+    while (next < data.measurements.size() && data.measurements[next].utime < actuator.utime)
+      estimator.add(data.measurements[next++]);
+    estimator.add(actuator);
+  }
+  return nis;
+}
+
+TEST(EstimatorEffects, InnovationsAreInTheirBandWithTheEffectAndNotWithout) {
+  const std::vector<model::ActiveEffect> effects = {
+      effect("torsional_windup", {0.6}), effect("camera_latency", {0.08}), effect("insertion_scale", {1.03}),
+      effect("relaxation", {1.0, 0.8}),  effect("flip_transient", {10.0}), effect("camera_scale", {1.03}),
+  };
+  for (const auto& one : effects) {
+    ASSERT_NE(one.effect, nullptr);
+    std::mt19937_64 rng(kSeed);
+    const EstimatorConfig with = config_with({one});
+    const testing::Insertion data = simulate(with, rng);
+    const auto known = innovations(with, data);
+    const auto left_out = innovations(config_with({}), data);
+    std::cout << one.effect->name() << ": NIS/axis " << known.mean() << " with, " << left_out.mean()
+              << " without, band [" << known.lowest() << ", " << known.highest() << "], seed " << kSeed << "\n";
+    EXPECT_TRUE(known.in_band()) << one.effect->name();
+    EXPECT_GT(left_out.mean(), left_out.highest()) << one.effect->name();
+  }
+}
+
+TEST(EstimatorEffects, AnEffectThatIsNoneGivesThePlainFilter) {
+  std::mt19937_64 rng(kSeed);
+  EstimatorConfig plain = config_with({});
+  plain.relinearised_steps = 0;
+  const testing::Insertion data = simulate(plain, rng);
+  const EstimatorConfig none = config_with({effect("torsional_windup", {0.0})});
+  const auto end = [&data](const EstimatorConfig& config) {
+    NeedleEstimator estimator(config);
+    std::size_t next = 0;
+    for (const auto& actuator : data.actuators) {
+      while (next < data.measurements.size() && data.measurements[next].utime < actuator.utime)
+        estimator.add(data.measurements[next++]);
+      estimator.add(actuator);
+    }
+    return estimator.estimate(data.actuators.back().utime).state;
+  };
+  const FilterState a = end(plain), b = end(none);
+  EXPECT_LT((a.pose.p_mm - b.pose.p_mm).norm(), 1e-9);
+  EXPECT_LT((a.covariance - b.covariance).norm(), 1e-9 * a.covariance.norm());
+  EXPECT_NEAR(a.lambda1_per_rad, b.lambda1_per_rad, 1e-9);
+}
+
+}  // namespace
+}  // namespace bevel::estimator
