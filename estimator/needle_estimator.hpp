@@ -32,8 +32,8 @@ struct Estimate {
 
 class NeedleEstimator {
  public:
-  // history: number of nodes kept; at 100 Hz of actuators and 2 x 30 Hz of cameras 128 nodes are 0.8 s.
-  explicit NeedleEstimator(const EstimatorConfig& config, std::size_t history = 128);
+  // history: number of nodes kept; at 100 Hz of actuators and 2 x 30 Hz of cameras 96 nodes are 0.6 s.
+  explicit NeedleEstimator(const EstimatorConfig& config, std::size_t history = 96);
 
   void add(const model::ActuatorState& actuator);
   void add(const model::TipMeasurement& measurement);

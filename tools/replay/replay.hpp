@@ -62,7 +62,7 @@ struct Replay {
 };
 
 struct ReplayOptions {
-  std::size_t history = 128;
+  std::size_t history = 96;
   // Replaces each measurement's information by that of this noise, per axis; empty: as the camera says.
   std::vector<NoiseColour> noise_by_axis;
   std::vector<io::EffectEntry> effects;  // of the model file, for replay_logs: some are a recording's own
