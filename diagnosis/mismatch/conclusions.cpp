@@ -245,7 +245,9 @@ std::string_view name_of(Verdict verdict) {
 
 double probability_of(const std::vector<std::pair<EffectSet, double>>& visited, const Member& member) {
   const auto score = [](const auto& one) {
-    return 0.5 * (one.second - kPriorCost * static_cast<double>(one.first.size()));
+    const auto nameless = std::count_if(one.first.begin(), one.first.end(), is_correction);
+    return 0.5 * (one.second - kPriorCost * static_cast<double>(one.first.size()) -
+                  kNamelessMargin * static_cast<double>(nameless));
   };
   double best = -std::numeric_limits<double>::infinity();
   for (const auto& one : visited) best = std::max(best, score(one));

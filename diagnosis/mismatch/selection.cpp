@@ -89,14 +89,21 @@ void Selection::say(const std::string& text) const {
 }
 
 Selection::Known& Selection::known(const EffectSet& set) {
-  const auto at = known_.find(key_of(set));
-  if (at != known_.end()) return at->second;
-  // Not fitted on the way here: from its largest known part.
-  const EffectSet rest = without_member(set, set.size() - 1);
-  additions(rest);
-  const auto now = known_.find(key_of(set));
-  if (now != known_.end()) return now->second;
-  return known_[key_of(set)] = {set, known(rest).fit, known(rest).evidence};  // it cannot be fitted
+  const std::string key = key_of(set);
+  if (const auto at = known_.find(key); at != known_.end()) return at->second;
+  // Not fitted on the way here: from a part that was.
+  std::size_t last = set.size() - 1;
+  for (std::size_t m = 0; m < set.size(); ++m)
+    if (known_.contains(key_of(without_member(set, m)))) last = m;
+  const Known part = known(without_member(set, last));
+  const Ground ground = make_ground(evidence_, *part.fit);
+  const auto dictionary = make_dictionary(evidence_, *part.fit, ground, {set[last]}, rules_.threads);
+  const auto fit =
+      fit_addition(evidence_, *part.fit, dictionary[0], best_promises(dictionary[0], ground, rules_.starts_fitted));
+  // A set that cannot be fitted is worth no more than its part.
+  if (!fit) return known_[key] = {part.set, part.fit, part.evidence};
+  const double base = known_.at(key_of({})).fit->penalised;
+  return known_[key] = {set, fit, base - fit->penalised - cost_of(set, *fit)};
 }
 
 std::shared_ptr<const Fit> Selection::fit_of(const EffectSet& set) { return known(set).fit; }
