@@ -99,10 +99,10 @@ io::Plot band_plot(const Replay& replay, const std::string& label, Value value, 
     high.push_back(y.back() + 2 * spread(row));
   }
   io::Plot plot;
-  plot.title = label;
   plot.x_label = "time (s)";
   plot.y_label = label;
-  plot.height_px = 260;
+  plot.height_px = 220;
+  plot.legend = io::Plot::Legend::none;  // it would lie on the end of the curves, which matters most
   plot.band("2 sigma", x, low, high, 0).line("estimate", x, y, 0);
   return plot;
 }
@@ -148,8 +148,8 @@ void print(std::ostream& out, const Replay& replay, double ahead_mm) {
   const estimator::Counters& c = replay.counters;
   out << replay.name << "\n";
   out << text_of(
-      "  messages     %lld actuator states (%lld refused), %lld measurements: %lld not usable, %lld too old, "
-      "%lld duplicate, %lld late\n",
+      "  messages     %lld actuator states (%lld refused), %lld measurements:\n"
+      "               %lld not usable, %lld too old, %lld duplicate, %lld late\n",
       static_cast<long long>(c.actuators), static_cast<long long>(c.actuators_refused),
       static_cast<long long>(c.measurements), static_cast<long long>(c.not_usable), static_cast<long long>(c.too_old),
       static_cast<long long>(c.duplicate), static_cast<long long>(c.late));
@@ -210,7 +210,10 @@ void write_files(const Replay& replay, const std::string& folder) {
   io::HtmlReport page("Replay of " + replay.name);
   std::ostringstream summary;
   print(summary, replay, 20);
-  page.heading("Figures").code(summary.str()).heading("States with 2-sigma bands");
+  page.heading("Figures")
+      .code(summary.str())
+      .heading("States with 2-sigma bands")
+      .paragraph("Blue: the estimate, its band two standard deviations wide to either side. Dots: measured.");
   add_state_plots(page, replay);
   page.save(stem + ".html");
 }
