@@ -1,7 +1,7 @@
 #include <algorithm>
 #include <cmath>
 #include <cstdio>
-#include <map>
+#include <limits>
 
 #include "tools/diagnose/drawing.hpp"
 #include "tools/diagnose/figures.hpp"
@@ -26,15 +26,12 @@ std::string shade(double share) {
   return text;
 }
 
-// The least absorbed of an effect's parameters: that by which it can be seen.
-std::map<std::string, double> absorbed_shares(const Findings& findings) {
-  std::map<std::string, double> shares;
-  for (const auto& d : findings.detectable) {
-    if (!std::isfinite(d.absorbed)) continue;
-    const auto [at, is_new] = shares.emplace(d.effect, d.absorbed);
-    if (!is_new) at->second = std::min(at->second, d.absorbed);
-  }
-  return shares;
+// The least absorbed of an effect's parameters: that by which it can be seen. NaN if nothing is known of it.
+double absorbed_share(const Findings& findings, const std::string& name) {
+  double least = std::numeric_limits<double>::quiet_NaN();
+  for (const auto& d : findings.detectable)
+    if (is_kind_of(name, d.effect, d.parameter) && !(d.absorbed >= least)) least = d.absorbed;
+  return least;
 }
 
 void draw_cell(Drawing& drawing, const Box& cell, double value, const std::string& hint) {
@@ -57,7 +54,6 @@ void draw_cell(Drawing& drawing, const Box& cell, double value, const std::strin
 std::string confusion_picture(const Findings& findings) {
   const auto count = static_cast<Eigen::Index>(findings.confusion_names.size());
   if (count < 2 || findings.confusion.rows() != count || findings.confusion.cols() != count) return "";
-  const auto shares = absorbed_shares(findings);
   const double left = kNames + 50;
   const double cell = std::min((832 - left - kLeaning) / static_cast<double>(count), 34.0);
   const double height = std::min(cell, 24.0);
@@ -66,14 +62,13 @@ std::string confusion_picture(const Findings& findings) {
   drawing.text({kNames + 24, top - 8}, "absorbed", {.size = 11, .colour = ink::kSoft, .turned_deg = -50});
   for (Eigen::Index i = 0; i < count; ++i) {
     const std::string& name = findings.confusion_names[static_cast<std::size_t>(i)];
-    const bool found =
-        std::any_of(findings.effects.begin(), findings.effects.end(), [&](const auto& e) { return e.name == name; });
+    const bool found = std::any_of(findings.effects.begin(), findings.effects.end(),
+                                   [&](const auto& e) { return is_kind_of(name, e); });
     const double y = top + static_cast<double>(i) * height;
     drawing.text({kNames - 8, y + height / 2 + 4}, name, {.anchor = Lettering::Anchor::end, .bold = found});
-    const auto share = shares.find(name);
-    if (share != shares.end())
-      draw_cell(drawing, {kNames, y, 38, height}, share->second,
-                name + ": " + percent(share->second) + " absorbed by k, lambda1, lambda2");
+    if (const double share = absorbed_share(findings, name); std::isfinite(share))
+      draw_cell(drawing, {kNames, y, 38, height}, share,
+                name + ": " + percent(share) + " absorbed by k, lambda1, lambda2");
     if (i > 0)
       drawing.text({left + (static_cast<double>(i) + 0.5) * cell, top - 8}, name,
                    {.size = 11, .bold = found, .turned_deg = -50});

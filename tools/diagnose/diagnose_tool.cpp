@@ -62,7 +62,7 @@ Findings find(const Options& options) {
 void print_verdict(std::ostream& out, const Findings& f) {
   out << headline_of(f.verdict) << ": " << f.sentence << "\n\n";
   for (const auto& effect : f.effects) {
-    out << "  " << effect.name << "  probability " << percent(effect.probability)
+    out << "  " << effect.name << "  probability " << probability(effect.probability)
         << (effect.ambiguous_with.empty() ? "" : ", or " + listed(effect.ambiguous_with)) << '\n';
     for (const auto& p : effect.parameters) print_parameter(out, p, "");
     for (const auto& r : effect.recordings)

@@ -147,7 +147,7 @@ Panel::Panel(Drawing& drawing, const Box& box, Axis x, Axis y, std::string_view 
     : drawing_(drawing), box_(box), x_(std::move(x)), y_(std::move(y)) {
   const Lettering small{.anchor = Lettering::Anchor::middle, .size = 11, .colour = ink::kSoft};
   const int across = std::max(3, static_cast<int>(box_.width / 60));
-  const int upward = std::max(3, static_cast<int>(box_.height / 32));
+  const int upward = std::max(3, static_cast<int>(box_.height / 28));
   for (const double v : ticks(x_, across)) {
     const double left = at(v, y_.low).x;
     drawing_.line({left, box_.top}, {left, box_.bottom()}, {.colour = ink::kGrid});

@@ -21,7 +21,8 @@ Lettering name_lettering(bool bold = false) {
 }
 
 bool was_found(const Findings& findings, const std::string& name) {
-  return std::any_of(findings.effects.begin(), findings.effects.end(), [&](const auto& e) { return e.name == name; });
+  return std::any_of(findings.effects.begin(), findings.effects.end(),
+                     [&](const auto& e) { return is_kind_of(name, e); });
 }
 
 // What an addition has to bring: more than the luckiest by chance, and enough to be visible.
@@ -32,7 +33,8 @@ double shown(double gain) { return std::isfinite(gain) ? std::max(gain, 1.0) : 1
 
 }  // namespace
 
-std::string ranking_picture(const Findings& findings, const std::vector<TriedEffect>& tried) {
+std::string ranking_picture(const Findings& findings, std::vector<TriedEffect> tried) {
+  std::stable_sort(tried.begin(), tried.end(), [](const auto& a, const auto& b) { return a.gain > b.gain; });
   if (tried.empty()) return "";
   constexpr double kRow = 22;
   double most = 100;
@@ -58,13 +60,13 @@ std::string ranking_picture(const Findings& findings, const std::vector<TriedEff
                       found      ? ink::kAfter
                       : t.passes ? "#8db8dc"
                                  : "#c9c9c9",
-                      1, t.name + ": fall of chi2 " + number(t.gain) + ", to be passed " + number(mark_of(t)));
+                      1, t.name + ": fall of chi2 " + fall_of_chi2(t.gain) + ", to be passed " + number(mark_of(t)));
     if (mark_of(t) > 1) {
       const double mark = panel.at(mark_of(t), 0).x;
       drawing.line({mark, top + 2}, {mark, top + kRow - 2}, {.colour = "#111111", .width = 2});
     }
     drawing.text({box.left - 8, top + 16}, t.name, name_lettering(found));
-    drawing.text({box.right() + 10, top + 16}, number(t.gain), {.size = 11, .colour = ink::kSoft});
+    drawing.text({box.right() + 10, top + 16}, fall_of_chi2(t.gain), {.size = 11, .colour = ink::kSoft});
   }
   return drawing.svg();
 }

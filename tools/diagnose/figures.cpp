@@ -68,7 +68,8 @@ std::string interval(const std::array<double, 2>& ends) {
   if (!std::isfinite(ends[0])) return "up to " + number(ends[1]);
   if (!std::isfinite(ends[1])) return "from " + number(ends[0]);
   const double width = ends[1] - ends[0];
-  const int decimals = decimals_for(width > 0 ? width / 4 : ends[0], 2);
+  if (!(width > 0)) return number(ends[0], 4);
+  const int decimals = decimals_for(width / 4, 2);
   return fixed(ends[0], decimals) + " to " + fixed(ends[1], decimals);
 }
 
@@ -78,6 +79,29 @@ std::string percent(double share) {
   if (value > 99.9 && value < 100) return "> 99.9 %";
   if (value > 0 && value < 0.1) return "< 0.1 %";
   return number(value, value >= 99 ? 3 : 2) + " %";
+}
+
+std::string probability(double p) { return p > 0.999 ? "> 99.9 %" : percent(p); }
+
+std::string fall_of_chi2(double gain) {
+  if (!std::isfinite(gain)) return "-";
+  if (gain < 0) return "worse";
+  return fixed(gain, gain < 100 ? 1 : 0);
+}
+
+bool is_kind_of(std::string_view tried, std::string_view effect, std::string_view parameter) {
+  if (!tried.starts_with(effect)) return false;
+  std::string_view kind = tried.substr(effect.size());
+  if (kind.empty()) return true;
+  if (!kind.starts_with(" (") || !kind.ends_with(')')) return false;
+  kind = kind.substr(2, kind.size() - 3);
+  return parameter.starts_with(kind);
+}
+
+bool is_kind_of(std::string_view tried, const diagnosis::FoundEffect& found) {
+  return std::any_of(found.parameters.begin(), found.parameters.end(),
+                     [&](const auto& p) { return is_kind_of(tried, found.name, p.name); }) ||
+         tried == found.name;
 }
 
 std::string unit_of(std::string_view name) { return std::string(split(name).second); }

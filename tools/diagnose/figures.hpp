@@ -17,11 +17,18 @@ std::string with_error(double value, double std_error);
 // Both ends rounded alike: "0.76 to 0.89".
 std::string interval(const std::array<double, 2>& ends);
 std::string percent(double share);
+std::string probability(double p);      // never 100 %
+std::string fall_of_chi2(double gain);  // a tenth is as fine as it means anything
 
 // The unit at the end of a name: "mm" of "depth_mm", "rad/s" of "turn_rate_rad_s"; "" if it has none.
 std::string unit_of(std::string_view name);
 // The name in words, its unit behind: "lag at 100mm (rad)", "depth (mm)".
 std::string in_words(std::string_view name);
+
+// "lost_steps (rotation)", an effect tried in one of its kinds: whether that is the kind of the effect that was found.
+bool is_kind_of(std::string_view tried, const diagnosis::FoundEffect& found);
+// The same for a parameter of an effect.
+bool is_kind_of(std::string_view tried, std::string_view effect, std::string_view parameter);
 
 std::string headline_of(diagnosis::Verdict verdict);  // "Effects found", ...
 

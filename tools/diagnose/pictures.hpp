@@ -26,8 +26,8 @@ std::string path_picture(const diagnosis::Findings& findings, const std::vector<
 // Indices of traces, those that the model before gets worst first.
 std::vector<std::size_t> worst_first(const diagnosis::Findings& findings);
 
-// Every effect tried: its gain as a bar, a mark at its threshold.
-std::string ranking_picture(const diagnosis::Findings& findings, const std::vector<diagnosis::TriedEffect>& tried);
+// Every effect tried, best first: its gain as a bar, a mark at what it has to pass.
+std::string ranking_picture(const diagnosis::Findings& findings, std::vector<diagnosis::TriedEffect> tried);
 std::string held_out_picture(const diagnosis::HeldOut& held_out);
 // Parameters with their intervals, each on its own scale, with the value at which the effect would vanish.
 std::string interval_picture(const diagnosis::Findings& findings);

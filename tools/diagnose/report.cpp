@@ -38,11 +38,13 @@ std::string sizes_of(const FoundEffect& effect) {
   return text;
 }
 
-std::string held_out_sentence(const HeldOut& h) {
+std::string held_out_sentence(const Findings& f) {
+  const HeldOut& h = f.held_out;
+  const std::string with =
+      f.corrections.empty() ? "with what was found" : "with the curves below that describe the rest";
   return "On recordings that it was not fitted to, the model is off by " + measured(h.before.rmse_mm) +
-         " mm rms as it stands and by " + measured(h.after.rmse_mm) +
-         " mm with what was found; chi2 per reading falls from " + measured(h.before.chi2_per_dof) + " to " +
-         measured(h.after.chi2_per_dof) + " (1 is noise alone).";
+         " mm rms as it stands and by " + measured(h.after.rmse_mm) + " mm " + with + "; chi2 per reading goes from " +
+         measured(h.before.chi2_per_dof) + " to " + measured(h.after.chi2_per_dof) + " (1 is noise alone).";
 }
 
 io::Tone tone_of(Verdict verdict) {
@@ -55,6 +57,12 @@ io::Tone tone_of(Verdict verdict) {
       return io::Tone::warning;
   }
   return io::Tone::plain;
+}
+
+std::string span_of(const Location& w) {
+  const std::string from = number(w.range[0]);
+  const std::string to = number(w.range[1]);
+  return in_words(w.covariate) + " " + from + (from == to ? "" : " to " + to);
 }
 
 bool has_rivals(const Findings& f) {
@@ -73,25 +81,25 @@ void add_verdict(io::HtmlReport& page, const Findings& f) {
         measured(f.held_out.before.chi2_per_dof) +
         " (1 is noise alone). Nothing above the sizes listed under \"What these recordings could have shown\".";
   else
-    consequences += held_out_sentence(f.held_out);
+    consequences += held_out_sentence(f);
   page.callout(tone_of(f.verdict), headline_of(f.verdict) + ". " + f.sentence, consequences);
 
   std::vector<io::Fact> facts;
   for (const auto& effect : f.effects)
-    facts.push_back({effect.name, percent(effect.probability),
+    facts.push_back({effect.name, probability(effect.probability),
                      effect.ambiguous_with.empty() ? "probability; no rival"
                                                    : "probability; or " + listed(effect.ambiguous_with, " or ")});
+  const auto change = [&](double FitFigures::*figure) {
+    const std::string before = measured(f.held_out.before.*figure);
+    return f.verdict == Verdict::nothing_missing ? before : before + " → " + measured(f.held_out.after.*figure);
+  };
+  const FitFigures& last = f.verdict == Verdict::nothing_missing ? f.held_out.before : f.held_out.after;
   facts.push_back(
-      {"held-out error",
-       measured(f.held_out.before.rmse_mm) + (f.effects.empty() ? "" : " → " + measured(f.held_out.after.rmse_mm)) +
-           " mm",
-       "rms, largest " + number(f.effects.empty() ? f.held_out.before.max_mm : f.held_out.after.max_mm) + " mm"});
-  facts.push_back({"chi2 per reading",
-                   measured(f.held_out.before.chi2_per_dof) +
-                       (f.effects.empty() ? "" : " → " + measured(f.held_out.after.chi2_per_dof)),
-                   "held out; 1 is noise alone"});
-  if (f.verdict == Verdict::unknown_effect)
-    facts.push_back({"unexplained", percent(f.checks.unexplained_share), "of the mismatch"});
+      {"held-out error", change(&FitFigures::rmse_mm) + " mm", "rms, largest " + measured(last.max_mm) + " mm"});
+  facts.push_back({"chi2 per reading", change(&FitFigures::chi2_per_dof), "held out; 1 is noise alone"});
+  if (!f.corrections.empty())
+    facts.push_back(
+        {"unknown part", f.corrections.front().component, "against " + in_words(f.corrections.front().covariate)});
   facts.push_back(
       {"readings", std::to_string(f.readings),
        "in " + std::to_string(f.traces.size()) + " recordings; " + std::to_string(f.outliers) + " outliers"});
@@ -122,10 +130,10 @@ void add_what_to_do(io::HtmlReport& page, const Findings& f) {
       todo.emplace_back(
           "Do not trust the model where the pictures below mark it: something acts there that is not on the list of "
           "effects.");
-      todo.emplace_back("model.toml carries " +
-                        std::string(f.effects.empty() ? "the needle refitted, and no effect"
-                                                      : "the known part, " + listed(names_of(f.effects))) +
-                        "; the rest is described by curves, under no name.");
+      todo.emplace_back(
+          "model.toml carries the needle as fitted beside the curves" +
+          std::string(f.effects.empty() ? ", and no effect" : " and the known part, " + listed(names_of(f.effects))) +
+          ". What the curves describe is in verdict.json under corrections, and has no name.");
       todo.emplace_back(
           "Look for a cause that depends on what the curves are drawn against; docs/adding-an-effect.md tells how to "
           "put an equation for it to the test.");
@@ -166,10 +174,8 @@ void add_location(io::HtmlReport& page, const Findings& f) {
       "and what came before it?");
   std::vector<std::vector<std::string>> rows;
   for (const auto& w : f.where)
-    rows.push_back(
-        {w.log, w.channel, number(w.from_s) + " to " + number(w.to_s),
-         w.covariate.empty() ? "-" : in_words(w.covariate) + " " + number(w.range[0]) + " to " + number(w.range[1]),
-         percent(w.share)});
+    rows.push_back({w.log, w.channel, number(w.from_s) + " to " + number(w.to_s),
+                    w.covariate.empty() ? "-" : span_of(w), percent(w.share)});
   page.table({"recording", "channel", "time (s)", "there", "share of the mismatch"}, rows);
   const std::string picture = located_picture(f, 2);
   if (!picture.empty())

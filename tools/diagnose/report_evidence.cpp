@@ -13,16 +13,24 @@ using namespace bevel::diagnosis;  // NOLINT(google-build-using-namespace)
 namespace {
 
 // "0.055 rad"; "1 ± 0.13" where an effect vanishes at one.
-std::string reach_of(const DetectableSize& d) {
-  if (!std::isfinite(d.size)) return "no size in reach";
+std::string size_of(const DetectableSize& d, double size) {
+  if (!std::isfinite(size)) return "no size in reach";
   const model::Effect* effect = model::find_effect(d.effect);
   double none = 0;
   if (effect != nullptr)
     for (const auto& p : effect->parameters())
       if (p.name == d.parameter && std::isfinite(p.none)) none = p.none;
   const std::string unit = unit_of(d.parameter);
-  return (none == 0 ? "" : number(none) + " ± ") + number(d.size, 2) + (unit.empty() ? "" : " " + unit);
+  return (none == 0 ? "" : number(none) + " ± ") + number(size, 2) + (unit.empty() ? "" : " " + unit);
 }
+
+std::string words_of(const std::string& parameter) {
+  const std::string words = in_words(parameter);
+  return words.substr(0, words.find(" ("));
+}
+
+// Stages that take next to nothing are not worth their digits.
+std::string seconds_of(double seconds) { return seconds < 0.05 ? "< 0.1" : measured(seconds, seconds < 1 ? 1 : 3); }
 
 // The same motion often shows several effects: said once.
 std::vector<std::string> experiments_of(const std::vector<DetectableSize>& sizes) {
@@ -68,7 +76,7 @@ void add_evidence(io::HtmlReport& page, const Findings& f) {
     std::string sizes;
     for (const auto& [name, value] : t.parameters)
       sizes += (sizes.empty() ? "" : ", ") + in_words(name) + " " + number(value);
-    rows.push_back({t.name, number(t.gain), number(t.chance, 2), number(t.threshold, 3), sizes});
+    rows.push_back({t.name, fall_of_chi2(t.gain), number(t.chance, 2), number(t.threshold, 3), sizes});
   }
   page.folded("the figures", [&](io::HtmlReport& inside) {
     inside.table({"effect, alone", "fall of chi2", "mean of chance", "1 of 100", "fitted"}, rows);
@@ -97,7 +105,7 @@ void add_reach(io::HtmlReport& page, const Findings& f) {
         "would leave as well; what they absorb nobody can see.");
     std::vector<std::vector<std::string>> rows;
     for (const auto& d : f.detectable)
-      rows.push_back({d.effect, in_words(d.parameter), reach_of(d), number(d.typical), percent(d.absorbed)});
+      rows.push_back({d.effect, words_of(d.parameter), size_of(d, d.size), size_of(d, d.typical), percent(d.absorbed)});
     page.table({"effect", "parameter", "seen from", "typical", "absorbed"}, rows);
     const auto experiments = experiments_of(f.detectable);
     if (!experiments.empty())
@@ -139,14 +147,13 @@ void add_noise_and_checks(io::HtmlReport& page, const Findings& f) {
       percent(f.noise.outlier_share) + " of them are outliers.");
   page.table({"channel", "standard deviation (mm)"}, rows);
   const auto& c = f.checks;
-  page.table(
-      {"check of the final model", "found", "passed if"},
-      {{"chi2 per reading", measured(c.chi2_per_dof, 4), measured(c.band[0], 4) + " to " + measured(c.band[1], 4)},
-       {"correlation left in the residuals (Ljung-Box p)", c.ljung_box_p < 0.001 ? "< 0.001" : number(c.ljung_box_p, 2),
-        "above 0.01"},
-       {"slow structure left (standard deviations of chance)", number(c.remaining_sigmas, 2), "near 0"},
-       {"share of the mismatch unexplained", percent(c.unexplained_share), "small"}},
-      c.clean ? "What is left is noise." : "What is left is more than noise: something is still missing.");
+  page.table({"check of the final model", "found", "passed if"},
+             {{"chi2 per reading", measured(c.chi2_per_dof, 4), interval(c.band)},
+              {"correlation left in the residuals (Ljung-Box p)",
+               c.ljung_box_p < 0.001 ? "< 0.001" : number(c.ljung_box_p, 2), "above 0.01"},
+              {"slow structure left (standard deviations of chance)", number(c.remaining_sigmas, 2), "near 0"},
+              {"share of the mismatch unexplained", percent(c.unexplained_share), "small"}},
+             c.clean ? "What is left is noise." : "What is left is more than noise: something is still missing.");
   if (!f.remarks.empty()) page.subheading("Remarks").list(f.remarks);
 }
 
@@ -155,10 +162,10 @@ void add_making(io::HtmlReport& page, const Findings& f, const std::string& mode
   std::vector<std::vector<std::string>> rows;
   double total = 0;
   for (const auto& t : f.times) {
-    rows.push_back({t.stage, measured(t.seconds, 2)});
+    rows.push_back({t.stage, seconds_of(t.seconds)});
     total += t.seconds;
   }
-  rows.push_back({"all", number(total, 3)});
+  rows.push_back({"all", seconds_of(total)});
   page.table({"stage", "seconds"}, rows);
   std::string logs;
   for (const auto& trace : f.traces) logs += (logs.empty() ? "" : ", ") + trace.log;

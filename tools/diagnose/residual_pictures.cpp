@@ -55,8 +55,8 @@ Binned bin(const std::vector<double>& x, const std::vector<double>& y, double lo
   return result;
 }
 
-// A band with gaps: one area for each unbroken stretch.
-void draw_binned(Panel& panel, const Binned& b, std::string_view colour) {
+// A band with gaps: one area for each unbroken stretch, and a bar where a bin stands alone.
+void draw_binned(Drawing& drawing, Panel& panel, const Binned& b, std::string_view colour) {
   Binned stretch;
   for (std::size_t i = 0; i <= b.x.size(); ++i) {
     if (i < b.x.size() && std::isfinite(b.median[i])) {
@@ -66,9 +66,12 @@ void draw_binned(Panel& panel, const Binned& b, std::string_view colour) {
       continue;
     }
     if (stretch.x.size() > 1) panel.band(stretch.x, stretch.low, stretch.high, colour);
+    if (stretch.x.size() == 1)
+      drawing.line(panel.at(stretch.x[0], stretch.low[0]), panel.at(stretch.x[0], stretch.high[0]),
+                   {.colour = colour, .width = 5, .opacity = 0.3});
     stretch = {};
   }
-  panel.curve(b.x, b.median, {.colour = colour, .width = 2});
+  panel.curve(b.x, b.median, {.colour = colour, .width = 2}).points(b.x, b.median, colour, 1, 2.2);
 }
 
 std::vector<double> every(const std::vector<double>& values, std::size_t step) {
@@ -172,8 +175,8 @@ std::string residual_picture(const Findings& findings, std::size_t channel) {
     const std::size_t step = x.size() / kMostPoints + 1;
     panel.points(every(x, step), every(y_before, step), ink::kBefore, 0.22);
     panel.points(every(x, step), every(y_after, step), ink::kAfter, 0.22);
-    draw_binned(panel, bin(x, y_before, across.low, across.high), ink::kBefore);
-    draw_binned(panel, bin(x, y_after, across.low, across.high), ink::kAfter);
+    draw_binned(drawing, panel, bin(x, y_before, across.low, across.high), ink::kBefore);
+    draw_binned(drawing, panel, bin(x, y_after, across.low, across.high), ink::kAfter);
   }
   const double left = 44 + 3 * 199.0;
   double top = 24 + 195 + 20;
