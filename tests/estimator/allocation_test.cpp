@@ -33,5 +33,29 @@ TEST(NeedleEstimator, AllocatesNothingInAStep) {
   EXPECT_GT(estimator.estimate(data.actuators.back().utime).state.reset_count, 0);
 }
 
+TEST(NeedleEstimator, AllocatesNothingInAStepWithEffects) {
+  std::mt19937_64 rng(22);
+  EstimatorConfig config;
+  for (const char* name : {"torsional_windup", "camera_latency", "relaxation", "flip_transient"}) {
+    model::ActiveEffect active;
+    active.effect = model::find_effect(name);
+    ASSERT_NE(active.effect, nullptr) << name;
+    for (std::size_t i = 0; i < active.effect->parameters().size(); ++i)
+      active.parameters[i] = active.effect->parameters()[i].starts.front();
+    config.effects.push_back(active);
+  }
+  testing::Insertion data = testing::insert(config.prior.needle, {}, {}, rng);
+  NeedleEstimator estimator(config);
+  std::size_t next = 0;
+  const long before = bevel::testing::allocations;
+  for (const auto& actuator : data.actuators) {
+    estimator.add(actuator);
+    while (next < data.measurements.size() && data.measurements[next].utime + 60'000 < actuator.utime)
+      estimator.add(data.measurements[next++]);
+  }
+  EXPECT_EQ(bevel::testing::allocations - before, 0);
+  EXPECT_GT(estimator.counters().late, 100);
+}
+
 }  // namespace
 }  // namespace bevel::estimator
