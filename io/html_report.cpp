@@ -52,7 +52,8 @@ const char* class_of(Tone tone) {
 bool is_number(const std::string& text) {
   if (text.empty()) return false;
   char* end = nullptr;
-  std::strtod(text.c_str(), &end);
+  const bool bounded = text.starts_with("< ") || text.starts_with("> ");
+  std::strtod(text.c_str() + (bounded ? 2 : 0), &end);
   return *end == '\0' || std::strcmp(end, " %") == 0;
 }
 

@@ -13,7 +13,7 @@ using namespace bevel::diagnosis;  // NOLINT(google-build-using-namespace)
 
 namespace {
 
-constexpr double kNames = 150;  // room for names on the left
+constexpr double kNames = 164;  // room for names on the left
 constexpr double kNameSize = 12.5;
 
 Lettering name_lettering(bool bold = false) {
@@ -44,10 +44,11 @@ std::string ranking_picture(const Findings& findings, std::vector<TriedEffect> t
   Drawing drawing(832, 34 + height + 40);
   draw_keys(drawing, {kNames, 14},
             {{ink::kAfter, "found"},
-             {"#8db8dc", "passes, but another explains more"},
+             {"#8db8dc", findings.verdict == Verdict::unknown_effect ? "passes, but does not explain it"
+                                                                     : "passes, but another explains more"},
              {"#c9c9c9", "does not pass"},
              {"#111111", "mark: to be passed"}});
-  const Box box{kNames, 30, 590, height};
+  const Box box{kNames, 30, 580, height};
   Axis upward{0, 1, ""};
   upward.ruled = false;
   const Panel panel(drawing, box, gain, upward);
@@ -74,7 +75,7 @@ std::string ranking_picture(const Findings& findings, std::vector<TriedEffect> t
 namespace {
 
 void draw_pairs(Drawing& drawing, const Box& box, const HeldOut& held_out, double FitFigures::*figure,
-                const std::string& label, bool names) {
+                const std::string& label, bool names, bool one_model) {
   std::vector<double> values{0};
   for (const auto& r : held_out.recordings) values.insert(values.end(), {r.before.*figure, r.after.*figure});
   double most = 0;
@@ -97,8 +98,7 @@ void draw_pairs(Drawing& drawing, const Box& box, const HeldOut& held_out, doubl
     const double y = box.top + (static_cast<double>(i) + 0.5) * row;
     const Point before{panel.at(r.before.*figure, 0).x, y};
     const Point after{panel.at(r.after.*figure, 0).x, y};
-    drawing.line(before, after, {.colour = "#bbbbbb", .width = 2.5});
-    drawing.dots({before}, 5, ink::kBefore);
+    if (!one_model) drawing.line(before, after, {.colour = "#bbbbbb", .width = 2.5}).dots({before}, 5, ink::kBefore);
     drawing.dots({after}, 5, ink::kAfter);
     if (names) drawing.text({box.left - 10, y + 4}, r.log, name_lettering());
   }
@@ -110,20 +110,24 @@ void draw_pairs(Drawing& drawing, const Box& box, const HeldOut& held_out, doubl
 
 }  // namespace
 
-std::string held_out_picture(const HeldOut& held_out) {
+std::string held_out_picture(const Findings& findings) {
+  const HeldOut& held_out = findings.held_out;
+  const bool one_model = findings.verdict == Verdict::nothing_missing;  // before is after
   if (held_out.recordings.empty()) return "";
   const double height = 24 * static_cast<double>(held_out.recordings.size());
   double names = 60;
   for (const auto& r : held_out.recordings) names = std::max(names, width_of(r.log, kNameSize) + 16);
   names = std::min(names, 240.0);
   Drawing drawing(832, 44 + height + 38);
-  draw_keys(drawing, {names, 14},
-            {{ink::kBefore, "before: needle refitted without this recording"},
-             {ink::kAfter, "after: with what was found, from the others"}});
+  std::vector<Key> keys;
+  if (!one_model) keys.push_back({ink::kBefore, "before: needle refitted without this recording"});
+  keys.push_back({ink::kAfter, one_model ? "needle refitted without this recording"
+                                         : "after: with what was found, from the others"});
+  draw_keys(drawing, {names, 14}, keys);
   const double width = (832 - names - 60) / 2;
-  draw_pairs(drawing, {names, 44, width, height}, held_out, &FitFigures::rmse_mm, "rms error (mm)", true);
+  draw_pairs(drawing, {names, 44, width, height}, held_out, &FitFigures::rmse_mm, "rms error (mm)", true, one_model);
   draw_pairs(drawing, {names + width + 40, 44, width, height}, held_out, &FitFigures::chi2_per_dof, "chi2 per reading",
-             false);
+             false, one_model);
   return drawing.svg();
 }
 

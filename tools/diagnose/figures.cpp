@@ -18,7 +18,10 @@ std::string fixed(double value, int decimals) {
 
 int decimals_for(double size, int digits) {
   if (!(std::abs(size) > 0)) return 0;
-  return std::clamp(digits - 1 - static_cast<int>(std::floor(std::log10(std::abs(size)) + 1e-9)), 0, 9);
+  const auto above = [&](double of) { return static_cast<int>(std::floor(std::log10(std::abs(of)) + 1e-9)); };
+  const double unit = std::pow(10.0, above(size) - digits + 1);
+  const double rounded = std::round(size / unit) * unit;  // 0.9998 is 1.00, not 1.000
+  return std::clamp(digits - 1 - above(rounded), 0, 9);
 }
 
 constexpr std::pair<std::string_view, std::string_view> kUnits[] = {{"_mm_per_rad", "mm/rad"},

@@ -23,7 +23,7 @@ std::vector<double> along(const std::vector<Eigen::Vector3d>& path_mm, int axis,
   return values;
 }
 
-void draw_plane(Drawing& drawing, const Box& box, const Trace& trace, int axis, bool last) {
+void draw_plane(Drawing& drawing, const Box& box, const Trace& trace, int axis, bool last, bool one_model) {
   const std::size_t step = trace.time_s.size() / kMostPoints + 1;
   std::vector<std::size_t> use;
   for (std::size_t i = 0; i < trace.time_s.size(); ++i)
@@ -44,7 +44,7 @@ void draw_plane(Drawing& drawing, const Box& box, const Trace& trace, int axis, 
     panel.curve(along(path, 2, use), along(path, axis, use), stroke);
   };
   draw(trace.model_file_mm, {.colour = "#4d4d4d", .width = 1.2, .dashes = "2,3"});
-  draw(trace.before_mm, {.colour = ink::kBefore, .width = 1.6, .dashes = "6,3"});
+  if (!one_model) draw(trace.before_mm, {.colour = ink::kBefore, .width = 1.6, .dashes = "6,3"});
   draw(trace.after_mm, {.colour = ink::kAfter, .width = 1.6});
 }
 
@@ -74,16 +74,16 @@ std::string path_picture(const Findings& findings, const std::vector<std::size_t
   if (traces.empty()) return "";
   const auto rows = static_cast<double>(traces.size());
   Drawing drawing(832, 32 + rows * kRow + 22);
-  draw_keys(drawing, {50, 14},
-            {{"#8a8a8a", "measured"},
-             {"#4d4d4d", "model file as given", true},
-             {ink::kBefore, "before: needle refitted", true},
-             {ink::kAfter, "after: with what was found"}});
+  const bool one_model = findings.verdict == Verdict::nothing_missing;  // before is after
+  std::vector<Key> keys{{"#8a8a8a", "measured"}, {"#4d4d4d", "model file as given", true}};
+  if (!one_model) keys.push_back({ink::kBefore, "before: needle refitted", true});
+  keys.push_back({ink::kAfter, one_model ? "needle refitted" : "after: with what was found"});
+  draw_keys(drawing, {50, 14}, keys);
   for (std::size_t i = 0; i < traces.size(); ++i) {
     const double top = 50 + static_cast<double>(i) * kRow;
     for (const int axis : {0, 1})
       draw_plane(drawing, {50 + axis * 422.0, top, 340, kRow - 50}, findings.traces[traces[i]], axis,
-                 i + 1 == traces.size());
+                 i + 1 == traces.size(), one_model);
   }
   return drawing.svg();
 }

@@ -1,4 +1,5 @@
-// The page's pictures, each an <svg> element; "" where there is nothing to show.
+// The page's pictures, each an <svg> element; "" where there is nothing to show. Where nothing is missing, before and
+// after are one model, and it is drawn once.
 #pragma once
 
 #include <string>
@@ -28,7 +29,7 @@ std::vector<std::size_t> worst_first(const diagnosis::Findings& findings);
 
 // Every effect tried, best first: its gain as a bar, a mark at what it has to pass.
 std::string ranking_picture(const diagnosis::Findings& findings, std::vector<diagnosis::TriedEffect> tried);
-std::string held_out_picture(const diagnosis::HeldOut& held_out);
+std::string held_out_picture(const diagnosis::Findings& findings);
 // Parameters with their intervals, each on its own scale, with the value at which the effect would vanish.
 std::string interval_picture(const diagnosis::Findings& findings);
 

@@ -1,6 +1,7 @@
 #include "tools/diagnose/report.hpp"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 
 #include "tools/diagnose/figures.hpp"
@@ -149,21 +150,25 @@ void add_parameters(io::HtmlReport& page, const Findings& f) {
     page.figure_svg(picture,
                     "What was found, with 95 % intervals from the profile likelihood (everything else refitted at each "
                     "value). An interval that reaches the diamond would be no evidence of an effect.");
-  const auto& a = f.model_file;
-  const auto& b = f.base;
-  const auto& c = f.needle;
-  page.table(
-      {"needle", "model file", "refitted alone", "with what was found"},
-      {{"k (1/mm)", number(a.curvature_per_mm, 4), with_error(b.value.curvature_per_mm, b.curvature_sd_per_mm),
-        with_error(c.value.curvature_per_mm, c.curvature_sd_per_mm)},
-       {"lambda1 (1/rad)", number(a.lambda1_per_rad, 4), with_error(b.value.lambda1_per_rad, b.lambda1_sd_per_rad),
-        with_error(c.value.lambda1_per_rad, c.lambda1_sd_per_rad)},
-       {"lambda2", number(a.lambda2, 4), with_error(b.value.lambda2, b.lambda2_sd),
-        with_error(c.value.lambda2, c.lambda2_sd)},
-       {"wheelbase (mm), not fitted", number(a.wheelbase_mm, 4), number(b.value.wheelbase_mm, 4),
-        number(c.value.wheelbase_mm, 4)}},
-      "Value ± standard error. A wrong k, lambda1 or lambda2 is no missing physics: they are refitted before anything "
-      "is named.");
+  const auto fitted = [](const NeedleEstimate& n) {
+    return std::array{with_error(n.value.curvature_per_mm, n.curvature_sd_per_mm),
+                      with_error(n.value.lambda1_per_rad, n.lambda1_sd_per_rad),
+                      with_error(n.value.lambda2, n.lambda2_sd), number(n.value.wheelbase_mm, 4)};
+  };
+  const std::array<double, 4> given{f.model_file.curvature_per_mm, f.model_file.lambda1_per_rad, f.model_file.lambda2,
+                                    f.model_file.wheelbase_mm};
+  constexpr const char* kNames[] = {"k (1/mm)", "lambda1 (1/rad)", "lambda2", "wheelbase (mm), not fitted"};
+  const bool one_model = f.verdict == Verdict::nothing_missing;
+  std::vector<std::string> header{"needle", "model file", one_model ? "refitted" : "refitted alone"};
+  if (!one_model) header.emplace_back(f.corrections.empty() ? "with what was found" : "beside the curves");
+  std::vector<std::vector<std::string>> rows;
+  for (std::size_t i = 0; i < given.size(); ++i) {
+    rows.push_back({kNames[i], number(given[i], 4), fitted(f.base)[i]});
+    if (!one_model) rows.back().push_back(fitted(f.needle)[i]);
+  }
+  page.table(header, rows,
+             "Value ± standard error. A wrong k, lambda1 or lambda2 is no missing physics: they are refitted before "
+             "anything is named.");
 }
 
 void add_location(io::HtmlReport& page, const Findings& f) {
@@ -213,18 +218,22 @@ void add_residuals(io::HtmlReport& page, const Findings& f) {
     order.emplace_back(-sum, c);
   }
   std::sort(order.begin(), order.end());
+  const bool one_model = f.verdict == Verdict::nothing_missing;
+  const std::string reading = one_model
+                                  ? " The line should lie at zero in every panel, within what its band lets it waver."
+                                  : " Where the orange line leaves zero and the blue one does not, what was found "
+                                    "explains it.";
   const auto add = [&](io::HtmlReport& to, std::size_t c) {
     const std::string picture = residual_picture(f, c);
     if (!picture.empty())
       to.figure_svg(picture, "Channel " + f.channels[c] +
-                                 ", measured less predicted, all recordings; outliers left out. Where the orange line "
-                                 "leaves zero and the blue one does not, what was found explains it.");
+                                 ", measured less predicted, all recordings; outliers left out." + reading);
   };
   if (order.empty() || f.traces.empty()) return;
-  page.heading("What is left over, before and after");
+  page.heading(one_model ? "What is left over" : "What is left over, before and after");
   page.paragraph(
       "Residuals against seven quantities. Missing physics shows as a line that leaves zero in an orderly way against "
-      "one of them; noise has no order. After a complete model the blue line stays at zero in every panel.");
+      "one of them; noise has no order. With a complete model the blue line stays at zero in every panel.");
   add(page, order.front().second);
   if (order.size() > 1) add(page, order[1].second);
   if (order.size() > 2)
@@ -239,9 +248,10 @@ void add_paths(io::HtmlReport& page, const Findings& f) {
   if (order.empty()) return;
   const auto middle = order.begin() + static_cast<std::ptrdiff_t>(std::min(kShown, order.size()));
   page.heading("Paths, measured and predicted");
-  page.figure_svg(path_picture(f, {order.begin(), middle}),
-                  "The recordings that the model before gets worst, seen from two sides: x over z on the left, y over "
-                  "z on the right. Lateral axes are stretched. The blue line should run through the grey dots.");
+  page.figure_svg(
+      path_picture(f, {order.begin(), middle}),
+      "The recordings that the refitted needle alone gets worst, seen from two sides: x over z on the left, y over "
+      "z on the right. Lateral axes are stretched. The blue line should run through the grey dots.");
   if (middle != order.end())
     page.folded("the other recordings", [&](io::HtmlReport& inside) {
       inside.figure_svg(path_picture(f, {middle, order.end()}), "The other recordings.");

@@ -60,9 +60,14 @@ void add_evidence(io::HtmlReport& page, const Findings& f) {
       "recording. The bar is how much better it then explains them. The black mark is what it has to pass: what the "
       "luckiest of all these effects reaches by chance in 1 of 100 simulated cases without any effect, and at least "
       "five standard deviations.");
-  page.figure_svg(ranking_picture(f, f.tried),
-                  "Effects fitted alone, best first. Several may pass because they look alike; the best explanation is "
-                  "kept and the others are then tried beside it.");
+  const char* const caption =
+      f.verdict == Verdict::nothing_missing ? "Effects fitted alone, best first. None passes its mark."
+      : f.verdict == Verdict::effects_found
+          ? "Effects fitted alone, best first. Several may pass because they look alike; the best explanation is kept "
+            "and the others are then tried beside it."
+          : "Effects fitted alone, best first. Many pass, because anything that bends the path a little explains some "
+            "of it; none leaves only noise, so none is named for it.";
+  page.figure_svg(ranking_picture(f, f.tried), caption);
   if (!f.beside.empty()) {
     const std::string beside = f.beside.front().beside;
     const auto shown = static_cast<std::ptrdiff_t>(std::min<std::size_t>(f.beside.size(), 8));
@@ -87,12 +92,15 @@ void add_held_out(io::HtmlReport& page, const Findings& f) {
   if (f.held_out.recordings.empty()) return;
   page.heading("Recordings foretold");
   page.paragraph(
-      "The proof that a name is more than a fit: each recording in turn is put aside, everything is fitted to the "
-      "others, and the one put aside is predicted. An effect of the wrong name fits what it has seen and gets the rest "
-      "wrong.");
-  page.figure_svg(held_out_picture(f.held_out),
-                  "Each recording predicted from the others, before and after. Blue should lie left of orange, and on "
-                  "the right picture near the line of noise alone.");
+      "Each recording in turn is put aside, everything is fitted to the others, and the one put aside is predicted. An "
+      "effect of the wrong name fits what it has seen and gets the rest wrong.");
+  page.figure_svg(
+      held_out_picture(f),
+      f.verdict == Verdict::nothing_missing
+          ? "Each recording predicted from the others. On the right they should lie near the line of noise "
+            "alone, none far off."
+          : "Each recording predicted from the others, before and after. Blue should lie left of orange, and "
+            "on the right picture near the line of noise alone.");
 }
 
 void add_reach(io::HtmlReport& page, const Findings& f) {

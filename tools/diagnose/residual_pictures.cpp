@@ -94,7 +94,9 @@ constexpr Against kAgainst[] = {{model::Covariate::time_s, "time in the recordin
                                 {model::Covariate::since_stop_s, "time since stop, at rest", "s", true},
                                 {model::Covariate::since_reversal_mm, "insertion since last turn", "mm"}};
 constexpr int kColumns = 4;
-constexpr double kPanelWidth = 181;
+constexpr double kLeft = 52;
+constexpr double kPanelWidth = 179;
+constexpr double kPitch = 197;
 constexpr double kPanelHeight = 120;
 
 // So that the picture tells of the bulk, and zero is in it; a point outside is cut off.
@@ -141,12 +143,13 @@ std::string residual_picture(const Findings& findings, std::size_t channel) {
     taken_at.insert(taken_at.end(), trace.covariates.begin(), trace.covariates.end());
   }
   if (std::none_of(before.begin(), before.end(), [](double v) { return std::isfinite(v); })) return "";
+  const bool one_model = findings.verdict == Verdict::nothing_missing;  // before is after
   Drawing drawing(832, 390);
   int place = 0;
   for (const Against& against : kAgainst) {
     const int column = place % kColumns;
     const int row = place++ / kColumns;
-    const Box box{44 + column * 199.0, 24 + row * 195.0, kPanelWidth, kPanelHeight};
+    const Box box{kLeft + column * kPitch, 24 + row * 195.0, kPanelWidth, kPanelHeight};
     const bool leftmost = column == 0;
     std::vector<double> x;
     std::vector<double> y_before;
@@ -173,16 +176,18 @@ std::string residual_picture(const Findings& findings, std::size_t channel) {
         panel.span(where.range[0], where.range[1]);
     panel.level(0, {.colour = ink::kSoft});
     const std::size_t step = x.size() / kMostPoints + 1;
-    panel.points(every(x, step), every(y_before, step), ink::kBefore, 0.22);
+    if (!one_model) panel.points(every(x, step), every(y_before, step), ink::kBefore, 0.22);
     panel.points(every(x, step), every(y_after, step), ink::kAfter, 0.22);
-    draw_binned(drawing, panel, bin(x, y_before, across.low, across.high), ink::kBefore);
+    if (!one_model) draw_binned(drawing, panel, bin(x, y_before, across.low, across.high), ink::kBefore);
     draw_binned(drawing, panel, bin(x, y_after, across.low, across.high), ink::kAfter);
   }
-  const double left = 44 + 3 * 199.0;
+  const double left = kLeft + 3 * kPitch;
   double top = 24 + 195 + 20;
-  for (const Key& key : std::vector<Key>{{ink::kBefore, "before: needle refitted"},
-                                         {ink::kAfter, "after: as found"},
-                                         {ink::kSpan, "where it goes wrong"}}) {
+  const std::vector<Key> keys = one_model ? std::vector<Key>{{ink::kAfter, "needle refitted"}}
+                                          : std::vector<Key>{{ink::kBefore, "before: needle refitted"},
+                                                             {ink::kAfter, "after: as found"},
+                                                             {ink::kSpan, "where it goes wrong"}};
+  for (const Key& key : keys) {
     draw_keys(drawing, {left, top}, {key});
     top += 22;
   }
