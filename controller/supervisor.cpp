@@ -1,6 +1,8 @@
 #include "controller/supervisor.hpp"
 
+#include <algorithm>
 #include <cmath>
+#include <utility>
 
 namespace bevel::controller {
 
@@ -56,8 +58,9 @@ const char* to_string(Reason reason) {
   return "?";
 }
 
-Supervisor::Supervisor(const ControllerConfig& config, const model::NeedleParameters& needle)
-    : config_(config), needle_(needle) {}
+Supervisor::Supervisor(const ControllerConfig& config, const model::NeedleParameters& needle,
+                       std::vector<model::ActiveEffect> effects)
+    : config_(config), needle_(needle), axes_(std::move(effects)) {}
 
 model::NeedleParameters Supervisor::needle_now() const {
   model::NeedleParameters needle = needle_;
@@ -183,6 +186,11 @@ model::MotionCommand Supervisor::step(std::int64_t now_utime, double dt_s) {
   }
   const double tolerance_mm = target_->tolerance_mm > 0 ? target_->tolerance_mm : config_.gains.tolerance_mm;
   Rates wanted = steering_rates(status_.geometry, actuator_->rotation_rad, tolerance_mm, config_);
+  if (axes_.turns_late()) {
+    const double share = std::min(1.0, std::abs(status_.geometry.sigma_rad) / config_.gains.boundary_layer_rad);
+    wanted.rotation_rad_s =
+        base_rate_rad_s(wanted.rotation_rad_s, axes_.take_up_rad(wanted.rotation_rad_s), share, config_.limits);
+  }
   // Come to rest at the closest approach: never faster than the ramp can stop within what is left.
   const double braking = std::sqrt(2 * 0.5 * config_.limits.insertion_acceleration_mm_s2 * status_.geometry.ahead_mm);
   wanted.insertion_mm_s = std::min(wanted.insertion_mm_s, braking);

@@ -6,6 +6,7 @@
 #include <optional>
 #include <string>
 
+#include "controller/axis_model.hpp"
 #include "controller/reach.hpp"
 #include "model/samples.hpp"
 
@@ -62,12 +63,17 @@ struct Status {
 
 class Supervisor {
  public:
-  // `needle` gives ell and the variants; k and lambda come with each state.
-  Supervisor(const ControllerConfig& config, const model::NeedleParameters& needle);
+  // `needle` gives ell and the variants; k and lambda come with each state. `effects` of the model file: what keeps the
+  // tip from turning with the base is undone; the rest is the estimator's.
+  Supervisor(const ControllerConfig& config, const model::NeedleParameters& needle,
+             std::vector<model::ActiveEffect> effects = {});
 
   // The newest of each; the supervisor judges their age by the time handed to step().
   void set_needle(const NeedleView& view) { needle_state_ = view; }
-  void set_actuator(const model::ActuatorState& state) { actuator_ = state; }
+  void set_actuator(const model::ActuatorState& state) {
+    actuator_ = state;
+    axes_.follow(state, needle_state_ ? needle_state_->pose.p_mm.z() : 0);
+  }
 
   // An operator's word. arm: takes the target and leaves off, hold or stopped; refused (reason latched) when out of
   // reach. start: from armed or hold to steering, once
@@ -88,6 +94,7 @@ class Supervisor {
 
   ControllerConfig config_;
   model::NeedleParameters needle_;
+  AxisModel axes_;
   std::optional<NeedleView> needle_state_;
   std::optional<model::ActuatorState> actuator_;
   std::optional<Target> target_;

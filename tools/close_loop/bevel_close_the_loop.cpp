@@ -1,0 +1,33 @@
+// bevel-close-the-loop: diagnoses a case, and shows rig, estimator and controller before and after.
+#include <algorithm>
+#include <filesystem>
+#include <iostream>
+#include <thread>
+
+#include "tools/close_loop/close_loop.hpp"
+#include "tools/common/command_line.hpp"
+#include "tools/diagnose/result_files.hpp"
+
+int main(int argc, char** argv) {
+  bevel::close_loop::Options o;
+  std::vector<std::string> folders;
+  o.threads = std::clamp(static_cast<int>(std::thread::hardware_concurrency()), 1, 64);
+  bevel::tools::CommandLine command_line(
+      "bevel-close-the-loop",
+      "Diagnoses a case, and shows what rig, estimator and controller make of the model before and after.");
+  command_line.arguments("CASE", folders, "folder with model.toml and rec*.lcm")
+      .option("-o,--out", o.out_folder, "folder for the results; out/close-the-loop/CASE if not given")
+      .option("-c,--config", o.estimator_path, "the estimator's settings for the replays (TOML)")
+      .option("--seed", o.diagnosis_seed, "of the diagnosis", 0, 1'000'000'000)
+      .option("--insertions", o.targeting.seeds, "steered to each target with each model", 1, 1000)
+      .option("--threads", o.threads, "at work at once; the results do not depend on it", 1, 64)
+      .flag("-q,--quiet", o.quiet, "no progress on stderr")
+      .check([&] { return folders.size() == 1 ? "" : "one CASE at a time"; });
+  bevel::diagnose::end_on_signals("bevel-close-the-loop");
+  return command_line.run(argc, argv, [&] {
+    o.folder = folders.front();
+    if (o.out_folder.empty())
+      o.out_folder = "out/close-the-loop/" + std::filesystem::weakly_canonical(o.folder).filename().string();
+    return bevel::close_loop::run(o, std::cout);
+  });
+}

@@ -1,0 +1,79 @@
+#include "tools/close_loop/close_loop.hpp"
+
+#include <ostream>
+
+#include "io/estimator_config.hpp"
+#include "tools/close_loop/report.hpp"
+#include "tools/diagnose/diagnose_tool.hpp"
+#include "tools/diagnose/progress.hpp"
+#include "tools/diagnose/read_case.hpp"
+#include "tools/diagnose/report.hpp"
+#include "tools/diagnose/result_files.hpp"
+#include "tools/diagnose/verdict_json.hpp"
+
+namespace bevel::close_loop {
+namespace {
+
+estimator::EstimatorConfig load_estimator(const std::string& path) {
+  estimator::EstimatorConfig config;
+  io::ConfigFile file = io::ConfigFile::load(path);
+  io::read_estimator_config(file.root(), config);
+  file.finish();
+  return config;
+}
+
+}  // namespace
+
+ClosedLoop close_the_loop(const Options& options) {
+  const CaseFiles files = find_case(options.folder);
+  const estimator::EstimatorConfig estimator = load_estimator(options.estimator_path);
+  ClosedLoop loop;
+  loop.case_name = files.name;
+  diagnose::Options diagnosis;
+  diagnosis.model_path = files.model_path;
+  diagnosis.logs = files.logs;
+  diagnosis.seed = options.diagnosis_seed;
+  diagnosis.bootstrap_draws = options.diagnosis_draws;
+  diagnosis.threads = options.threads;
+  diagnosis.quiet = options.quiet;
+  loop.findings = diagnose::find(diagnosis);
+  const diagnosis::Findings& findings = loop.findings;
+
+  // Through the file and back: what is shown is what the other programs will read.
+  loop.models = {io::load_model_file(files.model_path), io::ModelFile{findings.base.value, {}},
+                 io::parse_model_file(io::to_toml(diagnose::model_of(findings)), "model.toml")};
+  const diagnosis::RecordedCase recorded = without_outliers(diagnose::read_case(files.logs).recorded, findings);
+  const auto noise = noise_by_axis(recorded, findings.noise);
+
+  const diagnose::Progress progress(options.quiet ? nullptr : stderr);
+  progress.say("the rig with each model; the estimator on each recording");
+  for (std::size_t stage = 0; stage < kStages; ++stage) {
+    loop.rig[stage] = simulate_rig(recorded, findings.noise, loop.models[stage]);
+    const auto& fitted = stage == kAugmented ? findings.needle : findings.base;
+    loop.estimator.known[stage] =
+        replay_case(files.logs, loop.models[stage], noise, with_needle_known(estimator, fitted));
+    loop.estimator.free[stage] = replay_case(files.logs, loop.models[stage], noise, estimator);
+  }
+  progress.say("steering to targets with each model");
+  TargetingOptions targeting = options.targeting;
+  targeting.threads = options.threads;
+  loop.targeting = steer_all(loop.models, recorded, findings.noise, targeting);
+  progress.say("done");
+  return loop;
+}
+
+int run(const Options& options, std::ostream& out) {
+  diagnose::check_writable(options.out_folder);
+  const ClosedLoop loop = close_the_loop(options);
+  const std::string model_path = (find_case(options.folder)).model_path;
+  diagnose::write_together(options.out_folder, {{"report.html", diagnose::report_html(loop.findings, model_path)},
+                                                {"model.toml", io::to_toml(loop.models[kAugmented])},
+                                                {"verdict.json", diagnose::verdict_json(loop.findings)},
+                                                {"close-the-loop.html", page_html(loop)},
+                                                {"close-the-loop.json", to_json(loop)}});
+  out << table_text(loop) << "\nwritten: " << options.out_folder
+      << "/close-the-loop.html, close-the-loop.json, and the diagnosis: verdict.json, report.html, model.toml\n";
+  return 0;
+}
+
+}  // namespace bevel::close_loop

@@ -1,0 +1,47 @@
+// What a diagnosis is good for: the model that it leaves, put back into the rig, the estimator and the controller, and
+// what each does with it against what it did before.
+#pragma once
+
+#include <iosfwd>
+#include <string>
+
+#include "tools/close_loop/estimator_figure.hpp"
+#include "tools/close_loop/models.hpp"
+#include "tools/close_loop/rig_figure.hpp"
+#include "tools/close_loop/targeting_figure.hpp"
+
+namespace bevel::close_loop {
+
+struct Options {
+  std::string folder, out_folder;
+  std::string estimator_path = "tools/replay/strict.toml";
+  int diagnosis_seed = 1;
+  int diagnosis_draws = 400;
+  int threads = 2;
+  bool quiet = false;  // no progress on stderr
+  TargetingOptions targeting;
+};
+
+// The estimator's figure in two settings, see with_needle_known().
+struct EstimatorFigures {
+  std::array<EstimatorFigure, kStages> known, free;
+};
+
+struct ClosedLoop {
+  std::string case_name;
+  diagnosis::Findings findings;
+  Models models;
+  std::array<RigFigure, kStages> rig;
+  EstimatorFigures estimator;
+  TargetingFigures targeting;
+};
+
+// Throws std::runtime_error, std::invalid_argument or io::ConfigError with one sentence for a case that cannot be used.
+// Writes nothing.
+ClosedLoop close_the_loop(const Options& options);
+
+// All of it: the mismatch tool's three files, close-the-loop.json and close-the-loop.html in the folder, the table on
+// `out`. Returns the exit status.
+int run(const Options& options, std::ostream& out);
+
+}  // namespace bevel::close_loop

@@ -1,0 +1,40 @@
+// The estimator on the case's recordings: are its innovations those of a model that leaves nothing out?
+#pragma once
+
+#include <array>
+#include <string>
+#include <vector>
+
+#include "diagnosis/mismatch/findings.hpp"
+#include "diagnosis/mismatch/recorded_case.hpp"
+#include "estimator/config.hpp"
+#include "io/model_file.hpp"
+#include "tools/replay/statistics.hpp"
+
+namespace bevel::close_loop {
+
+// Innovations of accepted measurements, with the camera's correlation taken out.
+struct EstimatorFigure {
+  replay::ChiSquareMean nis;                  // all axes
+  std::array<replay::ChiSquareMean, 3> axis;  // x, y, z
+  int series = 0, coloured = 0;               // Ljung-Box at 1 %, one series per axis and recording
+  int coloured_by_chance = 0;                 // no more of so many white series look coloured 99 times in 100
+  std::int64_t measurements = 0, rejected = 0, resets = 0;
+  std::vector<double> nis_by_recording;
+
+  bool consistent() const { return nis.in_band() && coloured <= coloured_by_chance; }
+};
+
+// The noise found, per axis of {A}; sd 0 where no camera axis lies along it: there the messages' own is kept.
+std::vector<replay::NoiseColour> noise_by_axis(const diagnosis::RecordedCase& recorded, const diagnosis::Noise& noise);
+
+// `config` says how well entry and needle are known beforehand and what the filter forgives; the mean of the needle and
+// the effects are the model's.
+EstimatorFigure replay_case(const std::vector<std::string>& logs, const io::ModelFile& model,
+                            const std::vector<replay::NoiseColour>& noise, estimator::EstimatorConfig config);
+
+// `config` with k and lambda as well known as a fit over all recordings at once knows them. Where each recording may
+// choose its own, they take over what is missing: a recording alone cannot tell windup from another k.
+estimator::EstimatorConfig with_needle_known(estimator::EstimatorConfig config, const diagnosis::NeedleEstimate& known);
+
+}  // namespace bevel::close_loop

@@ -1,0 +1,51 @@
+#include "tools/close_loop/models.hpp"
+
+#include <algorithm>
+#include <filesystem>
+#include <stdexcept>
+
+#include "diagnosis/mismatch/noise.hpp"
+
+namespace bevel::close_loop {
+namespace fs = std::filesystem;
+
+CaseFiles find_case(const std::string& folder) {
+  if (!fs::is_directory(folder))
+    throw std::runtime_error(folder + ": no such folder; a case is a folder with model.toml and rec*.lcm");
+  CaseFiles files;
+  files.name = fs::weakly_canonical(folder).filename().string();
+  files.model_path = (fs::path(folder) / "model.toml").string();
+  if (!fs::exists(files.model_path)) throw std::runtime_error(folder + ": holds no model.toml");
+  for (const auto& entry : fs::directory_iterator(folder))
+    if (entry.path().extension() == ".lcm" && entry.path().filename().string().starts_with("rec"))
+      files.logs.push_back(entry.path().string());
+  if (files.logs.empty()) throw std::runtime_error(folder + ": holds no recording (rec*.lcm)");
+  std::sort(files.logs.begin(), files.logs.end());
+  return files;
+}
+
+diagnosis::RecordedCase without_outliers(const diagnosis::RecordedCase& recorded, const diagnosis::Findings& findings) {
+  std::vector<std::vector<std::size_t>> outliers(recorded.recordings.size());
+  for (std::size_t r = 0; r < outliers.size(); ++r) {
+    const auto trace = std::find_if(findings.traces.begin(), findings.traces.end(),
+                                    [&](const auto& t) { return t.log == recorded.recordings[r].name; });
+    if (trace == findings.traces.end()) continue;
+    for (std::size_t i = 0; i < trace->outlier.size(); ++i)
+      if (trace->outlier[i] != 0) outliers[r].push_back(i);
+  }
+  return diagnosis::without(recorded, outliers);
+}
+
+bool is_known_beforehand(const io::EffectEntry& entry) {
+  const model::Effect* effect = model::find_effect(entry.name);
+  return effect == nullptr || std::none_of(effect->parameters().begin(), effect->parameters().end(),
+                                           [](const auto& p) { return p.scope == model::Scope::recording; });
+}
+
+std::vector<io::EffectEntry> known_beforehand(const std::vector<io::EffectEntry>& effects) {
+  std::vector<io::EffectEntry> known;
+  std::copy_if(effects.begin(), effects.end(), std::back_inserter(known), is_known_beforehand);
+  return known;
+}
+
+}  // namespace bevel::close_loop

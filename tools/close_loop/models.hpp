@@ -1,0 +1,35 @@
+// The models that are compared, and what they are compared on.
+#pragma once
+
+#include <array>
+#include <string>
+#include <vector>
+
+#include "diagnosis/mismatch/findings.hpp"
+#include "diagnosis/mismatch/recorded_case.hpp"
+#include "io/model_file.hpp"
+
+namespace bevel::close_loop {
+
+// As the model file came; its needle refitted, without effects; with what the mismatch tool found.
+enum Stage : std::size_t { kAsItCame, kRefitted, kAugmented, kStages };
+inline constexpr std::array<const char*, kStages> kStageNames = {"as it came", "refitted", "augmented"};
+using Models = std::array<io::ModelFile, kStages>;
+
+// A folder with model.toml and rec*.lcm.
+struct CaseFiles {
+  std::string name, model_path;
+  std::vector<std::string> logs;  // in the order of their names
+};
+// Throws std::runtime_error naming what is not there.
+CaseFiles find_case(const std::string& folder);
+
+// The readings that the mismatch tool took for outliers, taken out.
+diagnosis::RecordedCase without_outliers(const diagnosis::RecordedCase& recorded, const diagnosis::Findings& findings);
+
+// What a model knows before an insertion: effects with an unknown of the single recording (an instant, a phase) are
+// left out, for the next one's is not known.
+std::vector<io::EffectEntry> known_beforehand(const std::vector<io::EffectEntry>& effects);
+bool is_known_beforehand(const io::EffectEntry& effect);
+
+}  // namespace bevel::close_loop

@@ -1,0 +1,25 @@
+// The three figures as a table for the terminal, as JSON, and as a page.
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include "io/plot.hpp"
+#include "tools/close_loop/close_loop.hpp"
+
+namespace bevel::close_loop {
+
+std::string table_text(const ClosedLoop& loop);
+std::string to_json(const ClosedLoop& loop);
+std::string page_html(const ClosedLoop& loop);
+
+// What is to be said beside the figures, one sentence each: what got better, what did not and why.
+std::vector<std::string> conclusions(const ClosedLoop& loop);
+std::string found_in_words(const ClosedLoop& loop);  // "torsional_windup (lag_at_100mm_rad 0.823)", "nothing"
+
+// One picture a figure.
+io::Plot rig_picture(const ClosedLoop& loop);
+io::Plot estimator_picture(const ClosedLoop& loop);
+io::Plot targeting_picture(const ClosedLoop& loop);
+
+}  // namespace bevel::close_loop

@@ -1,0 +1,153 @@
+#include "tools/close_loop/targeting.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <deque>
+#include <map>
+#include <random>
+
+#include "estimator/needle_estimator.hpp"
+
+namespace bevel::close_loop {
+namespace {
+
+constexpr std::int64_t kStart_utime = 1'700'000'000'000'000;
+constexpr std::int64_t kTick_us = 5'000;
+constexpr std::int64_t kActuatorPeriod_us = 10'000;
+constexpr std::int64_t kSettle_us = 500'000;  // at rest before it is told to go: the filter has seen the tip
+constexpr std::int64_t kTimeLimit_us = 240'000'000;
+
+// The cameras of a rig: coloured noise along each axis they see, and one message a frame from each.
+class Cameras {
+ public:
+  Cameras(const SteeredRig& rig, std::uint64_t seed)
+      : rig_(rig), random_(seed), coloured_mm_(rig.channels.size()), late_us_(0) {
+    for (std::size_t c = 0; c < coloured_mm_.size(); ++c) coloured_mm_[c] = rig.noise.sigma_mm[c] * normal_(random_);
+  }
+
+  void take(const rig::KinematicPlant& plant, std::int64_t utime) {
+    model::TipReading reading{plant.tip().p_mm, model::PointColumns(3, 0)};
+    plant.model().through_cameras(reading);
+    late_us_ = std::llround(1e6 * plant.model().latency_s().value);
+    std::map<int, model::TipMeasurement> frames;
+    const double rho = rig_.noise.ar1;
+    for (std::size_t c = 0; c < rig_.channels.size(); ++c) {
+      const diagnosis::Channel& channel = rig_.channels[c];
+      const double sigma_mm = rig_.noise.sigma_mm[c];
+      coloured_mm_[c] = rho * coloured_mm_[c] + std::sqrt(1 - rho * rho) * sigma_mm * normal_(random_);
+      model::TipMeasurement& frame = frames[channel.camera];
+      frame.position_mm += channel.axis * (channel.axis.dot(reading.position_mm) + coloured_mm_[c]);
+      // What frames of correlated noise are worth to a filter for white noise, as bevel-replay puts it.
+      const double white_variance = sigma_mm * sigma_mm * (1 + rho) / (1 - rho);
+      frame.information_per_mm2 += channel.axis * channel.axis.transpose() / white_variance;
+    }
+    const std::int64_t transport_us = std::llround(1e6 * rig_.transport_s);
+    for (auto& [camera, frame] : frames) {
+      frame.utime = utime + late_us_;
+      frame.seq = seq_;
+      frame.camera = camera;
+      under_way_.push_back({std::max(frame.utime, utime + transport_us), frame});
+    }
+    ++seq_;
+  }
+
+  void deliver(estimator::NeedleEstimator& estimator, std::int64_t utime) {
+    for (; !under_way_.empty() && under_way_.front().arrives_utime <= utime; under_way_.pop_front())
+      estimator.add(under_way_.front().measurement);
+  }
+
+ private:
+  struct UnderWay {
+    std::int64_t arrives_utime;
+    model::TipMeasurement measurement;
+  };
+  const SteeredRig& rig_;
+  std::mt19937_64 random_;
+  std::normal_distribution<double> normal_{0, 1};
+  std::vector<double> coloured_mm_;
+  std::int64_t late_us_;
+  std::deque<UnderWay> under_way_;
+  std::int64_t seq_ = 0;
+};
+
+controller::NeedleView view_of(const estimator::Estimate& estimate) {
+  controller::NeedleView view;
+  view.utime = estimate.utime;
+  view.pose = estimate.state.pose;
+  view.curvature_per_mm = estimate.state.curvature_per_mm;
+  view.lambda1_per_rad = estimate.state.lambda1_per_rad;
+  view.lambda2 = estimate.state.lambda2;
+  view.position_variance_mm2 = estimate.state.covariance.diagonal().head<3>().maxCoeff();
+  view.health = estimate.health;
+  view.reset_count = estimate.state.reset_count;
+  return view;
+}
+
+estimator::EstimatorConfig estimator_config(const SteeredRig& rig, const Believed& believed) {
+  estimator::EstimatorConfig config;
+  config.prior.needle = believed.needle;
+  config.effects = believed.effects;
+  // A rig whose camera is late has its limit set for that: it is not what is looked at here.
+  config.limits.measurement_age_s += model::AugmentedNeedle(rig.needle, rig.effects).latency_s().value;
+  return config;
+}
+
+}  // namespace
+
+Insertion steer(const SteeredRig& rig, const Believed& believed, const Eigen::Vector3d& target_mm, std::uint64_t seed) {
+  rig::KinematicPlant plant(rig.needle, rig.effects);
+  Cameras cameras(rig, seed);
+  estimator::NeedleEstimator estimator(estimator_config(rig, believed));
+  const controller::ControllerConfig config;
+  controller::Supervisor supervisor(
+      config, model::AugmentedNeedle(believed.needle, believed.effects).needle(),
+      believed.controller_knows_axes ? believed.effects : std::vector<model::ActiveEffect>{});
+  const auto frame_us = std::llround(1e6 * rig.noise.frame_s);
+  const auto control_us = std::llround(1e6 * config.period_s);
+  const double tick_s = static_cast<double>(kTick_us) * 1e-6;
+  Insertion result;
+  model::ActuatorState axes;
+  axes.axis_status = {static_cast<std::int32_t>(model::AxisStatus::enabled),
+                      static_cast<std::int32_t>(model::AxisStatus::enabled)};
+  std::int64_t next_frame_us = 0;
+  bool started = false;
+  for (std::int64_t us = 0; us < kTimeLimit_us; us += kTick_us) {
+    const std::int64_t utime = kStart_utime + us;
+    if (us > 0) {
+      const double insertion_mm = axes.insertion_rate_mm_s * tick_s, rotation_rad = axes.rotation_rate_rad_s * tick_s;
+      plant.advance(insertion_mm, rotation_rad, tick_s);
+      axes.insertion_mm += insertion_mm, axes.rotation_rad += rotation_rad;
+      result.turned_rad += std::abs(rotation_rad);
+    }
+    if (us % kActuatorPeriod_us == 0) {
+      axes.utime = utime;
+      ++axes.seq;
+      estimator.add(axes);
+      supervisor.set_actuator(axes);
+    }
+    if (us >= next_frame_us) {
+      next_frame_us += frame_us;
+      cameras.take(plant, utime);
+    }
+    cameras.deliver(estimator, utime);
+    if (us % control_us != 0 || us < kSettle_us) continue;
+    supervisor.set_needle(view_of(estimator.estimate(utime)));
+    if (!started) {
+      const controller::Target target{target_mm, 0};
+      supervisor.request(controller::Request::arm, target, utime);
+      supervisor.request(controller::Request::start, target, utime);
+      started = true;
+    }
+    const model::MotionCommand command = supervisor.step(utime, config.period_s);
+    axes.insertion_rate_mm_s = command.insertion_rate_mm_s;
+    axes.rotation_rate_rad_s = command.rotation_rate_rad_s;
+    if (supervisor.status().state != controller::State::steering) break;
+  }
+  result.arrived = supervisor.status().state == controller::State::hold;
+  result.reason = supervisor.status().reason;
+  result.miss_mm = (plant.tip().p_mm - target_mm).norm();
+  result.estimate_error_mm = (estimator.estimate(axes.utime).state.pose.p_mm - plant.tip().p_mm).norm();
+  return result;
+}
+
+}  // namespace bevel::close_loop

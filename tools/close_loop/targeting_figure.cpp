@@ -1,0 +1,149 @@
+#include "tools/close_loop/targeting_figure.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <map>
+#include <numbers>
+#include <numeric>
+#include <random>
+#include <stdexcept>
+
+#include "diagnosis/mismatch/parallel.hpp"
+
+namespace bevel::close_loop {
+namespace {
+
+constexpr double kLongest_mm = 110;    // the controller's workspace with room
+constexpr double kShareOfReach = 0.6;  // of the farthest that the needle bends to the side
+constexpr int kDirections = 6;
+constexpr std::array<double, 2> kDepthShares = {0.7, 1.0};
+constexpr std::uint64_t kBootstrapSeed = 20'260'101;
+
+double mean(const std::vector<double>& values) {
+  return std::accumulate(values.begin(), values.end(), 0.0) / static_cast<double>(values.size());
+}
+double largest(const std::vector<double>& values) { return *std::max_element(values.begin(), values.end()); }
+
+template <class Statistic>
+WithInterval bootstrap(const std::vector<double>& values, int draws, Statistic statistic) {
+  std::mt19937_64 random(kBootstrapSeed);
+  std::uniform_int_distribution<std::size_t> any(0, values.size() - 1);
+  std::vector<double> drawn(values.size()), of_draws;
+  for (int d = 0; d < draws; ++d) {
+    for (double& v : drawn) v = values[any(random)];
+    of_draws.push_back(statistic(drawn));
+  }
+  std::sort(of_draws.begin(), of_draws.end());
+  const auto at = [&](double share) {
+    return of_draws[static_cast<std::size_t>(share * static_cast<double>(of_draws.size() - 1))];
+  };
+  return {statistic(values), at(0.025), at(0.975)};
+}
+
+WithInterval mean_difference(const TargetingFigure& before, const TargetingFigure& after, int draws) {
+  std::vector<double> falls;
+  for (std::size_t i = 0; i < before.miss_mm.size(); ++i) falls.push_back(before.miss_mm[i] - after.miss_mm[i]);
+  return bootstrap(falls, draws, mean);
+}
+
+// Unknowns of one recording, as another insertion might have them: angles anywhere, instants while the needle goes in.
+std::vector<model::ActiveEffect> for_one_insertion(const io::ModelFile& model, double duration_s, std::uint64_t seed) {
+  std::mt19937_64 random(seed ^ 0x9e3779b97f4a7c15ULL);
+  std::vector<model::ActiveEffect> effects = io::active_effects(model, "");
+  for (auto& active : effects) {
+    const auto& parameters = active.effect->parameters();
+    for (std::size_t i = 0; i < parameters.size(); ++i) {
+      if (parameters[i].scope != model::Scope::recording) continue;
+      const double low = parameters[i].periodic ? parameters[i].lower : 0.2 * duration_s;
+      const double high = parameters[i].periodic ? parameters[i].upper : 0.8 * duration_s;
+      active.parameters[i] = std::uniform_real_distribution<double>(low, high)(random);
+    }
+  }
+  return effects;
+}
+
+TargetingFigure summarised(const std::vector<Insertion>& insertions, double inserted_mm, int draws) {
+  TargetingFigure figure;
+  std::map<std::string, int> reasons;
+  double turned_rad = 0;
+  for (const Insertion& one : insertions) {
+    figure.miss_mm.push_back(one.miss_mm);
+    turned_rad += one.turned_rad;
+    if (one.arrived) continue;
+    ++figure.stopped;
+    ++reasons[one.reason == controller::Reason::none ? "not there in time" : controller::to_string(one.reason)];
+  }
+  int most = 0;
+  for (const auto& [reason, count] : reasons)
+    if (count > most) most = count, figure.why = reason;
+  figure.turns_per_100mm = turned_rad / (2 * std::numbers::pi) / inserted_mm * 100;
+  figure.mean_mm = bootstrap(figure.miss_mm, draws, mean);
+  figure.largest_mm = bootstrap(figure.miss_mm, draws, largest);
+  return figure;
+}
+
+}  // namespace
+
+std::vector<Eigen::Vector3d> choose_targets(const model::NeedleParameters& needle, double deepest_mm) {
+  std::vector<Eigen::Vector3d> targets;
+  for (const double share : kDepthShares) {
+    const double depth_mm = share * std::min(deepest_mm, kLongest_mm);
+    model::Pose tip;
+    while (tip.p_mm.z() < depth_mm &&
+           model::advance(tip, {1, 0, {needle.curvature_per_mm, 0}}, model::slip_parameters(needle))) {
+    }
+    const double radius_mm = kShareOfReach * tip.p_mm.head<2>().norm();
+    for (int i = 0; i < kDirections; ++i) {
+      const double angle = 2 * std::numbers::pi * (i + 0.25) / kDirections;
+      const Eigen::Vector3d target(radius_mm * std::cos(angle), radius_mm * std::sin(angle), depth_mm);
+      if (controller::predict_reach({}, needle, target, 1).reachable) targets.push_back(target);
+    }
+  }
+  if (targets.empty())
+    throw std::runtime_error("no target within reach of the needle down to " + std::to_string(deepest_mm) +
+                             " mm: the recordings are too shallow to steer as far as they go");
+  return targets;
+}
+
+TargetingFigures steer_all(const Models& models, const diagnosis::RecordedCase& recorded, const diagnosis::Noise& noise,
+                           const TargetingOptions& options) {
+  double deepest_mm = 0;
+  for (const auto& recording : recorded.recordings)
+    for (const auto& node : recording.motion.nodes)
+      deepest_mm = std::max(deepest_mm, node.insertion_mm - recording.motion.nodes.front().insertion_mm);
+
+  const io::ModelFile& truth = models[kAugmented];
+  TargetingFigures figures;
+  figures.targets_mm = choose_targets(truth.needle, deepest_mm);
+  for (int s = 1; s <= options.seeds; ++s) figures.seeds.push_back(static_cast<std::uint64_t>(s));
+
+  std::vector<Believed> beliefs;
+  for (const io::ModelFile& model : models)
+    beliefs.push_back({model.needle, io::active_effects(known_beforehand(model.effects), ""), true});
+  beliefs.push_back(beliefs[kAugmented]);
+  beliefs.back().controller_knows_axes = false;
+  figures.axes_matter = controller::AxisModel(beliefs[kAugmented].effects).turns_late();
+
+  const std::size_t count = figures.targets_mm.size() * figures.seeds.size();
+  std::vector<std::vector<Insertion>> insertions(beliefs.size(), std::vector<Insertion>(count));
+  const double nominal_s = deepest_mm / controller::SteeringLimits{}.insertion_rate_mm_s;
+  diagnosis::parallel_for(beliefs.size() * count, options.threads, [&](std::size_t job) {
+    const std::size_t belief = job / count, i = job % count;
+    if (belief == kStages && !figures.axes_matter) return;
+    const std::uint64_t seed = 1000 * figures.seeds[i % figures.seeds.size()] + i / figures.seeds.size();
+    const SteeredRig rig{truth.needle, for_one_insertion(truth, nominal_s, seed), recorded.channels, noise};
+    insertions[belief][i] = steer(rig, beliefs[belief], figures.targets_mm[i / figures.seeds.size()], seed);
+  });
+  double inserted_mm = 0;
+  for (const auto& target : figures.targets_mm) inserted_mm += target.z() * static_cast<double>(figures.seeds.size());
+  for (std::size_t stage = 0; stage < kStages; ++stage)
+    figures.stages[stage] = summarised(insertions[stage], inserted_mm, options.bootstrap_draws);
+  if (figures.axes_matter)
+    figures.axes_not_undone = summarised(insertions[kStages], inserted_mm, options.bootstrap_draws);
+  const auto& s = figures.stages;
+  figures.gain_mm = mean_difference(s[kRefitted], s[kAugmented], options.bootstrap_draws);
+  figures.gain_on_as_came_mm = mean_difference(s[kAsItCame], s[kAugmented], options.bootstrap_draws);
+  return figures;
+}
+
+}  // namespace bevel::close_loop

@@ -1,0 +1,48 @@
+// Many steered insertions: how far from the target the needle comes to rest, with one model in the software or another.
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include "tools/close_loop/models.hpp"
+#include "tools/close_loop/targeting.hpp"
+
+namespace bevel::close_loop {
+
+struct WithInterval {
+  double value = 0, low = 0, high = 0;  // 95 %, bootstrap over the insertions
+};
+
+struct TargetingFigure {
+  std::vector<double> miss_mm;  // one per insertion, in the same order for each model
+  WithInterval mean_mm, largest_mm;
+  int stopped = 0;             // came to rest before the target, or never left; counted where they stood
+  std::string why;             // the commonest reason
+  double turns_per_100mm = 0;  // of the base, on average
+};
+
+struct TargetingFigures {
+  std::array<TargetingFigure, kStages> stages;
+  TargetingFigure axes_not_undone;           // augmented, but the controller is not told
+  bool axes_matter = false;                  // whether there is anything to undo
+  WithInterval gain_mm, gain_on_as_came_mm;  // fall of the mean miss to the augmented model, of the same insertions
+  std::vector<Eigen::Vector3d> targets_mm;
+  std::vector<std::uint64_t> seeds;
+};
+
+// Targets that the rig reaches, no deeper than it was recorded, all around. Throws std::runtime_error where the needle
+// bends too little for one.
+std::vector<Eigen::Vector3d> choose_targets(const model::NeedleParameters& needle, double deepest_mm);
+
+struct TargetingOptions {
+  int seeds = 3;
+  int bootstrap_draws = 4000;
+  int threads = 2;
+};
+
+// The rig is the augmented model, its unknowns of single recordings (a phase, an instant) drawn anew for each
+// insertion; nobody tells the software these.
+TargetingFigures steer_all(const Models& models, const diagnosis::RecordedCase& recorded, const diagnosis::Noise& noise,
+                           const TargetingOptions& options);
+
+}  // namespace bevel::close_loop
