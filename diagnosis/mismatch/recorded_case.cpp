@@ -12,7 +12,8 @@ namespace bevel::diagnosis {
 namespace {
 
 constexpr double kRankTolerance = 1e-9;
-constexpr double kSameAxis = 0.99;  // cosine
+constexpr double kSameAxis = 0.99;       // cosine
+constexpr double kSameDirection = 0.05;  // what information mixes into other directions, as a share
 constexpr double kClocksApart_s = 1.0;
 constexpr double kDifferentRig = 3.0;  // ratio of frame periods or of claimed noise
 constexpr double kMoving_mm_s = 0.05;
@@ -64,6 +65,23 @@ std::size_t channel_of(std::vector<Channel>& channels, int camera, const Eigen::
   return channels.size() - 1;
 }
 
+// Known channels first: of equal eigenvalues any directions in their plane are eigenvectors, and the last digits of a
+// message would choose others for the next.
+std::vector<std::pair<Eigen::Vector3d, double>> axes_of(const model::TipMeasurement& tip,
+                                                        const std::vector<Channel>& channels) {
+  auto axes = seen_axes(tip.information_per_mm2);
+  std::vector<std::pair<Eigen::Vector3d, double>> known;
+  for (const Channel& channel : channels) {
+    if (channel.camera != tip.camera) continue;
+    const Eigen::Vector3d seen = tip.information_per_mm2 * channel.axis;
+    const double information = channel.axis.dot(seen);
+    if (information > kRankTolerance * tip.information_per_mm2.cwiseAbs().maxCoeff() &&
+        (seen - information * channel.axis).norm() < kSameDirection * information)
+      known.emplace_back(channel.axis, information);
+  }
+  return known.size() == axes.size() ? known : axes;
+}
+
 Recording make_recording(RawRecording& raw, std::vector<Channel>& channels) {
   Recording recording;
   recording.name = raw.name;
@@ -98,7 +116,7 @@ Recording make_recording(RawRecording& raw, std::vector<Channel>& channels) {
   recording.motion = model::make_motion(raw.actuators, utimes);
   for (std::size_t i = 0; i < usable.size(); ++i) {
     recording.position_mm.push_back(usable[i].position_mm);
-    for (const auto& [axis, information] : seen_axes(usable[i].information_per_mm2)) {
+    for (const auto& [axis, information] : axes_of(usable[i], channels)) {
       const std::size_t c = channel_of(channels, usable[i].camera, axis);
       if (recording.series.size() < channels.size()) recording.series.resize(channels.size());
       Series& series = recording.series[c];
