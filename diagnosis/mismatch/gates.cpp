@@ -45,7 +45,13 @@ HeldOutFit leave_one_out(const Evidence& evidence, const Fit& whole, int threads
     if (local) values = fit(alone, hypothesis, scan_local_unknowns(alone, hypothesis, values), rules).values;
     Workspace workspace;
     out.values[r] = values;
-    if (!evaluate(evidence, hypothesis, r, values, false, workspace)) workspace.residuals.white.setConstant(1e3);
+    if (!evaluate(evidence, hypothesis, r, values, false, workspace)) {
+      // Out of the model's domain: as wrong as can be, not free of error.
+      Eigen::Index rows = 0;
+      for (const auto& series : evidence.recorded->recordings[r].series)
+        rows += static_cast<Eigen::Index>(series.time_s.size());
+      workspace.residuals.white.setConstant(rows, 1e3);
+    }
     out.chi2[r] = workspace.residuals.white.squaredNorm();
     out.count[r] = static_cast<std::size_t>(workspace.residuals.white.size());
   });
