@@ -1,0 +1,168 @@
+// The gates: whiteness, foretelling, what remains.
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include "diagnosis/mismatch/gates.hpp"
+#include "tests/mismatch/simulated_rig.hpp"
+
+namespace bevel::diagnosis {
+namespace {
+
+using testing::active;
+using testing::evidence_of;
+using testing::fit_of;
+using testing::member;
+using testing::record_case;
+using testing::SimulatedRig;
+
+Eigen::VectorXd formula_series(double share) {
+  Eigen::VectorXd x(80);
+  for (int i = 1; i <= 80; ++i) x[i - 1] = std::sin(0.37 * i * i) + share * std::sin(0.9 * i);
+  return x;
+}
+
+// statsmodels 0.15.0: i = numpy.arange(1, 81); x = sin(0.37*i*i) + a*sin(0.9*i);
+// statsmodels.stats.diagnostic.acorr_ljungbox(x, lags=[12], model_df=df): lb_pvalue.
+TEST(LjungBox, IsThatOfStatsmodels) {
+  EXPECT_NEAR(ljung_box_p(formula_series(0.3), 12, 0), 0.83635948, 1e-7);
+  EXPECT_NEAR(ljung_box_p(formula_series(0.3), 12, 1), 0.7733244, 1e-7);
+  EXPECT_NEAR(ljung_box_p(formula_series(0.6), 12, 0), 2.89400255e-03, 1e-10);
+  EXPECT_NEAR(ljung_box_p(formula_series(0.6), 12, 1), 1.64477274e-03, 1e-10);
+}
+
+TEST(LjungBox, IsUniformOnWhiteNoise) {
+  std::mt19937_64 random(9);
+  std::normal_distribution<double> normal;
+  constexpr int kSeries = 500;
+  std::vector<double> p;
+  for (int s = 0; s < kSeries; ++s) {
+    Eigen::VectorXd white(400);
+    for (double& x : white) x = normal(random);
+    p.push_back(ljung_box_p(white, 12, 0));
+  }
+  std::sort(p.begin(), p.end());
+  double distance = 0;  // Kolmogorov and Smirnov
+  for (int s = 0; s < kSeries; ++s) {
+    const double at = p[static_cast<std::size_t>(s)];
+    distance = std::max({distance, (s + 1.0) / kSeries - at, at - static_cast<double>(s) / kSeries});
+  }
+  EXPECT_LT(distance, 1.95 / std::sqrt(kSeries)) << "seed 9; 0.1 %";
+}
+
+TEST(LjungBox, OfTooFewReadingsSaysNothing) { EXPECT_EQ(ljung_box_p(Eigen::VectorXd::LinSpaced(30, 0, 1), 12, 0), 1); }
+
+double chi2_of(const Evidence& evidence, const Hypothesis& hypothesis, std::size_t r, const Eigen::VectorXd& values) {
+  Workspace workspace;
+  EXPECT_TRUE(evaluate(evidence, hypothesis, r, values, false, workspace));
+  return workspace.residuals.white.squaredNorm();
+}
+
+TEST(LeaveOneOut, IsAFitToTheOthersByHand) {
+  const SimulatedRig rig{.effects = {active("drilling", {2.0})}, .recordings = 3};
+  const auto recorded = record_case(rig, 4);
+  const Evidence evidence = evidence_of(recorded, rig);
+  const Fit whole = fit_of(evidence, {member("drilling")});
+  const HeldOutFit held_out = leave_one_out(evidence, whole, 2);
+  double total = 0;
+  for (std::size_t r = 0; r < 3; ++r) {
+    RecordedCase others = recorded;
+    others.recordings.erase(others.recordings.begin() + static_cast<std::ptrdiff_t>(r));
+    const Evidence other_evidence = evidence_of(others, rig);
+    const Hypothesis hypothesis(rig.needle, {member("drilling")}, others);
+    const Fit by_hand = fit(other_evidence, hypothesis, whole.values);
+    EXPECT_EQ(held_out.values[r], by_hand.values) << r;
+    EXPECT_EQ(held_out.chi2[r], chi2_of(evidence, whole.hypothesis, r, by_hand.values)) << r;
+    EXPECT_EQ(held_out.count[r], whole.count_by_recording[r]);
+    total += held_out.chi2[r];
+  }
+  EXPECT_DOUBLE_EQ(held_out.total(), total);
+  EXPECT_GT(held_out.total(), whole.chi2) << "what is foretold is never better than what is fitted";
+}
+
+TEST(LeaveOneOut, FitsOnlyThePhaseOfTheRecordingHeldOut) {
+  const double phases[] = {0.5, 2.2, 4.1};
+  const SimulatedRig rig{.effects_in =
+                             [&](int r) {
+                               return std::vector{active("tissue_motion", {1.0, 0.4, 0.6, phases[r]})};
+                             },
+                         .recordings = 3};
+  const auto recorded = record_case(rig, 4);
+  const Evidence evidence = evidence_of(recorded, rig);
+  const Hypothesis hypothesis(rig.needle, {member("tissue_motion")}, recorded);
+  Eigen::VectorXd start = hypothesis.start();
+  start.segment<3>(3) << 1.0, 0.4, 0.6;
+  for (int r = 0; r < 3; ++r) start[6 + r] = phases[r];
+  const Fit whole = fit(evidence, hypothesis, start);
+  const HeldOutFit held_out = leave_one_out(evidence, whole, 1);
+  for (std::size_t r = 0; r < 3; ++r) {
+    const int own = hypothesis.find(0, 3, static_cast<int>(r));
+    Evidence others = evidence;
+    others.used = {true, true, true};
+    others.used[r] = false;
+    Eigen::VectorXd expected = fit(others, hypothesis, whole.values).values;
+    Eigen::VectorXd found = held_out.values[r];
+    expected[own] = found[own] = 0;
+    EXPECT_EQ(found, expected) << "all else is of the others";
+    // No phase of a fine grid is better.
+    double least = 1e300;
+    for (int i = 0; i < 2000; ++i) {
+      Eigen::VectorXd trial = held_out.values[r];
+      trial[own] = 2 * std::numbers::pi * i / 2000;
+      least = std::min(least, chi2_of(evidence, hypothesis, r, trial));
+    }
+    EXPECT_LT(held_out.chi2[r], least + 0.05);
+  }
+}
+
+TEST(LeaveOneOut, ARecordingThatLeavesTheDomainIsNotForetold) {
+  const SimulatedRig rig{.recordings = 3};
+  auto raw = testing::record(rig, 4);
+  // Inserted so far that a needle of this curvature turns past where the slip law is defined.
+  for (auto& state : raw[2].actuators) state.insertion_mm *= 8;
+  const auto recorded = make_case(raw);
+  const Evidence evidence = evidence_of(recorded, rig);
+  Fit whole(Hypothesis(rig.needle, {}, recorded));
+  whole.values = whole.hypothesis.start();
+  const HeldOutFit held_out = leave_one_out(evidence, whole, 1);
+  EXPECT_GT(held_out.chi2[2], 1e3 * static_cast<double>(recorded.recordings[2].series[0].time_s.size()));
+  EXPECT_GT(held_out.count[2], 0U);
+}
+
+TEST(Remains, OfATrueModelAreNoise) {
+  int outside = 0, rejected = 0, structured = 0;
+  constexpr int kReplicates = 40;
+  for (std::uint64_t seed = 1; seed <= kReplicates; ++seed) {
+    const SimulatedRig rig{.ar1 = 0.5};
+    const auto recorded = record_case(rig, seed);
+    const Evidence evidence = evidence_of(recorded, rig);
+    const Remains remains = examine_remains(evidence, fit_of(evidence, {}));
+    if (remains.chi2_per_dof < remains.band[0] || remains.chi2_per_dof > remains.band[1]) ++outside;
+    if (remains.ljung_box_p < 0.01) ++rejected;
+    if (remains.structure_sigmas > 3) ++structured;
+  }
+  // One in a hundred of each is expected; four of forty come about once in a thousand.
+  EXPECT_LE(outside, 3);
+  EXPECT_LE(rejected, 3);
+  EXPECT_LE(structured, 3);
+}
+
+TEST(Remains, ShowPhysicsThatIsLeftOut) {
+  const SimulatedRig rig{.effects = {active("layer", {30, 0.6})}, .ar1 = 0.5};
+  const auto recorded = record_case(rig, 2);
+  const Evidence evidence = evidence_of(recorded, rig);
+  const Fit base = fit_of(evidence, {});
+  const Remains before = examine_remains(evidence, base);
+  EXPECT_GT(before.chi2_per_dof, before.band[1]);
+  EXPECT_GT(before.structure_sigmas, 10);
+  const Hypothesis hypothesis(rig.needle, {member("layer")}, recorded);
+  Eigen::VectorXd start = hypothesis.start();
+  start.tail<2>() << 30, 0.7;
+  const Fit layer = fit(evidence, hypothesis, start);
+  const Remains after = examine_remains(evidence, layer);
+  EXPECT_LT(after.structure_sigmas, 3);
+  // What the layer explains of chi2 was slow structure.
+  EXPECT_NEAR(before.structure_energy - after.structure_energy, base.chi2 - layer.chi2, 0.1 * (base.chi2 - layer.chi2));
+}
+
+}  // namespace
+}  // namespace bevel::diagnosis

@@ -1,0 +1,205 @@
+// Which channels a case has, and which recordings cannot be diagnosed.
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <numbers>
+
+#include "tests/mismatch/simulated_rig.hpp"
+
+namespace bevel::diagnosis {
+namespace {
+
+using ::testing::AllOf;
+using ::testing::HasSubstr;
+using testing::record;
+using testing::SimulatedRig;
+
+std::vector<RawRecording> with_information(const std::function<Eigen::Matrix3d(std::size_t)>& of) {
+  auto raw = record({.recordings = 2}, 1);
+  for (auto& recording : raw)
+    for (std::size_t i = 0; i < recording.tips.size(); ++i) recording.tips[i].information_per_mm2 = of(i);
+  return raw;
+}
+
+Eigen::Matrix3d diagonal(double x, double y, double z) {
+  Eigen::Matrix3d matrix = Eigen::Matrix3d::Zero();
+  matrix.diagonal() << x, y, z;
+  return matrix;
+}
+
+std::string refusal(std::vector<RawRecording> raw) {
+  try {
+    make_case(std::move(raw));
+  } catch (const std::invalid_argument& e) {
+    return e.what();
+  }
+  return "taken";
+}
+
+std::vector<std::string> names_of(const RecordedCase& recorded) {
+  std::vector<std::string> names;
+  for (const auto& channel : recorded.channels) names.push_back(channel.name);
+  return names;
+}
+
+TEST(Channels, ADiagonalInformationSeesTheAxesItHasInformationAlong) {
+  const auto recorded = make_case(with_information([](auto) { return diagonal(0, 25, 16); }));
+  EXPECT_THAT(names_of(recorded), ::testing::ElementsAre("tip.y", "tip.z"));
+  EXPECT_NEAR(recorded.channels[0].claimed_sigma_mm, 0.2, 1e-12);
+  EXPECT_NEAR(recorded.channels[1].claimed_sigma_mm, 0.25, 1e-12);
+  const auto& recording = recorded.recordings[0];
+  ASSERT_EQ(recording.series[0].measured_mm.size(), recording.position_mm.size());
+  for (std::size_t i = 0; i < recording.position_mm.size(); ++i) {
+    EXPECT_EQ(recording.series[0].measured_mm[i], recording.position_mm[i].y());
+    EXPECT_EQ(recording.series[1].measured_mm[i], recording.position_mm[i].z());
+  }
+  EXPECT_EQ(recorded.measurements(),
+            2 * (recorded.recordings[0].position_mm.size() + recorded.recordings[1].position_mm.size()));
+}
+
+TEST(Channels, AnObliqueInformationSeesAlongItsEigenvectors) {
+  // One camera turned about z by 30 degrees, with unequal deviations across.
+  const Eigen::Matrix3d turn = Eigen::AngleAxisd(std::numbers::pi / 6, Eigen::Vector3d::UnitZ()).toRotationMatrix();
+  const Eigen::Matrix3d information = turn * diagonal(100, 25, 4) * turn.transpose();
+  const auto recorded = make_case(with_information([&](auto) { return information; }));
+  ASSERT_EQ(recorded.channels.size(), 3U);
+  for (const auto& channel : recorded.channels) {
+    const double sigma_mm = std::abs(channel.axis.z()) > 0.99 ? 0.5 : channel.axis.x() > channel.axis.y() ? 0.1 : 0.2;
+    EXPECT_NEAR(channel.claimed_sigma_mm, sigma_mm, 1e-9) << channel.name;
+    EXPECT_NEAR((information * channel.axis - channel.axis / (sigma_mm * sigma_mm)).norm(), 0, 1e-9) << channel.name;
+  }
+}
+
+TEST(Channels, ACameraThatSeesNoDepthHasTwo) {
+  // It looks along (1 1 0)/sqrt 2.
+  const Eigen::Vector3d depth = Eigen::Vector3d(1, 1, 0).normalized();
+  const Eigen::Matrix3d information = 25 * (Eigen::Matrix3d::Identity() - depth * depth.transpose());
+  const auto recorded = make_case(with_information([&](auto) { return information; }));
+  ASSERT_EQ(recorded.channels.size(), 2U);
+  for (const auto& channel : recorded.channels) {
+    EXPECT_NEAR(channel.axis.dot(depth), 0, 1e-9);
+    EXPECT_NEAR(channel.claimed_sigma_mm, 0.2, 1e-9);
+  }
+  EXPECT_NEAR(recorded.channels[0].axis.dot(recorded.channels[1].axis), 0, 1e-9);
+}
+
+TEST(Channels, AnObliqueCamerasOwnRoundingMakesNoNewOnes) {
+  // Equal deviations across: any two directions are eigenvectors, and the last digits would choose others for every
+  // message.
+  const Eigen::Vector3d depth = Eigen::Vector3d(0.3, -0.5, 0.8).normalized();
+  const Eigen::Matrix3d seen = Eigen::Matrix3d::Identity() - depth * depth.transpose();
+  std::mt19937_64 random(3);
+  std::uniform_real_distribution<double> uniform(-1, 1);
+  const auto recorded = make_case(with_information([&](auto) {
+    const Eigen::Vector3d tangent = seen * Eigen::Vector3d(uniform(random), uniform(random), uniform(random));
+    const Eigen::Matrix3d other = 1e-6 * tangent * tangent.transpose();
+    return Eigen::Matrix3d((25 + 5 * uniform(random)) * (seen + other));
+  }));
+  ASSERT_EQ(recorded.channels.size(), 2U);
+  for (const auto& channel : recorded.channels) EXPECT_NEAR(channel.claimed_sigma_mm, 0.2, 0.02);
+  for (const auto& recording : recorded.recordings)
+    for (const auto& series : recording.series) EXPECT_EQ(series.time_s.size(), recording.position_mm.size());
+}
+
+TEST(Channels, TwoCamerasThatSeeOneAxisAreTwoChannels) {
+  auto raw = record({.recordings = 2}, 1);
+  for (auto& recording : raw)
+    for (std::size_t i = 0; i < recording.tips.size(); ++i) {
+      recording.tips[i].camera = static_cast<std::int32_t>(i % 2);
+      recording.tips[i].information_per_mm2 = diagonal(i % 2 == 0 ? 0 : 25, 25, 0);
+    }
+  EXPECT_THAT(names_of(make_case(raw)), ::testing::ElementsAre("tip.y", "tip[1].x", "tip[1].y"));
+}
+
+TEST(Channels, AReadingLessSureThanTheMedianSaysSo) {
+  const auto recorded =
+      make_case(with_information([](std::size_t i) { return diagonal(0, i == 7 ? 25.0 / 9 : 25.0, 0); }));
+  const auto& series = recorded.recordings[0].series[0];
+  EXPECT_NEAR(series.relative_sd[7], 3, 1e-12);
+  EXPECT_NEAR(series.relative_sd[8], 1, 1e-12);
+}
+
+TEST(Channels, MessagesThatAreNotUsableAreCounted) {
+  auto raw = record({.recordings = 2}, 1);
+  raw[0].tips[3].status = 2;
+  raw[0].tips[4].information_per_mm2.setZero();
+  raw[0].tips[5].position_mm.x() = std::numeric_limits<double>::quiet_NaN();
+  const std::size_t all = raw[0].tips.size();
+  const auto recorded = make_case(raw);
+  EXPECT_EQ(recorded.recordings[0].skipped, 3U);
+  EXPECT_EQ(recorded.recordings[0].position_mm.size(), all - 3);
+}
+
+TEST(BadInput, OneRecordingOnly) {
+  EXPECT_THAT(refusal(record({.recordings = 1}, 1)), AllOf(HasSubstr("1 recording given"), HasSubstr("at least two")));
+}
+
+TEST(BadInput, NoUsableTip) {
+  auto raw = record({.recordings = 2}, 1);
+  for (auto& tip : raw[1].tips) tip.status = 3;
+  EXPECT_THAT(refusal(raw), AllOf(HasSubstr("rec2: no usable TIP_MEASUREMENT"),
+                                  HasSubstr(std::to_string(raw[1].tips.size()) + " in the log")));
+}
+
+TEST(BadInput, NoMotion) {
+  auto raw = record({.recordings = 2}, 1);
+  raw[1].actuators.resize(1);
+  EXPECT_THAT(refusal(raw), AllOf(HasSubstr("rec2: 1 ACTUATOR_STATE"), HasSubstr("at least two")));
+}
+
+TEST(BadInput, ClocksApart) {
+  for (const double ahead_s : {30.0, -30.0}) {
+    auto raw = record({.recordings = 2}, 1);
+    for (auto& tip : raw[1].tips) tip.utime += std::llround(ahead_s * 1e6);
+    EXPECT_THAT(refusal(raw), AllOf(HasSubstr("rec2"), HasSubstr("clocks of camera and axes are apart"))) << ahead_s;
+  }
+  // An exposure late by a tenth of a second is physics, not a broken clock.
+  auto late = record({.recordings = 2}, 1);
+  for (auto& tip : late[1].tips) tip.utime += 100'000;
+  EXPECT_EQ(refusal(late), "taken");
+}
+
+TEST(BadInput, MixedRigs) {
+  const auto mixed = [](const std::function<void(RawRecording&)>& change) {
+    auto raw = record({.recordings = 3}, 1);
+    change(raw[2]);
+    return refusal(raw);
+  };
+  EXPECT_THAT(mixed([](RawRecording& r) {
+                for (auto& tip : r.tips) tip.information_per_mm2(0, 0) = 0;
+              }),
+              AllOf(HasSubstr("rec3 and rec1"), HasSubstr("different rigs"), HasSubstr("tip.x")));
+  EXPECT_THAT(mixed([](RawRecording& r) {
+                for (auto& tip : r.tips) tip.information_per_mm2 *= 1.0 / 16;
+              }),
+              AllOf(HasSubstr("different rigs"), HasSubstr("standard deviation claimed for tip.x"), HasSubstr("0.6")));
+  EXPECT_THAT(mixed([](RawRecording& r) {
+                std::vector<model::TipMeasurement> few;
+                for (std::size_t i = 0; i < r.tips.size(); i += 4) few.push_back(r.tips[i]);
+                r.tips = few;
+              }),
+              AllOf(HasSubstr("different rigs"), HasSubstr("a reading of tip.x every")));
+}
+
+TEST(Covariates, OfAMotionMadeByHand) {
+  // 2 s in at 5 mm/s, 1 s of rest, half a second of turning by 1 rad, 1 s in at 10 mm/s; a node every half second.
+  model::Motion motion;
+  motion.nodes = {{0, 0, 0},    {0.5, 2.5, 0}, {1, 5, 0},    {1.5, 7.5, 0}, {2, 10, 0},
+                  {2.5, 10, 0}, {3, 10, 0},    {3.5, 10, 1}, {4, 15, 1},    {4.5, 20, 1}};
+  const auto at = find_covariates(motion);
+  ASSERT_EQ(at.size(), motion.nodes.size());
+  for (std::size_t i = 0; i < at.size(); ++i) {
+    EXPECT_EQ(at[i].time_s, motion.nodes[i].time_s);
+    EXPECT_EQ(at[i].depth_mm, motion.nodes[i].insertion_mm);
+    EXPECT_EQ(at[i].roll_rad, motion.nodes[i].rotation_rad);
+    EXPECT_NEAR(at[i].speed_mm_s, i == 0 || (i > 4 && i < 8) ? 0 : i < 8 ? 5 : 10, 1e-12) << i;
+    EXPECT_NEAR(at[i].turn_rate_rad_s, i == 7 ? 2 : 0, 1e-12) << i;
+    EXPECT_NEAR(at[i].since_stop_s, i > 4 && i < 8 ? 0.5 * static_cast<double>(i - 4) : 0, 1e-12) << i;
+    EXPECT_NEAR(at[i].since_reversal_mm, i < 7 ? motion.nodes[i].insertion_mm : motion.nodes[i].insertion_mm - 10,
+                1e-12)
+        << i;
+  }
+}
+
+}  // namespace
+}  // namespace bevel::diagnosis

@@ -1,0 +1,101 @@
+#include "tests/mismatch/simulated_rig.hpp"
+
+namespace bevel::diagnosis::testing {
+
+model::testing::Script script_of(int recording) {
+  const double turn = 2.5 + 0.5 * (recording % 4);
+  const double sense = recording % 2 == 0 ? 1 : -1;
+  if (recording % 3 == 0)
+    return {{1.0, 12, 0}, {0.6, 0, sense * turn}, {1.2, 12, 0}, {0.8, 0, -sense * turn}, {0.5, 0, 0},
+            {1.2, 16, 0}, {0.5, 0, sense * turn}, {1.5, 8, 0},  {0.5, -10, 0},           {0.6, 14, 0}};
+  if (recording % 3 == 1)
+    return {{0.8, 10, 0}, {1.0, 10, sense * 4}, {1.0, 14, 0},  {0.6, 0, -sense * turn},
+            {1.0, 18, 0}, {1.2, 0, 0},          {1.2, 10, -5}, {1.2, 8, 0}};
+  return {{0.6, 6, sense * 3}, {1.4, 18, 0}, {0.5, 0, -sense * turn}, {0.8, 6, 0}, {0.6, 0, sense * turn}, {1.0, 12, 0},
+          {0.7, 8, 6},         {0.4, -8, 0}, {1.4, 12, -0.5}};
+}
+
+Eigen::VectorXd coloured_noise(const std::vector<double>& time_s, double sigma, double ar1, double frame_s,
+                               std::mt19937_64& random) {
+  std::normal_distribution<double> normal;
+  Eigen::VectorXd noise(static_cast<Eigen::Index>(time_s.size()));
+  for (Eigen::Index i = 0; i < noise.size(); ++i) {
+    const auto at = static_cast<std::size_t>(i);
+    const double kept = i == 0 ? 0 : std::pow(ar1, (time_s[at] - time_s[at - 1]) / frame_s);
+    noise[i] = (i == 0 ? 0 : kept * noise[i - 1]) + sigma * std::sqrt(1 - kept * kept) * normal(random);
+  }
+  return noise;
+}
+
+std::vector<RawRecording> record(const SimulatedRig& rig, std::uint64_t seed) {
+  std::mt19937_64 random(seed);
+  std::uniform_real_distribution<double> uniform;
+  std::normal_distribution<double> normal;
+  std::vector<RawRecording> all;
+  for (int r = 0; r < rig.recordings; ++r) {
+    RawRecording raw{.name = "rec" + std::to_string(r + 1), .actuators = script_of(r).actuators(0.02), .tips = {}};
+    std::vector<std::int64_t> utimes;
+    std::vector<double> time_s;
+    for (double t = 0; t < script_of(r).duration_s(); t += rig.frame_s) {
+      if (uniform(random) < rig.dropped_share) continue;
+      utimes.push_back(raw.actuators.front().utime + std::llround(t * 1e6));
+      time_s.push_back(t);
+    }
+    auto base = raw.actuators;
+    if (rig.true_motion) rig.true_motion(base);
+    auto effects = rig.effects;
+    if (rig.effects_in)
+      for (const auto& effect : rig.effects_in(r)) effects.push_back(effect);
+    const auto path = model::testing::path_of(rig.needle, effects, model::make_motion(base, utimes));
+    Eigen::MatrixXd noise(static_cast<Eigen::Index>(path.size()), 3);
+    for (Eigen::Index i = 0; i < 3; ++i)
+      noise.col(i) = coloured_noise(time_s, rig.sigma_mm[i], rig.ar1, rig.frame_s, random);
+    for (std::size_t i = 0; i < path.size(); ++i) {
+      model::TipMeasurement tip;
+      tip.utime = utimes[i];
+      tip.seq = static_cast<std::int64_t>(i);
+      tip.position_mm = path[i] + noise.row(static_cast<Eigen::Index>(i)).transpose();
+      if (uniform(random) < rig.outlier_share)
+        tip.position_mm +=
+            20 * rig.sigma_mm.mean() * Eigen::Vector3d(normal(random), normal(random), normal(random)).normalized();
+      tip.information_per_mm2 = rig.sigma_mm.cwiseAbs2().cwiseInverse().asDiagonal();
+      raw.tips.push_back(tip);
+    }
+    all.push_back(std::move(raw));
+  }
+  return all;
+}
+
+RecordedCase record_case(const SimulatedRig& rig, std::uint64_t seed) { return make_case(record(rig, seed)); }
+
+Evidence evidence_of(const RecordedCase& recorded, const SimulatedRig& rig) {
+  Evidence evidence;
+  evidence.recorded = &recorded;
+  evidence.noise = {.sigma_mm = {rig.sigma_mm[0], rig.sigma_mm[1], rig.sigma_mm[2]},
+                    .ar1 = rig.ar1,
+                    .outlier_share = 0,
+                    .frame_s = rig.frame_s};
+  evidence.belief = rig.needle;
+  return evidence;
+}
+
+Member member(std::string_view name, std::uint32_t variant) {
+  const model::Effect* effect = model::find_effect(name);
+  if (effect == nullptr) throw std::invalid_argument("no effect " + std::string(name));
+  return {effect, variant == ~0U ? effect->variants().front() : variant};
+}
+
+Fit fit_of(const Evidence& evidence, const EffectSet& set) {
+  const Hypothesis hypothesis(evidence.belief, set, *evidence.recorded);
+  Eigen::VectorXd start = hypothesis.start();
+  // From where every effect does something: at "none" a lag or a width has no slope.
+  for (std::size_t i = kBaseUnknowns; i < hypothesis.unknowns().size(); ++i) {
+    const Unknown& u = hypothesis.unknowns()[i];
+    if (u.recording < 0)
+      start[static_cast<Eigen::Index>(i)] =
+          set[static_cast<std::size_t>(u.member)].effect->parameters()[static_cast<std::size_t>(u.parameter)].starts[0];
+  }
+  return fit(evidence, hypothesis, start);
+}
+
+}  // namespace bevel::diagnosis::testing
