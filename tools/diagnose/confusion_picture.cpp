@@ -13,7 +13,7 @@ using namespace bevel::diagnosis;  // NOLINT(google-build-using-namespace)
 
 namespace {
 
-constexpr double kNames = 145;
+constexpr double kNames = 150;
 constexpr double kLeaning = 72;  // how far the last column's name leans to the right
 constexpr double kWorthANumber = 0.5;
 

@@ -105,7 +105,10 @@ void draw_pairs(Drawing& drawing, const Box& box, const HeldOut& held_out, doubl
   if (figure != &FitFigures::chi2_per_dof) return;
   const double one = panel.at(1, 0).x;
   drawing.line({one, box.top}, {one, box.bottom()}, {.colour = ink::kGood, .width = 1.2, .dashes = "4,3"});
-  drawing.text({one + 4, box.top - 5}, "noise alone", {.size = 11, .colour = ink::kGood});
+  const bool on_the_left = one > box.left + box.width / 2;  // where there is room
+  drawing.text(
+      {one + (on_the_left ? 4 : -4), box.top - 5}, "noise alone",
+      {.anchor = on_the_left ? Lettering::Anchor::end : Lettering::Anchor::start, .size = 11, .colour = ink::kGood});
 }
 
 }  // namespace
