@@ -211,7 +211,12 @@ Calibration calibrate_noise(const RecordedCase& recorded, const Errors& errors, 
       for (std::size_t i = 0; i < sum.size(); ++i) {
         // An outlier makes its neighbours look bad too: only the worst of three goes, the others are looked at again.
         const bool worst = (i == 0 || sum[i] >= sum[i - 1]) && (i + 1 == sum.size() || sum[i] >= sum[i + 1]);
-        if (sum[i] > kOutlier && worst) out.outliers[r].push_back(i), ++dropped, found = true;
+        // Outliers come alone: a run of them may be physics that acts for a moment, a membrane or a jump.
+        const auto flagged = [&](std::size_t j) {
+          return std::find(out.outliers[r].begin(), out.outliers[r].end(), j) != out.outliers[r].end();
+        };
+        const bool alone = !(i > 0 && flagged(i - 1)) && !flagged(i + 1);
+        if (sum[i] > kOutlier && worst && alone) out.outliers[r].push_back(i), ++dropped, found = true;
       }
     }
     if (!found) break;

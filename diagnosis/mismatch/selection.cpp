@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 
 #include "diagnosis/mismatch/gates.hpp"
 #include "diagnosis/mismatch/local_unknowns.hpp"
@@ -10,6 +11,8 @@
 namespace bevel::diagnosis {
 namespace {
 constexpr int kScans = 2;
+constexpr std::size_t kFineGrid = 20;    // starts
+constexpr double kLittle = 6.0;          // chi2
 constexpr double kSettled = 0.5;         // chi2
 constexpr double kCorrectionChance = 4;  // mean gain of a correction of four knots under noise
 constexpr std::size_t kCorrectionsFitted = 3;
@@ -18,6 +21,43 @@ constexpr int kLargestCorrections = 2;
 bool has_local(const Hypothesis& hypothesis) {
   return std::any_of(hypothesis.unknowns().begin(), hypothesis.unknowns().end(),
                      [](const Unknown& u) { return u.recording >= 0; });
+}
+
+// Where an effect's start is one of a fine grid, its valley is narrow and a linear promise of its size is rough: the
+// full model looks around first.
+Eigen::VectorXd look_around(const Evidence& evidence, const Hypothesis& hypothesis, std::size_t member,
+                            const Eigen::VectorXd& values) {
+  const auto& parameters = hypothesis.set()[member].effect->parameters();
+  int shape = -1, size = -1;
+  double spacing = 0;
+  for (std::size_t p = 0; p < parameters.size(); ++p) {
+    const auto& starts = parameters[p].starts;
+    if (parameters[p].scope != model::Scope::rig || hypothesis.find(member, p) < 0) continue;
+    if (std::isnan(parameters[p].none) && starts.size() >= kFineGrid)
+      shape = hypothesis.find(member, p), spacing = starts[1] - starts[0];
+    else if (!std::isnan(parameters[p].none))
+      size = hypothesis.find(member, p);
+  }
+  if (shape < 0 || size < 0) return values;
+  const Unknown& info = hypothesis.unknowns()[static_cast<std::size_t>(size)];
+  const double none = parameters[static_cast<std::size_t>(info.parameter)].none;
+  Workspace workspace;
+  Eigen::VectorXd best = values;
+  double least = std::numeric_limits<double>::infinity();
+  for (const double step : {0.0, -0.5, 0.5, -1.0, 1.0})
+    for (const double scale : {1.0, 0.5, 1.5, 2.5, 5.0}) {
+      Eigen::VectorXd trial = values;
+      trial[shape] += step * spacing;
+      trial[size] = none + scale * (values[size] - none);
+      hypothesis.clamp(trial);
+      double chi2 = 0;
+      for (std::size_t r = 0; r < evidence.recorded->recordings.size() && chi2 < least; ++r)
+        if (evidence.uses(r))
+          chi2 += evaluate(evidence, hypothesis, r, trial, false, workspace) ? workspace.residuals.white.squaredNorm()
+                                                                             : 1e300;
+      if (chi2 < least) least = chi2, best = trial;
+    }
+  return best;
 }
 
 std::string member_key(const Member& member) {
@@ -56,6 +96,7 @@ std::shared_ptr<const Fit> fit_addition(const Evidence& evidence, const Fit& fro
         const bool local = static_cast<int>(p) == candidate.local && r < promise.local_by_recording.size();
         values[i] = local ? promise.local_by_recording[r] : promise.parameters[p];
       }
+    values = look_around(evidence, hypothesis, m, values);
     auto one = std::make_shared<Fit>(fit(evidence, hypothesis, values));
     for (int scan = 0; scan < kScans && one->valid && has_local(hypothesis); ++scan) {
       auto again =
@@ -270,6 +311,13 @@ bool Selection::give_up_names(EffectSet& set) {
 EffectSet Selection::select() {
   EffectSet now;
   for (int round = 0; round < 12; ++round) {
+    // While even nameless curves leave structure, a name beside them would be a guess.
+    const bool nameless = std::any_of(now.begin(), now.end(), is_correction);
+    if (nameless && examine_remains(evidence_, *fit_of(now)).structure_sigmas > kStructureSigmas) {
+      std::erase_if(now, [](const Member& member) { return !is_correction(member); });
+      if (!give_up_names(now)) break;
+      continue;
+    }
     const bool grown = grow(now);
     const bool changed = swap(now) || shrink(now) || grown;
     // Names are put to the question as soon as there are any, so that a wrong one does not draw others after it.

@@ -4,6 +4,12 @@
 
 namespace bevel::model {
 
+std::vector<double> starts_every(double step, double first, double last) {
+  std::vector<double> starts;
+  for (int i = 0; first + i * step <= last; ++i) starts.push_back(first + i * step);
+  return starts;
+}
+
 std::string_view name_of(Covariate covariate) {
   switch (covariate) {
     case Covariate::time_s:

@@ -34,6 +34,8 @@ struct EffectParameter {
   Scope scope = Scope::rig;
   bool periodic = false;  // an angle: the bounds are one period apart
 };
+// Starts from first to last, evenly: as close as the effect is narrow, or a fit never finds it.
+std::vector<double> starts_every(double step, double first, double last);
 inline constexpr double kNoNone = std::numeric_limits<double>::quiet_NaN();
 
 // Against what the effect is to be looked at: where it shows.

@@ -7,16 +7,13 @@ namespace {
 class Layer final : public Effect {
  public:
   Layer()
-      : Effect({.name = "layer",
-                .meaning = "a second layer of tissue bends the needle differently",
-                .covariate = Covariate::depth_mm,
-                .parameters = {
-                    {.name = "depth_mm",
-                     .lower = 0,
-                     .upper = 300,
-                     .none = kNoNone,
-                     .starts = {7.5, 15, 22.5, 30, 37.5, 45, 52.5, 60, 67.5, 75, 82.5, 90, 97.5, 105, 112.5, 120}},
-                    {.name = "curvature_ratio", .lower = 0, .upper = 4, .none = 1, .starts = {0.8}}}}) {}
+      : Effect(
+            {.name = "layer",
+             .meaning = "a second layer of tissue bends the needle differently",
+             .covariate = Covariate::depth_mm,
+             .parameters = {
+                 {.name = "depth_mm", .lower = 0, .upper = 300, .none = kNoNone, .starts = starts_every(7.5, 7.5, 120)},
+                 {.name = "curvature_ratio", .lower = 0, .upper = 4, .none = 1, .starts = {0.8}}}}) {}
 
   void curvature(Parameters p, const LegView& leg, EffectMemory& /*memory*/, Dual2& kappa_per_mm) const override {
     const Dual end_mm = leg.tip_depth_mm + leg.insertion_mm * leg.heading_z;

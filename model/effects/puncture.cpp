@@ -8,16 +8,13 @@ namespace {
 class Puncture final : public Effect {
  public:
   Puncture()
-      : Effect({.name = "puncture",
-                .meaning = "a membrane holds the tip back until it breaks through",
-                .covariate = Covariate::depth_mm,
-                .parameters = {
-                    {.name = "depth_mm",
-                     .lower = 0,
-                     .upper = 300,
-                     .none = kNoNone,
-                     .starts = {7.5, 15, 22.5, 30, 37.5, 45, 52.5, 60, 67.5, 75, 82.5, 90, 97.5, 105, 112.5, 120}},
-                    {.name = "indentation_mm", .lower = 0, .upper = 15, .none = 0, .starts = {2.0}}}}) {}
+      : Effect(
+            {.name = "puncture",
+             .meaning = "a membrane holds the tip back until it breaks through",
+             .covariate = Covariate::depth_mm,
+             .parameters = {
+                 {.name = "depth_mm", .lower = 0, .upper = 300, .none = kNoNone, .starts = starts_every(1.0, 1.0, 120)},
+                 {.name = "indentation_mm", .lower = 0, .upper = 15, .none = 0, .starts = {1.0}}}}) {}
 
   void axes(Parameters p, const LegView& leg, EffectMemory& memory, Dual& insertion_mm,
             Dual& /*rotation_rad*/) const override {

@@ -23,13 +23,13 @@ class TissueMotion final : public Effect {
                                 .lower = 0,
                                 .upper = std::numbers::pi,
                                 .none = kNoNone,
-                                .starts = {0, 0.8, 1.6, 2.4},
+                                .starts = {0, 1.05, 2.09},
                                 .periodic = true},
                                {.name = "phase_rad",
                                 .lower = 0,
                                 .upper = 2 * std::numbers::pi,
                                 .none = kNoNone,
-                                .starts = {0, 0.8, 1.6, 2.4, 3.2, 4.0, 4.8, 5.6},
+                                .starts = {0, 1.05, 2.09, 3.14, 4.19, 5.24},
                                 .scope = Scope::recording,
                                 .periodic = true}}}) {}
 
