@@ -19,7 +19,7 @@ using ::testing::HasSubstr;
 using ::testing::Not;
 
 std::string page_of(Verdict verdict, const std::string& name) {
-  const std::string html = report_html(made_up(verdict), "rig/model.toml");
+  std::string html = report_html(made_up(verdict), "rig/model.toml");
   std::ofstream(std::filesystem::path(BEVEL_BINARY_DIR) / name) << html;
   return html;
 }
