@@ -88,9 +88,11 @@ FoundParameter profile_instant(const Evidence& evidence, const Fit& best, int un
   const double least = chi2_at(out.value);
   out.ci95 = {out.value, out.value};
   for (int side = 0; side < 2; ++side) {
-    double at_s = out.value;
+    const double step_s = side == 0 ? -kInstantSpacing_s : kInstantSpacing_s;
+    // A jump is placed better than that only by its assumed form: the first step is free.
+    double at_s = std::clamp(out.value + step_s, info.lower, info.upper);
     for (;;) {
-      const double next_s = at_s + (side == 0 ? -kInstantSpacing_s : kInstantSpacing_s);
+      const double next_s = at_s + step_s;
       if (next_s <= info.lower || next_s >= info.upper || chi2_at(next_s) - least > kRise95) break;
       at_s = next_s;
     }
