@@ -18,8 +18,9 @@ namespace {
 
 // An effect more has to be this much more likely than chance before it is believed: prior odds of 1 in 400.
 constexpr double kPriorCost = 12.0;
-constexpr double kRivalEvidence = 6.0;   // odds of 20 to 1
-constexpr double kCloseEvidence = 9.2;   // odds of 100 to 1, for effects of nearly one signature
+constexpr double kRivalEvidence = 6.0;  // odds of 20 to 1
+constexpr double kCloseEvidence = 9.2;  // odds of 100 to 1, for effects of nearly one signature
+constexpr double kUnexplainedSigmas = 6;
 constexpr double kSameSignature = 0.95;  // cosine of visible parts
 
 std::string label_of(const Member& member) {
@@ -220,11 +221,12 @@ void find_sentence(Findings& findings) {
       findings.sentence = "The model leaves out " + list() + ".";
       break;
     case Verdict::unknown_effect:
-      findings.sentence = "Something is missing that no effect of the library explains: the " +
-                          (findings.corrections.empty() ? std::string("motion is off")
-                                                        : findings.corrections.front().component + " is off with " +
-                                                              findings.corrections.front().covariate) +
-                          (findings.effects.empty() ? "." : ", beside " + list() + ".");
+      findings.sentence =
+          "Something is missing that no effect of the library explains: the " +
+          (findings.corrections.empty()
+               ? std::string("tip is off in a way that no curve of one covariate describes")
+               : findings.corrections.front().component + " is off with " + findings.corrections.front().covariate) +
+          (findings.effects.empty() ? "." : ", beside " + list() + ".");
       break;
   }
 }
@@ -295,9 +297,6 @@ void conclude(Selection& selection, const Fit& base, const EffectSet& set, Findi
     }
     findings.effects.push_back(std::move(found));
   }
-  if (!set.empty() && findings.corrections.empty()) findings.beside = tried_beside(selection, set);
-  find_detectable(selection, base, findings);
-
   const Remains remains = examine_remains(selection.evidence(), *fit);
   auto& checks = findings.checks;
   checks.chi2_per_dof = remains.chi2_per_dof;
@@ -309,6 +308,11 @@ void conclude(Selection& selection, const Fit& base, const EffectSet& set, Findi
   checks.unexplained_share = explained + left > 0 ? left / (explained + left) : 0;
   checks.clean = remains.structure_sigmas < kStructureSigmas && remains.ljung_box_p > 0.001 &&
                  remains.chi2_per_dof > remains.band[0] && remains.chi2_per_dof < remains.band[1];
+  // Whatever has a name or a curve: what leaves this much structure is not explained.
+  if (remains.structure_sigmas > kUnexplainedSigmas) findings.verdict = Verdict::unknown_effect;
+
+  if (!set.empty() && findings.corrections.empty()) findings.beside = tried_beside(selection, set);
+  find_detectable(selection, base, findings);
 
   const double depth_mm = deepest_mm(*selection.evidence().recorded);
   if (findings.verdict == Verdict::unknown_effect) {

@@ -122,13 +122,14 @@ Findings diagnose(const RecordedCase& original, const model::NeedleParameters& m
 
   stages.begin("foretelling each recording from the others");
   findings.held_out = hold_out(evidence, base, *selection->fit_of(set), options.threads);
-  while (!set.empty() && findings.held_out.gain <= 0) {
-    // What does not foretell is not physics.
-    findings.remarks.push_back(
-        describe(set) + " fits, but foretells recordings it was not fitted on no better than without (chi2 rises by " +
-        std::to_string(static_cast<int>(-findings.held_out.gain)) + "): " + std::string(set.back().effect->name()) +
-        " was dropped");
-    set.pop_back();
+  while (findings.held_out.gain <= 0) {
+    // A name that does not foretell is not physics. (A nameless curve may: it only describes.)
+    const auto named = std::find_if_not(set.rbegin(), set.rend(), is_correction);
+    if (named == set.rend()) break;
+    findings.remarks.push_back(std::string(named->effect->name()) + " beside " +
+                               describe(without_member(set, static_cast<std::size_t>(set.rend() - named) - 1)) +
+                               " fits, but foretells recordings that it was not fitted on no better: it was dropped");
+    set.erase(std::next(named).base());
     findings.held_out = hold_out(evidence, base, *selection->fit_of(set), options.threads);
   }
 
