@@ -17,7 +17,7 @@ from recordings import CHANNELS
 from trajectory_fit import Problem
 
 COVARIATES = ("depth", "time", "speed", "turn rate", "sin(roll)", "cos(roll)")
-FOR_LENGTHS, FOR_PREDICTION = 300, 1200
+FOR_LENGTHS, FOR_PREDICTION = 200, 1000
 SEED = 7
 SURE_SD = 2.0  # a prediction further from zero than this many of its own standard deviations counts as a discrepancy
 ALARM_SHARE = 0.05  # and this share of readings, one in twenty, is what a right process without one may show
@@ -40,7 +40,8 @@ class Discrepancy:
         self.processes = []
         for c in range(3):
             variance = max(float(Y[:, c].var()), 1e-6)
-            kernel = (ConstantKernel(variance, (1e-4 * variance, 1e2 * variance)) * RBF(np.ones(X.shape[1]), (0.05, 1e3))
+            kernel = (ConstantKernel(variance, (1e-4 * variance, 1e2 * variance))
+                      * RBF(np.ones(X.shape[1]), (0.05, 1e3))
                       + WhiteKernel(0.5 * variance, (1e-3 * variance, 2 * variance)))  # fmt: skip
             found = GaussianProcessRegressor(kernel, random_state=SEED).fit(Z[few], Y[few, c])
             self.processes.append(GaussianProcessRegressor(found.kernel_, optimizer=None).fit(Z[many], Y[many, c]))

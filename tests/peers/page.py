@@ -93,14 +93,18 @@ def names(result):
 
 def seconds(result):
     methods = [m for m in used(result) if m not in ("model refitted", "sindy sparse")]
-    return table(["case", *(METHODS[m].removesuffix(", least error") for m in methods)],
-                 [[row["case"], *(number(row["methods"][m]["seconds"], 1) for m in methods)] for row in result["cases"]])
+    rows = [[row["case"], *(number(row["methods"][m]["seconds"], 1) for m in methods)] for row in result["cases"]]
+    return table(["case", *(METHODS[m].removesuffix(", least error") for m in methods)], rows)
 
 
 def tables(result):
     return "\n\n".join(("### Summary", summary(result), "### Held-out error, RMSE in mm / chi2 per reading",
                         held_out(result), "### What each names", names(result), "### Seconds of one processor",
                         seconds(result)))  # fmt: skip
+
+
+def cross(x, y):
+    return f'<path d="M{x - 5:.1f} {y - 5:.1f}l10 10m0 -10l-10 10" stroke="black" stroke-width="1.5"/>'
 
 
 def picture(result):
@@ -117,15 +121,14 @@ def picture(result):
         return left + wide * (log - low) / (most - low)
 
     height = top + high * len(result["cases"]) + 44
-    out = [f'<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 {left + wide + 20} {height}" font-family="sans-serif" '
-           f'font-size="12"><rect width="100%" height="100%" fill="white"/>']  # fmt: skip
+    out = [f'<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 {left + wide + 20} {height}" '
+           f'font-family="sans-serif" font-size="12"><rect width="100%" height="100%" fill="white"/>']  # fmt: skip
     for i, method in enumerate(methods):
         at_x, at_y = 12 + 225 * (i % 4), 18 + 20 * (i // 4)
         out.append(f'<circle cx="{at_x}" cy="{at_y - 4}" r="5" fill="{COLOURS[method]}"/>'
                    f'<text x="{at_x + 10}" y="{at_y}">{html.escape(METHODS[method])}</text>')  # fmt: skip
     at_x, at_y = 12 + 225 * 3, 38
-    out.append(f'<path d="M{at_x - 5} {at_y - 9}l10 10m0 -10l-10 10" stroke="black" stroke-width="1.5"/>'
-               f'<text x="{at_x + 10}" y="{at_y}">wrong cause named</text>')  # fmt: skip
+    out.append(f'{cross(at_x, at_y - 4)}<text x="{at_x + 10}" y="{at_y}">wrong cause named</text>')
     bottom = top + high * len(result["cases"])
     for tick in (1, 2, 5, 10, 20, 50, 100, 200, 500, 1000):
         if math.log10(tick) > most:
@@ -145,7 +148,7 @@ def picture(result):
             cx, cy = x(at["chi2_per_reading"]), y + spread
             out.append(f'<circle cx="{cx:.1f}" cy="{cy:.1f}" r="4.5" fill="{COLOURS[method]}" fill-opacity="0.85"/>')
             if at.get("exact") is False:
-                out.append(f'<path d="M{cx - 5:.1f} {cy - 5:.1f}l10 10m0 -10l-10 10" stroke="black" stroke-width="1.5"/>')
+                out.append(cross(cx, cy))
     return "\n".join([*out, "</svg>"]) + "\n"
 
 

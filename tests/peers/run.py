@@ -29,13 +29,20 @@ def arguments():
     root = pathlib.Path(__file__).resolve().parents[2]
     parser = argparse.ArgumentParser(prog="compare", description=__doc__)
     parser.add_argument("folder", type=pathlib.Path, help="one folder per case in it, model.toml and logs in each")
-    parser.add_argument("--out", type=pathlib.Path, default=root / "out/peers", help="bevel-diagnose's results, peers.json")
+    parser.add_argument("--out", type=pathlib.Path, default=root / "out/peers", help="for all results")
     parser.add_argument("--program", type=pathlib.Path, default=root / "build/bin/bevel-diagnose")
-    parser.add_argument("--truth", type=pathlib.Path, help="default: FOLDER/truth.json if it is there")
+    parser.add_argument("--truth", type=pathlib.Path,
+                        help="list of truths, or the folder sealed/ of a blind trial; default: FOLDER/truth.json")
     parser.add_argument("--cases", help="some of them: case02,case11")
+    parser.add_argument("--keep", action="store_true", help="go on with what --out holds already")
     parser.add_argument("--jobs", type=int, default=os.cpu_count())
-    parser.add_argument("--page", type=pathlib.Path, help="put the tables into this page, its picture and JSON beside it")
+    parser.add_argument("--page", type=pathlib.Path, help="page to put the tables into; picture and JSON go beside it")
     return parser.parse_args()
+
+
+def name_of(folder):
+    """A blind trial keeps its logs in tNNNN/case."""
+    return folder.parent.name if folder.name == "case" else folder.name
 
 
 def clean(folder):
@@ -50,7 +57,7 @@ def clean(folder):
 
 
 def diagnose(folder, options):
-    out = options.out / folder.name
+    out = options.out / name_of(folder)
     before = resource.getrusage(resource.RUSAGE_CHILDREN).ru_utime
     command = [options.program, "--quiet", "--threads", "1", "--model", folder / "model.toml", "--out", out]
     done = subprocess.run([*command, *sorted(folder.glob("*.lcm"))], capture_output=True, text=True, check=False)
@@ -91,10 +98,23 @@ def warm_up(folder):
     run_peer(folder, "model refitted")
 
 
+def read_truths(path):
+    """Case -> truth, of a list in one file, or of bevel-blindtrial's folder of opened truths."""
+    if path.is_dir():
+        return {p.stem: json.loads(json.loads(p.read_text())["truth"]) for p in sorted(path.glob("*.json"))}
+    return {t["case"]: t for t in json.loads(path.read_text())} if path.exists() else {}
+
+
 def right_names(truth):
+    if "expected" in truth:  # bevel-blindtrial says itself what is right to name
+        return sorted(truth["expected"])
     if truth.get("visible_sigmas", np.inf) < VISIBLE_SIGMAS:
         return []
     return sorted(e["name"] for e in truth["effects"])
+
+
+def row_path(folder, options):
+    return options.out / f"{name_of(folder)}.json"
 
 
 def score_verdict(found):
@@ -131,30 +151,38 @@ def score_case(name, verdict, peers, times, truth):
 
 def main():
     options = arguments()
-    folders = sorted(p.parent for p in options.folder.glob("*/model.toml") if any(p.parent.glob("*.lcm")))
+    folders = sorted(p.parent for pattern in ("*/model.toml", "*/case/model.toml") for p in options.folder.glob(pattern)
+                     if any(p.parent.glob("*.lcm")))  # fmt: skip
     if options.cases:
-        folders = [f for f in folders if f.name in options.cases.split(",")]
+        folders = [f for f in folders if name_of(f) in options.cases.split(",")]
     if not folders:
         sys.exit(f"compare: {options.folder} has no folder with model.toml and logs")
-    truth_path = options.truth or options.folder / "truth.json"
-    truths = {t["case"]: t for t in json.loads(truth_path.read_text())} if truth_path.exists() else {}
+    truths = read_truths(options.truth or options.folder / "truth.json")
     if not options.program.exists():
         print(f"compare: no {options.program}: the peers alone, with the noise of the model refitted", file=sys.stderr)
     options.out.mkdir(parents=True, exist_ok=True)
     began = time.monotonic()
+    rows = []
     with concurrent.futures.ProcessPoolExecutor(options.jobs) as pool:
         pool.submit(warm_up, folders[0]).result()
-        verdicts = {f: pool.submit(diagnose, f, options) for f in folders if options.program.exists()}
-        runs = {f: [pool.submit(run_peer, f, peer) for peer in PEERS] for f in folders}
-        rows = []
+        runs = {}
         for folder in folders:
-            peers = {}
-            for run in runs[folder]:
-                results, times = run.result()
-                peers |= results
-            verdict = verdicts[folder].result() if verdicts else None
-            rows.append(score_case(folder.name, verdict, peers, times, truths.get(folder.name)))
-            print(f"{folder.name} {time.monotonic() - began:.0f} s", file=sys.stderr)
+            if options.keep and row_path(folder, options).exists():
+                continue
+            diagnosed = pool.submit(diagnose, folder, options) if options.program.exists() else None
+            runs[folder] = diagnosed, [pool.submit(run_peer, folder, peer) for peer in PEERS]
+        for folder in folders:
+            if folder in runs:
+                diagnosed, tasks = runs[folder]
+                peers = {}
+                for task in tasks:
+                    results, times = task.result()
+                    peers |= results
+                row = score_case(name_of(folder), diagnosed and diagnosed.result(), peers, times,
+                                 truths.get(name_of(folder)))  # fmt: skip
+                row_path(folder, options).write_text(json.dumps(row, indent=1) + "\n")
+                print(f"{name_of(folder)} {time.monotonic() - began:.0f} s", file=sys.stderr)
+            rows.append(json.loads(row_path(folder, options).read_text()))
     result = {"machine": f"{os.cpu_count()} cores, Python {platform.python_version()}", "cases": rows}
     (options.out / "peers.json").write_text(json.dumps(result, indent=1) + "\n")
     print(page.tables(result))

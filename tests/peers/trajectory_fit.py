@@ -18,7 +18,8 @@ BOUNDS = {
     "layer.depth_mm": (2, 120), "layer.curvature_ratio": (0.05, 4), "depth_dependence.per_100mm": (-1, 3),
     "drilling.coefficient_mm_per_rad": (0, 50), "flip_transient.length_mm": (0, 60), "relaxation.amplitude_mm": (0, 10),
     "relaxation.tau_s": (0.1, 100), "puncture.depth_mm": (0, 120), "puncture.indentation_mm": (0, 15),
-    "tissue_motion.amplitude_mm": (0, 40), "tissue_motion.frequency_hz": (0.05, 2), "camera_latency.latency_s": (-0.3, 0.5),
+    "tissue_motion.amplitude_mm": (0, 40), "tissue_motion.frequency_hz": (0.05, 2),
+    "camera_latency.latency_s": (-0.3, 0.5),
 }  # fmt: skip
 
 
@@ -56,7 +57,9 @@ class Problem:
 
     def chi2(self, fit, noise, r):
         error = self.errors(fit, [r])[0]
-        return float((whiten(error, self.recordings[r].tip_s, noise) ** 2).sum()) if np.isfinite(error).all() else math.inf
+        if not np.isfinite(error).all():
+            return math.inf
+        return float((whiten(error, self.recordings[r].tip_s, noise) ** 2).sum())
 
     def refit(self, start, noise, only=None, shared=True):
         """Least squares over the free parameters and each recording's own; finite differences."""
