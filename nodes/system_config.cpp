@@ -2,6 +2,7 @@
 
 #include <cmath>
 #include <filesystem>
+#include <utility>
 
 #include "io/config.hpp"
 #include "io/estimator_config.hpp"
@@ -123,23 +124,27 @@ CameraViewConfig read_camera(Section s) {
   return c;
 }
 
-void read_model(Section& s, const std::filesystem::path& path, RigConfig& c) {
+// `needle` and `effects` as the section has them, or from the model file that its key `model` names.
+void read_model(Section& s, const std::filesystem::path& folder, io::Presence needle_presence,
+                model::NeedleParameters& needle, std::vector<io::EffectEntry>& effects) {
+  std::string path;
+  s.read("model", path, optional);
+  if (Section own = s.section("needle", path.empty() ? needle_presence : optional); own.present())
+    needle = io::read_needle(own);
+  effects = io::read_effects(s);
+  if (path.empty()) return;
   if (s.has("needle") || s.has("effect")) return s.fail("model", "stands for needle and effect; one or the other");
   try {
-    const io::ModelFile model = io::load_model_file(path.string());
-    c.truth = model.needle;
-    c.effects = model.effects;
+    io::ModelFile model = io::load_model_file((folder / path).string());
+    needle = model.needle;
+    effects = std::move(model.effects);
   } catch (const io::ConfigError& e) {
     s.fail("model", e.what());
   }
 }
 
 void read_rig(Section s, const std::filesystem::path& folder, RigConfig& c) {
-  if (Section truth = s.section("needle", optional); truth.present()) c.truth = io::read_needle(truth);
-  c.effects = io::read_effects(s);
-  std::string model_path;
-  s.read("model", model_path, optional);
-  if (!model_path.empty()) read_model(s, folder / model_path, c);
+  read_model(s, folder, optional, c.truth, c.effects);
   s.read("roll_error_rad", c.roll_error_rad, optional, in_range(-3.2, 3.2));
   s.read("frames_socket", c.frames_socket, optional);
   s.read("frame_rate_hz", c.frame_rate_hz, optional, in_range(1, 120));
@@ -158,7 +163,9 @@ SystemConfig load_system_config(const std::string& path) {
   system.read("lcm_url", c.lcm_url, optional);
   system.read("can", c.can, optional);
   system.read("realtime", c.realtime, optional);
-  c.needle = io::read_needle(file.section("needle", required));
+  const std::filesystem::path folder = std::filesystem::path(path).parent_path();
+  Section root = file.root();
+  read_model(root, folder, required, c.needle, c.effects);
   c.estimator.prior.needle = c.needle;
   io::read_estimator_config(file.section("estimator", optional), c.estimator);
   read_controller(file.section("controller", optional), c.controller);
@@ -166,8 +173,9 @@ SystemConfig load_system_config(const std::string& path) {
   read_source(file.section("source", optional), c.source);
   for (const Section& s : file.sections("camera", optional)) c.cameras.push_back(read_camera(s));
   c.rig.truth = c.needle;
-  read_rig(file.section("rig", optional), std::filesystem::path(path).parent_path(), c.rig);
+  read_rig(file.section("rig", optional), folder, c.rig);
   file.finish();
+  c.estimator.effects = io::active_effects(c.effects, "");
   return c;
 }
 

@@ -24,9 +24,9 @@ struct CameraViewConfig {
 };
 
 struct RigConfig {
-  // Of the simulated needle: [rig.needle] and [[rig.effect]]s, or the model file `model`; unlike [needle], which is
-  // what the software believes. Unknowns of single recordings are as in the effect's own table; time counts from the
-  // start.
+  // Of the simulated needle: [rig.needle] and [[rig.effect]]s, or the model file `model`; unlike [needle] and
+  // [[effect]], which are what the software believes. Without [rig.needle] it is [needle], but [[effect]]s are never
+  // taken over. Unknowns of single recordings are as in the effect's own table; time counts from the start.
   model::NeedleParameters truth;
   std::vector<io::EffectEntry> effects;
   double roll_error_rad = 0;  // the bevel's true roll at the start; the software believes zero
@@ -41,7 +41,10 @@ struct SystemConfig {
   std::string lcm_url;  // empty: LCM's default, or LCM_DEFAULT_URL
   std::string can = "unix:/tmp/bevel-rig-can.sock";
   bool realtime = false;  // SCHED_FIFO and locked memory for controller and stepper, where the system permits
+  // What the software believes: [needle] and [[effect]]s, or the model file `model` at the top of the file. The
+  // controller plans with the needle alone; the estimator has the effects too (estimator.effects), as of no recording.
   model::NeedleParameters needle;
+  std::vector<io::EffectEntry> effects;
   estimator::EstimatorConfig estimator;
   controller::ControllerConfig controller;
   stepper::StepperConfig stepper;

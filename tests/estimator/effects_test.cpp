@@ -5,6 +5,7 @@
 #include <iostream>
 
 #include "estimator/needle_estimator.hpp"
+#include "estimator/propagate.hpp"
 #include "model/effects/open_loop.hpp"
 #include "tests/estimator/insertion.hpp"
 #include "tools/replay/statistics.hpp"
@@ -96,6 +97,63 @@ TEST(EstimatorEffects, InnovationsAreInTheirBandWithTheEffectAndNotWithout) {
     EXPECT_TRUE(known.in_band()) << one.effect->name();
     EXPECT_GT(left_out.mean(), left_out.highest()) << one.effect->name();
   }
+}
+
+// The filter's step as it would stand without effects: the model's advance, its derivatives, the walk.
+void plain_predict(FilterState& state, const EstimatorConfig& config, double insertion_mm, double rotation_rad) {
+  const auto square = [](double x) { return x * x; };
+  model::SlipParameters slip = model::slip_parameters(config.prior.needle);
+  slip.lambda1_per_rad = state.lambda1_per_rad;
+  slip.lambda2 = state.lambda2;
+  model::NeedleJacobian jacobian;
+  ASSERT_TRUE(model::advance(state.pose, {insertion_mm, rotation_rad, {state.curvature_per_mm, 0}}, slip, jacobian));
+  propagate<9>(state.covariance, jacobian.pose, jacobian.needle.leftCols<3>());
+  const ProcessNoise& noise = config.process;
+  Vector9d walk;
+  walk << Eigen::Vector3d::Constant(square(noise.position_mm)), square(noise.tilt_rad), square(noise.tilt_rad),
+      square(noise.roll_rad), square(noise.curvature_per_mm), square(noise.lambda1_per_rad), square(noise.lambda2);
+  walk *= std::abs(insertion_mm);
+  walk[5] += square(noise.roll_per_sqrt_rad) * std::abs(rotation_rad);
+  state.covariance.diagonal() += walk;
+}
+
+TEST(EstimatorEffects, NoEffectsIsThePlainFilterBitForBit) {
+  std::mt19937_64 rng(kSeed);
+  EstimatorConfig config = config_with({});
+  config.process = {};
+  config.prior.roll_sd_rad = 0.05;
+  const testing::Insertion data = simulate(config, rng);
+  const NeedleFilter filter(config);
+  FilterState state = filter.initial(data.actuators[0].insertion_mm, data.actuators[0].rotation_rad);
+  ASSERT_EQ(state.pose.p_mm, Eigen::Vector3d::Zero());
+  ASSERT_EQ(state.pose.R, Eigen::Matrix3d::Identity());
+  EXPECT_EQ(filter.latency_us(), 0);
+  std::size_t accepted = 0;
+  for (std::size_t i = 1; i < data.actuators.size(); ++i) {
+    const double insertion_mm = data.actuators[i].insertion_mm - data.actuators[i - 1].insertion_mm;
+    const double rotation_rad = data.actuators[i].rotation_rad - data.actuators[i - 1].rotation_rad;
+    FilterState plain = state;
+    filter.predict(state, insertion_mm, rotation_rad, 0.01);
+    if (insertion_mm != 0 || rotation_rad != 0) plain_predict(plain, config, insertion_mm, rotation_rad);
+    ASSERT_EQ(state.pose.p_mm, plain.pose.p_mm) << i;
+    ASSERT_EQ(state.pose.R, plain.pose.R) << i;
+    ASSERT_EQ(state.covariance, plain.covariance) << i;
+    if (i % 3 != 0 || accepted >= data.measurements.size()) continue;
+    // The measurement's part: the residual is to the pose itself.
+    model::TipMeasurement m = data.measurements[accepted];
+    m.position_mm = state.pose.p_mm + Eigen::Vector3d(0.03, -0.02, 0.01);
+    ASSERT_EQ(filter.seen_position_mm(state), state.pose.p_mm);
+    const Eigen::Vector3d residual = m.position_mm - state.pose.p_mm;
+    const Update update = filter.update(state, m);
+    ASSERT_TRUE(update.accepted);
+    ASSERT_EQ(update.innovation, residual);
+    ++accepted;
+  }
+  EXPECT_GT(accepted, 200U);
+  // What effects would keep was never touched.
+  EXPECT_EQ(state.effects.base.time_s, 0);
+  EXPECT_EQ(state.effects.base.insertion_mm, 0);
+  EXPECT_EQ(state.effects.tip_insertion_mm, 0);
 }
 
 TEST(EstimatorEffects, AnEffectThatIsNoneGivesThePlainFilter) {

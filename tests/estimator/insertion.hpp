@@ -13,7 +13,8 @@ namespace bevel::estimator::testing {
 struct Insertion {
   std::vector<model::ActuatorState> actuators;
   std::vector<model::TipMeasurement> measurements;
-  model::Pose final_pose;  // at the newest actuator state
+  std::vector<model::Pose> poses;  // true, at each actuator state
+  model::Pose final_pose;          // at the newest actuator state
   // The direction of motion stayed within the range for which the parameters were found valid. Where it does not, the
   // model says nothing, and a truth made of it is none: near 90 degrees the simulated tip would stand still.
   bool in_domain = true;
@@ -68,6 +69,7 @@ inline Insertion insert(const model::NeedleParameters& truth, const model::Pose&
       a.rotation_rad = rotation;
       a.rotation_rate_rad_s = rate;
       out.actuators.push_back(a);
+      out.poses.push_back(pose);
       out.final_pose = pose;
     }
     if (ms % 33 == 7 && unit(rng) >= plan.lost_share) {

@@ -11,6 +11,8 @@
 
 #include "io/estimator_config.hpp"
 #include "io/model_file.hpp"
+#include "nodes/system_config.hpp"
+#include "tools/replay/held_out.hpp"
 #include "tools/replay/report.hpp"
 
 namespace bevel::replay {
@@ -35,24 +37,31 @@ std::vector<std::string> find_logs(const std::vector<std::string>& paths) {
   return logs;
 }
 
-estimator::EstimatorConfig load_config(const std::string& model_path, const std::string& config_path, bool bicycle) {
-  estimator::EstimatorConfig config;
-  if (!config_path.empty()) {
-    io::ConfigFile file = io::ConfigFile::load(config_path);
-    io::read_estimator_config(file.root(), config);
-    file.finish();
+Setup load_setup(const BatchOptions& options) {
+  Setup setup;
+  if (!options.system_path.empty()) {
+    const nodes::SystemConfig system = nodes::load_system_config(options.system_path);
+    setup = {system.estimator, system.effects};
+  } else {
+    if (!options.config_path.empty()) {
+      io::ConfigFile file = io::ConfigFile::load(options.config_path);
+      io::read_estimator_config(file.root(), setup.config);
+      file.finish();
+    }
+    const io::ModelFile model = io::load_model_file(options.model_path);
+    setup.config.prior.needle = model.needle;
+    setup.effects = model.effects;
   }
-  const io::ModelFile model = io::load_model_file(model_path);
-  config.prior.needle = model.needle;
-  if (bicycle) {
-    config.prior.needle.lambda1_per_rad = config.prior.needle.lambda2 = 0;
-    config.prior.lambda1_sd_per_rad = config.prior.lambda2_sd = 0;
+  if (options.bicycle) {
+    estimator::Prior& prior = setup.config.prior;
+    prior.needle.lambda1_per_rad = prior.needle.lambda2 = 0;
+    prior.lambda1_sd_per_rad = prior.lambda2_sd = 0;
   }
-  return config;
+  return setup;
 }
 
-std::vector<Replay> replay_logs(const std::vector<std::string>& logs, const estimator::EstimatorConfig& config,
-                                const ReplayOptions& options) {
+std::vector<Replay> replay_logs(const std::vector<std::string>& logs,
+                                const std::vector<estimator::EstimatorConfig>& configs, const ReplayOptions& options) {
   std::vector<Replay> replays(logs.size());
   // Logs of one name in several folders are told apart by the folder.
   const auto name_of = [&logs](const fs::path& log) {
@@ -68,9 +77,12 @@ std::vector<Replay> replay_logs(const std::vector<std::string>& logs, const esti
     for (std::size_t i = next++; i < logs.size(); i = next++) {
       try {
         const io::MappedFile file(logs[i]);
-        estimator::EstimatorConfig own = config;
+        estimator::EstimatorConfig own = configs.at(i);
         own.effects = io::active_effects(options.effects, logs[i]);
         replays[i] = replay_log(file.bytes(), name_of(logs[i]), own, options);
+        if (!(options.ahead_mm > 0)) continue;
+        replays[i].next = foretell(replays[i], 1e-6);
+        replays[i].ahead = foretell(replays[i], options.ahead_mm);
       } catch (...) {
         const std::lock_guard lock(failure_mutex);
         failure = std::current_exception();
@@ -85,17 +97,29 @@ std::vector<Replay> replay_logs(const std::vector<std::string>& logs, const esti
   return replays;
 }
 
+std::vector<Replay> replay_logs(const std::vector<std::string>& logs, const estimator::EstimatorConfig& config,
+                                const ReplayOptions& options) {
+  return replay_logs(logs, std::vector(logs.size(), config), options);
+}
+
 int run(const BatchOptions& options, std::ostream& out, std::ostream& speed) {
-  ReplayOptions with_effects;
-  with_effects.effects = io::load_model_file(options.model_path).effects;
-  const auto replays = replay_logs(find_logs(options.paths),
-                                   load_config(options.model_path, options.config_path, options.bicycle), with_effects);
+  const Setup setup = load_setup(options);
+  const auto logs = find_logs(options.paths);
+  if (options.held_out && logs.size() < 2)
+    throw std::runtime_error("there is one log; to learn on the others takes at least two");
+  ReplayOptions replay_options;
+  replay_options.effects = setup.effects;
+  std::vector<estimator::EstimatorConfig> configs(logs.size(), setup.config);
+  if (options.held_out) configs = held_out_configs(replay_logs(logs, configs, replay_options), options.width);
+  replay_options.ahead_mm = options.ahead_mm;
+  const auto replays = replay_logs(logs, configs, replay_options);
   bool intact = true;
   for (const Replay& replay : replays) {
     print(out, replay, options.ahead_mm);
-    if (!options.out_folder.empty()) write_files(replay, options.out_folder);
+    if (!options.out_folder.empty()) write_files(replay, options.out_folder, options.ahead_mm);
     intact = intact && replay.damage.intact() && replay.refused_messages == 0;
   }
+  if (replays.size() > 1) print_together(out, replays, options.ahead_mm);
   print_speed(speed, replays);
   return intact ? 0 : 1;
 }

@@ -11,10 +11,13 @@ namespace bevel::replay {
 struct BatchOptions {
   std::string model_path;   // TOML model file
   std::string config_path;  // TOML of the estimator; empty: defaults
+  std::string system_path;  // instead of both: the file of the rig, as the live estimator reads it
   std::string out_folder;   // empty: no files
   double ahead_mm = 20;
-  bool bicycle = false;  // lambda = 0, held there: the plain bicycle
-  bool cases = false;    // each path is a folder of case folders with model.toml and logs
+  bool bicycle = false;   // lambda = 0, held there: the plain bicycle
+  bool held_out = false;  // k and lambda of each log's prior learned on the other logs
+  double width = 0.3;     // of that prior, as a share of the prior's own standard deviations
+  bool cases = false;     // each path is a folder of case folders with model.toml and logs
   std::vector<std::string> paths;
 };
 
@@ -22,9 +25,18 @@ struct BatchOptions {
 // what is not there.
 std::vector<std::string> find_logs(const std::vector<std::string>& paths);
 
-estimator::EstimatorConfig load_config(const std::string& model_path, const std::string& config_path, bool bicycle);
+struct Setup {
+  estimator::EstimatorConfig config;     // its effects are left to replay_logs
+  std::vector<io::EffectEntry> effects;  // of the model file
+};
+// From the options' model_path and config_path, or system_path. Throws io::ConfigError.
+Setup load_setup(const BatchOptions& options);
 
-// The replays in the order of `logs`, on as many threads as the machine has.
+// The replays in the order of `logs`, on as many threads as the machine has; one configuration for each log, or for
+// all.
+std::vector<Replay> replay_logs(const std::vector<std::string>& logs,
+                                const std::vector<estimator::EstimatorConfig>& configs,
+                                const ReplayOptions& options = {});
 std::vector<Replay> replay_logs(const std::vector<std::string>& logs, const estimator::EstimatorConfig& config,
                                 const ReplayOptions& options = {});
 

@@ -6,7 +6,6 @@
 #include <ostream>
 #include <stdexcept>
 
-#include "io/model_file.hpp"
 #include "tools/replay/batch.hpp"
 
 namespace bevel::replay {
@@ -24,11 +23,13 @@ struct CaseFigures {
 
 CaseFigures figures_of(const std::string& folder, const BatchOptions& options) {
   const auto logs = find_logs({folder});
-  const auto config = load_config((fs::path(folder) / "model.toml").string(), options.config_path, options.bicycle);
+  BatchOptions own = options;
+  own.model_path = (fs::path(folder) / "model.toml").string();
+  const Setup setup = load_setup(own);
   CaseFigures result;
   ReplayOptions calibrated;
-  calibrated.effects = io::load_model_file((fs::path(folder) / "model.toml").string()).effects;
-  const auto first = replay_logs(logs, config, calibrated);
+  calibrated.effects = setup.effects;
+  const auto first = replay_logs(logs, setup.config, calibrated);
   for (int axis = 0; axis < 3; ++axis) {
     std::vector<std::vector<AxisSample>> readings;
     readings.reserve(first.size());
@@ -40,7 +41,7 @@ CaseFigures figures_of(const std::string& folder, const BatchOptions& options) {
     const InnovationFigures f = innovation_figures(replay);
     result.raw.sum += f.nis.sum, result.raw.degrees += f.nis.degrees;
   }
-  for (const Replay& replay : replay_logs(logs, config, calibrated)) {
+  for (const Replay& replay : replay_logs(logs, setup.config, calibrated)) {
     const InnovationFigures f = innovation_figures(replay);
     result.rejected += f.rejected, result.measurements += f.measurements;
     for (int axis = 0; axis < 3; ++axis) {

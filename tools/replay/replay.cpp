@@ -91,6 +91,8 @@ void compare(Replay& result, const std::vector<needle_state_t>& truths, const es
     tilt2 += error.segment<2>(3).squaredNorm();
     roll2 += square(error[5]);
     figures.pose_nees.add(error.dot(state.covariance.topLeftCorner<6, 6>().ldlt().solve(error)), 6);
+    for (Eigen::Index i = 0; i < 6; ++i)
+      figures.axis_nees[static_cast<std::size_t>(i)].add(square(error[i]) / state.covariance(i, i), 1);
     figures.last_position_error_mm = offset.norm();
     ++figures.count;
   }
@@ -167,10 +169,23 @@ Replay replay_log(std::span<const std::uint8_t> log, const std::string& name, co
   return result;
 }
 
+void Foretold::add(const Foretold& other) {
+  for (std::size_t i = 0; i < 2; ++i) {
+    count[i] += other.count[i];
+    squares_mm2[i] += other.squares_mm2[i];
+  }
+}
+
+double Foretold::lateral_rmse_mm() const {
+  double mean_mm2 = 0;
+  for (std::size_t i = 0; i < 2; ++i)
+    if (count[i] > 0) mean_mm2 += squares_mm2[i] / static_cast<double>(count[i]);
+  return std::sqrt(mean_mm2);
+}
+
 Foretold foretell(const Replay& replay, double ahead_mm) {
   const estimator::NeedleFilter filter(replay.config);
   Foretold result;
-  double sum = 0;
   for (auto from = replay.states.begin(); from != replay.states.end(); ++from) {
     // The first accepted measurement that lies so far ahead of a state, and is not yet part of it.
     const auto to = std::find_if(replay.innovations.begin(), replay.innovations.end(), [&](const InnovationRow& row) {
@@ -189,10 +204,13 @@ Foretold foretell(const Replay& replay, double ahead_mm) {
     }
     const Eigen::Vector2d last = axes_at(replay, to->utime) - axes;
     filter.predict(state, last[0], last[1], seconds_to(to->utime));
-    sum += (to->position_mm - filter.seen_position_mm(state)).head<2>().squaredNorm();
-    ++result.count;
+    const Eigen::Vector3d error = to->position_mm - filter.seen_position_mm(state);
+    for (std::size_t i = 0; i < 2; ++i) {
+      if (!to->sees[i]) continue;
+      result.squares_mm2[i] += square(error[static_cast<Eigen::Index>(i)]);
+      ++result.count[i];
+    }
   }
-  if (result.count > 0) result.lateral_rmse_mm = std::sqrt(sum / static_cast<double>(result.count));
   return result;
 }
 

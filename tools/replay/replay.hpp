@@ -44,7 +44,18 @@ struct TruthFigures {
   double tilt_rmse_rad = 0;
   double roll_rmse_rad = 0;
   double last_position_error_mm = 0;
-  ChiSquareMean pose_nees;  // 6 degrees each
+  ChiSquareMean pose_nees;                 // 6 degrees each
+  std::array<ChiSquareMean, 6> axis_nees;  // of each error of the pose on its own: x, y, along the needle, tilts, roll
+};
+
+// How well the filter foretells measurements that it has not seen yet: lateral (x, y) error in mm, each axis over the
+// measurements that see it.
+struct Foretold {
+  std::array<std::int64_t, 2> count{};
+  std::array<double, 2> squares_mm2{};
+
+  void add(const Foretold& other);
+  double lateral_rmse_mm() const;  // of both axes together; 0 if neither was seen
 };
 
 struct Replay {
@@ -59,24 +70,22 @@ struct Replay {
   double run_s = 0;    // wall time of decoding and estimating
   double processor_s = 0;
   estimator::EstimatorConfig config;
+  Foretold next;   // one measurement ahead; both by replay_logs, if asked
+  Foretold ahead;  // ReplayOptions::ahead_mm ahead
 };
 
 struct ReplayOptions {
   std::size_t history = 96;
+  double ahead_mm = 0;  // for replay_logs: 0, nothing is foretold
   // Replaces each measurement's information by that of this noise, per axis; empty: as the camera says.
-  std::vector<NoiseColour> noise_by_axis;
-  std::vector<io::EffectEntry> effects;  // of the model file, for replay_logs: some are a recording's own
+  std::vector<NoiseColour> noise_by_axis{};
+  std::vector<io::EffectEntry> effects{};  // of the model file, for replay_logs: some are a recording's own
 };
 
 Replay replay_log(std::span<const std::uint8_t> log, const std::string& name, const estimator::EstimatorConfig& config,
                   const ReplayOptions& options = {});
 
-// How well the filter foretells measurements that it has not seen yet, at least `ahead_mm` further in: from its state
-// just after a measurement, by the model alone. Lateral (x, y) error in mm.
-struct Foretold {
-  std::int64_t count = 0;
-  double lateral_rmse_mm = 0;
-};
+// Of measurements at least `ahead_mm` further in, from the filter's state just after a measurement, by the model alone.
 Foretold foretell(const Replay& replay, double ahead_mm);
 
 // Figures over the innovations of one or more replays.

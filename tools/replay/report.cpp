@@ -1,5 +1,6 @@
 #include "tools/replay/report.hpp"
 
+#include <algorithm>
 #include <cmath>
 #include <cstdio>
 #include <filesystem>
@@ -141,6 +142,12 @@ void add_state_plots(io::HtmlReport& page, const Replay& replay) {
               "Roll is never measured: this is what the filter admits not to know of it.");
 }
 
+void print_foretold(std::ostream& out, const Foretold& next, const Foretold& ahead, double ahead_mm) {
+  const auto times = [](const Foretold& f) { return static_cast<long long>(std::max(f.count[0], f.count[1])); };
+  out << text_of("  foretold     lateral RMSE %.3f mm one measurement ahead (%lld), %.3f mm %g mm ahead (%lld)\n",
+                 next.lateral_rmse_mm(), times(next), ahead.lateral_rmse_mm(), ahead_mm, times(ahead));
+}
+
 }  // namespace
 
 void print(std::ostream& out, const Replay& replay, double ahead_mm) {
@@ -170,6 +177,10 @@ void print(std::ostream& out, const Replay& replay, double ahead_mm) {
     out << "  " << kAxisName[i] << "            " << with_band(figures.axis[i])
         << text_of("; Ljung-Box Q(%d) %.1f, p %.3g\n", white.lags, white.statistic, white.p_value);
   }
+  const estimator::Prior& prior = replay.config.prior;
+  out << text_of("  prior        k %.6f +- %.6f, lambda1 %.4f +- %.4f, lambda2 %.4f +- %.4f\n",
+                 prior.needle.curvature_per_mm, prior.curvature_sd_per_mm, prior.needle.lambda1_per_rad,
+                 prior.lambda1_sd_per_rad, prior.needle.lambda2, prior.lambda2_sd);
   const estimator::FilterState& last = replay.states.back().state;
   out << text_of("  k            %.6f +- %.6f /mm\n  lambda1      %.4f +- %.4f /rad\n  lambda2      %.4f +- %.4f\n",
                  last.curvature_per_mm, sd(last, 6), last.lambda1_per_rad, sd(last, 7), last.lambda2, sd(last, 8));
@@ -185,11 +196,28 @@ void print(std::ostream& out, const Replay& replay, double ahead_mm) {
         replay.truth.roll_rmse_rad, replay.truth.last_position_error_mm, static_cast<long long>(replay.truth.count));
     // One insertion's errors hang together over time, so a band for independent ones would not hold.
     out << text_of("  pose NEES/6  %.3f over the insertion (not independent samples)\n", replay.truth.pose_nees.mean());
+    const auto& nees = replay.truth.axis_nees;
+    out << text_of("  by itself    x %.2f, y %.2f, along the needle %.2f, tilts %.2f and %.2f, roll %.2f\n",
+                   nees[0].mean(), nees[1].mean(), nees[2].mean(), nees[3].mean(), nees[4].mean(), nees[5].mean());
   }
-  const Foretold next = foretell(replay, 1e-6);
-  const Foretold ahead = foretell(replay, ahead_mm);
-  out << text_of("  foretold     lateral RMSE %.3f mm one measurement ahead, %.3f mm %g mm ahead (%lld)\n",
-                 next.lateral_rmse_mm, ahead.lateral_rmse_mm, ahead_mm, static_cast<long long>(ahead.count));
+  print_foretold(out, replay.next, replay.ahead, ahead_mm);
+}
+
+void print_together(std::ostream& out, const std::vector<Replay>& replays, double ahead_mm) {
+  ChiSquareMean nis;
+  std::int64_t rejected = 0;
+  std::int64_t measurements = 0;
+  Foretold next, ahead;
+  for (const Replay& replay : replays) {
+    const InnovationFigures figures = innovation_figures(replay);
+    nis.add(figures.nis.sum, figures.nis.degrees);
+    rejected += figures.rejected, measurements += figures.measurements;
+    next.add(replay.next), ahead.add(replay.ahead);
+  }
+  out << text_of("%zu logs together\n  gate         %lld of %lld rejected\n", replays.size(),
+                 static_cast<long long>(rejected), static_cast<long long>(measurements));
+  if (nis.degrees > 0) out << "  NIS / axis   " << with_band(nis) << "\n";
+  print_foretold(out, next, ahead, ahead_mm);
 }
 
 void print_speed(std::ostream& out, const std::vector<Replay>& replays) {
@@ -202,14 +230,14 @@ void print_speed(std::ostream& out, const std::vector<Replay>& replays) {
       replays.size(), log_s, run_s, times(run_s), times(processor_s));
 }
 
-void write_files(const Replay& replay, const std::string& folder) {
+void write_files(const Replay& replay, const std::string& folder, double ahead_mm) {
   std::filesystem::create_directories(folder);
   const std::string stem = (std::filesystem::path(folder) / replay.name).string();
   write_csv(replay, stem);
   if (replay.states.size() < 2) return;
   io::HtmlReport page("Replay of " + replay.name);
   std::ostringstream summary;
-  print(summary, replay, 20);
+  print(summary, replay, ahead_mm);
   page.heading("Figures")
       .code(summary.str())
       .heading("States with 2-sigma bands")

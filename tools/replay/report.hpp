@@ -10,10 +10,12 @@
 namespace bevel::replay {
 
 void print(std::ostream& out, const Replay& replay, double ahead_mm);
+// What several replays say together: NIS, and measurements foretold.
+void print_together(std::ostream& out, const std::vector<Replay>& replays, double ahead_mm);
 void print_speed(std::ostream& out, const std::vector<Replay>& replays);
 
 // DIR/<name>.states.csv, DIR/<name>.innovations.csv and one page DIR/<name>.html. Throws std::runtime_error naming the
 // file.
-void write_files(const Replay& replay, const std::string& folder);
+void write_files(const Replay& replay, const std::string& folder, double ahead_mm);
 
 }  // namespace bevel::replay

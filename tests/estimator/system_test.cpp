@@ -1,0 +1,208 @@
+// The live estimator as a rig's file sets it up, and replays against the truth that a rig writes.
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <unistd.h>
+
+#include <cmath>
+#include <filesystem>
+#include <fstream>
+#include <iostream>
+
+#include "io/log_reader.hpp"
+#include "io/log_writer.hpp"
+#include "nodes/estimator_node.hpp"
+#include "nodes/needle_pose.hpp"
+#include "nodes/runtime.hpp"
+#include "nodes/system_config.hpp"
+#include "tests/estimator/insertion.hpp"
+#include "tools/replay/batch.hpp"
+
+namespace bevel {
+namespace {
+
+namespace fs = std::filesystem;
+using ::testing::HasSubstr;
+constexpr unsigned kSeed = 41;
+
+constexpr const char* kNeedle =
+    "[needle]\ncurvature_per_mm = 0.0047\nwheelbase_mm = 20.0\nlambda1_per_rad = 0.49\nlambda2 = 0.22\n";
+constexpr const char* kWindup = "[[effect]]\nname = \"torsional_windup\"\nlag_at_100mm_rad = 0.6\n";
+
+struct SystemFile : ::testing::Test {
+  fs::path folder = fs::temp_directory_path() / ("bevel_system_" + std::to_string(::getpid()));
+  void SetUp() override { fs::create_directories(folder); }
+  void TearDown() override { fs::remove_all(folder); }
+  std::string write(const std::string& text, const std::string& name = "rig.toml") const {
+    std::ofstream(folder / name) << text;
+    return (folder / name).string();
+  }
+};
+
+TEST_F(SystemFile, TheEstimatorTakesTheEffectsBesideItsNeedle) {
+  const auto config = nodes::load_system_config(write(std::string(kNeedle) + kWindup));
+  ASSERT_EQ(config.estimator.effects.size(), 1U);
+  EXPECT_EQ(config.estimator.effects[0].effect->name(), "torsional_windup");
+  EXPECT_EQ(config.estimator.effects[0].parameters[0].value, 0.6);
+  EXPECT_TRUE(config.rig.effects.empty());
+  EXPECT_TRUE(nodes::load_system_config(write(kNeedle)).estimator.effects.empty());
+}
+
+TEST_F(SystemFile, OrTheModelFileBesideIt) {
+  write(std::string(kNeedle) + kWindup, "found.toml");
+  const auto config = nodes::load_system_config(write("model = \"found.toml\"\n"));
+  EXPECT_EQ(config.needle.lambda1_per_rad, 0.49);
+  EXPECT_EQ(config.estimator.prior.needle, config.needle);
+  EXPECT_EQ(config.rig.truth, config.needle);
+  ASSERT_EQ(config.estimator.effects.size(), 1U);
+}
+
+TEST_F(SystemFile, MistakesAreNamed) {
+  const auto fault_of = [this](const std::string& text) -> std::string {
+    try {
+      nodes::load_system_config(write(text));
+    } catch (const io::ConfigError& error) {
+      return error.what();
+    }
+    return "";
+  };
+  EXPECT_THAT(fault_of("model = \"none.toml\"\n"), HasSubstr("none.toml: cannot be read"));
+  EXPECT_THAT(fault_of(std::string("model = \"m.toml\"\n") + kNeedle), HasSubstr("model: stands for needle"));
+  EXPECT_THAT(fault_of(std::string(kNeedle) + "[[effect]]\nname = \"layer\"\ncurvature_ratio = 0.5\n"),
+              HasSubstr("effect[0].depth_mm is missing"));
+  EXPECT_THAT(fault_of("[system]\n"), HasSubstr("needle"));
+}
+
+estimator::testing::Insertion insertion(std::mt19937_64& rng, const estimator::Prior& prior) {
+  estimator::testing::InsertionPlan plan;
+  plan.cameras = 2;
+  for (;;) {
+    auto data = estimator::testing::insert(estimator::testing::draw_needle(prior, rng),
+                                           estimator::testing::draw_start(prior, rng), plan, rng);
+    if (data.in_domain) return data;
+  }
+}
+
+// Measurements before the actuator state that follows them, which is when the live estimator could first use them.
+template <class TakeActuator, class TakeMeasurement>
+void in_order(const estimator::testing::Insertion& data, TakeActuator take_actuator, TakeMeasurement take_measurement) {
+  std::size_t next = 0;
+  for (const auto& actuator : data.actuators) {
+    while (next < data.measurements.size() && data.measurements[next].utime < actuator.utime)
+      take_measurement(data.measurements[next++]);
+    take_actuator(actuator);
+  }
+}
+
+needle_state_t truth_message(std::int64_t utime, const model::Pose& pose) {
+  needle_state_t m{};
+  m.utime = utime;
+  nodes::write_pose(pose, m);
+  return m;
+}
+
+void write_log(const std::string& path, const estimator::testing::Insertion& data,
+               const std::vector<needle_state_t>& truths = {}) {
+  io::LogWriter log(path);
+  in_order(
+      data,
+      [&](const model::ActuatorState& a) {
+        log.write_message(a.utime, io::channel::kActuatorState, io::to_message(a));
+      },
+      [&](const model::TipMeasurement& m) {
+        log.write_message(m.utime, io::channel::kTipMeasurement, io::to_message(m));
+      });
+  for (const needle_state_t& truth : truths) log.write_message(truth.utime, io::channel::kNeedleTruth, truth);
+  log.close();
+}
+
+TEST_F(SystemFile, TheLiveNodeAppliesItsEffectsAsAReplayWithTheSameFileDoes) {
+  std::mt19937_64 rng(kSeed);
+  const std::string system_path = write(std::string(kNeedle) + kWindup);
+  const auto config = nodes::load_system_config(system_path);
+  const auto data = insertion(rng, config.estimator.prior);
+  lcm::LCM lcm("memq://");
+  nodes::EstimatorNode node(lcm, config.estimator);
+  nodes::LcmPort port(lcm);
+  std::vector<needle_state_t> live;
+  port.subscribe<needle_state_t>(io::channel::kNeedleState, [&live](const needle_state_t& m) { live.push_back(m); });
+  in_order(
+      data,
+      [&](const model::ActuatorState& a) {
+        port.publish(io::channel::kActuatorState, io::to_message(a));
+        nodes::pump(lcm);
+      },
+      [&](const model::TipMeasurement& m) {
+        port.publish(io::channel::kTipMeasurement, io::to_message(m));
+        nodes::pump(lcm);
+      });
+  const std::string log = (folder / "live.lcm").string();
+  write_log(log, data);
+  replay::BatchOptions options;
+  options.system_path = system_path;
+  const replay::Setup setup = replay::load_setup(options);
+  const auto replayed = replay::replay_logs({log}, setup.config, {.effects = setup.effects}).front();
+  const auto without = replay::replay_logs({log}, setup.config).front();
+  ASSERT_EQ(live.size(), replayed.states.size());
+  ASSERT_GT(live.size(), 900U);
+  for (std::size_t i = 0; i < live.size(); ++i)
+    for (int k = 0; k < 3; ++k) ASSERT_EQ(live[i].position_mm[k], replayed.states[i].state.pose.p_mm[k]) << i;
+  EXPECT_NE(live.back().lambda1_per_rad, without.states.back().state.lambda1_per_rad);
+}
+
+TEST_F(SystemFile, ErrorsAgainstTheTruthAreThoseThatWerePutIn) {
+  std::mt19937_64 rng(kSeed);
+  const estimator::EstimatorConfig config;
+  const auto data = insertion(rng, config.prior);
+  const std::string log = (folder / "truth.lcm").string();
+  write_log(log, data);
+  const auto blind = replay::replay_logs({log}, config).front();
+  EXPECT_EQ(blind.truth.count, 0);
+  // A truth off the estimate by as much in its own frame, sampled at every fifth actuator state.
+  model::Vector6d error;
+  error << 0.3, 0, 0.4, 0.01, 0, 0.03;
+  std::vector<needle_state_t> truths;
+  double nees = 0;
+  for (std::size_t i = 0; i < blind.states.size(); i += 5) {
+    const auto& state = blind.states[i].state;
+    truths.push_back(truth_message(blind.states[i].utime, state.pose * model::exp_se3(error)));
+    nees += error.dot(state.covariance.topLeftCorner<6, 6>().inverse() * error) / 6;
+  }
+  nees /= static_cast<double>(truths.size());
+  // Before the first actuator state there is no estimate: such a truth is left out.
+  truths.insert(truths.begin(), truth_message(blind.states.front().utime - 1000, {}));
+  write_log(log, data, truths);
+  const auto seen = replay::replay_logs({log}, config).front();
+  EXPECT_EQ(seen.truth.count, static_cast<std::int64_t>(truths.size()) - 1);
+  EXPECT_NEAR(seen.truth.position_rmse_mm, 0.5, 2e-3);  // exp of a twist turns its displacement by half of 0.03
+  EXPECT_NEAR(seen.truth.last_position_error_mm, 0.5, 2e-3);
+  EXPECT_NEAR(seen.truth.tilt_rmse_rad, 0.01, 1e-6);
+  EXPECT_NEAR(seen.truth.roll_rmse_rad, 0.03, 1e-6);
+  EXPECT_NEAR(seen.truth.pose_nees.mean(), nees, 1e-3 * nees);
+}
+
+TEST_F(SystemFile, AgainstTheTruthOfFortyInsertionsTheFilterIsConsistent) {
+  std::mt19937_64 rng(kSeed);
+  estimator::EstimatorConfig config;
+  config.process = {0, 0, 0, 0, 0, 0, 0};  // as the truth: the default's walk alone would bring NEES to a half
+  replay::ChiSquareMean nees;
+  double squares_mm2 = 0;
+  constexpr int kRuns = 40;
+  for (int run = 0; run < kRuns; ++run) {
+    const auto data = insertion(rng, config.prior);
+    // At the end alone: one independent figure of six degrees each.
+    const std::string log = (folder / "truth.lcm").string();
+    write_log(log, data, {truth_message(data.actuators.back().utime, data.poses.back())});
+    const auto replay = replay::replay_logs({log}, config).front();
+    ASSERT_EQ(replay.truth.count, 1);
+    nees.add(replay.truth.pose_nees.sum, 6);
+    squares_mm2 += replay.truth.position_rmse_mm * replay.truth.position_rmse_mm / kRuns;
+  }
+  std::cout << "pose NEES/6 at the end of " << kRuns << " insertions " << nees.mean() << " [" << nees.lowest() << ", "
+            << nees.highest() << "], RMSE " << std::sqrt(squares_mm2) << " mm, seed " << kSeed << "\n";
+  EXPECT_TRUE(nees.in_band()) << nees.mean();
+  EXPECT_LT(std::sqrt(squares_mm2), 0.15);  // a measurement's own standard deviation
+}
+
+}  // namespace
+}  // namespace bevel
