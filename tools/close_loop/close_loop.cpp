@@ -43,7 +43,7 @@ ClosedLoop close_the_loop(const Options& options) {
   loop.models = {io::load_model_file(files.model_path), io::ModelFile{findings.base.value, {}},
                  io::parse_model_file(io::to_toml(diagnose::model_of(findings)), "model.toml")};
   const diagnosis::RecordedCase recorded = without_outliers(diagnose::read_case(files.logs).recorded, findings);
-  const auto noise = noise_by_axis(recorded, findings.noise);
+  const auto noise = measure_noise(files.logs, loop.models[kAsItCame], estimator);
 
   const diagnose::Progress progress(options.quiet ? nullptr : stderr);
   progress.say("the rig with each model; the estimator on each recording");

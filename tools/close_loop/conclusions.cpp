@@ -18,36 +18,32 @@ std::string rig_sentence(const ClosedLoop& loop) {
   return "The simulated rig does not come nearer to the recordings: " + change + ".";
 }
 
-std::string estimator_sentence(const ClosedLoop& loop) {
-  const auto &before = loop.estimator.known[kRefitted], &after = loop.estimator.known[kAugmented];
+std::string estimator_sentence(const std::array<EstimatorFigure, kStages>& stages, const std::string& setting) {
+  const auto &before = stages[kRefitted], &after = stages[kAugmented];
   const auto coloured = [](const EstimatorFigure& f) {
     return std::to_string(f.coloured) + " of " + std::to_string(f.series);
   };
-  std::string text = "Innovations with the needle known as the fit knows it: NIS " + measured(before.nis.mean()) +
-                     " to " + measured(after.nis.mean()) + ", coloured series " + coloured(before) + " to " +
-                     coloured(after) + "; ";
-  text += after.consistent() ? "they are now what a complete model leaves."
-                             : "they are not yet what a complete model leaves (NIS in its band, no more than " +
-                                   std::to_string(after.coloured_by_chance) + " coloured).";
-  const auto &free_before = loop.estimator.free[kRefitted], &free_after = loop.estimator.free[kAugmented];
-  if (free_before.consistent() && free_after.consistent() && !before.consistent())
-    text +=
-        " Where each recording may choose its own k and lambda the filter hides what is missing: it passes with "
-        "either model.";
-  return text;
+  const std::string change = "NIS " + measured(before.nis.mean()) + " to " + measured(after.nis.mean()) +
+                             ", coloured series " + coloured(before) + " to " + coloured(after);
+  std::string text = "The estimator, " + setting + ": " + change + ". ";
+  if (before.consistent() && after.consistent())
+    return text + "It passes with either model: what is missing hides in what the filter may choose.";
+  if (after.consistent()) return text + "Its innovations are now what a complete model leaves.";
+  return text + "That is not what a complete model leaves: NIS " + measured(after.nis.lowest()) + " to " +
+         measured(after.nis.highest()) + " and at most " + std::to_string(after.coloured_by_chance) + " coloured.";
 }
 
-std::string targeting_sentence(const ClosedLoop& loop) {
-  const TargetingFigures& t = loop.targeting;
-  char change[160];
+std::string targeting_sentence(const std::array<TargetingFigure, kStages>& stages, const WithInterval& gain_mm,
+                               const std::string& filter) {
+  char change[200];
   std::snprintf(change, sizeof change,
-                "mean miss %.3f to %.3f mm, fall %.3f mm [%.3f, %.3f] over the same %zu insertions",
-                t.stages[kRefitted].mean_mm.value, t.stages[kAugmented].mean_mm.value, t.gain_mm.value, t.gain_mm.low,
-                t.gain_mm.high, t.stages[kRefitted].miss_mm.size());
-  if (t.gain_mm.low > 0) return std::string("Targeting improves: ") + change + ".";
-  if (t.gain_mm.high < 0) return std::string("Targeting gets worse: ") + change + ".";
-  return std::string("Targeting does not improve by more than chance: ") + change +
-         ". The tip is seen while it is steered, and what the model leaves out is corrected as it shows.";
+                "mean miss %.3f to %.3f mm, a fall of %.3f mm [%.3f, %.3f] over the same %zu insertions",
+                stages[kRefitted].mean_mm.value, stages[kAugmented].mean_mm.value, gain_mm.value, gain_mm.low,
+                gain_mm.high, stages[kRefitted].miss_mm.size());
+  if (gain_mm.low > 0) return "Targeting improves with " + filter + ": " + change + ".";
+  if (gain_mm.high < 0) return "Targeting gets worse with " + filter + ": " + change + ".";
+  return "Targeting does not improve by more than chance with " + filter + ": " + change +
+         ". The tip is seen while it is steered, so that what the model leaves out is corrected as it shows.";
 }
 
 std::string unknown_beforehand(const io::EffectEntry& entry) {
@@ -83,11 +79,15 @@ std::vector<std::string> conclusions(const ClosedLoop& loop) {
     all.push_back("No effect was named: the augmented model is the refitted one, and nothing is expected to change.");
   }
   all.push_back(rig_sentence(loop));
-  all.push_back(estimator_sentence(loop));
-  if (!effects.empty()) all.push_back(targeting_sentence(loop));
+  all.push_back(estimator_sentence(loop.estimator.known, "with the needle known as the fit knows it"));
+  all.push_back(estimator_sentence(loop.estimator.free, "choosing a needle for each recording"));
+  const TargetingFigures& t = loop.targeting;
+  if (!effects.empty()) {
+    all.push_back(targeting_sentence(t.live, t.gain_mm, "the filter as it runs live"));
+    all.push_back(targeting_sentence(t.forgiving, t.gain_forgiving_mm, "a forgiving filter"));
+  }
   for (const auto& entry : effects)
     if (!is_known_beforehand(entry)) all.push_back(unknown_beforehand(entry));
-  const TargetingFigures& t = loop.targeting;
   if (t.axes_matter) {
     char text[256];
     std::snprintf(text, sizeof text,
@@ -96,11 +96,13 @@ std::vector<std::string> conclusions(const ClosedLoop& loop) {
                   t.axes_not_undone.mean_mm.value, t.axes_not_undone.mean_mm.low, t.axes_not_undone.mean_mm.high);
     all.emplace_back(text);
   }
-  for (std::size_t s = 0; s < kStages; ++s)
-    if (const auto& figure = t.stages[s]; figure.stopped > 0)
-      all.push_back("With the model " + std::string(kStageNames[s]) + ", " + std::to_string(figure.stopped) + " of " +
-                    std::to_string(figure.miss_mm.size()) + " insertions ended before the target (" + figure.why +
-                    "); they count with their distance to it.");
+  for (const bool forgiving : {false, true})
+    for (std::size_t s = 0; s < kStages; ++s)
+      if (const auto& figure = forgiving ? t.forgiving[s] : t.live[s]; figure.stopped > 0)
+        all.push_back("With the model " + std::string(kStageNames[s]) +
+                      (forgiving ? " and a forgiving filter, " : ", ") + std::to_string(figure.stopped) + " of " +
+                      std::to_string(figure.miss_mm.size()) + " insertions ended before the target (" + figure.why +
+                      "); they count with their distance to it.");
   all.push_back(
       "The steered rig is the augmented model itself, the best known; what neither knows of the real one is not in the "
       "targeting figure.");

@@ -8,18 +8,22 @@
 namespace bevel::close_loop {
 namespace {
 
-constexpr double kAlong = 0.99;         // cosine
 constexpr double kSignificance = 0.01;  // of one series, and of their number
 
 }  // namespace
 
-std::vector<replay::NoiseColour> noise_by_axis(const diagnosis::RecordedCase& recorded, const diagnosis::Noise& noise) {
-  std::vector<replay::NoiseColour> colours(3);
-  for (std::size_t c = 0; c < recorded.channels.size(); ++c)
-    for (int i = 0; i < 3; ++i)
-      if (std::abs(recorded.channels[c].axis[i]) > kAlong)
-        colours[static_cast<std::size_t>(i)] = {noise.sigma_mm[c], noise.ar1};
-  return colours;
+std::vector<replay::NoiseColour> measure_noise(const std::vector<std::string>& logs, const io::ModelFile& model,
+                                               estimator::EstimatorConfig config) {
+  config.prior.needle = model.needle;  // which plays no part: the readings are looked at alone
+  const auto replays = replay::replay_logs(logs, config);
+  std::vector<replay::NoiseColour> noise;
+  for (int axis = 0; axis < 3; ++axis) {
+    std::vector<std::vector<replay::AxisSample>> readings;
+    readings.reserve(replays.size());
+    for (const auto& one : replays) readings.push_back(replay::axis_samples(one, axis));
+    noise.push_back(replay::measure_noise(readings));
+  }
+  return noise;
 }
 
 estimator::EstimatorConfig with_needle_known(estimator::EstimatorConfig config,

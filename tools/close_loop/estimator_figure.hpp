@@ -6,7 +6,6 @@
 #include <vector>
 
 #include "diagnosis/mismatch/findings.hpp"
-#include "diagnosis/mismatch/recorded_case.hpp"
 #include "estimator/config.hpp"
 #include "io/model_file.hpp"
 #include "tools/replay/statistics.hpp"
@@ -25,8 +24,9 @@ struct EstimatorFigure {
   bool consistent() const { return nis.in_band() && coloured <= coloured_by_chance; }
 };
 
-// The noise found, per axis of {A}; sd 0 where no camera axis lies along it: there the messages' own is kept.
-std::vector<replay::NoiseColour> noise_by_axis(const diagnosis::RecordedCase& recorded, const diagnosis::Noise& noise);
+// The cameras' noise per axis of {A}, as bevel-replay measures it: without a model, and with no regard to outliers.
+std::vector<replay::NoiseColour> measure_noise(const std::vector<std::string>& logs, const io::ModelFile& model,
+                                               estimator::EstimatorConfig config);
 
 // `config` says how well entry and needle are known beforehand and what the filter forgives; the mean of the needle and
 // the effects are the model's.

@@ -61,7 +61,7 @@ io::Plot targeting_picture(const ClosedLoop& loop) {
   plot.y_range = {0, 100};
   plot.legend = io::Plot::Legend::bottom_right;
   for (std::size_t s = 0; s < kStages; ++s) {
-    std::vector<double> miss = loop.targeting.stages[s].miss_mm, share;
+    std::vector<double> miss = loop.targeting.live[s].miss_mm, share;
     std::sort(miss.begin(), miss.end());
     miss.insert(miss.begin(), 0);
     for (std::size_t i = 0; i < miss.size(); ++i)

@@ -51,12 +51,16 @@ std::vector<Row> rows_of(const ClosedLoop& loop) {
                   static_cast<long long>(stages[s].measurements));
     });
   }
-  const auto& targeting = loop.targeting.stages;
-  add("controller", "mean miss (mm)", [&](std::size_t s) { return with_interval(targeting[s].mean_mm); });
-  add("", "largest miss (mm)", [&](std::size_t s) { return with_interval(targeting[s].largest_mm); });
-  add("", "ended early",
-      [&](std::size_t s) { return text("%d of %zu", targeting[s].stopped, targeting[s].miss_mm.size()); });
-  add("", "turns per 100 mm", [&](std::size_t s) { return text("%.1f", targeting[s].turns_per_100mm); });
+  const std::array steered = {std::pair{"controller", &loop.targeting.live},
+                              std::pair{"controller, forgiving filter", &loop.targeting.forgiving}};
+  for (const auto& [name, figures] : steered) {
+    const auto& stages = *figures;
+    add(name, "mean miss (mm)", [&](std::size_t s) { return with_interval(stages[s].mean_mm); });
+    add("", "largest miss (mm)", [&](std::size_t s) { return with_interval(stages[s].largest_mm); });
+    add("", "ended early",
+        [&](std::size_t s) { return text("%d of %zu", stages[s].stopped, stages[s].miss_mm.size()); });
+    add("", "turns per 100 mm", [&](std::size_t s) { return text("%.1f", stages[s].turns_per_100mm); });
+  }
   return rows;
 }
 
@@ -91,9 +95,13 @@ std::vector<std::string> notes(const ClosedLoop& loop) {
   all.push_back(
       "needle known: k and lambda as well known beforehand as the fit over all recordings knows them; needle "
       "free: each recording chooses its own.");
-  all.push_back(std::to_string(loop.targeting.stages[0].miss_mm.size()) + " insertions with each model: " +
+  all.push_back(std::to_string(loop.targeting.live[0].miss_mm.size()) + " insertions with each model: " +
                 std::to_string(loop.targeting.targets_mm.size()) + " targets, seeds " + seeds_of(loop) +
                 "; 95 % bootstrap intervals (that of the largest reaches no higher than the largest seen).");
+  all.push_back(
+      text("forgiving filter: its process noise times %.0f, as one would set it whose filter rejects what it "
+           "sees.",
+           kForgiveness));
   all.push_back("targets (mm): " + targets_of(loop) + ".");
   return all;
 }
@@ -170,12 +178,13 @@ std::string to_json(const ClosedLoop& loop) {
     j["rig"][kStageNames[s]] = as_json(loop.rig[s]);
     j["estimator"]["needle known"][kStageNames[s]] = as_json(loop.estimator.known[s]);
     j["estimator"]["needle free"][kStageNames[s]] = as_json(loop.estimator.free[s]);
-    j["controller"][kStageNames[s]] = as_json(loop.targeting.stages[s]);
+    j["controller"]["live"][kStageNames[s]] = as_json(loop.targeting.live[s]);
+    j["controller"]["forgiving filter"][kStageNames[s]] = as_json(loop.targeting.forgiving[s]);
   }
   json& controller = j["controller"];
-  controller["fall_of_mean_mm"] = {{"from refitted", as_json(loop.targeting.gain_mm)},
-                                   {"from as it came", as_json(loop.targeting.gain_on_as_came_mm)}};
-  if (loop.targeting.axes_matter) controller["estimator only"] = as_json(loop.targeting.axes_not_undone);
+  controller["fall_of_mean_mm"] = {{"live", as_json(loop.targeting.gain_mm)},
+                                   {"forgiving filter", as_json(loop.targeting.gain_forgiving_mm)}};
+  if (loop.targeting.axes_matter) controller["live, controller not told"] = as_json(loop.targeting.axes_not_undone);
   controller["seeds"] = loop.targeting.seeds;
   for (const auto& t : loop.targeting.targets_mm) controller["targets_mm"].push_back({t.x(), t.y(), t.z()});
   j["conclusions"] = conclusions(loop);
@@ -185,7 +194,7 @@ std::string to_json(const ClosedLoop& loop) {
 std::string page_html(const ClosedLoop& loop) {
   const auto &rig = loop.rig, &before = rig;
   const auto& nis = loop.estimator.known;
-  const auto& miss = loop.targeting.stages;
+  const auto& miss = loop.targeting.live;
   io::HtmlReport page("The loop closed: " + loop.case_name);
   const bool better = loop.targeting.gain_mm.low > 0;
   page.callout(better ? io::Tone::good : io::Tone::plain, "Found: " + found_in_words(loop), loop.findings.sentence);

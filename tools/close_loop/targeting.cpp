@@ -87,6 +87,10 @@ estimator::EstimatorConfig estimator_config(const SteeredRig& rig, const Believe
   estimator::EstimatorConfig config;
   config.prior.needle = believed.needle;
   config.effects = believed.effects;
+  auto& process = config.process;
+  for (double* noise : {&process.position_mm, &process.tilt_rad, &process.roll_rad, &process.roll_per_sqrt_rad,
+                        &process.curvature_per_mm, &process.lambda1_per_rad, &process.lambda2})
+    *noise *= believed.forgiveness;
   // A rig whose camera is late has its limit set for that: it is not what is looked at here.
   config.limits.measurement_age_s += model::AugmentedNeedle(rig.needle, rig.effects).latency_s().value;
   return config;

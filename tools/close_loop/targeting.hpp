@@ -26,6 +26,7 @@ struct SteeredRig {
 struct Believed {
   model::NeedleParameters needle;
   std::vector<model::ActiveEffect> effects;
+  double forgiveness = 1;             // times the filter's process noise as it runs live
   bool controller_knows_axes = true;  // effects of the axes are undone by the controller too, not only followed
 };
 

@@ -118,31 +118,37 @@ TargetingFigures steer_all(const Models& models, const diagnosis::RecordedCase& 
   for (int s = 1; s <= options.seeds; ++s) figures.seeds.push_back(static_cast<std::uint64_t>(s));
 
   std::vector<Believed> beliefs;
-  for (const io::ModelFile& model : models)
-    beliefs.push_back({model.needle, io::active_effects(known_beforehand(model.effects), ""), true});
-  beliefs.push_back(beliefs[kAugmented]);
-  beliefs.back().controller_knows_axes = false;
+  for (const double forgiveness : {1.0, kForgiveness})
+    for (const io::ModelFile& model : models)
+      beliefs.push_back({model.needle, io::active_effects(known_beforehand(model.effects), ""), forgiveness});
   figures.axes_matter = controller::AxisModel(beliefs[kAugmented].effects).turns_late();
+  if (figures.axes_matter) {
+    beliefs.push_back(beliefs[kAugmented]);
+    beliefs.back().controller_knows_axes = false;
+  }
 
   const std::size_t count = figures.targets_mm.size() * figures.seeds.size();
   std::vector<std::vector<Insertion>> insertions(beliefs.size(), std::vector<Insertion>(count));
   const double nominal_s = deepest_mm / controller::SteeringLimits{}.insertion_rate_mm_s;
   diagnosis::parallel_for(beliefs.size() * count, options.threads, [&](std::size_t job) {
-    const std::size_t belief = job / count, i = job % count;
-    if (belief == kStages && !figures.axes_matter) return;
-    const std::uint64_t seed = 1000 * figures.seeds[i % figures.seeds.size()] + i / figures.seeds.size();
+    const std::size_t belief = job / count, i = job % count, target = i / figures.seeds.size();
+    const std::uint64_t seed = 1000 * figures.seeds[i % figures.seeds.size()] + target;
     const SteeredRig rig{truth.needle, for_one_insertion(truth, nominal_s, seed), recorded.channels, noise};
-    insertions[belief][i] = steer(rig, beliefs[belief], figures.targets_mm[i / figures.seeds.size()], seed);
+    insertions[belief][i] = steer(rig, beliefs[belief], figures.targets_mm[target], seed);
   });
   double inserted_mm = 0;
   for (const auto& target : figures.targets_mm) inserted_mm += target.z() * static_cast<double>(figures.seeds.size());
-  for (std::size_t stage = 0; stage < kStages; ++stage)
-    figures.stages[stage] = summarised(insertions[stage], inserted_mm, options.bootstrap_draws);
-  if (figures.axes_matter)
-    figures.axes_not_undone = summarised(insertions[kStages], inserted_mm, options.bootstrap_draws);
-  const auto& s = figures.stages;
-  figures.gain_mm = mean_difference(s[kRefitted], s[kAugmented], options.bootstrap_draws);
-  figures.gain_on_as_came_mm = mean_difference(s[kAsItCame], s[kAugmented], options.bootstrap_draws);
+  const auto summary = [&](std::size_t belief) {
+    return summarised(insertions[belief], inserted_mm, options.bootstrap_draws);
+  };
+  for (std::size_t stage = 0; stage < kStages; ++stage) {
+    figures.live[stage] = summary(stage);
+    figures.forgiving[stage] = summary(kStages + stage);
+  }
+  if (figures.axes_matter) figures.axes_not_undone = summary(2 * kStages);
+  figures.gain_mm = mean_difference(figures.live[kRefitted], figures.live[kAugmented], options.bootstrap_draws);
+  figures.gain_forgiving_mm =
+      mean_difference(figures.forgiving[kRefitted], figures.forgiving[kAugmented], options.bootstrap_draws);
   return figures;
 }
 
