@@ -89,12 +89,12 @@ FoundParameter profile_instant(const Evidence& evidence, const Fit& best, int un
   out.ci95 = {out.value, out.value};
   for (int side = 0; side < 2; ++side) {
     const double step_s = side == 0 ? -kInstantSpacing_s : kInstantSpacing_s;
-    // A jump is placed better than that only by its assumed form: the first step is free.
-    double at_s = std::clamp(out.value + step_s, info.lower, info.upper);
-    for (;;) {
-      const double next_s = at_s + step_s;
-      if (next_s <= info.lower || next_s >= info.upper || chi2_at(next_s) - least > kRise95) break;
-      at_s = next_s;
+    // Out to the first step that is worse: a jump is placed better than that only by its assumed form.
+    double at_s = out.value;
+    double rise = 0;
+    while (rise <= kRise95 && at_s + step_s > info.lower && at_s + step_s < info.upper) {
+      at_s += step_s;
+      rise = chi2_at(at_s) - least;
     }
     out.ci95[static_cast<std::size_t>(side)] = at_s;
   }

@@ -17,6 +17,7 @@ constexpr double kSettled = 0.5;         // chi2
 constexpr double kCorrectionChance = 4;  // mean gain of a correction of four knots under noise
 constexpr std::size_t kCorrectionsFitted = 3;
 constexpr int kLargestCorrections = 2;
+constexpr double kFarBetter = 1.03;  // of the evidence
 
 bool has_local(const Hypothesis& hypothesis) {
   return std::any_of(hypothesis.unknowns().begin(), hypothesis.unknowns().end(),
@@ -289,14 +290,21 @@ bool Selection::shrink(EffectSet& set) {
 }
 
 // A name has to fit better than a nameless curve in its place: an effect that is on no list often looks somewhat like
-// one that is.
+// one that is, or like several together.
 bool Selection::give_up_names(EffectSet& set) {
   const auto corrections = std::count_if(set.begin(), set.end(), is_correction);
   if (corrections >= kLargestCorrections) return false;
+  const auto beats = [&](const Trial& nameless) {
+    return nameless.fit && nameless.evidence > evidence_of(set) + kNamelessMargin;
+  };
+  if (const Trial& alone = best_correction({}); set.size() > 1 && corrections == 0 && beats(alone)) {
+    set = alone.set;
+    return true;
+  }
   for (std::size_t m = 0; m < set.size(); ++m) {
     if (is_correction(set[m])) continue;
     const Trial& nameless = best_correction(without_member(set, m));
-    if (!nameless.fit || nameless.evidence < evidence_of(set) + kNamelessMargin) continue;
+    if (!beats(nameless)) continue;
     set = nameless.set;
     return true;
   }
@@ -306,6 +314,14 @@ bool Selection::give_up_names(EffectSet& set) {
   if (!set.empty() && examine_remains(evidence_, *fit_of(set)).structure_sigmas < kStructureSigmas) return false;
   set = rest.set;
   return true;
+}
+
+// So much better than the best name that looking for more names is idle. (A little better it may be because of a
+// second effect that is still to be found.)
+bool Selection::far_from_any_name(const EffectSet& set) {
+  if (set.size() != 1 || is_correction(set[0])) return false;
+  const Trial& nameless = best_correction({});
+  return nameless.fit && nameless.evidence > kFarBetter * evidence_of(set) + kNamelessMargin * kNamelessMargin;
 }
 
 EffectSet Selection::select() {
@@ -319,10 +335,12 @@ EffectSet Selection::select() {
       continue;
     }
     const bool grown = grow(now);
-    const bool changed = swap(now) || shrink(now) || grown;
-    // Names are put to the question as soon as there are any, so that a wrong one does not draw others after it.
-    if (!changed || now.size() == 1)
-      if (!give_up_names(now) && !changed) break;
+    if (grown && far_from_any_name(now)) {
+      now = best_correction({}).set;
+      continue;
+    }
+    const bool exchanged = swap(now) || shrink(now);
+    if (!grown && !exchanged && !give_up_names(now)) break;
   }
   return now;
 }

@@ -79,6 +79,7 @@ class Selection {
   bool swap(EffectSet& set);
   bool shrink(EffectSet& set);
   bool give_up_names(EffectSet& set);
+  bool far_from_any_name(const EffectSet& set);
 
   const Evidence& evidence_;
   SelectionRules rules_;
