@@ -1,1 +1,185 @@
+// A whole diagnosis of a small rig: do the findings make sense together.
+#include <gmock/gmock.h>
 #include <gtest/gtest.h>
+
+#include <set>
+
+#include "diagnosis/mismatch/diagnose.hpp"
+#include "tests/mismatch/simulated_rig.hpp"
+
+namespace bevel::diagnosis {
+namespace {
+
+using testing::active;
+using ::testing::HasSubstr;
+using ::testing::IsEmpty;
+using testing::record_case;
+using testing::SimulatedRig;
+
+Findings findings_of(const SimulatedRig& rig, std::uint64_t seed, int threads = 2) {
+  DiagnosisOptions options;
+  options.bootstrap_draws = 200;
+  options.threads = threads;
+  // The lab's belief is somewhat wrong, as it always is.
+  model::NeedleParameters model = rig.needle;
+  model.curvature_per_mm *= 1.08;
+  model.lambda1_per_rad += 0.05;
+  return diagnose(record_case(rig, seed), model, options);
+}
+
+const SimulatedRig kWindup{.effects = {active("torsional_windup", {0.7})},
+                           .recordings = 5,
+                           .frame_s = 1.0 / 30,
+                           .ar1 = 0.5,
+                           .outlier_share = 0.01,
+                           .dropped_share = 0.03};
+
+TEST(Diagnose, FindsWindupAndSaysSoInEveryPlace) {
+  const Findings found = findings_of(kWindup, 1);
+  EXPECT_EQ(found.verdict, Verdict::effects_found) << found.sentence;
+  ASSERT_EQ(found.effects.size(), 1U) << found.sentence;
+  const FoundEffect& effect = found.effects[0];
+  EXPECT_EQ(effect.name, "torsional_windup");
+  EXPECT_THAT(found.sentence, HasSubstr("torsional_windup"));
+  EXPECT_THAT(found.sentence, HasSubstr(effect.meaning));
+  EXPECT_GT(effect.probability, 0.9);
+  EXPECT_GT(effect.gain, effect.threshold);
+  EXPECT_GT(effect.visible_sigmas, 5);
+  ASSERT_EQ(effect.parameters.size(), 1U);
+  const FoundParameter& lag = effect.parameters[0];
+  EXPECT_EQ(lag.name, "lag_at_100mm_rad");
+  EXPECT_NEAR(lag.value, 0.7, 4 * lag.std_error);
+  EXPECT_LT(lag.ci95[0], lag.value);
+  EXPECT_GT(lag.ci95[1], lag.value);
+
+  // Its rig's noise, the outliers apart.
+  ASSERT_EQ(found.noise.sigma_mm.size(), 3U);
+  for (std::size_t c = 0; c < 3; ++c)
+    EXPECT_NEAR(found.noise.sigma_mm[c] / kWindup.sigma_mm[static_cast<Eigen::Index>(c)], 1, 0.15);
+  EXPECT_NEAR(found.noise.ar1, 0.5, 0.08);
+  EXPECT_NEAR(found.noise.outlier_share, 0.01, 0.01);
+  EXPECT_GT(found.outliers, 0U);
+  EXPECT_EQ(found.channels, (std::vector<std::string>{"tip.x", "tip.y", "tip.z"}));
+
+  // What was left out foretells; what is left is noise.
+  EXPECT_NEAR(found.held_out.after.chi2_per_dof, 1, 0.1);
+  EXPECT_GT(found.held_out.before.chi2_per_dof, found.held_out.after.chi2_per_dof);
+  EXPECT_GT(found.held_out.before.rmse_mm, found.held_out.after.rmse_mm);
+  EXPECT_GT(found.held_out.gain, 25);
+  EXPECT_EQ(found.held_out.recordings.size(), 5U);
+  EXPECT_TRUE(found.checks.clean) << found.checks.chi2_per_dof << ' ' << found.checks.ljung_box_p << ' '
+                                  << found.checks.remaining_sigmas;
+
+  // Located in recordings there are, in time they have, against what the effect acts on.
+  ASSERT_FALSE(found.where.empty());
+  for (const Location& where : found.where) {
+    EXPECT_THAT(where.log, HasSubstr("rec"));
+    EXPECT_THAT(where.channel, HasSubstr("tip."));
+    EXPECT_GE(where.from_s, 0);
+    EXPECT_GT(where.to_s, where.from_s);
+    EXPECT_LT(where.to_s, 10);
+    EXPECT_EQ(where.covariate, "depth_mm");
+    EXPECT_GT(where.range[1], where.range[0]);
+    EXPECT_GT(where.share, 0);
+  }
+
+  // The ranking, the pictures' data, the next experiment.
+  ASSERT_GT(found.tried.size(), 15U);
+  EXPECT_EQ(found.tried.front().name, "torsional_windup");
+  EXPECT_TRUE(found.tried.front().passes);
+  for (const TriedEffect& tried : found.beside) EXPECT_FALSE(tried.passes) << tried.name;
+  ASSERT_EQ(found.traces.size(), 5U);
+  std::size_t outliers = 0;
+  for (const Trace& trace : found.traces) {
+    EXPECT_EQ(trace.after_mm.size(), trace.time_s.size());
+    for (const char one : trace.outlier) outliers += one == 1 ? 1 : 0;
+  }
+  EXPECT_EQ(outliers, found.outliers);
+  ASSERT_TRUE(found.next_experiment.has_value());
+  EXPECT_EQ(found.next_experiment->separates[0], "torsional_windup");
+  EXPECT_EQ(found.confusion.rows(), static_cast<Eigen::Index>(found.confusion_names.size()));
+  EXPECT_LE(found.confusion.maxCoeff(), 1);
+  // The needle again as it is, not as the file has it.
+  EXPECT_NEAR(found.needle.value.curvature_per_mm, kWindup.needle.curvature_per_mm,
+              4 * found.needle.curvature_sd_per_mm);
+}
+
+TEST(Diagnose, WhereNothingIsMissingSaysHowSmallItWouldHaveSeen) {
+  const Findings found = findings_of({.recordings = 4, .ar1 = 0.8}, 2);
+  EXPECT_EQ(found.verdict, Verdict::nothing_missing) << found.sentence;
+  EXPECT_THAT(found.effects, IsEmpty());
+  EXPECT_THAT(found.where, IsEmpty());
+  EXPECT_THAT(found.corrections, IsEmpty());
+  EXPECT_NEAR(found.held_out.after.chi2_per_dof, 1, 0.1);
+  EXPECT_EQ(found.held_out.gain, 0);
+  // Every amplitude of every effect that does anything, each with a size.
+  std::set<std::string> effects;
+  for (const DetectableSize& one : found.detectable) {
+    effects.insert(one.effect);
+    EXPECT_GT(one.size, 0) << one.effect << ' ' << one.parameter;
+    EXPECT_GE(one.absorbed, -1e-9);
+    EXPECT_LE(one.absorbed, 1 + 1e-9);
+    if (!(one.size < one.typical)) {
+      EXPECT_FALSE(one.experiment.empty()) << one.effect << " is not visible, and no motion is named";
+    }
+  }
+  EXPECT_GT(effects.size(), 18U);
+}
+
+TEST(Diagnose, IsTheSameForOneThreadAndTwo) {
+  SimulatedRig rig = kWindup;
+  rig.recordings = 3;
+  rig.frame_s = 1.0 / 15;
+  const Findings one = findings_of(rig, 3, 1), two = findings_of(rig, 3, 2);
+  EXPECT_EQ(one.sentence, two.sentence);
+  EXPECT_EQ(one.noise.sigma_mm, two.noise.sigma_mm);
+  EXPECT_EQ(one.held_out.gain, two.held_out.gain);
+  EXPECT_EQ(one.confusion, two.confusion);
+  ASSERT_EQ(one.effects.size(), two.effects.size());
+  for (std::size_t e = 0; e < one.effects.size(); ++e) {
+    EXPECT_EQ(one.effects[e].name, two.effects[e].name);
+    EXPECT_EQ(one.effects[e].probability, two.effects[e].probability);
+    ASSERT_EQ(one.effects[e].parameters.size(), two.effects[e].parameters.size());
+    for (std::size_t p = 0; p < one.effects[e].parameters.size(); ++p) {
+      EXPECT_EQ(one.effects[e].parameters[p].value, two.effects[e].parameters[p].value);
+      EXPECT_EQ(one.effects[e].parameters[p].ci95, two.effects[e].parameters[p].ci95);
+    }
+  }
+  ASSERT_EQ(one.tried.size(), two.tried.size());
+  for (std::size_t t = 0; t < one.tried.size(); ++t) {
+    EXPECT_EQ(one.tried[t].name, two.tried[t].name);
+    EXPECT_EQ(one.tried[t].gain, two.tried[t].gain);
+    EXPECT_EQ(one.tried[t].threshold, two.tried[t].threshold);
+  }
+  ASSERT_EQ(one.detectable.size(), two.detectable.size());
+  for (std::size_t d = 0; d < one.detectable.size(); ++d) EXPECT_EQ(one.detectable[d].size, two.detectable[d].size);
+}
+
+TEST(Diagnose, AModelThatCannotFollowIsRefused) {
+  // Insertion logged in another unit.
+  auto raw = testing::record({.recordings = 2}, 1);
+  for (auto& recording : raw)
+    for (auto& state : recording.actuators) state.insertion_mm *= 8;
+  const auto recorded = make_case(raw);
+  const model::NeedleParameters model = testing::SimulatedRig{}.needle;
+  try {
+    diagnose(recorded, model, {});
+    FAIL() << "taken";
+  } catch (const std::invalid_argument& e) {
+    EXPECT_THAT(e.what(), HasSubstr("leaves the domain"));
+  }
+}
+
+TEST(Diagnose, ReportsProgressAndStopsWhereProgressThrows) {
+  const auto recorded = record_case({.recordings = 2, .frame_s = 0.1}, 1);
+  DiagnosisOptions options;
+  int stages = 0;
+  options.progress = [&](const std::string&) {
+    if (++stages == 2) throw std::runtime_error("stopped");
+  };
+  EXPECT_THROW(diagnose(recorded, testing::SimulatedRig{}.needle, options), std::runtime_error);
+  EXPECT_EQ(stages, 2);
+}
+
+}  // namespace
+}  // namespace bevel::diagnosis

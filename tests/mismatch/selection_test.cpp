@@ -1,1 +1,168 @@
+// Which names are given, on recordings of which the truth is known.
+#include <gmock/gmock.h>
 #include <gtest/gtest.h>
+
+#include "diagnosis/mismatch/conclusions.hpp"
+#include "diagnosis/mismatch/selection.hpp"
+#include "tests/mismatch/simulated_rig.hpp"
+
+namespace bevel::diagnosis {
+namespace {
+
+using testing::active;
+using testing::evidence_of;
+using testing::fit_of;
+using ::testing::IsEmpty;
+using testing::member;
+using testing::record_case;
+using testing::SimulatedRig;
+using ::testing::UnorderedElementsAre;
+
+constexpr int kDraws = 200;
+
+struct Selected {
+  std::vector<std::string> names;
+  bool nameless = false;
+  EffectSet set;
+};
+
+// On evidence with the noise known; calibration has tests of its own.
+Selected select(const SimulatedRig& rig, std::uint64_t seed) {
+  const auto recorded = record_case(rig, seed);
+  const Evidence evidence = evidence_of(recorded, rig);
+  Selection selection(evidence, fit_of(evidence, {}), {.bootstrap_draws = kDraws, .seed = 1});
+  Selected out;
+  out.set = selection.select();
+  for (const Member& one : out.set) {
+    if (is_correction(one))
+      out.nameless = true;
+    else
+      out.names.emplace_back(one.effect->name());
+  }
+  return out;
+}
+
+TEST(Select, NothingWhereNothingIsMissing) {
+  for (const std::uint64_t seed : {1, 2, 3}) {
+    const SimulatedRig rig{.ar1 = seed % 2 == 0 ? 0.7 : 0.0};
+    const auto found = select(rig, seed);
+    EXPECT_THAT(found.names, IsEmpty()) << "seed " << seed;
+    EXPECT_FALSE(found.nameless) << "seed " << seed;
+  }
+}
+
+TEST(Select, NothingWhereOnlyTheModelFileIsWrong) {
+  SimulatedRig rig;
+  const auto recorded = record_case(rig, 5);
+  rig.needle.curvature_per_mm *= 1.25;
+  rig.needle.lambda1_per_rad += 0.2;
+  const Evidence evidence = evidence_of(recorded, rig);
+  Selection selection(evidence, fit_of(evidence, {}), {.bootstrap_draws = kDraws, .seed = 1});
+  EXPECT_EQ(describe(selection.select()), "nothing");
+}
+
+TEST(Select, TorsionalWindup) {
+  const auto found = select({.effects = {active("torsional_windup", {1.0})}, .ar1 = 0.5}, 1);
+  EXPECT_THAT(found.names, UnorderedElementsAre("torsional_windup"));
+  EXPECT_FALSE(found.nameless);
+}
+
+TEST(Select, DrillingAndRotationBacklash) {
+  const auto found =
+      select({.effects = {active("drilling", {2.0}), active("rotation_backlash", {0.5})}, .ar1 = 0.5}, 1);
+  EXPECT_THAT(found.names, UnorderedElementsAre("drilling", "rotation_backlash"));
+  EXPECT_FALSE(found.nameless);
+}
+
+TEST(Select, StepsLostInTwoRecordingsOfSix) {
+  const SimulatedRig rig{.effects_in =
+                             [](int r) {
+                               return std::vector{active("lost_steps", {0.9, 0, r == 1 ? 3.17 : r == 4 ? 1.63 : 0})};
+                             },
+                         .recordings = 6};
+  const auto recorded = record_case(rig, 1);
+  const Evidence evidence = evidence_of(recorded, rig);
+  Selection selection(evidence, fit_of(evidence, {}), {.bootstrap_draws = kDraws, .seed = 1});
+  const EffectSet set = selection.select();
+  ASSERT_EQ(describe(set), "lost_steps");
+  const Fit& fit = *selection.fit_of(set);
+  EXPECT_NEAR(fit.hypothesis.parameter(fit.values, 0, 0), 0.9, 0.1);
+  for (int r = 0; r < 6; ++r) {
+    const double at_s = fit.hypothesis.parameter(fit.values, 0, 2, r);
+    EXPECT_NEAR(at_s, r == 1 ? 3.17 : r == 4 ? 1.63 : 0, 0.2) << "recording " << r;
+  }
+}
+
+TEST(Select, NoNameForAnEffectThatIsOnNoList) {
+  // The drive slips more and more as it warms: the tip's advance falls behind with time, not with depth.
+  const auto slipping = [](std::vector<model::ActuatorState>& base) {
+    double tip_mm = 0, before_mm = base.front().insertion_mm;
+    for (auto& state : base) {
+      const double time_s = 1e-6 * static_cast<double>(state.utime - base.front().utime);
+      const double share = 1 - 0.09 * std::sin(1.3 * time_s);
+      tip_mm += share * (state.insertion_mm - before_mm);
+      before_mm = state.insertion_mm;
+      state.insertion_mm = tip_mm;
+    }
+  };
+  const auto found = select({.true_motion = slipping, .recordings = 6}, 1);
+  EXPECT_TRUE(found.nameless) << describe(found.set);
+  EXPECT_THAT(found.names, IsEmpty());
+}
+
+// Bitwise the same, in everything that is reported of the trials.
+TEST(Select, IsThatOfItsSeedWhateverTheThreads) {
+  const SimulatedRig rig{.effects = {active("torsional_windup", {0.6})}, .recordings = 2, .frame_s = 0.1};
+  const auto recorded = record_case(rig, 1);
+  const Evidence evidence = evidence_of(recorded, rig);
+  const auto everything = [&](int threads) {
+    Selection selection(evidence, fit_of(evidence, {}), {.bootstrap_draws = 50, .seed = 9, .threads = threads});
+    const EffectSet set = selection.select();
+    std::vector<std::pair<std::string, std::vector<double>>> out = {{describe(set), {}}};
+    for (const auto& [visited, gain] : selection.visited()) out.emplace_back(describe(visited), std::vector{gain});
+    for (const Trial& trial : selection.additions({})) {
+      std::vector<double> numbers = {trial.gain, trial.chance, trial.threshold, trial.evidence};
+      if (trial.fit) numbers.insert(numbers.end(), trial.fit->values.begin(), trial.fit->values.end());
+      out.emplace_back(describe(trial.set), numbers);
+    }
+    return out;
+  };
+  const auto one = everything(1);
+  EXPECT_EQ(one, everything(2));
+  EXPECT_EQ(one, everything(1));
+}
+
+TEST(Additions, AreRankedByEvidenceAndHaveTheirThresholds) {
+  const SimulatedRig rig{.effects = {active("layer", {31, 0.7})}};
+  const auto recorded = record_case(rig, 1);
+  const Evidence evidence = evidence_of(recorded, rig);
+  Selection selection(evidence, fit_of(evidence, {}), {.bootstrap_draws = kDraws, .seed = 1});
+  const auto& trials = selection.additions({});
+  ASSERT_GT(trials.size(), 19U);
+  EXPECT_EQ(describe(trials.front().set), "layer");
+  for (std::size_t i = 0; i < trials.size(); ++i) {
+    const Trial& trial = trials[i];
+    if (!trial.fit) continue;
+    if (i > 0) {
+      EXPECT_GE(trials[i - 1].evidence, trial.evidence);
+    }
+    EXPECT_GT(trial.threshold, trial.chance);
+    // But for the one without an amplitude, which cannot be nothing.
+    if (describe(trial.set) != "slip_direction") {
+      EXPECT_GE(trial.gain, -0.1) << describe(trial.set);
+    }
+  }
+}
+
+TEST(ProbabilityOf, IsTheShareOfTheSetsThatHaveIt) {
+  const Member a = member("drilling"), b = member("layer");
+  // Evidence is twice a log-likelihood; each effect costs 12.
+  const std::vector<std::pair<EffectSet, double>> visited = {{{}, 0}, {{a}, 42}, {{b}, 42}, {{a, b}, 54}};
+  // Scores (42 - 12)/2, (42 - 12)/2, (54 - 24)/2 and 0: three alike.
+  EXPECT_NEAR(probability_of(visited, a), 2.0 / 3, 1e-6);
+  EXPECT_NEAR(probability_of({{{}, 0}, {{a}, 12}}, a), 0.5, 1e-12);
+  EXPECT_LT(probability_of({{{}, 0}, {{a}, 2}}, a), 0.01);
+}
+
+}  // namespace
+}  // namespace bevel::diagnosis
