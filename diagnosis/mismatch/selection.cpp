@@ -17,7 +17,6 @@ constexpr double kSettled = 0.5;         // chi2
 constexpr double kCorrectionChance = 4;  // mean gain of a correction of four knots under noise
 constexpr std::size_t kCorrectionsFitted = 3;
 constexpr int kLargestCorrections = 2;
-constexpr double kFarBetter = 1.03;  // of the evidence
 
 bool has_local(const Hypothesis& hypothesis) {
   return std::any_of(hypothesis.unknowns().begin(), hypothesis.unknowns().end(),
@@ -316,12 +315,12 @@ bool Selection::give_up_names(EffectSet& set) {
   return true;
 }
 
-// So much better than the best name that looking for more names is idle. (A little better it may be because of a
+// One curve better than two names together: looking for a third is idle. (Better than one name it may be because of a
 // second effect that is still to be found.)
 bool Selection::far_from_any_name(const EffectSet& set) {
-  if (set.size() != 1 || is_correction(set[0])) return false;
+  if (set.size() < 2 || std::any_of(set.begin(), set.end(), is_correction)) return false;
   const Trial& nameless = best_correction({});
-  return nameless.fit && nameless.evidence > kFarBetter * evidence_of(set) + kNamelessMargin * kNamelessMargin;
+  return nameless.fit && nameless.evidence > evidence_of(set) + kNamelessMargin;
 }
 
 EffectSet Selection::select() {
