@@ -62,15 +62,18 @@ ClosedLoop close_the_loop(const Options& options) {
   return loop;
 }
 
+void write_results(const ClosedLoop& loop, const std::string& model_path, const std::string& out_folder) {
+  diagnose::write_together(out_folder, {{"report.html", diagnose::report_html(loop.findings, model_path)},
+                                        {"model.toml", io::to_toml(loop.models[kAugmented])},
+                                        {"verdict.json", diagnose::verdict_json(loop.findings)},
+                                        {"close-the-loop.html", page_html(loop)},
+                                        {"close-the-loop.json", to_json(loop)}});
+}
+
 int run(const Options& options, std::ostream& out) {
   diagnose::check_writable(options.out_folder);
   const ClosedLoop loop = close_the_loop(options);
-  const std::string model_path = (find_case(options.folder)).model_path;
-  diagnose::write_together(options.out_folder, {{"report.html", diagnose::report_html(loop.findings, model_path)},
-                                                {"model.toml", io::to_toml(loop.models[kAugmented])},
-                                                {"verdict.json", diagnose::verdict_json(loop.findings)},
-                                                {"close-the-loop.html", page_html(loop)},
-                                                {"close-the-loop.json", to_json(loop)}});
+  write_results(loop, find_case(options.folder).model_path, options.out_folder);
   out << table_text(loop) << "\nwritten: " << options.out_folder
       << "/close-the-loop.html, close-the-loop.json, and the diagnosis: verdict.json, report.html, model.toml\n";
   return 0;

@@ -40,8 +40,11 @@ struct ClosedLoop {
 // Writes nothing.
 ClosedLoop close_the_loop(const Options& options);
 
-// All of it: the mismatch tool's three files, close-the-loop.json and close-the-loop.html in the folder, the table on
-// `out`. Returns the exit status.
+// The mismatch tool's three files, close-the-loop.json and close-the-loop.html, all or none. Throws std::runtime_error
+// naming the file and the reason.
+void write_results(const ClosedLoop& loop, const std::string& model_path, const std::string& out_folder);
+
+// All of it, the table on `out`. Returns the exit status.
 int run(const Options& options, std::ostream& out);
 
 }  // namespace bevel::close_loop

@@ -27,7 +27,8 @@ std::string estimator_sentence(const std::array<EstimatorFigure, kStages>& stage
                              ", coloured series " + coloured(before) + " to " + coloured(after);
   std::string text = "The estimator, " + setting + ": " + change + ". ";
   if (before.consistent() && after.consistent())
-    return text + "It passes with either model: what is missing hides in what the filter may choose.";
+    return text +
+           "It passes with either model: one recording at a time is a weaker test than the fit over all of them.";
   if (after.consistent()) return text + "Its innovations are now what a complete model leaves.";
   return text + "That is not what a complete model leaves: NIS " + measured(after.nis.lowest()) + " to " +
          measured(after.nis.highest()) + " and at most " + std::to_string(after.coloured_by_chance) + " coloured.";
@@ -44,6 +45,19 @@ std::string targeting_sentence(const std::array<TargetingFigure, kStages>& stage
   if (gain_mm.high < 0) return "Targeting gets worse with " + filter + ": " + change + ".";
   return "Targeting does not improve by more than chance with " + filter + ": " + change +
          ". The tip is seen while it is steered, so that what the model leaves out is corrected as it shows.";
+}
+
+std::string axes_sentence(const TargetingFigures& t) {
+  char text[320];
+  std::snprintf(text, sizeof text,
+                "The controller turns the base through the dead band ahead of the tip. Were only the estimator told, "
+                "the mean miss would be %.3f mm, %s: a difference of %.3f mm [%.3f, %.3f].",
+                t.axes_not_undone.mean_mm.value,
+                t.gain_by_axes_mm.low > 0    ? "more"
+                : t.gain_by_axes_mm.high < 0 ? "less"
+                                             : "the same but for chance",
+                t.gain_by_axes_mm.value, t.gain_by_axes_mm.low, t.gain_by_axes_mm.high);
+  return text;
 }
 
 std::string unknown_beforehand(const io::EffectEntry& entry) {
@@ -88,14 +102,7 @@ std::vector<std::string> conclusions(const ClosedLoop& loop) {
   }
   for (const auto& entry : effects)
     if (!is_known_beforehand(entry)) all.push_back(unknown_beforehand(entry));
-  if (t.axes_matter) {
-    char text[256];
-    std::snprintf(text, sizeof text,
-                  "The controller turns the base through the dead band ahead of the tip; with the effect in the "
-                  "estimator alone the mean miss is %.3f mm [%.3f, %.3f].",
-                  t.axes_not_undone.mean_mm.value, t.axes_not_undone.mean_mm.low, t.axes_not_undone.mean_mm.high);
-    all.emplace_back(text);
-  }
+  if (t.axes_matter) all.push_back(axes_sentence(t));
   for (const bool forgiving : {false, true})
     for (std::size_t s = 0; s < kStages; ++s)
       if (const auto& figure = forgiving ? t.forgiving[s] : t.live[s]; figure.stopped > 0)

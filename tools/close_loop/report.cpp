@@ -184,6 +184,8 @@ std::string to_json(const ClosedLoop& loop) {
   json& controller = j["controller"];
   controller["fall_of_mean_mm"] = {{"live", as_json(loop.targeting.gain_mm)},
                                    {"forgiving filter", as_json(loop.targeting.gain_forgiving_mm)}};
+  if (loop.targeting.axes_matter)
+    controller["fall_of_mean_mm"]["controller told"] = as_json(loop.targeting.gain_by_axes_mm);
   if (loop.targeting.axes_matter) controller["live, controller not told"] = as_json(loop.targeting.axes_not_undone);
   controller["seeds"] = loop.targeting.seeds;
   for (const auto& t : loop.targeting.targets_mm) controller["targets_mm"].push_back({t.x(), t.y(), t.z()});
@@ -192,21 +194,23 @@ std::string to_json(const ClosedLoop& loop) {
 }
 
 std::string page_html(const ClosedLoop& loop) {
-  const auto &rig = loop.rig, &before = rig;
+  const auto& rig = loop.rig;
   const auto& nis = loop.estimator.known;
   const auto& miss = loop.targeting.live;
   io::HtmlReport page("The loop closed: " + loop.case_name);
   const bool better = loop.targeting.gain_mm.low > 0;
   page.callout(better ? io::Tone::good : io::Tone::plain, "Found: " + found_in_words(loop), loop.findings.sentence);
   page.facts(
-      {{"rig against recordings", text("%.2f to %.2f mm", before[kRefitted].rmse_mm, rig[kAugmented].rmse_mm),
+      {{"rig against recordings", text("%.2f to %.2f mm", rig[kRefitted].rmse_mm, rig[kAugmented].rmse_mm),
         text("chi2 per reading %.2f to %.2f", rig[kRefitted].chi2_per_reading, rig[kAugmented].chi2_per_reading)},
        {"estimator's NIS", text("%.2f to %.2f", nis[kRefitted].nis.mean(), nis[kAugmented].nis.mean()),
         text("coloured series %d to %d of %d", nis[kRefitted].coloured, nis[kAugmented].coloured,
              nis[kAugmented].series)},
        {"mean targeting error", text("%.2f to %.2f mm", miss[kRefitted].mean_mm.value, miss[kAugmented].mean_mm.value),
-        text("fall %.2f mm, 95 %% %.2f to %.2f", loop.targeting.gain_mm.value, loop.targeting.gain_mm.low,
-             loop.targeting.gain_mm.high)}});
+        miss[kRefitted].stopped > 0 ? text("ended before the target: %d to %d of %zu", miss[kRefitted].stopped,
+                                           miss[kAugmented].stopped, miss[kAugmented].miss_mm.size())
+                                    : text("fall %.3f mm, 95 %% %.3f to %.3f", loop.targeting.gain_mm.value,
+                                           loop.targeting.gain_mm.low, loop.targeting.gain_mm.high)}});
   page.list(conclusions(loop));
   page.heading("The simulated rig");
   page.figure(rig_picture(loop), "Each recording's motion through plant and cameras, against what was measured.");

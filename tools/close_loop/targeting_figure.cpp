@@ -145,7 +145,11 @@ TargetingFigures steer_all(const Models& models, const diagnosis::RecordedCase& 
     figures.live[stage] = summary(stage);
     figures.forgiving[stage] = summary(kStages + stage);
   }
-  if (figures.axes_matter) figures.axes_not_undone = summary(2 * kStages);
+  if (figures.axes_matter) {
+    figures.axes_not_undone = summary(2 * kStages);
+    figures.gain_by_axes_mm =
+        mean_difference(figures.axes_not_undone, figures.live[kAugmented], options.bootstrap_draws);
+  }
   figures.gain_mm = mean_difference(figures.live[kRefitted], figures.live[kAugmented], options.bootstrap_draws);
   figures.gain_forgiving_mm =
       mean_difference(figures.forgiving[kRefitted], figures.forgiving[kAugmented], options.bootstrap_draws);

@@ -28,8 +28,9 @@ struct TargetingFigures {
                                                    // model and whose filter rejects what it sees
   TargetingFigure axes_not_undone;                 // live and augmented, but the controller is not told
   bool axes_matter = false;                        // whether there is anything to undo
-  // Fall of the mean miss, refitted to augmented, of the same insertions.
-  WithInterval gain_mm, gain_forgiving_mm;
+  // Falls of the mean miss, of the same insertions: refitted to augmented, and by undoing what lies between the axes
+  // and the tip.
+  WithInterval gain_mm, gain_forgiving_mm, gain_by_axes_mm;
   std::vector<Eigen::Vector3d> targets_mm;
   std::vector<std::uint64_t> seeds;
 };
