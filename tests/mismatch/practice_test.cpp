@@ -1,1 +1,52 @@
+// Practice recordings of a simulator that shares no code with this project, where they are at hand.
 #include <gtest/gtest.h>
+
+#include <cstdlib>
+#include <filesystem>
+
+#include "diagnosis/mismatch/diagnose.hpp"
+#include "io/model_file.hpp"
+#include "tools/diagnose/read_case.hpp"
+
+namespace bevel::diagnosis {
+namespace {
+
+namespace fs = std::filesystem;
+
+fs::path practice() {
+  const char* shared = std::getenv("BEVEL_SHARED");
+  return (shared != nullptr ? fs::path(shared) : fs::path(BEVEL_SOURCE_DIR) / ".." / "shared") / "recordings" /
+         "practice";
+}
+
+Findings findings_of(const fs::path& folder) {
+  std::vector<std::string> logs;
+  for (const auto& entry : fs::directory_iterator(folder))
+    if (entry.path().extension() == ".lcm") logs.push_back(entry.path().string());
+  std::sort(logs.begin(), logs.end());
+  return diagnose(diagnose::read_case(logs).recorded, io::load_model_file((folder / "model.toml").string()).needle, {});
+}
+
+TEST(Practice, WhereNothingIsMissing) {
+  const fs::path folder = practice() / "case13";
+  if (!fs::exists(folder)) GTEST_SKIP() << folder << " is not there; set BEVEL_SHARED to the folder of recordings";
+  const Findings found = findings_of(folder);
+  EXPECT_EQ(found.verdict, Verdict::nothing_missing) << found.sentence;
+  EXPECT_NEAR(found.held_out.after.chi2_per_dof, 1, 0.1);
+}
+
+TEST(Practice, ALayer) {
+  const fs::path folder = practice() / "case04";
+  if (!fs::exists(folder)) GTEST_SKIP() << folder << " is not there; set BEVEL_SHARED to the folder of recordings";
+  const Findings found = findings_of(folder);
+  EXPECT_EQ(found.verdict, Verdict::effects_found) << found.sentence;
+  ASSERT_EQ(found.effects.size(), 1U) << found.sentence;
+  EXPECT_EQ(found.effects[0].name, "layer");
+  // The recordings' truth: 22.50 mm and 0.642.
+  for (const FoundParameter& one : found.effects[0].parameters)
+    EXPECT_NEAR(one.value, one.name == "depth_mm" ? 22.504 : 0.6425, 4 * one.std_error) << one.name;
+  EXPECT_NEAR(found.held_out.after.chi2_per_dof, 1, 0.1);
+}
+
+}  // namespace
+}  // namespace bevel::diagnosis

@@ -68,8 +68,8 @@ TEST(Select, TorsionalWindup) {
 }
 
 TEST(Select, DrillingAndRotationBacklash) {
-  const auto found =
-      select({.effects = {active("drilling", {2.0}), active("rotation_backlash", {0.5})}, .ar1 = 0.5}, 1);
+  const auto found = select(
+      {.effects = {active("drilling", {2.0}), active("rotation_backlash", {0.5})}, .frame_s = 0.1, .ar1 = 0.4}, 1);
   EXPECT_THAT(found.names, UnorderedElementsAre("drilling", "rotation_backlash"));
   EXPECT_FALSE(found.nameless);
 }
@@ -79,7 +79,8 @@ TEST(Select, StepsLostInTwoRecordingsOfSix) {
                              [](int r) {
                                return std::vector{active("lost_steps", {0.9, 0, r == 1 ? 3.17 : r == 4 ? 1.63 : 0})};
                              },
-                         .recordings = 6};
+                         .recordings = 6,
+                         .frame_s = 0.1};
   const auto recorded = record_case(rig, 1);
   const Evidence evidence = evidence_of(recorded, rig);
   Selection selection(evidence, fit_of(evidence, {}), {.bootstrap_draws = kDraws, .seed = 1});
