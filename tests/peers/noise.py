@@ -7,8 +7,8 @@ from scipy.optimize import minimize_scalar
 
 from recordings import FRAME_S
 
-HAMPEL_HALF = 3  # readings on either side
-HAMPEL_SD = 6.0
+SPIKE_SD = 6.0
+SPIKE_PASSES = 4
 
 
 @dataclasses.dataclass
@@ -46,12 +46,34 @@ def most_likely(errors, times, coloured):
     return value, Noise(sigma, ar1)
 
 
-def outliers(error):
-    """Messages further from the running median of the errors than noise goes (Hampel's filter), per reading."""
-    padded = np.pad(error, ((HAMPEL_HALF, HAMPEL_HALF), (0, 0)), mode="edge")
-    window = np.lib.stride_tricks.sliding_window_view(padded, 2 * HAMPEL_HALF + 1, axis=0)
-    off = np.abs(error - np.median(window, axis=-1))
-    return (off > HAMPEL_SD * 1.4826 * np.median(off, axis=0)).any(axis=1)
+def spikes(error):
+    """How far each reading is from the middle of its neighbours; at the ends from its one neighbour, to the same sd."""
+    out = np.empty_like(error)
+    out[1:-1] = error[1:-1] - 0.5 * (error[:-2] + error[2:])
+    out[0], out[-1] = math.sqrt(0.75) * (error[0] - error[1]), math.sqrt(0.75) * (error[-1] - error[-2])
+    return np.abs(out)
+
+
+def outliers(errors):
+    """Per recording, messages that stand out of their neighbours further than noise does (median of all recordings).
+
+    Of the errors of the model refitted, and of neighbours only: what the model lacks is smooth and stays in.
+    """
+    dropped = [np.zeros(len(e), bool) for e in errors]
+    for _ in range(SPIKE_PASSES):
+        all_spikes = [spikes(e[~d]) for e, d in zip(errors, dropped)]
+        sd = 1.4826 * np.median(np.concatenate(all_spikes), axis=0)
+        found = 0
+        for s, d in zip(all_spikes, dropped):
+            height = (s / sd).max(axis=1)
+            around = np.pad(height, 1)
+            # An outlier makes its neighbours look bad too: only the worst goes, the others are looked at again.
+            worst = (height > SPIKE_SD) & (height >= around[:-2]) & (height >= around[2:])
+            d[np.flatnonzero(~d)[worst]] = True
+            found += worst.sum()
+        if not found:
+            break
+    return dropped
 
 
 def figures(errors, times, noise):

@@ -1,11 +1,12 @@
 """Runs bevel-diagnose and its peers on the same cases and compares them; tests/peers/compare sets up what it needs.
 
 A case is a folder with model.toml and logs. Everybody gets these and nothing else. Of the logs the peers get the
-readings that Hampel's filter leaves; bevel-diagnose gets them all and judges outliers itself. Each task has one thread;
+readings that are no spikes; bevel-diagnose gets them all and judges outliers itself. Each task has one thread;
 seconds are of the processor, so that a busy machine does not count.
 """
 import argparse
 import concurrent.futures
+import hashlib
 import json
 import os
 import pathlib
@@ -51,19 +52,23 @@ def clean(folder):
 
     case = read_case(folder)
     problem = Problem(case, coloured=False)
-    dropped = [noise.outliers(e) for e in problem.errors(problem.null())]
+    dropped = noise.outliers(problem.errors(problem.null()))
     case.recordings = [r.without(d) for r, d in zip(case.recordings, dropped)]
     return case, float(np.concatenate(dropped).mean())
 
 
 def diagnose(folder, options):
     out = options.out / name_of(folder)
+    timed = out / "seconds.json"
+    if options.keep and timed.exists():
+        return {"verdict": json.loads((out / "verdict.json").read_text()), "seconds": json.loads(timed.read_text())}
     before = resource.getrusage(resource.RUSAGE_CHILDREN).ru_utime
     command = [options.program, "--quiet", "--threads", "1", "--model", folder / "model.toml", "--out", out]
     done = subprocess.run([*command, *sorted(folder.glob("*.lcm"))], capture_output=True, text=True, check=False)
     if done.returncode != 0:
         raise SystemExit(f"compare: bevel-diagnose on {folder}: {done.stderr.strip()}")
     seconds = resource.getrusage(resource.RUSAGE_CHILDREN).ru_utime - before
+    timed.write_text(json.dumps(seconds))
     return {"verdict": json.loads((out / "verdict.json").read_text()), "seconds": seconds}
 
 
@@ -184,6 +189,8 @@ def main():
                 print(f"{name_of(folder)} {time.monotonic() - began:.0f} s", file=sys.stderr)
             rows.append(json.loads(row_path(folder, options).read_text()))
     result = {"machine": f"{os.cpu_count()} cores, Python {platform.python_version()}", "cases": rows}
+    if options.program.exists():
+        result["bevel_diagnose_sha256"] = hashlib.sha256(options.program.read_bytes()).hexdigest()
     (options.out / "peers.json").write_text(json.dumps(result, indent=1) + "\n")
     print(page.tables(result))
     if options.page:

@@ -109,6 +109,7 @@ class Problem:
     def judge(self, fit):
         errors = self.errors(fit)
         if not all(np.isfinite(e).all() for e in errors):
+            fit.bic = math.inf
             return fit
         fit.deviance, fit.noise = most_likely(errors, [r.tip_s for r in self.recordings], self.coloured)
         fit.bic = fit.deviance + fit.parameters() * math.log(self.count)
