@@ -45,12 +45,12 @@ testing::Insertion simulate(const EstimatorConfig& truth, std::mt19937_64& rng) 
     const bool turning = (ms >= 3000 && ms < 4000) || (ms >= 8000 && ms < 9000);
     if (ms % 10 == 0) {
       model::ActuatorState a;
-      a.utime = testing::kStart_utime + ms * 1000;
+      a.utime = testing::kStart_utime + std::int64_t{1000} * ms;
       a.insertion_mm = insertion_mm;
       a.rotation_rad = rotation_rad;
       data.actuators.push_back(a);
     }
-    if (ms % 33 == 7 && ms > 400) times.push_back(testing::kStart_utime + ms * 1000);
+    if (ms % 33 == 7 && ms > 400) times.push_back(testing::kStart_utime + std::int64_t{1000} * ms);
     insertion_mm += rest ? 0 : 0.01;
     rotation_rad += turning ? EIGEN_PI * 1e-3 : 0;
   }

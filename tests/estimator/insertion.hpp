@@ -56,7 +56,7 @@ inline Insertion insert(const model::NeedleParameters& truth, const model::Pose&
   std::int64_t seq = 0;
   for (int ms = 0; ms <= static_cast<int>(duration_s * 1000); ++ms) {
     const double t = ms * 1e-3;
-    const std::int64_t utime = kStart_utime + ms * 1000;
+    const std::int64_t utime = kStart_utime + std::int64_t{1000} * ms;
     // The shaft turns one way and back, at constant rates between actuator samples.
     const double rate = (ms / 2000) % 2 ? -plan.rotation_rate_rad_s : plan.rotation_rate_rad_s;
     if (ms % 10 == 0) {

@@ -195,7 +195,7 @@ TEST(NeedleEstimator, MeasurementsWithoutActuatorsKeepTheAnchor) {
   a.utime = testing::kStart_utime;
   estimator.add(a);
   for (int i = 1; i < 100; ++i)
-    estimator.add(testing::measure({0, 0, 0}, a.utime + i * 1000, i, 0, {1, 1, 1}, 0.1, rng));
+    estimator.add(testing::measure({0, 0, 0}, a.utime + std::int64_t{1000} * i, i, 0, {1, 1, 1}, 0.1, rng));
   EXPECT_GT(estimator.counters().too_old, 0);
   EXPECT_TRUE(estimator.estimate(a.utime).state.pose.p_mm.allFinite());
   EXPECT_GT(estimator.estimate(a.utime).state.covariance(0, 0), 0);

@@ -129,7 +129,7 @@ Insertion insert_beam(const model::BeamPlantConfig& config, double sigma_mm, std
   model::BeamPlant plant(config);
   double rotation_rad = 0;
   for (int ms = 0; ms <= 10'000; ++ms) {
-    const std::int64_t utime = testing::kStart_utime + ms * 1000;
+    const std::int64_t utime = testing::kStart_utime + std::int64_t{1000} * ms;
     const double rate = (ms / 2000) % 2 ? -0.6 : 0.6;
     if (ms % 10 == 0) {
       model::ActuatorState a;

@@ -21,7 +21,7 @@ int main(int argc, char** argv) {
       .flag("--cases", options.cases, "a table, one line per folder with model.toml and logs")
       .check([&]() -> std::string {
         const int given = !options.model_path.empty() + !options.system_path.empty() + options.cases;
-        if (given != 1) return "one of --model, --system, --cases is required";
+        if (given != 1) return "exactly one of --model, --system, --cases is required";
         if (options.cases && options.held_out) return "--cases excludes --held-out";
         return options.system_path.empty() || options.config_path.empty() ? "" : "--system excludes --config";
       });
