@@ -36,7 +36,9 @@ std::vector<RawRecording> record(const SimulatedRig& rig, std::uint64_t seed) {
     RawRecording raw{.name = "rec" + std::to_string(r + 1), .actuators = script_of(r).actuators(0.02), .tips = {}};
     std::vector<std::int64_t> utimes;
     std::vector<double> time_s;
-    for (double t = 0; t < script_of(r).duration_s(); t += rig.frame_s) {
+    const int frames = static_cast<int>(std::ceil(script_of(r).duration_s() / rig.frame_s));
+    for (int i = 0; i < frames; ++i) {
+      const double t = i * rig.frame_s;
       if (uniform(random) < rig.dropped_share) continue;
       utimes.push_back(raw.actuators.front().utime + std::llround(t * 1e6));
       time_s.push_back(t);
