@@ -37,12 +37,6 @@ def used(result):
     return [m for m in METHODS if all(m in row["methods"] for row in result["cases"])]
 
 
-def excess(row, method):
-    """Held-out chi2 per reading above the noise's 1."""
-    chi2 = row["methods"][method]["chi2_per_reading"]
-    return math.inf if chi2 is None else chi2 - 1
-
-
 def summary(result):
     rows = []
     known = [row for row in result["cases"] if "truth" in row]
@@ -103,14 +97,14 @@ def tables(result):
                         seconds(result)))  # fmt: skip
 
 
-def cross(x, y):
-    return f'<path d="M{x - 5:.1f} {y - 5:.1f}l10 10m0 -10l-10 10" stroke="black" stroke-width="1.5"/>'
+def cross(x, y, colour):
+    return f'<path d="M{x - 4:.1f} {y - 4:.1f}l8 8m0 -8l-8 8" stroke="{colour}" stroke-width="2.5"/>'
 
 
 def picture(result):
-    """A row per case: held-out chi2 per reading, logarithmic; causes named wrongly are crossed out."""
+    """A row per case: held-out chi2 per reading, logarithmic; a cross where the wrong cause is named."""
     methods = used(result)
-    left, top, wide, high = 250, 64, 640, 24
+    left, top, wide, high = 250, 64, 640, 40
     chi2 = [row["methods"][m]["chi2_per_reading"] for row in result["cases"] for m in methods]
     finite = [c for c in chi2 if c is not None and math.isfinite(c)]
     low, most = math.log10(0.9), math.log10(max(finite) * 1.15)
@@ -128,7 +122,7 @@ def picture(result):
         out.append(f'<circle cx="{at_x}" cy="{at_y - 4}" r="5" fill="{COLOURS[method]}"/>'
                    f'<text x="{at_x + 10}" y="{at_y}">{html.escape(METHODS[method])}</text>')  # fmt: skip
     at_x, at_y = 12 + 225 * 3, 38
-    out.append(f'{cross(at_x, at_y - 4)}<text x="{at_x + 10}" y="{at_y}">wrong cause named</text>')
+    out.append(f'{cross(at_x, at_y - 4, "black")}<text x="{at_x + 10}" y="{at_y}">as a cross: wrong cause named</text>')
     bottom = top + high * len(result["cases"])
     for tick in (1, 2, 5, 10, 20, 50, 100, 200, 500, 1000):
         if math.log10(tick) > most:
@@ -144,11 +138,11 @@ def picture(result):
                    f'<line x1="{left}" x2="{left + wide}" y1="{y}" y2="{y}" stroke="#f2f2f2"/>')  # fmt: skip
         for place, method in enumerate(methods):
             at = row["methods"][method]
-            spread = (place - (len(methods) - 1) / 2) * 2.2
-            cx, cy = x(at["chi2_per_reading"]), y + spread
-            out.append(f'<circle cx="{cx:.1f}" cy="{cy:.1f}" r="4.5" fill="{COLOURS[method]}" fill-opacity="0.85"/>')
+            cx, cy = x(at["chi2_per_reading"]), y + (place - (len(methods) - 1) / 2) * 5
             if at.get("exact") is False:
-                out.append(cross(cx, cy))
+                out.append(cross(cx, cy, COLOURS[method]))
+            else:
+                out.append(f'<circle cx="{cx:.1f}" cy="{cy:.1f}" r="3.5" fill="{COLOURS[method]}"/>')
     return "\n".join([*out, "</svg>"]) + "\n"
 
 
