@@ -13,6 +13,7 @@ constexpr double kLargestAr1 = 0.98;
 // Sum over a message's axes of squared errors against its neighbours, each in standard deviations. A Gaussian message
 // of three axes passes this once in 3e5.
 constexpr double kOutlier = 28.0;
+constexpr double kGrossOutlier = 200.0;  // beside whatever
 constexpr int kOutlierPasses = 6;
 
 struct Whitened {
@@ -211,12 +212,13 @@ Calibration calibrate_noise(const RecordedCase& recorded, const Errors& errors, 
       for (std::size_t i = 0; i < sum.size(); ++i) {
         // An outlier makes its neighbours look bad too: only the worst of three goes, the others are looked at again.
         const bool worst = (i == 0 || sum[i] >= sum[i - 1]) && (i + 1 == sum.size() || sum[i] >= sum[i + 1]);
-        // Outliers come alone: a run of them may be physics that acts for a moment, a membrane or a jump.
+        // Small outliers come alone: a run of them may be physics that acts for a moment, a membrane or a jump.
         const auto flagged = [&](std::size_t j) {
           return std::find(out.outliers[r].begin(), out.outliers[r].end(), j) != out.outliers[r].end();
         };
         const bool alone = !(i > 0 && flagged(i - 1)) && !flagged(i + 1);
-        if (sum[i] > kOutlier && worst && alone) out.outliers[r].push_back(i), ++dropped, found = true;
+        if (worst && (sum[i] > kGrossOutlier || (sum[i] > kOutlier && alone)))
+          out.outliers[r].push_back(i), ++dropped, found = true;
       }
     }
     if (!found) break;
