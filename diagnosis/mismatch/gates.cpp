@@ -2,12 +2,12 @@
 
 #include <Eigen/QR>
 #include <algorithm>
-#include <boost/math/distributions/chi_squared.hpp>
 #include <cmath>
 #include <numeric>
 
 #include "diagnosis/mismatch/local_unknowns.hpp"
 #include "diagnosis/mismatch/parallel.hpp"
+#include "diagnosis/statistics/ljung_box.hpp"
 
 namespace bevel::diagnosis {
 namespace {
@@ -59,18 +59,8 @@ HeldOutFit leave_one_out(const Evidence& evidence, const Fit& whole, int threads
 }
 
 double ljung_box_p(const Eigen::VectorXd& white, int lags, int fitted) {
-  const auto n = static_cast<double>(white.size());
   if (white.size() < 3 * lags) return 1;
-  const Eigen::VectorXd centred = white.array() - white.mean();
-  const double variance = centred.squaredNorm();
-  if (!(variance > 0)) return 1;
-  double q = 0;
-  for (int lag = 1; lag <= lags; ++lag) {
-    const double r = centred.head(white.size() - lag).dot(centred.tail(white.size() - lag)) / variance;
-    q += r * r / (n - lag);
-  }
-  q *= n * (n + 2);
-  return boost::math::cdf(boost::math::complement(boost::math::chi_squared(std::max(lags - fitted, 1)), q));
+  return ljung_box(white, lags, fitted).p_value;
 }
 
 Remains examine_remains(const Evidence& evidence, const Fit& fit) {

@@ -6,7 +6,6 @@
 #include <cmath>
 #include <limits>
 #include <map>
-#include <numeric>
 
 namespace bevel::replay {
 namespace {
@@ -58,27 +57,8 @@ double ChiSquareMean::lowest() const { return quantile_of_mean(degrees, 0.025); 
 double ChiSquareMean::highest() const { return quantile_of_mean(degrees, 0.975); }
 
 LjungBox ljung_box(const std::vector<double>& series, int lags) {
-  LjungBox result;
   const auto n = static_cast<int>(series.size());
-  result.lags = std::min(lags, n / 4);
-  if (result.lags < 1) return result;
-  const double mean = std::accumulate(series.begin(), series.end(), 0.0) / n;
-  const auto product = [&](int lag) {
-    double sum = 0;
-    for (int i = lag; i < n; ++i)
-      sum += (series[static_cast<std::size_t>(i)] - mean) * (series[static_cast<std::size_t>(i - lag)] - mean);
-    return sum;
-  };
-  const double variance = product(0);
-  if (!(variance > 0)) return result;
-  for (int lag = 1; lag <= result.lags; ++lag) {
-    const double r = product(lag) / variance;
-    result.statistic += r * r / (n - lag);
-  }
-  result.statistic *= static_cast<double>(n) * (n + 2);
-  result.p_value = boost::math::cdf(
-      boost::math::complement(boost::math::chi_squared(static_cast<double>(result.lags)), result.statistic));
-  return result;
+  return diagnosis::ljung_box(Eigen::VectorXd::Map(series.data(), n), std::min(lags, n / 4));
 }
 
 NoiseColour measure_noise(const std::vector<std::vector<AxisSample>>& recordings) {

@@ -3,6 +3,8 @@
 #include <cstdint>
 #include <vector>
 
+#include "diagnosis/statistics/ljung_box.hpp"
+
 namespace bevel::replay {
 
 // A mean of squared unit normals with the band in which it lies 95 times in 100.
@@ -17,13 +19,8 @@ struct ChiSquareMean {
   bool in_band() const { return mean() >= lowest() && mean() <= highest(); }
 };
 
-// Ljung and Box 1978, Biometrika 65(2): Q = n (n + 2) sum r_j^2 / (n - j) over `lags`, chi-square if the series is
-// white.
-struct LjungBox {
-  double statistic = 0;
-  int lags = 0;
-  double p_value = 1;
-};
+// Over `lags`, or a quarter of the series where that is fewer.
+using diagnosis::LjungBox;
 LjungBox ljung_box(const std::vector<double>& series, int lags = 20);
 
 // First-order autoregressive noise of one camera axis, n_k = rho n_(k-1) + white, per frame number.
