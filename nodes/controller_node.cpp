@@ -30,8 +30,12 @@ controller::NeedleView to_view(const needle_state_t& m) {
 }
 
 ControllerNode::ControllerNode(lcm::LCM& lcm, const controller::ControllerConfig& config,
-                               const model::NeedleParameters& needle)
-    : config_(config), port_(lcm), supervisor_(config, needle), status_(port_, "bevel-controller", config.period_s) {
+                               const model::NeedleParameters& needle, const std::vector<model::ActiveEffect>& effects)
+    : config_(config),
+      port_(lcm),
+      // An effect may be of the needle itself, its direction of slip for instance.
+      supervisor_(config, model::AugmentedNeedle(needle, effects).needle(), effects),
+      status_(port_, "bevel-controller", config.period_s) {
   port_.subscribe<needle_state_t>(io::channel::kNeedleState,
                                   [this](const needle_state_t& m) { supervisor_.set_needle(to_view(m)); });
   port_.subscribe<actuator_state_t>(io::channel::kActuatorState,

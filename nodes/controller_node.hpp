@@ -9,7 +9,9 @@ controller::NeedleView to_view(const needle_state_t& message);
 
 class ControllerNode {
  public:
-  ControllerNode(lcm::LCM& lcm, const controller::ControllerConfig& config, const model::NeedleParameters& needle);
+  // `effects`: those that the estimator has, so that both believe in the same needle (SystemConfig::live_effects).
+  ControllerNode(lcm::LCM& lcm, const controller::ControllerConfig& config, const model::NeedleParameters& needle,
+                 const std::vector<model::ActiveEffect>& effects);
   // One period; call at config.period_s. late_s: how much later than due; run past a bound it stops motion.
   void step(std::int64_t now_utime, double late_s);
   const controller::Supervisor& supervisor() const { return supervisor_; }

@@ -175,7 +175,8 @@ SystemConfig load_system_config(const std::string& path) {
   c.rig.truth = c.needle;
   read_rig(file.section("rig", optional), folder, c.rig);
   file.finish();
-  c.estimator.effects = io::active_effects(c.effects, "");
+  c.live_effects = io::live_effects(c.effects);
+  c.estimator.effects = c.live_effects.active;
   return c;
 }
 

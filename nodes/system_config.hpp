@@ -11,7 +11,7 @@
 #include "drivers/camera/tracker_config.hpp"
 #include "drivers/stepper/stepper_config.hpp"
 #include "estimator/config.hpp"
-#include "io/model_file.hpp"
+#include "io/live_effects.hpp"
 
 namespace bevel::nodes {
 
@@ -41,10 +41,11 @@ struct SystemConfig {
   std::string lcm_url;  // empty: LCM's default, or LCM_DEFAULT_URL
   std::string can = "unix:/tmp/bevel-rig-can.sock";
   bool realtime = false;  // SCHED_FIFO and locked memory for controller and stepper, where the system permits
-  // What the software believes: [needle] and [[effect]]s, or the model file `model` at the top of the file. The
-  // controller plans with the needle alone; the estimator has the effects too (estimator.effects), as of no recording.
+  // What the software believes: [needle] and [[effect]]s, or the model file `model` at the top of the file. Of the
+  // effects, estimator (estimator.effects) and controller have those that are known before an insertion.
   model::NeedleParameters needle;
   std::vector<io::EffectEntry> effects;
+  io::LiveEffects live_effects;
   estimator::EstimatorConfig estimator;
   controller::ControllerConfig controller;
   stepper::StepperConfig stepper;

@@ -96,17 +96,6 @@ TEST_F(CloseTheLoop, InsertionScaleFoundMakesAllThreeBetterAndTheFilesSaySo) {
   for (const char* name : {"verdict.json", "report.html", "model.toml"}) EXPECT_TRUE(fs::exists(folder / "out" / name));
 }
 
-// What differs from insertion to insertion is not the software's to know, but it is the rig's to have.
-TEST(KnownBeforehand, EffectsWithAnUnknownOfTheRecordingAreNot) {
-  const std::vector<io::EffectEntry> effects = {
-      {"tissue_motion", {{"amplitude_mm", 0.5}, {"frequency_hz", 0.25}, {"direction_rad", 0.3}}, {}},
-      {"lost_steps", {{"rotation_rad", 0.8}}, {{"rec01.lcm", {{"at_s", 3}}}}},
-      {"drilling", {{"coefficient_mm_per_rad", 1.5}}, {}}};
-  const auto known = known_beforehand(effects);
-  ASSERT_EQ(known.size(), 1U);
-  EXPECT_EQ(known[0].name, "drilling");
-}
-
 // The rig of the tool is the one the effects' tests know: its open loop is model/effects/open_loop, late camera too.
 TEST(SimulatedRecording, IsThePredictionOfTheModelFile) {
   io::ModelFile model{model::testing::agar(),

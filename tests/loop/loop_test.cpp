@@ -52,7 +52,8 @@ class Loop : public ::testing::Test {
     rig = std::make_unique<nodes::RigNode>(lcm, *drive_buses[0], *drive_buses[1], config, nullptr);
     stepper = std::make_unique<nodes::StepperNode>(lcm, *stepper_bus, config.stepper);
     estimator = std::make_unique<nodes::EstimatorNode>(lcm, config.estimator);
-    controller = std::make_unique<nodes::ControllerNode>(lcm, config.controller, config.needle);
+    controller =
+        std::make_unique<nodes::ControllerNode>(lcm, config.controller, config.needle, config.live_effects.active);
     ON_CALL(camera, see).WillByDefault([this](const Eigen::Vector3d& tip, std::int64_t utime, int which) {
       return picture(tip, utime, which);
     });

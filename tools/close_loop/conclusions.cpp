@@ -1,5 +1,6 @@
 #include <cstdio>
 
+#include "io/live_effects.hpp"
 #include "tools/close_loop/report.hpp"
 #include "tools/diagnose/figures.hpp"
 
@@ -60,11 +61,8 @@ std::string axes_sentence(const TargetingFigures& t) {
   return text;
 }
 
-std::string unknown_beforehand(const io::EffectEntry& entry) {
-  std::string names;
-  for (const auto& p : model::find_effect(entry.name)->parameters())
-    if (p.scope == model::Scope::recording) names += (names.empty() ? "" : ", ") + std::string(p.name);
-  return "Targeting cannot improve by " + entry.name + ": its " + names +
+std::string no_gain_sentence(const io::EffectEntry& entry, const std::string& unknown) {
+  return "Targeting cannot improve by " + entry.name + ": its " + unknown +
          " differs from recording to recording and is not known before the next insertion, so the live estimator and "
          "the controller do without it. The rig has it, drawn anew for each insertion.";
 }
@@ -101,7 +99,8 @@ std::vector<std::string> conclusions(const ClosedLoop& loop) {
     all.push_back(targeting_sentence(t.forgiving, t.gain_forgiving_mm, "a forgiving filter"));
   }
   for (const auto& entry : effects)
-    if (!is_known_beforehand(entry)) all.push_back(unknown_beforehand(entry));
+    if (const std::string unknown = io::unknown_beforehand(entry); !unknown.empty())
+      all.push_back(no_gain_sentence(entry, unknown));
   if (t.axes_matter) all.push_back(axes_sentence(t));
   for (const bool forgiving : {false, true})
     for (std::size_t s = 0; s < kStages; ++s)

@@ -36,16 +36,4 @@ diagnosis::RecordedCase without_outliers(const diagnosis::RecordedCase& recorded
   return diagnosis::without(recorded, outliers);
 }
 
-bool is_known_beforehand(const io::EffectEntry& entry) {
-  const model::Effect* effect = model::find_effect(entry.name);
-  return effect == nullptr || std::none_of(effect->parameters().begin(), effect->parameters().end(),
-                                           [](const auto& p) { return p.scope == model::Scope::recording; });
-}
-
-std::vector<io::EffectEntry> known_beforehand(const std::vector<io::EffectEntry>& effects) {
-  std::vector<io::EffectEntry> known;
-  std::copy_if(effects.begin(), effects.end(), std::back_inserter(known), is_known_beforehand);
-  return known;
-}
-
 }  // namespace bevel::close_loop

@@ -27,9 +27,4 @@ CaseFiles find_case(const std::string& folder);
 // The readings that the mismatch tool took for outliers, taken out.
 diagnosis::RecordedCase without_outliers(const diagnosis::RecordedCase& recorded, const diagnosis::Findings& findings);
 
-// What a model knows before an insertion: effects with an unknown of the single recording (an instant, a phase) are
-// left out, for the next one's is not known.
-std::vector<io::EffectEntry> known_beforehand(const std::vector<io::EffectEntry>& effects);
-bool is_known_beforehand(const io::EffectEntry& effect);
-
 }  // namespace bevel::close_loop

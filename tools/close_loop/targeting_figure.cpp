@@ -9,6 +9,7 @@
 #include <stdexcept>
 
 #include "diagnosis/mismatch/parallel.hpp"
+#include "io/live_effects.hpp"
 
 namespace bevel::close_loop {
 namespace {
@@ -120,7 +121,7 @@ TargetingFigures steer_all(const Models& models, const diagnosis::RecordedCase& 
   std::vector<Believed> beliefs;
   for (const double forgiveness : {1.0, kForgiveness})
     for (const io::ModelFile& model : models)
-      beliefs.push_back({model.needle, io::active_effects(known_beforehand(model.effects), ""), forgiveness});
+      beliefs.push_back({model.needle, io::live_effects(model.effects).active, forgiveness});
   figures.axes_matter = controller::AxisModel(beliefs[kAugmented].effects).turns_late();
   if (figures.axes_matter) {
     beliefs.push_back(beliefs[kAugmented]);

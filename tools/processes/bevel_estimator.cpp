@@ -8,6 +8,7 @@ int main(int argc, char** argv) {
       "bevel-estimator", "Estimates the needle's pose, curvature and lambda from tip measurements and axis positions.");
   return tools::process_main(command_line, argc, argv, [](nodes::SystemConfig& config, lcm::LCM& lcm) {
     nodes::claim_name("bevel-estimator");
+    tools::warn_of_effects_left_out(config, "bevel-estimator");
     nodes::EstimatorNode node(lcm, config.estimator);
     // Messages are handled as they arrive; the period is that of the health checks.
     nodes::run_periodic(lcm, 0.01, [&](const nodes::Now& now, double) {

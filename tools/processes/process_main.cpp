@@ -24,4 +24,9 @@ void go_realtime(const nodes::SystemConfig& config, const char* program, int pri
     std::fprintf(stderr, "%s: %s; running without\n", program, refused.c_str());
 }
 
+void warn_of_effects_left_out(const nodes::SystemConfig& config, const char* program) {
+  for (const std::string& sentence : config.live_effects.left_out)
+    std::fprintf(stderr, "%s: %s\n", program, sentence.c_str());
+}
+
 }  // namespace bevel::tools

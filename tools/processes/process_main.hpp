@@ -16,4 +16,7 @@ int process_main(CommandLine& command_line, int argc, char** argv, const Process
 // Asks for real-time scheduling where the file wants it; a refusal is said and not fatal.
 void go_realtime(const nodes::SystemConfig& config, const char* program, int priority);
 
+// A line on stderr for each effect of the file that cannot be used live.
+void warn_of_effects_left_out(const nodes::SystemConfig& config, const char* program);
+
 }  // namespace bevel::tools
