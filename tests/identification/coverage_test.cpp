@@ -19,12 +19,12 @@ TEST(Coverage, IntervalsContainTheTruthAsOftenAsTheySay) {
   constexpr std::uint64_t kSeed = 7;
   std::printf("seed %llu\n", static_cast<unsigned long long>(kSeed));
   for (const auto& c : coverage_study(truth, 80, kSeed, {}, 6, options)) {
-    std::printf("%-18s %d of %d\n", kParameterNames[c.parameter], c.inside, c.sets);
+    std::printf("%-18s %d of %d\n", kParameterNames[c.parameter], c.inside.hits, c.inside.of);
     // 95 % of 80 is 76; three standard deviations of the binomial are 5.8.
-    EXPECT_GE(c.inside, 70);
+    EXPECT_GE(c.inside.hits, 70);
     double squares = 0;
     for (const double z : c.z) squares += z * z;
-    EXPECT_NEAR(std::sqrt(squares / c.sets), 1, 0.25);  // neither too narrow nor too wide
+    EXPECT_NEAR(std::sqrt(squares / c.inside.of), 1, 0.25);  // neither too narrow nor too wide
   }
 }
 

@@ -35,12 +35,13 @@ int main(int argc, char** argv) {
     options.loss = c.loss;
     page.heading(c.name);
     for (const auto& p : coverage_study(truth, sets, kSeed, plan, 6, options)) {
-      const auto band = p.wilson();
-      const bool inside = p.share() >= 0.93 && p.share() <= 0.97;
+      const proof::Interval band = proof::wilson95(p.inside);
+      const double share = p.inside.value();
+      const bool inside = share >= 0.93 && share <= 0.97;
       std::printf("%-34s %-18s %3d of %d = %.1f %%  (Wilson 95 %%: %.1f to %.1f) %s\n", c.name,
-                  kParameterNames[p.parameter], p.inside, p.sets, 100 * p.share(), 100 * band[0], 100 * band[1],
-                  inside ? "" : "outside 93-97 %");
-      good = good && band[0] <= 0.95 && 0.95 <= band[1];
+                  kParameterNames[p.parameter], p.inside.hits, p.inside.of, 100 * share, 100 * band.low,
+                  100 * band.high, inside ? "" : "outside 93-97 %");
+      good = good && band.low <= 0.95 && 0.95 <= band.high;
       std::vector<double> z = p.z, expected, order;
       std::sort(z.begin(), z.end());
       // Ordered errors against the standard normal's quantiles (Hastings' approximation is enough for a picture).
@@ -60,7 +61,7 @@ int main(int argc, char** argv) {
       char caption[160];
       std::snprintf(caption, sizeof caption,
                     "%s: %d of %d intervals contain the truth (Wilson 95 %%: %.1f to %.1f %%).",
-                    kParameterNames[p.parameter], p.inside, p.sets, 100 * band[0], 100 * band[1]);
+                    kParameterNames[p.parameter], p.inside.hits, p.inside.of, 100 * band.low, 100 * band.high);
       page.figure(plot, caption);
     }
   }
