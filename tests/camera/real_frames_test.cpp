@@ -5,13 +5,13 @@
 
 #include <algorithm>
 #include <cstdio>
-#include <cstdlib>
 #include <filesystem>
 #include <optional>
 
 #include "drivers/camera/frame_source.hpp"
 #include "drivers/camera/planar_view.hpp"
 #include "drivers/camera/tip_tracker.hpp"
+#include "tests/support/shared_recordings.hpp"
 
 namespace bevel::camera {
 namespace {
@@ -20,11 +20,6 @@ namespace fs = std::filesystem;
 
 constexpr double kPxPerMm = 5.607;  // stated by the authors
 constexpr double kStep_mm = 8.0;
-
-fs::path shared_folder() {
-  const char* named = std::getenv("BEVEL_SHARED");
-  return named != nullptr ? fs::path(named) : fs::path(BEVEL_SOURCE_DIR) / ".." / "shared";
-}
 
 TrackerConfig lara() {
   TrackerConfig config;
@@ -35,8 +30,8 @@ TrackerConfig lara() {
 }
 
 TEST(RealFrames, TheTipAdvancesByTheCommandedStep) {
-  const fs::path root = shared_folder() / "real" / "lara" / "camera";
-  if (!fs::is_directory(root)) GTEST_SKIP() << "no real frames at " << root << "; set BEVEL_SHARED to where they are";
+  const fs::path root = test::shared_recordings() / "real" / "lara" / "camera";
+  BEVEL_SKIP_WITHOUT(root);
   std::vector<fs::path> folders;
   for (const auto& entry : fs::directory_iterator(root))
     if (entry.is_directory()) folders.push_back(entry.path());

@@ -11,7 +11,7 @@
 #include "drivers/camera/frame_source.hpp"
 #include "drivers/camera/frame_stream.hpp"
 #include "rig/camera/frame_server.hpp"
-#include "tests/camera/temporary_folder.hpp"
+#include "tests/support/temporary_folder.hpp"
 
 namespace bevel::camera {
 namespace {
@@ -44,7 +44,7 @@ TEST(FolderSource, NaturalOrderAndStamps) {
   const test::TemporaryFolder folder;
   for (const int i : {10, 1, 2, 9}) cv::imwrite(folder / ("ImgFeedback" + std::to_string(i) + ".png"), shade(i));
   std::ofstream(folder / "notes.txt") << "not a picture";
-  SourceConfig config = config_of(SourceKind::folder, folder.str());
+  SourceConfig config = config_of(SourceKind::folder, folder.path());
   config.start_utime = 1000;
   config.period_us = 50;
   config.camera = 3;
@@ -67,7 +67,7 @@ TEST(FolderSource, NaturalOrderAndStamps) {
 TEST(FolderSource, UnreadableImageIsAFailureThatNamesIt) {
   const test::TemporaryFolder folder;
   std::ofstream(folder / "broken.png") << "no picture";
-  const FrameResult got = make_frame_source(config_of(SourceKind::folder, folder.str()))->next(milliseconds(0));
+  const FrameResult got = make_frame_source(config_of(SourceKind::folder, folder.path()))->next(milliseconds(0));
   ASSERT_TRUE(std::holds_alternative<SourceFailure>(got));
   EXPECT_NE(std::get<SourceFailure>(got).text.find("broken.png"), std::string::npos);
 }
@@ -81,12 +81,12 @@ TEST(SourceConfigCheck, NamesTheKeyOrThePath) {
   std::vector<Case> cases;
   cases.push_back({"path", config_of(SourceKind::folder, "")});
   cases.push_back({"/no/such/folder", config_of(SourceKind::folder, "/no/such/folder")});
-  cases.push_back({"no jpg", config_of(SourceKind::folder, folder.str())});
+  cases.push_back({"no jpg", config_of(SourceKind::folder, folder.path())});
   cases.push_back({"/no/such/film.avi", config_of(SourceKind::video, "/no/such/film.avi")});
   cases.push_back({"/dev/null", config_of(SourceKind::device, "/dev/null")});
   cases.push_back({"no frame server answers", config_of(SourceKind::stream, folder / "nobody")});
   cases.push_back({"characters", config_of(SourceKind::stream, "/" + std::string(200, 'x'))});
-  cases.push_back({"period_us", config_of(SourceKind::folder, folder.str())});
+  cases.push_back({"period_us", config_of(SourceKind::folder, folder.path())});
   cases.back().config.period_us = 0;
   cases.push_back({"rate_hz", config_of(SourceKind::device, "/dev/video0")});
   cases.back().config.rate_hz = std::nan("");

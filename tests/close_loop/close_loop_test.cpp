@@ -3,25 +3,23 @@
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
-#include <unistd.h>
 
-#include <fstream>
 #include <iostream>
 #include <nlohmann/json.hpp>
 
 #include "tests/close_loop/made_case.hpp"
+#include "tests/support/temporary_folder.hpp"
 #include "tools/close_loop/report.hpp"
 
 namespace bevel::close_loop {
 namespace {
 
 namespace fs = std::filesystem;
+using test::text_of;
 using ::testing::HasSubstr;
 
 struct CloseTheLoop : ::testing::Test {
-  fs::path folder = fs::temp_directory_path() / ("bevel_close_loop_" + std::to_string(::getpid()));
-  void SetUp() override { fs::create_directories(folder); }
-  void TearDown() override { fs::remove_all(folder); }
+  test::TemporaryFolder folder;
 
   Options options(const std::string& name) const {
     Options o;
@@ -32,10 +30,6 @@ struct CloseTheLoop : ::testing::Test {
     o.quiet = true;
     o.targeting.seeds = 3;
     return o;
-  }
-  static std::string text_of(const fs::path& path) {
-    std::ifstream file(path);
-    return {std::istreambuf_iterator<char>(file), {}};
   }
   static std::string refusal(const Options& o) {
     try {

@@ -14,21 +14,18 @@
 
 #include "io/model_file.hpp"
 #include "tests/diagnosis/recorded_logs.hpp"
+#include "tests/support/temporary_folder.hpp"
 
 namespace bevel::diagnose {
 namespace {
 
 namespace fs = std::filesystem;
 using model::testing::active;
+using test::text_of;
 using ::testing::AllOf;
 using ::testing::HasSubstr;
 using ::testing::IsEmpty;
 using ::testing::Not;
-
-std::string text_of(const fs::path& path) {
-  std::ifstream file(path, std::ios::binary);
-  return {std::istreambuf_iterator<char>(file), {}};
-}
 
 struct Said {
   int status = -1;
@@ -36,15 +33,11 @@ struct Said {
 };
 
 struct Program : ::testing::Test {
-  fs::path folder = fs::temp_directory_path() / ("bevel_diagnose_" + std::to_string(::getpid()));
+  test::TemporaryFolder folder;
   std::vector<std::string> logs;
   std::string model_path = (folder / "model.toml").string();
 
-  void SetUp() override {
-    fs::create_directories(folder);
-    io::save_model_file({model::testing::agar(), {}}, model_path);
-  }
-  void TearDown() override { fs::remove_all(folder); }
+  void SetUp() override { io::save_model_file({model::testing::agar(), {}}, model_path); }
 
   void write_logs(const std::vector<model::ActiveEffect>& effects) {
     for (int i = 0; i < 4; ++i) {

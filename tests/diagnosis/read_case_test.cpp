@@ -1,12 +1,11 @@
 // Input that cannot be diagnosed: each has one clear message.
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
-#include <unistd.h>
 
 #include <filesystem>
-#include <fstream>
 
 #include "tests/diagnosis/recorded_logs.hpp"
+#include "tests/support/temporary_folder.hpp"
 #include "tools/diagnose/read_case.hpp"
 
 namespace bevel::diagnose {
@@ -14,30 +13,21 @@ namespace {
 
 namespace fs = std::filesystem;
 using diagnosis::testing::LogContents;
+using test::text_of;
 using ::testing::AllOf;
 using ::testing::HasSubstr;
 using ::testing::Not;
 
 struct ReadLogs : ::testing::Test {
-  fs::path folder = fs::temp_directory_path() / ("bevel_read_case_" + std::to_string(::getpid()));
+  test::TemporaryFolder folder;
   std::vector<std::string> logs;
 
   void SetUp() override {
-    fs::create_directories(folder);
     for (int i = 0; i < 3; ++i) logs.push_back(write("rec0" + std::to_string(i + 1) + ".lcm", {.script = i}));
   }
-  void TearDown() override { fs::remove_all(folder); }
 
   std::string write(const std::string& name, const LogContents& contents) const {
     write_log(folder / name, contents);
-    return (folder / name).string();
-  }
-  static std::string bytes_of(const std::string& path) {
-    std::ifstream file(path, std::ios::binary);
-    return {std::istreambuf_iterator<char>(file), {}};
-  }
-  std::string with_bytes(const std::string& name, const std::string& bytes) const {
-    std::ofstream(folder / name, std::ios::binary) << bytes;
     return (folder / name).string();
   }
   static std::string refusal(const std::vector<std::string>& of) {
@@ -64,13 +54,13 @@ TEST_F(ReadLogs, AFileThatIsNotThere) {
 }
 
 TEST_F(ReadLogs, AFolderInPlaceOfALog) {
-  EXPECT_THAT(refusal({logs[0], folder.string()}), HasSubstr("give the logs in it"));
+  EXPECT_THAT(refusal({logs[0], folder.path().string()}), HasSubstr("give the logs in it"));
 }
 
 TEST_F(ReadLogs, TheSameLogTwice) {
   EXPECT_THAT(refusal({logs[0], logs[1], logs[0]}), HasSubstr("given twice"));
   EXPECT_THAT(refusal({logs[0], (folder / "." / "rec01.lcm").string()}), HasSubstr("given twice"));
-  const auto copy = with_bytes("copy.lcm", bytes_of(logs[1]));
+  const auto copy = folder.write("copy.lcm", text_of(logs[1]));
   EXPECT_THAT(refusal({logs[0], logs[1], copy}),
               AllOf(HasSubstr("copy.lcm: the same recording as"), HasSubstr("rec02")));
 }
@@ -106,23 +96,23 @@ TEST_F(ReadLogs, MotionUnknownForAWhile) {
 }
 
 TEST_F(ReadLogs, EmptyAndForeignFiles) {
-  EXPECT_THAT(refusal({logs[0], with_bytes("empty.lcm", "")}), HasSubstr("empty.lcm"));
-  EXPECT_THAT(refusal({logs[0], with_bytes("text.lcm", std::string(5000, 'x'))}),
+  EXPECT_THAT(refusal({logs[0], folder.write("empty.lcm", "")}), HasSubstr("empty.lcm"));
+  EXPECT_THAT(refusal({logs[0], folder.write("text.lcm", std::string(5000, 'x'))}),
               AllOf(HasSubstr("text.lcm: no LCM event in its 5000 bytes"), Not(HasSubstr("empty"))));
 }
 
 TEST_F(ReadLogs, ALittleDamageIsARemarkMuchIsARefusal) {
-  std::string bytes = bytes_of(logs[2]);
+  std::string bytes = text_of(logs[2]);
   std::fill_n(bytes.begin() + 20'000, 150, 'x');
-  const ReadCase read = read_case({logs[0], logs[1], with_bytes("scratched.lcm", bytes)});
+  const ReadCase read = read_case({logs[0], logs[1], folder.write("scratched.lcm", bytes)});
   ASSERT_EQ(read.remarks.size(), 1U);
   EXPECT_THAT(read.remarks[0], AllOf(HasSubstr("scratched.lcm: damaged"), HasSubstr("skipped")));
 
-  const auto torn = with_bytes("torn.lcm", bytes_of(logs[2]).substr(0, bytes.size() - 40));
+  const auto torn = folder.write("torn.lcm", text_of(logs[2]).substr(0, bytes.size() - 40));
   EXPECT_THAT(read_case({logs[0], torn}).remarks.at(0), HasSubstr("torn.lcm: damaged"));
 
   std::fill(bytes.begin() + 20'000, bytes.begin() + 60'000, 'x');
-  EXPECT_THAT(refusal({logs[0], with_bytes("gutted.lcm", bytes)}),
+  EXPECT_THAT(refusal({logs[0], folder.write("gutted.lcm", bytes)}),
               AllOf(HasSubstr("gutted.lcm: damaged beyond use"), HasSubstr("at most 20 %")));
 }
 

@@ -13,6 +13,7 @@
 #include <nlohmann/json.hpp>
 
 #include "tests/diagnosis/made_up_findings.hpp"
+#include "tests/support/temporary_folder.hpp"
 #include "tools/diagnose/result_files.hpp"
 #include "tools/diagnose/verdict_json.hpp"
 
@@ -22,22 +23,17 @@ namespace {
 namespace fs = std::filesystem;
 using diagnosis::Verdict;
 using diagnosis::testing::made_up;
+using test::text_of;
 using ::testing::HasSubstr;
 using ::testing::UnorderedElementsAre;
 
 struct Results : ::testing::Test {
-  fs::path folder = fs::temp_directory_path() / ("bevel_results_" + std::to_string(::getpid()));
-  void SetUp() override { fs::create_directories(folder); }
-  void TearDown() override { fs::remove_all(folder); }
+  test::TemporaryFolder folder;
 
   std::vector<std::string> names_in(const fs::path& where) const {
     std::vector<std::string> names;
     for (const auto& entry : fs::directory_iterator(where)) names.push_back(entry.path().filename().string());
     return names;
-  }
-  static std::string text_of(const fs::path& path) {
-    std::ifstream file(path);
-    return {std::istreambuf_iterator<char>(file), {}};
   }
 };
 
@@ -47,10 +43,10 @@ TEST_F(Results, VerdictsFollowTheSchema) {
   auto odd = made_up(Verdict::nothing_missing);
   odd.held_out.before.chi2_per_dof = std::numeric_limits<double>::infinity();
   odd.noise.sigma_mm = {};
-  write_together(folder, {{"found.json", verdict_json(made_up(Verdict::effects_found))},
-                          {"nothing.json", verdict_json(made_up(Verdict::nothing_missing))},
-                          {"unknown.json", verdict_json(made_up(Verdict::unknown_effect))},
-                          {"odd.json", verdict_json(odd)}});
+  write_together(folder.path(), {{"found.json", verdict_json(made_up(Verdict::effects_found))},
+                                 {"nothing.json", verdict_json(made_up(Verdict::nothing_missing))},
+                                 {"unknown.json", verdict_json(made_up(Verdict::unknown_effect))},
+                                 {"odd.json", verdict_json(odd)}});
   const std::string check = std::string("python3 ") + BEVEL_SOURCE_DIR + "/tests/diagnosis/validate_verdict.py ";
   for (const char* name : {"found", "nothing", "unknown", "odd"})
     EXPECT_EQ(std::system((check + (folder / name).string() + ".json").c_str()), 0) << name;
@@ -93,23 +89,23 @@ TEST_F(Results, TakeThePlaceOfOlderOnesTogether) {
 }
 
 TEST_F(Results, NoneIsTouchedIfOneCannotBe) {
-  write_together(folder, {{"a", "old"}, {"b", "old"}});
+  write_together(folder.path(), {{"a", "old"}, {"b", "old"}});
   fs::create_directories(folder / "c" / "full");
-  EXPECT_THROW(write_together(folder, {{"a", "new"}, {"c", "new"}, {"b", "new"}}), std::runtime_error);
+  EXPECT_THROW(write_together(folder.path(), {{"a", "new"}, {"c", "new"}, {"b", "new"}}), std::runtime_error);
   EXPECT_EQ(text_of(folder / "a"), "old");
   EXPECT_EQ(text_of(folder / "b"), "old");
-  EXPECT_THAT(names_in(folder), UnorderedElementsAre("a", "b", "c"));
+  EXPECT_THAT(names_in(folder.path()), UnorderedElementsAre("a", "b", "c"));
 }
 
 TEST_F(Results, AFullDiskLeavesTheOldOnes) {
-  write_together(folder, {{"a", "old"}});
+  write_together(folder.path(), {{"a", "old"}});
   const pid_t child = ::fork();
   if (child == 0) {
     ::signal(SIGXFSZ, SIG_IGN);
     const rlimit small{1000, 1000};  // a write beyond fails as on a full disk
     ::setrlimit(RLIMIT_FSIZE, &small);
     try {
-      write_together(folder, {{"a", std::string(5000, 'n')}});
+      write_together(folder.path(), {{"a", std::string(5000, 'n')}});
     } catch (const std::runtime_error& e) {
       ::_exit(std::string(e.what()).find("cannot be written") == std::string::npos ? 2 : 0);
     }
@@ -119,7 +115,7 @@ TEST_F(Results, AFullDiskLeavesTheOldOnes) {
   ::waitpid(child, &status, 0);
   EXPECT_EQ(WEXITSTATUS(status), 0);
   EXPECT_EQ(text_of(folder / "a"), "old");
-  EXPECT_THAT(names_in(folder), UnorderedElementsAre("a"));
+  EXPECT_THAT(names_in(folder.path()), UnorderedElementsAre("a"));
 }
 
 TEST_F(Results, AFolderThatCannotHoldThemIsSaidBeforehandAndNothingMade) {

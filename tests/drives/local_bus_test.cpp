@@ -4,7 +4,6 @@
 #include <sys/un.h>
 #include <unistd.h>
 
-#include <filesystem>
 #include <memory>
 #include <stdexcept>
 #include <string>
@@ -12,27 +11,16 @@
 
 #include "drivers/can/local_bus.hpp"
 #include "drivers/can/open_bus.hpp"
+#include "tests/support/temporary_folder.hpp"
 
 namespace bevel::can {
 namespace {
 
 class LocalBusTest : public testing::Test {
  protected:
-  void SetUp() override {
-    std::string folder = (std::filesystem::temp_directory_path() / "bevel-bus-XXXXXX").string();
-    ASSERT_NE(mkdtemp(folder.data()), nullptr);
-    folder_ = folder;
-    path_ = folder + "/bus";
-    hub_ = std::make_unique<LocalHub>(path_);
-  }
-  void TearDown() override {
-    hub_.reset();
-    std::filesystem::remove_all(folder_);
-  }
-
-  std::string folder_;
-  std::string path_;
-  std::unique_ptr<LocalHub> hub_;
+  test::TemporaryFolder folder_;
+  std::string path_ = (folder_ / "bus").string();
+  std::unique_ptr<LocalHub> hub_ = std::make_unique<LocalHub>(path_);
 };
 
 TEST_F(LocalBusTest, FramesReachAllOthersAndEchoToTheSender) {

@@ -3,17 +3,15 @@
 #include <gtest/gtest.h>
 
 #include <sys/wait.h>
-#include <unistd.h>
 
 #include <cstdlib>
 #include <filesystem>
-#include <fstream>
-#include <sstream>
 
 #include "io/log_writer.hpp"
 #include "io/messages.hpp"
 #include "io/model_file.hpp"
 #include "tests/effects/script.hpp"
+#include "tests/support/temporary_folder.hpp"
 #include "tools/predict/predict.hpp"
 
 namespace bevel::model::testing {
@@ -32,20 +30,8 @@ struct Said {
 };
 
 struct Predict : ::testing::Test {
-  fs::path folder = fs::temp_directory_path() / ("bevel_predict_" + std::to_string(::getpid()));
+  test::TemporaryFolder folder;
 
-  void SetUp() override { fs::create_directories(folder); }
-  void TearDown() override { fs::remove_all(folder); }
-
-  std::string write(const std::string& name, const std::string& text) const {
-    std::ofstream(folder / name, std::ios::binary) << text;
-    return (folder / name).string();
-  }
-  static std::string read(const fs::path& path) {
-    std::ostringstream text;
-    text << std::ifstream(path, std::ios::binary).rdbuf();
-    return text.str();
-  }
   // The script as a rig logs it: states at 50 Hz, tips at 30 Hz, each the newest at its time.
   std::string write_log(const std::string& name, bool states = true, bool tips = true,
                         const Script& script = rich_script()) const {
@@ -69,16 +55,16 @@ struct Predict : ::testing::Test {
     const std::string command = std::string(BEVEL_BINARY_DIR) + "/bin/bevel-predict " + arguments + " >" +
                                 (folder / "out").string() + " 2>" + (folder / "err").string();
     const int status = std::system(command.c_str());
-    return {WEXITSTATUS(status), read(folder / "out"), read(folder / "err")};
+    return {WEXITSTATUS(status), test::text_of(folder / "out"), test::text_of(folder / "err")};
   }
   void expect_peer_agrees(const std::string& model, double largest_mm) const {
-    const std::string model_path = write("m.toml", model);
+    const std::string model_path = folder.write("m.toml", model);
     const std::string log = write_log("rec01.lcm");
     const Said said = run("--model " + model_path + " " + log);
     ASSERT_EQ(said.status, 0) << said.err;
     EXPECT_EQ(said.err, "");
     const std::string command = std::string("python3 ") + BEVEL_SOURCE_DIR + "/tests/effects/predict_peer.py " +
-                                model_path + " " + log + " " + write("predicted.csv", said.out) + " " +
+                                model_path + " " + log + " " + folder.write("predicted.csv", said.out) + " " +
                                 std::to_string(largest_mm);
     const int status = WEXITSTATUS(std::system(command.c_str()));
     if (status == 77 || status == 127) GTEST_SKIP() << "no python3 with tomllib (3.11 or newer)";
@@ -152,7 +138,7 @@ TEST_F(Predict, PrintsALineForEachMeasurementInTheOrderOfTheLog) {
 }
 
 TEST_F(Predict, SaysWhatIsWrong) {
-  const std::string model = "--model " + write("m.toml", kAgar) + " ";
+  const std::string model = "--model " + folder.write("m.toml", kAgar) + " ";
   const auto expect = [this](const std::string& arguments, int status, const std::string& message) {
     const Said said = run(arguments);
     EXPECT_EQ(said.status, status) << said.err;
@@ -162,13 +148,13 @@ TEST_F(Predict, SaysWhatIsWrong) {
   expect(model + write_log("a.lcm", false, true), 1, "no ACTUATOR_STATE");
   expect(model + write_log("b.lcm", true, false), 1, "no TIP_MEASUREMENT");
   expect(model + (folder / "none.lcm").string(), 1, "none.lcm");
-  expect(model + write("noise.lcm", std::string(5000, '\x17')), 1, "damaged");
-  const std::string sharp =
-      write("sharp.toml",
-            "[needle]\ncurvature_per_mm = 0.03\nwheelbase_mm = 20.0\nlambda1_per_rad = 0.144\nlambda2 = 0.032\n");
+  expect(model + folder.write("noise.lcm", std::string(5000, '\x17')), 1, "damaged");
+  const std::string sharp = folder.write(
+      "sharp.toml",
+      "[needle]\ncurvature_per_mm = 0.03\nwheelbase_mm = 20.0\nlambda1_per_rad = 0.144\nlambda2 = 0.032\n");
   expect("--model " + sharp + " " + write_log("deep.lcm", true, true, {{10, 20, 0}}), 1,
          "leaves the domain of the slip law");
-  expect("--model " + write("layer.toml", std::string(kAgar) + "[[effect]]\nname = \"layer\"\n") + " " +
+  expect("--model " + folder.write("layer.toml", std::string(kAgar) + "[[effect]]\nname = \"layer\"\n") + " " +
              write_log("c.lcm"),
          1, "effect[0].depth_mm is missing");
   expect(write_log("c.lcm"), 2, "--model is required");
@@ -179,13 +165,13 @@ TEST_F(Predict, SaysWhatIsWrong) {
 }
 
 TEST_F(Predict, PredictsWhatIsReadableOfADamagedLogAndFails) {
-  const std::string model = "--model " + write("m.toml", kAgar) + " ";
+  const std::string model = "--model " + folder.write("m.toml", kAgar) + " ";
   const std::string whole = write_log("whole.lcm");
-  std::string bytes = read(whole);
+  std::string bytes = test::text_of(whole);
   const auto lines = [](const std::string& csv) { return std::count(csv.begin(), csv.end(), '\n'); };
   const Said before = run(model + whole);
   bytes.replace(bytes.size() / 2, 100, std::string(100, '\0'));
-  const Said said = run(model + write("torn.lcm", bytes.substr(0, bytes.size() - 30)));
+  const Said said = run(model + folder.write("torn.lcm", bytes.substr(0, bytes.size() - 30)));
   EXPECT_EQ(said.status, 1);
   EXPECT_THAT(said.err, HasSubstr("damaged"));
   EXPECT_THAT(said.out, StartsWith("utime,x_mm,y_mm,z_mm\n"));

@@ -2,16 +2,14 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-#include <unistd.h>
-
 #include <filesystem>
-#include <fstream>
 #include <thread>
 
 #include "drivers/camera/frame_source.hpp"
 #include "drivers/can/memory_bus.hpp"
 #include "nodes/rig_node.hpp"
 #include "tests/effects/script.hpp"
+#include "tests/support/temporary_folder.hpp"
 
 namespace bevel::model::testing {
 namespace {
@@ -74,7 +72,8 @@ TEST(RigWithEffects, FramesOfALateCameraComeLateAndAreStampedThen) {
   config.cameras.resize(1);
   config.cameras[0].view.origin_px = {240, 40};
   config.rig.effects = {{.name = "camera_latency", .parameters = {{"latency_s", 0.1}}}};
-  const std::string socket = (fs::temp_directory_path() / ("bevel_rig_" + std::to_string(::getpid()))).string();
+  const test::TemporaryFolder folder;
+  const std::string socket = (folder / "frames").string();
   rig::FrameServer frames(socket);
   const auto source = camera::make_frame_source({.kind = camera::SourceKind::stream, .path = socket});
   for (int i = 0; i < 5000 && frames.clients() < 1; ++i) std::this_thread::sleep_for(std::chrono::milliseconds(1));
@@ -93,12 +92,9 @@ TEST(RigWithEffects, FramesOfALateCameraComeLateAndAreStampedThen) {
 }
 
 struct RigConfigFile : ::testing::Test {
-  fs::path folder = fs::temp_directory_path() / ("bevel_rig_config_" + std::to_string(::getpid()));
-  void SetUp() override { fs::create_directories(folder); }
-  void TearDown() override { fs::remove_all(folder); }
+  test::TemporaryFolder folder;
   nodes::RigConfig load(const std::string& rig) const {
-    std::ofstream(folder / "rig.toml") << kNeedle << rig;
-    return nodes::load_system_config((folder / "rig.toml").string()).rig;
+    return nodes::load_system_config(folder.write("rig.toml", kNeedle + rig)).rig;
   }
   std::string fault_of(const std::string& rig) const {
     try {

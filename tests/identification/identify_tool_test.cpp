@@ -6,12 +6,11 @@
 #include <nlohmann/json.hpp>
 #include <sstream>
 
-#include <unistd.h>
-
 #include "io/log_writer.hpp"
 #include "io/messages.hpp"
 #include "io/model_file.hpp"
 #include "tests/identification/simulated_insertion.hpp"
+#include "tests/support/temporary_folder.hpp"
 #include "tools/identify/identify.hpp"
 
 namespace bevel::identify {
@@ -20,12 +19,11 @@ namespace {
 namespace fs = std::filesystem;
 
 struct IdentifyTool : ::testing::Test {
-  fs::path folder = fs::temp_directory_path() / ("bevel_identify_" + std::to_string(::getpid()));
+  test::TemporaryFolder folder;
   model::NeedleParameters truth;
   Options options;
 
   void SetUp() override {
-    fs::create_directories(folder);
     truth.lambda1_per_rad = 0.49;
     truth.lambda2 = 0.22;
     auto start = truth;
@@ -47,7 +45,6 @@ struct IdentifyTool : ::testing::Test {
     options.model_path = (folder / "start.toml").string();
     options.out_folder = (folder / "out").string();
   }
-  void TearDown() override { fs::remove_all(folder); }
 };
 
 TEST_F(IdentifyTool, WritesAModelThatOtherProgramsAcceptAndFiguresToMatch) {

@@ -13,6 +13,7 @@
 #include <vector>
 
 #include "diagnosis/identification/candidates.hpp"
+#include "tests/support/shared_recordings.hpp"
 
 namespace {
 using namespace bevel;
@@ -178,9 +179,7 @@ void study_tissue(const fs::path& folder, const std::string& tissue) {
 }  // namespace
 
 int main() {
-  const char* shared = std::getenv("BEVEL_SHARED");
-  const fs::path folder =
-      (shared != nullptr ? fs::path(shared) : fs::path(BEVEL_SOURCE_DIR) / ".." / "shared") / "real" / "bwh";
+  const fs::path folder = bevel::test::shared_recordings() / "real" / "bwh";
   if (!fs::exists(folder)) {
     std::printf("%s: not there; the real recordings are not part of this project\n", folder.c_str());
     return 0;

@@ -1,35 +1,26 @@
 #include <gtest/gtest.h>
-#include <unistd.h>
 
-#include <cstdlib>
 #include <filesystem>
-#include <fstream>
 
 #include "io/csv_export.hpp"
 #include "io/csv_import.hpp"
+#include "tests/support/shared_recordings.hpp"
+#include "tests/support/temporary_folder.hpp"
 
 namespace bevel::io {
 namespace {
 
 class CsvImport : public ::testing::Test {
  protected:
-  void SetUp() override {
-    folder = std::filesystem::temp_directory_path() / ("bevel-csv-" + std::to_string(::getpid()));
-    std::filesystem::create_directories(folder);
-  }
-  void TearDown() override { std::filesystem::remove_all(folder); }
-  std::string file(const std::string& name, const std::string& text) {
-    std::ofstream(folder / name) << text;
-    return (folder / name).string();
-  }
-  std::string map(const std::string& insertion = "column = \"-Base y\"\nsettled = true\n") {
+  std::string file(const std::string& name, const std::string& text) const { return folder.write(name, text); }
+  std::string map(const std::string& insertion = "column = \"-Base y\"\nsettled = true\n") const {
     return file("map.toml",
                 "[time]\nseconds = \"s\"\nnanoseconds = \"ns\"\n[tip]\naxes = [\"Tip z\", \"-Tip x\", \"-Tip y\"]\n"
                 "origin = [\"E z\", \"-E x\", \"-E y\"]\nsigma_mm = [0.1, 0.2, 0]\n[insertion]\n" +
                     insertion + "[rows]\nnonzero = [\"Tip x\", \"E x\"]\n");
   }
   static constexpr const char* kHeader = "s, ns, Tip x, Tip y, Tip z, E x, E y, E z, Base y\n";
-  std::filesystem::path folder;
+  test::TemporaryFolder folder;
 };
 
 TEST_F(CsvImport, MapsAxesDropsEmptyRowsAndKeepsOnlySettledSteps) {
@@ -85,10 +76,8 @@ TEST_F(CsvImport, FaultsNameFileLineColumnAndTheNearestName) {
 }
 
 TEST_F(CsvImport, RealInsertionsBecomeLogsOfTwentyOneSteps) {
-  const char* shared = std::getenv("BEVEL_SHARED");
-  const std::filesystem::path real =
-      (shared ? std::filesystem::path(shared) : std::filesystem::path(BEVEL_SOURCE_DIR) / "../shared") / "real/bwh";
-  if (!std::filesystem::exists(real)) GTEST_SKIP() << "no recordings at " << real << "; set BEVEL_SHARED";
+  const std::filesystem::path real = test::shared_recordings() / "real/bwh";
+  BEVEL_SKIP_WITHOUT(real);
   const ColumnMap columns = load_column_map(std::string(BEVEL_SOURCE_DIR) + "/docs/import/bwh.toml");
   int files = 0;
   for (const auto& entry : std::filesystem::directory_iterator(real)) {

@@ -4,8 +4,6 @@
 
 #include <chrono>
 #include <cstdlib>
-#include <filesystem>
-#include <fstream>
 #include <random>
 #include <set>
 
@@ -13,6 +11,7 @@
 #include "io/log_writer.hpp"
 #include "io/messages.hpp"
 #include "io/recording.hpp"
+#include "tests/support/temporary_folder.hpp"
 
 namespace bevel::io {
 namespace {
@@ -21,17 +20,16 @@ using Bytes = std::vector<std::uint8_t>;
 
 class TemporaryLog {
  public:
-  explicit TemporaryLog(const std::string& name)
-      : path_(std::filesystem::temp_directory_path() / ("bevel-test-" + std::to_string(::getpid()) + "-" + name)) {}
-  ~TemporaryLog() { std::filesystem::remove(path_); }
-  std::string path() const { return path_.string(); }
+  explicit TemporaryLog(const std::string& name) : path_((folder_ / name).string()) {}
+  const std::string& path() const { return path_; }
   Bytes bytes() const {
-    std::ifstream file(path_, std::ios::binary);
-    return Bytes{std::istreambuf_iterator<char>(file), {}};
+    const std::string text = test::text_of(path_);
+    return {text.begin(), text.end()};
   }
 
  private:
-  std::filesystem::path path_;
+  test::TemporaryFolder folder_;
+  std::string path_;
 };
 
 actuator_state_t actuator(std::int64_t seq) {

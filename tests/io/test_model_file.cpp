@@ -2,9 +2,8 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-#include <filesystem>
-
 #include "io/model_file.hpp"
+#include "tests/support/temporary_folder.hpp"
 
 namespace bevel::io {
 namespace {
@@ -58,10 +57,10 @@ TEST(ModelFile, saves_what_it_loads_to_the_last_bit) {
   model.needle.curvature_per_mm = 0.1 / 21.0;
   model.needle.lambda1_per_rad = 1.0 / 3.0;
   model.effects[0].parameters["lag_at_100mm_rad"] = 1e-7;
-  const std::string path = (std::filesystem::temp_directory_path() / "bevel-test-model.toml").string();
+  const test::TemporaryFolder folder;
+  const std::string path = (folder / "model.toml").string();
   save_model_file(model, path);
   EXPECT_EQ(load_model_file(path), model);
-  std::filesystem::remove(path);
   EXPECT_THAT(to_toml(model), HasSubstr("wheelbase_mm = 20.0"));  // a float to other readers too
   EXPECT_THROW(save_model_file(model, "/nonexistent/m.toml"), std::runtime_error);
 }

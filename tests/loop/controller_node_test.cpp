@@ -1,21 +1,17 @@
 // bevel-controller as a rig's file sets it up: what it commands for the same state, with effects and without.
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
-#include <unistd.h>
-
-#include <filesystem>
-#include <fstream>
 
 #include "controller/axis_model.hpp"
 #include "nodes/controller_node.hpp"
 #include "nodes/needle_pose.hpp"
 #include "nodes/runtime.hpp"
 #include "nodes/system_config.hpp"
+#include "tests/support/temporary_folder.hpp"
 
 namespace bevel::nodes {
 namespace {
 
-namespace fs = std::filesystem;
 using ::testing::ElementsAre;
 using ::testing::HasSubstr;
 using ::testing::IsEmpty;
@@ -31,11 +27,8 @@ constexpr const char* kLostSteps =
     "[[effect]]\nname = \"lost_steps\"\nrotation_rad = 0.8\n[effect.recordings.\"rec01.lcm\"]\nat_s = 3.3\n";
 
 SystemConfig system_of(const std::string& text) {
-  const fs::path path = fs::temp_directory_path() / ("bevel_controller_node_" + std::to_string(::getpid()) + ".toml");
-  std::ofstream(path) << text;
-  SystemConfig config = load_system_config(path.string());
-  fs::remove(path);
-  return config;
+  const test::TemporaryFolder folder;
+  return load_system_config(folder.write("rig.toml", text));
 }
 
 // Commands of `periods` of the loop, from the second on steering to a target at the side; the needle is at its entry,

@@ -1,7 +1,6 @@
 // What the estimator says live, over LCM, is what a replay of the log of the same messages says.
 #include <gtest/gtest.h>
 
-#include <filesystem>
 #include <random>
 
 #include "io/log_reader.hpp"
@@ -9,6 +8,7 @@
 #include "nodes/estimator_node.hpp"
 #include "nodes/runtime.hpp"
 #include "tests/estimator/insertion.hpp"
+#include "tests/support/temporary_folder.hpp"
 #include "tools/replay/replay.hpp"
 
 namespace bevel {
@@ -42,7 +42,8 @@ TEST(LiveReplay, TheNodesStatesAreThoseOfAReplayOfItsLog) {
   nodes::LcmPort port(lcm);
   std::vector<needle_state_t> live;
   port.subscribe<needle_state_t>(io::channel::kNeedleState, [&live](const needle_state_t& m) { live.push_back(m); });
-  const std::string path = (std::filesystem::path(::testing::TempDir()) / "live_replay.lcm").string();
+  const test::TemporaryFolder folder;
+  const std::string path = (folder / "live.lcm").string();
   {
     io::LogWriter log(path);
     for (const Event& event : events) {
@@ -62,7 +63,6 @@ TEST(LiveReplay, TheNodesStatesAreThoseOfAReplayOfItsLog) {
   }
   const io::MappedFile file(path);
   const auto replay = replay::replay_log(file.bytes(), "live", config);
-  std::filesystem::remove(path);
 
   ASSERT_EQ(live.size(), replay.states.size());
   ASSERT_GT(live.size(), 900U);

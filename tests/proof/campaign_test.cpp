@@ -10,6 +10,7 @@
 #include "proof/commitment.hpp"
 #include "proof/trial_files.hpp"
 #include "tests/proof/script_tool.hpp"
+#include "tests/support/temporary_folder.hpp"
 
 namespace bevel::proof {
 namespace {
@@ -27,7 +28,7 @@ class Campaign : public testing::Test {
     CampaignOptions o;
     o.trials = trials;
     o.seed = 4;
-    o.out = folder_.path() / "campaign";
+    o.out = folder_ / "campaign";
     o.diagnose = write_tool(folder_.path(), std::string(kFindOut) + tool_body);
     o.unsealed = true;
     return o;
@@ -39,14 +40,14 @@ class Campaign : public testing::Test {
     return status;
   }
   int calls() const {
-    const fs::path path = folder_.path() / "calls";
+    const fs::path path = folder_ / "calls";
     if (!fs::exists(path)) return 0;
     const std::string text = read_text(path);
     return static_cast<int>(std::count(text.begin(), text.end(), '\n'));
   }
-  std::string count_call() const { return "echo called >> '" + (folder_.path() / "calls").string() + "'\n"; }
+  std::string count_call() const { return "echo called >> '" + (folder_ / "calls").string() + "'\n"; }
 
-  TemporaryFolder folder_;
+  test::TemporaryFolder folder_;
   std::string said_;
 };
 
@@ -100,7 +101,7 @@ TEST_F(Campaign, ChangedLogsAndVerdictsAreNoticed) {
 TEST_F(Campaign, FailuresOfTheToolAreAbstentions) {
   for (const char* body :
        {"exit 3", "true", "echo nonsense > $out/verdict.json", "ln -s /etc/passwd $out/verdict.json"}) {
-    fs::remove_all(folder_.path() / "campaign");
+    fs::remove_all(folder_ / "campaign");
     const CampaignOptions o = options(body, 1);
     ASSERT_EQ(run(o), 0) << body;
     EXPECT_EQ(json::parse(read_text(o.out / "results.json"))["summary"]["abstentions"], 1) << body;
@@ -122,7 +123,7 @@ TEST_F(Campaign, AnInterruptLeavesNothingHalfDone) {
 
 TEST_F(Campaign, AToolThatDoesNotExistIsNamedBeforeAnythingRuns) {
   CampaignOptions o = options("true", 1);
-  o.diagnose = folder_.path() / "no-such-tool";
+  o.diagnose = folder_ / "no-such-tool";
   EXPECT_THAT([&] { run(o); }, ThrowsMessage<std::runtime_error>(HasSubstr("no-such-tool")));
 }
 

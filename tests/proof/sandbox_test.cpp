@@ -13,6 +13,7 @@
 #include "proof/tool_run.hpp"
 #include "proof/trial_files.hpp"
 #include "tests/proof/script_tool.hpp"
+#include "tests/support/temporary_folder.hpp"
 
 namespace bevel::proof {
 namespace {
@@ -32,20 +33,20 @@ class Sandbox : public testing::Test {
  protected:
   void SetUp() override {
     if (!namespaces_work()) GTEST_SKIP() << "this kernel does not let users make namespaces";
-    fs::create_directories(folder_.path() / "case");
-    fs::create_directories(folder_.path() / "out");
-    write_atomically(folder_.path() / "case" / "rec01.lcm", "a log");
-    write_atomically(folder_.path() / "case" / "model.toml", "a model");
+    fs::create_directories(folder_ / "case");
+    fs::create_directories(folder_ / "out");
+    write_atomically(folder_ / "case" / "rec01.lcm", "a log");
+    write_atomically(folder_ / "case" / "model.toml", "a model");
     write_atomically(secret(), "THE TRUTH");
   }
-  fs::path secret() const { return folder_.path() / "sealed" / "t0000.json"; }
+  fs::path secret() const { return folder_ / "sealed" / "t0000.json"; }
 
   ToolRun run_of(const std::string& body, bool sealed) {
     return {write_tool(folder_.path(), body),
-            folder_.path() / "case",
-            folder_.path() / "out",
-            folder_.path() / "sealed",
-            folder_.path() / "console.txt",
+            folder_ / "case",
+            folder_ / "out",
+            folder_ / "sealed",
+            folder_ / "console.txt",
             {},
             30.0,
             sealed};
@@ -54,10 +55,10 @@ class Sandbox : public testing::Test {
   std::string console(const std::string& body, bool sealed) {
     const std::atomic<int> stop{0};
     run_tool(run_of(body, sealed), stop);
-    return read_text(folder_.path() / "console.txt");
+    return read_text(folder_ / "console.txt");
   }
 
-  TemporaryFolder folder_;
+  test::TemporaryFolder folder_;
 };
 
 TEST_F(Sandbox, TheCaseIsThereReadOnlyAndTheOutputIsKept) {
@@ -67,9 +68,9 @@ TEST_F(Sandbox, TheCaseIsThereReadOnlyAndTheOutputIsKept) {
       true);
   EXPECT_THAT(said, HasSubstr("--model /case/model.toml --out /out /case/rec01.lcm"));
   EXPECT_THAT(said, HasSubstr("a log"));
-  EXPECT_EQ(read_text(folder_.path() / "out" / "verdict.json"), "yes\n");
-  EXPECT_EQ(read_text(folder_.path() / "case" / "rec01.lcm"), "a log");
-  EXPECT_EQ(read_text(folder_.path() / "case" / "model.toml"), "a model");
+  EXPECT_EQ(read_text(folder_ / "out" / "verdict.json"), "yes\n");
+  EXPECT_EQ(read_text(folder_ / "case" / "rec01.lcm"), "a log");
+  EXPECT_EQ(read_text(folder_ / "case" / "model.toml"), "a model");
 }
 
 TEST_F(Sandbox, TheTruthCannotBeOpenedByItsName) {
@@ -133,7 +134,7 @@ TEST_F(Sandbox, WhenTimeIsOverNothingOfTheToolStaysBehind) {
     EXPECT_LT(end.seconds, 20.0);
   }
   std::this_thread::sleep_for(std::chrono::milliseconds(1600));
-  EXPECT_FALSE(fs::exists(folder_.path() / "out" / "late"));
+  EXPECT_FALSE(fs::exists(folder_ / "out" / "late"));
 }
 
 TEST_F(Sandbox, ATruthInSightOfTheToolIsRefused) {

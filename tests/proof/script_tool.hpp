@@ -1,9 +1,8 @@
 #pragma once
 // Tools under test, made of a few lines of shell.
+#include <filesystem>
 #include <fstream>
 #include <string>
-
-#include "tests/proof/temporary_folder.hpp"
 
 namespace bevel::proof {
 

@@ -10,7 +10,7 @@
 #include "io/recording.hpp"
 #include "proof/score.hpp"
 #include "proof/trial_files.hpp"
-#include "tests/proof/temporary_folder.hpp"
+#include "tests/support/temporary_folder.hpp"
 
 namespace bevel::proof {
 namespace {
@@ -67,7 +67,7 @@ TEST(Trial, AnEffectBelowTheLimitIsNotExpected) {
 }
 
 TEST(Trial, TheLabsModelFileIsWrongButValidAndLogsAreWhole) {
-  const TemporaryFolder out;
+  const test::TemporaryFolder out;
   const Trial trial = draw_trial(4, first_of(TrialClass::nothing));
   write_trial(out.path(), trial);
   const TrialFolders folders(out.path(), trial.truth.trial);
@@ -93,7 +93,7 @@ TEST(Trial, TheLabsModelFileIsWrongButValidAndLogsAreWhole) {
 }
 
 TEST(Trial, NothingTheToolSeesHoldsTheTruth) {
-  const TemporaryFolder out;
+  const test::TemporaryFolder out;
   const int number = first_of(TrialClass::one);
   const Trial trial = draw_trial(4, number);
   write_trial(out.path(), trial);
@@ -106,7 +106,7 @@ TEST(Trial, NothingTheToolSeesHoldsTheTruth) {
 }
 
 TEST(Trial, ATruthThatWasChangedDoesNotOpen) {
-  const TemporaryFolder out;
+  const test::TemporaryFolder out;
   write_trial(out.path(), draw_trial(4, first_of(TrialClass::nothing)));
   const TrialFolders folders(out.path(), first_of(TrialClass::nothing));
   EXPECT_NO_THROW(open_truth(folders));
