@@ -28,6 +28,7 @@ CameraNode::Outcome CameraNode::step(std::int64_t now_utime, int timeout_ms) {
     return Outcome::failed;
   }
   const auto& seen = std::get<camera::TipObservation>(result);
+  status_.note_run(seen.run_s);
   tip_measurement_t m{};
   m.utime = seen.capture_utime;
   m.seq = seq_++;

@@ -53,7 +53,6 @@ void ControllerNode::step(std::int64_t now_utime, double late_s) {
     supervisor_.report_overrun();
   }
   port_.publish(io::channel::kMotionCommand, io::to_message(supervisor_.step(now_utime, config_.period_s)));
-  status_.note_step(late_s, 0);
   const controller::Status& s = supervisor_.status();
   std::string reason = controller::to_string(s.reason);
   char number[96];

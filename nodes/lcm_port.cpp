@@ -1,6 +1,6 @@
 #include "nodes/lcm_port.hpp"
 
-#include <algorithm>
+#include "nodes/runtime.hpp"
 
 namespace bevel::nodes {
 namespace {
@@ -21,24 +21,21 @@ StatusReporter::StatusReporter(LcmPort& port, std::string process, double period
   message_.loop_period_s = period_s;
 }
 
-void StatusReporter::note_step(double late_s, double run_s) {
-  message_.loop_late_max_s = std::max(message_.loop_late_max_s, late_s);
-  message_.loop_run_max_s = std::max(message_.loop_run_max_s, run_s);
-  if (message_.loop_period_s > 0 && run_s > message_.loop_period_s) ++overruns_;
-}
-
 void StatusReporter::report(std::int64_t now_utime, const std::string& state, const std::string& reason) {
   const bool changed = state != message_.state || reason != message_.reason;
   if (!changed && now_utime - last_utime_ < kStatusPeriod_us && now_utime >= last_utime_) return;
   message_.utime = now_utime;
   message_.state = state;
   message_.reason = reason;
-  message_.overruns = overruns_;
+  const LoopTimes loop = take_loop_times();
+  message_.loop_late_max_s = loop.late_max_s;
+  message_.loop_run_max_s = std::max(loop.run_max_s, run_max_s_);
+  message_.overruns = loop.overruns + overruns_;
   message_.received = port_.counters().received;
   message_.rejected = port_.counters().rejected;
   port_.publish(io::channel::kProcessStatus, message_);
   ++message_.seq;
-  message_.loop_late_max_s = message_.loop_run_max_s = 0;
+  run_max_s_ = 0;
   last_utime_ = now_utime;
 }
 

@@ -1,6 +1,7 @@
 #pragma once
 // LCM for the nodes: every message that comes in goes through the one checked decode, every one that goes out is
 // checked before. One lcm::LCM per thread; no exception leaves a handler.
+#include <algorithm>
 #include <bevel/actuator_state_t.hpp>
 #include <bevel/motion_command_t.hpp>
 #include <bevel/needle_state_t.hpp>
@@ -91,8 +92,9 @@ class LcmPort {
 class StatusReporter {
  public:
   StatusReporter(LcmPort& port, std::string process, double period_s);
-  void note_step(double late_s, double run_s);
-  void note_overrun() { ++overruns_; }
+  // For a process whose steps its input drives; those of run_periodic() are measured there.
+  void note_run(double run_s) { run_max_s_ = std::max(run_max_s_, run_s); }
+  void note_overrun() { ++overruns_; }  // of a bound of the process's own, beside those of its loop
   // Sends when it is time or when state or reason changed.
   void report(std::int64_t now_utime, const std::string& state, const std::string& reason);
 
@@ -100,6 +102,7 @@ class StatusReporter {
   LcmPort& port_;
   process_status_t message_{};
   std::int64_t last_utime_ = 0;
+  double run_max_s_ = 0;
   std::int64_t overruns_ = 0;
 };
 

@@ -6,6 +6,7 @@
 #include <sys/socket.h>
 #include <sys/un.h>
 
+#include <algorithm>
 #include <cerrno>
 #include <chrono>
 #include <cmath>
@@ -22,6 +23,8 @@ static_assert(std::atomic<bool>::is_always_lock_free, "set from a signal handler
 void on_signal(int) { stop_flag = true; }
 
 constexpr int kMaxMessagesAtOnce = 256;
+
+thread_local LoopTimes loop_times;
 
 }  // namespace
 
@@ -68,22 +71,42 @@ void pump(lcm::LCM& lcm) {
   }
 }
 
+LoopTimes take_loop_times() {
+  const LoopTimes taken = loop_times;
+  loop_times = {0, 0, taken.overruns};
+  return taken;
+}
+
 void run_periodic(lcm::LCM& lcm, double period_s, const std::function<bool(const Now&, double late_s)>& step) {
   const auto period_ns = std::llround(period_s * 1e9);
   std::int64_t due_ns = now().ns;
+  loop_times = {};
+  const auto note_run = [period_ns](std::int64_t run_ns) {
+    loop_times.run_max_s = std::max(loop_times.run_max_s, static_cast<double>(run_ns) * 1e-9);
+    if (run_ns > period_ns) ++loop_times.overruns;
+  };
   while (!stop_requested()) {
     const std::int64_t wait_ns = due_ns - now().ns;
     if (wait_ns > 0) {
       pollfd fd{lcm.getFileno(), POLLIN, 0};
       const timespec timeout{wait_ns / 1'000'000'000, wait_ns % 1'000'000'000};
-      if (ppoll(&fd, 1, &timeout, nullptr) > 0) lcm.handleTimeout(0);
+      if (ppoll(&fd, 1, &timeout, nullptr) <= 0) continue;
+      const std::int64_t begun_ns = now().ns;
+      lcm.handleTimeout(0);
+      note_run(now().ns - begun_ns);
       continue;
     }
+    const std::int64_t begun_ns = now().ns;
     pump(lcm);
     const Now at = now();
-    if (!step(at, static_cast<double>(at.ns - due_ns) * 1e-9)) return;
+    const double late_s = static_cast<double>(at.ns - due_ns) * 1e-9;
+    loop_times.late_max_s = std::max(loop_times.late_max_s, late_s);
+    const bool go_on = step(at, late_s);
+    const std::int64_t done_ns = now().ns;
+    note_run(done_ns - begun_ns);
+    if (!go_on) return;
     due_ns += period_ns;
-    if (now().ns - due_ns > period_ns) due_ns = now().ns;
+    if (done_ns - due_ns > period_ns) due_ns = done_ns;
   }
 }
 

@@ -30,6 +30,15 @@ std::string try_realtime(int priority);
 // arrive in between. After a stall the missed periods are skipped, not caught up.
 void run_periodic(lcm::LCM& lcm, double period_s, const std::function<bool(const Now&, double late_s)>& step);
 
+// How the loop on this thread keeps its time. One process has one loop, and its status is reported from within.
+struct LoopTimes {
+  double late_max_s = 0;      // latest start of a step, since the last taking
+  double run_max_s = 0;       // longest step or handling of a message, since the last taking
+  std::int64_t overruns = 0;  // of those longer than the period, since the start
+};
+// Of run_periodic() on this thread, up to the step before the one that asks; zeros without one. Both maxima begin anew.
+LoopTimes take_loop_times();
+
 // Handles what has arrived, without waiting.
 void pump(lcm::LCM& lcm);
 

@@ -41,7 +41,12 @@ CameraPipeline::Result CameraPipeline::next(std::chrono::milliseconds timeout) {
     if (auto* failure = std::get_if<SourceFailure>(&got)) return std::move(*failure);
     const Frame& frame = std::get<Frame>(got);
     const auto eye = eyes_.find(frame.camera);
-    if (eye != eyes_.end()) return observe(eye->second, frame);
+    if (eye != eyes_.end()) {
+      const auto begun = std::chrono::steady_clock::now();
+      TipObservation seen = observe(eye->second, frame);
+      seen.run_s = std::chrono::duration<double>(std::chrono::steady_clock::now() - begun).count();
+      return seen;
+    }
     ++counters_.unknown_camera;
   }
 }

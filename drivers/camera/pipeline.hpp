@@ -28,6 +28,7 @@ struct TipObservation {
   cv::Point2d tip_px;             ///< and the rest: only if ok
   cv::Vec2d direction_px;
   std::string_view reason;  ///< why not ok; static storage
+  double run_s = 0;         ///< from the frame to this, without waiting for it
 };
 
 struct CameraSetup {
