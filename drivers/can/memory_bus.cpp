@@ -5,7 +5,7 @@
 namespace bevel::can {
 
 std::unique_ptr<MemoryBus> MemoryNetwork::attach() {
-  auto bus = std::make_unique<MemoryBus>(*this);
+  auto bus = std::unique_ptr<MemoryBus>(new MemoryBus(*this));
   members_.push_back(bus.get());
   return bus;
 }

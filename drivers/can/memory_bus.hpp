@@ -44,7 +44,6 @@ class MemoryBus : public Bus {
  public:
   static constexpr std::size_t kTransmitQueueFrames = 10;
 
-  explicit MemoryBus(MemoryNetwork& network) : network_(&network) {}
   ~MemoryBus() override;
 
   SendResult send(const Frame& frame) override;
@@ -59,6 +58,8 @@ class MemoryBus : public Bus {
 
  private:
   friend class MemoryNetwork;
+  // By MemoryNetwork::attach() alone: without a place on the wire it would hear nothing.
+  explicit MemoryBus(MemoryNetwork& network) : network_(&network) {}
   void lose(BusEvent why);
 
   MemoryNetwork* network_;
