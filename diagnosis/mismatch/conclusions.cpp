@@ -50,7 +50,7 @@ TriedEffect tried_of(const Trial& trial, const EffectSet& beside) {
                   .beside = beside.empty() ? "" : describe(beside),
                   .gain = trial.gain,
                   .chance = trial.chance,
-                  .threshold = std::max(trial.threshold, trial.chance + kVisibleSigmas * kVisibleSigmas),
+                  .threshold = trial.limit(),
                   .evidence = trial.evidence,
                   .parameters = {},
                   .passes = trial.passes()};
@@ -64,8 +64,7 @@ TriedEffect tried_of(const Trial& trial, const EffectSet& beside) {
 
 std::vector<TriedEffect> tried_beside(Selection& selection, const EffectSet& set) {
   std::vector<TriedEffect> out;
-  for (const Trial& trial : selection.additions(set))
-    if (trial.fit) out.push_back(tried_of(trial, set));
+  for (const Trial& trial : selection.additions(set)) out.push_back(tried_of(trial, set));
   return out;
 }
 
@@ -109,12 +108,10 @@ FoundEffect find_effect_of(Selection& selection, const EffectSet& set, std::size
   found.name = set[member].effect->name();
   found.meaning = set[member].effect->meaning();
   found.probability = probability_of(selection.visited(), set[member]);
-  found.ambiguous_with = rivals_of(selection, set, member);
-  found.gain = without.penalised - fit.penalised - kInstantCost * (instants_in_use(fit) - instants_in_use(without));
+  found.gain = cost_of(without) - cost_of(fit);
   found.visible_sigmas = std::sqrt(std::max(0.0, found.gain));
   for (const Trial& trial : selection.additions(rest))
-    if (trial.fit && trial.set.back() == set[member])
-      found.threshold = std::max(trial.threshold, trial.chance + kVisibleSigmas * kVisibleSigmas);
+    if (trial.set.back() == set[member]) found.threshold = trial.limit();
   std::size_t in_fit = 0;
   while (!(fit.hypothesis.set()[in_fit] == set[member])) ++in_fit;
   find_parameters(selection.evidence(), fit, in_fit, found, threads);
@@ -195,11 +192,25 @@ double confusion_between(const Findings& findings, const std::string& a, const s
   return largest;
 }
 
+// Effects that explain as much in its place, or nearly, where the two look alike in these recordings.
+std::vector<std::string> rivals_of(Selection& selection, const EffectSet& set, std::size_t member,
+                                   const Findings& findings) {
+  std::set<std::string> names;
+  const std::string mine(set[member].effect->name());
+  for (const Trial& trial : selection.additions(without_member(set, member))) {
+    const std::string other(trial.set.back().effect->name());
+    const double behind = selection.evidence_of(set) - trial.evidence;
+    const bool alike = confusion_between(findings, mine, other) > kSameSignature;
+    if (other != mine && behind < (alike ? kCloseEvidence : kRivalEvidence)) names.insert(other);
+  }
+  return {names.begin(), names.end()};
+}
+
 // What comes nearest to the verdict: the set to tell it from.
 const Trial* nearest_rival(Selection& selection, const EffectSet& set) {
   const auto& trials = selection.additions(set.empty() ? EffectSet{} : without_member(set, set.size() - 1));
   for (const Trial& trial : trials)
-    if (trial.fit && key_of(trial.set) != key_of(set)) return &trial;
+    if (key_of(trial.set) != key_of(set)) return &trial;
   return nullptr;
 }
 
@@ -263,15 +274,6 @@ double probability_of(const std::vector<std::pair<EffectSet, double>>& visited, 
   return with / all;
 }
 
-std::vector<std::string> rivals_of(Selection& selection, const EffectSet& set, std::size_t member) {
-  std::set<std::string> names;
-  const double evidence = selection.evidence_of(set);
-  for (const Trial& trial : selection.additions(without_member(set, member)))
-    if (trial.fit && trial.set.back().effect != set[member].effect && trial.evidence > evidence - kRivalEvidence)
-      names.insert(std::string(trial.set.back().effect->name()));
-  return {names.begin(), names.end()};
-}
-
 void conclude(Selection& selection, const Fit& base, const EffectSet& set, Findings& findings, int threads) {
   const std::shared_ptr<const Fit> fit = selection.fit_of(set);
   findings.base = estimate_of(base);
@@ -287,14 +289,7 @@ void conclude(Selection& selection, const Fit& base, const EffectSet& set, Findi
       continue;
     }
     FoundEffect found = find_effect_of(selection, set, m, threads);
-    // Nearly one signature: a rival a little further off counts too.
-    for (const Trial& trial : selection.additions(without_member(set, m))) {
-      const std::string other(trial.set.back().effect->name());
-      if (!trial.fit || other == found.name || trial.evidence < selection.evidence_of(set) - kCloseEvidence) continue;
-      if (confusion_between(findings, found.name, other) > kSameSignature &&
-          std::find(found.ambiguous_with.begin(), found.ambiguous_with.end(), other) == found.ambiguous_with.end())
-        found.ambiguous_with.push_back(other);
-    }
+    found.ambiguous_with = rivals_of(selection, set, m, findings);
     findings.effects.push_back(std::move(found));
   }
   const Remains remains = examine_remains(selection.evidence(), *fit);

@@ -9,8 +9,7 @@ namespace bevel::diagnosis {
 // Fills all of `findings` that follows from the selection (not: held_out, where, noise, traces).
 void conclude(Selection& selection, const Fit& base, const EffectSet& set, Findings& findings, int threads);
 
-// Parts of it, for tests.
+// A part of it, for tests.
 double probability_of(const std::vector<std::pair<EffectSet, double>>& visited, const Member& member);
-std::vector<std::string> rivals_of(Selection& selection, const EffectSet& set, std::size_t member);
 
 }  // namespace bevel::diagnosis

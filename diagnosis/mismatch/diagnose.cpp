@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <chrono>
 #include <cmath>
+#include <limits>
 
 #include "diagnosis/mismatch/conclusions.hpp"
 #include "diagnosis/mismatch/gates.hpp"
@@ -13,8 +14,9 @@ namespace bevel::diagnosis {
 namespace {
 
 constexpr double kNoiseSettled_share = 0.03;  // of sigma
-constexpr double kNoiseSettled_ar1 = 0.03;
+constexpr double kNoiseSettled_ar = 0.03;
 constexpr int kNoiseRounds = 3;
+constexpr std::size_t kFewReadings = 40;
 
 class Stages {
  public:
@@ -41,7 +43,7 @@ class Stages {
 bool settled(const Noise& a, const Noise& b) {
   for (std::size_t c = 0; c < a.sigma_mm.size(); ++c)
     if (std::abs(b.sigma_mm[c] / a.sigma_mm[c] - 1) > kNoiseSettled_share) return false;
-  return std::abs(a.ar1 - b.ar1) < kNoiseSettled_ar1;
+  return std::abs(a.ar1 - b.ar1) < kNoiseSettled_ar && std::abs(a.ar2 - b.ar2) < kNoiseSettled_ar;
 }
 
 // Leave-one-out, before and after, with the figures per recording.
@@ -63,6 +65,41 @@ HeldOut hold_out(const Evidence& evidence, const Fit& before, const Fit& after, 
   }
   out.gain = without.total() - with.total();
   return out;
+}
+
+void remark_on_short_recordings(const RecordedCase& recorded, Findings& findings) {
+  std::size_t fewest = std::numeric_limits<std::size_t>::max();
+  for (const auto& recording : recorded.recordings) fewest = std::min(fewest, recording.motion.at.size());
+  if (fewest < kFewReadings)
+    findings.remarks.push_back(
+        "a recording has only " + std::to_string(fewest) +
+        " readings: the cameras' noise is hardly known, and what is quicker than a few readings cannot be seen");
+}
+
+// A name that does not foretell is not physics, and a nameless curve that does not is no description.
+void drop_what_does_not_foretell(Selection& selection, const Fit& base, EffectSet& set, Findings& findings,
+                                 int threads) {
+  const Evidence& evidence = selection.evidence();
+  const auto drop = [&](EffectSet::iterator member) {
+    const EffectSet rest = without_member(set, static_cast<std::size_t>(member - set.begin()));
+    findings.remarks.push_back(std::string(member->effect->name()) + " beside " + describe(rest) +
+                               " fits, but foretells recordings that it was not fitted on no better: it was dropped");
+    set = rest;
+    findings.held_out = hold_out(evidence, base, *selection.fit_of(set), threads);
+  };
+  for (bool dropped = true; dropped;) {
+    dropped = false;
+    for (auto member = set.begin(); member != set.end() && !dropped; ++member) {
+      if (!is_correction(*member)) continue;
+      const EffectSet rest = without_member(set, static_cast<std::size_t>(member - set.begin()));
+      if (leave_one_out(evidence, *selection.fit_of(set), threads).total() <
+          leave_one_out(evidence, *selection.fit_of(rest), threads).total())
+        continue;
+      drop(member);
+      dropped = true;
+    }
+  }
+  while (!set.empty() && findings.held_out.gain <= 0) drop(std::prev(set.end()));
 }
 
 }  // namespace
@@ -117,21 +154,13 @@ Findings diagnose(const RecordedCase& original, const model::NeedleParameters& m
     if (only_outliers && round > 0) break;
   }
   findings.noise = evidence.noise;
+  remark_on_short_recordings(original, findings);
   for (const auto& recording : original.recordings) findings.readings += recording.motion.at.size();
   for (const auto& readings : calibration.outliers) findings.outliers += readings.size();
 
   stages.begin("foretelling each recording from the others");
   findings.held_out = hold_out(evidence, base, *selection->fit_of(set), options.threads);
-  while (findings.held_out.gain <= 0) {
-    // A name that does not foretell is not physics. (A nameless curve may: it only describes.)
-    const auto named = std::find_if_not(set.rbegin(), set.rend(), is_correction);
-    if (named == set.rend()) break;
-    findings.remarks.push_back(std::string(named->effect->name()) + " beside " +
-                               describe(without_member(set, static_cast<std::size_t>(set.rend() - named) - 1)) +
-                               " fits, but foretells recordings that it was not fitted on no better: it was dropped");
-    set.erase(std::next(named).base());
-    findings.held_out = hold_out(evidence, base, *selection->fit_of(set), options.threads);
-  }
+  drop_what_does_not_foretell(*selection, base, set, findings, options.threads);
 
   stages.begin("intervals, rivals and the next experiment");
   conclude(*selection, base, set, findings, options.threads);

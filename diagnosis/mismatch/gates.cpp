@@ -11,7 +11,7 @@
 
 namespace bevel::diagnosis {
 namespace {
-constexpr int kLags = 12;
+constexpr int kLags = 12;                // at most, and a third of the readings
 constexpr double kBandQuantile = 2.576;  // 99 %
 }  // namespace
 
@@ -58,11 +58,6 @@ HeldOutFit leave_one_out(const Evidence& evidence, const Fit& whole, int threads
   return out;
 }
 
-double ljung_box_p(const Eigen::VectorXd& white, int lags, int fitted) {
-  if (white.size() < 3 * lags) return 1;
-  return ljung_box(white, lags, fitted).p_value;
-}
-
 Remains examine_remains(const Evidence& evidence, const Fit& fit) {
   Remains out;
   Workspace workspace;
@@ -83,7 +78,10 @@ Remains examine_remains(const Evidence& evidence, const Fit& fit) {
       const Eigen::VectorXd white = workspace.residuals.white.segment(row, count);
       row += count;
       ++series_count;
-      smallest_p = std::min(smallest_p, ljung_box_p(white, kLags, evidence.noise.ar1 > 0 ? 1 : 0));
+      const auto& noise = evidence.noise;
+      const int lags = std::min(kLags, static_cast<int>(count) / 3);
+      smallest_p =
+          std::min(smallest_p, ljung_box(white, lags, (noise.ar1 > 0 ? 1 : 0) + (noise.ar2 != 0 ? 1 : 0)).p_value);
       Eigen::MatrixXd X = spline_basis(series, kKnot_s);
       whiten(make_whitening(series, evidence.noise, evidence.noise.sigma_mm[c]), X);
       const Eigen::HouseholderQR<Eigen::MatrixXd> qr(X);

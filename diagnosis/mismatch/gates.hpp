@@ -26,7 +26,4 @@ struct Remains {
 };
 Remains examine_remains(const Evidence& evidence, const Fit& fit);
 
-// Ljung and Box 1978, Biometrika 65: probability of correlations this large up to `lags` in white noise.
-double ljung_box_p(const Eigen::VectorXd& white, int lags, int fitted);
-
 }  // namespace bevel::diagnosis

@@ -8,7 +8,8 @@
 namespace bevel::diagnosis {
 namespace {
 constexpr double kCurvatureMax_per_mm = 0.05;
-constexpr double kSmallestU = 1e-9;  // (26) is strict
+constexpr double kSmallestU = 1e-9;      // (26) is strict
+constexpr double kFewestReadings = 2.5;  // a period
 }  // namespace
 
 std::string describe(const EffectSet& set) {
@@ -24,12 +25,19 @@ Hypothesis::Hypothesis(const model::NeedleParameters& needle, EffectSet set, con
   unknowns_.push_back({.lower = kSmallestU, .upper = 5});
   unknowns_.push_back({.lower = -2, .upper = 0.9});
   columns_.assign(recorded.recordings.size(), {0, 1, 2});
+  double longest_s = 0;
+  for (const auto& recording : recorded.recordings) longest_s = std::max(longest_s, recording.duration_s());
   for (std::size_t m = 0; m < set_.size(); ++m) {
     const auto& parameters = set_[m].effect->parameters();
     for (std::size_t p = 0; p < parameters.size(); ++p) {
       if (!set_[m].fits(p)) continue;
       Unknown unknown{static_cast<int>(m), static_cast<int>(p), -1,
                       parameters[p].lower, parameters[p].upper, parameters[p].periodic};
+      if (parameters[p].frequency) {
+        // Less than a period in the longest recording is a drift, and readings too far apart show another frequency.
+        unknown.lower = std::max(unknown.lower, 1 / std::max(longest_s, 1e-3));
+        unknown.upper = std::max(unknown.lower, std::min(unknown.upper, 1 / (kFewestReadings * recorded.frame_s)));
+      }
       if (parameters[p].scope == model::Scope::rig) {
         for (auto& columns : columns_) columns.push_back(static_cast<int>(unknowns_.size()));
         unknowns_.push_back(unknown);
@@ -95,10 +103,21 @@ void Hypothesis::clamp(Eigen::VectorXd& values) const {
     const Unknown& u = unknowns_[static_cast<std::size_t>(i)];
     if (u.periodic) {
       const double period = u.upper - u.lower;
-      values[i] -= period * std::floor((values[i] - u.lower) / period);
+      const double turns = std::floor((values[i] - u.lower) / period);
+      values[i] -= period * turns;
+      if (std::fmod(turns, 2) != 0) turn_partners(u, values);
     }
     values[i] = std::clamp(values[i], u.lower, u.upper);
   }
+}
+
+// A swing along a line at an angle is the one along the line turned by a half turn, in opposite phase.
+void Hypothesis::turn_partners(const Unknown& turned, Eigen::VectorXd& values) const {
+  const auto& parameters = set_[static_cast<std::size_t>(turned.member)].effect->parameters();
+  const int partner = parameters[static_cast<std::size_t>(turned.parameter)].half_turns;
+  for (std::size_t j = 0; partner >= 0 && j < unknowns_.size(); ++j)
+    if (unknowns_[j].member == turned.member && unknowns_[j].parameter == partner)
+      values[static_cast<Eigen::Index>(j)] += 0.5 * (unknowns_[j].upper - unknowns_[j].lower);
 }
 
 model::NeedleParameters Hypothesis::needle(const Eigen::VectorXd& values) const {

@@ -45,7 +45,7 @@ class Hypothesis {
   Eigen::VectorXd start() const;
   // Values of another hypothesis carried over, member by member; the rest from start().
   Eigen::VectorXd start_from(const Hypothesis& other, const Eigen::VectorXd& values) const;
-  // Back within the bounds; angles by whole turns.
+  // Back within the bounds; angles by whole turns, and the angles that go with them (EffectParameter::half_turns).
   void clamp(Eigen::VectorXd& values) const;
 
   // Which unknowns move one recording, in the order of the columns of make_needle.
@@ -55,6 +55,8 @@ class Hypothesis {
   double parameter(const Eigen::VectorXd& values, std::size_t member, std::size_t parameter, int recording = -1) const;
 
  private:
+  void turn_partners(const Unknown& turned, Eigen::VectorXd& values) const;
+
   model::NeedleParameters needle_;
   EffectSet set_;
   std::vector<Unknown> unknowns_;

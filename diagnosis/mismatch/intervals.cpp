@@ -24,7 +24,8 @@ FoundParameter profile(const Evidence& evidence, const Fit& best, int unknown, c
   rules.held = {unknown};
   rules.tolerance = 0.01;
   const auto rise_at = [&](double value, Eigen::VectorXd& from) {
-    Eigen::VectorXd values = from;
+    // An angle past its bounds turns others with it: each time from where they belong together.
+    Eigen::VectorXd values = info.periodic ? best.values : from;
     values[unknown] = value;
     const Fit there = fit(evidence, best.hypothesis, values, rules);
     if (!there.valid) return 1e6;

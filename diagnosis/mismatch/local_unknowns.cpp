@@ -7,14 +7,9 @@
 namespace bevel::diagnosis {
 namespace {
 constexpr double kInstantSpacing_s = 0.3;
+constexpr int kFineSteps = 5;  // to each side of the best instant, twice: a jump has no slope to follow
 constexpr int kPhases = 12;
 
-bool is_instant(const Hypothesis& hypothesis, const Unknown& unknown) {
-  return unknown.recording >= 0 && !unknown.periodic &&
-         hypothesis.set()[static_cast<std::size_t>(unknown.member)]
-                 .effect->parameters()[static_cast<std::size_t>(unknown.parameter)]
-                 .none == 0;
-}
 // An instant in most recordings is no accident: those that bring least are switched off.
 void keep_the_exceptions(std::size_t recordings, std::vector<std::pair<double, Eigen::Index>>& brought,
                          Eigen::VectorXd& values) {
@@ -23,6 +18,13 @@ void keep_the_exceptions(std::size_t recordings, std::vector<std::pair<double, E
 }
 
 }  // namespace
+
+bool is_instant(const Hypothesis& hypothesis, const Unknown& unknown) {
+  return unknown.recording >= 0 && !unknown.periodic &&
+         hypothesis.set()[static_cast<std::size_t>(unknown.member)]
+                 .effect->parameters()[static_cast<std::size_t>(unknown.parameter)]
+                 .none == 0;
+}
 
 Eigen::VectorXd scan_local_unknowns(const Evidence& evidence, const Hypothesis& hypothesis,
                                     const Eigen::VectorXd& values) {
@@ -46,10 +48,17 @@ Eigen::VectorXd scan_local_unknowns(const Evidence& evidence, const Hypothesis& 
     double value = best[column];
     double least = cost_at(value);
     if (instant && cost_at(0) <= least) least = cost_at(0), value = 0;
-    for (int k = 0; k < count; ++k) {
-      const double candidate = unknown.lower + span * (k + 0.5) / count;
+    const auto try_at = [&](double candidate) {
       const double cost = cost_at(candidate);
       if (cost < least) least = cost, value = candidate;
+    };
+    for (int k = 0; k < count; ++k) try_at(unknown.lower + span * (k + 0.5) / count);
+    double spacing_s = kInstantSpacing_s;
+    for (int finer = 0; finer < 2 && instant && value > 0; ++finer) {
+      spacing_s /= kFineSteps;
+      const double middle = value;
+      for (int k = -kFineSteps; k <= kFineSteps; ++k)
+        if (const double at_s = middle + k * spacing_s; at_s > unknown.lower && at_s < unknown.upper) try_at(at_s);
     }
     best[column] = value;
     if (instant && value > 0) brought.emplace_back(cost_at(0) - least, column);
@@ -64,6 +73,17 @@ int instants_in_use(const Fit& fit) {
     if (is_instant(fit.hypothesis, fit.hypothesis.unknowns()[i]) && fit.values[static_cast<Eigen::Index>(i)] > 0)
       ++count;
   return count;
+}
+
+double cost_of(const Fit& fit) { return fit.penalised + kInstantCost * instants_in_use(fit); }
+
+Fit fit_beside_instants(const Evidence& evidence, const Hypothesis& hypothesis, const Eigen::VectorXd& start,
+                        FitRules rules) {
+  Fit all = fit(evidence, hypothesis, start, rules);
+  bool jumps = false;
+  for (std::size_t i = 0; i < hypothesis.unknowns().size(); ++i)
+    if (is_instant(hypothesis, hypothesis.unknowns()[i])) rules.held.push_back(static_cast<int>(i)), jumps = true;
+  return jumps && all.valid ? fit(evidence, hypothesis, all.values, rules) : all;
 }
 
 }  // namespace bevel::diagnosis

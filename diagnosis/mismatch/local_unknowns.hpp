@@ -12,7 +12,16 @@ inline constexpr double kInstantCost = 12.0;
 Eigen::VectorXd scan_local_unknowns(const Evidence& evidence, const Hypothesis& hypothesis,
                                     const Eigen::VectorXd& values);
 
+// Instants at which something happens in one recording; 0: not in this one. (Phases are the other kind.)
+bool is_instant(const Hypothesis& hypothesis, const Unknown& unknown);
 // How many instants are not "off".
 int instants_in_use(const Fit& fit);
+// By which fits are compared: chi2, belief included, and what each instant has to bring.
+double cost_of(const Fit& fit);
+
+// A fit, and after it one with the instants held: where a jump meets a reading chi2 has a kink, at which a step of all
+// unknowns together stops short.
+Fit fit_beside_instants(const Evidence& evidence, const Hypothesis& hypothesis, const Eigen::VectorXd& start,
+                        FitRules rules = {});
 
 }  // namespace bevel::diagnosis

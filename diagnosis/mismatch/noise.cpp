@@ -10,6 +10,8 @@ namespace bevel::diagnosis {
 namespace {
 
 constexpr double kLargestAr1 = 0.98;
+constexpr double kLowestAr2 = -0.7, kHighestAr2 = 0.5;
+constexpr double kSecondOrder = 10.8;  // fall of the deviance that chance brings once in 1000
 // Sum over a message's axes of squared errors against its neighbours, each in standard deviations. A Gaussian message
 // of three axes passes this once in 3e5.
 constexpr double kOutlier = 28.0;
@@ -66,10 +68,54 @@ double deviance(const RecordedCase& recorded, const Errors& errors,
   return sum;
 }
 
-// Errors of readings against what their neighbours (and the curve) foretell, squared in standard deviations.
+// Correlation of errors so many seconds apart; of second order by its recursion over frames, and between them a line.
+class Correlations {
+ public:
+  explicit Correlations(const Noise& noise) : ar1_(noise.ar1), frame_s_(noise.frame_s) {
+    if (noise.ar2 == 0) return;
+    by_frames_ = {1, noise.ar1};
+    while (by_frames_.size() < kFrames)
+      by_frames_.push_back(noise.ar1 * (1 - noise.ar2) * by_frames_.back() +
+                           noise.ar2 * by_frames_[by_frames_.size() - 2]);
+  }
+  double operator()(double apart_s) const {
+    const double frames = apart_s / frame_s_;
+    if (by_frames_.empty()) return std::pow(ar1_, frames);
+    const auto whole = static_cast<std::size_t>(frames);
+    if (whole + 1 >= kFrames) return 0;
+    const double share = frames - static_cast<double>(whole);
+    return by_frames_[whole] * (1 - share) + by_frames_[whole + 1] * share;
+  }
+
+ private:
+  static constexpr std::size_t kFrames = 256;
+  double ar1_, frame_s_;
+  std::vector<double> by_frames_;
+};
+
+// Where a function with one valley in [low, high] is least, to within `width`.
+template <class Function>
+double valley(double low, double high, double width, Function&& f) {
+  constexpr double kGolden = 0.6180339887498949;
+  double a = high - kGolden * (high - low), b = low + kGolden * (high - low);
+  double fa = f(a), fb = f(b);
+  while (high - low > width) {
+    if (fa < fb) {
+      high = b, b = a, fb = fa, a = high - kGolden * (high - low), fa = f(a);
+    } else {
+      low = a, a = b, fa = fb, b = low + kGolden * (high - low), fb = f(b);
+    }
+  }
+  return 0.5 * (low + high);
+}
+
+// Errors of readings against what their neighbours (and the curve) foretell, squared in standard deviations. The noise
+// is taken as of first order: neighbours are enough to tell an outlier.
 Eigen::VectorXd surprise(const Series& series, Eigen::VectorXd error, const Noise& noise, double sigma_mm) {
   const Eigen::Index n = error.size();
-  const Whitening whitening = make_whitening(series, noise, 1.0);
+  Noise first_order = noise;
+  first_order.ar2 = 0;
+  const Whitening whitening = make_whitening(series, first_order, 1.0);
   Eigen::MatrixXd X = spline_basis(series, kKnot_s);
   const Eigen::MatrixXd curve = X;
   Eigen::VectorXd e = error;
@@ -103,14 +149,27 @@ Whitening make_whitening(const Series& series, const Noise& noise, double sigma_
   Whitening out;
   const std::size_t n = series.time_s.size();
   out.carry.assign(n, 0);
+  out.carry2.assign(n, 0);
   out.weight.resize(n);
+  const Correlations correlation(noise);
   for (std::size_t i = 0; i < n; ++i) {
     double left = 1;
     if (i > 0 && noise.ar1 > 0) {
-      const double kept = std::pow(noise.ar1, (series.time_s[i] - series.time_s[i - 1]) / noise.frame_s);
-      left = 1 - kept * kept;
+      const auto between = [&](std::size_t a, std::size_t b) {
+        return correlation(series.time_s[a] - series.time_s[b]);
+      };
+      const double near = between(i, i - 1);
+      double first = near, second = 0;
+      if (i > 1 && noise.ar2 != 0) {
+        const double apart = between(i - 1, i - 2), far = between(i, i - 2);
+        second = (far - near * apart) / (1 - apart * apart);
+        first = near - second * apart;
+        left -= second * far;
+      }
+      left -= first * near;
       // The process is of errors in units of their claimed standard deviations.
-      out.carry[i] = kept * series.relative_sd[i] / series.relative_sd[i - 1];
+      out.carry[i] = first * series.relative_sd[i] / series.relative_sd[i - 1];
+      if (second != 0) out.carry2[i] = second * series.relative_sd[i] / series.relative_sd[i - 2];
     }
     out.weight[i] = 1 / (sigma_mm * series.relative_sd[i] * std::sqrt(left));
   }
@@ -138,7 +197,7 @@ Eigen::MatrixXd spline_basis(const Series& series, double knot_s) {
   return X;
 }
 
-Noise estimate_noise(const RecordedCase& recorded, const Errors& errors, bool flexible) {
+Noise estimate_noise(const RecordedCase& recorded, const Errors& errors, bool flexible, bool second_order) {
   std::vector<std::vector<Eigen::MatrixXd>> bases(recorded.recordings.size());
   for (std::size_t r = 0; flexible && r < bases.size(); ++r)
     for (const auto& series : recorded.recordings[r].series)
@@ -146,29 +205,34 @@ Noise estimate_noise(const RecordedCase& recorded, const Errors& errors, bool fl
   const auto* in_use = flexible ? &bases : nullptr;
   Noise noise;
   noise.frame_s = recorded.frame_s;
-  const auto at = [&](double ar1) {
+  const auto at = [&](double ar1, double ar2) {
     noise.ar1 = ar1;
+    noise.ar2 = ar2;
     return deviance(recorded, errors, in_use, noise);
   };
   // The deviance in ar1 has one valley: a coarse scan, then golden-section steps.
-  double best = 0, best_value = std::numeric_limits<double>::infinity();
-  for (int i = 0; i <= 12; ++i) {
-    const double ar1 = kLargestAr1 * i / 12;
-    const double value = at(ar1);
-    if (value < best_value) best = ar1, best_value = value;
-  }
-  double low = std::max(0.0, best - kLargestAr1 / 12), high = std::min(kLargestAr1, best + kLargestAr1 / 12);
-  constexpr double kGolden = 0.6180339887498949;
-  double a = high - kGolden * (high - low), b = low + kGolden * (high - low);
-  double fa = at(a), fb = at(b);
-  while (high - low > 0.004) {
-    if (fa < fb) {
-      high = b, b = a, fb = fa, a = high - kGolden * (high - low), fa = at(a);
-    } else {
-      low = a, a = b, fa = fb, b = low + kGolden * (high - low), fb = at(b);
+  const auto best_ar1 = [&](double ar2) {
+    double best = 0, best_value = std::numeric_limits<double>::infinity();
+    for (int i = 0; i <= 12; ++i) {
+      const double ar1 = kLargestAr1 * i / 12;
+      const double value = at(ar1, ar2);
+      if (value < best_value) best = ar1, best_value = value;
     }
+    const double found = valley(std::max(0.0, best - kLargestAr1 / 12), std::min(kLargestAr1, best + kLargestAr1 / 12),
+                                0.004, [&](double ar1) { return at(ar1, ar2); });
+    return found < 0.004 ? 0.0 : found;
+  };
+  double ar1 = best_ar1(0), ar2 = 0;
+  if (second_order && ar1 > 0) {
+    const double first_order = at(ar1, 0);
+    double other1 = ar1, other2 = 0;
+    for (int turn = 0; turn < 3; ++turn) {
+      other2 = valley(kLowestAr2, kHighestAr2, 0.004, [&](double x) { return at(other1, x); });
+      other1 = best_ar1(other2);
+    }
+    if (first_order - at(other1, other2) > kSecondOrder) ar1 = other1, ar2 = other2;
   }
-  at(0.5 * (low + high) < 0.004 ? 0.0 : 0.5 * (low + high));
+  at(ar1, ar2);
   return noise;
 }
 
@@ -197,7 +261,7 @@ Calibration calibrate_noise(const RecordedCase& recorded, const Errors& errors, 
   std::size_t messages = 0, dropped = 0;
   for (const auto& recording : recorded.recordings) messages += recording.motion.at.size();
   for (int pass = 0; pass < kOutlierPasses; ++pass) {
-    out.noise = estimate_noise(now, left, flexible);
+    out.noise = estimate_noise(now, left, flexible, false);
     bool found = false;
     for (std::size_t r = 0; r < now.recordings.size(); ++r) {
       const auto& recording = now.recordings[r];

@@ -1,8 +1,9 @@
 #pragma once
-// The cameras' noise: first-order coloured, one standard deviation per channel, and a share of outliers. It is found
-// before any physics is named, from what a flexible curve leaves of the residuals, so that missing physics does not
-// pass for noise; it is then held fixed while structures are compared.
-// Source: restricted maximum likelihood, Harville 1977, JASA 72; AR(1) over gaps as an Ornstein-Uhlenbeck process.
+// The cameras' noise: coloured, of first order or second, one standard deviation per channel, and a share of outliers.
+// It is found before any physics is named, from what a flexible curve leaves of the residuals, so that missing physics
+// does not pass for noise; it is then held fixed while structures are compared. Source: restricted maximum likelihood,
+// Harville 1977, JASA 72; AR(1) over gaps as an Ornstein-Uhlenbeck process, AR(2) by its partial correlations
+// (Barndorff-Nielsen and Schou 1973, J. Multivar. Anal. 3).
 #include <span>
 #include <vector>
 
@@ -13,23 +14,28 @@ namespace bevel::diagnosis {
 struct Noise {
   std::vector<double> sigma_mm;  // per channel, of one reading (the coloured process's own)
   double ar1 = 0;                // correlation of readings one frame apart
+  double ar2 = 0;                // of readings two frames apart, given the one between; 0: of first order
   double outlier_share = 0;      // of messages
   double frame_s = 1.0 / 30;
 };
 
 // Coefficients that turn a series of errors into independent ones of unit variance:
-// white_i = (e_i - carry_i e_(i-1)) * weight_i.
+// white_i = (e_i - carry_i e_(i-1) - carry2_i e_(i-2)) * weight_i.
+// Of second order it is the best that two readings foretell: exact where no frame is missing.
 struct Whitening {
-  std::vector<double> carry, weight;
+  std::vector<double> carry, carry2, weight;
 };
 Whitening make_whitening(const Series& series, const Noise& noise, double sigma_mm);
 
 // In place, on each column; rows are the series in time.
 template <class Matrix>
 void whiten(const Whitening& whitening, Matrix&& rows) {
-  for (Eigen::Index i = rows.rows() - 1; i > 0; --i)
-    rows.row(i) = (rows.row(i) - whitening.carry[static_cast<std::size_t>(i)] * rows.row(i - 1)) *
-                  whitening.weight[static_cast<std::size_t>(i)];
+  for (Eigen::Index i = rows.rows() - 1; i > 0; --i) {
+    const auto at = static_cast<std::size_t>(i);
+    rows.row(i) -= whitening.carry[at] * rows.row(i - 1);
+    if (whitening.carry2[at] != 0) rows.row(i) -= whitening.carry2[at] * rows.row(i - 2);
+    rows.row(i) *= whitening.weight[at];
+  }
   if (rows.rows() > 0) rows.row(0) *= whitening.weight[0];
 }
 
@@ -47,8 +53,8 @@ struct Calibration {
 
 // errors: of the model in use. With flexible = false the model is trusted and no curve is taken out.
 Calibration calibrate_noise(const RecordedCase& recorded, const Errors& errors, bool flexible = true);
-// sigma and ar1 alone, of the readings as they are.
-Noise estimate_noise(const RecordedCase& recorded, const Errors& errors, bool flexible);
+// Deviation and colour alone, of the readings as they are. With second_order, ar2 too, where the readings ask for it.
+Noise estimate_noise(const RecordedCase& recorded, const Errors& errors, bool flexible, bool second_order = true);
 
 // The case without those readings.
 RecordedCase without(const RecordedCase& recorded, const std::vector<std::vector<std::size_t>>& readings);

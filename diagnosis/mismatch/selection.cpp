@@ -2,63 +2,22 @@
 
 #include <algorithm>
 #include <cmath>
-#include <limits>
+#include <numeric>
 
+#include "diagnosis/mismatch/addition.hpp"
 #include "diagnosis/mismatch/gates.hpp"
 #include "diagnosis/mismatch/local_unknowns.hpp"
 #include "diagnosis/mismatch/parallel.hpp"
 
 namespace bevel::diagnosis {
 namespace {
-constexpr int kScans = 2;
-constexpr std::size_t kFineGrid = 20;    // starts
-constexpr double kLittle = 6.0;          // chi2
-constexpr double kSettled = 0.5;         // chi2
+constexpr int kImprovements = 2;
+constexpr double kNoticeable = 0.5;      // chi2
 constexpr double kCorrectionChance = 4;  // mean gain of a correction of four knots under noise
 constexpr std::size_t kCorrectionsFitted = 3;
 constexpr int kLargestCorrections = 2;
 
-bool has_local(const Hypothesis& hypothesis) {
-  return std::any_of(hypothesis.unknowns().begin(), hypothesis.unknowns().end(),
-                     [](const Unknown& u) { return u.recording >= 0; });
-}
-
-// Where an effect's start is one of a fine grid, its valley is narrow and a linear promise of its size is rough: the
-// full model looks around first.
-Eigen::VectorXd look_around(const Evidence& evidence, const Hypothesis& hypothesis, std::size_t member,
-                            const Eigen::VectorXd& values) {
-  const auto& parameters = hypothesis.set()[member].effect->parameters();
-  int shape = -1, size = -1;
-  double spacing = 0;
-  for (std::size_t p = 0; p < parameters.size(); ++p) {
-    const auto& starts = parameters[p].starts;
-    if (parameters[p].scope != model::Scope::rig || hypothesis.find(member, p) < 0) continue;
-    if (std::isnan(parameters[p].none) && starts.size() >= kFineGrid)
-      shape = hypothesis.find(member, p), spacing = starts[1] - starts[0];
-    else if (!std::isnan(parameters[p].none))
-      size = hypothesis.find(member, p);
-  }
-  if (shape < 0 || size < 0) return values;
-  const Unknown& info = hypothesis.unknowns()[static_cast<std::size_t>(size)];
-  const double none = parameters[static_cast<std::size_t>(info.parameter)].none;
-  Workspace workspace;
-  Eigen::VectorXd best = values;
-  double least = std::numeric_limits<double>::infinity();
-  for (const double step : {0.0, -0.5, 0.5, -1.0, 1.0})
-    for (const double scale : {1.0, 0.5, 1.5, 2.5, 5.0}) {
-      Eigen::VectorXd trial = values;
-      trial[shape] += step * spacing;
-      trial[size] = none + scale * (values[size] - none);
-      hypothesis.clamp(trial);
-      double chi2 = 0;
-      for (std::size_t r = 0; r < evidence.recorded->recordings.size() && chi2 < least; ++r)
-        if (evidence.uses(r))
-          chi2 += evaluate(evidence, hypothesis, r, trial, false, workspace) ? workspace.residuals.white.squaredNorm()
-                                                                             : 1e300;
-      if (chi2 < least) least = chi2, best = trial;
-    }
-  return best;
-}
+bool has_correction(const EffectSet& set) { return std::any_of(set.begin(), set.end(), is_correction); }
 
 std::string member_key(const Member& member) {
   return std::string(member.effect->name()) + "/" + std::to_string(member.variant);
@@ -80,53 +39,25 @@ EffectSet without_member(const EffectSet& set, std::size_t index) {
   return rest;
 }
 
-std::shared_ptr<const Fit> fit_addition(const Evidence& evidence, const Fit& from, const Candidate& candidate,
-                                        const std::vector<Promise>& promises) {
-  EffectSet set = from.hypothesis.set();
-  set.push_back(candidate.member);
-  const Hypothesis hypothesis(evidence.belief, set, *evidence.recorded);
-  const std::size_t m = set.size() - 1;
-  std::shared_ptr<Fit> best;
-  for (const auto& promise : promises) {
-    Eigen::VectorXd values = hypothesis.start_from(from.hypothesis, from.values);
-    for (std::size_t p = 0; p < promise.parameters.size(); ++p)
-      for (std::size_t r = 0; r < evidence.recorded->recordings.size(); ++r) {
-        const int i = hypothesis.find(m, p, static_cast<int>(r));
-        if (i < 0) continue;
-        const bool local = static_cast<int>(p) == candidate.local && r < promise.local_by_recording.size();
-        values[i] = local ? promise.local_by_recording[r] : promise.parameters[p];
-      }
-    values = look_around(evidence, hypothesis, m, values);
-    auto one = std::make_shared<Fit>(fit(evidence, hypothesis, values));
-    for (int scan = 0; scan < kScans && one->valid && has_local(hypothesis); ++scan) {
-      auto again =
-          std::make_shared<Fit>(fit(evidence, hypothesis, scan_local_unknowns(evidence, hypothesis, one->values)));
-      const auto cost = [](const Fit& f) { return f.penalised + kInstantCost * instants_in_use(f); };
-      const bool better = again->valid && cost(*again) < cost(*one);
-      const bool settled = cost(*again) > cost(*one) - kSettled;
-      if (better) one = again;
-      if (settled) break;
-    }
-    if (one->valid && (!best || one->penalised < best->penalised)) best = one;
-  }
-  return best;
-}
-
 Selection::Selection(const Evidence& evidence, const Fit& base, const SelectionRules& rules, Progress progress)
     : evidence_(evidence), rules_(rules), progress_(std::move(progress)), corrections_(*evidence.recorded) {
   known_[key_of({})] = {{}, std::make_shared<Fit>(base), 0};
-  ground_ = make_ground(evidence_, base);
-  dictionary_ = make_dictionary(evidence_, base, ground_, members_of_library({}), rules_.threads);
-  null_gains_ = bootstrap_null(dictionary_, ground_, rules_.bootstrap_draws, rules_.seed, rules_.threads);
-  for (std::size_t e = 0; e < dictionary_.size(); ++e) chance_[member_key(dictionary_[e].member)] = null_gains_.mean[e];
+  library_ = make_library(base, members_of_library({}));
+  for (std::size_t e = 0; e < library_.candidates.size(); ++e)
+    chance_[member_key(library_.candidates[e].member)] = library_.chance.mean[e];
 }
-
-const NullGains& Selection::null_gains() { return null_gains_; }
-const std::vector<Candidate>& Selection::dictionary() { return dictionary_; }
-const Ground& Selection::ground() { return ground_; }
 
 void Selection::say(const std::string& text) const {
   if (progress_) progress_(text);
+}
+
+Selection::Library Selection::make_library(const Fit& from, const std::vector<Member>& members) const {
+  Library library;
+  library.ground = make_ground(evidence_, from);
+  library.candidates = make_dictionary(evidence_, from, library.ground, members, rules_.threads);
+  library.chance =
+      bootstrap_null(library.candidates, library.ground, rules_.bootstrap_draws, rules_.seed, rules_.threads);
+  return library;
 }
 
 Selection::Known& Selection::known(const EffectSet& set) {
@@ -143,58 +74,73 @@ Selection::Known& Selection::known(const EffectSet& set) {
       fit_addition(evidence_, *part.fit, dictionary[0], best_promises(dictionary[0], ground, rules_.starts_fitted));
   // A set that cannot be fitted is worth no more than its part.
   if (!fit) return known_[key] = {part.set, part.fit, part.evidence};
-  const double base = known_.at(key_of({})).fit->penalised;
-  return known_[key] = {set, fit, base - fit->penalised - cost_of(set, *fit)};
+  return known_[key] = {set, fit, evidence_for(set, *fit)};
 }
 
 std::shared_ptr<const Fit> Selection::fit_of(const EffectSet& set) { return known(set).fit; }
 double Selection::evidence_of(const EffectSet& set) { return known(set).evidence; }
 
-double Selection::cost_of(const EffectSet& set, const Fit& fit) {
+double Selection::evidence_for(const EffectSet& set, const Fit& fit) const {
   double cost = kInstantCost * instants_in_use(fit);
-  for (const auto& member : set) cost += is_correction(member) ? kCorrectionChance : chance_[member_key(member)];
-  return cost;
+  for (const auto& member : set) cost += is_correction(member) ? kCorrectionChance : chance_.at(member_key(member));
+  return known_.at(key_of({})).fit->penalised - fit.penalised - cost;
+}
+
+// Some candidates of a library, each added to the set and fitted; what cannot be fitted is left out.
+std::vector<Trial> Selection::try_beside(const EffectSet& set, const Library& library,
+                                         const std::vector<std::size_t>& which, std::size_t starts) {
+  const std::shared_ptr<const Fit> from = known(set).fit;
+  std::vector<Trial> trials(which.size());
+  parallel_for(which.size(), rules_.threads, [&](std::size_t i) {
+    const Candidate& candidate = library.candidates[which[i]];
+    Trial& trial = trials[i];
+    trial.set = set;
+    trial.set.push_back(candidate.member);
+    trial.chance = library.chance.mean[which[i]];
+    trial.threshold = library.chance.threshold[which[i]];
+    trial.fit = fit_addition(evidence_, *from, candidate, best_promises(candidate, library.ground, starts));
+  });
+  std::erase_if(trials, [](const Trial& trial) { return !trial.fit; });
+  for (Trial& trial : trials) {
+    trial.gain = cost_of(*from) - cost_of(*trial.fit);
+    trial.evidence = evidence_for(trial.set, *trial.fit);
+    Known& slot = known_[key_of(trial.set)];
+    if (!slot.fit || trial.evidence > slot.evidence) slot = {trial.set, trial.fit, trial.evidence};
+  }
+  std::stable_sort(trials.begin(), trials.end(),
+                   [](const Trial& a, const Trial& b) { return a.evidence > b.evidence; });
+  return trials;
+}
+
+// The fit of more may have come upon a better valley for the unknowns that both have: what the set gains there is not
+// the addition's.
+bool Selection::improve(const EffectSet& set, const Trial& larger) {
+  Known& now = known(set);
+  const Hypothesis& hypothesis = now.fit->hypothesis;
+  const auto moved = std::make_shared<Fit>(
+      fit_beside_instants(evidence_, hypothesis, hypothesis.start_from(larger.fit->hypothesis, larger.fit->values)));
+  const auto again = moved->valid ? from_other_sizes(evidence_, moved) : moved;
+  if (!again->valid || cost_of(*again) > cost_of(*now.fit) - kNoticeable) return false;
+  now.fit = again;
+  now.evidence = evidence_for(set, *again);
+  best_corrections_.erase(key_of(set));
+  return true;
 }
 
 const std::vector<Trial>& Selection::additions(const EffectSet& to) {
   const std::string key = key_of(to);
   if (const auto at = additions_.find(key); at != additions_.end()) return at->second;
-  const std::shared_ptr<const Fit> from = known(to).fit;
-  const double base = known_.at(key_of({})).fit->penalised;
-  Ground ground;
-  std::vector<Candidate> dictionary;
-  NullGains chance;
-  const bool first = to.empty();
-  if (!first) {
-    ground = make_ground(evidence_, *from);
-    dictionary = make_dictionary(evidence_, *from, ground, members_of_library(to), rules_.threads);
-    chance = bootstrap_null(dictionary, ground, rules_.bootstrap_draws, rules_.seed, rules_.threads);
+  std::vector<Trial> trials;
+  for (int turn = 0; turn <= kImprovements; ++turn) {
+    Library beside;
+    if (!to.empty()) beside = make_library(*known(to).fit, members_of_library(to));
+    const Library& library = to.empty() ? library_ : beside;
+    std::vector<std::size_t> all(library.candidates.size());
+    std::iota(all.begin(), all.end(), std::size_t{0});
+    trials = try_beside(to, library, all, rules_.starts_fitted);
+    if (to.empty() || trials.empty() || !improve(to, trials.front())) break;
   }
-  const Ground& g = first ? ground_ : ground;
-  const auto& candidates = first ? dictionary_ : dictionary;
-  const NullGains& null_gains = first ? null_gains_ : chance;
-  std::vector<Trial> trials(candidates.size());
-  parallel_for(candidates.size(), rules_.threads, [&](std::size_t e) {
-    Trial& trial = trials[e];
-    trial.set = to;
-    trial.set.push_back(candidates[e].member);
-    trial.chance = null_gains.mean[e];
-    trial.threshold = null_gains.threshold[e];
-    trial.fit = fit_addition(evidence_, *from, candidates[e], best_promises(candidates[e], g, rules_.starts_fitted));
-  });
-  for (Trial& trial : trials) {
-    if (!trial.fit) continue;
-    trial.gain =
-        from->penalised - trial.fit->penalised - kInstantCost * (instants_in_use(*trial.fit) - instants_in_use(*from));
-    trial.evidence = base - trial.fit->penalised - cost_of(trial.set, *trial.fit);
-    Known& slot = known_[key_of(trial.set)];
-    if (!slot.fit || trial.evidence > slot.evidence) slot = {trial.set, trial.fit, trial.evidence};
-  }
-  std::stable_sort(trials.begin(), trials.end(), [](const Trial& a, const Trial& b) {
-    if (!a.fit || !b.fit) return a.fit && !b.fit;
-    return a.evidence > b.evidence;
-  });
-  if (!trials.empty() && trials.front().fit)
+  if (!trials.empty())
     say("tried every effect beside " + describe(to) + ": best " +
         std::string(trials.front().set.back().effect->name()) + ", chi2 falls by " +
         std::to_string(static_cast<int>(trials.front().gain)));
@@ -204,37 +150,20 @@ const std::vector<Trial>& Selection::additions(const EffectSet& to) {
 const Trial& Selection::best_correction(const EffectSet& beside) {
   const std::string key = key_of(beside);
   if (const auto at = best_corrections_.find(key); at != best_corrections_.end()) return at->second;
-  const std::shared_ptr<const Fit> from = known(beside).fit;
-  const Ground ground = make_ground(evidence_, *from);
   std::vector<Member> members = corrections_.members();
   std::erase_if(members, [&](const Member& m) { return std::find(beside.begin(), beside.end(), m) != beside.end(); });
-  const auto dictionary = make_dictionary(evidence_, *from, ground, members, rules_.threads);
-  const NullGains chance = bootstrap_null(dictionary, ground, rules_.bootstrap_draws, rules_.seed, rules_.threads);
+  const Library library = make_library(*known(beside).fit, members);
   std::vector<std::pair<double, std::size_t>> order;
-  for (std::size_t e = 0; e < dictionary.size(); ++e)
-    for (const auto& promise : best_promises(dictionary[e], ground, 1)) order.emplace_back(-promise.gain, e);
+  for (std::size_t e = 0; e < library.candidates.size(); ++e)
+    for (const auto& promise : best_promises(library.candidates[e], library.ground, 1))
+      order.emplace_back(-promise.gain, e);
   std::sort(order.begin(), order.end());
   if (order.size() > kCorrectionsFitted) order.resize(kCorrectionsFitted);
-  std::vector<Trial> trials(order.size());
-  parallel_for(order.size(), rules_.threads, [&](std::size_t i) {
-    const std::size_t e = order[i].second;
-    trials[i].set = beside;
-    trials[i].set.push_back(dictionary[e].member);
-    trials[i].chance = chance.mean[e];
-    trials[i].threshold = chance.threshold[e];
-    trials[i].fit = fit_addition(evidence_, *from, dictionary[e], best_promises(dictionary[e], ground, 1));
-  });
-  Trial best;
-  const double base = known_.at(key_of({})).fit->penalised;
-  for (Trial& trial : trials) {
-    if (!trial.fit) continue;
-    trial.gain = from->penalised - trial.fit->penalised;
-    trial.evidence = base - trial.fit->penalised - cost_of(trial.set, *trial.fit);
-    known_[key_of(trial.set)] = {trial.set, trial.fit, trial.evidence};
-    if (!best.fit || trial.evidence > best.evidence) best = trial;
-  }
+  std::vector<std::size_t> most_promising;
+  for (const auto& [gain, e] : order) most_promising.push_back(e);
+  const auto trials = try_beside(beside, library, most_promising, 1);
   say("looked for what no effect explains beside " + describe(beside));
-  return best_corrections_[key] = std::move(best);
+  return best_corrections_[key] = trials.empty() ? Trial{} : trials.front();
 }
 
 Correction Selection::describe_correction(const EffectSet& set, std::size_t member) {
@@ -244,8 +173,7 @@ Correction Selection::describe_correction(const EffectSet& set, std::size_t memb
   Correction out = corrections_.describe(*fit, static_cast<std::size_t>(at - members.begin()));
   const EffectSet rest = without_member(set, member);
   out.gain = fit_of(rest)->penalised - fit->penalised;
-  const Trial& best = best_correction(rest);
-  out.threshold = std::max(best.threshold, best.chance + kVisibleSigmas * kVisibleSigmas);
+  out.threshold = best_correction(rest).limit();
   return out;
 }
 
@@ -253,7 +181,7 @@ Correction Selection::describe_correction(const EffectSet& set, std::size_t memb
 bool Selection::grow(EffectSet& set) {
   if (static_cast<int>(set.size()) >= rules_.largest_set) return false;
   for (const Trial& trial : additions(set))
-    if (trial.fit && trial.passes()) {
+    if (trial.passes()) {
       set = trial.set;
       return true;
     }
@@ -265,7 +193,7 @@ bool Selection::swap(EffectSet& set) {
   for (std::size_t m = 0; m < set.size() && set.size() > 1; ++m) {
     if (is_correction(set[m])) continue;
     const auto& others = additions(without_member(set, m));
-    if (others.empty() || !others.front().fit || key_of(others.front().set) == key_of(set)) continue;
+    if (others.empty() || key_of(others.front().set) == key_of(set)) continue;
     if (others.front().evidence <= evidence_of(set) + 1e-6) continue;
     set = others.front().set;
     return true;
@@ -318,7 +246,7 @@ bool Selection::give_up_names(EffectSet& set) {
 // One curve better than two names together: looking for a third is idle. (Better than one name it may be because of a
 // second effect that is still to be found.)
 bool Selection::far_from_any_name(const EffectSet& set) {
-  if (set.size() < 2 || std::any_of(set.begin(), set.end(), is_correction)) return false;
+  if (set.size() < 2 || has_correction(set)) return false;
   const Trial& nameless = best_correction({});
   return nameless.fit && nameless.evidence > evidence_of(set) + kNamelessMargin;
 }
@@ -327,8 +255,7 @@ EffectSet Selection::select() {
   EffectSet now;
   for (int round = 0; round < 12; ++round) {
     // While even nameless curves leave structure, a name beside them would be a guess.
-    const bool nameless = std::any_of(now.begin(), now.end(), is_correction);
-    if (nameless && examine_remains(evidence_, *fit_of(now)).structure_sigmas > kStructureSigmas) {
+    if (has_correction(now) && examine_remains(evidence_, *fit_of(now)).structure_sigmas > kStructureSigmas) {
       std::erase_if(now, [](const Member& member) { return !is_correction(member); });
       if (!give_up_names(now)) break;
       continue;

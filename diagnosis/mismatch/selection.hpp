@@ -4,6 +4,7 @@
 // An effect enters when the fall of chi2 that it brings exceeds what the maximum over the whole library brings by
 // chance in 1 of 100 bootstrap draws, and when it is visible: kVisibleSigmas standard deviations above the mean of
 // chance. Sets are compared by evidence: the fall of chi2 less what chance brings to each member.
+#include <algorithm>
 #include <functional>
 #include <map>
 #include <memory>
@@ -36,7 +37,8 @@ struct Trial {
   double chance = 0;     // mean of what noise brings
   double threshold = 0;  // exceeded by chance, over the library, in 1 of 100
   double evidence = 0;   // against no effect at all
-  bool passes() const { return gain > threshold && gain > chance + kVisibleSigmas * kVisibleSigmas; }
+  double limit() const { return std::max(threshold, chance + kVisibleSigmas * kVisibleSigmas); }
+  bool passes() const { return gain > limit(); }
 };
 
 class Selection {
@@ -44,7 +46,7 @@ class Selection {
   using Progress = std::function<void(const std::string&)>;
   Selection(const Evidence& evidence, const Fit& base, const SelectionRules& rules, Progress progress = {});
 
-  // Every effect added to a set, best evidence first. Fitted once, then remembered.
+  // Every effect added to a set that can be fitted, best evidence first. Fitted once, then remembered.
   const std::vector<Trial>& additions(const EffectSet& to);
   // The best set found. A correction among its members says that something is missing that no effect of the library
   // explains: it fits better than the best effect did, or something remains beside the effects.
@@ -61,10 +63,9 @@ class Selection {
   std::vector<std::pair<EffectSet, double>> visited() const;
   const Evidence& evidence() const { return evidence_; }
   const SelectionRules& rules() const { return rules_; }
-  // Gains that chance brings to each library member, for the base hypothesis.
-  const NullGains& null_gains();
-  const std::vector<Candidate>& dictionary();
-  const Ground& ground();
+  // Signatures of the library beside no effect, and what they are relative to.
+  const std::vector<Candidate>& dictionary() const { return library_.candidates; }
+  const Ground& ground() const { return library_.ground; }
 
  private:
   struct Known {
@@ -72,8 +73,18 @@ class Selection {
     std::shared_ptr<const Fit> fit;
     double evidence = 0;
   };
+  // Candidates beside a fit, and what chance brings to each.
+  struct Library {
+    Ground ground;
+    std::vector<Candidate> candidates;
+    NullGains chance;
+  };
+  Library make_library(const Fit& from, const std::vector<Member>& members) const;
+  std::vector<Trial> try_beside(const EffectSet& set, const Library& library, const std::vector<std::size_t>& which,
+                                std::size_t starts);
+  bool improve(const EffectSet& set, const Trial& larger);
   Known& known(const EffectSet& set);
-  double cost_of(const EffectSet& set, const Fit& fit);
+  double evidence_for(const EffectSet& set, const Fit& fit) const;
   void say(const std::string& text) const;
   bool grow(EffectSet& set);
   bool swap(EffectSet& set);
@@ -86,18 +97,11 @@ class Selection {
   Progress progress_;
   std::map<std::string, Known> known_;  // by sorted names
   std::map<std::string, std::vector<Trial>> additions_;
-  Ground ground_;
-  std::vector<Candidate> dictionary_;
-  NullGains null_gains_;
+  Library library_;                       // beside no effect
   std::map<std::string, double> chance_;  // per member, at the base
   CorrectionLibrary corrections_;
   std::map<std::string, Trial> best_corrections_;
 };
-
-// The best of several fits of set + member, begun where a linear model promises most; local unknowns (instants,
-// phases) scanned anew with the full model in between.
-std::shared_ptr<const Fit> fit_addition(const Evidence& evidence, const Fit& from, const Candidate& candidate,
-                                        const std::vector<Promise>& promises);
 
 EffectSet without_member(const EffectSet& set, std::size_t index);
 std::string key_of(const EffectSet& set);

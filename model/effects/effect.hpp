@@ -32,7 +32,9 @@ struct EffectParameter {
   // Where fits begin: one value if the likelihood has one valley, a grid if several (a depth, a frequency).
   std::vector<double> starts;
   Scope scope = Scope::rig;
-  bool periodic = false;  // an angle: the bounds are one period apart
+  bool periodic = false;   // an angle: the bounds are one period apart
+  int half_turns = -1;     // periodic: the angle that has to turn by half of its own period when this one turns by one
+  bool frequency = false;  // in Hz: readings too far apart do not show it
 };
 // Starts from first to last, evenly: as close as the effect is narrow, or a fit never finds it.
 std::vector<double> starts_every(double step, double first, double last);

@@ -3,8 +3,9 @@
 namespace bevel::model {
 namespace {
 
-// A motor stalls for an instant: from at_s on the axis stands elsewhere than its counter says. The jump takes
-// kStall_s, so that a fit can move its instant. at_s = 0: not in this recording.
+// A motor stalls for an instant: from at_s on the axis stands elsewhere than its counter says. at_s = 0: not in this
+// recording. The jump takes a moment, so that a fit can move its instant: an insertion's shows at once and takes no
+// longer than the drives' messages are apart, a rotation's shows only in where the needle goes from there on.
 class LostSteps final : public Effect {
  public:
   LostSteps()
@@ -24,9 +25,9 @@ class LostSteps final : public Effect {
   void axes(Parameters p, const LegView& leg, EffectMemory& /*memory*/, Dual& insertion_mm,
             Dual& rotation_rad) const override {
     if (p[2].value <= 0) return;
-    const Dual share = clamp((leg.to.time_s - p[2]) / kStall_s + 0.5, 0, 1);
-    insertion_mm += share * p[1];
-    rotation_rad += share * p[0];
+    const auto share = [&](double stall_s) { return clamp((leg.to.time_s - p[2]) / stall_s + 0.5, 0, 1); };
+    insertion_mm += share(kInsertionStall_s) * p[1];
+    rotation_rad += share(kRotationStall_s) * p[0];
   }
   // One axis stalls, not both.
   std::span<const std::uint32_t> variants() const override {
@@ -35,7 +36,8 @@ class LostSteps final : public Effect {
   }
 
  private:
-  static constexpr double kStall_s = 0.1;
+  static constexpr double kInsertionStall_s = 0.02;
+  static constexpr double kRotationStall_s = 0.1;
 };
 
 }  // namespace

@@ -124,8 +124,9 @@ TEST(LostSteps, AreAJumpOfTheTrueAxis) {
   for (const bool rotation : {true, false}) {
     const auto effect = active("lost_steps", {rotation ? 0.8 : 0, rotation ? 0 : -2.5, at_s});
     BruteForce brute{.needle = agar(), .axes = [&](const Instant& now, double& s_mm, double& r_rad) {
-                       // kStall_s of the product: the jump takes a tenth of a second.
-                       const double share = std::clamp((now.time_s - at_s + 0.05) / 0.1, 0.0, 1.0);
+                       // The product's stalls: a fiftieth of a second for an insertion, a tenth for a rotation.
+                       const double stall_s = rotation ? 0.1 : 0.02;
+                       const double share = std::clamp((now.time_s - at_s) / stall_s + 0.5, 0.0, 1.0);
                        (rotation ? r_rad : s_mm) += share * (rotation ? 0.8 : -2.5);
                      }};
     const auto path = path_of(agar(), {effect}, motion);

@@ -2,6 +2,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include "diagnosis/mismatch/addition.hpp"
 #include "diagnosis/mismatch/dictionary.hpp"
 #include "diagnosis/mismatch/selection.hpp"
 #include "tests/mismatch/simulated_rig.hpp"

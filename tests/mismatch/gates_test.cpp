@@ -15,42 +15,6 @@ using testing::member;
 using testing::record_case;
 using testing::SimulatedRig;
 
-Eigen::VectorXd formula_series(double share) {
-  Eigen::VectorXd x(80);
-  for (int i = 1; i <= 80; ++i) x[i - 1] = std::sin(0.37 * i * i) + share * std::sin(0.9 * i);
-  return x;
-}
-
-// statsmodels 0.15.0: i = numpy.arange(1, 81); x = sin(0.37*i*i) + a*sin(0.9*i);
-// statsmodels.stats.diagnostic.acorr_ljungbox(x, lags=[12], model_df=df): lb_pvalue.
-TEST(LjungBox, IsThatOfStatsmodels) {
-  EXPECT_NEAR(ljung_box_p(formula_series(0.3), 12, 0), 0.83635948, 1e-7);
-  EXPECT_NEAR(ljung_box_p(formula_series(0.3), 12, 1), 0.7733244, 1e-7);
-  EXPECT_NEAR(ljung_box_p(formula_series(0.6), 12, 0), 2.89400255e-03, 1e-10);
-  EXPECT_NEAR(ljung_box_p(formula_series(0.6), 12, 1), 1.64477274e-03, 1e-10);
-}
-
-TEST(LjungBox, IsUniformOnWhiteNoise) {
-  std::mt19937_64 random(9);
-  std::normal_distribution<double> normal;
-  constexpr int kSeries = 500;
-  std::vector<double> p;
-  for (int s = 0; s < kSeries; ++s) {
-    Eigen::VectorXd white(400);
-    for (double& x : white) x = normal(random);
-    p.push_back(ljung_box_p(white, 12, 0));
-  }
-  std::sort(p.begin(), p.end());
-  double distance = 0;  // Kolmogorov and Smirnov
-  for (int s = 0; s < kSeries; ++s) {
-    const double at = p[static_cast<std::size_t>(s)];
-    distance = std::max({distance, (s + 1.0) / kSeries - at, at - static_cast<double>(s) / kSeries});
-  }
-  EXPECT_LT(distance, 1.95 / std::sqrt(kSeries)) << "seed 9; 0.1 %";
-}
-
-TEST(LjungBox, OfTooFewReadingsSaysNothing) { EXPECT_EQ(ljung_box_p(Eigen::VectorXd::LinSpaced(30, 0, 1), 12, 0), 1); }
-
 double chi2_of(const Evidence& evidence, const Hypothesis& hypothesis, std::size_t r, const Eigen::VectorXd& values) {
   Workspace workspace;
   EXPECT_TRUE(evaluate(evidence, hypothesis, r, values, false, workspace));

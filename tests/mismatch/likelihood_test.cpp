@@ -2,6 +2,8 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <numbers>
+
 #include "tests/mismatch/simulated_rig.hpp"
 
 namespace bevel::diagnosis {
@@ -127,6 +129,43 @@ TEST(Hypothesis, HoldsItsBounds) {
   EXPECT_EQ(values[hypothesis.find(0, 0)], 0);
   EXPECT_NEAR(values[hypothesis.find(1, 0)], 4.0 - 2 * std::numbers::pi, 1e-12);
   EXPECT_GT(values[kUnknownU], 0);
+}
+
+TEST(Hypothesis, ADirectionPastItsEndsIsTheSameSwing) {
+  const auto recorded = record_case({.recordings = 2}, 1);
+  const Hypothesis hypothesis(model::testing::agar(), {member("tissue_motion")}, recorded);
+  const auto set = [&](double direction_rad) {
+    Eigen::VectorXd values = hypothesis.start();
+    values[hypothesis.find(0, 0)] = 0.7;
+    values[hypothesis.find(0, 1)] = 0.3;
+    values[hypothesis.find(0, 2)] = direction_rad;
+    values[hypothesis.find(0, 3, 0)] = 1.0;
+    values[hypothesis.find(0, 3, 1)] = 5.0;
+    return values;
+  };
+  model::OpenLoop path, turned_path;
+  for (const double direction_rad : {-0.2, 3.3, -3.5, 7.0}) {
+    Eigen::VectorXd turned = set(direction_rad);
+    hypothesis.clamp(turned);
+    EXPECT_GE(turned[hypothesis.find(0, 2)], 0);
+    EXPECT_LE(turned[hypothesis.find(0, 2)], std::numbers::pi);
+    for (std::size_t r = 0; r < 2; ++r) {
+      const auto& motion = recorded.recordings[r].motion;
+      ASSERT_TRUE(model::predict(hypothesis.make_needle(r, set(direction_rad), false), motion, path));
+      ASSERT_TRUE(model::predict(hypothesis.make_needle(r, turned, false), motion, turned_path));
+      for (std::size_t i = 0; i < path.position_mm.size(); ++i)
+        ASSERT_LT((path.position_mm[i] - turned_path.position_mm[i]).norm(), 1e-12) << direction_rad;
+    }
+  }
+}
+
+TEST(Hypothesis, AFrequencyIsOneThatTheReadingsShow) {
+  const auto recorded = record_case({.recordings = 2, .frame_s = 0.4}, 1);
+  const Hypothesis hypothesis(model::testing::agar(), {member("tissue_motion")}, recorded);
+  const Unknown& frequency = hypothesis.unknowns()[static_cast<std::size_t>(hypothesis.find(0, 1))];
+  EXPECT_NEAR(frequency.upper, 1.0, 1e-9) << "two and a half readings a period";
+  const double longest_s = std::max(recorded.recordings[0].duration_s(), recorded.recordings[1].duration_s());
+  EXPECT_NEAR(frequency.lower, 1 / longest_s, 1e-9) << "a period in the longest";
 }
 
 TEST(Hypothesis, OfTooManyUnknownsIsRefused) {

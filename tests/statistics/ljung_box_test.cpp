@@ -2,7 +2,10 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
+#include <random>
+#include <vector>
 
 namespace bevel::diagnosis {
 namespace {
@@ -33,6 +36,40 @@ TEST(LjungBox, SaysNothingOfTooFewValuesOrEqualOnes) {
   EXPECT_EQ(ljung_box(kRamp, 4).p_value, 1);
   EXPECT_EQ(ljung_box(Eigen::VectorXd(), 1).p_value, 1);
   EXPECT_EQ(ljung_box(Eigen::VectorXd::Constant(50, 3.0), 12).p_value, 1);
+}
+
+Eigen::VectorXd formula_series(double share) {
+  Eigen::VectorXd x(80);
+  for (int i = 1; i <= 80; ++i) x[i - 1] = std::sin(0.37 * i * i) + share * std::sin(0.9 * i);
+  return x;
+}
+
+// statsmodels 0.15.0: i = numpy.arange(1, 81); x = sin(0.37*i*i) + a*sin(0.9*i);
+// statsmodels.stats.diagnostic.acorr_ljungbox(x, lags=[12], model_df=df): lb_pvalue.
+TEST(LjungBox, IsThatOfStatsmodels) {
+  EXPECT_NEAR(ljung_box(formula_series(0.3), 12, 0).p_value, 0.83635948, 1e-7);
+  EXPECT_NEAR(ljung_box(formula_series(0.3), 12, 1).p_value, 0.7733244, 1e-7);
+  EXPECT_NEAR(ljung_box(formula_series(0.6), 12, 0).p_value, 2.89400255e-03, 1e-10);
+  EXPECT_NEAR(ljung_box(formula_series(0.6), 12, 1).p_value, 1.64477274e-03, 1e-10);
+}
+
+TEST(LjungBox, IsUniformOnWhiteNoise) {
+  std::mt19937_64 random(9);
+  std::normal_distribution<double> normal;
+  constexpr int kSeries = 500;
+  std::vector<double> p;
+  for (int s = 0; s < kSeries; ++s) {
+    Eigen::VectorXd white(400);
+    for (double& x : white) x = normal(random);
+    p.push_back(ljung_box(white, 12, 0).p_value);
+  }
+  std::sort(p.begin(), p.end());
+  double distance = 0;  // Kolmogorov and Smirnov
+  for (int s = 0; s < kSeries; ++s) {
+    const double at = p[static_cast<std::size_t>(s)];
+    distance = std::max({distance, (s + 1.0) / kSeries - at, at - static_cast<double>(s) / kSeries});
+  }
+  EXPECT_LT(distance, 1.95 / std::sqrt(kSeries)) << "seed 9; 0.1 %";
 }
 
 }  // namespace

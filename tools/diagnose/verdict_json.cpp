@@ -152,6 +152,7 @@ std::string verdict_json(const Findings& f) {
   for (const auto& location : f.where) j["where"].push_back(as_json(location));
   j["noise"] = {{"sigma_mm", figures(f.noise.sigma_mm)},
                 {"ar1", figure(f.noise.ar1)},
+                {"ar2", figure(f.noise.ar2)},
                 {"outlier_share", figure(f.noise.outlier_share)},
                 {"channels", f.channels},
                 {"frame_s", figure(f.noise.frame_s)}};
