@@ -7,10 +7,11 @@
 namespace bevel::estimator {
 
 struct Prior {
-  model::NeedleParameters needle;  // means of k, lambda1, lambda2; ell, slip and front_wheel are taken as they are
+  model::NeedleParameters needle;  // means of k, lambda1, lambda2, ell; slip and front_wheel are taken as they are
   double curvature_sd_per_mm = 0.001;
   double lambda1_sd_per_rad = 0.15;
   double lambda2_sd = 0.08;
+  double wheelbase_sd_mm = 0;   // 0: ell is held at its mean, nine states; above: ell is the tenth
   double position_sd_mm = 0.3;  // tip at the entry point
   double tilt_sd_rad = 0.02;    // heading about body x and y
   double roll_sd_rad = 0.05;    // bevel about the heading
@@ -50,7 +51,7 @@ struct EstimatorConfig {
   // measurement (offset, camera, latency). None: the plain model, bit for bit.
   std::vector<model::ActiveEffect> effects;
   // Steps that are kept of what has left the history, to run again with better derivatives (NeedleFilter::relinearise)
-  // each time their number has grown by a quarter; the whole costs about 1.5 us a step each time. 0: never.
+  // after each six of them, or an eighth of their number; the whole costs some 5 us a step each time. 0: never.
   // With effects, whose memory cannot be walked back, always 0.
   int relinearised_steps = 2048;
 };

@@ -1,7 +1,7 @@
 // The filter's propagation and measurement with the effects of a model file.
 #include <cmath>
 
-#include "estimator/needle_filter.hpp"
+#include "estimator/error_state.hpp"
 #include "estimator/propagate.hpp"
 
 namespace bevel::estimator {
@@ -11,7 +11,7 @@ model::AugmentedState NeedleFilter::augmented(const FilterState& state) const {
   model::AugmentedState augmented;
   augmented.pose = state.pose;
   // Sensitivities of one step: by the error of the pose before it, and by the parameters.
-  augmented.D.setIdentity(6, 9);
+  augmented.D.setIdentity(6, wheelbase_estimated_ ? 10 : 9);
   augmented.entry = effects.entry;
   augmented.base = effects.base;
   augmented.tip_insertion_mm = effects.tip_insertion_mm;
@@ -23,16 +23,19 @@ model::AugmentedState NeedleFilter::augmented(const FilterState& state) const {
   return augmented;
 }
 
+template <int kSize>
 bool NeedleFilter::predict_with_effects(FilterState& state, const model::BaseMotion& increment) const {
   if (increment.insertion_mm == 0 && increment.rotation_rad == 0 && increment.time_s == 0) return true;
   const model::BaseMotion& base = state.effects.base;
   model::AugmentedState moved = augmented(state);
-  needle_.set_needle(state.curvature_per_mm, state.lambda1_per_rad, state.lambda2);
+  needle_.set_needle(state.curvature_per_mm, state.lambda1_per_rad, state.lambda2, slip_of(state).wheelbase_mm);
   if (!needle_.advance(moved, {base.time_s + increment.time_s, base.insertion_mm + increment.insertion_mm,
                                base.rotation_rad + increment.rotation_rad}))
     return false;
-  propagate<9>(state.covariance, moved.D.leftCols<6>(), moved.D.middleCols<3>(6));
-  state.covariance.diagonal() += process_variance(state.covariance, increment.insertion_mm, increment.rotation_rad);
+  Covariance<kSize> P = covariance_of<kSize>(state);
+  propagate<kSize>(P, moved.D.leftCols<6>(), moved.D.middleCols<kSize - 6>(6));
+  P.diagonal() += process_variance<kSize>(P, increment.insertion_mm, increment.rotation_rad);
+  set_covariance<kSize>(state, P);
   state.pose = moved.pose;
   EffectState& effects = state.effects;
   effects.base = moved.base;
@@ -44,6 +47,8 @@ bool NeedleFilter::predict_with_effects(FilterState& state, const model::BaseMot
   }
   return true;
 }
+template bool NeedleFilter::predict_with_effects<9>(FilterState&, const model::BaseMotion&) const;
+template bool NeedleFilter::predict_with_effects<10>(FilterState&, const model::BaseMotion&) const;
 
 model::TipReading NeedleFilter::reading(const FilterState& state) const {
   model::TipReading at;

@@ -9,12 +9,11 @@
 namespace bevel::estimator {
 
 NeedleEstimator::NeedleEstimator(const EstimatorConfig& config, std::size_t history)
-    : filter_(config), past_needle_(config.prior.needle) {
+    : filter_(config),
+      past_(config.effects.empty() ? static_cast<std::size_t>(std::max(config.relinearised_steps, 0)) : 0) {
   pool_.resize(std::max<std::size_t>(history, 8));
   order_.reserve(pool_.size());
   free_.reserve(pool_.size());
-  past_.reserve(static_cast<std::size_t>(config.effects.empty() ? std::max(config.relinearised_steps, 0) : 0));
-  past_room_.resize(past_.capacity());
   for (std::size_t i = pool_.size(); i-- > 0;) free_.push_back(static_cast<std::uint32_t>(i));
 }
 
@@ -61,14 +60,14 @@ void NeedleEstimator::drop_oldest() {
 }
 
 void NeedleEstimator::remember(const Node& before, const Node& node) {
-  if (node.state.reset_count != before.state.reset_count) {
-    past_.clear();
-    past_start_ = node.state;
+  if (!past_started_ || node.state.reset_count != before.state.reset_count) {
+    const bool first = !past_started_;
+    past_.restart(first ? before.state : node.state);
     past_due_ = kFirstRelinearisation;
-    past_complete_ = true;
-    return;
+    past_started_ = true;
+    if (!first) return;
   }
-  if (past_.empty()) past_start_ = before.state;
+  if (!past_.complete()) return;
   PastStep step;
   step.insertion_mm = node.insertion_mm - before.insertion_mm;
   step.rotation_rad = node.rotation_rad - before.rotation_rad;
@@ -77,63 +76,16 @@ void NeedleEstimator::remember(const Node& before, const Node& node) {
     step.position_mm = node.measurement.position_mm;
     step.information_per_mm2 = node.measurement.information_per_mm2;
   }
-  if (!past_.empty() && merge(past_.back(), step, before.state.pose.R, node)) return;
-  if (past_.size() < past_.capacity()) {
-    past_.push_back(step);
-  } else {
-    past_complete_ = false;
-  }
-}
-
-// Neighbours of one direction whose rates are nearly in proportion are one step, and what was measured on the way is
-// one reading: a hundred millimetres are a hundred steps, whatever the frame rate.
-bool NeedleEstimator::merge(PastStep& last, const PastStep& step, const Eigen::Matrix3d& R_before, const Node& node) {
-  constexpr double kMerged_mm = 1.0;
-  constexpr double kMerged_rad = 0.25;
-  constexpr double kSkew_mm_rad = 0.01;  // turns the heading by k times half of this
-  const auto diagonal = [](const Eigen::Matrix3d& W) { return W(0, 1) == 0 && W(0, 2) == 0 && W(1, 2) == 0; };
-  if (last.insertion_mm * step.insertion_mm < 0 || last.rotation_rad * step.rotation_rad < 0 ||
-      std::abs(last.insertion_mm + step.insertion_mm) > kMerged_mm ||
-      std::abs(last.rotation_rad + step.rotation_rad) > kMerged_rad ||
-      std::abs(last.insertion_mm * step.rotation_rad - last.rotation_rad * step.insertion_mm) > kSkew_mm_rad ||
-      !diagonal(last.information_per_mm2) || !diagonal(step.information_per_mm2))
-    return false;
-  last.insertion_mm += step.insertion_mm;
-  last.rotation_rad += step.rotation_rad;
-  // From the new end to where the tip was, in {A}; then the mean with the new reading, whose tip is the end itself.
-  Eigen::Vector3d offset_mm = last.measured ? Eigen::Vector3d(R_before * last.point_mm - node.moved_mm)
-                                            : Eigen::Vector3d(Eigen::Vector3d::Zero());
-  if (step.measured) {
-    const Eigen::Vector3d had = last.information_per_mm2.diagonal();
-    const Eigen::Vector3d comes = step.information_per_mm2.diagonal();
-    for (int i = 0; i < 3; ++i) {
-      if (!(had[i] + comes[i] > 0)) continue;
-      const double share = had[i] / (had[i] + comes[i]);
-      last.position_mm[i] = share * last.position_mm[i] + (1 - share) * step.position_mm[i];
-      offset_mm[i] *= share;
-    }
-    last.information_per_mm2.diagonal() = had + comes;
-    last.measured = true;
-  }
-  last.point_mm = node.state.pose.R.transpose() * offset_mm;
-  return true;
+  past_.add(before.state, step, node.state, node.moved_mm, filter_);
 }
 
 void NeedleEstimator::relinearise_if_due() {
-  if (!past_complete_ || past_.size() < past_due_) return;
+  if (!past_.complete() || past_.steps().size() < past_due_) return;
   FilterState& anchor = node(0).state;
-  const Prior& prior = filter_.config().prior;
-  const auto moved = [](double now, double then, double sd) { return std::abs(now - then) > kMovedShare * sd; };
-  if (!moved(anchor.curvature_per_mm, past_needle_.curvature_per_mm, prior.curvature_sd_per_mm) &&
-      !moved(anchor.lambda1_per_rad, past_needle_.lambda1_per_rad, prior.lambda1_sd_per_rad) &&
-      !moved(anchor.lambda2, past_needle_.lambda2, prior.lambda2_sd)) {
-    past_due_ = past_.size() + past_.size() / 10;
-    return;
-  }
-  past_due_ = past_.size() + past_.size() / 4;
-  past_needle_ = {anchor.curvature_per_mm, prior.needle.wheelbase_mm, anchor.lambda1_per_rad,
-                  anchor.lambda2,          prior.needle.slip,         prior.needle.front_wheel};
-  if (!filter_.relinearise(anchor, past_start_, past_, past_room_)) return;
+  past_.close(anchor, filter_);
+  if (!past_.complete()) return;
+  past_due_ = past_.steps().size() + std::max<std::size_t>(kRelinearisedEvery, past_.steps().size() / 8);
+  if (!filter_.relinearise(anchor, past_.start(), past_.steps())) return;
   ++counters_.relinearised;
   process_from(1);
 }

@@ -7,7 +7,7 @@
 #include <cstdint>
 #include <vector>
 
-#include "estimator/needle_filter.hpp"
+#include "estimator/past.hpp"
 
 namespace bevel::estimator {
 
@@ -32,8 +32,8 @@ struct Estimate {
 
 class NeedleEstimator {
  public:
-  // history: number of nodes kept; at 100 Hz of actuators and 2 x 30 Hz of cameras 96 nodes are 0.6 s.
-  explicit NeedleEstimator(const EstimatorConfig& config, std::size_t history = 96);
+  // history: number of nodes kept; at 100 Hz of actuators and 2 x 30 Hz of cameras 64 nodes are 0.4 s.
+  explicit NeedleEstimator(const EstimatorConfig& config, std::size_t history = 64);
 
   void add(const model::ActuatorState& actuator);
   void add(const model::TipMeasurement& measurement);
@@ -57,8 +57,9 @@ class NeedleEstimator {
   const NeedleFilter& filter() const { return filter_; }
 
  private:
-  static constexpr std::size_t kFirstRelinearisation = 20;
-  static constexpr double kMovedShare = 0.3;  // of a parameter's prior standard deviation since it was last done
+  // Steps of the past, 2.5 mm or less each; what has come since is linear.
+  static constexpr std::size_t kFirstRelinearisation = 12;
+  static constexpr std::size_t kRelinearisedEvery = 6;
   enum class Kind : std::uint8_t { actuator, measurement };
   struct Node {
     std::int64_t utime = 0;
@@ -78,7 +79,6 @@ class NeedleEstimator {
   void process_from(std::size_t index);
   void drop_oldest();
   void remember(const Node& before, const Node& node);
-  static bool merge(PastStep& last, const PastStep& step, const Eigen::Matrix3d& R_before, const Node& node);
   void relinearise_if_due();
   void interpolate(std::size_t index);
 
@@ -86,13 +86,10 @@ class NeedleEstimator {
   std::vector<Node> pool_;            // sized once
   std::vector<std::uint32_t> order_;  // indices into the pool, by time; reserved once
   std::vector<std::uint32_t> free_;
-  std::size_t processed_ = 0;   // nodes before this index hold a posterior
-  FilterState past_start_;      // before the first step of past_
-  std::vector<PastStep> past_;  // what has left the history, from its start or the last reset; reserved once
-  std::vector<Eigen::Vector3d> past_room_;        // for NeedleFilter::relinearise
+  std::size_t processed_ = 0;  // nodes before this index hold a posterior
+  Past past_;                  // what has left the history, from its start or the last reset
+  bool past_started_ = false;
   std::size_t past_due_ = kFirstRelinearisation;  // number of steps at which they are run again
-  model::NeedleParameters past_needle_;           // of the newest linearisation
-  bool past_complete_ = true;                     // false once past_ was full
   Counters counters_;
   Update newest_update_;
   std::int64_t newest_update_utime_ = 0;

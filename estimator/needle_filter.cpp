@@ -2,10 +2,12 @@
 
 #include <Eigen/Cholesky>
 #include <Eigen/Eigenvalues>
+#include <algorithm>
 #include <boost/math/distributions/chi_squared.hpp>
 #include <cmath>
 #include <numbers>
 
+#include "estimator/error_state.hpp"
 #include "estimator/propagate.hpp"
 
 namespace bevel::estimator {
@@ -13,7 +15,8 @@ namespace {
 
 // Information below this share of the largest is an axis that the camera does not see.
 constexpr double kRankTolerance = 1e-9;
-constexpr double kLambda2Max = 0.9;  // (24) with room: 1 - lambda2 stays away from zero
+constexpr double kLambda2Max = 0.9;                             // (24) with room: 1 - lambda2 stays away from zero
+constexpr double kWheelbaseMin_mm = 2, kWheelbaseMax_mm = 990;  // of the model's (1, 1000), with room
 constexpr double kVarianceFloor = 1e-14;
 
 double square(double x) { return x * x; }
@@ -52,13 +55,14 @@ SeenAxes seen_axes(const Eigen::Matrix3d& information) {
 }
 
 // `by_state`: derivative of what is seen by the first columns of the error; R of the pose if it is the tip itself.
-template <int kRank, int kColumns>
+template <int kSize, int kRank, int kColumns>
 Update update_rank(FilterState& state, const Eigen::Matrix<double, 3, kColumns>& by_state, const Eigen::Matrix3d& axes,
                    const Eigen::Vector3d& variance, const Eigen::Vector3d& residual, double gate) {
   using Vec = Eigen::Matrix<double, kRank, 1>;
   using Mat = Eigen::Matrix<double, kRank, kRank>;
   const Eigen::Matrix<double, kRank, kColumns> H = axes.rightCols<kRank>().transpose() * by_state;
-  const Eigen::Matrix<double, 9, kRank> PHt = state.covariance.leftCols<kColumns>() * H.transpose();
+  const auto& covariance = covariance_of<kSize>(state);
+  const Eigen::Matrix<double, kSize, kRank> PHt = covariance.template leftCols<kColumns>() * H.transpose();
   Mat S = H * PHt.template topRows<kColumns>();
   S.diagonal() += variance.tail<kRank>();
   const Eigen::LLT<Mat> llt(S);
@@ -74,33 +78,30 @@ Update update_rank(FilterState& state, const Eigen::Matrix<double, 3, kColumns>&
   result.accepted = result.test_ratio <= 1;  // false for a NaN too
   if (!result.accepted) return result;
 
-  const Eigen::Matrix<double, 9, kRank> K = llt.solve(PHt.transpose()).transpose();
-  const Vector9d correction = K * y;
+  const Eigen::Matrix<double, kSize, kRank> K = llt.solve(PHt.transpose()).transpose();
+  const Error<kSize> correction = K * y;
   // Joseph form, (I - K H) P (I - K H)^T + K R K^T, with H only in its first columns; small products written out.
-  Matrix9d P = state.covariance;
+  Covariance<kSize> P = covariance;
   P.noalias() -= K.lazyProduct(PHt.transpose());
-  Eigen::Matrix<double, 9, kRank> PHt2 = P.leftCols<kColumns>().lazyProduct(H.transpose());
+  Eigen::Matrix<double, kSize, kRank> PHt2 = P.template leftCols<kColumns>().lazyProduct(H.transpose());
   PHt2 -= K * variance.tail<kRank>().asDiagonal();
   P.noalias() -= PHt2.lazyProduct(K.transpose());
-  state.covariance = 0.5 * (P + P.transpose());
-  state.pose = state.pose * model::exp_se3(correction.head<6>());
+  set_covariance<kSize>(state, 0.5 * (P + P.transpose()));
+  move<kSize>(state, correction);
   state.pose.R = model::orthonormalised(state.pose.R);
-  state.curvature_per_mm += correction[6];
-  state.lambda1_per_rad += correction[7];
-  state.lambda2 += correction[8];
   return result;
 }
 
-template <int kColumns>
+template <int kSize, int kColumns>
 Update update_seen(FilterState& state, const Eigen::Matrix<double, 3, kColumns>& by_state, const SeenAxes& seen,
                    const Eigen::Vector3d& residual, const std::array<double, 3>& gate) {
   switch (seen.rank) {
     case 1:
-      return update_rank<1, kColumns>(state, by_state, seen.axes, seen.variance, residual, gate[0]);
+      return update_rank<kSize, 1, kColumns>(state, by_state, seen.axes, seen.variance, residual, gate[0]);
     case 2:
-      return update_rank<2, kColumns>(state, by_state, seen.axes, seen.variance, residual, gate[1]);
+      return update_rank<kSize, 2, kColumns>(state, by_state, seen.axes, seen.variance, residual, gate[1]);
     case 3:
-      return update_rank<3, kColumns>(state, by_state, seen.axes, seen.variance, residual, gate[2]);
+      return update_rank<kSize, 3, kColumns>(state, by_state, seen.axes, seen.variance, residual, gate[2]);
     default:
       return {};
   }
@@ -111,7 +112,9 @@ Update update_seen(FilterState& state, const Eigen::Matrix<double, 3, kColumns>&
 NeedleFilter::NeedleFilter(const EstimatorConfig& config)
     : config_(config),
       slip_(model::slip_parameters(config.prior.needle)),
-      needle_(config.prior.needle, config.effects, 9, {.curvature = 6, .lambda1 = 7, .lambda2 = 8}) {
+      wheelbase_estimated_(config.prior.wheelbase_sd_mm > 0),
+      needle_(config.prior.needle, config.effects, wheelbase_estimated_ ? 10 : 9,
+              {.curvature = 6, .lambda1 = 7, .lambda2 = 8, .wheelbase = wheelbase_estimated_ ? 9 : -1}) {
   for (int rank = 1; rank <= 3; ++rank)
     gate_[static_cast<std::size_t>(rank - 1)] =
         boost::math::quantile(boost::math::chi_squared(rank), config.gate.probability);
@@ -123,6 +126,8 @@ FilterState NeedleFilter::initial(double insertion_mm, double rotation_rad) cons
   state.curvature_per_mm = prior.needle.curvature_per_mm;
   state.lambda1_per_rad = prior.needle.lambda1_per_rad;
   state.lambda2 = prior.needle.lambda2;
+  state.wheelbase_mm = prior.needle.wheelbase_mm;
+  state.wheelbase_variance_mm2 = square(prior.wheelbase_sd_mm);
   state.covariance.diagonal() << Eigen::Vector3d::Constant(square(prior.position_sd_mm)), square(prior.tilt_sd_rad),
       square(prior.tilt_sd_rad), square(prior.roll_sd_rad), square(prior.curvature_sd_per_mm),
       square(prior.lambda1_sd_per_rad), square(prior.lambda2_sd);
@@ -135,31 +140,53 @@ FilterState NeedleFilter::initial(double insertion_mm, double rotation_rad) cons
   return state;
 }
 
-void NeedleFilter::predict(FilterState& state, double insertion_mm, double rotation_rad, double duration_s) const {
-  if (!config_.effects.empty()) {
-    state.outside_model = !predict_with_effects(state, {duration_s, insertion_mm, rotation_rad});
-    return;
-  }
-  if (insertion_mm == 0 && rotation_rad == 0) return;
+model::SlipParameters NeedleFilter::slip_of(const FilterState& state) const {
   model::SlipParameters slip = slip_;
   slip.lambda1_per_rad = state.lambda1_per_rad;
   slip.lambda2 = state.lambda2;
-  model::NeedleJacobian jacobian;
-  if (!model::advance(state.pose, {insertion_mm, rotation_rad, {state.curvature_per_mm, 0}}, slip, jacobian)) {
-    state.outside_model = true;
-    return;
-  }
-  state.outside_model = false;
-
-  propagate<9>(state.covariance, jacobian.pose, jacobian.needle.leftCols<3>());
-  state.covariance.diagonal() += process_variance(state.covariance, insertion_mm, rotation_rad);
+  if (wheelbase_estimated_) slip.wheelbase_mm = state.wheelbase_mm;
+  return slip;
 }
 
-Vector9d NeedleFilter::process_variance(const Matrix9d& covariance, double insertion_mm, double rotation_rad) const {
+void NeedleFilter::predict(FilterState& state, double insertion_mm, double rotation_rad, double duration_s) const {
+  if (!config_.effects.empty()) {
+    const model::BaseMotion increment{duration_s, insertion_mm, rotation_rad};
+    state.outside_model = !(wheelbase_estimated_ ? predict_with_effects<10>(state, increment)
+                                                 : predict_with_effects<9>(state, increment));
+    return;
+  }
+  if (insertion_mm == 0 && rotation_rad == 0) return;
+  wheelbase_estimated_ ? predict_plain<10>(state, insertion_mm, rotation_rad)
+                       : predict_plain<9>(state, insertion_mm, rotation_rad);
+}
+
+template <int kSize>
+void NeedleFilter::predict_plain(FilterState& state, double insertion_mm, double rotation_rad) const {
+  model::NeedleJacobian jacobian;
+  state.outside_model =
+      !model::advance(state.pose, {insertion_mm, rotation_rad, {state.curvature_per_mm, 0}}, slip_of(state), jacobian);
+  if (state.outside_model) return;
+  const auto move_covariance = [&](Covariance<kSize>& P) {
+    propagate<kSize>(P, jacobian.pose, jacobian.needle.leftCols<kSize - 6>());
+    P.diagonal() += process_variance<kSize>(P, insertion_mm, rotation_rad);
+  };
+  if constexpr (kSize == 9) {
+    move_covariance(state.covariance);
+  } else {
+    Covariance<kSize> P = covariance_of<kSize>(state);
+    move_covariance(P);
+    set_covariance<kSize>(state, P);
+  }
+}
+
+template <int kSize>
+Error<kSize> NeedleFilter::process_variance(const Covariance<kSize>& covariance, double insertion_mm,
+                                            double rotation_rad) const {
   const ProcessNoise& noise = config_.process;
-  Vector9d added;
-  added << Eigen::Vector3d::Constant(square(noise.position_mm)), square(noise.tilt_rad), square(noise.tilt_rad),
-      square(noise.roll_rad), square(noise.curvature_per_mm), square(noise.lambda1_per_rad), square(noise.lambda2);
+  Error<kSize> added = Error<kSize>::Zero();  // ell is the needle's: it does not walk
+  added.template head<9>() << Eigen::Vector3d::Constant(square(noise.position_mm)), square(noise.tilt_rad),
+      square(noise.tilt_rad), square(noise.roll_rad), square(noise.curvature_per_mm), square(noise.lambda1_per_rad),
+      square(noise.lambda2);
   added *= std::abs(insertion_mm);
   added[5] += square(noise.roll_per_sqrt_rad) * std::abs(rotation_rad);
   // A parameter that the prior holds fixed (standard deviation zero) stays fixed: no walk is added to it.
@@ -167,21 +194,28 @@ Vector9d NeedleFilter::process_variance(const Matrix9d& covariance, double inser
     if (covariance(i, i) == 0) added[i] = 0;
   return added;
 }
+template Error<9> NeedleFilter::process_variance<9>(const Covariance<9>&, double, double) const;
+template Error<10> NeedleFilter::process_variance<10>(const Covariance<10>&, double, double) const;
 
 Update NeedleFilter::update(FilterState& state, const model::TipMeasurement& measurement) const {
+  return wheelbase_estimated_ ? update_sized<10>(state, measurement) : update_sized<9>(state, measurement);
+}
+
+template <int kSize>
+Update NeedleFilter::update_sized(FilterState& state, const model::TipMeasurement& measurement) const {
   const SeenAxes seen = seen_axes(measurement.information_per_mm2);
   if (seen.rank == 0) return {};  // sees nothing: no rejection either
   Update result;
   if (config_.effects.empty()) {
-    result = update_seen<3>(state, state.pose.R, seen, measurement.position_mm - state.pose.p_mm, gate_);
+    result = update_seen<kSize, 3>(state, state.pose.R, seen, measurement.position_mm - state.pose.p_mm, gate_);
   } else {
     const model::TipReading at = reading(state);
-    result = update_seen<9>(state, at.D, seen, measurement.position_mm - at.position_mm, gate_);
+    result = update_seen<kSize, kSize>(state, at.D, seen, measurement.position_mm - at.position_mm, gate_);
   }
   if (result.accepted) {
     state.measurement_utime = measurement.utime;
     state.rejects_in_row = 0;
-    keep_in_domain(state);
+    keep_in_domain<kSize>(state);
   } else if (++state.rejects_in_row >= config_.gate.rejects_before_reset) {
     declare_reset(state);
     result.reset = true;
@@ -191,40 +225,46 @@ Update NeedleFilter::update(FilterState& state, const model::TipMeasurement& mea
 
 // Moves the parameters back into the valid set of Section III.A along the covariance, so that what is correlated with
 // them moves too; the covariance itself is kept (a bound that is reached must not make the filter confident).
+template <int kSize>
 void NeedleFilter::keep_in_domain(FilterState& state) const {
-  const auto move = [&state](const Vector9d& normal, double excess) {
-    const Vector9d Pa = state.covariance * normal;
+  const auto move_by = [&state](const Error<kSize>& normal, double excess) {
+    const Error<kSize> Pa = covariance_of<kSize>(state) * normal;
     const double variance = normal.dot(Pa);
     if (!(variance > 0)) return;
-    const Vector9d correction = -Pa * (excess / variance);
-    state.pose = state.pose * model::exp_se3(correction.head<6>());
-    state.curvature_per_mm += correction[6];
-    state.lambda1_per_rad += correction[7];
-    state.lambda2 += correction[8];
+    move<kSize>(state, -Pa * (excess / variance));
   };
+  if constexpr (kSize == 10) {
+    const double inside_mm = std::clamp(state.wheelbase_mm, kWheelbaseMin_mm, kWheelbaseMax_mm);
+    if (state.wheelbase_mm != inside_mm) move_by(Error<kSize>::Unit(9), state.wheelbase_mm - inside_mm);
+  }
   if (state.lambda1_per_rad == 0 && state.lambda2 == 0) return;
-  if (state.lambda2 > kLambda2Max) move(Vector9d::Unit(8), state.lambda2 - kLambda2Max);
+  if (state.lambda2 > kLambda2Max) move_by(Error<kSize>::Unit(8), state.lambda2 - kLambda2Max);
   // (26), linearised at the present lambda2; the set is convex, so twice is enough for small excesses.
   for (int i = 0; i < 2; ++i) {
     const double bound = square(state.lambda2) / (2 * std::numbers::pi) + 1e-6;
     if (state.lambda1_per_rad >= bound) break;
-    Vector9d normal = Vector9d::Zero();
+    Error<kSize> normal = Error<kSize>::Zero();
     normal[7] = 1;
     normal[8] = -state.lambda2 / std::numbers::pi;
-    move(normal, state.lambda1_per_rad - bound);
+    move_by(normal, state.lambda1_per_rad - bound);
   }
   // Whatever the covariance allowed, the state ends inside.
   state.lambda2 = std::min(state.lambda2, kLambda2Max);
   state.lambda1_per_rad = std::max(state.lambda1_per_rad, square(state.lambda2) / (2 * std::numbers::pi) + 1e-9);
+  if constexpr (kSize == 10) state.wheelbase_mm = std::clamp(state.wheelbase_mm, kWheelbaseMin_mm, kWheelbaseMax_mm);
   for (int i = 0; i < 9; ++i)
     if (state.covariance(i, i) != 0) state.covariance(i, i) = std::max(state.covariance(i, i), kVarianceFloor);
 }
+template void NeedleFilter::keep_in_domain<9>(FilterState&) const;
+template void NeedleFilter::keep_in_domain<10>(FilterState&) const;
 
 void NeedleFilter::declare_reset(FilterState& state) const {
   // The pose is believed no more; the parameters are, but less: their prior widths come back, correlations go.
   const FilterState prior = initial();
   const Gate& gate = config_.gate;
   state.covariance = prior.covariance;
+  state.wheelbase_covariance.setZero();
+  state.wheelbase_variance_mm2 = prior.wheelbase_variance_mm2;
   state.covariance.diagonal().head<6>() << Eigen::Vector3d::Constant(square(gate.reset_position_sd_mm)),
       square(gate.reset_tilt_sd_rad), square(gate.reset_tilt_sd_rad),
       square(std::max(gate.reset_tilt_sd_rad, config_.prior.roll_sd_rad));

@@ -1,7 +1,8 @@
 #pragma once
 // Extended Kalman filter of the needle: pose on SE(3), curvature and lambda, driven by actuator increments.
 //
-// State: pose of {B} in {A} (error in the body frame, mm | rad), k, lambda1, lambda2. Nine error states, in this order.
+// State: pose of {B} in {A} (error in the body frame, mm | rad), k, lambda1, lambda2. Nine error states, in this order;
+// ell is a tenth where the prior gives it a width (Prior::wheelbase_sd_mm).
 // Model: model/kinematics.hpp, (10) with the slip of (25); measurement: tip position in {A}, information of any rank.
 // Pure: no clock, no allocation, fixed-size Eigen. Covariance by the Joseph form, symmetric and floored.
 #include <Eigen/Core>
@@ -32,7 +33,11 @@ struct FilterState {
   double curvature_per_mm = 0;
   double lambda1_per_rad = 0;
   double lambda2 = 0;
+  double wheelbase_mm = 0;
   Matrix9d covariance = Matrix9d::Zero();
+  // Of ell with the nine, and its own; zero where ell is held.
+  Vector9d wheelbase_covariance = Vector9d::Zero();
+  double wheelbase_variance_mm2 = 0;
   std::int64_t measurement_utime = 0;  // newest accepted; 0 before the first
   std::int32_t rejects_in_row = 0;
   std::int32_t reset_count = 0;
@@ -62,6 +67,9 @@ struct PastStep {
   Eigen::Matrix3d information_per_mm2 = Eigen::Matrix3d::Zero();
 };
 
+template <int kSize>
+struct LinearFilter;  // relinearise.cpp
+
 class NeedleFilter {
  public:
   explicit NeedleFilter(const EstimatorConfig& config);
@@ -82,37 +90,47 @@ class NeedleFilter {
   Update update(FilterState& state, const model::TipMeasurement& measurement) const;
 
   // An extended filter keeps the derivatives that it took while it knew little of k and lambda, and is too sure for
-  // it. This runs the steps since `start` (the state before the first of them) again, with all derivatives taken on
-  // the path which leads, by the model with the parameters of `state`, to the pose of `state`; `state` is the estimate
-  // after the last step and is replaced by the result. False, and nothing changed, where the model has no answer or the
-  // path would not come nearer to the measurements. `room` has a place for each step and is written over.
-  // Iterated Kalman filter over a window, cf. Bell and Cathey 1993, IEEE TAC 38(2): a Gauss-Newton step of the batch.
-  // The posterior is a bent ridge where data leave k and lambda to trade off: mean and covariance follow the bend to
-  // second order along its length, as a second-order filter's do (Jazwinski 1970, section 9.3).
-  bool relinearise(FilterState& state, const FilterState& start, std::span<const PastStep> steps,
-                   std::span<Eigen::Vector3d> room) const;
+  // it. This runs the steps since `start` (the state before the first of them) again; `state` is the estimate after the
+  // last step and is replaced by the result. False, and nothing changed, where the model has no answer or the result's
+  // path would not come nearer to the measurements.
+  // Where data leave k and lambda to trade off, the posterior is a bent ridge. So this is done at three places along
+  // the least known direction, each time with all derivatives on the path that leads there: an iterated Kalman filter
+  // over a window (cf. Bell and Cathey 1993, IEEE TAC 38(2)) of the rest, given the place. The three are put together
+  // by Gauss and Hermite's rule, weighed by how probable each makes the measurements: mean and covariance of the ridge.
+  bool relinearise(FilterState& state, const FilterState& start, std::span<const PastStep> steps) const;
 
   const EstimatorConfig& config() const { return config_; }
 
  private:
-  template <class Visit>
-  bool walk_back(const FilterState& state, std::span<const PastStep> steps, model::Pose& entry, Visit&& visit) const;
-  double path_cost(const FilterState& state, const FilterState& start, std::span<const PastStep> steps,
-                   model::Pose& entry) const;
-  bool bend(const FilterState& state, const FilterState& start, std::span<const PastStep> steps,
-            std::span<Eigen::Vector3d> room, Vector9d& along, Vector9d& start_bend) const;
-  void shift(FilterState& state, const Vector9d& error, const Matrix9d& covariance) const;
+  // kSize: 9, or 10 with ell.
+  template <int kSize>
+  void predict_plain(FilterState& state, double insertion_mm, double rotation_rad) const;
+  template <int kSize>
   bool predict_with_effects(FilterState& state, const model::BaseMotion& increment) const;
+  template <int kSize>
+  Update update_sized(FilterState& state, const model::TipMeasurement& measurement) const;
+  template <int kSize>
+  bool relinearise_sized(FilterState& state, const FilterState& start, std::span<const PastStep> steps) const;
+  template <int kSize>
+  bool run_again(const FilterState& about, const FilterState& start, std::span<const PastStep> steps,
+                 LinearFilter<kSize>& linear) const;
+  template <int kSize>
+  double path_cost(const FilterState& state, const FilterState& start, std::span<const PastStep> steps) const;
+  template <int kSize>
+  Eigen::Matrix<double, kSize, 1> process_variance(const Eigen::Matrix<double, kSize, kSize>& covariance,
+                                                   double insertion_mm, double rotation_rad) const;
+  template <int kSize>
+  void keep_in_domain(FilterState& state) const;
+  model::SlipParameters slip_of(const FilterState& state) const;
   model::AugmentedState augmented(const FilterState& state) const;
   model::TipReading reading(const FilterState& state) const;
-  Vector9d process_variance(const Matrix9d& covariance, double insertion_mm, double rotation_rad) const;
-  void keep_in_domain(FilterState& state) const;
   void declare_reset(FilterState& state) const;
 
   EstimatorConfig config_;
   std::array<double, 3> gate_{};  // chi-square quantile by rank
-  model::SlipParameters slip_;    // ell and the variants; lambda comes from the state
-  // Its k and lambda are set to those of the state in each step: one filter serves one thread.
+  model::SlipParameters slip_;    // the variants; lambda and ell come from the state
+  bool wheelbase_estimated_ = false;
+  // Its parameters are set to those of the state in each step: one filter serves one thread.
   mutable model::AugmentedNeedle needle_;
 };
 

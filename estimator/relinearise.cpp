@@ -1,199 +1,219 @@
 #include <Eigen/Cholesky>
 #include <Eigen/Eigenvalues>
 #include <Eigen/LU>
+#include <algorithm>
+#include <array>
 #include <cmath>
 #include <limits>
 
-#include "estimator/needle_filter.hpp"
+#include "estimator/error_state.hpp"
 #include "estimator/propagate.hpp"
 
 namespace bevel::estimator {
-namespace {
 
-using model::Vector6d;
-
-constexpr double kSmallStep = 0.25;  // squared, in standard deviations
-
-// A linear filter of the error (pose in the body frame | parameters) about a given path, and of what the path's bend
-// adds to it: the same filter, with the bend for its residuals.
+// A linear filter of the error (pose in the body frame | parameters) about a given path.
+template <int kSize>
 struct LinearFilter {
-  Vector9d error;
-  Vector9d bend;
-  Matrix9d covariance;
+  Error<kSize> error;
+  Covariance<kSize> covariance;
+  double log_evidence = 0;  // of the measurements, up to what is the same for every path
 
-  void predict(const model::NeedleJacobian& j, const Vector9d& added) {
-    const Eigen::Matrix<double, 6, 3> G = j.needle.leftCols<3>();
-    for (Vector9d* e : {&error, &bend}) {
-      const Vector6d moved = j.pose * e->head<6>();
-      e->head<6>() = moved + G * e->tail<3>();
-    }
-    propagate<9>(covariance, j.pose, G);
+  void predict(const model::NeedleJacobian& j, const Error<kSize>& added) {
+    const Eigen::Matrix<double, 6, kSize - 6> G = j.needle.leftCols<kSize - 6>();
+    const model::Vector6d moved = j.pose * error.template head<6>();
+    error.template head<6>() = moved + G * error.template tail<kSize - 6>();
+    propagate<kSize>(covariance, j.pose, G);
     covariance.diagonal() += added;
   }
 
   // In information form on the seen axes, whatever the rank: S^-1 = (I + W H P H^T)^-1 W with W the information.
-  void update(const Eigen::Matrix3d& R, const PastStep& step, const Eigen::Vector3d& residual,
-              const Eigen::Vector3d& residual_of_bend) {
+  void update(const Eigen::Matrix3d& R, const PastStep& step, const Eigen::Vector3d& residual) {
+    using Columns = Eigen::Matrix<double, kSize, 3>;
     // The point moves by R (v + omega x point) under a body perturbation.
     const Eigen::Matrix3d lever = model::hat(step.point_mm);
-    Eigen::Matrix<double, 9, 3> by_body = covariance.leftCols<3>();
-    by_body.noalias() += covariance.middleCols<3>(3).lazyProduct(lever);
-    const Eigen::Matrix<double, 9, 3> PHt = by_body.lazyProduct(R.transpose());
-    const Eigen::Matrix3d HPHt = R * (PHt.topRows<3>() - lever * PHt.middleRows<3>(3));
-    const Eigen::Matrix3d weight =
-        (Eigen::Matrix3d::Identity() + step.information_per_mm2 * HPHt).inverse() * step.information_per_mm2;
-    const Eigen::Matrix<double, 9, 3> gain = PHt.lazyProduct(weight);
-    const auto seen = [&](const Vector9d& e) -> Eigen::Vector3d { return R * (e.head<3>() - lever * e.segment<3>(3)); };
-    error += gain * (residual - seen(error));
-    bend += gain * (residual_of_bend - seen(bend));
-    Matrix9d P = covariance;
+    Columns by_body = covariance.template leftCols<3>();
+    by_body.noalias() += covariance.template middleCols<3>(3).lazyProduct(lever);
+    const Columns PHt = by_body.lazyProduct(R.transpose());
+    const Eigen::Matrix3d HPHt = R * (PHt.template topRows<3>() - lever * PHt.template middleRows<3>(3));
+    const Eigen::Matrix3d spread = Eigen::Matrix3d::Identity() + step.information_per_mm2 * HPHt;
+    const Eigen::Matrix3d weight = spread.inverse() * step.information_per_mm2;
+    const Eigen::Vector3d innovation = residual - R * (error.template head<3>() - lever * error.template segment<3>(3));
+    log_evidence -= 0.5 * (innovation.dot(weight * innovation) + std::log(spread.determinant()));
+    const Columns gain = PHt.lazyProduct(weight);
+    error += gain * innovation;
+    Covariance<kSize> P = covariance;
     P.noalias() -= gain.lazyProduct(PHt.transpose());
+    covariance = 0.5 * (P + P.transpose());
+  }
+
+  // Given that the error along `normal` is zero. The evidence takes in how probable that was.
+  void condition(const Error<kSize>& normal) {
+    const Error<kSize> Pn = covariance * normal;
+    const double variance = normal.dot(Pn), off = normal.dot(error);
+    log_evidence -= 0.5 * (off * off / variance + std::log(variance));
+    error -= Pn * (off / variance);
+    covariance -= Pn * Pn.transpose() / variance;
+  }
+
+  // The covariance in other coordinates of the pose's error.
+  void turn(const model::Matrix6d& by) {
+    Covariance<kSize> T = Covariance<kSize>::Identity();
+    T.template topLeftCorner<6, 6>() = by;
+    const Covariance<kSize> P = T * covariance * T.transpose();
     covariance = 0.5 * (P + P.transpose());
   }
 };
 
-Vector9d error_of_start(const FilterState& start, const FilterState& state, const model::Pose& entry) {
-  Vector9d error;
-  error << model::log_se3(entry.inverse() * start.pose), start.curvature_per_mm - state.curvature_per_mm,
-      start.lambda1_per_rad - state.lambda1_per_rad, start.lambda2 - state.lambda2;
-  return error;
+namespace {
+
+constexpr double kKnown = 1e-12;  // variance against the prior's
+
+// Gauss and Hermite's rule of three for a unit normal density.
+struct Place {
+  double at, weight;
+};
+constexpr std::array<Place, 3> kPlaces{{{0, 2.0 / 3}, {1.7320508075688772, 1.0 / 6}, {-1.7320508075688772, 1.0 / 6}}};
+
+// The directions in which the parameters are least known against their prior, one for nine states, with ell two: by
+// `normal` a place along one is read off an error, `along` is the error that one standard deviation of it brings.
+template <int kSize>
+struct Ridge {
+  static constexpr int kDirections = kSize - 8;
+  Eigen::Matrix<double, kSize, kDirections> normal, along;
+  int directions = 0;  // no more than there are unknown parameters
+};
+
+template <int kSize>
+Ridge<kSize> find_ridge(const FilterState& state, const Prior& prior) {
+  constexpr int kParameters = kSize - 6;
+  using Vector = Eigen::Matrix<double, kParameters, 1>;
+  Vector sd;
+  sd.template head<3>() << prior.curvature_sd_per_mm, prior.lambda1_sd_per_rad, prior.lambda2_sd;
+  if constexpr (kSize == 10) sd[3] = prior.wheelbase_sd_mm;
+  const Vector scale = (sd.array() > 0).select(sd.cwiseInverse(), 0);
+  const auto& P = covariance_of<kSize>(state);
+  const Eigen::SelfAdjointEigenSolver<Eigen::Matrix<double, kParameters, kParameters>> eigen(
+      scale.asDiagonal() * P.template bottomRightCorner<kParameters, kParameters>() * scale.asDiagonal());
+  Ridge<kSize> ridge;
+  ridge.normal.setZero();
+  for (int i = 0; i < Ridge<kSize>::kDirections; ++i) {
+    const double variance = eigen.eigenvalues()[kParameters - 1 - i];
+    if (!(variance > kKnown)) break;
+    ridge.normal.col(i).template tail<kParameters>() =
+        scale.cwiseProduct(eigen.eigenvectors().col(kParameters - 1 - i));
+    ridge.along.col(i) = P * ridge.normal.col(i) / std::sqrt(variance);
+    ++ridge.directions;
+  }
+  return ridge;
 }
 
 }  // namespace
 
-// Moves an estimate by an error in its body frame; the covariance is that of the error.
-void NeedleFilter::shift(FilterState& state, const Vector9d& error, const Matrix9d& covariance) const {
-  state.pose = state.pose * model::exp_se3(error.head<6>());
-  state.pose.R = model::orthonormalised(state.pose.R);
-  state.curvature_per_mm += error[6];
-  state.lambda1_per_rad += error[7];
-  state.lambda2 += error[8];
-  Matrix9d to_pose = Matrix9d::Identity();
-  to_pose.topLeftCorner<6, 6>() = model::right_jacobian_se3(error.head<6>());
-  const Matrix9d P = to_pose * covariance * to_pose.transpose();
-  state.covariance = 0.5 * (P + P.transpose());
-}
-
-// The path that leads to `state`, from its end: visit(index, step, pose) for each step that was measured.
-template <class Visit>
-bool NeedleFilter::walk_back(const FilterState& state, std::span<const PastStep> steps, model::Pose& entry,
-                             Visit&& visit) const {
-  model::SlipParameters slip = slip_;
-  slip.lambda1_per_rad = state.lambda1_per_rad;
-  slip.lambda2 = state.lambda2;
-  const Eigen::Vector2d curvature(state.curvature_per_mm, 0);
-  entry = state.pose;
-  for (std::size_t i = steps.size(); i-- > 0;) {
-    if (steps[i].measured) visit(i, steps[i], entry);
-    if (!model::advance(entry, {-steps[i].insertion_mm, -steps[i].rotation_rad, curvature}, slip)) return false;
-  }
-  entry.R = model::orthonormalised(entry.R);
-  return true;
-}
-
 // Half the squares of what the path to `state` leaves of the measurements and of `start`; infinity where there is no
-// path. `entry` is the pose at its beginning.
-double NeedleFilter::path_cost(const FilterState& state, const FilterState& start, std::span<const PastStep> steps,
-                               model::Pose& entry) const {
+// path.
+template <int kSize>
+double NeedleFilter::path_cost(const FilterState& state, const FilterState& start,
+                               std::span<const PastStep> steps) const {
+  constexpr double kNone = std::numeric_limits<double>::infinity();
+  const model::SlipParameters slip = slip_of(state);
+  FilterState entry = state;
   double squares = 0;
-  const auto add = [&squares](std::size_t, const PastStep& step, const model::Pose& pose) {
-    const Eigen::Vector3d residual = step.position_mm - pose.p_mm - pose.R * step.point_mm;
-    squares += residual.dot(step.information_per_mm2 * residual);
-  };
-  if (!walk_back(state, steps, entry, add)) return std::numeric_limits<double>::infinity();
-  const Vector9d error = error_of_start(start, state, entry);
-  return 0.5 * (squares + error.dot(start.covariance.ldlt().solve(error)));
-}
-
-// The direction `along` in which k and lambda are least known against their prior, one standard deviation of the end
-// state long, and how the path bends there: room[i] is half the second difference of what step i measures, start_bend
-// that of the error at the start.
-bool NeedleFilter::bend(const FilterState& state, const FilterState& start, std::span<const PastStep> steps,
-                        std::span<Eigen::Vector3d> room, Vector9d& along, Vector9d& start_bend) const {
-  const Prior& prior = config_.prior;
-  const Eigen::Vector3d sd(prior.curvature_sd_per_mm, prior.lambda1_sd_per_rad, prior.lambda2_sd);
-  const Eigen::Vector3d scale = (sd.array() > 0).select(sd.cwiseInverse(), 0);
-  Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> eigen;
-  eigen.computeDirect(scale.asDiagonal() * state.covariance.bottomRightCorner<3, 3>() * scale.asDiagonal());
-  const double variance = eigen.eigenvalues()[2];
-  if (!(variance > 0)) return false;
-  along = state.covariance.rightCols<3>() * scale.cwiseProduct(eigen.eigenvectors().col(2)) / std::sqrt(variance);
-
-  start_bend.setZero();
-  for (const double side : {1.0, -1.0}) {
-    FilterState moved = state;
-    moved.pose = moved.pose * model::exp_se3(side * along.head<6>());
-    moved.curvature_per_mm += side * along[6];
-    moved.lambda1_per_rad += side * along[7];
-    moved.lambda2 += side * along[8];
-    model::Pose entry;
-    const auto add = [&room](std::size_t i, const PastStep& step, const model::Pose& pose) {
-      room[i] += 0.5 * (pose.p_mm + pose.R * step.point_mm);
-    };
-    if (!walk_back(moved, steps, entry, add)) return false;
-    start_bend += 0.5 * error_of_start(start, moved, entry);
-  }
-  return true;
-}
-
-bool NeedleFilter::relinearise(FilterState& state, const FilterState& start, std::span<const PastStep> steps,
-                               std::span<Eigen::Vector3d> room) const {
-  model::Pose pose;
-  const double cost_before = path_cost(state, start, steps, pose);
-  if (!std::isfinite(cost_before)) return false;
-  std::fill(room.begin(), room.begin() + static_cast<std::ptrdiff_t>(steps.size()), Eigen::Vector3d::Zero());
-  Vector9d along, start_bend;
-  const bool bent = bend(state, start, steps, room, along, start_bend);
-  model::SlipParameters slip = slip_;
-  slip.lambda1_per_rad = state.lambda1_per_rad;
-  slip.lambda2 = state.lambda2;
-  const Eigen::Vector2d curvature(state.curvature_per_mm, 0);
-
-  LinearFilter linear;
-  linear.error = error_of_start(start, state, pose);
-  linear.bend = bent ? Vector9d(start_bend - linear.error) : Vector9d::Zero();
-  // The error of `start` is about its own pose; here it is counted from the path's.
-  Matrix9d to_path = Matrix9d::Identity();
-  to_path.topLeftCorner<6, 6>() = model::right_jacobian_se3(linear.error.head<6>()).inverse();
-  linear.covariance = to_path * start.covariance * to_path.transpose();
-  for (std::size_t i = 0; i < steps.size(); ++i) {
+  for (std::size_t i = steps.size(); i-- > 0;) {
     const PastStep& step = steps[i];
+    if (step.measured) {
+      const Eigen::Vector3d residual = step.position_mm - entry.pose.p_mm - entry.pose.R * step.point_mm;
+      squares += residual.dot(step.information_per_mm2 * residual);
+    }
+    if (!model::advance(entry.pose, {-step.insertion_mm, -step.rotation_rad, {state.curvature_per_mm, 0}}, slip))
+      return kNone;
+  }
+  const Error<kSize> error = difference<kSize>(entry, start);
+  return 0.5 * (squares + error.dot(covariance_of<kSize>(start).ldlt().solve(error)));
+}
+
+// The linear filter over the steps, about the path that leads to `about`; false where there is none.
+template <int kSize>
+bool NeedleFilter::run_again(const FilterState& about, const FilterState& start, std::span<const PastStep> steps,
+                             LinearFilter<kSize>& linear) const {
+  const model::SlipParameters slip = slip_of(about);
+  const Eigen::Vector2d curvature(about.curvature_per_mm, 0);
+  FilterState entry = about;
+  model::Pose& pose = entry.pose;
+  for (std::size_t i = steps.size(); i-- > 0;)
+    if (!model::advance(pose, {-steps[i].insertion_mm, -steps[i].rotation_rad, curvature}, slip)) return false;
+  pose.R = model::orthonormalised(pose.R);
+
+  linear.error = difference<kSize>(entry, start);
+  // The error of `start` is about its own pose; here it is counted from the path's.
+  linear.covariance = covariance_of<kSize>(start);
+  linear.turn(model::right_jacobian_se3(linear.error.template head<6>()).inverse());
+  for (const PastStep& step : steps) {
     model::NeedleJacobian jacobian;
     if (step.insertion_mm != 0 || step.rotation_rad != 0) {
       if (!model::advance(pose, {step.insertion_mm, step.rotation_rad, curvature}, slip, jacobian)) return false;
-      linear.predict(jacobian, process_variance(linear.covariance, step.insertion_mm, step.rotation_rad));
+      linear.predict(jacobian, process_variance<kSize>(linear.covariance, step.insertion_mm, step.rotation_rad));
     }
-    if (!step.measured) continue;
-    const Eigen::Vector3d point = pose.p_mm + pose.R * step.point_mm;
-    linear.update(pose.R, step, step.position_mm - point,
-                  bent ? Eigen::Vector3d(point - room[i]) : Eigen::Vector3d::Zero());
+    if (step.measured) linear.update(pose.R, step, step.position_mm - pose.p_mm - pose.R * step.point_mm);
   }
-  if (!linear.error.allFinite() || !linear.covariance.allFinite() || !linear.bend.allFinite()) return false;
+  return linear.error.allFinite() && linear.covariance.allFinite() && std::isfinite(linear.log_evidence);
+}
 
-  // Along the ridge u is unit normal, and the ridge lies off by bend u^2: mean and variance of that.
-  Vector9d across = linear.bend;
-  const Eigen::LDLT<Matrix9d> information(linear.covariance);
-  across -= along * (along.dot(information.solve(across)) / along.dot(information.solve(along)));
-  if (!across.allFinite()) across.setZero();
-  const Matrix9d bent_covariance = linear.covariance + 2 * across * across.transpose();
-
-  // Half the way, and half of that, where the whole step overshoots. Rounding, and process noise, for which a path
-  // without it is no minimum, may raise the cost a little.
-  for (int halving = 0; halving < 4; ++halving, linear.error *= 0.5) {
-    FilterState moved = state;
-    shift(moved, linear.error, bent_covariance);
-    keep_in_domain(moved);
-    // A step well within what is known is small against any bend, and needs no look at where it led.
-    model::Pose entry;
-    if (!(linear.error.dot(information.solve(linear.error)) < kSmallStep) &&
-        !(path_cost(moved, start, steps, entry) <= 1.05 * cost_before + 1))
-      continue;
-    shift(moved, linear.bend, moved.covariance);
-    keep_in_domain(moved);
-    state = moved;
-    return true;
+template <int kSize>
+bool NeedleFilter::relinearise_sized(FilterState& state, const FilterState& start,
+                                     std::span<const PastStep> steps) const {
+  constexpr std::size_t kMost = Ridge<kSize>::kDirections == 1 ? 3 : 9;
+  const Ridge<kSize> ridge = find_ridge<kSize>(state, config_.prior);
+  std::array<FilterState, kMost> at;
+  std::array<LinearFilter<kSize>, kMost> linear;
+  std::array<double, kMost> weight{};
+  std::size_t count = 1;
+  for (int j = 0; j < ridge.directions; ++j) count *= kPlaces.size();
+  for (std::size_t i = 0; i < count; ++i) {
+    Error<kSize> offset = Error<kSize>::Zero();
+    std::size_t rest = i;
+    for (int j = 0; j < ridge.directions; ++j, rest /= kPlaces.size()) {
+      const Place& place = kPlaces[rest % kPlaces.size()];
+      offset += place.at * ridge.along.col(j);
+      // The rule is for a density over the unit normal one.
+      weight[i] += std::log(place.weight) + 0.5 * place.at * place.at;
+    }
+    at[i] = state;
+    move<kSize>(at[i], offset);
+    if (!run_again<kSize>(at[i], start, steps, linear[i])) return false;
+    for (int j = 0; j < ridge.directions; ++j) linear[i].condition(ridge.normal.col(j));
+    move<kSize>(at[i], linear[i].error);
+    linear[i].turn(model::right_jacobian_se3(linear[i].error.template head<6>()));
+    weight[i] += linear[i].log_evidence;
   }
-  return false;
+  const auto best = static_cast<std::size_t>(
+      std::max_element(weight.begin(), weight.begin() + static_cast<std::ptrdiff_t>(count)) - weight.begin());
+  double sum = 0;
+  const double largest = weight[best];
+  for (std::size_t i = 0; i < count; ++i) sum += weight[i] = std::exp(weight[i] - largest);
+  // Rounding, and process noise, for which a path without it is no minimum, may raise the cost a little.
+  if (!(path_cost<kSize>(at[best], start, steps) <= 1.05 * path_cost<kSize>(state, start, steps) + 1)) return false;
+
+  FilterState mean = at[best];
+  for (int pass = 0; pass < 2; ++pass) {
+    Error<kSize> step = Error<kSize>::Zero();
+    for (std::size_t i = 0; i < count; ++i) step += weight[i] / sum * difference<kSize>(mean, at[i]);
+    move<kSize>(mean, step);
+  }
+  Covariance<kSize> P = Covariance<kSize>::Zero();
+  for (std::size_t i = 0; i < count; ++i) {
+    const Error<kSize> off = difference<kSize>(mean, at[i]);
+    linear[i].turn(model::right_jacobian_se3(off.template head<6>()).inverse());
+    P += weight[i] / sum * (linear[i].covariance + off * off.transpose());
+  }
+  set_covariance<kSize>(mean, 0.5 * (P + P.transpose()));
+  mean.pose.R = model::orthonormalised(mean.pose.R);
+  keep_in_domain<kSize>(mean);
+  state = mean;
+  return true;
+}
+
+bool NeedleFilter::relinearise(FilterState& state, const FilterState& start, std::span<const PastStep> steps) const {
+  return wheelbase_estimated_ ? relinearise_sized<10>(state, start, steps) : relinearise_sized<9>(state, start, steps);
 }
 
 }  // namespace bevel::estimator

@@ -7,6 +7,7 @@ void read_estimator_config(Section section, estimator::EstimatorConfig& config) 
   prior.read("curvature_sd_per_mm", config.prior.curvature_sd_per_mm, optional, in_range(0, 0.05));
   prior.read("lambda1_sd_per_rad", config.prior.lambda1_sd_per_rad, optional, in_range(0, 5));
   prior.read("lambda2_sd", config.prior.lambda2_sd, optional, in_range(0, 1));
+  prior.read("wheelbase_sd_mm", config.prior.wheelbase_sd_mm, optional, in_range(0, 200));
   prior.read("position_sd_mm", config.prior.position_sd_mm, optional, in_range(1e-4, 100));
   prior.read("tilt_sd_rad", config.prior.tilt_sd_rad, optional, in_range(1e-5, 1));
   prior.read("roll_sd_rad", config.prior.roll_sd_rad, optional, in_range(1e-5, 3.2));

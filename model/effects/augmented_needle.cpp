@@ -48,10 +48,11 @@ AugmentedNeedle::AugmentedNeedle(const NeedleParameters& needle, std::vector<Act
   slip_ = slip_parameters(needle_);
 }
 
-void AugmentedNeedle::set_needle(double curvature_per_mm, double lambda1_per_rad, double lambda2) {
+void AugmentedNeedle::set_needle(double curvature_per_mm, double lambda1_per_rad, double lambda2, double wheelbase_mm) {
   needle_.curvature_per_mm = curvature_per_mm;
   slip_.lambda1_per_rad = needle_.lambda1_per_rad = lambda1_per_rad;
   slip_.lambda2 = needle_.lambda2 = lambda2;
+  slip_.wheelbase_mm = needle_.wheelbase_mm = wheelbase_mm;
 }
 
 AugmentedState AugmentedNeedle::entry(const BaseMotion& base) const {

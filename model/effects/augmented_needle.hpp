@@ -63,8 +63,8 @@ class AugmentedNeedle {
   const NeedleParameters& needle() const { return needle_; }
   std::span<const ActiveEffect> effects() const { return effects_; }
   int columns() const { return columns_; }
-  // For a filter, whose curvature and lambda are states.
-  void set_needle(double curvature_per_mm, double lambda1_per_rad, double lambda2);
+  // For a filter, whose curvature and lambda are states, and ell on request.
+  void set_needle(double curvature_per_mm, double lambda1_per_rad, double lambda2, double wheelbase_mm);
 
  private:
   bool advance_plain(AugmentedState& state, const BaseMotion& to) const;

@@ -8,11 +8,12 @@
 namespace bevel::estimator {
 namespace {
 
-TEST(NeedleEstimator, AllocatesNothingInAStep) {
+void expect_no_allocation(double wheelbase_sd_mm) {
   std::mt19937_64 rng(21);
   EstimatorConfig config;
   config.prior.needle.lambda1_per_rad = 0.49;
   config.prior.needle.lambda2 = 0.22;
+  config.prior.wheelbase_sd_mm = wheelbase_sd_mm;
   testing::InsertionPlan plan;
   plan.cameras = 2;
   testing::Insertion data = testing::insert(config.prior.needle, {}, plan, rng);
@@ -32,6 +33,10 @@ TEST(NeedleEstimator, AllocatesNothingInAStep) {
   EXPECT_GT(estimator.counters().relinearised, 0);
   EXPECT_GT(estimator.estimate(data.actuators.back().utime).state.reset_count, 0);
 }
+
+TEST(NeedleEstimator, AllocatesNothingInAStep) { expect_no_allocation(0); }
+
+TEST(NeedleEstimator, AllocatesNothingInAStepWithEllAsAState) { expect_no_allocation(5); }
 
 TEST(NeedleEstimator, AllocatesNothingInAStepWithEffects) {
   std::mt19937_64 rng(22);

@@ -156,12 +156,13 @@ TEST(EstimatorEffects, NoEffectsIsThePlainFilterBitForBit) {
   EXPECT_EQ(state.effects.tip_insertion_mm, 0);
 }
 
-TEST(EstimatorEffects, AnEffectThatIsNoneGivesThePlainFilter) {
+void expect_plain_filter_of_an_effect_that_is_none(double wheelbase_sd_mm) {
   std::mt19937_64 rng(kSeed);
   EstimatorConfig plain = config_with({});
   plain.relinearised_steps = 0;
   const testing::Insertion data = simulate(plain, rng);
-  const EstimatorConfig none = config_with({effect("torsional_windup", {0.0})});
+  EstimatorConfig none = config_with({effect("torsional_windup", {0.0})});
+  plain.prior.wheelbase_sd_mm = none.prior.wheelbase_sd_mm = wheelbase_sd_mm;
   const auto end = [&data](const EstimatorConfig& config) {
     NeedleEstimator estimator(config);
     std::size_t next = 0;
@@ -176,6 +177,14 @@ TEST(EstimatorEffects, AnEffectThatIsNoneGivesThePlainFilter) {
   EXPECT_LT((a.pose.p_mm - b.pose.p_mm).norm(), 1e-9);
   EXPECT_LT((a.covariance - b.covariance).norm(), 1e-9 * a.covariance.norm());
   EXPECT_NEAR(a.lambda1_per_rad, b.lambda1_per_rad, 1e-9);
+  EXPECT_NEAR(a.wheelbase_mm, b.wheelbase_mm, 1e-6);
+  EXPECT_NEAR(a.wheelbase_variance_mm2, b.wheelbase_variance_mm2, 1e-6);
+}
+
+TEST(EstimatorEffects, AnEffectThatIsNoneGivesThePlainFilter) { expect_plain_filter_of_an_effect_that_is_none(0); }
+
+TEST(EstimatorEffects, AnEffectThatIsNoneGivesThePlainFilterWithEllToo) {
+  expect_plain_filter_of_an_effect_that_is_none(4);
 }
 
 }  // namespace

@@ -98,6 +98,7 @@ inline model::NeedleParameters draw_needle(const Prior& prior, std::mt19937_64& 
     needle.curvature_per_mm += prior.curvature_sd_per_mm * normal(rng);
     needle.lambda1_per_rad += prior.lambda1_sd_per_rad * normal(rng);
     needle.lambda2 += prior.lambda2_sd * normal(rng);
+    if (prior.wheelbase_sd_mm > 0) needle.wheelbase_mm += prior.wheelbase_sd_mm * normal(rng);
     if (!model::find_domain_violation(needle)) return needle;
   }
 }

@@ -75,7 +75,7 @@ struct Replay {
 };
 
 struct ReplayOptions {
-  std::size_t history = 96;
+  std::size_t history = 64;
   double ahead_mm = 0;  // for replay_logs: 0, nothing is foretold
   // Replaces each measurement's information by that of this noise, per axis; empty: as the camera says.
   std::vector<NoiseColour> noise_by_axis{};

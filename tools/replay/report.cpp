@@ -63,7 +63,7 @@ void write_csv(const Replay& replay, const std::string& stem) {
   CsvFile states(stem + ".states.csv",
                  "utime,insertion_mm,rotation_rad,x_mm,y_mm,z_mm,qw,qx,qy,qz,curvature_per_mm,lambda1_per_rad,lambda2,"
                  "x_sd_mm,y_sd_mm,z_sd_mm,tilt_x_sd_rad,tilt_y_sd_rad,roll_sd_rad,curvature_sd_per_mm,"
-                 "lambda1_sd_per_rad,lambda2_sd,test_ratio,health,resets");
+                 "lambda1_sd_per_rad,lambda2_sd,test_ratio,health,resets,wheelbase_mm,wheelbase_sd_mm");
   for (const StateRow& row : replay.states) {
     const auto& s = row.state;
     const Eigen::Quaterniond q(s.pose.R);
@@ -71,8 +71,9 @@ void write_csv(const Replay& replay, const std::string& stem) {
     states.row("%lld,%.6f,%.6f,%.6f,%.6f,%.6f,%.9f,%.9f,%.9f,%.9f,%.9g,%.9g,%.9g,", static_cast<long long>(row.utime),
                row.insertion_mm, row.rotation_rad, s.pose.p_mm.x(), s.pose.p_mm.y(), s.pose.p_mm.z(), q.w(), q.x(),
                q.y(), q.z(), s.curvature_per_mm, s.lambda1_per_rad, s.lambda2);
-    states.row("%.6g,%.6g,%.6g,%.6g,%.6g,%.6g,%.6g,%.6g,%.6g,%.6g,%d,%d\n", spread.x(), spread.y(), spread.z(),
-               sd(s, 3), sd(s, 4), sd(s, 5), sd(s, 6), sd(s, 7), sd(s, 8), row.test_ratio, row.health, s.reset_count);
+    states.row("%.6g,%.6g,%.6g,%.6g,%.6g,%.6g,%.6g,%.6g,%.6g,%.6g,%d,%d,%.6g,%.6g\n", spread.x(), spread.y(),
+               spread.z(), sd(s, 3), sd(s, 4), sd(s, 5), sd(s, 6), sd(s, 7), sd(s, 8), row.test_ratio, row.health,
+               s.reset_count, s.wheelbase_mm, std::sqrt(s.wheelbase_variance_mm2));
   }
   states.close();
   CsvFile innovations(stem + ".innovations.csv",
@@ -184,6 +185,9 @@ void print(std::ostream& out, const Replay& replay, double ahead_mm) {
   const estimator::FilterState& last = replay.states.back().state;
   out << text_of("  k            %.6f +- %.6f /mm\n  lambda1      %.4f +- %.4f /rad\n  lambda2      %.4f +- %.4f\n",
                  last.curvature_per_mm, sd(last, 6), last.lambda1_per_rad, sd(last, 7), last.lambda2, sd(last, 8));
+  if (prior.wheelbase_sd_mm > 0)
+    out << text_of("  ell          %.2f +- %.2f mm, prior %.2f +- %.2f\n", last.wheelbase_mm,
+                   std::sqrt(last.wheelbase_variance_mm2), prior.needle.wheelbase_mm, prior.wheelbase_sd_mm);
   const Eigen::Vector3d spread = position_sd_mm(last);
   out << text_of("  tip          %.3f %.3f %.3f +- %.3f %.3f %.3f mm, roll +- %.3f rad, %s\n", last.pose.p_mm.x(),
                  last.pose.p_mm.y(), last.pose.p_mm.z(), spread.x(), spread.y(), spread.z(), sd(last, 5),

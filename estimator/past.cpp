@@ -1,0 +1,100 @@
+#include "estimator/past.hpp"
+
+#include <cmath>
+
+namespace bevel::estimator {
+namespace {
+
+constexpr double kLongest_mm = 2.5;
+constexpr double kLongest_rad = 0.25;
+constexpr double kSkew_mm_rad = 0.01;  // turns the heading by k times half of this
+
+bool in_proportion(double insertion_mm, double rotation_rad, const PastStep& step) {
+  return insertion_mm * step.insertion_mm >= 0 && rotation_rad * step.rotation_rad >= 0 &&
+         std::abs(insertion_mm * step.rotation_rad - rotation_rad * step.insertion_mm) <= kSkew_mm_rad;
+}
+
+bool diagonal(const Eigen::Matrix3d& W) { return W(0, 1) == 0 && W(0, 2) == 0 && W(1, 2) == 0; }
+
+}  // namespace
+
+Past::Past(std::size_t room) { steps_.reserve(room); }
+
+void Past::restart(const FilterState& start) {
+  start_ = start;
+  steps_.clear();
+  has_open_ = false;
+  complete_ = true;
+}
+
+bool Past::joins(const PastStep& step) const {
+  return in_proportion(open_.insertion_mm, open_.rotation_rad, step) &&
+         std::abs(open_.insertion_mm + step.insertion_mm) <= kLongest_mm &&
+         std::abs(open_.rotation_rad + step.rotation_rad) <= kLongest_rad && diagonal(open_.information_per_mm2) &&
+         diagonal(step.information_per_mm2);
+}
+
+void Past::add(const FilterState& before, const PastStep& step, const FilterState& after,
+               const Eigen::Vector3d& moved_mm, const NeedleFilter& filter) {
+  if (has_open_ && !joins(step)) close(before, filter);
+  if (!has_open_) {
+    open_ = step;
+    has_open_ = true;
+    progress_ = measured_at_ = std::abs(step.insertion_mm) + std::abs(step.rotation_rad);
+    return;
+  }
+  progress_ += std::abs(step.insertion_mm) + std::abs(step.rotation_rad);
+  open_.insertion_mm += step.insertion_mm;
+  open_.rotation_rad += step.rotation_rad;
+  // From the new end to where the tip was, in {A}; then the mean with the new reading, whose tip is the end itself.
+  Eigen::Vector3d offset_mm = Eigen::Vector3d::Zero();
+  if (open_.measured) offset_mm = before.pose.R * open_.point_mm - moved_mm;
+  if (step.measured) {
+    const Eigen::Vector3d had = open_.information_per_mm2.diagonal();
+    const Eigen::Vector3d comes = step.information_per_mm2.diagonal();
+    for (int i = 0; i < 3; ++i) {
+      if (!(had[i] + comes[i] > 0)) continue;
+      const double share = had[i] / (had[i] + comes[i]);
+      open_.position_mm[i] = share * open_.position_mm[i] + (1 - share) * step.position_mm[i];
+      offset_mm[i] *= share;
+    }
+    open_.information_per_mm2.diagonal() = had + comes;
+    measured_at_ += (progress_ - measured_at_) * comes.sum() / (had + comes).sum();
+    open_.measured = true;
+  }
+  open_.point_mm = after.pose.R.transpose() * offset_mm;
+}
+
+void Past::append(double insertion_mm, double rotation_rad) {
+  if (insertion_mm == 0 && rotation_rad == 0) return;
+  if (!steps_.empty() && !steps_.back().measured && in_proportion(insertion_mm, rotation_rad, steps_.back())) {
+    steps_.back().insertion_mm += insertion_mm;
+    steps_.back().rotation_rad += rotation_rad;
+  } else {
+    steps_.push_back({.insertion_mm = insertion_mm, .rotation_rad = rotation_rad});
+  }
+}
+
+void Past::close(const FilterState& end, const NeedleFilter& filter) {
+  if (!has_open_) return;
+  has_open_ = false;
+  // The stretch up to the reading, the reading, and what is left of the stretch.
+  if (!complete_ || steps_.size() + 3 > steps_.capacity()) {
+    complete_ = false;
+    return;
+  }
+  if (!open_.measured) return append(open_.insertion_mm, open_.rotation_rad);
+  const double share = progress_ > 0 ? measured_at_ / progress_ : 1;
+  append(share * open_.insertion_mm, share * open_.rotation_rad);
+  if (steps_.empty() || steps_.back().measured) steps_.emplace_back();
+  FilterState there = end;
+  filter.predict(there, (share - 1) * open_.insertion_mm, (share - 1) * open_.rotation_rad);
+  PastStep& step = steps_.back();
+  step.measured = true;
+  step.position_mm = open_.position_mm;
+  step.information_per_mm2 = open_.information_per_mm2;
+  step.point_mm = there.pose.R.transpose() * (end.pose.p_mm + end.pose.R * open_.point_mm - there.pose.p_mm);
+  append((1 - share) * open_.insertion_mm, (1 - share) * open_.rotation_rad);
+}
+
+}  // namespace bevel::estimator
