@@ -6,9 +6,9 @@
 #include <cmath>
 #include <functional>
 #include <numeric>
-#include <random>
 
 #include "diagnosis/mismatch/parallel.hpp"
+#include "diagnosis/statistics/median.hpp"
 
 namespace bevel::diagnosis {
 namespace {
@@ -20,7 +20,6 @@ using Eigen::VectorXd;
 constexpr int kInstants = 14;       // of a jump, over a recording
 constexpr double kOnPenalty = 8.0;  // chi2 that a jump has to bring in a recording: 2 log of the instants and more
 constexpr double kFarthest = 4.0;   // amplitudes promised reach to so many times their start
-constexpr double kQuantile = 0.99;
 
 // Whitened prediction of one recording with the effect added at these values; empty outside the model's domain.
 VectorXd path_with(const Evidence& evidence, const Hypothesis& hypothesis, const VectorXd& values, std::size_t r,
@@ -305,15 +304,6 @@ std::vector<Promise> best_promises(const Candidate& candidate, const Ground& gro
   return promises;
 }
 
-namespace {
-double median(std::vector<double> values) {
-  if (values.empty()) return 0;
-  const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
-  std::nth_element(values.begin(), middle, values.end());
-  return *middle;
-}
-}  // namespace
-
 double visible_per_unit(const Candidate& candidate, std::size_t amplitude) {
   const auto p = static_cast<std::size_t>(candidate.amplitudes[amplitude]);
   const double none = candidate.member.effect->parameters()[p].none;
@@ -365,44 +355,6 @@ MatrixXd visible_basis(const Candidate& candidate, const Ground& ground) {
   const Eigen::ColPivHouseholderQR<MatrixXd> qr(columns);
   const Index rank = columns.squaredNorm() > 1e-12 ? qr.rank() : 0;
   return qr.householderQ() * MatrixXd::Identity(columns.rows(), rank);
-}
-
-NullGains bootstrap_null(const std::vector<Candidate>& dictionary, const Ground& ground, int draws, std::uint64_t seed,
-                         int threads) {
-  NullGains out{.mean = std::vector<double>(dictionary.size(), 0),
-                .threshold = std::vector<double>(dictionary.size(), 0),
-                .draws = draws,
-                .seed = seed};
-  const auto count = static_cast<std::size_t>(draws);
-  MatrixXd gains(static_cast<Index>(dictionary.size()), draws);
-  parallel_for(count, threads, [&](std::size_t d) {
-    std::mt19937_64 random(seed + 0x9E3779B97F4A7C15ULL * (d + 1));
-    std::normal_distribution<double> normal;
-    VectorXd noise(ground.residual.size());
-    for (double& x : noise) x = normal(random);
-    noise -= ground.Q * (ground.Q.transpose() * noise).eval();
-    for (std::size_t e = 0; e < dictionary.size(); ++e) {
-      double best = 0;
-      for (const auto& signature : dictionary[e].signatures)
-        best = std::max(best, promise_of(dictionary[e], signature, ground, noise).gain);
-      gains(static_cast<Index>(e), static_cast<Index>(d)) = best;
-    }
-  });
-  // Gains are sums of squares: their cube roots are near normal (Wilson and Hilferty 1931), so that effects of many
-  // starts and of few can be held to one standard.
-  const MatrixXd roots = gains.array().pow(1.0 / 3).matrix();
-  const VectorXd mean = roots.rowwise().mean();
-  const VectorXd sd = ((roots.colwise() - mean).array().square().rowwise().mean()).sqrt().max(1e-6);
-  std::vector<double> largest(count);
-  for (std::size_t d = 0; d < count; ++d)
-    largest[d] = ((roots.col(static_cast<Index>(d)) - mean).array() / sd.array()).maxCoeff();
-  std::sort(largest.begin(), largest.end());
-  const double limit = largest[std::min(count - 1, static_cast<std::size_t>(kQuantile * static_cast<double>(count)))];
-  for (std::size_t e = 0; e < dictionary.size(); ++e) {
-    out.mean[e] = gains.row(static_cast<Index>(e)).mean();
-    out.threshold[e] = std::pow(mean[static_cast<Index>(e)] + limit * sd[static_cast<Index>(e)], 3);
-  }
-  return out;
 }
 
 }  // namespace bevel::diagnosis

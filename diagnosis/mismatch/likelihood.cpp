@@ -86,6 +86,13 @@ std::vector<Index> free_unknowns(const Hypothesis& hypothesis, const FitRules& r
 
 }  // namespace
 
+VectorXd errors_of(const Series& series, const Channel& channel, const model::OpenLoop& path) {
+  VectorXd errors(static_cast<Index>(series.reading.size()));
+  for (std::size_t i = 0; i < series.reading.size(); ++i)
+    errors[static_cast<Index>(i)] = series.measured_mm[i] - channel.axis.dot(path.position_mm[series.reading[i]]);
+  return errors;
+}
+
 bool evaluate(const Evidence& evidence, const Hypothesis& hypothesis, std::size_t r, const VectorXd& values,
               bool with_jacobian, Workspace& workspace) {
   const Recording& recording = evidence.recorded->recordings[r];
@@ -102,14 +109,12 @@ bool evaluate(const Evidence& evidence, const Hypothesis& hypothesis, std::size_
     const Series& series = recording.series[c];
     const auto count = static_cast<Index>(series.time_s.size());
     if (count == 0) continue;
-    const Eigen::Vector3d& axis = evidence.recorded->channels[c].axis;
-    for (Index i = 0; i < count; ++i) {
-      const std::size_t reading = series.reading[static_cast<std::size_t>(i)];
-      out.white[row + i] = series.measured_mm[static_cast<std::size_t>(i)] - axis.dot(path.position_mm[reading]);
-      if (with_jacobian)
-        out.jacobian.row(row + i).noalias() =
-            -axis.transpose() * path.jacobian.middleRows<3>(static_cast<Index>(3 * reading));
-    }
+    const Channel& channel = evidence.recorded->channels[c];
+    out.white.segment(row, count) = errors_of(series, channel, path);
+    for (Index i = 0; with_jacobian && i < count; ++i)
+      out.jacobian.row(row + i).noalias() =
+          -channel.axis.transpose() *
+          path.jacobian.middleRows<3>(static_cast<Index>(3 * series.reading[static_cast<std::size_t>(i)]));
     const Whitening whitening = make_whitening(series, evidence.noise, evidence.noise.sigma_mm[c]);
     whiten(whitening, out.white.segment(row, count));
     if (with_jacobian) whiten(whitening, out.jacobian.middleRows(row, count));
@@ -215,16 +220,8 @@ Errors errors_of(const Evidence& evidence, const Fit& fit) {
   for (std::size_t r = 0; r < errors.size(); ++r) {
     const Recording& recording = evidence.recorded->recordings[r];
     model::predict(fit.hypothesis.make_needle(r, fit.values, false), recording.motion, workspace.open_loop);
-    for (std::size_t c = 0; c < recording.series.size(); ++c) {
-      const Series& series = recording.series[c];
-      VectorXd e(static_cast<Index>(series.time_s.size()));
-      for (Index i = 0; i < e.size(); ++i) {
-        const std::size_t reading = series.reading[static_cast<std::size_t>(i)];
-        e[i] = series.measured_mm[static_cast<std::size_t>(i)] -
-               evidence.recorded->channels[c].axis.dot(workspace.open_loop.position_mm[reading]);
-      }
-      errors[r].push_back(e);
-    }
+    for (std::size_t c = 0; c < recording.series.size(); ++c)
+      errors[r].push_back(errors_of(recording.series[c], evidence.recorded->channels[c], workspace.open_loop));
   }
   return errors;
 }

@@ -63,6 +63,8 @@ struct FitRules {
 Fit fit(const Evidence& evidence, const Hypothesis& hypothesis, const Eigen::VectorXd& start,
         const FitRules& rules = {});
 
+// Measured - model in mm, of one channel of one recording.
+Eigen::VectorXd errors_of(const Series& series, const Channel& channel, const model::OpenLoop& path);
 // Errors in mm, per recording and channel (measured - model), for noise calibration and pictures.
 Errors errors_of(const Evidence& evidence, const Fit& fit);
 

@@ -159,14 +159,12 @@ FitFigures figures_of(const Evidence& evidence, const Hypothesis& hypothesis, st
   double squares = 0;
   std::size_t count = 0;
   for (std::size_t c = 0; c < recording.series.size(); ++c) {
-    const Series& series = recording.series[c];
-    for (std::size_t i = 0; i < series.reading.size(); ++i) {
-      const double e = series.measured_mm[i] -
-                       evidence.recorded->channels[c].axis.dot(workspace.open_loop.position_mm[series.reading[i]]);
-      squares += e * e;
-      out.max_mm = std::max(out.max_mm, std::abs(e));
-      ++count;
-    }
+    const Eigen::VectorXd errors_mm =
+        errors_of(recording.series[c], evidence.recorded->channels[c], workspace.open_loop);
+    if (errors_mm.size() == 0) continue;
+    squares += errors_mm.squaredNorm();
+    out.max_mm = std::max(out.max_mm, errors_mm.cwiseAbs().maxCoeff());
+    count += recording.series[c].reading.size();
   }
   const double chi2 = workspace.residuals.white.squaredNorm();
   const auto n = static_cast<double>(std::max<std::size_t>(count, 1));

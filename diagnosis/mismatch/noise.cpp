@@ -298,6 +298,7 @@ Calibration calibrate_noise(const RecordedCase& recorded, const Errors& errors, 
         }
       }
   }
+  for (auto& readings : out.outliers) std::sort(readings.begin(), readings.end());
   out.noise = estimate_noise(now, left, flexible);
   out.noise.outlier_share = static_cast<double>(dropped) / static_cast<double>(std::max<std::size_t>(messages, 1));
   return out;

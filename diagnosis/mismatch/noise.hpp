@@ -48,7 +48,7 @@ inline constexpr double kKnot_s = 1.0;
 
 struct Calibration {
   Noise noise;
-  std::vector<std::vector<std::size_t>> outliers;  // per recording: readings (indices into motion.at)
+  std::vector<std::vector<std::size_t>> outliers;  // per recording: readings (indices into motion.at), ascending
 };
 
 // errors: of the model in use. With flexible = false the model is trusted and no curve is taken out.

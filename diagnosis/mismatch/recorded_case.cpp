@@ -8,6 +8,8 @@
 #include <sstream>
 #include <stdexcept>
 
+#include "diagnosis/statistics/median.hpp"
+
 namespace bevel::diagnosis {
 namespace {
 
@@ -18,12 +20,6 @@ constexpr double kClocksApart_s = 1.0;
 constexpr double kDifferentRig = 3.0;  // ratio of frame periods or of claimed noise
 constexpr double kMoving_mm_s = 0.05;
 constexpr double kTurning_rad_s = 0.02;
-
-double median(std::vector<double> values) {
-  const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
-  std::nth_element(values.begin(), middle, values.end());
-  return *middle;
-}
 
 std::string channel_name(int camera, const Eigen::Vector3d& axis) {
   std::ostringstream text;

@@ -148,7 +148,7 @@ Findings made_up(Verdict verdict) {
     n->lambda2_sd = 0.008;
   }
   f.channels = {"tip.x", "tip.y", "tip.z"};
-  f.noise = {{0.151, 0.149, 0.26}, 0.6, 0.0167, 1.0 / 30};
+  f.noise = {.sigma_mm = {0.151, 0.149, 0.26}, .ar1 = 0.6, .ar2 = -0.1, .outlier_share = 0.0167, .frame_s = 1.0 / 30};
   const auto truth = truth_of(verdict);
   const bool explained = verdict == Verdict::effects_found;
   for (int i = 0; i < 8; ++i) {

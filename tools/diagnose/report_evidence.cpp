@@ -151,8 +151,9 @@ void add_noise_and_checks(io::HtmlReport& page, const Findings& f) {
     rows.push_back({f.channels[c], measured(f.noise.sigma_mm[c])});
   page.paragraph(
       "Noise of one reading, found before anything is named and held fixed from then on. Successive readings, " +
-      number(1 / f.noise.frame_s, 3) + " a second, correlate by " + number(f.noise.ar1, 2) + "; " +
-      percent(f.noise.outlier_share) + " of them are outliers.");
+      number(1 / f.noise.frame_s, 3) + " a second, correlate by " + number(f.noise.ar1, 2) +
+      (f.noise.ar2 != 0 ? " (and those two apart, given the one between, by " + number(f.noise.ar2, 2) + ")" : "") +
+      "; " + percent(f.noise.outlier_share) + " of them are outliers.");
   page.table({"channel", "standard deviation (mm)"}, rows);
   const auto& c = f.checks;
   page.table({"check of the final model", "found", "passed if"},
