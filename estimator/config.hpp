@@ -51,7 +51,7 @@ struct EstimatorConfig {
   // measurement (offset, camera, latency). None: the plain model, bit for bit.
   std::vector<model::ActiveEffect> effects;
   // Steps that are kept of what has left the history, to run again with better derivatives (NeedleFilter::relinearise)
-  // after each six of them, or an eighth of their number; the whole costs some 5 us a step each time. 0: never.
+  // each 15 mm, or an eighth of the way so far; the whole costs some 5 us a step each time. 0: never.
   // With effects, whose memory cannot be walked back, always 0.
   int relinearised_steps = 2048;
 };

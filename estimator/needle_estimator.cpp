@@ -63,7 +63,8 @@ void NeedleEstimator::remember(const Node& before, const Node& node) {
   if (!past_started_ || node.state.reset_count != before.state.reset_count) {
     const bool first = !past_started_;
     past_.restart(first ? before.state : node.state);
-    past_due_ = kFirstRelinearisation;
+    past_mm_ = 0;
+    past_due_mm_ = kFirstRelinearisation_mm;
     past_started_ = true;
     if (!first) return;
   }
@@ -76,15 +77,16 @@ void NeedleEstimator::remember(const Node& before, const Node& node) {
     step.position_mm = node.measurement.position_mm;
     step.information_per_mm2 = node.measurement.information_per_mm2;
   }
+  past_mm_ += std::abs(step.insertion_mm);
   past_.add(before.state, step, node.state, node.moved_mm, filter_);
 }
 
 void NeedleEstimator::relinearise_if_due() {
-  if (!past_.complete() || past_.steps().size() < past_due_) return;
+  if (!past_.complete() || past_mm_ < past_due_mm_) return;
   FilterState& anchor = node(0).state;
   past_.close(anchor, filter_);
   if (!past_.complete()) return;
-  past_due_ = past_.steps().size() + std::max<std::size_t>(kRelinearisedEvery, past_.steps().size() / 8);
+  past_due_mm_ = past_mm_ + std::max(kRelinearisedEvery_mm, past_mm_ / 8);
   if (!filter_.relinearise(anchor, past_.start(), past_.steps())) return;
   ++counters_.relinearised;
   process_from(1);

@@ -57,9 +57,9 @@ class NeedleEstimator {
   const NeedleFilter& filter() const { return filter_; }
 
  private:
-  // Steps of the past, 2.5 mm or less each; what has come since is linear.
-  static constexpr std::size_t kFirstRelinearisation = 12;
-  static constexpr std::size_t kRelinearisedEvery = 6;
+  // Insertion after which the past is run again; what has come since is linear.
+  static constexpr double kFirstRelinearisation_mm = 30;
+  static constexpr double kRelinearisedEvery_mm = 15;
   enum class Kind : std::uint8_t { actuator, measurement };
   struct Node {
     std::int64_t utime = 0;
@@ -89,7 +89,8 @@ class NeedleEstimator {
   std::size_t processed_ = 0;  // nodes before this index hold a posterior
   Past past_;                  // what has left the history, from its start or the last reset
   bool past_started_ = false;
-  std::size_t past_due_ = kFirstRelinearisation;  // number of steps at which they are run again
+  double past_mm_ = 0;  // insertion and retraction in it
+  double past_due_mm_ = kFirstRelinearisation_mm;
   Counters counters_;
   Update newest_update_;
   std::int64_t newest_update_utime_ = 0;
