@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <atomic>
+#include <chrono>
 #include <exception>
 #include <filesystem>
 #include <mutex>
@@ -42,6 +43,8 @@ Setup load_setup(const BatchOptions& options) {
   if (!options.system_path.empty()) {
     const nodes::SystemConfig system = nodes::load_system_config(options.system_path);
     setup = {system.estimator, system.effects};
+    // As live: what differs from recording to recording was not known then.
+    std::erase_if(setup.effects, [](const io::EffectEntry& effect) { return !io::unknown_beforehand(effect).empty(); });
   } else {
     if (!options.config_path.empty()) {
       io::ConfigFile file = io::ConfigFile::load(options.config_path);
@@ -59,6 +62,12 @@ Setup load_setup(const BatchOptions& options) {
   }
   return setup;
 }
+
+namespace {
+std::size_t threads_for(std::size_t logs) {
+  return std::min<std::size_t>(logs, std::max(1U, std::thread::hardware_concurrency()));
+}
+}  // namespace
 
 std::vector<Replay> replay_logs(const std::vector<std::string>& logs,
                                 const std::vector<estimator::EstimatorConfig>& configs, const ReplayOptions& options) {
@@ -89,9 +98,8 @@ std::vector<Replay> replay_logs(const std::vector<std::string>& logs,
       }
     }
   };
-  const std::size_t count = std::min<std::size_t>(logs.size(), std::max(1U, std::thread::hardware_concurrency()));
   std::vector<std::jthread> threads;
-  for (std::size_t i = 0; i < count; ++i) threads.emplace_back(work);
+  for (std::size_t i = 0; i < threads_for(logs.size()); ++i) threads.emplace_back(work);
   threads.clear();
   if (failure) std::rethrow_exception(failure);
   return replays;
@@ -112,7 +120,9 @@ int run(const BatchOptions& options, std::ostream& out, std::ostream& speed) {
   std::vector<estimator::EstimatorConfig> configs(logs.size(), setup.config);
   if (options.held_out) configs = held_out_configs(replay_logs(logs, configs, replay_options), options.width);
   replay_options.ahead_mm = options.ahead_mm;
+  const auto start = std::chrono::steady_clock::now();
   const auto replays = replay_logs(logs, configs, replay_options);
+  const std::chrono::duration<double> wall_s = std::chrono::steady_clock::now() - start;
   bool intact = true;
   for (const Replay& replay : replays) {
     print(out, replay, options.ahead_mm);
@@ -120,7 +130,7 @@ int run(const BatchOptions& options, std::ostream& out, std::ostream& speed) {
     intact = intact && replay.damage.intact() && replay.refused_messages == 0;
   }
   if (replays.size() > 1) print_together(out, replays, options.ahead_mm);
-  print_speed(speed, replays);
+  print_speed(speed, replays, wall_s.count(), threads_for(logs.size()));
   return intact ? 0 : 1;
 }
 
