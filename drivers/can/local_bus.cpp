@@ -54,8 +54,6 @@ LocalBus::LocalBus(std::string path, std::span<const std::uint32_t> listen)
   open();
 }
 
-LocalBus::~LocalBus() { close(); }
-
 bool LocalBus::open() {
   const int fd = ::socket(AF_UNIX, SOCK_SEQPACKET | SOCK_NONBLOCK | SOCK_CLOEXEC, 0);
   if (fd < 0) return false;
@@ -67,17 +65,6 @@ bool LocalBus::open() {
   }
   fd_ = fd;
   return true;
-}
-
-void LocalBus::close() {
-  if (fd_ >= 0) ::close(fd_);
-  fd_ = -1;
-}
-
-void LocalBus::lose() {
-  close();
-  event_pending_ = true;
-  pending_ = BusEvent::gone;
 }
 
 bool LocalBus::hears(std::uint32_t id) const {
@@ -95,18 +82,18 @@ SendResult LocalBus::send(const Frame& frame) {
     ++counters_.queue_full;
     return SendResult::queue_full;
   }
-  lose();
+  lose(BusEvent::gone);
   return SendResult::gone;
 }
 
 Reception LocalBus::receive() {
-  while (fd_ >= 0 && !event_pending_) {
+  while (fd_ >= 0 && !has_event()) {
     wire::Packet packet{};
     const ssize_t got = ::recv(fd_, packet.data(), packet.size(), MSG_DONTWAIT | MSG_TRUNC);
     if (got < 0 && errno == EINTR) continue;
     if (got < 0 && errno == EAGAIN) return {};
     if (got <= 0) {
-      lose();
+      lose(BusEvent::gone);
       break;
     }
     const auto frame = got == static_cast<ssize_t>(packet.size()) ? wire::decode(packet) : std::nullopt;
@@ -119,26 +106,12 @@ Reception LocalBus::receive() {
     ++counters_.received;
     return {Reception::Kind::frame, *frame, {}};
   }
-  if (!event_pending_) return {};
-  event_pending_ = false;
-  return {Reception::Kind::event, {}, pending_};
+  return take_event();
 }
 
 bool LocalBus::purge() {
   close();
   return false;
-}
-
-void LocalBus::maintain(std::int64_t now_ns) {
-  if (fd_ >= 0 || !back_off_.due(now_ns)) return;
-  if (!open()) {
-    back_off_.failed(now_ns);
-    return;
-  }
-  back_off_.succeeded();
-  ++counters_.reopens;
-  event_pending_ = true;
-  pending_ = BusEvent::reopened;
 }
 
 }  // namespace bevel::can

@@ -8,38 +8,26 @@
 #include <string>
 #include <vector>
 
-#include "drivers/can/bus.hpp"
+#include "drivers/can/socket_bus.hpp"
 
 namespace bevel::can {
 
-class LocalBus : public Bus {
+class LocalBus final : public SocketBus {
  public:
   // path: of the hub's socket. A hub that is not there yet is waited for.
   // Throws std::runtime_error when the path is empty or too long for a socket address (107 characters).
   LocalBus(std::string path, std::span<const std::uint32_t> listen);
-  ~LocalBus() override;
 
   SendResult send(const Frame& frame) override;
   Reception receive() override;
   bool purge() override;  // leaves and joins again; what the hub had already taken in still goes out, so false
-  void maintain(std::int64_t now_ns) override;
-  bool is_open() const override { return fd_ >= 0; }
-  int poll_fd() const override { return fd_; }
-  const BusCounters& counters() const override { return counters_; }
 
  private:
-  bool open();
-  void close();
-  void lose();
+  bool open() override;
   bool hears(std::uint32_t id) const;
 
   std::string path_;
   std::vector<std::uint32_t> listen_;
-  int fd_ = -1;
-  BackOff back_off_;
-  BusCounters counters_;
-  bool event_pending_ = false;
-  BusEvent pending_ = BusEvent::gone;
 };
 
 class LocalHub {

@@ -60,8 +60,6 @@ SocketCanBus::SocketCanBus(std::string interface, std::span<const std::uint32_t>
   open();
 }
 
-SocketCanBus::~SocketCanBus() { close(); }
-
 bool SocketCanBus::open() {
   const int fd = ::socket(PF_CAN, SOCK_RAW | SOCK_NONBLOCK | SOCK_CLOEXEC, CAN_RAW);
   if (fd < 0) return false;
@@ -97,17 +95,6 @@ bool SocketCanBus::open() {
   return true;
 }
 
-void SocketCanBus::close() {
-  if (fd_ >= 0) ::close(fd_);
-  fd_ = -1;
-}
-
-void SocketCanBus::lose(BusEvent why) {
-  close();
-  event_pending_ = true;
-  pending_ = why;
-}
-
 SendResult SocketCanBus::send(const Frame& frame) {
   if (fd_ < 0) return SendResult::link_down;
   can_frame raw{};
@@ -133,10 +120,7 @@ SendResult SocketCanBus::send(const Frame& frame) {
 }
 
 Reception SocketCanBus::receive() {
-  if (event_pending_) {
-    event_pending_ = false;
-    return {Reception::Kind::event, {}, pending_};
-  }
+  if (has_event()) return take_event();
   while (fd_ >= 0) {
     can_frame raw{};
     iovec io{&raw, sizeof raw};
@@ -151,8 +135,7 @@ Reception SocketCanBus::receive() {
       if (errno == EINTR) continue;
       if (errno == ENETDOWN || errno == ENODEV || errno == ENXIO) {
         lose(errno == ENETDOWN ? BusEvent::link_down : BusEvent::gone);
-        event_pending_ = false;
-        return {Reception::Kind::event, {}, pending_};
+        return take_event();
       }
       return {};
     }
@@ -163,8 +146,7 @@ Reception SocketCanBus::receive() {
       if (total != overflow_total_) {
         counters_.overflows += total - overflow_total_;
         overflow_total_ = total;
-        event_pending_ = true;
-        pending_ = BusEvent::overflow;
+        tell(BusEvent::overflow);
       }
     }
     if ((raw.can_id & CAN_ERR_FLAG) != 0) {
@@ -204,18 +186,6 @@ bool SocketCanBus::purge() {
   }
   ::close(fd);
   return purged;
-}
-
-void SocketCanBus::maintain(std::int64_t now_ns) {
-  if (fd_ >= 0 || !back_off_.due(now_ns)) return;
-  if (!open()) {
-    back_off_.failed(now_ns);
-    return;
-  }
-  back_off_.succeeded();
-  ++counters_.reopens;
-  event_pending_ = true;
-  pending_ = BusEvent::reopened;
 }
 
 }  // namespace bevel::can
