@@ -16,6 +16,7 @@ NullGains bootstrap_null(const std::vector<Candidate>& dictionary, const Ground&
                 .threshold = std::vector<double>(dictionary.size(), 0),
                 .draws = draws,
                 .seed = seed};
+  if (dictionary.empty()) return out;
   const auto count = static_cast<std::size_t>(draws);
   Eigen::MatrixXd gains(static_cast<Eigen::Index>(dictionary.size()), draws);
   parallel_for(count, threads, [&](std::size_t d) {

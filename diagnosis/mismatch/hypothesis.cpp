@@ -19,6 +19,13 @@ std::string describe(const EffectSet& set) {
   return text;
 }
 
+bool can_be_fitted(const EffectSet& set) {
+  int unknowns = kBaseUnknowns;
+  for (const auto& member : set)
+    for (std::size_t p = 0; p < member.effect->parameters().size(); ++p) unknowns += member.fits(p) ? 1 : 0;
+  return unknowns <= model::kMaxColumns;
+}
+
 Hypothesis::Hypothesis(const model::NeedleParameters& needle, EffectSet set, const RecordedCase& recorded)
     : needle_(needle), set_(std::move(set)) {
   unknowns_.push_back({.lower = -kCurvatureMax_per_mm, .upper = kCurvatureMax_per_mm});

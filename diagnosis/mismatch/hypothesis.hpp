@@ -19,6 +19,9 @@ using EffectSet = std::vector<Member>;
 
 std::string describe(const EffectSet& set);  // "layer + drilling", "nothing"
 
+// Whether the unknowns of a set are few enough for one recording (model::kMaxColumns). A Hypothesis of more throws.
+bool can_be_fitted(const EffectSet& set);
+
 // The first three unknowns are always k, u and lambda2, with u = lambda1 - lambda2^2/(2 pi) >= 0: the domain (26) as a
 // bound. ell is the model file's.
 enum BaseUnknown : int { kUnknownK, kUnknownU, kUnknownLambda2, kBaseUnknowns };

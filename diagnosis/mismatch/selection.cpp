@@ -51,7 +51,13 @@ void Selection::say(const std::string& text) const {
   if (progress_) progress_(text);
 }
 
-Selection::Library Selection::make_library(const Fit& from, const std::vector<Member>& members) const {
+Selection::Library Selection::make_library(const Fit& from, std::vector<Member> members) const {
+  EffectSet set = from.hypothesis.set();
+  set.emplace_back();
+  std::erase_if(members, [&set](const Member& member) {
+    set.back() = member;
+    return !can_be_fitted(set);
+  });
   Library library;
   library.ground = make_ground(evidence_, from);
   library.candidates = make_dictionary(evidence_, from, library.ground, members, rules_.threads);

@@ -73,13 +73,13 @@ class Selection {
     std::shared_ptr<const Fit> fit;
     double evidence = 0;
   };
-  // Candidates beside a fit, and what chance brings to each.
+  // Candidates beside a fit, as far as they have room, and what chance brings to each.
   struct Library {
     Ground ground;
     std::vector<Candidate> candidates;
     NullGains chance;
   };
-  Library make_library(const Fit& from, const std::vector<Member>& members) const;
+  Library make_library(const Fit& from, std::vector<Member> members) const;
   std::vector<Trial> try_beside(const EffectSet& set, const Library& library, const std::vector<std::size_t>& which,
                                 std::size_t starts);
   bool improve(const EffectSet& set, const Trial& larger);

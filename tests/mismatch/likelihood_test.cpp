@@ -172,6 +172,8 @@ TEST(Hypothesis, OfTooManyUnknownsIsRefused) {
   const auto recorded = record_case({}, 1);
   const EffectSet many = {member("tissue_motion"), member("entry_angle"), member("lateral_bias"), member("relaxation"),
                           member("refraction"),    member("layer"),       member("puncture")};
+  EXPECT_FALSE(can_be_fitted(many));
+  EXPECT_TRUE(can_be_fitted({many.begin(), many.end() - 2})) << "15 of 16";
   try {
     const Hypothesis hypothesis(testing::SimulatedRig{}.needle, many, recorded);
     FAIL() << "taken";

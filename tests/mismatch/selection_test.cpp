@@ -144,7 +144,6 @@ TEST(Additions, AreRankedByEvidenceAndHaveTheirThresholds) {
   EXPECT_EQ(describe(trials.front().set), "layer");
   for (std::size_t i = 0; i < trials.size(); ++i) {
     const Trial& trial = trials[i];
-    if (!trial.fit) continue;
     if (i > 0) {
       EXPECT_GE(trials[i - 1].evidence, trial.evidence);
     }
@@ -154,6 +153,16 @@ TEST(Additions, AreRankedByEvidenceAndHaveTheirThresholds) {
       EXPECT_GE(trial.gain, -0.1) << describe(trial.set);
     }
   }
+}
+
+TEST(BestCorrection, BesideASetThatLeavesItNoRoomIsNone) {
+  const SimulatedRig rig{.recordings = 2};
+  const auto recorded = record_case(rig, 1);
+  const Evidence evidence = evidence_of(recorded, rig);
+  Selection selection(evidence, fit_of(evidence, {}), {.bootstrap_draws = kDraws, .seed = 1});
+  // 3 of the needle and 10: a curve of four knots would make 17.
+  const EffectSet full = {member("tissue_motion"), member("entry_angle"), member("lateral_bias"), member("refraction")};
+  EXPECT_EQ(selection.best_correction(full).fit, nullptr);
 }
 
 TEST(ProbabilityOf, IsTheShareOfTheSetsThatHaveIt) {
