@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <atomic>
-#include <chrono>
 #include <exception>
 #include <filesystem>
 #include <mutex>
@@ -63,12 +62,6 @@ Setup load_setup(const BatchOptions& options) {
   return setup;
 }
 
-namespace {
-std::size_t threads_for(std::size_t logs) {
-  return std::min<std::size_t>(logs, std::max(1U, std::thread::hardware_concurrency()));
-}
-}  // namespace
-
 std::vector<Replay> replay_logs(const std::vector<std::string>& logs,
                                 const std::vector<estimator::EstimatorConfig>& configs, const ReplayOptions& options) {
   std::vector<Replay> replays(logs.size());
@@ -98,8 +91,9 @@ std::vector<Replay> replay_logs(const std::vector<std::string>& logs,
       }
     }
   };
+  const std::size_t count = std::min<std::size_t>(logs.size(), std::max(1U, std::thread::hardware_concurrency()));
   std::vector<std::jthread> threads;
-  for (std::size_t i = 0; i < threads_for(logs.size()); ++i) threads.emplace_back(work);
+  for (std::size_t i = 0; i < count; ++i) threads.emplace_back(work);
   threads.clear();
   if (failure) std::rethrow_exception(failure);
   return replays;
@@ -120,9 +114,7 @@ int run(const BatchOptions& options, std::ostream& out, std::ostream& speed) {
   std::vector<estimator::EstimatorConfig> configs(logs.size(), setup.config);
   if (options.held_out) configs = held_out_configs(replay_logs(logs, configs, replay_options), options.width);
   replay_options.ahead_mm = options.ahead_mm;
-  const auto start = std::chrono::steady_clock::now();
   const auto replays = replay_logs(logs, configs, replay_options);
-  const std::chrono::duration<double> wall_s = std::chrono::steady_clock::now() - start;
   bool intact = true;
   for (const Replay& replay : replays) {
     print(out, replay, options.ahead_mm);
@@ -130,7 +122,7 @@ int run(const BatchOptions& options, std::ostream& out, std::ostream& speed) {
     intact = intact && replay.damage.intact() && replay.refused_messages == 0;
   }
   if (replays.size() > 1) print_together(out, replays, options.ahead_mm);
-  print_speed(speed, replays, wall_s.count(), threads_for(logs.size()));
+  print_speed(speed, replays);
   return intact ? 0 : 1;
 }
 

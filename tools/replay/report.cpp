@@ -224,15 +224,14 @@ void print_together(std::ostream& out, const std::vector<Replay>& replays, doubl
   print_foretold(out, next, ahead, ahead_mm);
 }
 
-void print_speed(std::ostream& out, const std::vector<Replay>& replays, double wall_s, std::size_t threads) {
+void print_speed(std::ostream& out, const std::vector<Replay>& replays) {
   double log_s = 0, run_s = 0, processor_s = 0;
   for (const Replay& r : replays) log_s += r.log_s, run_s += r.run_s, processor_s += r.processor_s;
   const auto times = [log_s](double s) { return s > 0 ? log_s / s : 0.0; };
   out << text_of(
-      "%zu logs, %.1f s recorded, replayed in %.4f s on %zu threads: %.0f times real time; decoding and estimating "
-      "alone "
-      "%.0f times on one core (%.0f by processor time)\n",
-      replays.size(), log_s, wall_s, threads, times(wall_s), times(run_s), times(processor_s));
+      "%zu logs, %.1f s recorded, %.4f s decoding and estimating: %.0f times real time on one core (%.0f by processor "
+      "time)\n",
+      replays.size(), log_s, run_s, times(run_s), times(processor_s));
 }
 
 void write_files(const Replay& replay, const std::string& folder, double ahead_mm) {

@@ -12,8 +12,7 @@ namespace bevel::replay {
 void print(std::ostream& out, const Replay& replay, double ahead_mm);
 // What several replays say together: NIS, and measurements foretold.
 void print_together(std::ostream& out, const std::vector<Replay>& replays, double ahead_mm);
-// wall_s: of all of it, what is foretold included.
-void print_speed(std::ostream& out, const std::vector<Replay>& replays, double wall_s, std::size_t threads);
+void print_speed(std::ostream& out, const std::vector<Replay>& replays);
 
 // DIR/<name>.states.csv, DIR/<name>.innovations.csv and one page DIR/<name>.html. Throws std::runtime_error naming the
 // file.
