@@ -108,11 +108,6 @@ std::shared_ptr<const Fit> fit_addition(const Evidence& evidence, const Fit& fro
   const Hypothesis hypothesis(evidence.belief, set, *evidence.recorded);
   const std::size_t m = set.size() - 1;
   std::shared_ptr<const Fit> best;
-  const auto keep_better = [&](const std::shared_ptr<const Fit>& one) {
-    if (!one->valid || (best && cost_of(*one) >= cost_of(*best) - kSettled)) return false;
-    best = one;
-    return true;
-  };
   for (const auto& promise : promises) {
     Eigen::VectorXd values = hypothesis.start_from(from.hypothesis, from.values);
     for (std::size_t p = 0; p < promise.parameters.size(); ++p)
@@ -122,7 +117,8 @@ std::shared_ptr<const Fit> fit_addition(const Evidence& evidence, const Fit& fro
         const bool local = static_cast<int>(p) == candidate.local && r < promise.local_by_recording.size();
         values[i] = local ? promise.local_by_recording[r] : promise.parameters[p];
       }
-    keep_better(settled_fit(evidence, hypothesis, look_around(evidence, hypothesis, m, values)));
+    const auto one = settled_fit(evidence, hypothesis, look_around(evidence, hypothesis, m, values));
+    if (one->valid && (!best || cost_of(*one) < cost_of(*best) - kSettled)) best = one;
   }
   if (candidate.local_may_be_off && best && cost_of(from) - cost_of(*best) > kWorthALook)
     best = from_other_sizes(evidence, best);

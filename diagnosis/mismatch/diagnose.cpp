@@ -87,18 +87,18 @@ void drop_what_does_not_foretell(Selection& selection, const Fit& base, EffectSe
     set = rest;
     findings.held_out = hold_out(evidence, base, *selection.fit_of(set), threads);
   };
-  for (bool dropped = true; dropped;) {
-    dropped = false;
-    for (auto member = set.begin(); member != set.end() && !dropped; ++member) {
-      if (!is_correction(*member)) continue;
-      const EffectSet rest = without_member(set, static_cast<std::size_t>(member - set.begin()));
-      if (leave_one_out(evidence, *selection.fit_of(set), threads).total() <
-          leave_one_out(evidence, *selection.fit_of(rest), threads).total())
-        continue;
-      drop(member);
-      dropped = true;
-    }
-  }
+  const auto foretold = [&](const EffectSet& of) {
+    return leave_one_out(evidence, *selection.fit_of(of), threads).total();
+  };
+  const auto idle_curve = [&] {
+    if (std::none_of(set.begin(), set.end(), is_correction)) return set.end();
+    const double with = foretold(set);
+    return std::find_if(set.begin(), set.end(), [&](const Member& member) {
+      return is_correction(member) &&
+             !(with < foretold(without_member(set, static_cast<std::size_t>(&member - set.data()))));
+    });
+  };
+  for (auto idle = idle_curve(); idle != set.end(); idle = idle_curve()) drop(idle);
   while (!set.empty() && findings.held_out.gain <= 0) drop(std::prev(set.end()));
 }
 

@@ -111,4 +111,18 @@ inline model::Pose draw_start(const Prior& prior, std::mt19937_64& rng) {
   return model::exp_se3(error);
 }
 
+// Of a needle and a start drawn from the prior; drawn again where the needle leaves the model's domain.
+struct DrawnInsertion {
+  model::NeedleParameters needle;
+  Insertion data;
+  int redrawn = 0;
+};
+inline DrawnInsertion draw_insertion(const Prior& prior, const InsertionPlan& plan, std::mt19937_64& rng) {
+  for (DrawnInsertion drawn;; ++drawn.redrawn) {
+    drawn.needle = draw_needle(prior, rng);
+    drawn.data = insert(drawn.needle, draw_start(prior, rng), plan, rng);
+    if (drawn.data.in_domain) return drawn;
+  }
+}
+
 }  // namespace bevel::estimator::testing

@@ -38,12 +38,8 @@ TEST(NeedleEstimator, TwoHundredInsertionsAreConsistent) {
     InsertionPlan plan;
     plan.cameras = 1 + run % 2;
     plan.lost_share = 0.1;
-    auto truth = testing::draw_needle(config.prior, rng);
-    Insertion data = testing::insert(truth, testing::draw_start(config.prior, rng), plan, rng);
-    for (; !data.in_domain; ++redrawn) {
-      truth = testing::draw_needle(config.prior, rng);
-      data = testing::insert(truth, testing::draw_start(config.prior, rng), plan, rng);
-    }
+    const auto [truth, data, again] = testing::draw_insertion(config.prior, plan, rng);
+    redrawn += again;
     NeedleEstimator estimator(config);
     struct Sum {
       double d2 = 0;

@@ -92,12 +92,7 @@ void against_peers(int runs, unsigned seed) {
     testing::InsertionPlan plan;
     plan.cameras = 1 + run % 2;
     plan.lost_share = 0.1;
-    model::NeedleParameters truth;
-    Insertion data;
-    do {
-      truth = testing::draw_needle(config.prior, rng);
-      data = testing::insert(truth, testing::draw_start(config.prior, rng), plan, rng);
-    } while (!data.in_domain);
+    const auto [truth, data, redrawn] = testing::draw_insertion(config.prior, plan, rng);
     FilterState state;
     estimate(once, data, ekf, state);
     ekf.end(state, data, truth);

@@ -76,11 +76,7 @@ TEST_F(SystemFile, MistakesAreNamed) {
 estimator::testing::Insertion insertion(std::mt19937_64& rng, const estimator::Prior& prior) {
   estimator::testing::InsertionPlan plan;
   plan.cameras = 2;
-  for (;;) {
-    auto data = estimator::testing::insert(estimator::testing::draw_needle(prior, rng),
-                                           estimator::testing::draw_start(prior, rng), plan, rng);
-    if (data.in_domain) return data;
-  }
+  return estimator::testing::draw_insertion(prior, plan, rng).data;
 }
 
 // Measurements before the actuator state that follows them, which is when the live estimator could first use them.

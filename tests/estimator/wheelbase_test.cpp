@@ -128,12 +128,7 @@ TEST(Wheelbase, TwoHundredInsertionsWithEllDrawnFromItsPrior) {
     InsertionPlan plan;
     plan.cameras = 1 + run % 2;
     plan.lost_share = 0.1;
-    model::NeedleParameters truth;
-    Insertion data;
-    do {
-      truth = testing::draw_needle(config.prior, rng);
-      data = testing::insert(truth, testing::draw_start(config.prior, rng), plan, rng);
-    } while (!data.in_domain);
+    const auto [truth, data, redrawn] = testing::draw_insertion(config.prior, plan, rng);
     const FilterState state = end_of(config, data);
     nees += testing::nees_of<10>(state, data.final_pose, truth);
     nees_held += testing::nees_of(end_of(held, data), data.final_pose, truth);

@@ -1,11 +1,11 @@
 // Practice recordings of a simulator that shares no code with this project, where they are at hand.
 #include <gtest/gtest.h>
 
-#include <cstdlib>
 #include <filesystem>
 
 #include "diagnosis/mismatch/diagnose.hpp"
 #include "io/model_file.hpp"
+#include "tests/support/shared_recordings.hpp"
 #include "tools/diagnose/read_case.hpp"
 
 namespace bevel::diagnosis {
@@ -13,11 +13,7 @@ namespace {
 
 namespace fs = std::filesystem;
 
-fs::path practice() {
-  const char* shared = std::getenv("BEVEL_SHARED");
-  return (shared != nullptr ? fs::path(shared) : fs::path(BEVEL_SOURCE_DIR) / ".." / "shared") / "recordings" /
-         "practice";
-}
+fs::path practice() { return test::shared_recordings() / "recordings" / "practice"; }
 
 Findings findings_of(const fs::path& folder) {
   std::vector<std::string> logs;
@@ -29,7 +25,7 @@ Findings findings_of(const fs::path& folder) {
 
 TEST(Practice, WhereNothingIsMissing) {
   const fs::path folder = practice() / "case13";
-  if (!fs::exists(folder)) GTEST_SKIP() << folder << " is not there; set BEVEL_SHARED to the folder of recordings";
+  BEVEL_SKIP_WITHOUT(folder);
   const Findings found = findings_of(folder);
   EXPECT_EQ(found.verdict, Verdict::nothing_missing) << found.sentence;
   EXPECT_NEAR(found.held_out.after.chi2_per_dof, 1, 0.1);
@@ -37,7 +33,7 @@ TEST(Practice, WhereNothingIsMissing) {
 
 TEST(Practice, ALayer) {
   const fs::path folder = practice() / "case04";
-  if (!fs::exists(folder)) GTEST_SKIP() << folder << " is not there; set BEVEL_SHARED to the folder of recordings";
+  BEVEL_SKIP_WITHOUT(folder);
   const Findings found = findings_of(folder);
   EXPECT_EQ(found.verdict, Verdict::effects_found) << found.sentence;
   ASSERT_EQ(found.effects.size(), 1U) << found.sentence;
