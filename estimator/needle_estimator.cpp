@@ -10,7 +10,8 @@ namespace bevel::estimator {
 
 NeedleEstimator::NeedleEstimator(const EstimatorConfig& config, std::size_t history)
     : filter_(config),
-      past_(config.effects.empty() ? static_cast<std::size_t>(std::max(config.relinearised_steps, 0)) : 0) {
+      past_(config.effects.empty() ? static_cast<std::size_t>(std::max(config.relinearised_steps, 0)) : 0),
+      walked_(std::make_unique_for_overwrite<WalkedStep[]>(past_.room())) {
   pool_.resize(std::max<std::size_t>(history, 8));
   order_.reserve(pool_.size());
   free_.reserve(pool_.size());
@@ -87,7 +88,7 @@ void NeedleEstimator::relinearise_if_due() {
   past_.close(anchor, filter_);
   if (!past_.complete()) return;
   past_due_mm_ = past_mm_ + std::max(kRelinearisedEvery_mm, past_mm_ / 8);
-  if (!filter_.relinearise(anchor, past_.start(), past_.steps())) return;
+  if (!filter_.relinearise(anchor, past_.start(), past_.steps(), {walked_.get(), past_.room()})) return;
   ++counters_.relinearised;
   process_from(1);
 }

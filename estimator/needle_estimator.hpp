@@ -5,6 +5,7 @@
 // Actuator states and measurements become nodes ordered by time. A measurement between two actuator states is applied
 // at positions interpolated between them; one that is newer than the newest actuator state waits for the next.
 #include <cstdint>
+#include <memory>
 #include <vector>
 
 #include "estimator/past.hpp"
@@ -86,8 +87,9 @@ class NeedleEstimator {
   std::vector<Node> pool_;            // sized once
   std::vector<std::uint32_t> order_;  // indices into the pool, by time; reserved once
   std::vector<std::uint32_t> free_;
-  std::size_t processed_ = 0;  // nodes before this index hold a posterior
-  Past past_;                  // what has left the history, from its start or the last reset
+  std::size_t processed_ = 0;             // nodes before this index hold a posterior
+  Past past_;                             // what has left the history, from its start or the last reset
+  std::unique_ptr<WalkedStep[]> walked_;  // room to run it again in: sized once, memory comes as it is used
   bool past_started_ = false;
   double past_mm_ = 0;  // insertion and retraction in it
   double past_due_mm_ = kFirstRelinearisation_mm;

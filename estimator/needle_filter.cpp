@@ -18,6 +18,7 @@ constexpr double kRankTolerance = 1e-9;
 constexpr double kLambda2Max = 0.9;                             // (24) with room: 1 - lambda2 stays away from zero
 constexpr double kWheelbaseMin_mm = 2, kWheelbaseMax_mm = 990;  // of the model's (1, 1000), with room
 constexpr double kVarianceFloor = 1e-14;
+constexpr double kShort_mm = 0.5, kShort_rad = 0.05;  // see EstimatorConfig::midpoint_derivatives
 
 double square(double x) { return x * x; }
 
@@ -78,7 +79,10 @@ Update update_rank(FilterState& state, const Eigen::Matrix<double, 3, kColumns>&
   result.accepted = result.test_ratio <= 1;  // false for a NaN too
   if (!result.accepted) return result;
 
-  const Eigen::Matrix<double, kSize, kRank> K = llt.solve(PHt.transpose()).transpose();
+  // By the inverse of a triangle of no more than three rows: Eigen's solver for the nine right sides is a blocked one.
+  const Mat inverse_L = llt.matrixL().solve(Mat::Identity());
+  const Eigen::Matrix<double, kSize, kRank> whitened_PHt = PHt.lazyProduct(inverse_L.transpose());
+  const Eigen::Matrix<double, kSize, kRank> K = whitened_PHt.lazyProduct(inverse_L);
   const Error<kSize> correction = K * y;
   // Joseph form, (I - K H) P (I - K H)^T + K R K^T, with H only in its first columns; small products written out.
   Covariance<kSize> P = covariance;
@@ -160,11 +164,21 @@ void NeedleFilter::predict(FilterState& state, double insertion_mm, double rotat
                        : predict_plain<9>(state, insertion_mm, rotation_rad);
 }
 
+void NeedleFilter::predict_mean(FilterState& state, double insertion_mm, double rotation_rad, double duration_s) const {
+  if (!config_.effects.empty()) return predict(state, insertion_mm, rotation_rad, duration_s);
+  if (insertion_mm == 0 && rotation_rad == 0) return;
+  const model::StepInput input{insertion_mm, rotation_rad, {state.curvature_per_mm, 0}};
+  state.outside_model = !model::advance(state.pose, input, slip_of(state));
+}
+
 template <int kSize>
 void NeedleFilter::predict_plain(FilterState& state, double insertion_mm, double rotation_rad) const {
   model::NeedleJacobian jacobian;
-  state.outside_model =
-      !model::advance(state.pose, {insertion_mm, rotation_rad, {state.curvature_per_mm, 0}}, slip_of(state), jacobian);
+  const model::StepInput input{insertion_mm, rotation_rad, {state.curvature_per_mm, 0}};
+  const bool short_step = std::abs(insertion_mm) <= kShort_mm && std::abs(rotation_rad) <= kShort_rad;
+  state.outside_model = config_.midpoint_derivatives && short_step
+                            ? !model::advance_by_midpoint(state.pose, input, slip_of(state), jacobian)
+                            : !model::advance(state.pose, input, slip_of(state), jacobian);
   if (state.outside_model) return;
   const auto move_covariance = [&](Covariance<kSize>& P) {
     propagate<kSize>(P, jacobian.pose, jacobian.needle.leftCols<kSize - 6>());

@@ -67,6 +67,13 @@ struct PastStep {
   Eigen::Matrix3d information_per_mm2 = Eigen::Matrix3d::Zero();
 };
 
+// What relinearise() writes down of a step of a path when it walks back over it.
+struct WalkedStep {
+  model::NeedleJacobian backwards;  // of the step that undoes it
+  Eigen::Matrix3d R;                // of the pose after it
+  Eigen::Vector3d residual_mm;      // measured, less where the path has the point
+};
+
 template <int kSize>
 struct LinearFilter;  // relinearise.cpp
 
@@ -81,6 +88,9 @@ class NeedleFilter {
   // Moves the state by increments of the two axes in so much time (which only effects ask for). Where the model has no
   // answer the pose stays, and outside_model is set.
   void predict(FilterState& state, double insertion_mm, double rotation_rad, double duration_s = 0) const;
+
+  // The same without the covariance, for what is only foretold.
+  void predict_mean(FilterState& state, double insertion_mm, double rotation_rad, double duration_s = 0) const;
 
   // Where the cameras see the tip of a state, and by how much they are late.
   Eigen::Vector3d seen_position_mm(const FilterState& state) const;
@@ -97,7 +107,9 @@ class NeedleFilter {
   // the least known direction, each time with all derivatives on the path that leads there: an iterated Kalman filter
   // over a window (cf. Bell and Cathey 1993, IEEE TAC 38(2)) of the rest, given the place. The three are put together
   // by Gauss and Hermite's rule, weighed by how probable each makes the measurements: mean and covariance of the ridge.
-  bool relinearise(FilterState& state, const FilterState& start, std::span<const PastStep> steps) const;
+  // `walked` is room to work in, for as many steps at least.
+  bool relinearise(FilterState& state, const FilterState& start, std::span<const PastStep> steps,
+                   std::span<WalkedStep> walked) const;
 
   const EstimatorConfig& config() const { return config_; }
 
@@ -110,10 +122,11 @@ class NeedleFilter {
   template <int kSize>
   Update update_sized(FilterState& state, const model::TipMeasurement& measurement) const;
   template <int kSize>
-  bool relinearise_sized(FilterState& state, const FilterState& start, std::span<const PastStep> steps) const;
+  bool relinearise_sized(FilterState& state, const FilterState& start, std::span<const PastStep> steps,
+                         std::span<WalkedStep> walked) const;
   template <int kSize>
   bool run_again(const FilterState& about, const FilterState& start, std::span<const PastStep> steps,
-                 LinearFilter<kSize>& linear) const;
+                 std::span<WalkedStep> walked, LinearFilter<kSize>& linear, double& cost) const;
   template <int kSize>
   double path_cost(const FilterState& state, const FilterState& start, std::span<const PastStep> steps) const;
   template <int kSize>

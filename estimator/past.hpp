@@ -24,6 +24,7 @@ class Past {
 
   const FilterState& start() const { return start_; }
   std::span<const PastStep> steps() const { return steps_; }
+  std::size_t room() const { return steps_.capacity(); }
   bool complete() const { return complete_; }  // false once there was no room
 
  private:

@@ -68,6 +68,21 @@ namespace {
 
 constexpr double kKnown = 1e-12;  // variance against the prior's
 
+bool moves(const PastStep& step) { return step.insertion_mm != 0 || step.rotation_rad != 0; }
+
+// Derivatives of a step from those of the step that undoes it.
+model::NeedleJacobian inverse(const model::NeedleJacobian& back) {
+  const Eigen::Matrix3d R = back.pose.topLeftCorner<3, 3>().transpose();
+  const Eigen::Matrix3d Y = back.pose.bottomRightCorner<3, 3>().inverse();
+  const Eigen::Matrix3d X = -(R * (back.pose.topRightCorner<3, 3>() * Y));
+  model::NeedleJacobian forwards;
+  forwards.pose << R, X, Eigen::Matrix3d::Zero(), Y;
+  forwards.needle.topRows<3>() = -(R.lazyProduct(back.needle.topRows<3>()));
+  forwards.needle.topRows<3>() -= X.lazyProduct(back.needle.bottomRows<3>());
+  forwards.needle.bottomRows<3>() = -(Y.lazyProduct(back.needle.bottomRows<3>()));
+  return forwards;
+}
+
 // Gauss and Hermite's rule of three for a unit normal density.
 struct Place {
   double at, weight;
@@ -131,41 +146,55 @@ double NeedleFilter::path_cost(const FilterState& state, const FilterState& star
   return 0.5 * (squares + error.dot(covariance_of<kSize>(start).ldlt().solve(error)));
 }
 
-// The linear filter over the steps, about the path that leads to `about`; false where there is none.
+// The linear filter over the steps, about the path that leads to `about`, and that path's cost as above; false where
+// there is none. The path is walked once, backwards, and leaves in `walked` what the filter needs on its way forwards.
 template <int kSize>
 bool NeedleFilter::run_again(const FilterState& about, const FilterState& start, std::span<const PastStep> steps,
-                             LinearFilter<kSize>& linear) const {
+                             std::span<WalkedStep> walked, LinearFilter<kSize>& linear, double& cost) const {
   const model::SlipParameters slip = slip_of(about);
   const Eigen::Vector2d curvature(about.curvature_per_mm, 0);
   FilterState entry = about;
   model::Pose& pose = entry.pose;
-  for (std::size_t i = steps.size(); i-- > 0;)
-    if (!model::advance(pose, {-steps[i].insertion_mm, -steps[i].rotation_rad, curvature}, slip)) return false;
+  double squares = 0;
+  for (std::size_t i = steps.size(); i-- > 0;) {
+    const PastStep& step = steps[i];
+    WalkedStep& back = walked[i];
+    if (step.measured) {
+      back.R = pose.R;
+      back.residual_mm = step.position_mm - pose.p_mm - pose.R * step.point_mm;
+      squares += back.residual_mm.dot(step.information_per_mm2 * back.residual_mm);
+    }
+    if (moves(step) &&
+        !model::advance_by_midpoint(pose, {-step.insertion_mm, -step.rotation_rad, curvature}, slip, back.backwards))
+      return false;
+  }
   pose.R = model::orthonormalised(pose.R);
 
   linear.error = difference<kSize>(entry, start);
-  // The error of `start` is about its own pose; here it is counted from the path's.
   linear.covariance = covariance_of<kSize>(start);
+  cost = 0.5 * (squares + linear.error.dot(linear.covariance.ldlt().solve(linear.error)));
+  // The error of `start` is about its own pose; here it is counted from the path's.
   linear.turn(model::right_jacobian_se3(linear.error.template head<6>()).inverse());
-  for (const PastStep& step : steps) {
-    model::NeedleJacobian jacobian;
-    if (step.insertion_mm != 0 || step.rotation_rad != 0) {
-      if (!model::advance(pose, {step.insertion_mm, step.rotation_rad, curvature}, slip, jacobian)) return false;
-      linear.predict(jacobian, process_variance<kSize>(linear.covariance, step.insertion_mm, step.rotation_rad));
-    }
-    if (step.measured) linear.update(pose.R, step, step.position_mm - pose.p_mm - pose.R * step.point_mm);
+  for (std::size_t i = 0; i < steps.size(); ++i) {
+    const PastStep& step = steps[i];
+    if (moves(step))
+      linear.predict(inverse(walked[i].backwards),
+                     process_variance<kSize>(linear.covariance, step.insertion_mm, step.rotation_rad));
+    if (step.measured) linear.update(walked[i].R, step, walked[i].residual_mm);
   }
   return linear.error.allFinite() && linear.covariance.allFinite() && std::isfinite(linear.log_evidence);
 }
 
 template <int kSize>
-bool NeedleFilter::relinearise_sized(FilterState& state, const FilterState& start,
-                                     std::span<const PastStep> steps) const {
+bool NeedleFilter::relinearise_sized(FilterState& state, const FilterState& start, std::span<const PastStep> steps,
+                                     std::span<WalkedStep> walked) const {
+  if (walked.size() < steps.size()) return false;
   constexpr std::size_t kMost = Ridge<kSize>::kDirections == 1 ? 3 : 9;
   const Ridge<kSize> ridge = find_ridge<kSize>(state, config_.prior);
   std::array<FilterState, kMost> at;
   std::array<LinearFilter<kSize>, kMost> linear;
   std::array<double, kMost> weight{};
+  double cost_before = 0;
   std::size_t count = 1;
   for (int j = 0; j < ridge.directions; ++j) count *= kPlaces.size();
   for (std::size_t i = 0; i < count; ++i) {
@@ -179,7 +208,9 @@ bool NeedleFilter::relinearise_sized(FilterState& state, const FilterState& star
     }
     at[i] = state;
     move<kSize>(at[i], offset);
-    if (!run_again<kSize>(at[i], start, steps, linear[i])) return false;
+    double cost = 0;
+    if (!run_again<kSize>(at[i], start, steps, walked, linear[i], cost)) return false;
+    if (i == 0) cost_before = cost;  // the first place is the state itself
     for (int j = 0; j < ridge.directions; ++j) linear[i].condition(ridge.normal.col(j));
     move<kSize>(at[i], linear[i].error);
     linear[i].turn(model::right_jacobian_se3(linear[i].error.template head<6>()));
@@ -191,7 +222,7 @@ bool NeedleFilter::relinearise_sized(FilterState& state, const FilterState& star
   const double largest = weight[best];
   for (std::size_t i = 0; i < count; ++i) sum += weight[i] = std::exp(weight[i] - largest);
   // Rounding, and process noise, for which a path without it is no minimum, may raise the cost a little.
-  if (!(path_cost<kSize>(at[best], start, steps) <= 1.05 * path_cost<kSize>(state, start, steps) + 1)) return false;
+  if (!(path_cost<kSize>(at[best], start, steps) <= 1.05 * cost_before + 1)) return false;
 
   FilterState mean = at[best];
   for (int pass = 0; pass < 2; ++pass) {
@@ -212,8 +243,10 @@ bool NeedleFilter::relinearise_sized(FilterState& state, const FilterState& star
   return true;
 }
 
-bool NeedleFilter::relinearise(FilterState& state, const FilterState& start, std::span<const PastStep> steps) const {
-  return wheelbase_estimated_ ? relinearise_sized<10>(state, start, steps) : relinearise_sized<9>(state, start, steps);
+bool NeedleFilter::relinearise(FilterState& state, const FilterState& start, std::span<const PastStep> steps,
+                               std::span<WalkedStep> walked) const {
+  return wheelbase_estimated_ ? relinearise_sized<10>(state, start, steps, walked)
+                              : relinearise_sized<9>(state, start, steps, walked);
 }
 
 }  // namespace bevel::estimator

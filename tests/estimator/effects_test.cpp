@@ -120,6 +120,7 @@ void plain_predict(FilterState& state, const EstimatorConfig& config, double ins
 TEST(EstimatorEffects, NoEffectsIsThePlainFilterBitForBit) {
   std::mt19937_64 rng(kSeed);
   EstimatorConfig config = config_with({});
+  config.midpoint_derivatives = false;
   config.process = {};
   config.prior.roll_sd_rad = 0.05;
   const testing::Insertion data = simulate(config, rng);
@@ -160,6 +161,7 @@ void expect_plain_filter_of_an_effect_that_is_none(double wheelbase_sd_mm) {
   std::mt19937_64 rng(kSeed);
   EstimatorConfig plain = config_with({});
   plain.relinearised_steps = 0;
+  plain.midpoint_derivatives = false;  // effects take those of the step itself
   const testing::Insertion data = simulate(plain, rng);
   EstimatorConfig none = config_with({effect("torsional_windup", {0.0})});
   plain.prior.wheelbase_sd_mm = none.prior.wheelbase_sd_mm = wheelbase_sd_mm;

@@ -199,11 +199,11 @@ Foretold foretell(const Replay& replay, double ahead_mm) {
       return static_cast<double>(later - std::exchange(utime, later)) * 1e-6;
     };
     for (auto row = from + 1; row != replay.states.end() && row->utime < to->utime; ++row) {
-      filter.predict(state, row->insertion_mm - axes[0], row->rotation_rad - axes[1], seconds_to(row->utime));
+      filter.predict_mean(state, row->insertion_mm - axes[0], row->rotation_rad - axes[1], seconds_to(row->utime));
       axes = {row->insertion_mm, row->rotation_rad};
     }
     const Eigen::Vector2d last = axes_at(replay, to->utime) - axes;
-    filter.predict(state, last[0], last[1], seconds_to(to->utime));
+    filter.predict_mean(state, last[0], last[1], seconds_to(to->utime));
     const Eigen::Vector3d error = to->position_mm - filter.seen_position_mm(state);
     for (std::size_t i = 0; i < 2; ++i) {
       if (!to->sees[i]) continue;
