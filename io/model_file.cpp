@@ -59,8 +59,8 @@ EffectEntry read_effect(Section section) {
   for (const auto& parameter : effect->parameters()) {
     const bool of_recording = parameter.scope == model::Scope::recording;
     by_recording |= of_recording;
-    read_parameter(section, parameter, std::isnan(parameter.none) && !of_recording ? required : optional,
-                   entry.parameters);
+    const bool needed = !of_recording && std::isnan(parameter.none) && std::isnan(parameter.usual);
+    read_parameter(section, parameter, needed ? required : optional, entry.parameters);
   }
   refuse_empty(section, *effect);
   if (!by_recording) return entry;
@@ -147,7 +147,9 @@ std::vector<model::ActiveEffect> active_effects(const std::vector<EffectEntry>& 
     values.insert(entry.parameters.begin(), entry.parameters.end());  // the recording's own come first
     for (std::size_t i = 0; const auto& parameter : one.effect->parameters()) {
       const auto given = values.extract(std::string(parameter.name));
-      const double otherwise = parameter.scope == model::Scope::recording ? 0 : parameter.none;
+      const double otherwise = parameter.scope == model::Scope::recording ? 0
+                               : std::isnan(parameter.usual)              ? parameter.none
+                                                                          : parameter.usual;
       one.parameters[i++] = given.empty() ? otherwise : given.mapped();
       if (given.empty() && std::isnan(otherwise))
         throw std::invalid_argument(entry.name + "." + std::string(parameter.name) + " is missing and is required");

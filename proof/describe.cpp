@@ -28,10 +28,10 @@ constexpr std::array<Remark, 30> kRemarks{{
     {"lost_steps",
      "lost one after another within 30 ms; in each recording with probability 0.45; 30 % on insertion, "
      "0.8 to 3 mm"},
-    {"rate_dependence", "bounded at rest (0.3 mm/s)"},
+    {"rate_dependence", "by the tip's own speed; bounded at rest (0.3 mm/s)"},
     {"layer", "the step is a tanh of 1.5 mm"},
     {"depth_dependence", "with the inserted length rather than the depth"},
-    {"drilling", "felt over 0.8 mm of travel"},
+    {"drilling", "by the tip's own rates; felt over 0.8 mm of travel"},
     {"flip_transient", "two stages, 85 % and 15 % of the length; none while retracting"},
     {"relaxation", "builds ever more slowly near its end; decays below 0.3 mm/s"},
     {"puncture", "the tip creeps by 8 % while it is held, catches up with 40 ms"},
@@ -146,6 +146,12 @@ std::string describe_distribution() {
          number(kVisible_sigmas) +
          " on. The right answer names exactly the visible effects, \"unknown\" for those on no list, and nothing where "
          "none is visible.\n\n"
+         "`nearest`: the parameters at which the plain forms of all visible listed effects, with k, lambda1 and "
+         "lambda2, "
+         "come closest to the noise-free readings. An estimate by the plain forms is about these; what was drawn "
+         "differs "
+         "from them by what the physical forms, the drives' periodic errors and what is too small to be named make of "
+         "it. Intervals are scored against both.\n\n"
          "An unlisted effect alone in its trial is also fitted by every listed one (plain form, its parameters and k, "
          "lambda1, lambda2 free; not lost_steps and tissue_motion). Those that come closer than the limit are its "
          "rivals: no tool can know better from these recordings, and naming one counts as ambiguous, apart.\n\n"

@@ -98,7 +98,7 @@ double DriveTrain::membrane(double advance_mm, double depth_mm) {
     if (membrane_lag_mm_ >= physics_.indentation_mm) membrane_ = Membrane::open;
     membrane_lag_mm_ = std::max(membrane_lag_mm_, 0.0);
   } else if (membrane_ == Membrane::open) {
-    membrane_lag_mm_ *= std::exp(-kStep_s / (0.01 + 0.03 * physics_.departure));
+    membrane_lag_mm_ *= physics_.departure > 0 ? std::exp(-kStep_s / (0.04 * physics_.departure)) : 0.0;
   }
   last_advance_mm_ = advance_mm;
   return advance_mm - membrane_lag_mm_;

@@ -36,6 +36,7 @@ struct HiddenPhysics {
   double flip_length_mm = 0;
   double relaxation_mm = 0;
   double relaxation_tau_s = 1;
+  double relaxation_build_mm = 3;
   double puncture_depth_mm = 0;
   double indentation_mm = 0;
   double motion_mm = 0;

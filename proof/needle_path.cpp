@@ -9,6 +9,8 @@
 namespace bevel::proof {
 namespace {
 
+constexpr double kSlowest_mm_s = 0.2;  // rate dependence is not continued below
+
 using Eigen::Vector2d;
 using Eigen::Vector3d;
 
@@ -42,16 +44,20 @@ class Tissue {
 
   double depth_mm() const { return tip_.p.z(); }
 
-  void advance(double time_s, double advance_mm, double roll_before_rad, double roll_after_rad) {
+  // `speed_mm_s` and `turn_rad_s` are the base's: in the physical forms the tip's own take their place.
+  void advance(double time_s, double advance_mm, double roll_before_rad, double roll_after_rad, double speed_mm_s,
+               double turn_rad_s) {
     const double roll_rad = 0.5 * (roll_before_rad + roll_after_rad);
-    const double speed_mm_s = std::abs(advance_mm) / kStep_s;
-    const double turn_rad_s = std::abs(roll_after_rad - roll_before_rad) / kStep_s;
+    const double share = physics_.departure;
+    speed_mm_s += share * (std::abs(advance_mm) / kStep_s - speed_mm_s);
+    turn_rad_s += share * (std::abs(roll_after_rad - roll_before_rad) / kStep_s - turn_rad_s);
     relax(advance_mm, speed_mm_s, roll_rad);
     if (std::abs(advance_mm) < 1e-12) return;
     advanced_mm_ += advance_mm;
     const double k = needle_.curvature_per_mm * softening(time_s, speed_mm_s, turn_rad_s, std::abs(advance_mm));
     const Vector2d bevel = k * Vector2d(std::cos(roll_rad), std::sin(roll_rad));
-    const Vector2d curvature = recover(bevel, std::max(advance_mm, 0.0));
+    const Vector2d own = needle_.curvature_per_mm * Vector2d(std::cos(roll_rad), std::sin(roll_rad));
+    const Vector2d curvature = recover(bevel, own, std::max(advance_mm, 0.0));
     const Rate first = rate(tip_, curvature, roll_rad);
     Tip middle = tip_;
     move(middle, first, 0.5 * advance_mm);
@@ -105,7 +111,7 @@ class Tissue {
     const double z = tip_.p.z();
     const double round = physics_.departure;
     if (physics_.rate_exponent != 0.0)
-      factor *= std::pow(std::hypot(speed_mm_s, 0.3 * round) / 10.0, -physics_.rate_exponent);
+      factor *= std::pow(std::hypot(std::max(speed_mm_s, kSlowest_mm_s), 0.3 * round) / 10.0, -physics_.rate_exponent);
     if (physics_.layer_ratio != 1.0) {
       const double width_mm = 1.5 * round;
       const double share = width_mm > 0.0 ? 0.5 * (1.0 + std::tanh((z - physics_.layer_depth_mm) / width_mm))
@@ -118,7 +124,7 @@ class Tissue {
       factor *= 1.0 + physics_.fibre_share * std::sin(2.0 * std::numbers::pi * z / physics_.fibre_period_mm);
     if (physics_.drilling_mm_per_rad != 0.0) {
       // The cutting face needs a little way to feel the change.
-      const double wanted = 1.0 / (1.0 + physics_.drilling_mm_per_rad * turn_rad_s / speed_mm_s);
+      const double wanted = 1.0 / (1.0 + physics_.drilling_mm_per_rad * turn_rad_s / std::max(speed_mm_s, 1e-3));
       const double way_mm = 0.8 * round;
       const double keep = way_mm > 0.0 ? std::exp(-travel_mm / way_mm) : 0.0;
       drilled_ = keep * drilled_ + (1.0 - keep) * wanted;
@@ -128,10 +134,10 @@ class Tissue {
   }
 
   // Curvature follows the bevel over a length, in two stages of which the second is short.
-  Vector2d recover(const Vector2d& bevel, double cut_mm) {
+  Vector2d recover(const Vector2d& bevel, const Vector2d& own, double cut_mm) {
     const double length_mm = physics_.flip_length_mm;
     if (length_mm <= 0.0) return bevel;
-    if (!recovering_) first_ = second_ = bevel;
+    if (!recovering_) first_ = second_ = own;
     recovering_ = true;
     const double short_mm = 0.15 * physics_.departure * length_mm;
     first_ = bevel + (first_ - bevel) * std::exp(-cut_mm / (length_mm - short_mm));
@@ -142,14 +148,13 @@ class Tissue {
   // An elastic offset toward the bevel: builds while the tip cuts, goes at rest.
   void relax(double advance_mm, double speed_mm_s, double roll_rad) {
     if (physics_.relaxation_mm <= 0.0) return;
-    constexpr double kBuild_mm = 3.0;
     const Vector2d full = physics_.relaxation_mm * Vector2d(std::sin(roll_rad), -std::cos(roll_rad));
     if (advance_mm > 0.0) {
       const Vector2d missing = full - offset_mm_;
       // From proportional to ever slower near the end.
       const double slowing =
           1.0 - 0.35 * physics_.departure * std::min(1.0, offset_mm_.norm() / physics_.relaxation_mm);
-      offset_mm_ += missing * std::min(1.0, slowing * advance_mm / kBuild_mm);
+      offset_mm_ += missing * std::min(1.0, slowing * advance_mm / physics_.relaxation_build_mm);
     }
     if (speed_mm_s < 0.3) offset_mm_ *= std::exp(-kStep_s / physics_.relaxation_tau_s);
   }
@@ -202,7 +207,9 @@ TipPath travel(const BaseNeedle& needle, const AxisMotion& motion, const HiddenP
   for (std::size_t i = 1; i < motion.size(); ++i) {
     const double time_s = kStep_s * static_cast<double>(i);
     const auto now = drive.step(time_s, motion.insertion_mm[i], motion.rotation_rad[i], tissue.depth_mm());
-    tissue.advance(time_s, now.advance_mm - before.advance_mm, before.roll_rad, now.roll_rad);
+    tissue.advance(time_s, now.advance_mm - before.advance_mm, before.roll_rad, now.roll_rad,
+                   std::abs(motion.insertion_mm[i] - motion.insertion_mm[i - 1]) / kStep_s,
+                   std::abs(motion.rotation_rad[i] - motion.rotation_rad[i - 1]) / kStep_s);
     path.push_back(tissue.tip_mm(time_s, recording));
     before = now;
   }

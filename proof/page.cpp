@@ -62,6 +62,7 @@ void shares(io::HtmlReport& page, const Tally& t) {
                                {"on no list: called unknown", t.unknown_called_unknown, 0.8},
                                {"the same, imitated by none listed", t.unknown_distinct, -1},
                                {"truth within the 95 % intervals", t.covered, 0.95},
+                               {"nearest plain form within them", t.covers_nearest, 0.95},
                                {"place within 0.2 s or 3 mm", t.located, -1},
                                {"held-out chi-square within 10 % of 1", t.chi2_at_floor, -1}};
   page.figure_svg(share_figure(lines),
@@ -162,6 +163,15 @@ void parameters(io::HtmlReport& page, const Tally& t) {
   page.paragraph(std::to_string(t.z.size()) + " parameters: mean " + digits(t.z_mean) + ", spread " +
                  digits(t.z_spread) + " (right are 0 and 1); the 95 % intervals hold the truth in " +
                  percent(t.covered.value()) + " (" + percent(w.low) + " to " + percent(w.high) + ").");
+  if (t.z_nearest.empty()) return;
+  const Interval n = wilson95(t.covers_nearest);
+  page.paragraph(
+      "The plant's forms are not the plain ones, so what a plain form comes to on it, even without noise, is not quite "
+      "what was drawn. Against that nearest value: mean " +
+      digits(t.z_nearest_mean) + ", spread " + digits(t.z_nearest_spread) + ", held in " +
+      percent(t.covers_nearest.value()) + " (" + percent(n.low) + " to " + percent(n.high) +
+      "). The first figure tells how far to trust a number as physics, the second whether the intervals are those of "
+      "the noise.");
 }
 
 void fits(io::HtmlReport& page, const Tally& t, const std::vector<TrialScore>& scores) {

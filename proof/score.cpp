@@ -59,12 +59,17 @@ void score_parameters(const OpenedEffect& truth, const NamedEffect& named, Trial
     if (found == named.parameters.end()) continue;
     const Estimate& estimate = found->second;
     ParameterScore p{truth.name, name, true_value, estimate.value, {}, {}};
-    const double d = difference(name, estimate.value, true_value);
-    if (estimate.std_error && *estimate.std_error > 0.0) p.z = d / *estimate.std_error;
-    // The interval moves with the estimate where a direction is turned to the truth's side.
-    const double shift = true_value + d - estimate.value;
-    if (estimate.low95 && estimate.high95)
-      p.covered = *estimate.low95 + shift <= true_value && true_value <= *estimate.high95 + shift;
+    const auto compare = [&](double with, std::optional<double>& z, std::optional<bool>& covered) {
+      const double d = difference(name, estimate.value, with);
+      if (estimate.std_error && *estimate.std_error > 0.0) z = d / *estimate.std_error;
+      // The interval moves with the estimate where a direction is turned to the truth's side.
+      const double shift = with + d - estimate.value;
+      if (estimate.low95 && estimate.high95)
+        covered = *estimate.low95 + shift <= with && with <= *estimate.high95 + shift;
+    };
+    compare(true_value, p.z, p.covered);
+    if (const auto nearest = truth.nearest.find(name); nearest != truth.nearest.end())
+      compare(nearest->second, p.z_nearest, p.covers_nearest);
     score.parameters.push_back(p);
   }
 }
@@ -154,6 +159,7 @@ OpenedTruth parse_truth(std::string_view text) {
       OpenedEffect effect{e.at("name"), e.value("kind", ""), e.at("visible_sigmas"), e.at("parameters"), {}};
       if (e.contains("per_recording") && e.at("per_recording").contains("at_s"))
         effect.at_s = e.at("per_recording").at("at_s").get<std::vector<double>>();
+      if (e.contains("nearest")) effect.nearest = e.at("nearest").get<std::map<std::string, double>>();
       truth.effects.push_back(std::move(effect));
     }
     for (const json& rival : j.at("rivals")) truth.rivals.push_back(rival.at("name"));

@@ -15,7 +15,8 @@ struct OpenedEffect {
   std::string kind;
   double visible_sigmas = 0;
   std::map<std::string, double> parameters;
-  std::vector<double> at_s;  // a recording each, 0: not there
+  std::vector<double> at_s;                    // a recording each, 0: not there
+  std::map<std::string, double> nearest = {};  // parameters by which the plain form comes closest to the plant
 };
 struct OpenedTruth {
   int trial = 0;
@@ -44,6 +45,9 @@ struct ParameterScore {
   double value = 0;
   std::optional<double> z;      // (value - truth) / std_error
   std::optional<bool> covered;  // by ci95
+  // The same against what the plain form comes to on this plant without noise.
+  std::optional<double> z_nearest = {};
+  std::optional<bool> covers_nearest = {};
 };
 
 struct LocationScore {

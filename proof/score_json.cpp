@@ -11,7 +11,10 @@ using nlohmann::json;
 
 namespace {
 
-json optional_json(const std::optional<double>& value) { return value ? json(*value) : json(nullptr); }
+template <class T>
+json optional_json(const std::optional<T>& value) {
+  return value ? json(*value) : json(nullptr);
+}
 
 std::optional<double> optional_number(const json& j, const char* key) {
   return j.contains(key) && j.at(key).is_number() ? std::optional(j.at(key).get<double>()) : std::nullopt;
@@ -75,7 +78,9 @@ json as_json(const TrialScore& s) {
                                {"truth", p.truth},
                                {"value", p.value},
                                {"z", optional_json(p.z)},
-                               {"covered", p.covered ? json(*p.covered) : json(nullptr)}});
+                               {"covered", optional_json(p.covered)},
+                               {"z_nearest", optional_json(p.z_nearest)},
+                               {"covers_nearest", optional_json(p.covers_nearest)}});
   for (const LocationScore& l : s.locations)
     j["locations"].push_back({{"effect", l.effect}, {"error", l.error}, {"unit", l.in_seconds ? "s" : "mm"}});
   return j;
@@ -106,6 +111,8 @@ TrialScore trial_score_of(const json& j) {
   for (const json& p : j.at("parameters")) {
     ParameterScore score{p.at("effect"), p.at("parameter"), p.at("truth"), p.at("value"), optional_number(p, "z"), {}};
     if (p.at("covered").is_boolean()) score.covered = p.at("covered").get<bool>();
+    score.z_nearest = optional_number(p, "z_nearest");
+    if (p.at("covers_nearest").is_boolean()) score.covers_nearest = p.at("covers_nearest").get<bool>();
     s.parameters.push_back(std::move(score));
   }
   for (const json& l : j.at("locations")) s.locations.push_back({l.at("effect"), l.at("error"), l.at("unit") == "s"});
@@ -137,6 +144,9 @@ json as_json(const Tally& t) {
           {"confusion", t.confusion},
           {"z_scores", {{"count", t.z.size()}, {"mean", t.z_mean}, {"spread", t.z_spread}, {"values", t.z}}},
           {"coverage95", share_json(t.covered)},
+          {"z_scores_of_nearest",
+           {{"count", t.z_nearest.size()}, {"mean", t.z_nearest_mean}, {"spread", t.z_nearest_spread}}},
+          {"coverage95_of_nearest", share_json(t.covers_nearest)},
           {"located_within_0.2_s_or_3_mm", share_json(t.located)},
           {"location_errors_s", t.location_errors_s},
           {"location_errors_mm", t.location_errors_mm},

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <tuple>
 
 namespace bevel::proof {
 namespace {
@@ -66,11 +67,20 @@ void note_parameters(const TrialScore& score, Tally& tally) {
   for (const ParameterScore& p : score.parameters) {
     if (p.z) tally.z.push_back(*p.z);
     if (p.covered) tally.covered.add(*p.covered);
+    if (p.z_nearest) tally.z_nearest.push_back(*p.z_nearest);
+    if (p.covers_nearest) tally.covers_nearest.add(*p.covers_nearest);
   }
   for (const LocationScore& location : score.locations) {
     (location.in_seconds ? tally.location_errors_s : tally.location_errors_mm).push_back(location.error);
     tally.located.add(location.error <= (location.in_seconds ? 0.2 : 3.0));
   }
+}
+
+std::pair<double, double> mean_and_spread(const std::vector<double>& values) {
+  double mean = 0, squares = 0;
+  for (const double value : values) mean += value / static_cast<double>(values.size());
+  for (const double value : values) squares += (value - mean) * (value - mean);
+  return {mean, values.size() > 1 ? std::sqrt(squares / static_cast<double>(values.size() - 1)) : 0.0};
 }
 
 }  // namespace
@@ -94,10 +104,8 @@ Tally tally(const std::vector<TrialScore>& scores) {
     note_parameters(score, t);
   }
   if (t.trials > 0) t.mean_probability_of_truth /= t.trials;
-  for (const double z : t.z) t.z_mean += z / static_cast<double>(t.z.size());
-  double squares = 0;
-  for (const double z : t.z) squares += (z - t.z_mean) * (z - t.z_mean);
-  if (t.z.size() > 1) t.z_spread = std::sqrt(squares / static_cast<double>(t.z.size() - 1));
+  std::tie(t.z_mean, t.z_spread) = mean_and_spread(t.z);
+  std::tie(t.z_nearest_mean, t.z_nearest_spread) = mean_and_spread(t.z_nearest);
   std::ranges::sort(t.seconds);
   return t;
 }

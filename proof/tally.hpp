@@ -33,6 +33,10 @@ struct Tally {
   double z_mean = 0;
   double z_spread = 0;
   Share covered;
+  std::vector<double> z_nearest;  // against what the plain forms come to on the plant without noise
+  double z_nearest_mean = 0;
+  double z_nearest_spread = 0;
+  Share covers_nearest;
   std::vector<double> location_errors_s, location_errors_mm;
   Share located;  // within 0.2 s or 3 mm
   std::vector<double> chi2_before, chi2_after;

@@ -6,6 +6,7 @@
 #include <numbers>
 #include <set>
 
+#include "model/needle.hpp"
 #include "proof/beam_path.hpp"
 #include "proof/distribution.hpp"
 
@@ -28,6 +29,14 @@ BaseNeedle mistaken(const BaseNeedle& needle, Random& random) {
   // (26), with room for what a file keeps of the digits
   const double least = believed.lambda2 * believed.lambda2 / (2.0 * std::numbers::pi) + 0.002;
   believed.lambda1_per_rad = std::max(believed.lambda1_per_rad, least);
+  // No lab has a model file that its own programs refuse, as they would that of the bicycle closest to some beams.
+  while (model::find_domain_violation({.curvature_per_mm = believed.curvature_per_mm,
+                                       .wheelbase_mm = believed.wheelbase_mm,
+                                       .lambda1_per_rad = believed.lambda1_per_rad,
+                                       .lambda2 = believed.lambda2})) {
+    believed.lambda1_per_rad *= 0.9;
+    believed.lambda2 *= 0.9;
+  }
   return believed;
 }
 
@@ -117,6 +126,17 @@ void limit_ripple(Truth& truth, Setting& setting) {
   truth.ripple = setting.ripple;
 }
 
+void state_nearest(Truth& truth, const Setting& setting, const Views& seen) {
+  std::vector<ConcealedEffect> effects;
+  std::vector<TruthEntry*> entries;
+  for (TruthEntry& entry : truth.entries)
+    if (entry.effect.kind.empty() && entry.visible_sigmas >= kVisible_sigmas)
+      effects.push_back(entry.effect), entries.push_back(&entry);
+  if (effects.empty()) return;
+  const auto nearest = nearest_plain(setting, seen, truth.needle, effects);
+  for (std::size_t i = 0; i < entries.size(); ++i) entries[i]->nearest = nearest[i];
+}
+
 // Kinematic plant: sizes, departure, visibility. Returns what the cameras see.
 Views conceal_in_kinematics(Truth& truth, Setting& setting, Random& random) {
   auto effects = draw_effects(truth.trial_class, random, setting.motions);
@@ -140,6 +160,7 @@ Views conceal_in_kinematics(Truth& truth, Setting& setting, Random& random) {
     truth.entries.push_back({effects[i], refit.sigmas});
   }
   if (!effects.empty()) truth.visible_sigmas = refit_base(setting, seen, truth.needle, {}).sigmas;
+  state_nearest(truth, setting, seen);
   return seen;
 }
 

@@ -1,6 +1,7 @@
 #pragma once
 // One trial as drawn from the published distribution: what is concealed, what the camera saw, what the lab believes.
 #include <cstdint>
+#include <map>
 #include <optional>
 #include <string>
 
@@ -18,6 +19,8 @@ inline constexpr double kVisible_sigmas = 5.0;
 struct TruthEntry {
   ConcealedEffect effect;
   double visible_sigmas = 0;  // of this effect, the others given
+  // Of a visible listed effect: the parameters by which the plain forms of all such come closest to this plant.
+  std::map<std::string, double> nearest = {};
 };
 
 struct Truth {

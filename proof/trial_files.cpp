@@ -120,6 +120,7 @@ json as_json(const DriveRipple& r) {
 json as_json(const TruthEntry& entry) {
   json j{
       {"name", entry.effect.name}, {"parameters", entry.effect.parameters}, {"visible_sigmas", entry.visible_sigmas}};
+  if (!entry.nearest.empty()) j["nearest"] = entry.nearest;
   if (!entry.effect.kind.empty()) j["kind"] = entry.effect.kind;
   if (!entry.effect.per_recording.empty()) j["per_recording"] = entry.effect.per_recording;
   return j;

@@ -118,6 +118,42 @@ std::vector<Rival> find_rivals(const Setting& setting, const Views& seen, const 
   return rivals;
 }
 
+std::vector<std::map<std::string, double>> nearest_plain(const Setting& setting, const Views& seen,
+                                                         const BaseNeedle& start,
+                                                         const std::vector<ConcealedEffect>& effects) {
+  Setting smooth = setting;
+  smooth.ripple = {};
+  std::vector<ConcealedEffect> moved = effects;
+  std::vector<double*> slots;
+  for (ConcealedEffect& effect : moved)
+    for (auto& [name, value] : effect.parameters) slots.push_back(&value);
+  const auto own = static_cast<Eigen::Index>(slots.size());
+  const auto set = [&](const Eigen::VectorXd& x) {
+    for (Eigen::Index j = 0; j < own; ++j) *slots[static_cast<std::size_t>(j)] = x(3 + j);
+  };
+  BoundedProblem problem{[&](const Eigen::VectorXd& x) {
+                           set(x);
+                           return misfit(smooth, seen, needle_at(x.head<3>(), start), physics_of(moved, 0.0));
+                         },
+                         Eigen::VectorXd(3 + own), Eigen::VectorXd(3 + own), Eigen::VectorXd(3 + own)};
+  problem.lowest.head<3>() = kLowest;
+  problem.highest.head<3>() = kHighest;
+  problem.probe.head<3>() = Point(kProbe.data());
+  Eigen::VectorXd from(3 + own);
+  from.head<3>() = point_of(start);
+  for (Eigen::Index j = 0; j < own; ++j) {
+    const double value = *slots[static_cast<std::size_t>(j)];
+    from(3 + j) = value;
+    problem.lowest(3 + j) = value - 0.5 * std::abs(value);
+    problem.highest(3 + j) = value + 0.5 * std::abs(value);
+    problem.probe(3 + j) = 2e-3 * std::abs(value) + 1e-9;
+  }
+  set(fit_in_box(problem, from, 15, std::numeric_limits<double>::infinity()).point);
+  std::vector<std::map<std::string, double>> nearest;
+  for (const ConcealedEffect& effect : moved) nearest.push_back(effect.parameters);
+  return nearest;
+}
+
 BaseTangent::BaseTangent(const Setting& setting, const BaseNeedle& needle, const HiddenPhysics& physics) {
   const Views here = views_of(setting, needle, physics);
   for (std::size_t j = 0; j < kFree.size(); ++j) {

@@ -3,6 +3,7 @@
 // cannot absorb, in standard deviations of the coloured noise, summed over a trial (the root of the sum of squares of
 // the whitened difference).
 #include <Eigen/Core>
+#include <map>
 #include <string>
 #include <vector>
 
@@ -39,6 +40,12 @@ struct Rival {
   double sigmas;
 };
 std::vector<Rival> find_rivals(const Setting& setting, const Views& seen, const BaseNeedle& start, double limit_sigmas);
+
+// Parameters, effect by effect, at which the plain forms of `effects` come closest to `seen`, k, lambda1 and lambda2
+// refitted along: what an estimate by the plain form would come to without noise.
+std::vector<std::map<std::string, double>> nearest_plain(const Setting& setting, const Views& seen,
+                                                         const BaseNeedle& start,
+                                                         const std::vector<ConcealedEffect>& effects);
 
 // Part of a whitened difference that no small change of k, lambda1, lambda2 makes.
 class BaseTangent {

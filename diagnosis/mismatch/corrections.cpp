@@ -75,7 +75,7 @@ class CorrectionEffect final : public model::Effect {
     if (info_.component == Component::curvature_bevel) kappa_per_mm[0] += line(p, covariate_of(leg, memory));
     if (info_.component == Component::curvature_across) kappa_per_mm[1] += line(p, covariate_of(leg, memory));
   }
-  void settle(Parameters p, const LegView& leg, const Dual2& /*kappa*/, EffectMemory& memory) const override {
+  void settle(Parameters p, const LegView& leg, EffectMemory& memory) const override {
     if (info_.component == Component::drift_bevel || info_.component == Component::drift_across) {
       const Dual drift = line(p, covariate_of(leg, memory)) * leg.insertion_mm;
       // Toward the bevel is body -y for k > 0.

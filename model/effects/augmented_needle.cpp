@@ -124,6 +124,7 @@ bool AugmentedNeedle::advance_with_effects(AugmentedState& state, const BaseMoti
     leg.heading_z.slope =
         (state.pose.R(2, 0) * leg.R_body.row(1) - state.pose.R(2, 1) * leg.R_body.row(0)).transpose().array();
   }
+  leg.curvature_per_mm = Dual::unknown(needle_.curvature_per_mm, needle_columns_.curvature);
   leg.tip_rotation_rad = state.tip_rotation_rad;
 
   Dual insertion_mm(to.insertion_mm);
@@ -132,7 +133,7 @@ bool AugmentedNeedle::advance_with_effects(AugmentedState& state, const BaseMoti
     effects_[i].effect->axes(parameters(effects_[i]), leg, memory[i], insertion_mm, rotation_rad);
   leg.insertion_mm = insertion_mm - state.tip_insertion_mm;
   leg.rotation_rad = rotation_rad - state.tip_rotation_rad;
-  Dual2 kappa = {Dual::unknown(needle_.curvature_per_mm, needle_columns_.curvature), Dual()};
+  Dual2 kappa = {leg.curvature_per_mm, Dual()};
   for (std::size_t i = 0; i < effects_.size(); ++i)
     effects_[i].effect->curvature(parameters(effects_[i]), leg, memory[i], kappa);
 
@@ -147,8 +148,7 @@ bool AugmentedNeedle::advance_with_effects(AugmentedState& state, const BaseMoti
     inputs.row(3) = kappa[1].slope.head(columns_).matrix().transpose();
     state.D.noalias() += J.input.lazyProduct(inputs);
   }
-  for (std::size_t i = 0; i < effects_.size(); ++i)
-    effects_[i].effect->settle(parameters(effects_[i]), leg, kappa, memory[i]);
+  for (std::size_t i = 0; i < effects_.size(); ++i) effects_[i].effect->settle(parameters(effects_[i]), leg, memory[i]);
   state.base = to;
   state.tip_insertion_mm = insertion_mm;
   state.tip_rotation_rad = rotation_rad;

@@ -35,6 +35,7 @@ struct EffectParameter {
   bool periodic = false;   // an angle: the bounds are one period apart
   int half_turns = -1;     // periodic: the angle that has to turn by half of its own period when this one turns by one
   bool frequency = false;  // in Hz: readings too far apart do not show it
+  double usual = std::numeric_limits<double>::quiet_NaN();  // where a model file does not say; NaN: it has to
 };
 // Starts from first to last, evenly: as close as the effect is narrow, or a fit never finds it.
 std::vector<double> starts_every(double step, double first, double last);
@@ -64,6 +65,7 @@ struct LegView {
   Dual heading_z;              // cosine of the tilt there
   Eigen::Matrix3d R;           // orientation of {B} at the start, and its derivatives as body rotations:
   Eigen::Matrix<double, 3, kMaxColumns> R_body;  // d(rotation vector in {B})/d(column)
+  Dual curvature_per_mm;                         // the needle's own k, whatever effects make of it
   // Known from `axes` on:
   Dual insertion_mm, rotation_rad;  // increments of the tip
   Dual tip_rotation_rad;            // of the tip at the start of the leg
@@ -113,7 +115,7 @@ class Effect {
   // Curvature in {B} over the leg; comes in as (k, 0).
   virtual void curvature(Parameters, const LegView&, EffectMemory&, Dual2& /*kappa_per_mm*/) const {}
   // After the leg has been integrated: memory that an offset needs. leg.R is still that of its start.
-  virtual void settle(Parameters, const LegView&, const Dual2& /*kappa_per_mm*/, EffectMemory&) const {}
+  virtual void settle(Parameters, const LegView&, EffectMemory&) const {}
   // Moves the point that the cameras see, in {A}.
   virtual void offset(Parameters, const EffectMemory&, double /*time_s*/, Dual3& /*position_mm*/) const {}
   // What the cameras make of the point.

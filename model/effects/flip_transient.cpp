@@ -4,8 +4,9 @@ namespace bevel::model {
 namespace {
 
 // The tissue holds the needle to its old curve for a while: the curvature vector, in the roll frame of the tissue,
-// follows the bevel over a length, dK/ds = (K_bevel - K) / length. Solved exactly over a leg for the bevel's mean
-// direction. The memory is K / |K_bevel|, so that it does not depend on k; it holds while the needle is drawn back.
+// follows the bevel over a length, dK/ds = (K_bevel - K) / length. K_bevel has the size that speed, depth and drilling
+// leave to k: that is followed over the length too. Solved exactly over a leg for the bevel's mean direction. The
+// memory is K / k with the needle's own k, so that it does not depend on k; it holds while the needle is drawn back.
 class FlipTransient final : public Effect {
  public:
   FlipTransient()
@@ -15,8 +16,11 @@ class FlipTransient final : public Effect {
                 .parameters = {{.name = "length_mm", .lower = 0, .upper = 60, .none = 0, .starts = {4, 10}}}}) {}
 
   void curvature(Parameters p, const LegView& leg, EffectMemory& memory, Dual2& kappa_per_mm) const override {
+    const Dual& k = leg.curvature_per_mm;
+    if (k.value == 0) return;  // nothing bends
     const Dual roll = leg.tip_rotation_rad + 0.5 * leg.rotation_rad;
-    const Dual2 bevel = {cos(roll), sin(roll)};
+    const Dual size = kappa_per_mm[0] / k;
+    const Dual2 bevel = {size * cos(roll), size * sin(roll)};
     Dual2 K = {memory.slot[0], memory.slot[1]};
     if (memory.phase == 0) K = {cos(leg.tip_rotation_rad), sin(leg.tip_rotation_rad)};
     memory.phase = 1;
@@ -36,7 +40,6 @@ class FlipTransient final : public Effect {
     memory.slot = {K[0], K[1], Dual()};
     // The needle's own curvature is along body x: the mean direction takes its place.
     const Dual2 in_body = turned(mean, -roll);
-    const Dual k = kappa_per_mm[0];
     kappa_per_mm = {k * in_body[0], kappa_per_mm[1] + k * in_body[1]};
   }
 

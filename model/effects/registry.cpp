@@ -14,17 +14,17 @@
   EFFECT(insertion_backlash)  \
   EFFECT(insertion_scale)     \
   EFFECT(puncture)            \
-  EFFECT(flip_transient)      \
   EFFECT(rate_dependence)     \
   EFFECT(layer)               \
   EFFECT(depth_dependence)    \
   EFFECT(drilling)            \
+  EFFECT(flip_transient)      \
   EFFECT(lateral_bias)        \
   EFFECT(relaxation)          \
   EFFECT(tissue_motion)       \
+  EFFECT(refraction)          \
   EFFECT(camera_rotation)     \
   EFFECT(camera_scale)        \
-  EFFECT(refraction)          \
   EFFECT(camera_latency)
 
 namespace bevel::model {

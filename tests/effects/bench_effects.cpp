@@ -8,7 +8,7 @@ namespace {
 
 AugmentedNeedle make_needle(int columns, int effects) {
   std::vector<ActiveEffect> all{active("torsional_windup", {0.5}), active("drilling", {1.5}),
-                                active("relaxation", {1.0, 2.0})};
+                                active("relaxation", {1.0, 2.0, 5})};
   all.resize(static_cast<std::size_t>(effects));
   int column = 4;
   for (auto& one : all)

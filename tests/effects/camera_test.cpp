@@ -36,13 +36,13 @@ TEST(Refraction, IsCubicAboutItsCentre) {
   EXPECT_LT((seen(effect, {7, 0, 40}) - Vector3d(7, 0, 40)).norm(), 1e-12);
 }
 
-TEST(Cameras, ActInTheOrderOfTheRegistry) {  // the frame is turned, then its scale, then the window
+TEST(Cameras, ActInTheOrderOfTheRegistry) {  // the window bends the light, then the camera is turned, then its scale
   const AugmentedNeedle needle(
       agar(), {active("refraction", {0.03, 40}), active("camera_scale", {1.04}), active("camera_rotation", {0.03})});
   TipReading reading{Vector3d(7, -5, 60), PointColumns(3, 0)};
   needle.through_cameras(reading);
-  Vector3d by_hand = seen(active("camera_rotation", {0.03}), {7, -5, 60});
-  by_hand = seen(active("refraction", {0.03, 40}), seen(active("camera_scale", {1.04}), by_hand));
+  Vector3d by_hand = seen(active("refraction", {0.03, 40}), {7, -5, 60});
+  by_hand = seen(active("camera_scale", {1.04}), seen(active("camera_rotation", {0.03}), by_hand));
   EXPECT_EQ(reading.position_mm, by_hand);
 }
 

@@ -13,10 +13,10 @@ namespace {
 using Eigen::Vector2d;
 using Eigen::Vector3d;
 
-constexpr double kBuild_mm = 5;  // as in model/effects/relaxation.cpp: the offset builds over it
+constexpr double kBuild_mm = 4;
 
 TEST(Relaxation, BuildsWhileCuttingAndDecaysAtRest) {
-  const auto effect = active("relaxation", {1.2, 2.5});
+  const auto effect = active("relaxation", {1.2, 2.5, kBuild_mm});
   const Script script{{2, 15, 0}, {6, 0, 0}};
   const Motion motion = script.recorded();
   const auto path = path_of(bicycle(), {effect}, motion);
@@ -42,13 +42,13 @@ TEST(Relaxation, FollowsTheBevelAndStaysInTheWorldAtRest) {
     const Vector2d side = (now.R * Vector3d(0, -1, 0)).head<2>();  // where a needle with k > 0 bends
     if (now.ds_mm > 0)
       offset += (1.2 * side - offset) * now.ds_mm / kBuild_mm;
-    else
+    else if (now.ds_mm == 0)  // it is held while the needle is drawn back
       offset -= offset * now.step_s / 2.5;
     seen->push_back(offset);
   };
   const Motion motion = script.fine();
   const auto nominal = brute.path(script, motion);
-  const auto path = path_of(agar(), {active("relaxation", {1.2, 2.5})}, motion);
+  const auto path = path_of(agar(), {active("relaxation", {1.2, 2.5, kBuild_mm})}, motion);
   const std::size_t steps = (seen->size()) / (motion.nodes.size() - 1);
   for (std::size_t i = 1; i < path.size(); ++i) {
     const Vector2d offset = seen->at(motion.at[i] * steps - 1);

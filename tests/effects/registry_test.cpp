@@ -26,7 +26,7 @@ std::vector<double> shown(const Effect& effect) {
                                                                      {"depth_dependence", {0.5}},
                                                                      {"drilling", {1.7}},
                                                                      {"lateral_bias", {0.0007, -0.0011}},
-                                                                     {"relaxation", {1.1, 2.2}},
+                                                                     {"relaxation", {1.1, 2.2, 4.3}},
                                                                      {"tissue_motion", {1.2, 0.27, 0.9, 2.0}},
                                                                      {"camera_rotation", {0.03}},
                                                                      {"camera_scale", {1.03}},

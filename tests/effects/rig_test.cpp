@@ -28,7 +28,7 @@ std::vector<std::vector<ActiveEffect>> all_pairs_of_interest() {
           {active("puncture", {21.7, 2.3}), active("depth_dependence", {0.5})},
           {active("lost_steps", {0.8, 0, 3.3}), active("rate_dependence", {0.2})},
           {active("entry_angle", {0.05, -0.03}), active("slip_direction", {})},
-          {active("bevel_offset", {0.3}), active("relaxation", {1.1, 2.2})},
+          {active("bevel_offset", {0.3}), active("relaxation", {1.1, 2.2, 5})},
           {active("tissue_motion", {1.2, 0.27, 0.9, 2.0})}};
 }
 

@@ -82,8 +82,8 @@ replay::ChiSquareMean innovations(const EstimatorConfig& config, const testing::
 
 TEST(EstimatorEffects, InnovationsAreInTheirBandWithTheEffectAndNotWithout) {
   const std::vector<model::ActiveEffect> effects = {
-      effect("torsional_windup", {0.6}), effect("camera_latency", {0.08}), effect("insertion_scale", {1.03}),
-      effect("relaxation", {1.0, 0.8}),  effect("flip_transient", {10.0}), effect("camera_scale", {1.03}),
+      effect("torsional_windup", {0.6}),     effect("camera_latency", {0.08}), effect("insertion_scale", {1.03}),
+      effect("relaxation", {1.0, 0.8, 5.0}), effect("flip_transient", {10.0}), effect("camera_scale", {1.03}),
   };
   for (const auto& one : effects) {
     ASSERT_NE(one.effect, nullptr);
