@@ -54,9 +54,9 @@ struct EstimatorConfig {
   // each 15 mm, or an eighth of the way so far; the whole costs some 5 us a step each time. 0: never.
   // With effects, whose memory cannot be walked back, always 0.
   int relinearised_steps = 2048;
-  // Steps of up to 0.5 mm and 0.05 rad, all that actuators take at their rate, move the covariance by derivatives of the
-  // midpoint rule, off by less than a thousandth of what the step does. False: by those of the step itself, as longer
-  // ones, at 1.2 times the time. The path is the same.
+  // Steps of up to 0.5 mm and 0.05 rad, all that actuators take at their rate, move the covariance by derivatives of
+  // the midpoint rule, off by less than a thousandth of what the step does. False: by those of the step itself, as
+  // longer ones, at 1.2 times the time. The path is the same.
   bool midpoint_derivatives = true;
 };
 

@@ -6,43 +6,48 @@
 
 namespace bevel::estimator {
 
-// By blocks and row by row, products written out: Eigen's general product would pack these small operands for its
-// blocked kernel, which takes several times as long as the arithmetic. Phi keeps its lower left block of zeros.
+// In products of pairs of numbers: Eigen's general product would pack these small operands for its blocked kernel, and
+// its lazy ones wait for what was just written in other widths; either takes more than twice as long as the arithmetic.
+// Phi's lower left block of zeros is left out; one triangle is mirrored, so that P stays symmetric to the last bit.
 template <int kSize>
 void propagate(Eigen::Matrix<double, kSize, kSize>& P, const model::Matrix6d& Phi,
                const Eigen::Matrix<double, 6, kSize - 6>& G) {
   constexpr int kParameters = kSize - 6;
-  using Rows3x6 = Eigen::Matrix<double, 3, 6, Eigen::RowMajor>;
-  using Rows6x6 = Eigen::Matrix<double, 6, 6, Eigen::RowMajor>;
-  using Rows6xN = Eigen::Matrix<double, 6, kParameters, Eigen::RowMajor>;
-  using RowsNx6 = Eigen::Matrix<double, kParameters, 6, Eigen::RowMajor>;
-  const Eigen::Matrix3d R = Phi.topLeftCorner<3, 3>();
-  const Eigen::Matrix3d X = Phi.topRightCorner<3, 3>();
-  const Eigen::Matrix3d Y = Phi.bottomRightCorner<3, 3>();
-  const Rows3x6 top = P.template topLeftCorner<3, 6>();
-  const Rows3x6 bottom = P.template block<3, 6>(3, 0);
-  const RowsNx6 by_parameters = P.template bottomLeftCorner<kParameters, 6>();
-  const Rows6xN cross = P.template topRightCorner<6, kParameters>();
+  using Pair = Eigen::Array2d;
+  constexpr int kPairs = 5;  // of a row, the last half empty for nine
+  Eigen::Array<double, 2 * kPairs, kSize> rows;
+  rows.template topRows<kSize>() = P.array();  // symmetric: its columns are its rows
+  if constexpr (kSize % 2) rows.template bottomRows<1>().setZero();
+  const auto pair = [](const double* at) -> Pair { return Eigen::Map<const Pair, Eigen::Aligned16>(at); };
 
-  Rows6x6 FP;  // rows of F P that belong to the pose: its columns of the pose, then those of the parameters
-  FP.noalias() = G.lazyProduct(by_parameters);
-  FP.template topRows<3>().noalias() += R.lazyProduct(top);
-  FP.template topRows<3>().noalias() += X.lazyProduct(bottom);
-  FP.template bottomRows<3>().noalias() += Y.lazyProduct(bottom);
-  Rows6xN moved;
-  moved.noalias() = G.lazyProduct(P.template bottomRightCorner<kParameters, kParameters>());
-  moved.template topRows<3>().noalias() += R.lazyProduct(cross.template topRows<3>());
-  moved.template topRows<3>().noalias() += X.lazyProduct(cross.template bottomRows<3>());
-  moved.template bottomRows<3>().noalias() += Y.lazyProduct(cross.template bottomRows<3>());
-
-  const Rows6x6 Phi_t = Phi.transpose();
-  const RowsNx6 G_t = G.transpose();
-  Rows6x6 pose;
-  pose.noalias() = FP.lazyProduct(Phi_t);
-  pose.noalias() += moved.lazyProduct(G_t);
-  P.template topLeftCorner<6, 6>() = 0.5 * (pose + pose.transpose());
-  P.template topRightCorner<6, kParameters>() = moved;
-  P.template bottomLeftCorner<kParameters, 6>() = moved.transpose();
+  // The first six rows of F P.
+  Eigen::Array<double, 2 * kPairs, 6> FP;
+  for (int i = 0; i < 6; ++i) {
+    for (int c = 0; c < kPairs; ++c) {
+      const double* column = rows.data() + 2 * c;
+      Pair sum = G(i, 0) * pair(column + 6 * 2 * kPairs);
+      for (int j = 1; j < kParameters; ++j) sum += G(i, j) * pair(column + (6 + j) * 2 * kPairs);
+      for (int j = 3; j < 6; ++j) sum += Phi(i, j) * pair(column + j * 2 * kPairs);
+      if (i < 3)
+        for (int j = 0; j < 3; ++j) sum += Phi(i, j) * pair(column + j * 2 * kPairs);
+      Eigen::Map<Pair, Eigen::Aligned16>(FP.data() + i * 2 * kPairs + 2 * c) = sum;
+    }
+  }
+  // Times the transpose, by pairs of columns.
+  for (int i = 0; i < 6; ++i) {
+    const double* row = FP.data() + i * 2 * kPairs;
+    for (int c = i / 2; c < 3; ++c) {
+      const auto column = [&](int j) -> Pair { return pair(Phi.data() + 6 * j + 2 * c); };
+      Pair sum = row[3] * column(3);
+      for (int j = 4; j < 6; ++j) sum += row[j] * column(j);
+      for (int j = 0; j < kParameters; ++j) sum += row[6 + j] * pair(G.data() + 6 * j + 2 * c);
+      if (c < 2)
+        for (int j = 0; j < 3; ++j) sum += row[j] * column(j);
+      P(2 * c, i) = P(i, 2 * c) = sum[0];
+      P(2 * c + 1, i) = P(i, 2 * c + 1) = sum[1];
+    }
+    for (int c = 6; c < kSize; ++c) P(c, i) = P(i, c) = row[c];
+  }
 }
 
 }  // namespace bevel::estimator

@@ -146,8 +146,11 @@ BEVEL_IN_PLACE Pose exponential(const Vector6d& twist) {
   const double t2 = w.squaredNorm();
   const AngleFunctions f = angle_functions(t2);
   Pose pose;
-  pose.R = (f.b * w) * w.transpose() + f.a * hat(w);
-  pose.R.diagonal().array() += 1 - f.b * t2;
+  const double x = f.b * w.x(), y = f.b * w.y(), z = f.b * w.z();
+  const double xy = x * w.y(), xz = x * w.z(), yz = y * w.z();
+  const Vector3d a = f.a * w;
+  pose.R << 1 - y * w.y() - z * w.z(), xy - a.z(), xz + a.y(), xy + a.z(), 1 - x * w.x() - z * w.z(), yz - a.x(),
+      xz - a.y(), yz + a.x(), 1 - x * w.x() - y * w.y();
   const Vector3d wxv = w.cross(v);
   pose.p_mm = v + f.b * wxv + f.c * w.cross(wxv);
   return pose;

@@ -145,8 +145,13 @@ Replay replay_log(std::span<const std::uint8_t> log, const std::string& name, co
       estimator.add(actuator);
       const estimator::Estimate estimate = estimator.estimate(actuator.utime);
       if (estimate.utime != actuator.utime) continue;
-      result.states.push_back({actuator.utime, actuator.insertion_mm, actuator.rotation_rad, estimate.state,
-                               estimate.newest_update.test_ratio, estimate.health});
+      StateRow& row = result.states.emplace_back();
+      row.utime = actuator.utime;
+      row.insertion_mm = actuator.insertion_mm;
+      row.rotation_rad = actuator.rotation_rad;
+      row.state = estimate.state;
+      row.test_ratio = estimate.newest_update.test_ratio;
+      row.health = estimate.health;
     } else if (event->channel == io::channel::kTipMeasurement) {
       const auto message = io::checked_decode<tip_measurement_t>(event->data.data(), event->data.size());
       if (!message) {
