@@ -290,6 +290,10 @@ void conclude(Selection& selection, const Fit& base, const EffectSet& set, Findi
     }
     FoundEffect found = find_effect_of(selection, set, m, threads);
     found.ambiguous_with = rivals_of(selection, set, m, findings);
+    if (found.gain < found.threshold)
+      findings.remarks.push_back(found.name +
+                                 " is not certain by itself: that something is missing is shown by a nameless curve, "
+                                 "which it explains nearly as well");
     findings.effects.push_back(std::move(found));
   }
   const Remains remains = examine_remains(selection.evidence(), *fit);

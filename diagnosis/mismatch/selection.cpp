@@ -245,6 +245,14 @@ bool Selection::give_up_names(EffectSet& set) {
   const Trial& rest = best_correction(set);
   if (!rest.fit || !rest.passes()) return false;
   if (!set.empty() && examine_remains(evidence_, *fit_of(set)).structure_sigmas < kStructureSigmas) return false;
+  // That something is missing is settled by this curve. A name that explains nearly as much is the better guess at
+  // what, even where it would not have been enough by itself.
+  if (static_cast<int>(set.size()) < rules_.largest_set && corrections == 0)
+    for (const Trial& named : additions(set))
+      if (named.gain > kVisibleSigmas * kVisibleSigmas && named.evidence > rest.evidence - kNamelessMargin) {
+        set = named.set;
+        return true;
+      }
   set = rest.set;
   return true;
 }
