@@ -126,9 +126,10 @@ def predict(q, lost_at_s, phase_rad, ell, bevel_plane, sign, base_s, insertion_m
         if q[FLIP] > 1e-6:
             middle = roll_tip + 0.5 * dr
             c, z = math.cos(middle), math.sin(middle)
+            size = k / q[K] if q[K] != 0 else 1.0  # speed, depth and drilling act on what is followed
             left = math.exp(-max(ds, 0.0) / q[FLIP])
-            tissue_x, tissue_y = c + (tissue_x - c) * left, z + (tissue_y - z) * left
-            kx, ky = k * (c * tissue_x + z * tissue_y), k * (c * tissue_y - z * tissue_x)
+            tissue_x, tissue_y = size * c + (tissue_x - size * c) * left, size * z + (tissue_y - size * z) * left
+            kx, ky = q[K] * (c * tissue_x + z * tissue_y), q[K] * (c * tissue_y - z * tissue_x)
         # World curvature (-y, x, 0), in the body.
         bx, by = -q[BIAS_Y], q[BIAS_X]
         kx += R[0, 0] * bx + R[1, 0] * by
