@@ -48,7 +48,7 @@ TEST(HeldOut, OfTwoLogsEachStartsWhereTheOtherEnded) {
   const auto configs = held_out_configs(replays, 0.3);
   ASSERT_EQ(configs.size(), 2U);
   for (const std::size_t own : {0U, 1U}) {
-    const estimator::FilterState& other = replays[1 - own].states.back().state;
+    const estimator::FilterState other = replays[1 - own].states.back().state.unpacked();
     const estimator::Prior& prior = configs[own].prior;
     EXPECT_NEAR(prior.needle.curvature_per_mm, other.curvature_per_mm, 1e-9);
     EXPECT_NEAR(prior.needle.lambda1_per_rad, other.lambda1_per_rad, 1e-6);

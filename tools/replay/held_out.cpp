@@ -26,7 +26,7 @@ Vector3d widths_of(const estimator::Prior& prior) {
 Learned learned_by(const Replay& replay) {
   Learned learned;
   if (replay.states.empty()) return learned;
-  const estimator::FilterState& last = replay.states.back().state;
+  const estimator::FilterState last = replay.states.back().state.unpacked();
   const Vector3d sd = widths_of(replay.config.prior);
   const Vector3d moved =
       Vector3d(last.curvature_per_mm, last.lambda1_per_rad, last.lambda2) - parameters_of(replay.config.prior.needle);

@@ -70,12 +70,12 @@ void compare(Replay& result, const std::vector<needle_state_t>& truths, const es
     const auto after = std::lower_bound(result.states.begin(), result.states.end(), truth.utime,
                                         [](const StateRow& row, std::int64_t utime) { return row.utime < utime; });
     if (after == result.states.end() || (after == result.states.begin() && after->utime != truth.utime)) continue;
-    estimator::FilterState state = after->state;
+    const auto row = static_cast<std::size_t>(after - result.states.begin());
+    estimator::FilterState state = filter_state(result, after->utime == truth.utime ? row : row - 1);
     if (after->utime != truth.utime) {
       const StateRow& before = *(after - 1);
       const double share =
           static_cast<double>(truth.utime - before.utime) / static_cast<double>(after->utime - before.utime);
-      state = before.state;
       filter.predict(state, share * (after->insertion_mm - before.insertion_mm),
                      share * (after->rotation_rad - before.rotation_rad),
                      static_cast<double>(truth.utime - before.utime) * 1e-6);
@@ -118,6 +118,12 @@ Eigen::Vector2d axes_at(const Replay& replay, std::int64_t utime) {
 
 }  // namespace
 
+estimator::FilterState filter_state(const Replay& replay, std::size_t row) {
+  estimator::FilterState state = replay.states[row].state.unpacked();
+  if (!replay.effects.empty()) state.effects = replay.effects[row];
+  return state;
+}
+
 Replay replay_log(std::span<const std::uint8_t> log, const std::string& name, const estimator::EstimatorConfig& config,
                   const ReplayOptions& options) {
   Replay result;
@@ -150,6 +156,7 @@ Replay replay_log(std::span<const std::uint8_t> log, const std::string& name, co
       row.insertion_mm = actuator.insertion_mm;
       row.rotation_rad = actuator.rotation_rad;
       row.state = estimate.state;
+      if (!config.effects.empty()) result.effects.push_back(estimate.state.effects);
       row.test_ratio = estimate.newest_update.test_ratio;
       row.health = estimate.health;
     } else if (event->channel == io::channel::kTipMeasurement) {
@@ -197,7 +204,7 @@ Foretold foretell(const Replay& replay, double ahead_mm) {
       return row.accepted && row.utime > from->utime && axes_at(replay, row.utime)[0] >= from->insertion_mm + ahead_mm;
     });
     if (to == replay.innovations.end()) break;
-    estimator::FilterState state = from->state;
+    estimator::FilterState state = filter_state(replay, static_cast<std::size_t>(from - replay.states.begin()));
     Eigen::Vector2d axes(from->insertion_mm, from->rotation_rad);
     std::int64_t utime = from->utime;
     const auto seconds_to = [&utime](std::int64_t later) {

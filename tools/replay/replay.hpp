@@ -8,6 +8,7 @@
 #include "estimator/needle_estimator.hpp"
 #include "io/log_reader.hpp"
 #include "io/model_file.hpp"
+#include "tools/replay/kept_state.hpp"
 #include "tools/replay/statistics.hpp"
 
 namespace bevel::replay {
@@ -17,7 +18,7 @@ struct StateRow {
   std::int64_t utime = 0;
   double insertion_mm = 0;
   double rotation_rad = 0;
-  estimator::FilterState state;
+  KeptState state;
   double test_ratio = 0;
   std::int32_t health = 0;
 };
@@ -61,6 +62,7 @@ struct Foretold {
 struct Replay {
   std::string name;
   std::vector<StateRow> states;
+  std::vector<estimator::EffectState> effects;  // one for each of `states` where the model has effects, else empty
   std::vector<InnovationRow> innovations;
   estimator::Counters counters;
   std::int64_t refused_messages = 0;  // by the checked decode
@@ -73,6 +75,9 @@ struct Replay {
   Foretold next;   // one measurement ahead; both by replay_logs, if asked
   Foretold ahead;  // ReplayOptions::ahead_mm ahead
 };
+
+// The whole state of a row, as the filter can go on from it.
+estimator::FilterState filter_state(const Replay& replay, std::size_t row);
 
 struct ReplayOptions {
   std::size_t history = 64;

@@ -65,7 +65,7 @@ void write_csv(const Replay& replay, const std::string& stem) {
                  "x_sd_mm,y_sd_mm,z_sd_mm,tilt_x_sd_rad,tilt_y_sd_rad,roll_sd_rad,curvature_sd_per_mm,"
                  "lambda1_sd_per_rad,lambda2_sd,test_ratio,health,resets,wheelbase_mm,wheelbase_sd_mm");
   for (const StateRow& row : replay.states) {
-    const auto& s = row.state;
+    const estimator::FilterState s = row.state.unpacked();
     const Eigen::Quaterniond q(s.pose.R);
     const Eigen::Vector3d spread = position_sd_mm(s);
     states.row("%lld,%.6f,%.6f,%.6f,%.6f,%.6f,%.9f,%.9f,%.9f,%.9f,%.9g,%.9g,%.9g,", static_cast<long long>(row.utime),
@@ -113,7 +113,7 @@ void add_state_plots(io::HtmlReport& page, const Replay& replay) {
   for (const Eigen::Index i : {0, 1, 2}) {
     io::Plot plot = band_plot(
         replay, std::string(kAxisName[i]) + " (mm)", [i](const StateRow& r) { return r.state.pose.p_mm[i]; },
-        [i](const StateRow& r) { return position_sd_mm(r.state)[i]; });
+        [i](const StateRow& r) { return position_sd_mm(r.state.unpacked())[i]; });
     std::vector<double> t, p;
     const std::size_t thin = std::max<std::size_t>(1, replay.innovations.size() / 400);
     for (std::size_t k = 0; k < replay.innovations.size(); k += thin) {
@@ -127,18 +127,18 @@ void add_state_plots(io::HtmlReport& page, const Replay& replay) {
   }
   page.figure(band_plot(
                   replay, "k (1/mm)", [](const StateRow& r) { return r.state.curvature_per_mm; },
-                  [](const StateRow& r) { return sd(r.state, 6); }),
+                  [](const StateRow& r) { return sd(r.state.unpacked(), 6); }),
               "Curvature. A band as wide as the prior's says that the path so far does not show it.");
   page.figure(band_plot(
                   replay, "lambda1 (1/rad)", [](const StateRow& r) { return r.state.lambda1_per_rad; },
-                  [](const StateRow& r) { return sd(r.state, 7); }),
+                  [](const StateRow& r) { return sd(r.state.unpacked(), 7); }),
               "");
   page.figure(band_plot(
                   replay, "lambda2", [](const StateRow& r) { return r.state.lambda2; },
-                  [](const StateRow& r) { return sd(r.state, 8); }),
+                  [](const StateRow& r) { return sd(r.state.unpacked(), 8); }),
               "");
   page.figure(band_plot(
-                  replay, "roll sd (rad)", [](const StateRow& r) { return sd(r.state, 5); },
+                  replay, "roll sd (rad)", [](const StateRow& r) { return sd(r.state.unpacked(), 5); },
                   [](const StateRow&) { return 0.0; }),
               "Roll is never measured: this is what the filter admits not to know of it.");
 }
@@ -182,7 +182,7 @@ void print(std::ostream& out, const Replay& replay, double ahead_mm) {
   out << text_of("  prior        k %.6f +- %.6f, lambda1 %.4f +- %.4f, lambda2 %.4f +- %.4f\n",
                  prior.needle.curvature_per_mm, prior.curvature_sd_per_mm, prior.needle.lambda1_per_rad,
                  prior.lambda1_sd_per_rad, prior.needle.lambda2, prior.lambda2_sd);
-  const estimator::FilterState& last = replay.states.back().state;
+  const estimator::FilterState last = replay.states.back().state.unpacked();
   out << text_of("  k            %.6f +- %.6f /mm\n  lambda1      %.4f +- %.4f /rad\n  lambda2      %.4f +- %.4f\n",
                  last.curvature_per_mm, sd(last, 6), last.lambda1_per_rad, sd(last, 7), last.lambda2, sd(last, 8));
   if (prior.wheelbase_sd_mm > 0)
