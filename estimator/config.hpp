@@ -51,7 +51,8 @@ struct EstimatorConfig {
   // measurement (offset, camera, latency). None: the plain model, bit for bit.
   std::vector<model::ActiveEffect> effects;
   // Steps that are kept of what has left the history, to run again with better derivatives (NeedleFilter::relinearise)
-  // each 15 mm, or an eighth of the way so far; the whole costs some 5 us a step each time. 0: never.
+  // each 15 mm, or an eighth of the way so far; each time takes some 0.2 ms, more than two hundred ordinary
+  // steps. 0: never.
   // With effects, whose memory cannot be walked back, always 0.
   int relinearised_steps = 2048;
   // Steps of up to 0.5 mm and 0.05 rad, all that actuators take at their rate, move the covariance by derivatives of

@@ -51,7 +51,7 @@ TriedEffect tried_of(const Trial& trial, const EffectSet& beside) {
                   .gain = trial.gain,
                   .chance = trial.chance,
                   .threshold = trial.limit(),
-                  .evidence = trial.evidence,
+                  .evidence = trial.preference,
                   .parameters = {},
                   .passes = trial.passes()};
   const auto& parameters = member.effect->parameters();
@@ -199,7 +199,7 @@ std::vector<std::string> rivals_of(Selection& selection, const EffectSet& set, s
   const std::string mine(set[member].effect->name());
   for (const Trial& trial : selection.additions(without_member(set, member))) {
     const std::string other(trial.set.back().effect->name());
-    const double behind = selection.evidence_of(set) - trial.evidence;
+    const double behind = selection.preference_of(set) - trial.preference;
     const bool alike = confusion_between(findings, mine, other) > kSameSignature;
     if (other != mine && behind < (alike ? kCloseEvidence : kRivalEvidence)) names.insert(other);
   }

@@ -96,7 +96,9 @@ Remains examine_remains(const Evidence& evidence, const Fit& fit) {
   const double sd = std::sqrt(2 / count + 2 / std::max(count - dof, 1.0));
   out.band = {1 - kBandQuantile * sd, 1 + kBandQuantile * sd};
   out.structure_energy = energy - dof;
-  out.structure_sigmas = dof > 0 ? (energy - dof) / std::sqrt(2 * dof) : 0;
+  // The splines' energy varies by itself, and all of it together with the colour that the noise was found to have.
+  const double slow_sd = std::hypot(std::sqrt(2 * dof), evidence.noise.slow_error * dof);
+  out.structure_sigmas = dof > 0 ? (energy - dof) / slow_sd : 0;
   out.ljung_box_p = std::min(1.0, smallest_p * series_count);
   return out;
 }

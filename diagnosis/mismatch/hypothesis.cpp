@@ -10,6 +10,7 @@ namespace {
 constexpr double kCurvatureMax_per_mm = 0.05;
 constexpr double kSmallestU = 1e-9;      // (26) is strict
 constexpr double kFewestReadings = 2.5;  // a period
+constexpr double kFewestPeriods = 1.5;   // of the longest recording
 }  // namespace
 
 std::string describe(const EffectSet& set) {
@@ -41,8 +42,9 @@ Hypothesis::Hypothesis(const model::NeedleParameters& needle, EffectSet set, con
       Unknown unknown{static_cast<int>(m), static_cast<int>(p), -1,
                       parameters[p].lower, parameters[p].upper, parameters[p].periodic};
       if (parameters[p].frequency) {
-        // Less than a period in the longest recording is a drift, and readings too far apart show another frequency.
-        unknown.lower = std::max(unknown.lower, 1 / std::max(longest_s, 1e-3));
+        // Hardly more than a period in the longest recording is a drift, and readings too far apart show another
+        // frequency.
+        unknown.lower = std::max(unknown.lower, kFewestPeriods / std::max(longest_s, 1e-3));
         unknown.upper = std::max(unknown.lower, std::min(unknown.upper, 1 / (kFewestReadings * recorded.frame_s)));
       }
       if (parameters[p].scope == model::Scope::rig) {

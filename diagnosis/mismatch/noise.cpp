@@ -232,7 +232,16 @@ Noise estimate_noise(const RecordedCase& recorded, const Errors& errors, bool fl
     }
     if (first_order - at(other1, other2) > kSecondOrder) ar1 = other1, ar2 = other2;
   }
+  // What is slow has the innovations' variance, which is well known, over (1 - ar1)^2. (Deviance: minus twice the
+  // logarithm of the likelihood, so that a curvature of two is a standard error of one.)
+  double slow_error = 0;
+  if (ar1 > 0) {
+    const double step = std::min(0.25 * (1 - ar1), 0.5 * ar1);
+    const double curvature = (at(ar1 + step, ar2) + at(ar1 - step, ar2) - 2 * at(ar1, ar2)) / (step * step);
+    if (curvature > 0) slow_error = 2 / (1 - ar1) * std::sqrt(2 / curvature);
+  }
   at(ar1, ar2);
+  noise.slow_error = slow_error;
   return noise;
 }
 

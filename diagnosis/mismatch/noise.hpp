@@ -15,6 +15,7 @@ struct Noise {
   std::vector<double> sigma_mm;  // per channel, of one reading (the coloured process's own)
   double ar1 = 0;                // correlation of readings one frame apart
   double ar2 = 0;                // of readings two frames apart, given the one between; 0: of first order
+  double slow_error = 0;         // relative standard error of its power far below the frame rate, by that of ar1
   double outlier_share = 0;      // of messages
   double frame_s = 1.0 / 30;
 };

@@ -16,11 +16,26 @@ constexpr double kNoticeable = 0.5;      // chi2
 constexpr double kCorrectionChance = 4;  // mean gain of a correction of four knots under noise
 constexpr std::size_t kCorrectionsFitted = 3;
 constexpr int kLargestCorrections = 2;
+constexpr double kAtBound = 1.03;
 
 bool has_correction(const EffectSet& set) { return std::any_of(set.begin(), set.end(), is_correction); }
 
 std::string member_key(const Member& member) {
   return std::string(member.effect->name()) + "/" + std::to_string(member.variant);
+}
+
+// A swing whose best frequency is the lowest or highest there is has not been seen to swing.
+bool has_no_period(const Fit& fit) {
+  const auto& unknowns = fit.hypothesis.unknowns();
+  for (std::size_t i = 0; i < unknowns.size(); ++i) {
+    const Unknown& u = unknowns[i];
+    if (u.member < 0) continue;
+    const auto& effect = *fit.hypothesis.set()[static_cast<std::size_t>(u.member)].effect;
+    if (!effect.parameters()[static_cast<std::size_t>(u.parameter)].frequency) continue;
+    const double value = fit.values[static_cast<Eigen::Index>(i)];
+    if (value < kAtBound * u.lower || value * kAtBound > u.upper) return true;
+  }
+  return false;
 }
 }  // namespace
 
@@ -85,11 +100,34 @@ Selection::Known& Selection::known(const EffectSet& set) {
 
 std::shared_ptr<const Fit> Selection::fit_of(const EffectSet& set) { return known(set).fit; }
 double Selection::evidence_of(const EffectSet& set) { return known(set).evidence; }
+double Selection::preference_of(const EffectSet& set) {
+  const Known& now = known(set);
+  return now.evidence - price_of_names(*now.fit);
+}
 
 double Selection::evidence_for(const EffectSet& set, const Fit& fit) const {
   double cost = kInstantCost * instants_in_use(fit);
   for (const auto& member : set) cost += is_correction(member) ? kCorrectionChance : chance_.at(member_key(member));
   return known_.at(key_of({})).fit->penalised - fit.penalised - cost;
+}
+
+// Beyond what chance brings, which evidence_for() has taken off.
+double Selection::price_of_names(const Fit& fit) const {
+  const EffectSet& set = fit.hypothesis.set();
+  double price = 0;
+  for (std::size_t m = 0; m < set.size(); ++m) {
+    if (is_correction(set[m])) continue;
+    const auto& parameters = set[m].effect->parameters();
+    int count = 0;
+    for (std::size_t p = 0; p < parameters.size(); ++p) {
+      if (!set[m].fits(p) || parameters[p].scope != model::Scope::rig) continue;
+      ++count;
+      if (fit.hypothesis.parameter(fit.values, m, p) > parameters[p].largest_seen) price += kUnseenPrice;
+    }
+    const double whole = 1 + kParameterPrice * (count - 1);
+    price += std::max(0.0, whole - chance_.at(member_key(set[m])));
+  }
+  return price;
 }
 
 // Some candidates of a library, each added to the set and fitted; what cannot be fitted is left out.
@@ -106,15 +144,16 @@ std::vector<Trial> Selection::try_beside(const EffectSet& set, const Library& li
     trial.threshold = library.chance.threshold[which[i]];
     trial.fit = fit_addition(evidence_, *from, candidate, best_promises(candidate, library.ground, starts));
   });
-  std::erase_if(trials, [](const Trial& trial) { return !trial.fit; });
+  std::erase_if(trials, [](const Trial& trial) { return !trial.fit || has_no_period(*trial.fit); });
   for (Trial& trial : trials) {
     trial.gain = cost_of(*from) - cost_of(*trial.fit);
     trial.evidence = evidence_for(trial.set, *trial.fit);
+    trial.preference = trial.evidence - price_of_names(*trial.fit);
     Known& slot = known_[key_of(trial.set)];
     if (!slot.fit || trial.evidence > slot.evidence) slot = {trial.set, trial.fit, trial.evidence};
   }
   std::stable_sort(trials.begin(), trials.end(),
-                   [](const Trial& a, const Trial& b) { return a.evidence > b.evidence; });
+                   [](const Trial& a, const Trial& b) { return a.preference > b.preference; });
   return trials;
 }
 
@@ -200,7 +239,7 @@ bool Selection::swap(EffectSet& set) {
     if (is_correction(set[m])) continue;
     const auto& others = additions(without_member(set, m));
     if (others.empty() || key_of(others.front().set) == key_of(set)) continue;
-    if (others.front().evidence <= evidence_of(set) + 1e-6) continue;
+    if (others.front().preference <= preference_of(set) + 1e-6) continue;
     set = others.front().set;
     return true;
   }
@@ -227,17 +266,19 @@ bool Selection::shrink(EffectSet& set) {
 bool Selection::give_up_names(EffectSet& set) {
   const auto corrections = std::count_if(set.begin(), set.end(), is_correction);
   if (corrections >= kLargestCorrections) return false;
-  const auto beats = [&](const Trial& nameless) {
-    return nameless.fit && nameless.evidence > evidence_of(set) + kNamelessMargin;
+  const auto beats = [&](const Trial& nameless, double margin) {
+    return nameless.fit && nameless.evidence > evidence_of(set) + margin;
   };
-  if (const Trial& alone = best_correction({}); set.size() > 1 && corrections == 0 && beats(alone)) {
+  if (const Trial& alone = best_correction({});
+      set.size() > 1 && corrections == 0 &&
+      beats(alone, kNamelessMargin - kNamelessCredit * static_cast<double>(set.size() - 1))) {
     set = alone.set;
     return true;
   }
   for (std::size_t m = 0; m < set.size(); ++m) {
     if (is_correction(set[m])) continue;
     const Trial& nameless = best_correction(without_member(set, m));
-    if (!beats(nameless)) continue;
+    if (!beats(nameless, kNamelessMargin)) continue;
     set = nameless.set;
     return true;
   }
@@ -268,11 +309,15 @@ bool Selection::far_from_any_name(const EffectSet& set) {
 EffectSet Selection::select() {
   EffectSet now;
   for (int round = 0; round < 12; ++round) {
-    // While even nameless curves leave structure, a name beside them would be a guess.
+    // While even nameless curves leave structure, a name beside them would be a guess; but not one that explains most.
     if (has_correction(now) && examine_remains(evidence_, *fit_of(now)).structure_sigmas > kStructureSigmas) {
-      std::erase_if(now, [](const Member& member) { return !is_correction(member); });
-      if (!give_up_names(now)) break;
-      continue;
+      EffectSet nameless = now;
+      std::erase_if(nameless, [](const Member& member) { return !is_correction(member); });
+      if (evidence_of(nameless) > 0.5 * evidence_of(now)) {
+        now = nameless;
+        if (!give_up_names(now)) break;
+        continue;
+      }
     }
     const bool grown = grow(now);
     if (grown && far_from_any_name(now)) {
@@ -287,7 +332,7 @@ EffectSet Selection::select() {
 
 std::vector<std::pair<EffectSet, double>> Selection::visited() const {
   std::vector<std::pair<EffectSet, double>> all;
-  for (const auto& [key, known] : known_) all.emplace_back(known.set, known.evidence);
+  for (const auto& [key, known] : known_) all.emplace_back(known.set, known.evidence - price_of_names(*known.fit));
   return all;
 }
 

@@ -16,8 +16,15 @@
 namespace bevel::diagnosis {
 
 inline constexpr double kVisibleSigmas = 5.0;
+// What each parameter of a name beyond its first has to gain: twice the logarithm of the range that it might have had,
+// in standard errors. Some twenty, as sizes are in the field.
+inline constexpr double kParameterPrice = 6.0;
+// Of a value that the effect's causes do not bring about.
+inline constexpr double kUnseenPrice = 6.0;
 // Evidence by which a nameless correction has to beat a named effect: it has more freedom, and there are many.
-inline constexpr double kNamelessMargin = 16.0;
+inline constexpr double kNamelessMargin = 10.0;
+// Less for each name after the first: one curve that does the work of several names is the simpler account.
+inline constexpr double kNamelessCredit = 8.0;
 // Slow structure left beside named effects, in standard deviations of what noise leaves, from which something remains.
 inline constexpr double kStructureSigmas = 4.0;
 
@@ -33,10 +40,11 @@ struct SelectionRules {
 struct Trial {
   EffectSet set;
   std::shared_ptr<const Fit> fit;
-  double gain = 0;       // fall of chi2 (belief included) against the set without the last member
-  double chance = 0;     // mean of what noise brings
-  double threshold = 0;  // exceeded by chance, over the library, in 1 of 100
-  double evidence = 0;   // against no effect at all
+  double gain = 0;        // fall of chi2 (belief included) against the set without the last member
+  double chance = 0;      // mean of what noise brings
+  double threshold = 0;   // exceeded by chance, over the library, in 1 of 100
+  double evidence = 0;    // against no effect at all
+  double preference = 0;  // among names: evidence, less what this set's names need beyond others
   double limit() const { return std::max(threshold, chance + kVisibleSigmas * kVisibleSigmas); }
   bool passes() const { return gain > limit(); }
 };
@@ -58,8 +66,8 @@ class Selection {
   Correction describe_correction(const EffectSet& set, std::size_t member);
 
   std::shared_ptr<const Fit> fit_of(const EffectSet& set);
-  double evidence_of(const EffectSet& set);
-  // All sets fitted so far.
+  double preference_of(const EffectSet& set);
+  // All sets fitted so far, with their preference.
   std::vector<std::pair<EffectSet, double>> visited() const;
   const Evidence& evidence() const { return evidence_; }
   const SelectionRules& rules() const { return rules_; }
@@ -84,7 +92,9 @@ class Selection {
                                 std::size_t starts);
   bool improve(const EffectSet& set, const Trial& larger);
   Known& known(const EffectSet& set);
+  double evidence_of(const EffectSet& set);
   double evidence_for(const EffectSet& set, const Fit& fit) const;
+  double price_of_names(const Fit& fit) const;
   void say(const std::string& text) const;
   bool grow(EffectSet& set);
   bool swap(EffectSet& set);

@@ -8,13 +8,15 @@ namespace {
 class Puncture final : public Effect {
  public:
   Puncture()
-      : Effect(
-            {.name = "puncture",
-             .meaning = "a membrane holds the tip back until it breaks through",
-             .covariate = Covariate::depth_mm,
-             .parameters = {
-                 {.name = "depth_mm", .lower = 0, .upper = 300, .none = kNoNone, .starts = starts_every(1.0, 1.0, 120)},
-                 {.name = "indentation_mm", .lower = 0, .upper = 15, .none = 0, .starts = {1.0}}}}) {}
+      : Effect({.name = "puncture",
+                .meaning = "a membrane holds the tip back until it breaks through",
+                .covariate = Covariate::depth_mm,
+                .parameters = {{.name = "depth_mm",
+                                .lower = 0,
+                                .upper = 300,
+                                .none = kNoNone,
+                                .starts = starts_every(0.25, 0.25, 120)},
+                               {.name = "indentation_mm", .lower = 0, .upper = 15, .none = 0, .starts = {1.0}}}}) {}
 
   void axes(Parameters p, const LegView& leg, EffectMemory& memory, Dual& insertion_mm,
             Dual& /*rotation_rad*/) const override {

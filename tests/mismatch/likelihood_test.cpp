@@ -165,7 +165,7 @@ TEST(Hypothesis, AFrequencyIsOneThatTheReadingsShow) {
   const Unknown& frequency = hypothesis.unknowns()[static_cast<std::size_t>(hypothesis.find(0, 1))];
   EXPECT_NEAR(frequency.upper, 1.0, 1e-9) << "two and a half readings a period";
   const double longest_s = std::max(recorded.recordings[0].duration_s(), recorded.recordings[1].duration_s());
-  EXPECT_NEAR(frequency.lower, 1 / longest_s, 1e-9) << "a period in the longest";
+  EXPECT_NEAR(frequency.lower, 1.5 / longest_s, 1e-9) << "one and a half periods in the longest";
 }
 
 TEST(Hypothesis, OfTooManyUnknownsIsRefused) {

@@ -134,7 +134,7 @@ TEST(Select, IsThatOfItsSeedWhateverTheThreads) {
   EXPECT_EQ(one, everything(1));
 }
 
-TEST(Additions, AreRankedByEvidenceAndHaveTheirThresholds) {
+TEST(Additions, AreRankedByPreferenceAndHaveTheirThresholds) {
   const SimulatedRig rig{.effects = {active("layer", {31, 0.7})}};
   const auto recorded = record_case(rig, 1);
   const Evidence evidence = evidence_of(recorded, rig);
@@ -145,7 +145,7 @@ TEST(Additions, AreRankedByEvidenceAndHaveTheirThresholds) {
   for (std::size_t i = 0; i < trials.size(); ++i) {
     const Trial& trial = trials[i];
     if (i > 0) {
-      EXPECT_GE(trials[i - 1].evidence, trial.evidence);
+      EXPECT_GE(trials[i - 1].preference, trial.preference);
     }
     EXPECT_GT(trial.threshold, trial.chance);
     // But for the one without an amplitude, which cannot be nothing.
