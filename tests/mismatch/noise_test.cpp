@@ -264,6 +264,29 @@ TEST(NoiseWithoutMisfit, IsFoundWithoutTheCurveToo) {
 
 class OutliersIn : public ::testing::TestWithParam<double> {};
 
+// What the power of slow noise is found to be, over many draws, spreads by what each says of its own error.
+TEST(SlowPower, SpreadsAsItsErrorSays) {
+  constexpr int kDraws = 80;
+  for (const double ar1 : {0.6, 0.9}) {
+    double sum = 0, squares = 0, error = 0;
+    for (int seed = 1; seed <= kDraws; ++seed) {
+      const Made made = make_series({.ar1 = ar1, .misfit_mm = 1}, static_cast<std::uint64_t>(seed));
+      const Noise noise = estimate_noise(made.recorded, made.errors, true, false);
+      const double power = std::log((1 + noise.ar1) / (1 - noise.ar1) * noise.sigma_mm[0] * noise.sigma_mm[1]);
+      sum += power;
+      squares += power * power;
+      error += noise.slow_error / kDraws;
+    }
+    const double mean = sum / kDraws;
+    const double spread = std::sqrt(squares / kDraws - mean * mean);
+    const double truth = std::log((1 + ar1) / (1 - ar1) * 0.15 * 0.25);
+    std::cout << "ar1 " << ar1 << ": spread " << spread << ", by its own word " << error << ", mean " << mean - truth
+              << " off, " << kDraws << " draws\n";
+    EXPECT_NEAR(spread / error, 1, 0.3);
+    EXPECT_NEAR(mean, truth, 0.5 * error);
+  }
+}
+
 TEST_P(OutliersIn, ColouredNoiseAreFoundAndNothingElse) {
   const Recipe recipe{.ar1 = GetParam(), .misfit_mm = 1.0, .outlier_share = 0.02};
   constexpr int kReplicates = 10;

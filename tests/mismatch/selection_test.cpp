@@ -10,10 +10,12 @@ namespace bevel::diagnosis {
 namespace {
 
 using testing::active;
+using ::testing::Contains;
 using testing::evidence_of;
 using testing::fit_of;
 using ::testing::IsEmpty;
 using testing::member;
+using ::testing::Not;
 using testing::record_case;
 using testing::SimulatedRig;
 using ::testing::UnorderedElementsAre;
@@ -110,6 +112,38 @@ TEST(Select, NoNameForAnEffectThatIsOnNoList) {
   const auto found = select({.true_motion = slipping, .recordings = 6}, 1);
   EXPECT_TRUE(found.nameless) << describe(found.set);
   EXPECT_THAT(found.names, IsEmpty());
+}
+
+// The recordings last 7 to 9 s: of a swing of 0.12 Hz they show one period.
+TEST(Select, NoTissueMotionWhereNoPeriodShows) {
+  const auto phase = [](int r) { return std::vector{active("tissue_motion", {0.8, 0.12, 0.5, 1.3 * r})}; };
+  const auto found = select({.effects_in = phase, .frame_s = 0.1}, 1);
+  EXPECT_FALSE(found.set.empty());
+  EXPECT_THAT(found.names, Not(Contains("tissue_motion"))) << describe(found.set);
+}
+
+// Either explains the path; entry_angle has a parameter more.
+TEST(Select, OfTwoNamesForOneThingTheOneWithFewerParameters) {
+  for (const std::uint64_t seed : {1, 2, 3, 4}) {
+    const auto found = select({.effects = {active("camera_rotation", {0.03})}, .frame_s = 0.1}, seed);
+    EXPECT_THAT(found.names, UnorderedElementsAre("camera_rotation")) << "seed " << seed;
+  }
+}
+
+// Slip and compression lose way; a camera may read too much or too little.
+TEST(Select, ReadingsThatGrowAreTheCameras) {
+  for (const std::uint64_t seed : {1, 2, 3, 4}) {
+    const auto found = select({.effects = {active("camera_scale", {1.02})}, .frame_s = 0.1}, seed);
+    EXPECT_THAT(found.names, UnorderedElementsAre("camera_scale")) << "seed " << seed;
+  }
+}
+
+// It holds the tip for a few frames: its start has to be near in depth.
+TEST(Select, AMembraneOfAMillimetreInColouredNoise) {
+  for (const double depth_mm : {21.37, 34.12}) {
+    const auto found = select({.effects = {active("puncture", {depth_mm, 1.1})}, .frame_s = 1.0 / 30, .ar1 = 0.9}, 1);
+    EXPECT_THAT(found.names, UnorderedElementsAre("puncture")) << depth_mm;
+  }
 }
 
 // Bitwise the same, in everything that is reported of the trials.
