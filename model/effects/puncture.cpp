@@ -4,7 +4,8 @@ namespace bevel::model {
 namespace {
 
 // A membrane at z = depth: the tip stalls there while the base goes on by the indentation, then breaks through and
-// catches up within kCatchUp_mm of the base. Memory: how far the base was when the tip touched.
+// catches up: within kCatchUp_mm of the base, half of it before the indentation is reached and half after (less before
+// where the indentation is not much longer than that). Memory: how far the base was when the tip touched.
 class Puncture final : public Effect {
  public:
   Puncture()
@@ -36,10 +37,11 @@ class Puncture final : public Effect {
     memory.slot[1] = insertion_mm;
     if (memory.phase != kTouching) return;
     const Dual pushed_mm = insertion_mm - touched_mm;
-    if (pushed_mm.value > p[1].value + kCatchUp_mm) {
+    const Dual breaks_at_mm = p[1] * p[1] / (p[1] + 0.5 * kCatchUp_mm);
+    if (pushed_mm.value > breaks_at_mm.value + kCatchUp_mm) {
       memory.phase = kThrough;
-    } else if (pushed_mm.value > p[1].value) {
-      insertion_mm = touched_mm + (pushed_mm - p[1]) * (p[1] + kCatchUp_mm) / kCatchUp_mm;
+    } else if (pushed_mm.value > breaks_at_mm.value) {
+      insertion_mm = touched_mm + (pushed_mm - breaks_at_mm) * (breaks_at_mm + kCatchUp_mm) / kCatchUp_mm;
     } else if (pushed_mm.value > 0) {
       insertion_mm = touched_mm;
     } else {

@@ -102,12 +102,13 @@ def predict(q, lost_at_s, phase_rad, ell, bevel_plane, sign, base_s, insertion_m
             if pierced == 0 and reach_mm > q[PUNCTURE_DEPTH] >= p[2]:
                 pierced, touched_mm = 1, s_tip + (q[PUNCTURE_DEPTH] - p[2]) / R[2, 2]
             if pierced == 1 and s > touched_mm:
-                # Held back by the indentation, then let go within a part of a mm, so that both have slopes.
+                # Held back by the indentation, then let go within a part of a mm about it, so that both have slopes.
                 pushed_mm = s - touched_mm
-                if pushed_mm > q[PUNCTURE] + CATCH_UP_MM:
+                breaks_mm = q[PUNCTURE] ** 2 / (q[PUNCTURE] + 0.5 * CATCH_UP_MM)
+                if pushed_mm > breaks_mm + CATCH_UP_MM:
                     pierced = 2
                 else:
-                    s = touched_mm + max(pushed_mm - q[PUNCTURE], 0.0) * (q[PUNCTURE] + CATCH_UP_MM) / CATCH_UP_MM
+                    s = touched_mm + max(pushed_mm - breaks_mm, 0.0) * (breaks_mm + CATCH_UP_MM) / CATCH_UP_MM
         roll_backlash = play(r, 0.5 * q[BACKLASH], roll_backlash)
         length = max(d - insertion_mm[0], 0.0) / 100
         roll_new = play(roll_backlash, q[WINDUP] * length * length, roll_tip)
