@@ -160,7 +160,7 @@ TEST_F(SystemFile, ErrorsAgainstTheTruthAreThoseThatWerePutIn) {
   std::vector<needle_state_t> truths;
   double nees = 0;
   for (std::size_t i = 0; i < blind.states.size(); i += 5) {
-    const auto& state = blind.states[i].state;
+    const estimator::FilterState state = blind.states[i].state.unpacked();
     truths.push_back(truth_message(blind.states[i].utime, state.pose * model::exp_se3(error)));
     nees += error.dot(state.covariance.topLeftCorner<6, 6>().inverse() * error) / 6;
   }
