@@ -72,7 +72,8 @@ TEST(LiveReplay, TheNodesStatesAreThoseOfAReplayOfItsLog) {
     for (int k = 0; k < 3; ++k) ASSERT_EQ(live[i].position_mm[k], row.state.pose.p_mm[k]) << i;
     ASSERT_EQ(live[i].curvature_per_mm, row.state.curvature_per_mm);
     ASSERT_EQ(live[i].lambda2, row.state.lambda2);
-    for (int k = 0; k < 81; ++k) ASSERT_EQ(live[i].covariance[k], row.state.covariance(k / 9, k % 9));
+    const estimator::Matrix9d covariance = row.state.unpacked().covariance;
+    for (int k = 0; k < 81; ++k) ASSERT_EQ(live[i].covariance[k], covariance(k / 9, k % 9));
     ASSERT_EQ(live[i].reset_count, row.state.reset_count);
   }
 }
