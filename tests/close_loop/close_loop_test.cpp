@@ -75,7 +75,9 @@ TEST_F(CloseTheLoop, InsertionScaleFoundMakesAllThreeBetterAndTheFilesSaySo) {
   const Options o = options("scale");
   const ClosedLoop loop = close_the_loop(o);
   expect_all_three_better(loop, "insertion_scale");
-  EXPECT_GT(loop.targeting.gain_forgiving_mm.low, 0) << "also where the filter is told to forgive";
+  // A filter that is told to forgive corrects a scale by feedback, to within microns of one that knows it.
+  EXPECT_GT(loop.targeting.gain_forgiving_mm.high, 0) << "not worse where the filter is told to forgive";
+  EXPECT_LT(std::abs(loop.targeting.gain_forgiving_mm.value), 0.02);
 
   EXPECT_THAT(table_text(loop), HasSubstr("scale: found insertion_scale (ratio 0.93)"));
   write_results(loop, o.folder + "/model.toml", o.out_folder);

@@ -67,7 +67,7 @@ TEST_F(Results, TheVerdictSaysWhatWasFound) {
   EXPECT_EQ(j["where"][0]["range"][1], 52);
   EXPECT_EQ(j["fit"]["held_out"], "leave-one-recording-out");
   EXPECT_DOUBLE_EQ(j["fit"]["after"]["chi2_per_dof"], 1.012);
-  EXPECT_TRUE(j["detectable"]["rate_dependence"]["exponent"].is_null());  // infinite
+  EXPECT_TRUE(j["detectable"]["layer"]["curvature_ratio"].is_null());  // infinite
   EXPECT_TRUE(nlohmann::json::parse(verdict_json(made_up(Verdict::nothing_missing)))["next_experiment"].is_null());
 }
 

@@ -11,7 +11,7 @@ TEST(AugmentedNeedle, AllocatesNothingOnALeg) {
   const Motion motion = rich_script().recorded();
   const std::vector<ActiveEffect> all{
       active("rotation_backlash", {0.3}),      active("torsional_windup", {0.5}), active("puncture", {20, 2}),
-      active("flip_transient", {6}),           active("lateral_bias", {1e-3, 0}), active("relaxation", {1, 2}),
+      active("flip_transient", {6}),           active("lateral_bias", {1e-3, 0}), active("relaxation", {1, 2, 5}),
       active("tissue_motion", {1, 0.3, 0, 0}), active("refraction", {0.02, 30})};
   ASSERT_EQ(all.size(), static_cast<std::size_t>(kMaxEffects));
   for (const int columns : {0, kMaxColumns}) {

@@ -15,7 +15,7 @@ TEST(Prebend, IsInTheRegistryWhereThePageSays) {
   const auto all = all_effects();
   const auto at = std::find(all.begin(), all.end(), find_effect("prebend"));
   ASSERT_NE(at, all.end());
-  EXPECT_EQ((*(at - 1))->name(), "drilling");
+  EXPECT_EQ((*(at - 1))->name(), "flip_transient");
   EXPECT_EQ((*(at + 1))->name(), "lateral_bias");
 }
 
