@@ -54,13 +54,14 @@ double difference(const std::string& parameter, double value, double truth) {
 }
 
 void score_parameters(const OpenedEffect& truth, const NamedEffect& named, TrialScore& score) {
-  for (const auto& [name, true_value] : truth.parameters) {
+  for (const auto& parameter : truth.parameters) {
+    const auto& [name, true_value] = parameter;
     const auto found = named.parameters.find(name);
     if (found == named.parameters.end()) continue;
     const Estimate& estimate = found->second;
     ParameterScore p{truth.name, name, true_value, estimate.value, {}, {}};
     const auto compare = [&](double with, std::optional<double>& z, std::optional<bool>& covered) {
-      const double d = difference(name, estimate.value, with);
+      const double d = difference(parameter.first, estimate.value, with);
       if (estimate.std_error && *estimate.std_error > 0.0) z = d / *estimate.std_error;
       // The interval moves with the estimate where a direction is turned to the truth's side.
       const double shift = with + d - estimate.value;
