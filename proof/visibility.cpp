@@ -7,6 +7,7 @@
 #include <numbers>
 #include <optional>
 #include <stdexcept>
+#include <utility>
 
 #include "proof/bounded_fit.hpp"
 
@@ -46,6 +47,22 @@ std::optional<Eigen::VectorXd> misfit(const Setting& setting, const Views& seen,
   }
 }
 
+// Where to look for k, lambda1 and lambda2, and where to begin, with room for so many unknowns of one's own after them.
+struct Search {
+  BoundedProblem problem;
+  Eigen::VectorXd from;
+};
+template <class Residual>
+Search search_about(const BaseNeedle& start, Eigen::Index own, Residual residual) {
+  const Eigen::VectorXd room = Eigen::VectorXd::Zero(3 + own);
+  Search search{{std::move(residual), room, room, room}, room};
+  search.problem.lowest.head<3>() = kLowest;
+  search.problem.highest.head<3>() = kHighest;
+  search.problem.probe.head<3>() = Point(kProbe.data());
+  search.from.head<3>() = point_of(start);
+  return search;
+}
+
 }  // namespace
 
 Views views_of(const Setting& setting, const BaseNeedle& needle, const HiddenPhysics& physics) {
@@ -71,10 +88,9 @@ Eigen::VectorXd whitened_difference(const Setting& setting, const Views& a, cons
 }
 
 Refit refit_base(const Setting& setting, const Views& seen, const BaseNeedle& start, const HiddenPhysics& known) {
-  const BoundedProblem problem{
-      [&](const Eigen::VectorXd& x) { return misfit(setting, seen, needle_at(x, start), known); }, kLowest, kHighest,
-      Point(kProbe.data())};
-  const BoundedFit fit = fit_in_box(problem, point_of(start), 40, std::numeric_limits<double>::infinity());
+  const auto [problem, from] = search_about(
+      start, 0, [&](const Eigen::VectorXd& x) { return misfit(setting, seen, needle_at(x, start), known); });
+  const BoundedFit fit = fit_in_box(problem, from, 40, std::numeric_limits<double>::infinity());
   return {needle_at(fit.point, start), fit.norm, fit.converged};
 }
 
@@ -94,14 +110,9 @@ std::vector<Rival> find_rivals(const Setting& setting, const Views& seen, const 
       for (Eigen::Index j = 0; j < own; ++j) physics.*parameters[static_cast<std::size_t>(j)].slot = x(3 + j);
       return physics;
     };
-    BoundedProblem problem{
-        [&](const Eigen::VectorXd& x) { return misfit(setting, seen, needle_at(x.head<3>(), start), physics_at(x)); },
-        Eigen::VectorXd(3 + own), Eigen::VectorXd(3 + own), Eigen::VectorXd(3 + own)};
-    problem.lowest.head<3>() = kLowest;
-    problem.highest.head<3>() = kHighest;
-    problem.probe.head<3>() = Point(kProbe.data());
-    Eigen::VectorXd from(3 + own);
-    from.head<3>() = point_of(start);
+    auto [problem, from] = search_about(start, own, [&](const Eigen::VectorXd& x) {
+      return misfit(setting, seen, needle_at(x.head<3>(), start), physics_at(x));
+    });
     for (Eigen::Index j = 0; j < own; ++j) {
       const ParameterRange& range = parameters[static_cast<std::size_t>(j)];
       const double reach = std::max(std::abs(range.high - range.neutral), std::abs(range.low - range.neutral));
@@ -131,16 +142,10 @@ std::vector<std::map<std::string, double>> nearest_plain(const Setting& setting,
   const auto set = [&](const Eigen::VectorXd& x) {
     for (Eigen::Index j = 0; j < own; ++j) *slots[static_cast<std::size_t>(j)] = x(3 + j);
   };
-  BoundedProblem problem{[&](const Eigen::VectorXd& x) {
-                           set(x);
-                           return misfit(smooth, seen, needle_at(x.head<3>(), start), physics_of(moved, 0.0));
-                         },
-                         Eigen::VectorXd(3 + own), Eigen::VectorXd(3 + own), Eigen::VectorXd(3 + own)};
-  problem.lowest.head<3>() = kLowest;
-  problem.highest.head<3>() = kHighest;
-  problem.probe.head<3>() = Point(kProbe.data());
-  Eigen::VectorXd from(3 + own);
-  from.head<3>() = point_of(start);
+  auto [problem, from] = search_about(start, own, [&](const Eigen::VectorXd& x) {
+    set(x);
+    return misfit(smooth, seen, needle_at(x.head<3>(), start), physics_of(moved, 0.0));
+  });
   for (Eigen::Index j = 0; j < own; ++j) {
     const double value = *slots[static_cast<std::size_t>(j)];
     from(3 + j) = value;

@@ -40,40 +40,32 @@ void BM_predict(benchmark::State& bench) {
 }
 BENCHMARK(BM_predict);
 
-void BM_model_step_with_jacobian(benchmark::State& bench) {
+// Insertions to and fro, one step at a time.
+template <class Jacobian, class Step>
+void run_steps_with(benchmark::State& bench, Step step) {
   model::Pose pose;
-  model::StepJacobian jacobian;
+  Jacobian jacobian;
   const auto slip = model::slip_parameters(agar().prior.needle);
   long i = 0;
   for (auto _ : bench) {
-    benchmark::DoNotOptimize(model::step(pose, {(i++ / 500) % 2 ? -0.1 : 0.1, 0.006, {0.0047, 0}}, slip, jacobian));
+    const model::StepInput input{(i++ / 500) % 2 ? -0.1 : 0.1, 0.006, {0.0047, 0}};
+    benchmark::DoNotOptimize(step(pose, input, slip, jacobian));
     benchmark::DoNotOptimize(jacobian.pose(0, 0));
   }
+}
+
+void BM_model_step_with_jacobian(benchmark::State& bench) {
+  run_steps_with<model::StepJacobian>(bench, [](auto&... with) { return model::step(with...); });
 }
 BENCHMARK(BM_model_step_with_jacobian);
 
 void BM_model_step_with_needle_jacobian(benchmark::State& bench) {
-  model::Pose pose;
-  model::NeedleJacobian jacobian;
-  const auto slip = model::slip_parameters(agar().prior.needle);
-  long i = 0;
-  for (auto _ : bench) {
-    benchmark::DoNotOptimize(model::advance(pose, {(i++ / 500) % 2 ? -0.1 : 0.1, 0.006, {0.0047, 0}}, slip, jacobian));
-    benchmark::DoNotOptimize(jacobian.pose(0, 0));
-  }
+  run_steps_with<model::NeedleJacobian>(bench, [](auto&... with) { return model::advance(with...); });
 }
 BENCHMARK(BM_model_step_with_needle_jacobian);
 
 void BM_model_step_with_midpoint_jacobian(benchmark::State& bench) {
-  model::Pose pose;
-  model::NeedleJacobian jacobian;
-  const auto slip = model::slip_parameters(agar().prior.needle);
-  long i = 0;
-  for (auto _ : bench) {
-    benchmark::DoNotOptimize(
-        model::advance_by_midpoint(pose, {(i++ / 500) % 2 ? -0.1 : 0.1, 0.006, {0.0047, 0}}, slip, jacobian));
-    benchmark::DoNotOptimize(jacobian.pose(0, 0));
-  }
+  run_steps_with<model::NeedleJacobian>(bench, [](auto&... with) { return model::advance_by_midpoint(with...); });
 }
 BENCHMARK(BM_model_step_with_midpoint_jacobian);
 

@@ -3,6 +3,7 @@
 #include <gtest/gtest.h>
 
 #include <Eigen/Cholesky>
+#include <iostream>
 #include <set>
 
 #include "tests/mismatch/simulated_rig.hpp"
@@ -262,8 +263,6 @@ TEST(NoiseWithoutMisfit, IsFoundWithoutTheCurveToo) {
   EXPECT_NEAR(noise.ar1, 0.6, 4 * 0.8 / std::sqrt(2880));
 }
 
-class OutliersIn : public ::testing::TestWithParam<double> {};
-
 // What the power of slow noise is found to be, over many draws, spreads by what each says of its own error.
 TEST(SlowPower, SpreadsAsItsErrorSays) {
   constexpr int kDraws = 80;
@@ -286,6 +285,8 @@ TEST(SlowPower, SpreadsAsItsErrorSays) {
     EXPECT_NEAR(mean, truth, 0.5 * error);
   }
 }
+
+class OutliersIn : public ::testing::TestWithParam<double> {};
 
 TEST_P(OutliersIn, ColouredNoiseAreFoundAndNothingElse) {
   const Recipe recipe{.ar1 = GetParam(), .misfit_mm = 1.0, .outlier_share = 0.02};

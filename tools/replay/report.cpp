@@ -96,9 +96,10 @@ io::Plot band_plot(const Replay& replay, const std::string& label, Value value, 
   for (std::size_t i = 0; i < replay.states.size(); i += thin) {
     const StateRow& row = replay.states[i];
     x.push_back(static_cast<double>(row.utime - replay.states.front().utime) * 1e-6);
-    y.push_back(value(row));
-    low.push_back(y.back() - 2 * spread(row));
-    high.push_back(y.back() + 2 * spread(row));
+    const estimator::FilterState state = row.state.unpacked();
+    y.push_back(value(state));
+    low.push_back(y.back() - 2 * spread(state));
+    high.push_back(y.back() + 2 * spread(state));
   }
   io::Plot plot;
   plot.x_label = "time (s)";
@@ -112,8 +113,8 @@ io::Plot band_plot(const Replay& replay, const std::string& label, Value value, 
 void add_state_plots(io::HtmlReport& page, const Replay& replay) {
   for (const Eigen::Index i : {0, 1, 2}) {
     io::Plot plot = band_plot(
-        replay, std::string(kAxisName[i]) + " (mm)", [i](const StateRow& r) { return r.state.pose.p_mm[i]; },
-        [i](const StateRow& r) { return position_sd_mm(r.state.unpacked())[i]; });
+        replay, std::string(kAxisName[i]) + " (mm)", [i](const estimator::FilterState& s) { return s.pose.p_mm[i]; },
+        [i](const estimator::FilterState& s) { return position_sd_mm(s)[i]; });
     std::vector<double> t, p;
     const std::size_t thin = std::max<std::size_t>(1, replay.innovations.size() / 400);
     for (std::size_t k = 0; k < replay.innovations.size(); k += thin) {
@@ -126,20 +127,20 @@ void add_state_plots(io::HtmlReport& page, const Replay& replay) {
     page.figure(plot, "");
   }
   page.figure(band_plot(
-                  replay, "k (1/mm)", [](const StateRow& r) { return r.state.curvature_per_mm; },
-                  [](const StateRow& r) { return sd(r.state.unpacked(), 6); }),
+                  replay, "k (1/mm)", [](const estimator::FilterState& s) { return s.curvature_per_mm; },
+                  [](const estimator::FilterState& s) { return sd(s, 6); }),
               "Curvature. A band as wide as the prior's says that the path so far does not show it.");
   page.figure(band_plot(
-                  replay, "lambda1 (1/rad)", [](const StateRow& r) { return r.state.lambda1_per_rad; },
-                  [](const StateRow& r) { return sd(r.state.unpacked(), 7); }),
+                  replay, "lambda1 (1/rad)", [](const estimator::FilterState& s) { return s.lambda1_per_rad; },
+                  [](const estimator::FilterState& s) { return sd(s, 7); }),
               "");
   page.figure(band_plot(
-                  replay, "lambda2", [](const StateRow& r) { return r.state.lambda2; },
-                  [](const StateRow& r) { return sd(r.state.unpacked(), 8); }),
+                  replay, "lambda2", [](const estimator::FilterState& s) { return s.lambda2; },
+                  [](const estimator::FilterState& s) { return sd(s, 8); }),
               "");
   page.figure(band_plot(
-                  replay, "roll sd (rad)", [](const StateRow& r) { return sd(r.state.unpacked(), 5); },
-                  [](const StateRow&) { return 0.0; }),
+                  replay, "roll sd (rad)", [](const estimator::FilterState& s) { return sd(s, 5); },
+                  [](const estimator::FilterState&) { return 0.0; }),
               "Roll is never measured: this is what the filter admits not to know of it.");
 }
 
