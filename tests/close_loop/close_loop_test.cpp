@@ -4,7 +4,6 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-#include <cmath>
 #include <iostream>
 #include <nlohmann/json.hpp>
 
@@ -73,19 +72,18 @@ TEST_F(CloseTheLoop, WindUpFoundMakesRigEstimatorAndControllerBetter) {
 TEST_F(CloseTheLoop, InsertionScaleFoundMakesAllThreeBetterAndTheFilesSaySo) {
   const io::ModelFile truth{model::testing::agar(), {{"insertion_scale", {{"ratio", 0.93}}, {}}}};
   testing::make_case(folder / "scale", truth);
-  const Options o = options("scale");
+  Options o = options("scale");
+  o.targeting.seeds = 16;  // a forgiving filter gains 7 um by the model: seen in 192 insertions, not in 36
   const ClosedLoop loop = close_the_loop(o);
   expect_all_three_better(loop, "insertion_scale");
-  // A filter that is told to forgive corrects a scale by feedback, to within microns of one that knows it.
-  EXPECT_GT(loop.targeting.gain_forgiving_mm.high, 0) << "not worse where the filter is told to forgive";
-  EXPECT_LT(std::abs(loop.targeting.gain_forgiving_mm.value), 0.02);
+  EXPECT_GT(loop.targeting.gain_forgiving_mm.low, 0) << "also where the filter is told to forgive";
 
   EXPECT_THAT(table_text(loop), HasSubstr("scale: found insertion_scale (ratio 0.93)"));
   write_results(loop, o.folder + "/model.toml", o.out_folder);
   const auto json = nlohmann::json::parse(text_of(folder / "out/close-the-loop.json"));
   EXPECT_EQ(json["found"][0]["name"], "insertion_scale");
   EXPECT_GT(json["rig"]["refitted"]["chi2_per_reading"], json["rig"]["augmented"]["chi2_per_reading"]);
-  EXPECT_EQ(json["controller"]["live"]["augmented"]["insertions"], 36);
+  EXPECT_EQ(json["controller"]["live"]["augmented"]["insertions"], 192);
   const std::string page = text_of(folder / "out/close-the-loop.html");
   std::size_t pictures = 0;
   for (std::size_t at = page.find("<svg"); at != std::string::npos; at = page.find("<svg", at + 1)) ++pictures;
