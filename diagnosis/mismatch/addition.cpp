@@ -8,15 +8,23 @@
 
 namespace bevel::diagnosis {
 namespace {
-constexpr int kScans = 4;              // at most
-constexpr std::size_t kFineGrid = 20;  // starts
-constexpr double kSettled = 0.5;       // chi2
-constexpr double kWorthALook = 20;     // chi2
-constexpr double kHopeless = 200;      // chi2
+constexpr int kScans = 4;               // at most
+constexpr std::size_t kFineGrid = 20;   // starts
+constexpr double kSettled = 0.5;        // chi2
+constexpr double kSettledShare = 1e-4;  // of chi2: a fit this far from the readings need not be finished
+constexpr double kWorthALook = 20;      // chi2
+constexpr double kHopeless = 200;       // chi2
+constexpr int kRoughIterations = 8;
+constexpr double kRoughTolerance = 0.05;  // chi2
+constexpr double kFarOff = 2;             // chi2 per reading: something else is missing first
 
 bool has_local(const Hypothesis& hypothesis) {
   return std::any_of(hypothesis.unknowns().begin(), hypothesis.unknowns().end(),
                      [](const Unknown& u) { return u.recording >= 0; });
+}
+
+bool hardly_better(const Fit& again, const Fit& one) {
+  return cost_of(again) > cost_of(one) - std::max(kSettled, kSettledShare * cost_of(one));
 }
 
 // Where an effect's start is one of a fine grid, its valley is narrow and a linear promise of its size is rough: the
@@ -56,24 +64,45 @@ Eigen::VectorXd look_around(const Evidence& evidence, const Hypothesis& hypothes
   return best;
 }
 
-// A fit, its local unknowns scanned and fitted again until that brings nothing more.
+// A fit, its local unknowns scanned and fitted again until that brings nothing more. On the way there no fit is
+// finished: at a jump the likelihood has kinks, along which it would creep.
 std::shared_ptr<const Fit> settled_fit(const Evidence& evidence, const Hypothesis& hypothesis,
                                        const Eigen::VectorXd& start, const FitRules& rules = {}) {
-  auto one = std::make_shared<Fit>(fit_beside_instants(evidence, hypothesis, start, rules));
-  for (int scan = 0; scan < kScans && one->valid && has_local(hypothesis); ++scan) {
-    const auto again = std::make_shared<Fit>(
-        fit_beside_instants(evidence, hypothesis, scan_local_unknowns(evidence, hypothesis, one->values), rules));
-    const bool settled = !again->valid || cost_of(*again) > cost_of(*one) - kSettled;
-    if (again->valid && cost_of(*again) < cost_of(*one)) one = again;
-    if (settled) break;
-  }
-  return one;
+  if (!has_local(hypothesis)) return std::make_shared<Fit>(fit(evidence, hypothesis, start, rules));
+  FitRules rough = rules;
+  rough.max_iterations = kRoughIterations;
+  rough.tolerance = kRoughTolerance;
+  const auto settle = [&](const Eigen::VectorXd& values) {
+    auto one = std::make_shared<Fit>(fit_beside_instants(evidence, hypothesis, values, rough));
+    for (int scan = 0; scan < kScans && one->valid; ++scan) {
+      const auto again = std::make_shared<Fit>(
+          fit_beside_instants(evidence, hypothesis, scan_local_unknowns(evidence, hypothesis, one->values), rough));
+      const bool settled = !again->valid || hardly_better(*again, *one);
+      if (again->valid && cost_of(*again) < cost_of(*one)) one = again;
+      if (settled) break;
+    }
+    return one;
+  };
+  const auto one = settle(start);
+  // What is added may make instants idle that stood for it, and each alone is still worth having: with the strongest.
+  const std::size_t half = evidence.recorded->recordings.size() / 2;
+  if (!one->valid || static_cast<std::size_t>(instants_in_use(*one)) <= half) return one;
+  const auto fewer = settle(scan_local_unknowns(evidence, hypothesis, start, half));
+  return fewer->valid && cost_of(*fewer) < cost_of(*one) ? fewer : one;
+}
+
+// With the fit finished.
+std::shared_ptr<const Fit> finished(const Evidence& evidence, std::shared_ptr<const Fit> rough) {
+  if (!has_local(rough->hypothesis)) return rough;
+  const auto whole = std::make_shared<Fit>(fit_beside_instants(evidence, rough->hypothesis, rough->values));
+  return whole->valid && cost_of(*whole) < cost_of(*rough) ? whole : rough;
 }
 
 }  // namespace
 
 std::shared_ptr<const Fit> from_other_sizes(const Evidence& evidence, std::shared_ptr<const Fit> best) {
   const Hypothesis hypothesis = best->hypothesis;
+  if (best->chi2 > kFarOff * static_cast<double>(best->count())) return best;
   for (std::size_t m = 0; m < hypothesis.set().size(); ++m) {
     FitRules rules;
     bool jumps = false;
@@ -91,7 +120,7 @@ std::shared_ptr<const Fit> from_other_sizes(const Evidence& evidence, std::share
         const auto held = settled_fit(evidence, hypothesis, scan_local_unknowns(evidence, hypothesis, values), rules);
         if (!held->valid || cost_of(*held) > cost_of(*best) + kHopeless) continue;
         const auto free = settled_fit(evidence, hypothesis, held->values);
-        if (!free->valid || cost_of(*free) > cost_of(*best) - kSettled) continue;
+        if (!free->valid || hardly_better(*free, *best)) continue;
         best = free;
         better = true;
         break;
@@ -122,7 +151,7 @@ std::shared_ptr<const Fit> fit_addition(const Evidence& evidence, const Fit& fro
   }
   if (candidate.local_may_be_off && best && cost_of(from) - cost_of(*best) > kWorthALook)
     best = from_other_sizes(evidence, best);
-  return best;
+  return best ? finished(evidence, best) : best;
 }
 
 }  // namespace bevel::diagnosis

@@ -16,8 +16,6 @@
 namespace bevel::diagnosis {
 namespace {
 
-// An effect more has to be this much more likely than chance before it is believed: prior odds of 1 in 400.
-constexpr double kPriorCost = 12.0;
 constexpr double kRivalEvidence = 6.0;  // odds of 20 to 1
 constexpr double kCloseEvidence = 9.2;  // odds of 100 to 1, for effects of nearly one signature
 constexpr double kUnexplainedSigmas = 6;
@@ -257,11 +255,7 @@ std::string_view name_of(Verdict verdict) {
 }
 
 double probability_of(const std::vector<std::pair<EffectSet, double>>& visited, const Member& member) {
-  const auto score = [](const auto& one) {
-    const auto nameless = std::count_if(one.first.begin(), one.first.end(), is_correction);
-    return 0.5 * (one.second - kPriorCost * static_cast<double>(one.first.size()) -
-                  kNamelessMargin * static_cast<double>(nameless));
-  };
+  const auto score = [](const auto& one) { return 0.5 * one.second; };
   double best = -std::numeric_limits<double>::infinity();
   for (const auto& one : visited) best = std::max(best, score(one));
   double with = 0, all = 0;

@@ -21,7 +21,19 @@ using Knots = std::array<double, kKnots>;
 constexpr double kMoving_mm_s = 0.05;
 constexpr double kTurning_rad_s = 0.02;
 
-enum class Component { curvature_bevel, curvature_across, advance, turning, drift_bevel, drift_across, x, y, z };
+enum class Component {
+  curvature_bevel,
+  curvature_across,
+  advance,
+  turning,
+  advance_turning,
+  turning_turning,
+  drift_bevel,
+  drift_across,
+  x,
+  y,
+  z
+};
 
 struct ComponentInfo {
   Component component;
@@ -29,11 +41,13 @@ struct ComponentInfo {
   const char* unit;
   double start;  // a size that would show
 };
-constexpr std::array<ComponentInfo, 9> kComponents = {
+constexpr std::array<ComponentInfo, 11> kComponents = {
     {{Component::curvature_bevel, "curvature toward the bevel", "1/mm", 2e-4},
      {Component::curvature_across, "curvature across the bevel", "1/mm", 2e-4},
      {Component::advance, "advance of the tip", "mm per mm", 0.01},
      {Component::turning, "turning of the tip", "rad per mm", 0.003},
+     {Component::advance_turning, "advance of the tip with turning", "mm per rad", 0.03},
+     {Component::turning_turning, "turning of the tip with turning", "rad per rad", 0.01},
      {Component::drift_bevel, "sideways drift toward the bevel", "mm per mm", 0.003},
      {Component::drift_across, "sideways drift across the bevel", "mm per mm", 0.003},
      {Component::x, "reading along x", "mm", 0.1},
@@ -68,6 +82,12 @@ class CorrectionEffect final : public model::Effect {
       insertion_mm += memory.slot[0];
     } else if (info_.component == Component::turning) {
       memory.slot[0] += line(p, covariate_of(leg, memory)) * std::abs(leg.base_insertion_mm());
+      rotation_rad += memory.slot[0];
+    } else if (info_.component == Component::advance_turning) {
+      memory.slot[0] += line(p, covariate_of(leg, memory)) * leg.base_rotation_rad();
+      insertion_mm += memory.slot[0];
+    } else if (info_.component == Component::turning_turning) {
+      memory.slot[0] += line(p, covariate_of(leg, memory)) * leg.base_rotation_rad();
       rotation_rad += memory.slot[0];
     }
   }

@@ -7,6 +7,7 @@
 #include <functional>
 #include <numeric>
 
+#include "diagnosis/mismatch/local_unknowns.hpp"
 #include "diagnosis/mismatch/parallel.hpp"
 #include "diagnosis/statistics/median.hpp"
 
@@ -194,10 +195,10 @@ Promise promise_of_choices(const Candidate& candidate, const Signature& signatur
       gains.push_back(pull[r].empty() ? 0 : best);
       if (chosen) chosen->push_back(value);
     }
-    // An instant in most recordings is no accident: only the half that gains most counts.
+    // An instant in nearly all recordings is no accident.
     if (candidate.local_may_be_off) {
       std::sort(gains.begin(), gains.end(), std::greater<>());
-      gains.resize(std::max<std::size_t>(recordings / 2, 1));
+      gains.resize(most_recordings_with_an_instant(recordings));
     }
     return std::accumulate(gains.begin(), gains.end(), 0.0);
   };

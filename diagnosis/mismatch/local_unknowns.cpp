@@ -10,11 +10,11 @@ constexpr double kInstantSpacing_s = 0.3;
 constexpr int kFineSteps = 5;  // to each side of the best instant, twice: a jump has no slope to follow
 constexpr int kPhases = 12;
 
-// An instant in most recordings is no accident: those that bring least are switched off.
-void keep_the_exceptions(std::size_t recordings, std::vector<std::pair<double, Eigen::Index>>& brought,
+// An instant in nearly all recordings is no accident: those that bring least are switched off.
+void keep_the_exceptions(std::size_t most_recordings, std::vector<std::pair<double, Eigen::Index>>& brought,
                          Eigen::VectorXd& values) {
   std::sort(brought.begin(), brought.end(), std::greater<>());
-  for (std::size_t i = std::max<std::size_t>(recordings / 2, 1); i < brought.size(); ++i) values[brought[i].second] = 0;
+  for (std::size_t i = most_recordings; i < brought.size(); ++i) values[brought[i].second] = 0;
 }
 
 }  // namespace
@@ -28,6 +28,12 @@ bool is_instant(const Hypothesis& hypothesis, const Unknown& unknown) {
 
 Eigen::VectorXd scan_local_unknowns(const Evidence& evidence, const Hypothesis& hypothesis,
                                     const Eigen::VectorXd& values) {
+  return scan_local_unknowns(evidence, hypothesis, values,
+                             most_recordings_with_an_instant(evidence.recorded->recordings.size()));
+}
+
+Eigen::VectorXd scan_local_unknowns(const Evidence& evidence, const Hypothesis& hypothesis,
+                                    const Eigen::VectorXd& values, std::size_t most_recordings) {
   Eigen::VectorXd best = values;
   Workspace workspace;
   std::vector<std::pair<double, Eigen::Index>> brought;
@@ -63,7 +69,7 @@ Eigen::VectorXd scan_local_unknowns(const Evidence& evidence, const Hypothesis& 
     best[column] = value;
     if (instant && value > 0) brought.emplace_back(cost_at(0) - least, column);
   }
-  keep_the_exceptions(evidence.recorded->recordings.size(), brought, best);
+  keep_the_exceptions(most_recordings, brought, best);
   return best;
 }
 

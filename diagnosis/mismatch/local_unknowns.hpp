@@ -1,5 +1,8 @@
 #pragma once
 // Instants and phases that each recording has for itself have many valleys: they are scanned, not descended.
+#include <algorithm>
+#include <cstddef>
+
 #include "diagnosis/mismatch/likelihood.hpp"
 
 namespace bevel::diagnosis {
@@ -8,9 +11,17 @@ namespace bevel::diagnosis {
 // are tried, and room.
 inline constexpr double kInstantCost = 12.0;
 
+// An instant of its own in more recordings than these (three in four) is no accident but physics of another kind.
+inline std::size_t most_recordings_with_an_instant(std::size_t recordings) {
+  return std::max<std::size_t>(3 * recordings / 4, 1);
+}
+
 // Values with every local unknown at the best of a grid, all else as it is.
 Eigen::VectorXd scan_local_unknowns(const Evidence& evidence, const Hypothesis& hypothesis,
                                     const Eigen::VectorXd& values);
+// The same, with an instant in at most so many recordings.
+Eigen::VectorXd scan_local_unknowns(const Evidence& evidence, const Hypothesis& hypothesis,
+                                    const Eigen::VectorXd& values, std::size_t most_recordings);
 
 // Instants at which something happens in one recording; 0: not in this one. (Phases are the other kind.)
 bool is_instant(const Hypothesis& hypothesis, const Unknown& unknown);

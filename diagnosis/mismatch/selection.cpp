@@ -5,6 +5,7 @@
 #include <numeric>
 
 #include "diagnosis/mismatch/addition.hpp"
+#include "diagnosis/mismatch/freedom.hpp"
 #include "diagnosis/mismatch/gates.hpp"
 #include "diagnosis/mismatch/local_unknowns.hpp"
 #include "diagnosis/mismatch/parallel.hpp"
@@ -12,11 +13,12 @@
 namespace bevel::diagnosis {
 namespace {
 constexpr int kImprovements = 2;
-constexpr double kNoticeable = 0.5;      // chi2
-constexpr double kCorrectionChance = 4;  // mean gain of a correction of four knots under noise
+constexpr double kNoticeable = 0.5;  // chi2
 constexpr std::size_t kCorrectionsFitted = 3;
+constexpr std::size_t kShortlist = 12;  // effects fitted beside others
 constexpr int kLargestCorrections = 2;
 constexpr double kAtBound = 1.03;
+constexpr double kIncidental = 0.2;  // of what the curves beside it explain
 
 bool has_correction(const EffectSet& set) { return std::any_of(set.begin(), set.end(), is_correction); }
 
@@ -56,10 +58,8 @@ EffectSet without_member(const EffectSet& set, std::size_t index) {
 
 Selection::Selection(const Evidence& evidence, const Fit& base, const SelectionRules& rules, Progress progress)
     : evidence_(evidence), rules_(rules), progress_(std::move(progress)), corrections_(*evidence.recorded) {
-  known_[key_of({})] = {{}, std::make_shared<Fit>(base), 0};
+  known_[key_of({})] = {{}, std::make_shared<Fit>(base), 0, 0};
   library_ = make_library(base, members_of_library({}));
-  for (std::size_t e = 0; e < library_.candidates.size(); ++e)
-    chance_[member_key(library_.candidates[e].member)] = library_.chance.mean[e];
 }
 
 void Selection::say(const std::string& text) const {
@@ -94,40 +94,32 @@ Selection::Known& Selection::known(const EffectSet& set) {
   const auto fit =
       fit_addition(evidence_, *part.fit, dictionary[0], best_promises(dictionary[0], ground, rules_.starts_fitted));
   // A set that cannot be fitted is worth no more than its part.
-  if (!fit) return known_[key] = {part.set, part.fit, part.evidence};
-  return known_[key] = {set, fit, evidence_for(set, *fit)};
+  return known_[key] = fit ? judged(set, fit) : part;
 }
 
 std::shared_ptr<const Fit> Selection::fit_of(const EffectSet& set) { return known(set).fit; }
 double Selection::evidence_of(const EffectSet& set) { return known(set).evidence; }
-double Selection::preference_of(const EffectSet& set) {
-  const Known& now = known(set);
-  return now.evidence - price_of_names(*now.fit);
+double Selection::preference_of(const EffectSet& set) { return known(set).preference; }
+
+Selection::Known Selection::judged(const EffectSet& set, std::shared_ptr<const Fit> fit) const {
+  Known out{.set = set, .fit = std::move(fit)};
+  out.evidence = known_.at(key_of({})).fit->penalised - cost_of(*out.fit);
+  out.preference = out.evidence - price_of_freedom(*out.fit);
+  for (const auto& member : set) out.preference -= is_correction(member) ? kCurvePrice : kNamePrice;
+  return out;
 }
 
-double Selection::evidence_for(const EffectSet& set, const Fit& fit) const {
-  double cost = kInstantCost * instants_in_use(fit);
-  for (const auto& member : set) cost += is_correction(member) ? kCorrectionChance : chance_.at(member_key(member));
-  return known_.at(key_of({})).fit->penalised - fit.penalised - cost;
-}
-
-// Beyond what chance brings, which evidence_for() has taken off.
-double Selection::price_of_names(const Fit& fit) const {
-  const EffectSet& set = fit.hypothesis.set();
-  double price = 0;
-  for (std::size_t m = 0; m < set.size(); ++m) {
-    if (is_correction(set[m])) continue;
-    const auto& parameters = set[m].effect->parameters();
-    int count = 0;
-    for (std::size_t p = 0; p < parameters.size(); ++p) {
-      if (!set[m].fits(p) || parameters[p].scope != model::Scope::rig) continue;
-      ++count;
-      if (fit.hypothesis.parameter(fit.values, m, p) > parameters[p].largest_seen) price += kUnseenPrice;
-    }
-    const double whole = 1 + kParameterPrice * (count - 1);
-    price += std::max(0.0, whole - chance_.at(member_key(set[m])));
-  }
-  return price;
+// By what the linear model promises beyond chance.
+std::vector<std::size_t> Selection::most_promising(const Library& library, std::size_t count) {
+  std::vector<std::pair<double, std::size_t>> order;
+  for (std::size_t e = 0; e < library.candidates.size(); ++e)
+    for (const auto& promise : best_promises(library.candidates[e], library.ground, 1))
+      order.emplace_back(library.chance.mean[e] - promise.gain, e);
+  std::sort(order.begin(), order.end());
+  if (order.size() > count) order.resize(count);
+  std::vector<std::size_t> out;
+  for (const auto& [gain, e] : order) out.push_back(e);
+  return out;
 }
 
 // Some candidates of a library, each added to the set and fitted; what cannot be fitted is left out.
@@ -147,10 +139,12 @@ std::vector<Trial> Selection::try_beside(const EffectSet& set, const Library& li
   std::erase_if(trials, [](const Trial& trial) { return !trial.fit || has_no_period(*trial.fit); });
   for (Trial& trial : trials) {
     trial.gain = cost_of(*from) - cost_of(*trial.fit);
-    trial.evidence = evidence_for(trial.set, *trial.fit);
-    trial.preference = trial.evidence - price_of_names(*trial.fit);
+    const Known now = judged(trial.set, trial.fit);
+    trial.evidence = now.evidence;
+    trial.preference = now.preference;
+    trial.worth = now.preference - preference_of(set);
     Known& slot = known_[key_of(trial.set)];
-    if (!slot.fit || trial.evidence > slot.evidence) slot = {trial.set, trial.fit, trial.evidence};
+    if (!slot.fit || now.evidence > slot.evidence) slot = now;
   }
   std::stable_sort(trials.begin(), trials.end(),
                    [](const Trial& a, const Trial& b) { return a.preference > b.preference; });
@@ -166,8 +160,7 @@ bool Selection::improve(const EffectSet& set, const Trial& larger) {
       fit_beside_instants(evidence_, hypothesis, hypothesis.start_from(larger.fit->hypothesis, larger.fit->values)));
   const auto again = moved->valid ? from_other_sizes(evidence_, moved) : moved;
   if (!again->valid || cost_of(*again) > cost_of(*now.fit) - kNoticeable) return false;
-  now.fit = again;
-  now.evidence = evidence_for(set, *again);
+  now = judged(set, again);
   best_corrections_.erase(key_of(set));
   return true;
 }
@@ -182,7 +175,7 @@ const std::vector<Trial>& Selection::additions(const EffectSet& to) {
     const Library& library = to.empty() ? library_ : beside;
     std::vector<std::size_t> all(library.candidates.size());
     std::iota(all.begin(), all.end(), std::size_t{0});
-    trials = try_beside(to, library, all, rules_.starts_fitted);
+    trials = try_beside(to, library, to.empty() ? all : most_promising(library, kShortlist), rules_.starts_fitted);
     if (to.empty() || trials.empty() || !improve(to, trials.front())) break;
   }
   if (!trials.empty())
@@ -198,15 +191,7 @@ const Trial& Selection::best_correction(const EffectSet& beside) {
   std::vector<Member> members = corrections_.members();
   std::erase_if(members, [&](const Member& m) { return std::find(beside.begin(), beside.end(), m) != beside.end(); });
   const Library library = make_library(*known(beside).fit, members);
-  std::vector<std::pair<double, std::size_t>> order;
-  for (std::size_t e = 0; e < library.candidates.size(); ++e)
-    for (const auto& promise : best_promises(library.candidates[e], library.ground, 1))
-      order.emplace_back(-promise.gain, e);
-  std::sort(order.begin(), order.end());
-  if (order.size() > kCorrectionsFitted) order.resize(kCorrectionsFitted);
-  std::vector<std::size_t> most_promising;
-  for (const auto& [gain, e] : order) most_promising.push_back(e);
-  const auto trials = try_beside(beside, library, most_promising, 1);
+  const auto trials = try_beside(beside, library, most_promising(library, kCorrectionsFitted), 1);
   say("looked for what no effect explains beside " + describe(beside));
   return best_corrections_[key] = trials.empty() ? Trial{} : trials.front();
 }
@@ -222,14 +207,38 @@ Correction Selection::describe_correction(const EffectSet& set, std::size_t memb
   return out;
 }
 
-// Forward: the best effect that passes.
+// What the nameless curves of a set explain; nothing without one.
+double Selection::gain_of_corrections(const EffectSet& set) {
+  if (!has_correction(set)) return 0;
+  EffectSet names = set;
+  std::erase_if(names, is_correction);
+  return std::max(0.0, evidence_of(set) - evidence_of(names));
+}
+
+// Forward: the best effect that passes. Beside a curve, which is only roughly what it stands for, it also has to be
+// more than a detail of that.
 bool Selection::grow(EffectSet& set) {
   if (static_cast<int>(set.size()) >= rules_.largest_set) return false;
+  const double least = kIncidental * gain_of_corrections(set);
   for (const Trial& trial : additions(set))
-    if (trial.passes()) {
+    if (trial.passes() && trial.gain > least) {
       set = trial.set;
       return true;
     }
+  return false;
+}
+
+// One name beside nameless curves that leaves nothing over, and is better than a further curve.
+bool Selection::complete(EffectSet& set) {
+  const double least = kIncidental * gain_of_corrections(set);
+  for (const Trial& trial : additions(set)) {
+    if (!trial.passes() || trial.gain < least) continue;
+    if (examine_remains(evidence_, *trial.fit).structure_sigmas > kStructureSigmas) continue;
+    const Trial& nameless = best_correction(set);
+    if (nameless.fit && nameless.preference > trial.preference) return false;
+    set = trial.set;
+    return true;
+  }
   return false;
 }
 
@@ -266,19 +275,20 @@ bool Selection::shrink(EffectSet& set) {
 bool Selection::give_up_names(EffectSet& set) {
   const auto corrections = std::count_if(set.begin(), set.end(), is_correction);
   if (corrections >= kLargestCorrections) return false;
-  const auto beats = [&](const Trial& nameless, double margin) {
-    return nameless.fit && nameless.evidence > evidence_of(set) + margin;
+  const auto beats = [&](const Trial& nameless) {
+    if (nameless.fit)
+      say(describe(nameless.set) + " instead: worth " + std::to_string(std::lround(nameless.preference)) +
+          ", the names " + std::to_string(std::lround(preference_of(set))));
+    return nameless.fit && nameless.preference > preference_of(set);
   };
-  if (const Trial& alone = best_correction({});
-      set.size() > 1 && corrections == 0 &&
-      beats(alone, kNamelessMargin - kNamelessCredit * static_cast<double>(set.size() - 1))) {
+  if (const Trial& alone = best_correction({}); set.size() > 1 && corrections == 0 && beats(alone)) {
     set = alone.set;
     return true;
   }
   for (std::size_t m = 0; m < set.size(); ++m) {
     if (is_correction(set[m])) continue;
     const Trial& nameless = best_correction(without_member(set, m));
-    if (!beats(nameless, kNamelessMargin)) continue;
+    if (!beats(nameless)) continue;
     set = nameless.set;
     return true;
   }
@@ -290,7 +300,7 @@ bool Selection::give_up_names(EffectSet& set) {
   // what, even where it would not have been enough by itself.
   if (static_cast<int>(set.size()) < rules_.largest_set && corrections == 0)
     for (const Trial& named : additions(set))
-      if (named.gain > kVisibleSigmas * kVisibleSigmas && named.evidence > rest.evidence - kNamelessMargin) {
+      if (named.gain > kVisibleSigmas * kVisibleSigmas && named.preference > rest.preference) {
         set = named.set;
         return true;
       }
@@ -303,7 +313,7 @@ bool Selection::give_up_names(EffectSet& set) {
 bool Selection::far_from_any_name(const EffectSet& set) {
   if (set.size() < 2 || has_correction(set)) return false;
   const Trial& nameless = best_correction({});
-  return nameless.fit && nameless.evidence > evidence_of(set) + kNamelessMargin;
+  return nameless.fit && nameless.preference > preference_of(set);
 }
 
 EffectSet Selection::select() {
@@ -315,7 +325,7 @@ EffectSet Selection::select() {
       std::erase_if(nameless, [](const Member& member) { return !is_correction(member); });
       if (evidence_of(nameless) > 0.5 * evidence_of(now)) {
         now = nameless;
-        if (!give_up_names(now)) break;
+        if (!complete(now) && !give_up_names(now)) break;
         continue;
       }
     }
@@ -332,7 +342,7 @@ EffectSet Selection::select() {
 
 std::vector<std::pair<EffectSet, double>> Selection::visited() const {
   std::vector<std::pair<EffectSet, double>> all;
-  for (const auto& [key, known] : known_) all.emplace_back(known.set, known.evidence - price_of_names(*known.fit));
+  for (const auto& [key, known] : known_) all.emplace_back(known.set, known.preference);
   return all;
 }
 

@@ -16,15 +16,10 @@
 namespace bevel::diagnosis {
 
 inline constexpr double kVisibleSigmas = 5.0;
-// What each parameter of a name beyond its first has to gain: twice the logarithm of the range that it might have had,
-// in standard errors. Some twenty, as sizes are in the field.
-inline constexpr double kParameterPrice = 6.0;
-// Of a value that the effect's causes do not bring about.
-inline constexpr double kUnseenPrice = 6.0;
-// Evidence by which a nameless correction has to beat a named effect: it has more freedom, and there are many.
-inline constexpr double kNamelessMargin = 10.0;
-// Less for each name after the first: one curve that does the work of several names is the simpler account.
-inline constexpr double kNamelessCredit = 8.0;
+// Prior odds, in chi2, of one name out of some twenty, and of one nameless curve out of some sixty: something on no
+// list is about a third as likely as something on it.
+inline constexpr double kNamePrice = 6.0;
+inline constexpr double kCurvePrice = 10.0;
 // Slow structure left beside named effects, in standard deviations of what noise leaves, from which something remains.
 inline constexpr double kStructureSigmas = 4.0;
 
@@ -43,10 +38,11 @@ struct Trial {
   double gain = 0;        // fall of chi2 (belief included) against the set without the last member
   double chance = 0;      // mean of what noise brings
   double threshold = 0;   // exceeded by chance, over the library, in 1 of 100
-  double evidence = 0;    // against no effect at all
-  double preference = 0;  // among names: evidence, less what this set's names need beyond others
+  double evidence = 0;    // fall of chi2 against no effect at all
+  double preference = 0;  // evidence, less what the set's freedom is worth and its prior odds
+  double worth = 0;       // preference, less that of the set without the last member
   double limit() const { return std::max(threshold, chance + kVisibleSigmas * kVisibleSigmas); }
-  bool passes() const { return gain > limit(); }
+  bool passes() const { return gain > limit() && worth > 0; }
 };
 
 class Selection {
@@ -80,6 +76,7 @@ class Selection {
     EffectSet set;
     std::shared_ptr<const Fit> fit;
     double evidence = 0;
+    double preference = 0;
   };
   // Candidates beside a fit, as far as they have room, and what chance brings to each.
   struct Library {
@@ -88,15 +85,17 @@ class Selection {
     NullGains chance;
   };
   Library make_library(const Fit& from, std::vector<Member> members) const;
+  static std::vector<std::size_t> most_promising(const Library& library, std::size_t count);
   std::vector<Trial> try_beside(const EffectSet& set, const Library& library, const std::vector<std::size_t>& which,
                                 std::size_t starts);
   bool improve(const EffectSet& set, const Trial& larger);
   Known& known(const EffectSet& set);
   double evidence_of(const EffectSet& set);
-  double evidence_for(const EffectSet& set, const Fit& fit) const;
-  double price_of_names(const Fit& fit) const;
+  Known judged(const EffectSet& set, std::shared_ptr<const Fit> fit) const;
   void say(const std::string& text) const;
+  double gain_of_corrections(const EffectSet& set);
   bool grow(EffectSet& set);
+  bool complete(EffectSet& set);
   bool swap(EffectSet& set);
   bool shrink(EffectSet& set);
   bool give_up_names(EffectSet& set);
@@ -107,8 +106,7 @@ class Selection {
   Progress progress_;
   std::map<std::string, Known> known_;  // by sorted names
   std::map<std::string, std::vector<Trial>> additions_;
-  Library library_;                       // beside no effect
-  std::map<std::string, double> chance_;  // per member, at the base
+  Library library_;  // beside no effect
   CorrectionLibrary corrections_;
   std::map<std::string, Trial> best_corrections_;
 };

@@ -17,6 +17,7 @@ class BevelOffset final : public Effect {
                                 .upper = std::numbers::pi,
                                 .none = 0,
                                 .starts = {0.1},
+                                .reported = 0.6,
                                 .periodic = true}}}) {}
 
   void enter(Parameters p, EntryPose& pose) const override { pose.roll_rad += p[0]; }

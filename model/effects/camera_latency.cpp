@@ -10,7 +10,8 @@ class CameraLatency final : public Effect {
       : Effect({.name = "camera_latency",
                 .meaning = "pictures are stamped later than they were taken",
                 .covariate = Covariate::speed_mm_s,
-                .parameters = {{.name = "latency_s", .lower = 0, .upper = 1, .none = 0, .starts = {0.05}}}}) {}
+                .parameters = {
+                    {.name = "latency_s", .lower = 0, .upper = 1, .none = 0, .starts = {0.05}, .reported = 0.2}}}) {}
 
   Dual latency_s(Parameters p) const override { return p[0]; }
 };

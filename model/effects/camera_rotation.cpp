@@ -10,7 +10,12 @@ class CameraRotation final : public Effect {
       : Effect({.name = "camera_rotation",
                 .meaning = "the camera is turned about its optical axis",
                 .covariate = Covariate::depth_mm,
-                .parameters = {{.name = "about_x_rad", .lower = -0.5, .upper = 0.5, .none = 0, .starts = {0.01}}}}) {}
+                .parameters = {{.name = "about_x_rad",
+                                .lower = -0.5,
+                                .upper = 0.5,
+                                .none = 0,
+                                .starts = {0.01},
+                                .reported = 0.05}}}) {}
 
   void camera(Parameters p, Dual3& position_mm) const override {
     const Dual2 yz = turned({position_mm[1], position_mm[2]}, -p[0]);

@@ -10,7 +10,8 @@ class DepthDependence final : public Effect {
       : Effect({.name = "depth_dependence",
                 .meaning = "the curvature changes steadily with depth",
                 .covariate = Covariate::depth_mm,
-                .parameters = {{.name = "per_100mm", .lower = -2, .upper = 4, .none = 0, .starts = {0.3}}}}) {}
+                .parameters = {
+                    {.name = "per_100mm", .lower = -2, .upper = 4, .none = 0, .starts = {0.3}, .reported = 0.8}}}) {}
 
   void curvature(Parameters p, const LegView& leg, EffectMemory& /*memory*/, Dual2& kappa_per_mm) const override {
     const Dual z_mm = leg.tip_depth_mm + 0.5 * leg.insertion_mm * leg.heading_z;

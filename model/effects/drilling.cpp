@@ -7,12 +7,15 @@ namespace {
 class Drilling final : public Effect {
  public:
   Drilling()
-      : Effect(
-            {.name = "drilling",
-             .meaning = "turning while inserting drills the channel wider and the needle bends less",
-             .covariate = Covariate::turn_rate_rad_s,
-             .parameters = {{.name = "coefficient_mm_per_rad", .lower = 0, .upper = 50, .none = 0, .starts = {1.0}}}}) {
-  }
+      : Effect({.name = "drilling",
+                .meaning = "turning while inserting drills the channel wider and the needle bends less",
+                .covariate = Covariate::turn_rate_rad_s,
+                .parameters = {{.name = "coefficient_mm_per_rad",
+                                .lower = 0,
+                                .upper = 50,
+                                .none = 0,
+                                .starts = {1.0},
+                                .reported = 3}}}) {}
 
   void curvature(Parameters p, const LegView& leg, EffectMemory& /*memory*/, Dual2& kappa_per_mm) const override {
     if (leg.base_insertion_mm() == 0) return;

@@ -31,6 +31,7 @@ struct EffectParameter {
   double none;            // where the effect vanishes; NaN: it does not vanish by this parameter (a layer's depth)
   // Where fits begin: one value if the likelihood has one valley, a grid if several (a depth, a frequency).
   std::vector<double> starts;
+  double reported = 0;  // how far from `none` the field's reports reach; 0: nothing is known
   Scope scope = Scope::rig;
   bool periodic = false;   // an angle: the bounds are one period apart
   int half_turns = -1;     // periodic: the angle that has to turn by half of its own period when this one turns by one

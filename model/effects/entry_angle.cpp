@@ -10,8 +10,14 @@ class EntryAngle final : public Effect {
       : Effect({.name = "entry_angle",
                 .meaning = "the needle enters the tissue at an angle",
                 .covariate = Covariate::depth_mm,
-                .parameters = {{.name = "about_x_rad", .lower = -0.5, .upper = 0.5, .none = 0, .starts = {0.01}},
-                               {.name = "about_y_rad", .lower = -0.5, .upper = 0.5, .none = 0, .starts = {0.01}}}}) {}
+                .parameters = {
+                    {.name = "about_x_rad", .lower = -0.5, .upper = 0.5, .none = 0, .starts = {0.01}, .reported = 0.08},
+                    {.name = "about_y_rad",
+                     .lower = -0.5,
+                     .upper = 0.5,
+                     .none = 0,
+                     .starts = {0.01},
+                     .reported = 0.08}}}) {}
 
   void enter(Parameters p, EntryPose& pose) const override {
     pose.tilt_x_rad += p[0];

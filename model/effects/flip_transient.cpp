@@ -13,7 +13,8 @@ class FlipTransient final : public Effect {
       : Effect({.name = "flip_transient",
                 .meaning = "after a turn the needle takes a length of tissue to bend the new way",
                 .covariate = Covariate::since_reversal_mm,
-                .parameters = {{.name = "length_mm", .lower = 0, .upper = 60, .none = 0, .starts = {4, 10}}}}) {}
+                .parameters = {
+                    {.name = "length_mm", .lower = 0, .upper = 60, .none = 0, .starts = {4, 10}, .reported = 14}}}) {}
 
   void curvature(Parameters p, const LegView& leg, EffectMemory& memory, Dual2& kappa_per_mm) const override {
     const Dual& k = leg.curvature_per_mm;

@@ -10,7 +10,8 @@ class InsertionBacklash final : public Effect {
       : Effect({.name = "insertion_backlash",
                 .meaning = "the drive of the insertion has backlash",
                 .covariate = Covariate::since_reversal_mm,
-                .parameters = {{.name = "width_mm", .lower = 0, .upper = 10, .none = 0, .starts = {1.0}}}}) {}
+                .parameters = {
+                    {.name = "width_mm", .lower = 0, .upper = 10, .none = 0, .starts = {1.0}, .reported = 2}}}) {}
 
   void axes(Parameters p, const LegView& leg, EffectMemory& memory, Dual& insertion_mm,
             Dual& /*rotation_rad*/) const override {

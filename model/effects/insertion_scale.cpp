@@ -11,8 +11,13 @@ class InsertionScale final : public Effect {
       : Effect({.name = "insertion_scale",
                 .meaning = "the tip advances by a fixed share of what the drive does",
                 .covariate = Covariate::depth_mm,
-                .parameters = {
-                    {.name = "ratio", .lower = 0.3, .upper = 1.7, .none = 1, .starts = {0.95}, .largest_seen = 1}}}) {}
+                .parameters = {{.name = "ratio",
+                                .lower = 0.3,
+                                .upper = 1.7,
+                                .none = 1,
+                                .starts = {0.95},
+                                .reported = 0.15,
+                                .largest_seen = 1}}}) {}
 
   void axes(Parameters p, const LegView& leg, EffectMemory& /*memory*/, Dual& insertion_mm,
             Dual& /*rotation_rad*/) const override {

@@ -12,8 +12,14 @@ class LateralBias final : public Effect {
       : Effect({.name = "lateral_bias",
                 .meaning = "a constant sideways pull, fixed in space, bends the needle",
                 .covariate = Covariate::roll_rad,
-                .parameters = {{.name = "x_per_mm", .lower = -0.02, .upper = 0.02, .none = 0, .starts = {1e-4}},
-                               {.name = "y_per_mm", .lower = -0.02, .upper = 0.02, .none = 0, .starts = {1e-4}}}}) {}
+                .parameters = {
+                    {.name = "x_per_mm", .lower = -0.02, .upper = 0.02, .none = 0, .starts = {1e-4}, .reported = 0.002},
+                    {.name = "y_per_mm",
+                     .lower = -0.02,
+                     .upper = 0.02,
+                     .none = 0,
+                     .starts = {1e-4},
+                     .reported = 0.002}}}) {}
 
   void curvature(Parameters p, const LegView& leg, EffectMemory& /*memory*/, Dual2& kappa_per_mm) const override {
     const Dual2 pull = leg.lateral_in_body({-p[1], p[0]});

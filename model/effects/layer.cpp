@@ -13,7 +13,7 @@ class Layer final : public Effect {
              .covariate = Covariate::depth_mm,
              .parameters = {
                  {.name = "depth_mm", .lower = 0, .upper = 300, .none = kNoNone, .starts = starts_every(7.5, 7.5, 120)},
-                 {.name = "curvature_ratio", .lower = 0, .upper = 4, .none = 1, .starts = {0.8}}}}) {}
+                 {.name = "curvature_ratio", .lower = 0, .upper = 4, .none = 1, .starts = {0.8}, .reported = 0.8}}}) {}
 
   void curvature(Parameters p, const LegView& leg, EffectMemory& /*memory*/, Dual2& kappa_per_mm) const override {
     const Dual end_mm = leg.tip_depth_mm + leg.insertion_mm * leg.heading_z;

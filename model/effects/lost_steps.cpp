@@ -9,18 +9,24 @@ namespace {
 class LostSteps final : public Effect {
  public:
   LostSteps()
-      : Effect({.name = "lost_steps",
-                .meaning = "a motor lost steps that its counter did not see",
-                .covariate = Covariate::time_s,
-                .parameters = {
-                    {.name = "rotation_rad", .lower = -7, .upper = 7, .none = 0, .starts = {-1.6, -0.8, 0.8, 1.6}},
-                    {.name = "insertion_mm", .lower = -30, .upper = 30, .none = 0, .starts = {-3.0, 3.0}},
-                    {.name = "at_s",
-                     .lower = 0,
-                     .upper = 10000.0,
-                     .none = 0,
-                     .starts = {0.0},
-                     .scope = Scope::recording}}}) {}
+      : Effect(
+            {.name = "lost_steps",
+             .meaning = "a motor lost steps that its counter did not see",
+             .covariate = Covariate::time_s,
+             .parameters = {
+                 {.name = "rotation_rad",
+                  .lower = -7,
+                  .upper = 7,
+                  .none = 0,
+                  .starts = {-1.6, -0.8, 0.8, 1.6},
+                  .reported = 1.5},
+                 {.name = "insertion_mm", .lower = -30, .upper = 30, .none = 0, .starts = {-3.0, 3.0}, .reported = 3},
+                 {.name = "at_s",
+                  .lower = 0,
+                  .upper = 10000.0,
+                  .none = 0,
+                  .starts = {0.0},
+                  .scope = Scope::recording}}}) {}
 
   void axes(Parameters p, const LegView& leg, EffectMemory& /*memory*/, Dual& insertion_mm,
             Dual& rotation_rad) const override {

@@ -4,8 +4,9 @@ namespace bevel::model {
 namespace {
 
 // A membrane at z = depth: the tip stalls there while the base goes on by the indentation, then breaks through and
-// catches up: within kCatchUp_mm of the base, half of it before the indentation is reached and half after (less before
-// where the indentation is not much longer than that). Memory: how far the base was when the tip touched.
+// catches up: within kCatchUp_mm of the base, or within the indentation where that is shorter, half of it before the
+// indentation is reached and half after (less before where the indentation is not much longer). Memory: how far the
+// base was when the tip touched.
 class Puncture final : public Effect {
  public:
   Puncture()
@@ -17,7 +18,12 @@ class Puncture final : public Effect {
                                 .upper = 300,
                                 .none = kNoNone,
                                 .starts = starts_every(0.25, 0.25, 120)},
-                               {.name = "indentation_mm", .lower = 0, .upper = 15, .none = 0, .starts = {1.0}}}}) {}
+                               {.name = "indentation_mm",
+                                .lower = 0,
+                                .upper = 15,
+                                .none = 0,
+                                .starts = {0.3, 1.0},
+                                .reported = 5}}}) {}
 
   void axes(Parameters p, const LegView& leg, EffectMemory& memory, Dual& insertion_mm,
             Dual& /*rotation_rad*/) const override {
@@ -37,11 +43,12 @@ class Puncture final : public Effect {
     memory.slot[1] = insertion_mm;
     if (memory.phase != kTouching) return;
     const Dual pushed_mm = insertion_mm - touched_mm;
-    const Dual breaks_at_mm = p[1] * p[1] / (p[1] + 0.5 * kCatchUp_mm);
-    if (pushed_mm.value > breaks_at_mm.value + kCatchUp_mm) {
+    const Dual catch_up_mm = p[1].value < kCatchUp_mm ? p[1] : Dual(kCatchUp_mm);
+    const Dual breaks_at_mm = p[1] * p[1] / (p[1] + 0.5 * catch_up_mm);
+    if (pushed_mm.value > breaks_at_mm.value + catch_up_mm.value) {
       memory.phase = kThrough;
     } else if (pushed_mm.value > breaks_at_mm.value) {
-      insertion_mm = touched_mm + (pushed_mm - breaks_at_mm) * (breaks_at_mm + kCatchUp_mm) / kCatchUp_mm;
+      insertion_mm = touched_mm + (pushed_mm - breaks_at_mm) * (breaks_at_mm + catch_up_mm) / catch_up_mm;
     } else if (pushed_mm.value > 0) {
       insertion_mm = touched_mm;
     } else {

@@ -13,7 +13,8 @@ class RateDependence final : public Effect {
       : Effect({.name = "rate_dependence",
                 .meaning = "the curvature depends on the speed of insertion",
                 .covariate = Covariate::speed_mm_s,
-                .parameters = {{.name = "exponent", .lower = -1, .upper = 1, .none = 0, .starts = {0.1}}}}) {}
+                .parameters = {
+                    {.name = "exponent", .lower = -1, .upper = 1, .none = 0, .starts = {0.1}, .reported = 0.35}}}) {}
 
   void curvature(Parameters p, const LegView& leg, EffectMemory& /*memory*/, Dual2& kappa_per_mm) const override {
     if (leg.base_insertion_mm() == 0) return;

@@ -11,7 +11,7 @@ class Refraction final : public Effect {
                 .meaning = "light is bent at the window of the tissue",
                 .covariate = Covariate::depth_mm,
                 .parameters = {
-                    {.name = "coefficient", .lower = -0.3, .upper = 0.3, .none = 0, .starts = {0.02}},
+                    {.name = "coefficient", .lower = -0.3, .upper = 0.3, .none = 0, .starts = {0.02}, .reported = 0.04},
                     {.name = "centre_mm", .lower = -100, .upper = 300, .none = kNoNone, .starts = {0, 25, 50, 75}}}}) {}
 
   void camera(Parameters p, Dual3& position_mm) const override {

@@ -9,18 +9,23 @@ namespace {
 class Relaxation final : public Effect {
  public:
   Relaxation()
-      : Effect(
-            {.name = "relaxation",
-             .meaning = "the tissue pushes the tip aside while it cuts and lets go at rest",
-             .covariate = Covariate::since_stop_s,
-             .parameters = {{.name = "amplitude_mm", .lower = 0, .upper = 10, .none = 0, .starts = {0.8}},
-                            {.name = "tau_s", .lower = 0.1, .upper = 120, .none = kNoNone, .starts = {0.8, 2.5, 8.0}},
-                            {.name = "build_mm",
-                             .lower = 1,
-                             .upper = 15,
-                             .none = kNoNone,
-                             .starts = {kUsualBuild_mm},
-                             .usual = kUsualBuild_mm}}}) {}
+      : Effect({.name = "relaxation",
+                .meaning = "the tissue pushes the tip aside while it cuts and lets go at rest",
+                .covariate = Covariate::since_stop_s,
+                .parameters = {
+                    {.name = "amplitude_mm", .lower = 0, .upper = 10, .none = 0, .starts = {0.8}, .reported = 2},
+                    {.name = "tau_s",
+                     .lower = 0.1,
+                     .upper = 120,
+                     .none = kNoNone,
+                     .starts = {0.8, 2.5, 8.0},
+                     .reported = 20},
+                    {.name = "build_mm",
+                     .lower = 1,
+                     .upper = 15,
+                     .none = kNoNone,
+                     .starts = {kUsualBuild_mm},
+                     .usual = kUsualBuild_mm}}}) {}
 
   void settle(Parameters p, const LegView& leg, EffectMemory& memory) const override {
     memory.phase = 1;

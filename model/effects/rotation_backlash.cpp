@@ -10,7 +10,8 @@ class RotationBacklash final : public Effect {
       : Effect({.name = "rotation_backlash",
                 .meaning = "the drive of the rotation has backlash",
                 .covariate = Covariate::since_reversal_mm,
-                .parameters = {{.name = "width_rad", .lower = 0, .upper = 2, .none = 0, .starts = {0.3}}}}) {}
+                .parameters = {
+                    {.name = "width_rad", .lower = 0, .upper = 2, .none = 0, .starts = {0.3}, .reported = 0.6}}}) {}
 
   void axes(Parameters p, const LegView& leg, EffectMemory& memory, Dual& /*insertion_mm*/,
             Dual& rotation_rad) const override {

@@ -14,7 +14,7 @@ class TissueMotion final : public Effect {
                 .meaning = "tissue or camera swings periodically",
                 .covariate = Covariate::time_s,
                 .parameters = {
-                    {.name = "amplitude_mm", .lower = 0, .upper = 40, .none = 0, .starts = {0.4}},
+                    {.name = "amplitude_mm", .lower = 0, .upper = 40, .none = 0, .starts = {0.4}, .reported = 5},
                     {.name = "frequency_hz",
                      .lower = 0.1,
                      .upper = 2,

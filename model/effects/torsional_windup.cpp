@@ -9,10 +9,12 @@ namespace {
 class TorsionalWindup final : public Effect {
  public:
   TorsionalWindup()
-      : Effect({.name = "torsional_windup",
-                .meaning = "friction on the inserted shaft winds it up, so the tip turns late",
-                .covariate = Covariate::depth_mm,
-                .parameters = {{.name = "lag_at_100mm_rad", .lower = 0, .upper = 4, .none = 0, .starts = {0.4}}}}) {}
+      : Effect(
+            {.name = "torsional_windup",
+             .meaning = "friction on the inserted shaft winds it up, so the tip turns late",
+             .covariate = Covariate::depth_mm,
+             .parameters = {
+                 {.name = "lag_at_100mm_rad", .lower = 0, .upper = 4, .none = 0, .starts = {0.4}, .reported = 0.9}}}) {}
 
   void axes(Parameters p, const LegView& leg, EffectMemory& memory, Dual& insertion_mm,
             Dual& rotation_rad) const override {

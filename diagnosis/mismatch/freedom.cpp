@@ -1,0 +1,127 @@
+#include "diagnosis/mismatch/freedom.hpp"
+
+#include <Eigen/Cholesky>
+#include <algorithm>
+#include <cmath>
+#include <numbers>
+#include <vector>
+
+#include "diagnosis/mismatch/corrections.hpp"
+#include "diagnosis/mismatch/local_unknowns.hpp"
+
+namespace bevel::diagnosis {
+namespace {
+
+using Eigen::Index;
+using Eigen::MatrixXd;
+using Eigen::VectorXd;
+
+constexpr double kExpectedShare = 0.75;  // standard deviation of a size, of the largest that is reported
+constexpr double kTail = 4;              // degrees of freedom of Student's t
+constexpr double kKnotsHang = 2.0;       // knots over which a curve's values hang together
+constexpr double kUnseenPrice = 6.0;     // of a value that the effect's causes do not bring about
+
+// A flat expectation over a range has the volume of a normal one of this variance.
+double variance_of_range(double range) { return range * range / (2 * std::numbers::pi); }
+
+// How far a size may be expected from `none`.
+double expected_size(const model::EffectParameter& parameter) {
+  double reported = parameter.reported;
+  if (!(reported > 0)) {
+    reported = 0;
+    for (const double start : parameter.starts) reported = std::max(reported, 2 * std::abs(start - parameter.none));
+  }
+  return kExpectedShare * reported;
+}
+
+double surprise_of(double standard_deviations) {
+  return (kTail + 1) * std::log1p(standard_deviations * standard_deviations / kTail);
+}
+
+struct Expectation {
+  MatrixXd covariance;
+  double surprise = 0;
+};
+
+// Of the unknowns listed, in their order.
+Expectation expectation_of(const Fit& fit, const std::vector<Index>& which) {
+  const auto& hypothesis = fit.hypothesis;
+  const auto n = static_cast<Index>(which.size());
+  Expectation out{.covariance = MatrixXd::Zero(n, n)};
+  for (Index i = 0; i < n; ++i) {
+    const Unknown& u = hypothesis.unknowns()[static_cast<std::size_t>(which[static_cast<std::size_t>(i)])];
+    const Member& member = hypothesis.set()[static_cast<std::size_t>(u.member)];
+    if (is_correction(member)) continue;
+    const auto& parameter = member.effect->parameters()[static_cast<std::size_t>(u.parameter)];
+    const double value = fit.values[which[static_cast<std::size_t>(i)]];
+    if (parameter.periodic) {
+      out.covariance(i, i) = variance_of_range(u.upper - u.lower);
+    } else if (std::isnan(parameter.none)) {
+      const double low = *std::min_element(parameter.starts.begin(), parameter.starts.end());
+      const double high =
+          std::max(*std::max_element(parameter.starts.begin(), parameter.starts.end()), parameter.reported);
+      const double variance = variance_of_range(std::max(high - low, std::abs(high)));
+      out.covariance(i, i) = variance;
+      out.surprise += surprise_of(std::max({low - value, value - high, 0.0}) / std::sqrt(variance));
+    } else {
+      const double sd = expected_size(parameter);
+      out.covariance(i, i) = sd * sd;
+      out.surprise += surprise_of((value - parameter.none) / sd);
+      if (value > parameter.largest_seen) out.surprise += kUnseenPrice;
+      const bool one_sided = parameter.lower == parameter.none || parameter.largest_seen == parameter.none;
+      if (one_sided) out.surprise -= 2 * std::numbers::ln2;
+    }
+  }
+  // A curve: its knots together.
+  for (std::size_t m = 0; m < hypothesis.set().size(); ++m) {
+    if (!is_correction(hypothesis.set()[m])) continue;
+    std::vector<Index> knots;
+    for (Index i = 0; i < n; ++i)
+      if (hypothesis.unknowns()[static_cast<std::size_t>(which[static_cast<std::size_t>(i)])].member ==
+          static_cast<int>(m))
+        knots.push_back(i);
+    const auto count = static_cast<Index>(knots.size());
+    if (count == 0) continue;
+    VectorXd values(count);
+    MatrixXd hang(count, count);
+    for (Index a = 0; a < count; ++a) {
+      values[a] = fit.values[which[static_cast<std::size_t>(knots[static_cast<std::size_t>(a)])]];
+      for (Index b = 0; b < count; ++b) hang(a, b) = std::exp(-std::abs(static_cast<double>(a - b)) / kKnotsHang);
+    }
+    const double variance = std::max(values.dot(hang.llt().solve(values)) / static_cast<double>(count), 1e-30);
+    out.surprise += static_cast<double>(count);
+    for (Index a = 0; a < count; ++a)
+      for (Index b = 0; b < count; ++b)
+        out.covariance(knots[static_cast<std::size_t>(a)], knots[static_cast<std::size_t>(b)]) = variance * hang(a, b);
+  }
+  return out;
+}
+
+double log_determinant(const MatrixXd& matrix) { return matrix.ldlt().vectorD().array().max(1e-300).log().sum(); }
+
+}  // namespace
+
+double price_of_freedom(const Fit& fit) {
+  const auto& unknowns = fit.hypothesis.unknowns();
+  const MatrixXd whole = fit.covariance();
+  std::vector<Index> which;
+  for (std::size_t i = 0; i < unknowns.size(); ++i) {
+    const auto at = static_cast<Index>(i);
+    if (unknowns[i].member >= 0 && !is_instant(fit.hypothesis, unknowns[i]) && whole(at, at) > 0) which.push_back(at);
+  }
+  if (which.empty()) return 0;
+  const Expectation expected = expectation_of(fit, which);
+  const auto n = static_cast<Index>(which.size());
+  // In standard errors, so that parameters of all units can stand together.
+  MatrixXd found(n, n), either(n, n);
+  for (Index i = 0; i < n; ++i)
+    for (Index j = 0; j < n; ++j) {
+      const Index a = which[static_cast<std::size_t>(i)], b = which[static_cast<std::size_t>(j)];
+      const double scale = std::sqrt(whole(a, a) * whole(b, b));
+      found(i, j) = whole(a, b) / scale;
+      either(i, j) = found(i, j) + expected.covariance(i, j) / scale;
+    }
+  return log_determinant(either) - log_determinant(found) + expected.surprise;
+}
+
+}  // namespace bevel::diagnosis

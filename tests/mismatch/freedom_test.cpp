@@ -1,0 +1,100 @@
+// What a set's freedom is worth, against the integral that it approximates.
+#include "diagnosis/mismatch/freedom.hpp"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <numbers>
+
+#include "diagnosis/mismatch/corrections.hpp"
+#include "tests/mismatch/simulated_rig.hpp"
+
+namespace bevel::diagnosis {
+namespace {
+
+using testing::active;
+using testing::evidence_of;
+using testing::fit_of;
+using testing::member;
+using testing::record_case;
+using testing::SimulatedRig;
+
+// Whatever is left of the parameters once one is held, fitted.
+double least_chi2(const Evidence& evidence, const Fit& best, int unknown, double value) {
+  Eigen::VectorXd start = best.values;
+  start[unknown] = value;
+  return fit(evidence, best.hypothesis, start, {.held = {unknown}}).penalised;
+}
+
+TEST(PriceOfFreedom, IsNothingForNoEffect) {
+  const SimulatedRig rig{.recordings = 2};
+  const auto recorded = record_case(rig, 1);
+  EXPECT_EQ(price_of_freedom(fit_of(evidence_of(recorded, rig), {})), 0);
+}
+
+// -2 ln of the integral of exp(-chi2/2) over the width, by the trapezoid rule, with what may be expected of a width:
+// the positive half of Student's t with 4 degrees of freedom, its scale three quarters of the 0.6 rad that are reported
+// (its peak that of a normal distribution of this scale).
+TEST(PriceOfFreedom, IsThatOfTheIntegralOverAWidth) {
+  for (const double width_rad : {0.15, 0.5}) {
+    const SimulatedRig rig{.effects = {active("rotation_backlash", {width_rad})}};
+    const auto recorded = record_case(rig, 1);
+    const Evidence evidence = evidence_of(recorded, rig);
+    const Fit best = fit_of(evidence, {member("rotation_backlash")});
+    const double found = best.values[kBaseUnknowns];
+    const double sd = std::sqrt(best.covariance()(kBaseUnknowns, kBaseUnknowns));
+    constexpr double kScale = 0.45;
+    double integral = 0;
+    constexpr double kStep = 0.25;
+    for (double z = -5; z <= 5; z += kStep) {
+      const double value = found + z * sd;
+      if (value < 0) continue;
+      const double density =
+          2 / (kScale * std::sqrt(2 * std::numbers::pi)) * std::pow(1 + value * value / (4 * kScale * kScale), -2.5);
+      integral +=
+          kStep * sd * density * std::exp(-0.5 * (least_chi2(evidence, best, kBaseUnknowns, value) - best.penalised));
+    }
+    EXPECT_NEAR(price_of_freedom(best), -2 * std::log(integral), 0.3) << width_rad;
+  }
+}
+
+TEST(PriceOfFreedom, GrowsWithTheLogarithmOfTheReadings) {
+  double price[2];
+  int i = 0;
+  for (const double frame_s : {1.0 / 10, 1.0 / 30}) {
+    const SimulatedRig rig{.effects = {active("torsional_windup", {0.6})}, .frame_s = frame_s};
+    const auto recorded = record_case(rig, 1);
+    price[i++] = price_of_freedom(fit_of(evidence_of(recorded, rig), {member("torsional_windup")}));
+  }
+  EXPECT_NEAR(price[1] - price[0], std::log(3.0), 0.2);  // a standard error sqrt(3) smaller
+}
+
+// What fits equally well by two is worth less than by one; by a curve, less than by a name.
+TEST(PriceOfFreedom, OfMoreParametersIsMore) {
+  const SimulatedRig rig{.effects = {active("drilling", {2.0})}};
+  const auto recorded = record_case(rig, 1);
+  const Evidence evidence = evidence_of(recorded, rig);
+  const double one = price_of_freedom(fit_of(evidence, {member("drilling")}));
+  const double two = price_of_freedom(fit_of(evidence, {member("drilling"), member("entry_angle")}));
+  EXPECT_GT(two, one + 4);
+  const CorrectionLibrary curves(recorded);
+  for (const Member& curve : curves.members()) {
+    if (curve.effect->name() != "correction of the curvature toward the bevel by turn_rate_rad_s") continue;
+    EXPECT_GT(price_of_freedom(fit_of(evidence, {curve})), one + 2);
+  }
+}
+
+// Ten times what the field reports: dear, but not impossible.
+TEST(PriceOfFreedom, OfASizeThatNobodyReportsIsMore) {
+  const auto price_of = [](double x_rad) {
+    const SimulatedRig rig{.effects = {active("entry_angle", {x_rad, 0.02})}, .recordings = 2};
+    const auto recorded = record_case(rig, 1);
+    return price_of_freedom(fit_of(evidence_of(recorded, rig), {member("entry_angle")}));
+  };
+  const double usual = price_of(0.03), large = price_of(0.4);
+  EXPECT_GT(large, usual + 8);
+  EXPECT_LT(large, usual + 30);
+}
+
+}  // namespace
+}  // namespace bevel::diagnosis
