@@ -41,6 +41,7 @@ class Puncture final : public Effect {
       }
     }
     memory.slot[1] = insertion_mm;
+    if (memory.phase == kTouching && p[1].value <= 0) memory.phase = kThrough;  // no membrane
     if (memory.phase != kTouching) return;
     const Dual pushed_mm = insertion_mm - touched_mm;
     const Dual catch_up_mm = p[1].value < kCatchUp_mm ? p[1] : Dual(kCatchUp_mm);
