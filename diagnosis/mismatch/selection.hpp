@@ -2,8 +2,9 @@
 // Which effects are missing: full nonlinear fits of sets of effects, grown, shrunk and swapped until none is better.
 //
 // An effect enters when the fall of chi2 that it brings exceeds what the maximum over the whole library brings by
-// chance in 1 of 100 bootstrap draws, and when it is visible: kVisibleSigmas standard deviations above the mean of
-// chance. Sets are compared by evidence: the fall of chi2 less what chance brings to each member.
+// chance in 1 of 100 bootstrap draws, when it is visible (kVisibleSigmas standard deviations above the mean of chance),
+// and when it is worth its freedom. Sets are compared by preference: the fall of chi2 less what their freedom is worth
+// (freedom.hpp) and their prior odds.
 #include <algorithm>
 #include <functional>
 #include <map>
