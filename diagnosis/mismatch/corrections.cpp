@@ -77,18 +77,21 @@ class CorrectionEffect final : public model::Effect {
 
   void axes(Parameters p, const LegView& leg, EffectMemory& memory, Dual& insertion_mm,
             Dual& rotation_rad) const override {
-    if (info_.component == Component::advance) {
-      memory.slot[0] += line(p, covariate_of(leg, memory)) * leg.base_insertion_mm();
-      insertion_mm += memory.slot[0];
-    } else if (info_.component == Component::turning) {
-      memory.slot[0] += line(p, covariate_of(leg, memory)) * std::abs(leg.base_insertion_mm());
-      rotation_rad += memory.slot[0];
-    } else if (info_.component == Component::advance_turning) {
-      memory.slot[0] += line(p, covariate_of(leg, memory)) * leg.base_rotation_rad();
-      insertion_mm += memory.slot[0];
-    } else if (info_.component == Component::turning_turning) {
-      memory.slot[0] += line(p, covariate_of(leg, memory)) * leg.base_rotation_rad();
-      rotation_rad += memory.slot[0];
+    switch (info_.component) {
+      case Component::advance:
+        insertion_mm += summed(p, leg, memory, leg.base_insertion_mm());
+        break;
+      case Component::turning:
+        rotation_rad += summed(p, leg, memory, std::abs(leg.base_insertion_mm()));
+        break;
+      case Component::advance_turning:
+        insertion_mm += summed(p, leg, memory, leg.base_rotation_rad());
+        break;
+      case Component::turning_turning:
+        rotation_rad += summed(p, leg, memory, leg.base_rotation_rad());
+        break;
+      default:
+        break;
     }
   }
   void curvature(Parameters p, const LegView& leg, EffectMemory& memory, Dual2& kappa_per_mm) const override {
@@ -116,6 +119,11 @@ class CorrectionEffect final : public model::Effect {
  private:
   int axis() const {
     return info_.component >= Component::x ? static_cast<int>(info_.component) - static_cast<int>(Component::x) : -1;
+  }
+  // So much per mm or rad of the base, over all legs so far.
+  const Dual& summed(Parameters p, const LegView& leg, EffectMemory& memory, double base) const {
+    memory.slot[0] += line(p, covariate_of(leg, memory)) * base;
+    return memory.slot[0];
   }
   // slot[2] keeps where the tip last stopped or last turned.
   double covariate_of(const LegView& leg, EffectMemory& memory) const {

@@ -3,6 +3,7 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
 #include <numbers>
 
@@ -77,11 +78,13 @@ TEST(PriceOfFreedom, OfMoreParametersIsMore) {
   const double one = price_of_freedom(fit_of(evidence, {member("drilling")}));
   const double two = price_of_freedom(fit_of(evidence, {member("drilling"), member("entry_angle")}));
   EXPECT_GT(two, one + 4);
-  const CorrectionLibrary curves(recorded);
-  for (const Member& curve : curves.members()) {
-    if (curve.effect->name() != "correction of the curvature toward the bevel by turn_rate_rad_s") continue;
-    EXPECT_GT(price_of_freedom(fit_of(evidence, {curve})), one + 2);
-  }
+  const CorrectionLibrary library(recorded);
+  const std::vector<Member> curves = library.members();
+  const auto curve = std::find_if(curves.begin(), curves.end(), [](const Member& member) {
+    return member.effect->name() == "correction of the curvature toward the bevel by turn_rate_rad_s";
+  });
+  ASSERT_NE(curve, curves.end());
+  EXPECT_GT(price_of_freedom(fit_of(evidence, {*curve})), one + 2);
 }
 
 // Ten times what the field reports: dear, but not impossible.
