@@ -102,7 +102,7 @@ std::shared_ptr<const Fit> finished(const Evidence& evidence, std::shared_ptr<co
 
 std::shared_ptr<const Fit> from_other_sizes(const Evidence& evidence, std::shared_ptr<const Fit> best) {
   const Hypothesis hypothesis = best->hypothesis;
-  if (best->chi2 > kFarOff * static_cast<double>(best->count())) return best;
+  if (best->chi2 > kFarOff * static_cast<double>(best->count())) return finished(evidence, best);
   for (std::size_t m = 0; m < hypothesis.set().size(); ++m) {
     FitRules rules;
     bool jumps = false;
@@ -127,7 +127,7 @@ std::shared_ptr<const Fit> from_other_sizes(const Evidence& evidence, std::share
       }
     }
   }
-  return best;
+  return finished(evidence, best);
 }
 
 std::shared_ptr<const Fit> fit_addition(const Evidence& evidence, const Fit& from, const Candidate& candidate,
@@ -150,7 +150,7 @@ std::shared_ptr<const Fit> fit_addition(const Evidence& evidence, const Fit& fro
     if (one->valid && (!best || cost_of(*one) < cost_of(*best) - kSettled)) best = one;
   }
   if (candidate.local_may_be_off && best && cost_of(from) - cost_of(*best) > kWorthALook)
-    best = from_other_sizes(evidence, best);
+    return from_other_sizes(evidence, best);
   return best ? finished(evidence, best) : best;
 }
 

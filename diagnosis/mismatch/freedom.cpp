@@ -18,6 +18,7 @@ using Eigen::VectorXd;
 
 constexpr double kExpectedShare = 0.75;  // standard deviation of a size, of the largest that is reported
 constexpr double kTail = 4;              // degrees of freedom of Student's t
+constexpr double kOrdersBelow = 3;       // orders of magnitude of a size, below what is reported
 constexpr double kKnotsHang = 2.0;       // knots over which a curve's values hang together
 constexpr double kUnseenPrice = 6.0;     // of a value that the effect's causes do not bring about
 
@@ -34,8 +35,18 @@ double expected_size(const model::EffectParameter& parameter) {
   return kExpectedShare * reported;
 }
 
+// Of a value, against one that a normal expectation has at its middle.
 double surprise_of(double standard_deviations) {
   return (kTail + 1) * std::log1p(standard_deviations * standard_deviations / kTail);
+}
+
+// A size is as large as what is reported, or of any order below: rigs that are made well are reported least. Of the
+// second kind it is known no better than to its own error.
+double surprise_of_size(double standard_deviations, double known_to) {
+  const double size = std::max(std::abs(standard_deviations), known_to);
+  const double any_order = std::sqrt(2 * std::numbers::pi) / (2 * kOrdersBelow * std::numbers::ln10 * size);
+  const double reported = std::exp(-0.5 * surprise_of(standard_deviations));
+  return -2 * std::log(0.5 * (reported + (size * kExpectedShare < 1 ? any_order : 0)));
 }
 
 struct Expectation {
@@ -44,7 +55,7 @@ struct Expectation {
 };
 
 // Of the unknowns listed, in their order.
-Expectation expectation_of(const Fit& fit, const std::vector<Index>& which) {
+Expectation expectation_of(const Fit& fit, const MatrixXd& covariance, const std::vector<Index>& which) {
   const auto& hypothesis = fit.hypothesis;
   const auto n = static_cast<Index>(which.size());
   Expectation out{.covariance = MatrixXd::Zero(n, n)};
@@ -66,8 +77,10 @@ Expectation expectation_of(const Fit& fit, const std::vector<Index>& which) {
     } else {
       const double sd = expected_size(parameter);
       out.covariance(i, i) = sd * sd;
-      out.surprise += surprise_of((value - parameter.none) / sd);
-      if (value > parameter.largest_seen) out.surprise += kUnseenPrice;
+      const auto at = which[static_cast<std::size_t>(i)];
+      out.surprise += surprise_of_size((value - parameter.none) / sd, std::sqrt(covariance(at, at)) / sd);
+      if (value > parameter.largest_seen || std::abs(value - parameter.none) < parameter.smallest_seen)
+        out.surprise += kUnseenPrice;
       const bool one_sided = parameter.lower == parameter.none || parameter.largest_seen == parameter.none;
       if (one_sided) out.surprise -= 2 * std::numbers::ln2;
     }
@@ -110,7 +123,7 @@ double price_of_freedom(const Fit& fit) {
     if (unknowns[i].member >= 0 && !is_instant(fit.hypothesis, unknowns[i]) && whole(at, at) > 0) which.push_back(at);
   }
   if (which.empty()) return 0;
-  const Expectation expected = expectation_of(fit, which);
+  const Expectation expected = expectation_of(fit, whole, which);
   const auto n = static_cast<Index>(which.size());
   // In standard errors, so that parameters of all units can stand together.
   MatrixXd found(n, n), either(n, n);

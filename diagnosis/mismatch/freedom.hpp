@@ -8,8 +8,8 @@
 //             -2 ln p(readings | set) = chi2 + ln |I + P C^-1| + surprise
 //           with C the covariance of the members' parameters, the needle's integrated out, and P that of what may be
 //           expected of them: of a size, what the field reports (EffectParameter::reported; beyond it the surprise
-//           grows with the logarithm, Student's t); of a depth or a frequency, where fits look for it; of a curve, a
-//           smooth one of the size that it was found to have.
+//           grows with the logarithm, Student's t) or as likely any order of magnitude below that; of a depth or a
+//           frequency, where fits look for it; of a curve, a smooth one of the size that it was found to have.
 #include "diagnosis/mismatch/likelihood.hpp"
 
 namespace bevel::diagnosis {

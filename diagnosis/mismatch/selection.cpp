@@ -122,6 +122,22 @@ std::vector<std::size_t> Selection::most_promising(const Library& library, std::
   return out;
 }
 
+// All effects beside nothing; beside others the most promising, and those that the set was fitted with already, by
+// another way: how they stand beside it is asked too.
+std::vector<std::size_t> Selection::worth_fitting(const EffectSet& beside, const Library& library) const {
+  std::vector<std::size_t> all(library.candidates.size());
+  std::iota(all.begin(), all.end(), std::size_t{0});
+  if (beside.empty()) return all;
+  std::vector<std::size_t> out = most_promising(library, kShortlist);
+  EffectSet larger = beside;
+  larger.emplace_back();
+  for (const std::size_t e : all) {
+    larger.back() = library.candidates[e].member;
+    if (known_.contains(key_of(larger)) && std::find(out.begin(), out.end(), e) == out.end()) out.push_back(e);
+  }
+  return out;
+}
+
 // Some candidates of a library, each added to the set and fitted; what cannot be fitted is left out.
 std::vector<Trial> Selection::try_beside(const EffectSet& set, const Library& library,
                                          const std::vector<std::size_t>& which, std::size_t starts) {
@@ -153,14 +169,13 @@ std::vector<Trial> Selection::try_beside(const EffectSet& set, const Library& li
 
 // The fit of more may have come upon a better valley for the unknowns that both have: what the set gains there is not
 // the addition's.
-bool Selection::improve(const EffectSet& set, const Trial& larger) {
+bool Selection::improve(const EffectSet& set, const Fit& larger) {
   Known& now = known(set);
   const Hypothesis& hypothesis = now.fit->hypothesis;
   const auto moved = std::make_shared<Fit>(
-      fit_beside_instants(evidence_, hypothesis, hypothesis.start_from(larger.fit->hypothesis, larger.fit->values)));
-  const auto again = moved->valid ? from_other_sizes(evidence_, moved) : moved;
-  if (!again->valid || cost_of(*again) > cost_of(*now.fit) - kNoticeable) return false;
-  now = judged(set, again);
+      fit_beside_instants(evidence_, hypothesis, hypothesis.start_from(larger.hypothesis, larger.values)));
+  if (!moved->valid || cost_of(*moved) > cost_of(*now.fit) - kNoticeable) return false;
+  now = judged(set, from_other_sizes(evidence_, moved));
   best_corrections_.erase(key_of(set));
   return true;
 }
@@ -173,10 +188,8 @@ const std::vector<Trial>& Selection::additions(const EffectSet& to) {
     Library beside;
     if (!to.empty()) beside = make_library(*known(to).fit, members_of_library(to));
     const Library& library = to.empty() ? library_ : beside;
-    std::vector<std::size_t> all(library.candidates.size());
-    std::iota(all.begin(), all.end(), std::size_t{0});
-    trials = try_beside(to, library, to.empty() ? all : most_promising(library, kShortlist), rules_.starts_fitted);
-    if (to.empty() || trials.empty() || !improve(to, trials.front())) break;
+    trials = try_beside(to, library, worth_fitting(to, library), rules_.starts_fitted);
+    if (to.empty() || trials.empty() || !improve(to, *trials.front().fit)) break;
   }
   if (!trials.empty())
     say("tried every effect beside " + describe(to) + ": best " +
@@ -207,19 +220,19 @@ Correction Selection::describe_correction(const EffectSet& set, std::size_t memb
   return out;
 }
 
-// What the nameless curves of a set explain; nothing without one.
-double Selection::gain_of_corrections(const EffectSet& set) {
+// What a name has to bring beside a set. Beside a curve, which is only roughly what it stands for, it has to be more
+// than a detail of that: a share of what the set's curves explain.
+double Selection::least_gain_beside(const EffectSet& set) {
   if (!has_correction(set)) return 0;
   EffectSet names = set;
   std::erase_if(names, is_correction);
-  return std::max(0.0, evidence_of(set) - evidence_of(names));
+  return kIncidental * std::max(0.0, evidence_of(set) - evidence_of(names));
 }
 
-// Forward: the best effect that passes. Beside a curve, which is only roughly what it stands for, it also has to be
-// more than a detail of that.
+// Forward: the best effect that passes.
 bool Selection::grow(EffectSet& set) {
   if (static_cast<int>(set.size()) >= rules_.largest_set) return false;
-  const double least = kIncidental * gain_of_corrections(set);
+  const double least = least_gain_beside(set);
   for (const Trial& trial : additions(set))
     if (trial.passes() && trial.gain > least) {
       set = trial.set;
@@ -230,9 +243,9 @@ bool Selection::grow(EffectSet& set) {
 
 // One name beside nameless curves that leaves nothing over, and is better than a further curve.
 bool Selection::complete(EffectSet& set) {
-  const double least = kIncidental * gain_of_corrections(set);
+  const double least = least_gain_beside(set);
   for (const Trial& trial : additions(set)) {
-    if (!trial.passes() || trial.gain < least) continue;
+    if (!trial.passes() || trial.gain <= least) continue;
     if (examine_remains(evidence_, *trial.fit).structure_sigmas > kStructureSigmas) continue;
     const Trial& nameless = best_correction(set);
     if (nameless.fit && nameless.preference > trial.preference) return false;
@@ -260,10 +273,11 @@ bool Selection::shrink(EffectSet& set) {
   for (std::size_t m = 0; m < set.size() && set.size() > 1; ++m) {
     const EffectSet rest = without_member(set, m);
     if (is_correction(set[m])) continue;
+    if (improve(rest, *fit_of(set))) additions_.erase(key_of(rest));
     const auto& trials = additions(rest);
     const auto same =
         std::find_if(trials.begin(), trials.end(), [&](const Trial& t) { return key_of(t.set) == key_of(set); });
-    if (same == trials.end() || same->passes()) continue;
+    if (same == trials.end() || (same->passes() && same->gain > least_gain_beside(rest))) continue;
     set = rest;
     return true;
   }

@@ -18,9 +18,9 @@ namespace bevel::diagnosis {
 
 inline constexpr double kVisibleSigmas = 5.0;
 // Prior odds, in chi2, of one name out of some twenty, and of one nameless curve out of some sixty: something on no
-// list is about a third as likely as something on it.
+// list is about as likely as something on it.
 inline constexpr double kNamePrice = 6.0;
-inline constexpr double kCurvePrice = 10.0;
+inline constexpr double kCurvePrice = 8.0;
 // Slow structure left beside named effects, in standard deviations of what noise leaves, from which something remains.
 inline constexpr double kStructureSigmas = 4.0;
 
@@ -51,7 +51,7 @@ class Selection {
   using Progress = std::function<void(const std::string&)>;
   Selection(const Evidence& evidence, const Fit& base, const SelectionRules& rules, Progress progress = {});
 
-  // Every effect added to a set that can be fitted, best evidence first. Fitted once, then remembered.
+  // Effects added to a set, as many as are worth fitting, the best first. Fitted once, then remembered.
   const std::vector<Trial>& additions(const EffectSet& to);
   // The best set found. A correction among its members says that something is missing that no effect of the library
   // explains: it fits better than the best effect did, or something remains beside the effects.
@@ -87,14 +87,15 @@ class Selection {
   };
   Library make_library(const Fit& from, std::vector<Member> members) const;
   static std::vector<std::size_t> most_promising(const Library& library, std::size_t count);
+  std::vector<std::size_t> worth_fitting(const EffectSet& beside, const Library& library) const;
   std::vector<Trial> try_beside(const EffectSet& set, const Library& library, const std::vector<std::size_t>& which,
                                 std::size_t starts);
-  bool improve(const EffectSet& set, const Trial& larger);
+  bool improve(const EffectSet& set, const Fit& larger);
   Known& known(const EffectSet& set);
   double evidence_of(const EffectSet& set);
   Known judged(const EffectSet& set, std::shared_ptr<const Fit> fit) const;
   void say(const std::string& text) const;
-  double gain_of_corrections(const EffectSet& set);
+  double least_gain_beside(const EffectSet& set);
   bool grow(EffectSet& set);
   bool complete(EffectSet& set);
   bool swap(EffectSet& set);

@@ -36,7 +36,8 @@ struct EffectParameter {
   bool periodic = false;   // an angle: the bounds are one period apart
   int half_turns = -1;     // periodic: the angle that has to turn by half of its own period when this one turns by one
   bool frequency = false;  // in Hz: readings too far apart do not show it
-  double largest_seen = std::numeric_limits<double>::infinity();  // that the effect's causes bring about
+  double smallest_seen = 0;  // how far from `none` the effect's causes bring it at least
+  double largest_seen = std::numeric_limits<double>::infinity();  // the largest value that they bring about
   double usual = std::numeric_limits<double>::quiet_NaN();        // where a model file does not say; NaN: it has to
 };
 // Starts from first to last, evenly: as close as the effect is narrow, or a fit never finds it.

@@ -8,6 +8,7 @@
 #include <numbers>
 
 #include "diagnosis/mismatch/corrections.hpp"
+#include "diagnosis/mismatch/local_unknowns.hpp"
 #include "tests/mismatch/simulated_rig.hpp"
 
 namespace bevel::diagnosis {
@@ -34,10 +35,10 @@ TEST(PriceOfFreedom, IsNothingForNoEffect) {
 }
 
 // -2 ln of the integral of exp(-chi2/2) over the width, by the trapezoid rule, with what may be expected of a width:
-// the positive half of Student's t with 4 degrees of freedom, its scale three quarters of the 0.6 rad that are reported
-// (its peak that of a normal distribution of this scale).
+// to one half the positive half of Student's t with 4 degrees of freedom, its scale three quarters of the 0.6 rad that
+// are reported (its peak that of a normal distribution of this scale), to the other any of three orders of magnitude.
 TEST(PriceOfFreedom, IsThatOfTheIntegralOverAWidth) {
-  for (const double width_rad : {0.15, 0.5}) {
+  for (const double width_rad : {0.08, 0.15, 0.5, 0.8}) {
     const SimulatedRig rig{.effects = {active("rotation_backlash", {width_rad})}};
     const auto recorded = record_case(rig, 1);
     const Evidence evidence = evidence_of(recorded, rig);
@@ -50,8 +51,10 @@ TEST(PriceOfFreedom, IsThatOfTheIntegralOverAWidth) {
     for (double z = -5; z <= 5; z += kStep) {
       const double value = found + z * sd;
       if (value < 0) continue;
-      const double density =
+      const double reported =
           2 / (kScale * std::sqrt(2 * std::numbers::pi)) * std::pow(1 + value * value / (4 * kScale * kScale), -2.5);
+      const double any_order = value < 0.6 ? 1 / (std::log(1000.0) * value) : 0;
+      const double density = (reported + any_order) / 2;
       integral +=
           kStep * sd * density * std::exp(-0.5 * (least_chi2(evidence, best, kBaseUnknowns, value) - best.penalised));
     }
@@ -97,6 +100,26 @@ TEST(PriceOfFreedom, OfASizeThatNobodyReportsIsMore) {
   const double usual = price_of(0.03), large = price_of(0.4);
   EXPECT_GT(large, usual + 8);
   EXPECT_LT(large, usual + 30);
+}
+
+// A small size that causes bring about is no surprise; a motor that loses less than a cycle of its currents is.
+TEST(PriceOfFreedom, OfASizeThatCausesDoNotBringAboutIsMore) {
+  const auto price_of = [](double rotation_rad) {
+    constexpr double kAt_s = 3.0;
+    const SimulatedRig rig{.effects_in =
+                               [rotation_rad](int) {
+                                 return std::vector{active("lost_steps", {rotation_rad, 0, kAt_s})};
+                               },
+                           .recordings = 2};
+    const auto recorded = record_case(rig, 1);
+    const Evidence evidence = evidence_of(recorded, rig);
+    const Hypothesis hypothesis(rig.needle, {member("lost_steps", 0b101)}, recorded);
+    Eigen::VectorXd start = hypothesis.start();
+    start[hypothesis.find(0, 0)] = rotation_rad;
+    for (int r = 0; r < rig.recordings; ++r) start[hypothesis.find(0, 2, r)] = kAt_s;
+    return price_of_freedom(fit_beside_instants(evidence, hypothesis, start));
+  };
+  EXPECT_GT(price_of(0.1), price_of(0.2) + 3);
 }
 
 }  // namespace
