@@ -288,6 +288,10 @@ void conclude(Selection& selection, const Fit& base, const EffectSet& set, Findi
       findings.remarks.push_back(found.name +
                                  " is not certain by itself: that something is missing is shown by a nameless curve, "
                                  "which it explains nearly as well");
+    for (const FoundParameter& parameter : found.parameters)
+      if (parameter.at_bound)
+        findings.remarks.push_back(found.name + ": " + parameter.name +
+                                   " lies at the end of the range that fits allow; it is a limit, not a measurement");
     findings.effects.push_back(std::move(found));
   }
   const Remains remains = examine_remains(selection.evidence(), *fit);

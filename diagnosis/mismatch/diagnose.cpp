@@ -5,19 +5,16 @@
 #include <cmath>
 #include <limits>
 
+#include "diagnosis/mismatch/calibration.hpp"
 #include "diagnosis/mismatch/conclusions.hpp"
 #include "diagnosis/mismatch/gates.hpp"
-#include "diagnosis/mismatch/local_unknowns.hpp"
 #include "diagnosis/mismatch/location.hpp"
 #include "diagnosis/mismatch/selection.hpp"
 
 namespace bevel::diagnosis {
 namespace {
 
-constexpr double kNoiseSettled_share = 0.03;  // of sigma
-constexpr double kNoiseSettled_ar = 0.03;
 constexpr int kNoiseRounds = 3;
-constexpr int kOutlierRounds = 4;
 constexpr std::size_t kFewReadings = 40;
 
 class Stages {
@@ -41,35 +38,6 @@ class Stages {
   std::string stage_;
   std::chrono::steady_clock::time_point start_;
 };
-
-bool settled(const Calibration& one, const Calibration& again) {
-  const Noise &a = one.noise, &b = again.noise;
-  for (std::size_t c = 0; c < a.sigma_mm.size(); ++c)
-    if (std::abs(b.sigma_mm[c] / a.sigma_mm[c] - 1) > kNoiseSettled_share) return false;
-  return std::abs(a.ar1 - b.ar1) < kNoiseSettled_ar && std::abs(a.ar2 - b.ar2) < kNoiseSettled_ar &&
-         one.outliers == again.outliers;
-}
-
-// Noise and outliers beside a fit, and the fit without the outliers, until both agree: a fit that took an outlier for
-// a reading is pulled towards it, and hides it.
-Calibration calibrate_beside(const RecordedCase& original, const Evidence& evidence, Fit fitted) {
-  Evidence all = evidence, kept = evidence;
-  all.recorded = &original;
-  Calibration now = calibrate_noise(original, errors_of(all, fitted));
-  for (int round = 0; round < kOutlierRounds; ++round) {
-    const RecordedCase rest = without(original, now.outliers);
-    kept.recorded = &rest;
-    kept.noise = now.noise;
-    const Fit again = fit_beside_instants(kept, fitted.hypothesis, fitted.values);
-    if (!again.valid) break;
-    fitted = again;
-    const Calibration next = calibrate_noise(original, errors_of(all, fitted));
-    const bool agree = settled(now, next);
-    now = next;
-    if (agree) break;
-  }
-  return now;
-}
 
 // Leave-one-out, before and after, with the figures per recording.
 HeldOut hold_out(const Evidence& evidence, const Fit& before, const Fit& after, int threads) {

@@ -4,6 +4,7 @@
 
 #include <set>
 
+#include "diagnosis/mismatch/conclusions.hpp"
 #include "diagnosis/mismatch/diagnose.hpp"
 #include "tests/mismatch/simulated_rig.hpp"
 
@@ -11,8 +12,12 @@ namespace bevel::diagnosis {
 namespace {
 
 using testing::active;
+using ::testing::Contains;
+using testing::evidence_of;
+using testing::fit_of;
 using ::testing::HasSubstr;
 using ::testing::IsEmpty;
+using testing::member;
 using testing::record_case;
 using testing::SimulatedRig;
 
@@ -124,6 +129,19 @@ TEST(Diagnose, WhereNothingIsMissingSaysHowSmallItWouldHaveSeen) {
     }
   }
   EXPECT_GT(effects.size(), 18U);
+}
+
+TEST(Diagnose, SaysOfAValueAtTheEndOfItsRangeThatItIsNone) {
+  const SimulatedRig rig{.effects = {active("rate_dependence", {1.1})}, .recordings = 3, .frame_s = 0.1};
+  const auto recorded = record_case(rig, 1);
+  const Evidence evidence = evidence_of(recorded, rig);
+  const Fit base = fit_of(evidence, {});
+  Selection selection(evidence, base, {.bootstrap_draws = 200, .seed = 1});
+  Findings found;
+  conclude(selection, base, {member("rate_dependence")}, found, 2);
+  ASSERT_EQ(found.effects.size(), 1U);
+  EXPECT_EQ(found.effects[0].parameters[0].value, 1);  // the largest exponent that is fitted
+  EXPECT_THAT(found.remarks, Contains(HasSubstr("rate_dependence: exponent lies at the end")));
 }
 
 TEST(Diagnose, IsTheSameForOneThreadAndTwo) {
