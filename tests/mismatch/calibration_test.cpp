@@ -9,15 +9,8 @@
 
 #include "tests/mismatch/simulated_rig.hpp"
 
-namespace bevel::diagnosis {
+namespace bevel::diagnosis::testing {
 namespace {
-
-using testing::active;
-using testing::evidence_of;
-using testing::fit_of;
-using testing::member;
-using testing::record_case;
-using testing::SimulatedRig;
 
 // Readings that are an outlier to one and not to the other.
 std::size_t differences(const Calibration& one, const Calibration& other) {
@@ -83,4 +76,4 @@ TEST(Settled, IsTheSameOutliersAndNearlyTheSameNoise) {
 }
 
 }  // namespace
-}  // namespace bevel::diagnosis
+}  // namespace bevel::diagnosis::testing

@@ -8,18 +8,12 @@
 #include "diagnosis/mismatch/diagnose.hpp"
 #include "tests/mismatch/simulated_rig.hpp"
 
-namespace bevel::diagnosis {
+namespace bevel::diagnosis::testing {
 namespace {
 
-using testing::active;
 using ::testing::Contains;
-using testing::evidence_of;
-using testing::fit_of;
 using ::testing::HasSubstr;
 using ::testing::IsEmpty;
-using testing::member;
-using testing::record_case;
-using testing::SimulatedRig;
 
 Findings findings_of(const SimulatedRig& rig, std::uint64_t seed, int threads = 2) {
   DiagnosisOptions options;
@@ -175,7 +169,7 @@ TEST(Diagnose, IsTheSameForOneThreadAndTwo) {
 
 TEST(Diagnose, AModelThatCannotFollowIsRefused) {
   const auto recorded = record_case({.recordings = 2}, 1);
-  model::NeedleParameters model = testing::SimulatedRig{}.needle;
+  model::NeedleParameters model = SimulatedRig{}.needle;
   model.lambda1_per_rad = 0.3;  // by (26) allowed, but these turns lead out of the domain
   model.lambda2 = 0.9;
   try {
@@ -193,9 +187,9 @@ TEST(Diagnose, ReportsProgressAndStopsWhereProgressThrows) {
   options.progress = [&](const std::string&) {
     if (++stages == 2) throw std::runtime_error("stopped");
   };
-  EXPECT_THROW(diagnose(recorded, testing::SimulatedRig{}.needle, options), std::runtime_error);
+  EXPECT_THROW(diagnose(recorded, SimulatedRig{}.needle, options), std::runtime_error);
   EXPECT_EQ(stages, 2);
 }
 
 }  // namespace
-}  // namespace bevel::diagnosis
+}  // namespace bevel::diagnosis::testing

@@ -7,15 +7,8 @@
 #include "diagnosis/mismatch/selection.hpp"
 #include "tests/mismatch/simulated_rig.hpp"
 
-namespace bevel::diagnosis {
+namespace bevel::diagnosis::testing {
 namespace {
-
-using testing::active;
-using testing::evidence_of;
-using testing::fit_of;
-using testing::member;
-using testing::record_case;
-using testing::SimulatedRig;
 
 // Tissue that is softer than thought, as an effect: exactly what k stands for.
 class Softness final : public model::Effect {
@@ -88,7 +81,7 @@ TEST(Absorption, IsTheShareThatRefittingTheNeedleTakes) {
   SimulatedRig rig{.effects = {active("insertion_scale", {0.998})}};
   const Eigen::Vector3d sigma_mm = rig.sigma_mm;
   rig.sigma_mm *= 1e-9;
-  auto raw = testing::record(rig, 1);
+  auto raw = record(rig, 1);
   rig.sigma_mm = sigma_mm;
   const auto recorded = make_case(raw);
   Evidence evidence = evidence_of(recorded, rig);
@@ -167,7 +160,7 @@ TEST(VisiblePerUnit, FiveDeviationsGainTwentyFive) {
 TEST(VisiblePerUnit, OfWhatIsNotExcitedIsNothing) {
   // Straight in, at one speed: no turn, no reversal, no change of speed.
   SimulatedRig rig;
-  auto raw = testing::record(rig, 1);
+  auto raw = record(rig, 1);
   for (auto& recording : raw)
     for (auto& state : recording.actuators) {
       state.rotation_rad = 0;
@@ -237,4 +230,4 @@ TEST(Chance, IsThatOfItsSeedWhateverTheThreads) {
 }
 
 }  // namespace
-}  // namespace bevel::diagnosis
+}  // namespace bevel::diagnosis::testing

@@ -8,15 +8,8 @@
 #include "diagnosis/mismatch/experiments.hpp"
 #include "tests/mismatch/simulated_rig.hpp"
 
-namespace bevel::diagnosis {
+namespace bevel::diagnosis::testing {
 namespace {
-
-using testing::active;
-using testing::evidence_of;
-using testing::fit_of;
-using testing::member;
-using testing::record_case;
-using testing::SimulatedRig;
 
 TEST(MotionScripts, KeepToTheDepthAndTheRatesStated) {
   for (const double depth_mm : {40.0, 70.0, 123.0}) {
@@ -64,7 +57,7 @@ TEST(Separation, IsByHowMuchTheRivalRefittedIsWorse) {
   SimulatedRig rig{.effects = {active("drilling", {0.3})}, .recordings = 2, .frame_s = 0.1};
   const Eigen::Vector3d sigma_mm = rig.sigma_mm;
   rig.sigma_mm *= 1e-9;
-  auto raw = testing::record(rig, 1);
+  auto raw = record(rig, 1);
   rig.sigma_mm = sigma_mm;
   auto recorded = make_case(raw);
   const Evidence evidence = evidence_of(recorded, rig);
@@ -116,4 +109,4 @@ TEST(BestExperiment, ForDrillingTurnsWhileInserting) {
 }
 
 }  // namespace
-}  // namespace bevel::diagnosis
+}  // namespace bevel::diagnosis::testing

@@ -11,15 +11,8 @@
 #include "diagnosis/mismatch/local_unknowns.hpp"
 #include "tests/mismatch/simulated_rig.hpp"
 
-namespace bevel::diagnosis {
+namespace bevel::diagnosis::testing {
 namespace {
-
-using testing::active;
-using testing::evidence_of;
-using testing::fit_of;
-using testing::member;
-using testing::record_case;
-using testing::SimulatedRig;
 
 // Whatever is left of the parameters once one is held, fitted.
 double least_chi2(const Evidence& evidence, const Fit& best, int unknown, double value) {
@@ -123,4 +116,4 @@ TEST(PriceOfFreedom, OfASizeThatCausesDoNotBringAboutIsMore) {
 }
 
 }  // namespace
-}  // namespace bevel::diagnosis
+}  // namespace bevel::diagnosis::testing

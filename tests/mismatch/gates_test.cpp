@@ -5,15 +5,8 @@
 #include "diagnosis/mismatch/gates.hpp"
 #include "tests/mismatch/simulated_rig.hpp"
 
-namespace bevel::diagnosis {
+namespace bevel::diagnosis::testing {
 namespace {
-
-using testing::active;
-using testing::evidence_of;
-using testing::fit_of;
-using testing::member;
-using testing::record_case;
-using testing::SimulatedRig;
 
 double chi2_of(const Evidence& evidence, const Hypothesis& hypothesis, std::size_t r, const Eigen::VectorXd& values) {
   Workspace workspace;
@@ -82,7 +75,7 @@ TEST(LeaveOneOut, ARecordingThatLeavesTheDomainIsNotForetold) {
   // Two short straight insertions, and readings that say next to nothing: the fit stays where the belief is, and there
   // the third recording turns past where the slip law is defined.
   SimulatedRig rig{.recordings = 3};
-  auto raw = testing::record(rig, 4);
+  auto raw = record(rig, 4);
   for (std::size_t r = 0; r < 2; ++r)
     for (auto& state : raw[r].actuators) state.insertion_mm *= 0.05, state.rotation_rad = 0;
   const auto recorded = make_case(raw);
@@ -136,4 +129,4 @@ TEST(Remains, ShowPhysicsThatIsLeftOut) {
 }
 
 }  // namespace
-}  // namespace bevel::diagnosis
+}  // namespace bevel::diagnosis::testing

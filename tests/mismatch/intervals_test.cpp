@@ -5,15 +5,8 @@
 #include "diagnosis/mismatch/intervals.hpp"
 #include "tests/mismatch/simulated_rig.hpp"
 
-namespace bevel::diagnosis {
+namespace bevel::diagnosis::testing {
 namespace {
-
-using testing::active;
-using testing::evidence_of;
-using testing::fit_of;
-using testing::member;
-using testing::record_case;
-using testing::SimulatedRig;
 
 TEST(Profile, OfANearlyLinearParameterIsTheNormalInterval) {
   const SimulatedRig rig{.effects = {active("camera_scale", {1.02}), active("entry_angle", {0.03, -0.01})}};
@@ -123,4 +116,4 @@ TEST(ProfileInstant, HoldsTheTrueInstant) {
 }
 
 }  // namespace
-}  // namespace bevel::diagnosis
+}  // namespace bevel::diagnosis::testing

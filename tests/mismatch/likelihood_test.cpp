@@ -6,15 +6,8 @@
 
 #include "tests/mismatch/simulated_rig.hpp"
 
-namespace bevel::diagnosis {
+namespace bevel::diagnosis::testing {
 namespace {
-
-using testing::active;
-using testing::evidence_of;
-using testing::fit_of;
-using testing::member;
-using testing::record_case;
-using testing::SimulatedRig;
 
 struct Hypothetical {
   std::string what;
@@ -102,8 +95,8 @@ INSTANTIATE_TEST_SUITE_P(
 
 TEST(Hypothesis, FindsItsUnknownsAndCarriesValuesOver) {
   const auto recorded = record_case({}, 1);
-  const Hypothesis one(testing::SimulatedRig{}.needle, {member("drilling")}, recorded);
-  const Hypothesis two(testing::SimulatedRig{}.needle, {member("lost_steps", 0b101), member("drilling")}, recorded);
+  const Hypothesis one(SimulatedRig{}.needle, {member("drilling")}, recorded);
+  const Hypothesis two(SimulatedRig{}.needle, {member("lost_steps", 0b101), member("drilling")}, recorded);
   EXPECT_EQ(one.size(), 4);
   EXPECT_EQ(two.size(), 3 + 1 + 4 + 1);
   EXPECT_EQ(two.find(0, 1), -1) << "the axis that does not stall is not fitted";
@@ -119,8 +112,7 @@ TEST(Hypothesis, FindsItsUnknownsAndCarriesValuesOver) {
 
 TEST(Hypothesis, HoldsItsBounds) {
   const auto recorded = record_case({}, 1);
-  const Hypothesis hypothesis(testing::SimulatedRig{}.needle, {member("rotation_backlash"), member("bevel_offset")},
-                              recorded);
+  const Hypothesis hypothesis(SimulatedRig{}.needle, {member("rotation_backlash"), member("bevel_offset")}, recorded);
   Eigen::VectorXd values = hypothesis.start();
   values[hypothesis.find(0, 0)] = -0.2;
   values[hypothesis.find(1, 0)] = 4.0;
@@ -175,7 +167,7 @@ TEST(Hypothesis, OfTooManyUnknownsIsRefused) {
   EXPECT_FALSE(can_be_fitted(many));
   EXPECT_TRUE(can_be_fitted({many.begin(), many.end() - 2})) << "16 of 16";
   try {
-    const Hypothesis hypothesis(testing::SimulatedRig{}.needle, many, recorded);
+    const Hypothesis hypothesis(SimulatedRig{}.needle, many, recorded);
     FAIL() << "taken";
   } catch (const std::invalid_argument& e) {
     EXPECT_THAT(e.what(), ::testing::HasSubstr("at most 16"));
@@ -266,4 +258,4 @@ TEST(Fit, LeavesOutRecordingsThatAreNotUsed) {
 }
 
 }  // namespace
-}  // namespace bevel::diagnosis
+}  // namespace bevel::diagnosis::testing

@@ -8,10 +8,8 @@
 
 #include "tests/mismatch/simulated_rig.hpp"
 
-namespace bevel::diagnosis {
+namespace bevel::diagnosis::testing {
 namespace {
-
-using testing::coloured_noise;
 
 constexpr double kFrame_s = 1.0 / 30;
 
@@ -338,4 +336,4 @@ TEST(Without, DropsThoseReadingsAndKeepsTheRestInOrder) {
 }
 
 }  // namespace
-}  // namespace bevel::diagnosis
+}  // namespace bevel::diagnosis::testing

@@ -6,13 +6,11 @@
 
 #include "tests/mismatch/simulated_rig.hpp"
 
-namespace bevel::diagnosis {
+namespace bevel::diagnosis::testing {
 namespace {
 
 using ::testing::AllOf;
 using ::testing::HasSubstr;
-using testing::record;
-using testing::SimulatedRig;
 
 std::vector<RawRecording> with_information(const std::function<Eigen::Matrix3d(std::size_t)>& of) {
   auto raw = record({.recordings = 2}, 1);
@@ -202,4 +200,4 @@ TEST(Covariates, OfAMotionMadeByHand) {
 }
 
 }  // namespace
-}  // namespace bevel::diagnosis
+}  // namespace bevel::diagnosis::testing

@@ -6,18 +6,12 @@
 #include "diagnosis/mismatch/selection.hpp"
 #include "tests/mismatch/simulated_rig.hpp"
 
-namespace bevel::diagnosis {
+namespace bevel::diagnosis::testing {
 namespace {
 
-using testing::active;
 using ::testing::Contains;
-using testing::evidence_of;
-using testing::fit_of;
 using ::testing::IsEmpty;
-using testing::member;
 using ::testing::Not;
-using testing::record_case;
-using testing::SimulatedRig;
 using ::testing::UnorderedElementsAre;
 
 constexpr int kDraws = 200;
@@ -239,4 +233,4 @@ TEST(ProbabilityOf, IsTheShareOfTheSetsThatHaveIt) {
 }
 
 }  // namespace
-}  // namespace bevel::diagnosis
+}  // namespace bevel::diagnosis::testing
