@@ -26,14 +26,12 @@ Calibration calibrate_beside(const RecordedCase& original, const Evidence& evide
   for (int round = 0; round < kRounds; ++round) {
     const RecordedCase rest = without(original, now.outliers);
     kept.recorded = &rest;
-    kept.noise = now.noise;
     const Fit again = fit_beside_instants(kept, fitted.hypothesis, fitted.values);
     if (!again.valid) break;
     fitted = again;
-    const Calibration next = calibrate_noise(original, errors_of(all, fitted));
-    const bool agree = settled(now, next);
-    now = next;
-    if (agree) break;
+    const auto before = now.outliers;
+    now = calibrate_noise(original, errors_of(all, fitted));
+    if (now.outliers == before) break;
   }
   return now;
 }

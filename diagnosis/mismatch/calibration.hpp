@@ -1,10 +1,11 @@
 #pragma once
-// The cameras' noise and outliers beside an explanation, settled together with its fit.
+// The cameras' noise and outliers beside an explanation.
 //
 // Problem   a fit that took an outlier for a reading is pulled towards it, and hides it; one that missed a jump by a
-//           frame has the readings at the jump for outliers, and stays where it is. Measured once, noise and outliers
-//           are those of the wrong fit.
-// Solution  noise of the fit, the fit without its outliers, noise again, until neither changes.
+//           frame has the readings at the jump for outliers, and stays where it is. Measured once, outliers are those
+//           of the wrong fit.
+// Solution  outliers of the fit, the fit without them, outliers again, until they stay. The noise by which fits are
+//           weighed stays as it was meanwhile: settled together with them, it swallows what is not explained.
 #include "diagnosis/mismatch/likelihood.hpp"
 
 namespace bevel::diagnosis {

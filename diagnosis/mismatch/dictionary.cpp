@@ -4,7 +4,6 @@
 #include <Eigen/QR>
 #include <algorithm>
 #include <cmath>
-#include <functional>
 #include <numeric>
 
 #include "diagnosis/mismatch/local_unknowns.hpp"
@@ -197,8 +196,14 @@ Promise promise_of_choices(const Candidate& candidate, const Signature& signatur
     }
     // An instant in nearly all recordings is no accident.
     if (candidate.local_may_be_off) {
-      std::sort(gains.begin(), gains.end(), std::greater<>());
-      gains.resize(most_recordings_with_an_instant(recordings));
+      std::vector<std::size_t> by_gain(recordings);
+      std::iota(by_gain.begin(), by_gain.end(), std::size_t{0});
+      std::stable_sort(by_gain.begin(), by_gain.end(),
+                       [&gains](std::size_t a, std::size_t b) { return gains[a] > gains[b]; });
+      for (std::size_t i = most_recordings_with_an_instant(recordings); i < recordings; ++i) {
+        gains[by_gain[i]] = 0;
+        if (chosen) (*chosen)[by_gain[i]] = 0;
+      }
     }
     return std::accumulate(gains.begin(), gains.end(), 0.0);
   };

@@ -8,6 +8,7 @@
 #include "diagnosis/mismatch/freedom.hpp"
 #include "diagnosis/mismatch/gates.hpp"
 #include "diagnosis/mismatch/local_unknowns.hpp"
+#include "diagnosis/mismatch/pairs.hpp"
 #include "diagnosis/mismatch/parallel.hpp"
 
 namespace bevel::diagnosis {
@@ -17,6 +18,7 @@ constexpr double kNoticeable = 0.5;  // chi2
 constexpr std::size_t kCorrectionsFitted = 3;
 constexpr std::size_t kShortlist = 12;  // effects fitted beside others
 constexpr int kLargestCorrections = 2;
+constexpr std::size_t kPairs = 8;  // of effects, fitted before names are given up
 constexpr double kAtBound = 1.03;
 constexpr double kIncidental = 0.2;  // of what the curves beside it explain
 
@@ -284,6 +286,21 @@ bool Selection::shrink(EffectSet& set) {
   return false;
 }
 
+// Before names are given up: a pair of which neither is the best alone, once.
+bool Selection::find_pair(EffectSet& set) {
+  if (pairs_tried_) return false;
+  pairs_tried_ = true;
+  EffectSet best = set;
+  for (const auto& [one, other] : best_pairs(library_.candidates, library_.ground, kPairs)) {
+    const EffectSet pair = {library_.candidates[one].member, library_.candidates[other].member};
+    if (preference_of(pair) > preference_of(best)) best = pair;
+  }
+  say("tried pairs: best " + describe(best) + ", worth " + std::to_string(std::lround(preference_of(best))));
+  if (key_of(best) == key_of(set)) return false;
+  set = best;
+  return true;
+}
+
 // A name has to fit better than a nameless curve in its place: an effect that is on no list often looks somewhat like
 // one that is, or like several together.
 bool Selection::give_up_names(EffectSet& set) {
@@ -296,14 +313,14 @@ bool Selection::give_up_names(EffectSet& set) {
     return nameless.fit && nameless.preference > preference_of(set);
   };
   if (const Trial& alone = best_correction({}); set.size() > 1 && corrections == 0 && beats(alone)) {
-    set = alone.set;
+    if (!find_pair(set)) set = alone.set;
     return true;
   }
   for (std::size_t m = 0; m < set.size(); ++m) {
     if (is_correction(set[m])) continue;
     const Trial& nameless = best_correction(without_member(set, m));
     if (!beats(nameless)) continue;
-    set = nameless.set;
+    if (corrections > 0 || !find_pair(set)) set = nameless.set;
     return true;
   }
   // Nothing of the library passes any more: is what remains noise?
@@ -345,7 +362,7 @@ EffectSet Selection::select() {
     }
     const bool grown = grow(now);
     if (grown && far_from_any_name(now)) {
-      now = best_correction({}).set;
+      if (!find_pair(now)) now = best_correction({}).set;
       continue;
     }
     const bool exchanged = swap(now) || shrink(now);

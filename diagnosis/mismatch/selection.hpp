@@ -100,6 +100,7 @@ class Selection {
   bool complete(EffectSet& set);
   bool swap(EffectSet& set);
   bool shrink(EffectSet& set);
+  bool find_pair(EffectSet& set);
   bool give_up_names(EffectSet& set);
   bool far_from_any_name(const EffectSet& set);
 
@@ -109,6 +110,7 @@ class Selection {
   std::map<std::string, Known> known_;  // by sorted names
   std::map<std::string, std::vector<Trial>> additions_;
   Library library_;  // beside no effect
+  bool pairs_tried_ = false;
   CorrectionLibrary corrections_;
   std::map<std::string, Trial> best_corrections_;
 };

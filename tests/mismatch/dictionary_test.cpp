@@ -2,6 +2,8 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <algorithm>
+
 #include "diagnosis/mismatch/addition.hpp"
 #include "diagnosis/mismatch/dictionary.hpp"
 #include "diagnosis/mismatch/selection.hpp"
@@ -136,6 +138,29 @@ TEST(Promise, OfAnEffectThatCannotBeNegativeIsNoneWhereItWouldBe) {
   ASSERT_EQ(dictionary[0].signatures.size(), 1U);
   EXPECT_GT(promise_of(dictionary[0], dictionary[0].signatures[0], with.ground, with.ground.residual).gain, 25);
   EXPECT_EQ(promise_of(dictionary[0], dictionary[0].signatures[0], with.ground, -with.ground.residual).gain, 0);
+}
+
+// What happens in every recording is no accident: a fit does not begin there.
+TEST(Promise, OfInstantsIsOfThreeRecordingsInFour) {
+  const SimulatedRig rig{.effects_in =
+                             [](int r) {
+                               return std::vector{active("lost_steps", {1.0, 0, 1.5 + 0.3 * r})};
+                             },
+                         .recordings = 4};
+  const auto recorded = record_case(rig, 1);
+  const Evidence evidence = evidence_of(recorded, rig);
+  const Fit base = fit_of(evidence, {});
+  const Ground ground = make_ground(evidence, base);
+  const auto dictionary = make_dictionary(evidence, base, ground, {member("lost_steps", 0b101)}, 2);
+  const auto promises = best_promises(dictionary[0], ground, 3);
+  ASSERT_FALSE(promises.empty());
+  for (const Promise& promise : promises) {
+    ASSERT_EQ(promise.local_by_recording.size(), 4U);
+    EXPECT_LE(std::count_if(promise.local_by_recording.begin(), promise.local_by_recording.end(),
+                            [](double at_s) { return at_s > 0; }),
+              3);
+  }
+  EXPECT_GT(promises.front().gain, 100);
 }
 
 TEST(VisiblePerUnit, FiveDeviationsGainTwentyFive) {

@@ -3,6 +3,7 @@
 #include <gtest/gtest.h>
 
 #include "diagnosis/mismatch/conclusions.hpp"
+#include "diagnosis/mismatch/pairs.hpp"
 #include "diagnosis/mismatch/selection.hpp"
 #include "tests/mismatch/simulated_rig.hpp"
 
@@ -167,6 +168,30 @@ TEST(Select, ANameBesideACurveWhereItLeavesNothingOver) {
   const auto found = select({.effects = {active("insertion_backlash", {1.5})}, .true_motion = screw}, 1);
   EXPECT_TRUE(found.nameless) << found.described;
   EXPECT_THAT(found.names, UnorderedElementsAre("insertion_backlash")) << found.described;
+}
+
+// Slip along the tilt instead of the bevel, and a bevel that is followed late: alone each looks least like both.
+const SimulatedRig kTwoThatHideEachOther{
+    .effects = {active("flip_transient", {5.0}), active("slip_direction", {})}, .recordings = 5, .frame_s = 0.1};
+
+TEST(BestPairs, BeginWithTheTwoThatAreThere) {
+  const auto recorded = record_case(kTwoThatHideEachOther, 1);
+  const Evidence evidence = evidence_of(recorded, kTwoThatHideEachOther);
+  const Fit base = fit_of(evidence, {});
+  const Ground ground = make_ground(evidence, base);
+  const auto candidates = make_dictionary(evidence, base, ground, members_of_library({}), 2);
+  const auto pairs = best_pairs(candidates, ground, 5);
+  ASSERT_EQ(pairs.size(), 5U);
+  std::vector<std::string> names;
+  for (const std::size_t i : pairs.front()) names.emplace_back(candidates[i].member.effect->name());
+  EXPECT_THAT(names, UnorderedElementsAre("flip_transient", "slip_direction"));
+  for (const auto& [one, other] : pairs) EXPECT_NE(one, other);
+}
+
+TEST(Select, TwoThatHideEachOther) {
+  const auto found = select(kTwoThatHideEachOther, 1);
+  EXPECT_THAT(found.names, UnorderedElementsAre("flip_transient", "slip_direction")) << found.described;
+  EXPECT_FALSE(found.nameless);
 }
 
 // Bitwise the same, in everything that is reported of the trials.
