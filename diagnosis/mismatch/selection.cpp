@@ -293,7 +293,8 @@ bool Selection::find_pair(EffectSet& set) {
   EffectSet best = set;
   for (const auto& [one, other] : best_pairs(library_.candidates, library_.ground, kPairs)) {
     const EffectSet pair = {library_.candidates[one].member, library_.candidates[other].member};
-    if (preference_of(pair) > preference_of(best)) best = pair;
+    const bool fitted = fit_of(pair)->hypothesis.set().size() == pair.size();
+    if (fitted && preference_of(pair) > preference_of(best)) best = pair;
   }
   say("tried pairs: best " + describe(best) + ", worth " + std::to_string(std::lround(preference_of(best))));
   if (key_of(best) == key_of(set)) return false;
