@@ -307,22 +307,22 @@ bool Selection::find_pair(EffectSet& set) {
 bool Selection::give_up_names(EffectSet& set) {
   const auto corrections = std::count_if(set.begin(), set.end(), is_correction);
   if (corrections >= kLargestCorrections) return false;
+  const auto give_way = [&](const Trial& nameless) {
+    if (corrections > 0 || !find_pair(set)) set = nameless.set;
+    return true;
+  };
   const auto beats = [&](const Trial& nameless) {
     if (nameless.fit)
       say(describe(nameless.set) + " instead: worth " + std::to_string(std::lround(nameless.preference)) +
           ", the names " + std::to_string(std::lround(preference_of(set))));
     return nameless.fit && nameless.preference > preference_of(set);
   };
-  if (const Trial& alone = best_correction({}); set.size() > 1 && corrections == 0 && beats(alone)) {
-    if (!find_pair(set)) set = alone.set;
-    return true;
-  }
+  if (const Trial& alone = best_correction({}); set.size() > 1 && corrections == 0 && beats(alone))
+    return give_way(alone);
   for (std::size_t m = 0; m < set.size(); ++m) {
     if (is_correction(set[m])) continue;
     const Trial& nameless = best_correction(without_member(set, m));
-    if (!beats(nameless)) continue;
-    if (corrections > 0 || !find_pair(set)) set = nameless.set;
-    return true;
+    if (beats(nameless)) return give_way(nameless);
   }
   // Nothing of the library passes any more: is what remains noise?
   const Trial& rest = best_correction(set);

@@ -170,7 +170,7 @@ TEST(Select, ANameBesideACurveWhereItLeavesNothingOver) {
   EXPECT_THAT(found.names, UnorderedElementsAre("insertion_backlash")) << found.described;
 }
 
-// Slip along the tilt instead of the bevel, and a bevel that is followed late: alone each looks least like both.
+// Slip along the tilt instead of the bevel, and a bevel that is followed late.
 const SimulatedRig kTwoThatHideEachOther{
     .effects = {active("flip_transient", {5.0}), active("slip_direction", {})}, .recordings = 5, .frame_s = 0.1};
 
