@@ -19,7 +19,8 @@ namespace {
 constexpr double kRivalEvidence = 6.0;  // odds of 20 to 1
 constexpr double kCloseEvidence = 9.2;  // odds of 100 to 1, for effects of nearly one signature
 constexpr double kUnexplainedSigmas = 6;
-constexpr double kSameSignature = 0.95;  // cosine of visible parts
+constexpr double kUnexplainedChance = 1e-6;  // of Ljung and Box: forms that are not quite the rig's leave 1e-5
+constexpr double kSameSignature = 0.95;      // cosine of visible parts
 
 std::string label_of(const Member& member) {
   const auto& effect = *member.effect;
@@ -303,10 +304,10 @@ void conclude(Selection& selection, const Fit& base, const EffectSet& set, Findi
   const double explained = std::max(0.0, base.penalised - fit->penalised);
   const double left = std::max(0.0, remains.structure_energy);
   checks.unexplained_share = explained + left > 0 ? left / (explained + left) : 0;
-  checks.clean = remains.structure_sigmas < kStructureSigmas && remains.ljung_box_p > 0.001 &&
-                 remains.chi2_per_dof > remains.band[0] && remains.chi2_per_dof < remains.band[1];
-  // Whatever has a name or a curve: what leaves this much structure is not explained.
-  if (remains.structure_sigmas > kUnexplainedSigmas) findings.verdict = Verdict::unknown_effect;
+  checks.clean = remains.is_noise();
+  // Whatever has a name or a curve: what leaves this much structure, slow or quick, is not explained.
+  if (remains.structure_sigmas > kUnexplainedSigmas || remains.ljung_box_p < kUnexplainedChance)
+    findings.verdict = Verdict::unknown_effect;
 
   if (!set.empty() && findings.corrections.empty()) findings.beside = tried_beside(selection, set);
   find_detectable(selection, base, findings);

@@ -1,9 +1,11 @@
 #include "diagnosis/mismatch/freedom.hpp"
 
 #include <Eigen/Cholesky>
+#include <Eigen/LU>
 #include <algorithm>
 #include <cmath>
 #include <numbers>
+#include <numeric>
 #include <vector>
 
 #include "diagnosis/mismatch/corrections.hpp"
@@ -54,6 +56,36 @@ struct Expectation {
   double surprise = 0;
 };
 
+// The knots of each curve, as places in the list of unknowns.
+std::vector<std::vector<Index>> knots_by_curve(const Hypothesis& hypothesis, const std::vector<Index>& which) {
+  std::vector<std::vector<Index>> curves;
+  for (std::size_t m = 0; m < hypothesis.set().size(); ++m) {
+    if (!is_correction(hypothesis.set()[m])) continue;
+    std::vector<Index> knots;
+    for (std::size_t i = 0; i < which.size(); ++i)
+      if (hypothesis.unknowns()[static_cast<std::size_t>(which[i])].member == static_cast<int>(m))
+        knots.push_back(static_cast<Index>(i));
+    if (!knots.empty()) curves.push_back(std::move(knots));
+  }
+  return curves;
+}
+
+// A curve's knots together: a smooth one, of the scale that it was found to have. The scale could have been of any
+// order of magnitude below, and so many knots tell it to a share of one over the root of twice their number.
+Expectation expectation_of_curve(const Fit& fit, const std::vector<Index>& which, const std::vector<Index>& knots) {
+  const auto count = static_cast<Index>(knots.size());
+  VectorXd values(count);
+  MatrixXd hang(count, count);
+  for (Index a = 0; a < count; ++a) {
+    values[a] = fit.values[which[static_cast<std::size_t>(knots[static_cast<std::size_t>(a)])]];
+    for (Index b = 0; b < count; ++b) hang(a, b) = std::exp(-std::abs(static_cast<double>(a - b)) / kKnotsHang);
+  }
+  const auto n = static_cast<double>(count);
+  const double variance = std::max(values.dot(hang.llt().solve(values)) / n, 1e-30);
+  const double any_order = std::sqrt(2 * std::numbers::pi / (2 * n)) / (kOrdersBelow * std::numbers::ln10);
+  return {.covariance = variance * hang, .surprise = n - 2 * std::log(any_order)};
+}
+
 // Of the unknowns listed, in their order.
 Expectation expectation_of(const Fit& fit, const MatrixXd& covariance, const std::vector<Index>& which) {
   const auto& hypothesis = fit.hypothesis;
@@ -85,27 +117,12 @@ Expectation expectation_of(const Fit& fit, const MatrixXd& covariance, const std
       if (one_sided) out.surprise -= 2 * std::numbers::ln2;
     }
   }
-  // A curve: its knots together.
-  for (std::size_t m = 0; m < hypothesis.set().size(); ++m) {
-    if (!is_correction(hypothesis.set()[m])) continue;
-    std::vector<Index> knots;
-    for (Index i = 0; i < n; ++i)
-      if (hypothesis.unknowns()[static_cast<std::size_t>(which[static_cast<std::size_t>(i)])].member ==
-          static_cast<int>(m))
-        knots.push_back(i);
-    const auto count = static_cast<Index>(knots.size());
-    if (count == 0) continue;
-    VectorXd values(count);
-    MatrixXd hang(count, count);
-    for (Index a = 0; a < count; ++a) {
-      values[a] = fit.values[which[static_cast<std::size_t>(knots[static_cast<std::size_t>(a)])]];
-      for (Index b = 0; b < count; ++b) hang(a, b) = std::exp(-std::abs(static_cast<double>(a - b)) / kKnotsHang);
-    }
-    const double variance = std::max(values.dot(hang.llt().solve(values)) / static_cast<double>(count), 1e-30);
-    out.surprise += static_cast<double>(count);
-    for (Index a = 0; a < count; ++a)
-      for (Index b = 0; b < count; ++b)
-        out.covariance(knots[static_cast<std::size_t>(a)], knots[static_cast<std::size_t>(b)]) = variance * hang(a, b);
+  for (const auto& knots : knots_by_curve(hypothesis, which)) {
+    const Expectation curve = expectation_of_curve(fit, which, knots);
+    out.surprise += curve.surprise;
+    for (std::size_t a = 0; a < knots.size(); ++a)
+      for (std::size_t b = 0; b < knots.size(); ++b)
+        out.covariance(knots[a], knots[b]) = curve.covariance(static_cast<Index>(a), static_cast<Index>(b));
   }
   return out;
 }
@@ -135,6 +152,15 @@ double price_of_freedom(const Fit& fit) {
       either(i, j) = found(i, j) + expected.covariance(i, j) / scale;
     }
   return log_determinant(either) - log_determinant(found) + expected.surprise;
+}
+
+MatrixXd precision_of_curves(const Fit& fit) {
+  std::vector<Index> all(static_cast<std::size_t>(fit.hypothesis.size()));
+  std::iota(all.begin(), all.end(), Index{0});
+  MatrixXd precision = MatrixXd::Zero(fit.hypothesis.size(), fit.hypothesis.size());
+  for (const auto& knots : knots_by_curve(fit.hypothesis, all))
+    precision(knots, knots) = MatrixXd(expectation_of_curve(fit, all, knots).covariance.inverse());
+  return precision;
 }
 
 }  // namespace bevel::diagnosis

@@ -9,12 +9,16 @@
 //           with C the covariance of the members' parameters, the needle's integrated out, and P that of what may be
 //           expected of them: of a size, what the field reports (EffectParameter::reported; beyond it the surprise
 //           grows with the logarithm, Student's t) or as likely any order of magnitude below that; of a depth or a
-//           frequency, where fits look for it; of a curve, a smooth one of the size that it was found to have.
+//           frequency, where fits look for it; of a curve, a smooth one of the scale that it was found to have, which
+//           could have been of any order below.
 #include "diagnosis/mismatch/likelihood.hpp"
 
 namespace bevel::diagnosis {
 
 // In chi2, over all members; instants apart (kInstantCost). Zero for no effect.
 double price_of_freedom(const Fit& fit);
+
+// The inverse of P for the knots of a fit's curves, zero for all else; rows and columns as Hypothesis::unknowns.
+Eigen::MatrixXd precision_of_curves(const Fit& fit);
 
 }  // namespace bevel::diagnosis

@@ -5,6 +5,7 @@
 #include <cmath>
 #include <numeric>
 
+#include "diagnosis/mismatch/freedom.hpp"
 #include "diagnosis/mismatch/local_unknowns.hpp"
 #include "diagnosis/mismatch/parallel.hpp"
 #include "diagnosis/statistics/ljung_box.hpp"
@@ -24,11 +25,14 @@ HeldOutFit leave_one_out(const Evidence& evidence, const Fit& whole, int threads
   out.chi2.resize(recordings);
   out.count.resize(recordings);
   const Hypothesis& hypothesis = whole.hypothesis;
+  // What the others do not tell of a curve, because only the one held out goes so deep or lasts so long, is as smooth
+  // and as large as the rest of it.
+  const FitRules smooth{.precision = precision_of_curves(whole)};
   parallel_for(recordings, threads, [&](std::size_t r) {
     Evidence others = evidence;
     others.used.assign(recordings, true);
     others.used[r] = false;
-    const Fit without = fit(others, hypothesis, whole.values);
+    const Fit without = fit(others, hypothesis, whole.values, smooth);
     // Its own phase or instant, all else held.
     Evidence alone = evidence;
     alone.used.assign(recordings, false);

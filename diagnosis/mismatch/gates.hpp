@@ -16,6 +16,9 @@ struct HeldOutFit {
 };
 HeldOutFit leave_one_out(const Evidence& evidence, const Fit& fit, int threads);
 
+// Slow structure left beside named effects, in standard deviations of what noise leaves, from which something remains.
+inline constexpr double kStructureSigmas = 4.0;
+
 // What is left of a fit.
 struct Remains {
   double chi2_per_dof = 0;
@@ -23,6 +26,10 @@ struct Remains {
   double structure_sigmas = 0;   // slow structure (splines, one knot a second): (energy - mean) / sd under noise
   double structure_energy = 0;   // energy above its mean, in chi2
   double ljung_box_p = 1;        // smallest of all series, times their number (Bonferroni), at most 1
+  bool is_noise() const {
+    return structure_sigmas < kStructureSigmas && ljung_box_p > 0.001 && chi2_per_dof > band[0] &&
+           chi2_per_dof < band[1];
+  }
 };
 Remains examine_remains(const Evidence& evidence, const Fit& fit);
 

@@ -40,8 +40,8 @@ void add_belief(const Evidence& evidence, const Hypothesis& hypothesis, const Ve
   normal.b.head<3>() += J.transpose() * r;
 }
 
-Normal assemble(const Evidence& evidence, const Hypothesis& hypothesis, const VectorXd& values, bool with_jacobian,
-                Workspace& workspace) {
+Normal assemble(const Evidence& evidence, const Hypothesis& hypothesis, const FitRules& rules, const VectorXd& values,
+                bool with_jacobian, Workspace& workspace) {
   Normal normal;
   const Index size = hypothesis.size();
   if (with_jacobian) normal.A.setZero(size, size), normal.b.setZero(size);
@@ -66,6 +66,11 @@ Normal assemble(const Evidence& evidence, const Hypothesis& hypothesis, const Ve
   }
   normal.penalised = normal.chi2;
   add_belief(evidence, hypothesis, values, with_jacobian, normal);
+  if (rules.precision.size() > 0) {
+    const VectorXd pull = rules.precision * values;
+    normal.penalised += values.dot(pull);
+    if (with_jacobian) normal.A += rules.precision, normal.b -= pull;
+  }
   return normal;
 }
 
@@ -160,7 +165,7 @@ Fit fit(const Evidence& evidence, const Hypothesis& hypothesis, const VectorXd& 
   Workspace workspace;
   VectorXd values = start;
   hypothesis.clamp(values);
-  Normal now = assemble(evidence, hypothesis, values, true, workspace);
+  Normal now = assemble(evidence, hypothesis, rules, values, true, workspace);
   double damping = 1e-4;
   for (int iteration = 0; now.valid && iteration < rules.max_iterations; ++iteration) {
     out.iterations = iteration + 1;
@@ -182,7 +187,7 @@ Fit fit(const Evidence& evidence, const Hypothesis& hypothesis, const VectorXd& 
       VectorXd trial = values;
       for (Index i = 0; i < n; ++i) trial[free[static_cast<std::size_t>(i)]] += step[i];
       hypothesis.clamp(trial);
-      const Normal there = assemble(evidence, hypothesis, trial, false, workspace);
+      const Normal there = assemble(evidence, hypothesis, rules, trial, false, workspace);
       if (there.valid && there.penalised < now.penalised) {
         small = now.penalised - there.penalised < rules.tolerance;
         values = trial;
@@ -195,7 +200,7 @@ Fit fit(const Evidence& evidence, const Hypothesis& hypothesis, const VectorXd& 
       damping *= 6;
     }
     if (!moved) break;
-    now = assemble(evidence, hypothesis, values, true, workspace);
+    now = assemble(evidence, hypothesis, rules, values, true, workspace);
     if (small) break;
   }
   out.values = values;

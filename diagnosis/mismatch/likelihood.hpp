@@ -56,8 +56,9 @@ struct Fit {
 
 struct FitRules {
   int max_iterations = 30;
-  double tolerance = 2e-3;  // of chi2: what changes it by less is done
-  std::vector<int> held;    // unknowns that stay where they start
+  double tolerance = 2e-3;      // of chi2: what changes it by less is done
+  std::vector<int> held{};      // unknowns that stay where they start
+  Eigen::MatrixXd precision{};  // of an expectation of the unknowns about zero; empty: none
 };
 
 Fit fit(const Evidence& evidence, const Hypothesis& hypothesis, const Eigen::VectorXd& start,

@@ -21,6 +21,7 @@ constexpr int kLargestCorrections = 2;
 constexpr std::size_t kPairs = 8;  // of effects, fitted before names are given up
 constexpr double kAtBound = 1.03;
 constexpr double kIncidental = 0.2;  // of what the curves beside it explain
+constexpr double kStandsOut = 9.2;   // odds of 100 to 1
 
 bool has_correction(const EffectSet& set) { return std::any_of(set.begin(), set.end(), is_correction); }
 
@@ -106,8 +107,7 @@ double Selection::preference_of(const EffectSet& set) { return known(set).prefer
 Selection::Known Selection::judged(const EffectSet& set, std::shared_ptr<const Fit> fit) const {
   Known out{.set = set, .fit = std::move(fit)};
   out.evidence = known_.at(key_of({})).fit->penalised - cost_of(*out.fit);
-  out.preference = out.evidence - price_of_freedom(*out.fit);
-  for (const auto& member : set) out.preference -= is_correction(member) ? kCurvePrice : kNamePrice;
+  out.preference = out.evidence - price_of_freedom(*out.fit) - kMemberPrice * static_cast<double>(set.size());
   return out;
 }
 
@@ -231,12 +231,22 @@ double Selection::least_gain_beside(const EffectSet& set) {
   return kIncidental * std::max(0.0, evidence_of(set) - evidence_of(names));
 }
 
+// Or it stands out: with it only noise is left, and no other name nor a further curve comes near.
+bool Selection::enough_beside(const EffectSet& set, const Trial& trial) {
+  if (!trial.passes()) return false;
+  if (trial.gain > least_gain_beside(set)) return true;
+  if (!examine_remains(evidence_, *trial.fit).is_noise()) return false;
+  double next = best_correction(set).fit ? best_correction(set).preference : preference_of(set);
+  for (const Trial& other : additions(set))
+    if (key_of(other.set) != key_of(trial.set)) next = std::max(next, other.preference);
+  return trial.preference > next + kStandsOut;
+}
+
 // Forward: the best effect that passes.
 bool Selection::grow(EffectSet& set) {
   if (static_cast<int>(set.size()) >= rules_.largest_set) return false;
-  const double least = least_gain_beside(set);
   for (const Trial& trial : additions(set))
-    if (trial.passes() && trial.gain > least) {
+    if (enough_beside(set, trial)) {
       set = trial.set;
       return true;
     }
@@ -245,9 +255,8 @@ bool Selection::grow(EffectSet& set) {
 
 // One name beside nameless curves that leaves nothing over, and is better than a further curve.
 bool Selection::complete(EffectSet& set) {
-  const double least = least_gain_beside(set);
   for (const Trial& trial : additions(set)) {
-    if (!trial.passes() || trial.gain <= least) continue;
+    if (!enough_beside(set, trial)) continue;
     if (examine_remains(evidence_, *trial.fit).structure_sigmas > kStructureSigmas) continue;
     const Trial& nameless = best_correction(set);
     if (nameless.fit && nameless.preference > trial.preference) return false;
@@ -279,7 +288,7 @@ bool Selection::shrink(EffectSet& set) {
     const auto& trials = additions(rest);
     const auto same =
         std::find_if(trials.begin(), trials.end(), [&](const Trial& t) { return key_of(t.set) == key_of(set); });
-    if (same == trials.end() || (same->passes() && same->gain > least_gain_beside(rest))) continue;
+    if (same == trials.end() || enough_beside(rest, *same)) continue;
     set = rest;
     return true;
   }

@@ -17,12 +17,8 @@
 namespace bevel::diagnosis {
 
 inline constexpr double kVisibleSigmas = 5.0;
-// Prior odds, in chi2, of one name out of some twenty, and of one nameless curve out of some sixty: something on no
-// list is about as likely as something on it.
-inline constexpr double kNamePrice = 6.0;
-inline constexpr double kCurvePrice = 8.0;
-// Slow structure left beside named effects, in standard deviations of what noise leaves, from which something remains.
-inline constexpr double kStructureSigmas = 4.0;
+// Prior odds, in chi2, of each member of a set, name or nameless curve: one out of some twenty.
+inline constexpr double kMemberPrice = 6.0;
 
 struct SelectionRules {
   int bootstrap_draws = 400;
@@ -96,6 +92,7 @@ class Selection {
   Known judged(const EffectSet& set, std::shared_ptr<const Fit> fit) const;
   void say(const std::string& text) const;
   double least_gain_beside(const EffectSet& set);
+  bool enough_beside(const EffectSet& set, const Trial& trial);
   bool grow(EffectSet& set);
   bool complete(EffectSet& set);
   bool swap(EffectSet& set);

@@ -2,6 +2,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <cmath>
 #include <set>
 
 #include "diagnosis/mismatch/conclusions.hpp"
@@ -136,6 +137,24 @@ TEST(Diagnose, SaysOfAValueAtTheEndOfItsRangeThatItIsNone) {
   ASSERT_EQ(found.effects.size(), 1U);
   EXPECT_EQ(found.effects[0].parameters[0].value, 1);  // the largest exponent that is fitted
   EXPECT_THAT(found.remarks, Contains(HasSubstr("rate_dependence: exponent lies at the end")));
+}
+
+// A shaft that winds up, and rattles twice a second.
+TEST(Conclude, WhatLeavesQuickStructureIsNotExplained) {
+  const auto rattle = [](std::vector<model::ActuatorState>& base) {
+    for (auto& state : base)
+      state.insertion_mm += 0.2 * std::sin(13.7e-6 * static_cast<double>(state.utime - base.front().utime));
+  };
+  const SimulatedRig rig{.effects = {active("torsional_windup", {0.7})}, .true_motion = rattle};
+  const auto recorded = record_case(rig, 1);
+  const Evidence evidence = evidence_of(recorded, rig);
+  const Fit base = fit_of(evidence, {});
+  Selection selection(evidence, base, {.bootstrap_draws = 200, .seed = 1});
+  Findings found;
+  conclude(selection, base, {member("torsional_windup")}, found, 2);
+  EXPECT_LT(found.checks.ljung_box_p, 1e-6);
+  EXPECT_LT(found.checks.remaining_sigmas, 4) << "slow structure would be enough by itself";
+  EXPECT_EQ(found.verdict, Verdict::unknown_effect) << found.sentence;
 }
 
 TEST(Diagnose, IsTheSameForOneThreadAndTwo) {

@@ -3,6 +3,7 @@
 
 #include <gtest/gtest.h>
 
+#include <Eigen/LU>
 #include <algorithm>
 #include <cmath>
 #include <numbers>
@@ -81,6 +82,57 @@ TEST(PriceOfFreedom, OfMoreParametersIsMore) {
   });
   ASSERT_NE(curve, curves.end());
   EXPECT_GT(price_of_freedom(fit_of(evidence, {*curve})), one + 2);
+}
+
+Member curve_of_y_by_depth(const CorrectionLibrary& library) {
+  const std::vector<Member> curves = library.members();
+  return *std::find_if(curves.begin(), curves.end(), [](const Member& member) {
+    return member.effect->name() == "correction of the reading along y by depth_mm";
+  });
+}
+
+// Neighbouring knots hang together by exp(-1/2).
+Eigen::Matrix4d hang() {
+  Eigen::Matrix4d out;
+  for (int a = 0; a < 4; ++a)
+    for (int b = 0; b < 4; ++b) out(a, b) = std::exp(-std::abs(a - b) / 2.0);
+  return out;
+}
+
+// -2 ln of the integral over the scale of a curve, as likely any of three orders of magnitude, and over its knots,
+// which are normal at each scale: by the trapezoid rule in the logarithm of the scale.
+TEST(PriceOfFreedom, IsThatOfTheIntegralOverACurve) {
+  for (const double rotation_rad : {0.01, 0.05}) {
+    const SimulatedRig rig{.effects = {active("camera_rotation", {rotation_rad})}};
+    const auto recorded = record_case(rig, 1);
+    const CorrectionLibrary library(recorded);
+    const Fit best = fit_of(evidence_of(recorded, rig), {curve_of_y_by_depth(library)});
+    const Eigen::Vector4d knots = best.values.tail<4>();
+    const Eigen::Matrix4d covariance = best.covariance().bottomRightCorner<4, 4>();
+    double integral = 0;
+    constexpr double kStep = 0.02;
+    for (double log_scale = -12; log_scale < 4; log_scale += kStep) {
+      const Eigen::Matrix4d either = covariance + std::exp(2 * log_scale) * hang();
+      integral += kStep / std::log(1000.0) * std::exp(-0.5 * knots.dot(either.inverse() * knots)) *
+                  std::sqrt(covariance.determinant() / either.determinant());
+    }
+    EXPECT_NEAR(price_of_freedom(best), -2 * std::log(integral), 1.0) << rotation_rad;
+  }
+}
+
+// As many standard deviations, squared, as the curve has knots: its scale is the one that it was found to have.
+TEST(PrecisionOfCurves, IsOfTheCurvesAlone) {
+  const SimulatedRig rig{.effects = {active("camera_rotation", {0.03})}};
+  const auto recorded = record_case(rig, 1);
+  const CorrectionLibrary library(recorded);
+  const Fit best = fit_of(evidence_of(recorded, rig), {member("drilling"), curve_of_y_by_depth(library)});
+  const Eigen::MatrixXd precision = precision_of_curves(best);
+  ASSERT_EQ(precision.rows(), best.hypothesis.size());
+  EXPECT_TRUE(precision.topRows(4).isZero());
+  EXPECT_TRUE(precision.leftCols(4).isZero());
+  EXPECT_NEAR(best.values.dot(precision * best.values), 4, 1e-9);
+  const Eigen::Matrix4d product = precision.bottomRightCorner<4, 4>() * hang();
+  EXPECT_TRUE(product.isApprox(product(0, 0) * Eigen::Matrix4d::Identity(), 1e-9));
 }
 
 // Ten times what the field reports: dear, but not impossible.

@@ -2,6 +2,8 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <algorithm>
+
 #include "diagnosis/mismatch/gates.hpp"
 #include "tests/mismatch/simulated_rig.hpp"
 
@@ -90,6 +92,35 @@ TEST(LeaveOneOut, ARecordingThatLeavesTheDomainIsNotForetold) {
   const HeldOutFit held_out = leave_one_out(evidence, whole, 1);
   EXPECT_EQ(held_out.count[2], 3 * recorded.recordings[2].series[0].time_s.size());
   EXPECT_GT(held_out.chi2[2], 1e3 * static_cast<double>(held_out.count[2]));
+}
+
+// Only the first recording goes deeper than 30 mm: what the others do not tell of a curve must not be made up.
+TEST(LeaveOneOut, OfACurveThatOnlyOneRecordingSeesInFull) {
+  const SimulatedRig rig{.effects = {active("depth_dependence", {1.5})}};
+  auto raw = record(rig, 4);
+  for (std::size_t r = 1; r < raw.size(); ++r) {
+    const auto deep = std::find_if(raw[r].actuators.begin(), raw[r].actuators.end(),
+                                   [](const auto& state) { return state.insertion_mm > 30; });
+    const auto end_utime = deep->utime;
+    raw[r].actuators.erase(deep, raw[r].actuators.end());
+    std::erase_if(raw[r].tips, [&](const auto& tip) { return tip.utime >= end_utime; });
+  }
+  const auto recorded = make_case(raw);
+  const Evidence evidence = evidence_of(recorded, rig);
+  const CorrectionLibrary library(recorded);
+  const std::vector<Member> curves = library.members();
+  const auto curve = std::find_if(curves.begin(), curves.end(), [](const Member& member) {
+    return member.effect->name() == "correction of the curvature toward the bevel by depth_mm";
+  });
+  ASSERT_NE(curve, curves.end());
+  const Fit whole = fit_of(evidence, {*curve});
+  const double without_curve = leave_one_out(evidence, fit_of(evidence, {}), 1).chi2[0];
+  EXPECT_LT(leave_one_out(evidence, whole, 1).chi2[0], without_curve);
+  // Left to the others alone, it is worse than none.
+  Evidence others = evidence;
+  others.used = {false, true, true, true};
+  const Fit left_alone = fit(others, whole.hypothesis, whole.values);
+  EXPECT_GT(chi2_of(evidence, whole.hypothesis, 0, left_alone.values), without_curve);
 }
 
 TEST(Remains, OfATrueModelAreNoise) {

@@ -159,15 +159,26 @@ TEST(Select, StepsLostInMoreThanHalfOfTheRecordings) {
   EXPECT_THAT(select(rig, 1).names, UnorderedElementsAre("lost_steps"));
 }
 
-// A shaft that feeds itself as it turns is on no list; play in the insertion is.
-TEST(Select, ANameBesideACurveWhereItLeavesNothingOver) {
-  const auto screw = [](std::vector<model::ActuatorState>& base) {
+// A shaft that feeds itself as it turns, by so many mm a radian, is on no list.
+Selected select_beside_a_screw(double pitch_mm_per_rad, const model::ActiveEffect& effect) {
+  const auto screw = [pitch_mm_per_rad](std::vector<model::ActuatorState>& base) {
     const double start_rad = base.front().rotation_rad;
-    for (auto& state : base) state.insertion_mm += 0.08 * (state.rotation_rad - start_rad);
+    for (auto& state : base) state.insertion_mm += pitch_mm_per_rad * (state.rotation_rad - start_rad);
   };
-  const auto found = select({.effects = {active("insertion_backlash", {1.5})}, .true_motion = screw}, 1);
+  return select({.effects = {effect}, .true_motion = screw}, 1);
+}
+
+TEST(Select, ANameBesideACurveWhereItLeavesNothingOver) {
+  const auto found = select_beside_a_screw(0.08, active("insertion_backlash", {1.5}));
   EXPECT_TRUE(found.nameless) << found.described;
   EXPECT_THAT(found.names, UnorderedElementsAre("insertion_backlash")) << found.described;
+}
+
+// It explains a hundredth of what the screw does, and stands out all the same.
+TEST(Select, ASmallNameBesideALargeCurveWhereOnlyNoiseIsLeft) {
+  const auto found = select_beside_a_screw(0.4, active("camera_rotation", {0.01}));
+  EXPECT_TRUE(found.nameless) << found.described;
+  EXPECT_THAT(found.names, UnorderedElementsAre("camera_rotation")) << found.described;
 }
 
 // Slip along the tilt instead of the bevel, and a bevel that is followed late.
