@@ -19,8 +19,7 @@ namespace {
 constexpr double kRivalEvidence = 6.0;  // odds of 20 to 1
 constexpr double kCloseEvidence = 9.2;  // odds of 100 to 1, for effects of nearly one signature
 constexpr double kUnexplainedSigmas = 6;
-constexpr double kUnexplainedChance = 1e-6;  // of Ljung and Box: forms that are not quite the rig's leave 1e-5
-constexpr double kSameSignature = 0.95;      // cosine of visible parts
+constexpr double kSameSignature = 0.95;  // cosine of visible parts
 
 std::string label_of(const Member& member) {
   const auto& effect = *member.effect;
@@ -306,7 +305,7 @@ void conclude(Selection& selection, const Fit& base, const EffectSet& set, Findi
   checks.unexplained_share = explained + left > 0 ? left / (explained + left) : 0;
   checks.clean = remains.is_noise();
   // Whatever has a name or a curve: what leaves this much structure, slow or quick, is not explained.
-  if (remains.structure_sigmas > kUnexplainedSigmas || remains.ljung_box_p < kUnexplainedChance)
+  if (remains.structure_sigmas > kUnexplainedSigmas || remains.ljung_box_p < kStructureChance)
     findings.verdict = Verdict::unknown_effect;
 
   if (!set.empty() && findings.corrections.empty()) findings.beside = tried_beside(selection, set);

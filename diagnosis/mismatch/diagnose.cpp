@@ -69,6 +69,12 @@ void remark_on_short_recordings(const RecordedCase& recorded, Findings& findings
         " readings: the cameras' noise is hardly known, and what is quicker than a few readings cannot be seen");
 }
 
+// No name holds, and what the curves leave is no noise: there is nothing to measure the noise beside.
+bool hopeless(const Evidence& evidence, const Fit& fit) {
+  const EffectSet& set = fit.hypothesis.set();
+  return std::all_of(set.begin(), set.end(), is_correction) && examine_remains(evidence, fit).has_structure();
+}
+
 // A name that does not foretell is not physics, and a nameless curve that does not is no description.
 void drop_what_does_not_foretell(Selection& selection, const Fit& base, EffectSet& set, Findings& findings,
                                  int threads) {
@@ -137,7 +143,7 @@ Findings diagnose(const RecordedCase& original, const model::NeedleParameters& m
     set = selection->select();
     if (round + 1 == kNoiseRounds) break;
     // Missing physics may have passed for noise, or for outliers: with the best explanation both are measured again.
-    if (set.empty()) break;
+    if (set.empty() || hopeless(evidence, *selection->fit_of(set))) break;
     const Calibration again = calibrate_beside(original, evidence, *selection->fit_of(set));
     if (settled(calibration, again)) break;
     calibration = again;

@@ -16,8 +16,10 @@ struct HeldOutFit {
 };
 HeldOutFit leave_one_out(const Evidence& evidence, const Fit& fit, int threads);
 
-// Slow structure left beside named effects, in standard deviations of what noise leaves, from which something remains.
+// From these on something remains beside named effects: slow structure, in standard deviations of what noise leaves; a
+// correlation from reading to reading, in its chance under noise (forms that are not quite the rig's leave 1e-5).
 inline constexpr double kStructureSigmas = 4.0;
+inline constexpr double kStructureChance = 1e-6;
 
 // What is left of a fit.
 struct Remains {
@@ -26,6 +28,7 @@ struct Remains {
   double structure_sigmas = 0;   // slow structure (splines, one knot a second): (energy - mean) / sd under noise
   double structure_energy = 0;   // energy above its mean, in chi2
   double ljung_box_p = 1;        // smallest of all series, times their number (Bonferroni), at most 1
+  bool has_structure() const { return structure_sigmas > kStructureSigmas || ljung_box_p < kStructureChance; }
   bool is_noise() const {
     return structure_sigmas < kStructureSigmas && ljung_box_p > 0.001 && chi2_per_dof > band[0] &&
            chi2_per_dof < band[1];

@@ -231,11 +231,13 @@ double Selection::least_gain_beside(const EffectSet& set) {
   return kIncidental * std::max(0.0, evidence_of(set) - evidence_of(names));
 }
 
-// Or it stands out: with it only noise is left, and no other name nor a further curve comes near.
+// Or it stands out: with it only noise is left (of less than was measured without it, perhaps), and no other name nor a
+// further curve comes near.
 bool Selection::enough_beside(const EffectSet& set, const Trial& trial) {
   if (!trial.passes()) return false;
   if (trial.gain > least_gain_beside(set)) return true;
-  if (!examine_remains(evidence_, *trial.fit).is_noise()) return false;
+  const Remains remains = examine_remains(evidence_, *trial.fit);
+  if (remains.has_structure() || remains.chi2_per_dof > remains.band[1]) return false;
   double next = best_correction(set).fit ? best_correction(set).preference : preference_of(set);
   for (const Trial& other : additions(set))
     if (key_of(other.set) != key_of(trial.set)) next = std::max(next, other.preference);
@@ -257,7 +259,7 @@ bool Selection::grow(EffectSet& set) {
 bool Selection::complete(EffectSet& set) {
   for (const Trial& trial : additions(set)) {
     if (!enough_beside(set, trial)) continue;
-    if (examine_remains(evidence_, *trial.fit).structure_sigmas > kStructureSigmas) continue;
+    if (examine_remains(evidence_, *trial.fit).has_structure()) continue;
     const Trial& nameless = best_correction(set);
     if (nameless.fit && nameless.preference > trial.preference) return false;
     set = trial.set;
@@ -361,7 +363,7 @@ EffectSet Selection::select() {
   EffectSet now;
   for (int round = 0; round < 12; ++round) {
     // While even nameless curves leave structure, a name beside them would be a guess; but not one that explains most.
-    if (has_correction(now) && examine_remains(evidence_, *fit_of(now)).structure_sigmas > kStructureSigmas) {
+    if (has_correction(now) && examine_remains(evidence_, *fit_of(now)).has_structure()) {
       EffectSet nameless = now;
       std::erase_if(nameless, [](const Member& member) { return !is_correction(member); });
       if (evidence_of(nameless) > 0.5 * evidence_of(now)) {

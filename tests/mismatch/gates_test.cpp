@@ -149,12 +149,14 @@ TEST(Remains, ShowPhysicsThatIsLeftOut) {
   const Remains before = examine_remains(evidence, base);
   EXPECT_GT(before.chi2_per_dof, before.band[1]);
   EXPECT_GT(before.structure_sigmas, 10);
+  EXPECT_TRUE(before.has_structure());
   const Hypothesis hypothesis(rig.needle, {member("layer")}, recorded);
   Eigen::VectorXd start = hypothesis.start();
   start.tail<2>() << 30, 0.7;
   const Fit layer = fit(evidence, hypothesis, start);
   const Remains after = examine_remains(evidence, layer);
   EXPECT_LT(after.structure_sigmas, 3);
+  EXPECT_FALSE(after.has_structure());
   // What the layer explains of chi2 was slow structure.
   EXPECT_NEAR(before.structure_energy - after.structure_energy, base.chi2 - layer.chi2, 0.1 * (base.chi2 - layer.chi2));
 }
