@@ -310,6 +310,15 @@ std::vector<Promise> best_promises(const Candidate& candidate, const Ground& gro
   return promises;
 }
 
+PromisingStart most_promising_start(const Candidate& candidate, const Ground& ground) {
+  PromisingStart best;
+  for (const auto& signature : candidate.signatures) {
+    Promise one = promise_of(candidate, signature, ground, ground.residual);
+    if (!best.signature || one.gain > best.promise.gain) best = {&signature, std::move(one)};
+  }
+  return best;
+}
+
 double visible_per_unit(const Candidate& candidate, std::size_t amplitude) {
   const auto p = static_cast<std::size_t>(candidate.amplitudes[amplitude]);
   const double none = candidate.member.effect->parameters()[p].none;
@@ -342,12 +351,7 @@ double absorbed_share(const Candidate& candidate) {
 }
 
 MatrixXd visible_basis(const Candidate& candidate, const Ground& ground) {
-  const Signature* best = nullptr;
-  Promise promise;
-  for (const auto& signature : candidate.signatures) {
-    Promise one = promise_of(candidate, signature, ground, ground.residual);
-    if (!best || one.gain > promise.gain) best = &signature, promise = std::move(one);
-  }
+  const auto [best, promise] = most_promising_start(candidate, ground);
   if (!best) return {};
   MatrixXd columns = best->columns;
   if (candidate.local >= 0) {

@@ -55,6 +55,12 @@ struct Promise {
 Promise promise_of(const Candidate& candidate, const Signature& signature, const Ground& ground,
                    const Eigen::VectorXd& residual);
 std::vector<Promise> best_promises(const Candidate& candidate, const Ground& ground, std::size_t count);
+// The start that promises most, the first of several that promise as much; null if there is none.
+struct PromisingStart {
+  const Signature* signature = nullptr;
+  Promise promise;
+};
+PromisingStart most_promising_start(const Candidate& candidate, const Ground& ground);
 
 // |projected signature| of one unit of an amplitude, the median over the starts: 1 / that is the size of one standard
 // deviation. Zero where these recordings cannot show it.

@@ -12,15 +12,6 @@ using Eigen::VectorXd;
 
 constexpr double kRidge = 1e-9;  // of a column's square: two of one signature are no more than one
 
-const Signature* most_promising(const Candidate& candidate, const Ground& ground) {
-  const Signature* best = nullptr;
-  double most = 0;
-  for (const Signature& signature : candidate.signatures)
-    if (const double gain = promise_of(candidate, signature, ground, ground.residual).gain; !best || gain > most)
-      best = &signature, most = gain;
-  return best;
-}
-
 // Fall of chi2 by any combination of the columns.
 double joint_gain(const MatrixXd& columns, const VectorXd& residual) {
   MatrixXd gram = columns.transpose() * columns;
@@ -35,7 +26,7 @@ std::vector<std::array<std::size_t, 2>> best_pairs(const std::vector<Candidate>&
                                                    std::size_t count) {
   std::vector<const Signature*> signatures(candidates.size(), nullptr);
   for (std::size_t i = 0; i < candidates.size(); ++i)
-    if (candidates[i].local < 0) signatures[i] = most_promising(candidates[i], ground);
+    if (candidates[i].local < 0) signatures[i] = most_promising_start(candidates[i], ground).signature;
   std::vector<std::pair<double, std::array<std::size_t, 2>>> pairs;
   for (std::size_t i = 0; i < candidates.size(); ++i)
     for (std::size_t j = 0; j < i; ++j) {

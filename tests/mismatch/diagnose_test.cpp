@@ -27,6 +27,17 @@ Findings findings_of(const SimulatedRig& rig, std::uint64_t seed, int threads = 
   return diagnose(record_case(rig, seed), model, options);
 }
 
+// What is concluded from a set, however it was come by.
+Findings conclusions_from(const SimulatedRig& rig, const EffectSet& set) {
+  const auto recorded = record_case(rig, 1);
+  const Evidence evidence = evidence_of(recorded, rig);
+  const Fit base = fit_of(evidence, {});
+  Selection selection(evidence, base, {.bootstrap_draws = 200, .seed = 1});
+  Findings found;
+  conclude(selection, base, set, found, 2);
+  return found;
+}
+
 const SimulatedRig kWindup{.effects = {active("torsional_windup", {0.7})},
                            .recordings = 5,
                            .frame_s = 1.0 / 30,
@@ -128,12 +139,7 @@ TEST(Diagnose, WhereNothingIsMissingSaysHowSmallItWouldHaveSeen) {
 
 TEST(Diagnose, SaysOfAValueAtTheEndOfItsRangeThatItIsNone) {
   const SimulatedRig rig{.effects = {active("rate_dependence", {1.1})}, .recordings = 3, .frame_s = 0.1};
-  const auto recorded = record_case(rig, 1);
-  const Evidence evidence = evidence_of(recorded, rig);
-  const Fit base = fit_of(evidence, {});
-  Selection selection(evidence, base, {.bootstrap_draws = 200, .seed = 1});
-  Findings found;
-  conclude(selection, base, {member("rate_dependence")}, found, 2);
+  const Findings found = conclusions_from(rig, {member("rate_dependence")});
   ASSERT_EQ(found.effects.size(), 1U);
   EXPECT_EQ(found.effects[0].parameters[0].value, 1);  // the largest exponent that is fitted
   EXPECT_THAT(found.remarks, Contains(HasSubstr("rate_dependence: exponent lies at the end")));
@@ -146,12 +152,7 @@ TEST(Conclude, WhatLeavesQuickStructureIsNotExplained) {
       state.insertion_mm += 0.2 * std::sin(13.7e-6 * static_cast<double>(state.utime - base.front().utime));
   };
   const SimulatedRig rig{.effects = {active("torsional_windup", {0.7})}, .true_motion = rattle};
-  const auto recorded = record_case(rig, 1);
-  const Evidence evidence = evidence_of(recorded, rig);
-  const Fit base = fit_of(evidence, {});
-  Selection selection(evidence, base, {.bootstrap_draws = 200, .seed = 1});
-  Findings found;
-  conclude(selection, base, {member("torsional_windup")}, found, 2);
+  const Findings found = conclusions_from(rig, {member("torsional_windup")});
   EXPECT_LT(found.checks.ljung_box_p, 1e-6);
   EXPECT_LT(found.checks.remaining_sigmas, 4) << "slow structure would be enough by itself";
   EXPECT_EQ(found.verdict, Verdict::unknown_effect) << found.sentence;

@@ -4,11 +4,9 @@
 #include <gtest/gtest.h>
 
 #include <Eigen/LU>
-#include <algorithm>
 #include <cmath>
 #include <numbers>
 
-#include "diagnosis/mismatch/corrections.hpp"
 #include "diagnosis/mismatch/local_unknowns.hpp"
 #include "tests/mismatch/simulated_rig.hpp"
 
@@ -76,20 +74,11 @@ TEST(PriceOfFreedom, OfMoreParametersIsMore) {
   const double two = price_of_freedom(fit_of(evidence, {member("drilling"), member("entry_angle")}));
   EXPECT_GT(two, one + 4);
   const CorrectionLibrary library(recorded);
-  const std::vector<Member> curves = library.members();
-  const auto curve = std::find_if(curves.begin(), curves.end(), [](const Member& member) {
-    return member.effect->name() == "correction of the curvature toward the bevel by turn_rate_rad_s";
-  });
-  ASSERT_NE(curve, curves.end());
-  EXPECT_GT(price_of_freedom(fit_of(evidence, {*curve})), one + 2);
+  const Member nameless = curve(library, "correction of the curvature toward the bevel by turn_rate_rad_s");
+  EXPECT_GT(price_of_freedom(fit_of(evidence, {nameless})), one + 2);
 }
 
-Member curve_of_y_by_depth(const CorrectionLibrary& library) {
-  const std::vector<Member> curves = library.members();
-  return *std::find_if(curves.begin(), curves.end(), [](const Member& member) {
-    return member.effect->name() == "correction of the reading along y by depth_mm";
-  });
-}
+constexpr const char* kYByDepth = "correction of the reading along y by depth_mm";
 
 // Neighbouring knots hang together by exp(-1/2).
 Eigen::Matrix4d hang() {
@@ -106,7 +95,7 @@ TEST(PriceOfFreedom, IsThatOfTheIntegralOverACurve) {
     const SimulatedRig rig{.effects = {active("camera_rotation", {rotation_rad})}};
     const auto recorded = record_case(rig, 1);
     const CorrectionLibrary library(recorded);
-    const Fit best = fit_of(evidence_of(recorded, rig), {curve_of_y_by_depth(library)});
+    const Fit best = fit_of(evidence_of(recorded, rig), {curve(library, kYByDepth)});
     const Eigen::Vector4d knots = best.values.tail<4>();
     const Eigen::Matrix4d covariance = best.covariance().bottomRightCorner<4, 4>();
     double integral = 0;
@@ -125,7 +114,7 @@ TEST(PrecisionOfCurves, IsOfTheCurvesAlone) {
   const SimulatedRig rig{.effects = {active("camera_rotation", {0.03})}};
   const auto recorded = record_case(rig, 1);
   const CorrectionLibrary library(recorded);
-  const Fit best = fit_of(evidence_of(recorded, rig), {member("drilling"), curve_of_y_by_depth(library)});
+  const Fit best = fit_of(evidence_of(recorded, rig), {member("drilling"), curve(library, kYByDepth)});
   const Eigen::MatrixXd precision = precision_of_curves(best);
   ASSERT_EQ(precision.rows(), best.hypothesis.size());
   EXPECT_TRUE(precision.topRows(4).isZero());

@@ -108,12 +108,7 @@ TEST(LeaveOneOut, OfACurveThatOnlyOneRecordingSeesInFull) {
   const auto recorded = make_case(raw);
   const Evidence evidence = evidence_of(recorded, rig);
   const CorrectionLibrary library(recorded);
-  const std::vector<Member> curves = library.members();
-  const auto curve = std::find_if(curves.begin(), curves.end(), [](const Member& member) {
-    return member.effect->name() == "correction of the curvature toward the bevel by depth_mm";
-  });
-  ASSERT_NE(curve, curves.end());
-  const Fit whole = fit_of(evidence, {*curve});
+  const Fit whole = fit_of(evidence, {curve(library, "correction of the curvature toward the bevel by depth_mm")});
   const double without_curve = leave_one_out(evidence, fit_of(evidence, {}), 1).chi2[0];
   EXPECT_LT(leave_one_out(evidence, whole, 1).chi2[0], without_curve);
   // Left to the others alone, it is worse than none.

@@ -87,6 +87,12 @@ Member member(std::string_view name, std::uint32_t variant) {
   return {effect, variant == ~0U ? effect->variants().front() : variant};
 }
 
+Member curve(const CorrectionLibrary& library, std::string_view name) {
+  for (const Member& one : library.members())
+    if (one.effect->name() == name) return one;
+  throw std::invalid_argument("no " + std::string(name));
+}
+
 Fit fit_of(const Evidence& evidence, const EffectSet& set) {
   const Hypothesis hypothesis(evidence.belief, set, *evidence.recorded);
   Eigen::VectorXd start = hypothesis.start();

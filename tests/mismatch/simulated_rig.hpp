@@ -6,6 +6,7 @@
 #include <functional>
 #include <random>
 
+#include "diagnosis/mismatch/corrections.hpp"
 #include "diagnosis/mismatch/likelihood.hpp"
 #include "tests/effects/script.hpp"
 
@@ -42,6 +43,8 @@ Eigen::VectorXd coloured_noise(const std::vector<double>& time_s, double sigma, 
                                std::mt19937_64& random);
 
 Member member(std::string_view name, std::uint32_t variant = ~0U);
+// "correction of the <component> by <covariate>".
+Member curve(const CorrectionLibrary& library, std::string_view name);
 Fit fit_of(const Evidence& evidence, const EffectSet& set);
 
 }  // namespace bevel::diagnosis::testing
