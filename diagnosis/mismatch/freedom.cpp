@@ -70,9 +70,8 @@ std::vector<std::vector<Index>> knots_by_curve(const Hypothesis& hypothesis, con
   return curves;
 }
 
-// A curve's knots together: a smooth one, of the scale that it was found to have. The scale could have been of any
-// order of magnitude below, and so many knots tell it to a share of one over the root of twice their number.
-Expectation expectation_of_curve(const Fit& fit, const std::vector<Index>& which, const std::vector<Index>& knots) {
+// A curve's knots together: a smooth one, of the scale that it was found to have.
+MatrixXd expectation_of_curve(const Fit& fit, const std::vector<Index>& which, const std::vector<Index>& knots) {
   const auto count = static_cast<Index>(knots.size());
   VectorXd values(count);
   MatrixXd hang(count, count);
@@ -80,13 +79,11 @@ Expectation expectation_of_curve(const Fit& fit, const std::vector<Index>& which
     values[a] = fit.values[which[static_cast<std::size_t>(knots[static_cast<std::size_t>(a)])]];
     for (Index b = 0; b < count; ++b) hang(a, b) = std::exp(-std::abs(static_cast<double>(a - b)) / kKnotsHang);
   }
-  const auto n = static_cast<double>(count);
-  const double variance = std::max(values.dot(hang.llt().solve(values)) / n, 1e-30);
-  const double any_order = std::sqrt(2 * std::numbers::pi / (2 * n)) / (kOrdersBelow * std::numbers::ln10);
-  return {.covariance = variance * hang, .surprise = n - 2 * std::log(any_order)};
+  const double variance = values.dot(hang.llt().solve(values)) / static_cast<double>(count);
+  return std::max(variance, 1e-30) * hang;
 }
 
-// Of the unknowns listed, in their order.
+// Of the unknowns listed, in their order; the surprise is the names'.
 Expectation expectation_of(const Fit& fit, const MatrixXd& covariance, const std::vector<Index>& which) {
   const auto& hypothesis = fit.hypothesis;
   const auto n = static_cast<Index>(which.size());
@@ -117,17 +114,32 @@ Expectation expectation_of(const Fit& fit, const MatrixXd& covariance, const std
       if (one_sided) out.surprise -= 2 * std::numbers::ln2;
     }
   }
-  for (const auto& knots : knots_by_curve(hypothesis, which)) {
-    const Expectation curve = expectation_of_curve(fit, which, knots);
-    out.surprise += curve.surprise;
-    for (std::size_t a = 0; a < knots.size(); ++a)
-      for (std::size_t b = 0; b < knots.size(); ++b)
-        out.covariance(knots[a], knots[b]) = curve.covariance(static_cast<Index>(a), static_cast<Index>(b));
-  }
+  for (const auto& knots : knots_by_curve(hypothesis, which))
+    out.covariance(knots, knots) = expectation_of_curve(fit, which, knots);
   return out;
 }
 
 double log_determinant(const MatrixXd& matrix) { return matrix.ldlt().vectorD().array().max(1e-300).log().sum(); }
+
+// Of a curve's values, whose scale could have been of any order of magnitude below the one that it was found to have:
+// -2 ln of the integral over the logarithm of the scale, of how likely what was found is at each, against the volume
+// at the scale found. `found` and `expected` are the covariances of all, the curve's at `knots`.
+double surprise_of_curve(const VectorXd& values, const MatrixXd& found, const MatrixXd& expected,
+                         const std::vector<Index>& knots) {
+  constexpr double kStep = 0.1;
+  constexpr double kRange = kOrdersBelow * std::numbers::ln10;
+  const double volume = log_determinant(found + expected);
+  const VectorXd of_curve = values(knots);
+  double integral = 0;
+  for (double log_scale = -kRange; log_scale < 0.5 * kRange; log_scale += kStep) {
+    MatrixXd either = found + expected;
+    either(knots, knots) = found(knots, knots) + std::exp(2 * log_scale) * expected(knots, knots);
+    const MatrixXd of_knots = either(knots, knots);
+    const double distance = of_curve.dot(of_knots.ldlt().solve(of_curve));
+    integral += kStep / kRange * std::exp(-0.5 * (distance + log_determinant(either) - volume));
+  }
+  return -2 * std::log(std::max(integral, 1e-300));
+}
 
 }  // namespace
 
@@ -141,17 +153,17 @@ double price_of_freedom(const Fit& fit) {
   }
   if (which.empty()) return 0;
   const Expectation expected = expectation_of(fit, whole, which);
-  const auto n = static_cast<Index>(which.size());
   // In standard errors, so that parameters of all units can stand together.
-  MatrixXd found(n, n), either(n, n);
-  for (Index i = 0; i < n; ++i)
-    for (Index j = 0; j < n; ++j) {
-      const Index a = which[static_cast<std::size_t>(i)], b = which[static_cast<std::size_t>(j)];
-      const double scale = std::sqrt(whole(a, a) * whole(b, b));
-      found(i, j) = whole(a, b) / scale;
-      either(i, j) = found(i, j) + expected.covariance(i, j) / scale;
-    }
-  return log_determinant(either) - log_determinant(found) + expected.surprise;
+  const VectorXd variances = whole.diagonal(), error = variances(which).cwiseSqrt();
+  const auto in_errors = [&](const MatrixXd& covariance) -> MatrixXd {
+    return covariance.array() / (error * error.transpose()).array();
+  };
+  const MatrixXd found = in_errors(whole(which, which)), widened = in_errors(expected.covariance);
+  const VectorXd values = VectorXd(fit.values(which)).cwiseQuotient(error);
+  double price = log_determinant(found + widened) - log_determinant(found) + expected.surprise;
+  for (const auto& knots : knots_by_curve(fit.hypothesis, which))
+    price += surprise_of_curve(values, found, widened, knots);
+  return price;
 }
 
 MatrixXd precision_of_curves(const Fit& fit) {
@@ -159,7 +171,7 @@ MatrixXd precision_of_curves(const Fit& fit) {
   std::iota(all.begin(), all.end(), Index{0});
   MatrixXd precision = MatrixXd::Zero(fit.hypothesis.size(), fit.hypothesis.size());
   for (const auto& knots : knots_by_curve(fit.hypothesis, all))
-    precision(knots, knots) = MatrixXd(expectation_of_curve(fit, all, knots).covariance.inverse());
+    precision(knots, knots) = MatrixXd(expectation_of_curve(fit, all, knots).inverse());
   return precision;
 }
 

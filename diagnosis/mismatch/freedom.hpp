@@ -9,8 +9,8 @@
 //           with C the covariance of the members' parameters, the needle's integrated out, and P that of what may be
 //           expected of them: of a size, what the field reports (EffectParameter::reported; beyond it the surprise
 //           grows with the logarithm, Student's t) or as likely any order of magnitude below that; of a depth or a
-//           frequency, where fits look for it; of a curve, a smooth one of the scale that it was found to have, which
-//           could have been of any order below.
+//           frequency, where fits look for it; of a curve, a smooth one of a scale that could have been of any order
+//           of magnitude below the one that it was found to have (integrated over).
 #include "diagnosis/mismatch/likelihood.hpp"
 
 namespace bevel::diagnosis {

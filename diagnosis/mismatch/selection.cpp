@@ -107,7 +107,8 @@ double Selection::preference_of(const EffectSet& set) { return known(set).prefer
 Selection::Known Selection::judged(const EffectSet& set, std::shared_ptr<const Fit> fit) const {
   Known out{.set = set, .fit = std::move(fit)};
   out.evidence = known_.at(key_of({})).fit->penalised - cost_of(*out.fit);
-  out.preference = out.evidence - price_of_freedom(*out.fit) - kMemberPrice * static_cast<double>(set.size());
+  out.preference = out.evidence - price_of_freedom(*out.fit);
+  for (const Member& member : set) out.preference -= is_correction(member) ? kCurvePrice : kNamePrice;
   return out;
 }
 

@@ -17,8 +17,10 @@
 namespace bevel::diagnosis {
 
 inline constexpr double kVisibleSigmas = 5.0;
-// Prior odds, in chi2, of each member of a set, name or nameless curve: one out of some twenty.
-inline constexpr double kMemberPrice = 6.0;
+// Prior odds against each member of a set, in chi2 (2 ln): a name is one of some twenty. Of nameless curves there are
+// three times as many, and what is missing is three times likelier to be on the list than not: one in 150.
+inline constexpr double kNamePrice = 6.0;
+inline constexpr double kCurvePrice = 10.0;
 
 struct SelectionRules {
   int bootstrap_draws = 400;

@@ -105,8 +105,34 @@ TEST(PriceOfFreedom, IsThatOfTheIntegralOverACurve) {
       integral += kStep / std::log(1000.0) * std::exp(-0.5 * knots.dot(either.inverse() * knots)) *
                   std::sqrt(covariance.determinant() / either.determinant());
     }
-    EXPECT_NEAR(price_of_freedom(best), -2 * std::log(integral), 1.0) << rotation_rad;
+    EXPECT_NEAR(price_of_freedom(best), -2 * std::log(integral), 0.1) << rotation_rad;
   }
+}
+
+// The same by another way, refitted with the expectation at each scale, for a curve whose constant is the needle's own
+// curvature but for what the model file says of that.
+TEST(PriceOfFreedom, IsThatOfTheIntegralOverACurveThatIsHalfBelieved) {
+  const SimulatedRig rig{.effects = {active("drilling", {2.0})}};
+  const auto recorded = record_case(rig, 1);
+  const Evidence evidence = evidence_of(recorded, rig);
+  const CorrectionLibrary library(recorded);
+  const Fit best =
+      fit_of(evidence, {curve(library, "correction of the curvature toward the bevel by turn_rate_rad_s")});
+  const Eigen::MatrixXd of_all = best.covariance().inverse();
+  const double of_needle = of_all.topLeftCorner<kBaseUnknowns, kBaseUnknowns>().determinant();
+  const Eigen::MatrixXd precision_found = precision_of_curves(best);
+  constexpr double kStep = 0.1;
+  double integral = 0;
+  Eigen::VectorXd start = best.values;
+  for (double log_scale = 3; log_scale > -std::log(1000.0); log_scale -= kStep) {
+    const Eigen::MatrixXd precision = std::exp(-2 * log_scale) * precision_found;
+    const Fit there = fit(evidence, best.hypothesis, start, {.precision = precision});
+    start = there.values;
+    const double volume =
+        (of_all + precision).determinant() / of_needle / precision.bottomRightCorner<4, 4>().determinant();
+    integral += kStep / std::log(1000.0) * std::exp(-0.5 * (there.penalised - best.penalised)) / std::sqrt(volume);
+  }
+  EXPECT_NEAR(price_of_freedom(best), -2 * std::log(integral), 0.2);
 }
 
 // As many standard deviations, squared, as the curve has knots: its scale is the one that it was found to have.
