@@ -94,7 +94,7 @@ Expectation expectation_of(const Fit& fit, const MatrixXd& covariance, const std
     if (is_correction(member)) continue;
     const auto& parameter = member.effect->parameters()[static_cast<std::size_t>(u.parameter)];
     const double value = fit.values[which[static_cast<std::size_t>(i)]];
-    if (parameter.periodic) {
+    if (parameter.periodic && std::isnan(parameter.none)) {
       out.covariance(i, i) = variance_of_range(u.upper - u.lower);
     } else if (std::isnan(parameter.none)) {
       const double low = *std::min_element(parameter.starts.begin(), parameter.starts.end());

@@ -17,13 +17,22 @@ void keep_the_exceptions(std::size_t most_recordings, std::vector<std::pair<doub
   for (std::size_t i = most_recordings; i < brought.size(); ++i) values[brought[i].second] = 0;
 }
 
+bool is_instant(const model::EffectParameter& parameter) {
+  return parameter.scope == model::Scope::recording && !parameter.periodic && parameter.none == 0;
+}
+
 }  // namespace
 
 bool is_instant(const Hypothesis& hypothesis, const Unknown& unknown) {
-  return unknown.recording >= 0 && !unknown.periodic &&
-         hypothesis.set()[static_cast<std::size_t>(unknown.member)]
-                 .effect->parameters()[static_cast<std::size_t>(unknown.parameter)]
-                 .none == 0;
+  return unknown.recording >= 0 && is_instant(hypothesis.set()[static_cast<std::size_t>(unknown.member)]
+                                                  .effect->parameters()[static_cast<std::size_t>(unknown.parameter)]);
+}
+
+bool has_instants(const Member& member) {
+  const auto& parameters = member.effect->parameters();
+  for (std::size_t p = 0; p < parameters.size(); ++p)
+    if (member.fits(p) && is_instant(parameters[p])) return true;
+  return false;
 }
 
 Eigen::VectorXd scan_local_unknowns(const Evidence& evidence, const Hypothesis& hypothesis,

@@ -25,6 +25,8 @@ Eigen::VectorXd scan_local_unknowns(const Evidence& evidence, const Hypothesis& 
 
 // Instants at which something happens in one recording; 0: not in this one. (Phases are the other kind.)
 bool is_instant(const Hypothesis& hypothesis, const Unknown& unknown);
+// An effect that happens at an instant of its own in each recording, or not in this one.
+bool has_instants(const Member& member);
 // How many instants are not "off".
 int instants_in_use(const Fit& fit);
 // By which fits are compared: chi2, belief included, and what each instant has to bring.

@@ -360,6 +360,17 @@ bool Selection::far_from_any_name(const EffectSet& set) {
   return nameless.fit && nameless.preference > preference_of(set);
 }
 
+// What may happen at any instant, or not at all, explains a part of anything: where what is left is no noise it is a
+// detail of something else, and a nameless curve describes that better if one does.
+void Selection::doubt_instants(EffectSet& set) {
+  if (std::none_of(set.begin(), set.end(), has_instants)) return;
+  if (!examine_remains(evidence_, *fit_of(set)).has_structure()) return;
+  std::erase_if(set, has_instants);
+  say("what may happen at any instant is no finding while structure is left: it goes");
+  if (has_correction(set)) return;
+  if (const Trial& nameless = best_correction(set); nameless.fit && nameless.passes()) set = nameless.set;
+}
+
 EffectSet Selection::select() {
   EffectSet now;
   for (int round = 0; round < 12; ++round) {
@@ -381,6 +392,7 @@ EffectSet Selection::select() {
     const bool exchanged = swap(now) || shrink(now);
     if (!grown && !exchanged && !give_up_names(now)) break;
   }
+  doubt_instants(now);
   return now;
 }
 

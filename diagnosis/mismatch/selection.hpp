@@ -102,6 +102,7 @@ class Selection {
   bool find_pair(EffectSet& set);
   bool give_up_names(EffectSet& set);
   bool far_from_any_name(const EffectSet& set);
+  void doubt_instants(EffectSet& set);
 
   const Evidence& evidence_;
   SelectionRules rules_;

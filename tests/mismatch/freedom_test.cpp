@@ -26,32 +26,38 @@ TEST(PriceOfFreedom, IsNothingForNoEffect) {
   EXPECT_EQ(price_of_freedom(fit_of(evidence_of(recorded, rig), {})), 0);
 }
 
-// -2 ln of the integral of exp(-chi2/2) over the width, by the trapezoid rule, with what may be expected of a width:
-// to one half the positive half of Student's t with 4 degrees of freedom, its scale three quarters of the 0.6 rad that
-// are reported (its peak that of a normal distribution of this scale), to the other any of three orders of magnitude.
-TEST(PriceOfFreedom, IsThatOfTheIntegralOverAWidth) {
-  for (const double width_rad : {0.08, 0.15, 0.5, 0.8}) {
-    const SimulatedRig rig{.effects = {active("rotation_backlash", {width_rad})}};
-    const auto recorded = record_case(rig, 1);
-    const Evidence evidence = evidence_of(recorded, rig);
-    const Fit best = fit_of(evidence, {member("rotation_backlash")});
-    const double found = best.values[kBaseUnknowns];
-    const double sd = std::sqrt(best.covariance()(kBaseUnknowns, kBaseUnknowns));
-    constexpr double kScale = 0.45;
-    double integral = 0;
-    constexpr double kStep = 0.25;
-    for (double z = -5; z <= 5; z += kStep) {
-      const double value = found + z * sd;
-      if (value < 0) continue;
-      const double reported =
-          2 / (kScale * std::sqrt(2 * std::numbers::pi)) * std::pow(1 + value * value / (4 * kScale * kScale), -2.5);
-      const double any_order = value < 0.6 ? 1 / (std::log(1000.0) * value) : 0;
-      const double density = (reported + any_order) / 2;
-      integral +=
-          kStep * sd * density * std::exp(-0.5 * (least_chi2(evidence, best, kBaseUnknowns, value) - best.penalised));
-    }
-    EXPECT_NEAR(price_of_freedom(best), -2 * std::log(integral), 0.3) << width_rad;
+// -2 ln of the integral of exp(-chi2/2) over a size, by the trapezoid rule, with what may be expected of it: to one
+// half Student's t with 4 degrees of freedom, its scale three quarters of the 0.6 rad that are reported (its peak that
+// of a normal distribution of this scale), to the other any of three orders of magnitude.
+void expect_integral_over_size(const char* effect, double size_rad, bool one_sided) {
+  const SimulatedRig rig{.effects = {active(effect, {size_rad})}};
+  const auto recorded = record_case(rig, 1);
+  const Evidence evidence = evidence_of(recorded, rig);
+  const Fit best = fit_of(evidence, {member(effect)});
+  const double found = best.values[kBaseUnknowns];
+  const double sd = std::sqrt(best.covariance()(kBaseUnknowns, kBaseUnknowns));
+  constexpr double kScale = 0.45;
+  double integral = 0;
+  constexpr double kStep = 0.25;
+  for (double z = -5; z <= 5; z += kStep) {
+    const double value = found + z * sd;
+    if (one_sided && value < 0) continue;
+    const double reported =
+        1 / (kScale * std::sqrt(2 * std::numbers::pi)) * std::pow(1 + value * value / (4 * kScale * kScale), -2.5);
+    const double any_order = std::abs(value) < 0.6 ? 1 / (2 * std::log(1000.0) * std::abs(value)) : 0;
+    const double density = (one_sided ? 2 : 1) * (reported + any_order) / 2;
+    integral +=
+        kStep * sd * density * std::exp(-0.5 * (least_chi2(evidence, best, kBaseUnknowns, value) - best.penalised));
   }
+  EXPECT_NEAR(price_of_freedom(best), -2 * std::log(integral), 0.3) << effect << " of " << size_rad;
+}
+
+TEST(PriceOfFreedom, IsThatOfTheIntegralOverAWidth) {
+  for (const double width_rad : {0.08, 0.15, 0.5, 0.8}) expect_integral_over_size("rotation_backlash", width_rad, true);
+}
+
+TEST(PriceOfFreedom, IsThatOfTheIntegralOverAnAngleWithAZero) {
+  for (const double roll_rad : {0.03, 0.1, 0.4}) expect_integral_over_size("bevel_offset", roll_rad, false);
 }
 
 TEST(PriceOfFreedom, GrowsWithTheLogarithmOfTheReadings) {

@@ -93,6 +93,23 @@ TEST(Select, StepsLostInTwoRecordingsOfSix) {
   }
 }
 
+// The insertion rattles: what is left is no noise, whatever is named.
+TEST(Select, NoStepsLostWhileReadingsHangTogether) {
+  const auto rattle = [](std::vector<model::ActuatorState>& base) {
+    for (auto& state : base)
+      state.insertion_mm += 0.3 * std::sin(13.7e-6 * static_cast<double>(state.utime - base.front().utime));
+  };
+  SimulatedRig rig{
+      .effects_in =
+          [](int r) {
+            return r % 3 == 0 ? std::vector{active("lost_steps", {0.3, 0, 3.0})} : std::vector<model::ActiveEffect>{};
+          },
+      .recordings = 6};
+  EXPECT_THAT(select(rig, 1).names, Contains("lost_steps"));
+  rig.true_motion = rattle;
+  EXPECT_THAT(select(rig, 1).names, Not(Contains("lost_steps")));
+}
+
 TEST(Select, NoNameForAnEffectThatIsOnNoList) {
   // The drive slips more and more as it warms: the tip's advance falls behind with time, not with depth.
   const auto slipping = [](std::vector<model::ActuatorState>& base) {
