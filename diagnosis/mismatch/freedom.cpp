@@ -128,12 +128,14 @@ double surprise_of_curve(const VectorXd& values, const MatrixXd& found, const Ma
                          const std::vector<Index>& knots) {
   constexpr double kStep = 0.1;
   constexpr double kRange = kOrdersBelow * std::numbers::ln10;
+  constexpr int kSteps = static_cast<int>(1.5 * kRange / kStep) + 1;
   const double volume = log_determinant(found + expected);
   const VectorXd of_curve = values(knots);
   double integral = 0;
-  for (double log_scale = -kRange; log_scale < 0.5 * kRange; log_scale += kStep) {
+  for (int i = 0; i < kSteps; ++i) {
+    const double scale = std::exp(i * kStep - kRange);
     MatrixXd either = found + expected;
-    either(knots, knots) = found(knots, knots) + std::exp(2 * log_scale) * expected(knots, knots);
+    either(knots, knots) = found(knots, knots) + scale * scale * expected(knots, knots);
     const MatrixXd of_knots = either(knots, knots);
     const double distance = of_curve.dot(of_knots.ldlt().solve(of_curve));
     integral += kStep / kRange * std::exp(-0.5 * (distance + log_determinant(either) - volume));

@@ -4,6 +4,7 @@
 #include <gtest/gtest.h>
 
 #include <Eigen/LU>
+#include <array>
 #include <cmath>
 #include <numbers>
 
@@ -39,8 +40,8 @@ void expect_integral_over_size(const char* effect, double size_rad, bool one_sid
   constexpr double kScale = 0.45;
   double integral = 0;
   constexpr double kStep = 0.25;
-  for (double z = -5; z <= 5; z += kStep) {
-    const double value = found + z * sd;
+  for (int i = -20; i <= 20; ++i) {
+    const double value = found + i * kStep * sd;
     if (one_sided && value < 0) continue;
     const double reported =
         1 / (kScale * std::sqrt(2 * std::numbers::pi)) * std::pow(1 + value * value / (4 * kScale * kScale), -2.5);
@@ -61,8 +62,8 @@ TEST(PriceOfFreedom, IsThatOfTheIntegralOverAnAngleWithAZero) {
 }
 
 TEST(PriceOfFreedom, GrowsWithTheLogarithmOfTheReadings) {
-  double price[2];
-  int i = 0;
+  std::array<double, 2> price{};
+  std::size_t i = 0;
   for (const double frame_s : {1.0 / 10, 1.0 / 30}) {
     const SimulatedRig rig{.effects = {active("torsional_windup", {0.6})}, .frame_s = frame_s};
     const auto recorded = record_case(rig, 1);
@@ -106,8 +107,8 @@ TEST(PriceOfFreedom, IsThatOfTheIntegralOverACurve) {
     const Eigen::Matrix4d covariance = best.covariance().bottomRightCorner<4, 4>();
     double integral = 0;
     constexpr double kStep = 0.02;
-    for (double log_scale = -12; log_scale < 4; log_scale += kStep) {
-      const Eigen::Matrix4d either = covariance + std::exp(2 * log_scale) * hang();
+    for (int i = -600; i < 200; ++i) {
+      const Eigen::Matrix4d either = covariance + std::exp(2 * i * kStep) * hang();
       integral += kStep / std::log(1000.0) * std::exp(-0.5 * knots.dot(either.inverse() * knots)) *
                   std::sqrt(covariance.determinant() / either.determinant());
     }
@@ -130,8 +131,8 @@ TEST(PriceOfFreedom, IsThatOfTheIntegralOverACurveThatIsHalfBelieved) {
   constexpr double kStep = 0.1;
   double integral = 0;
   Eigen::VectorXd start = best.values;
-  for (double log_scale = 3; log_scale > -std::log(1000.0); log_scale -= kStep) {
-    const Eigen::MatrixXd precision = std::exp(-2 * log_scale) * precision_found;
+  for (int i = 30; i > -70; --i) {
+    const Eigen::MatrixXd precision = std::exp(-2 * i * kStep) * precision_found;
     const Fit there = fit(evidence, best.hypothesis, start, {.precision = precision});
     start = there.values;
     const double volume =
