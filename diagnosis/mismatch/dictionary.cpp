@@ -137,15 +137,14 @@ std::vector<std::vector<double>> starts_of(const Candidate& candidate) {
 
 Candidate candidate_for(const Member& member) {
   Candidate candidate{.member = member, .amplitudes = {}, .signatures = {}};
+  candidate.local_may_be_off = has_instants(member);
   const auto& parameters = member.effect->parameters();
   for (std::size_t p = 0; p < parameters.size(); ++p) {
     if (!member.fits(p)) continue;
-    if (parameters[p].scope == model::Scope::recording) {
+    if (parameters[p].scope == model::Scope::recording)
       candidate.local = static_cast<int>(p);
-      candidate.local_may_be_off = !parameters[p].periodic;
-    } else if (!std::isnan(parameters[p].none)) {
+    else if (!std::isnan(parameters[p].none))
       candidate.amplitudes.push_back(static_cast<int>(p));
-    }
   }
   return candidate;
 }

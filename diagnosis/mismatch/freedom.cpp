@@ -129,12 +129,12 @@ double surprise_of_curve(const VectorXd& values, const MatrixXd& found, const Ma
   constexpr double kStep = 0.1;
   constexpr double kRange = kOrdersBelow * std::numbers::ln10;
   constexpr int kSteps = static_cast<int>(1.5 * kRange / kStep) + 1;
-  const double volume = log_determinant(found + expected);
+  MatrixXd either = found + expected;
+  const double volume = log_determinant(either);
   const VectorXd of_curve = values(knots);
   double integral = 0;
   for (int i = 0; i < kSteps; ++i) {
     const double scale = std::exp(i * kStep - kRange);
-    MatrixXd either = found + expected;
     either(knots, knots) = found(knots, knots) + scale * scale * expected(knots, knots);
     const MatrixXd of_knots = either(knots, knots);
     const double distance = of_curve.dot(of_knots.ldlt().solve(of_curve));

@@ -147,11 +147,7 @@ TEST(Diagnose, SaysOfAValueAtTheEndOfItsRangeThatItIsNone) {
 
 // A shaft that winds up, and rattles twice a second.
 TEST(Conclude, WhatLeavesQuickStructureIsNotExplained) {
-  const auto rattle = [](std::vector<model::ActuatorState>& base) {
-    for (auto& state : base)
-      state.insertion_mm += 0.2 * std::sin(13.7e-6 * static_cast<double>(state.utime - base.front().utime));
-  };
-  const SimulatedRig rig{.effects = {active("torsional_windup", {0.7})}, .true_motion = rattle};
+  const SimulatedRig rig{.effects = {active("torsional_windup", {0.7})}, .true_motion = rattle(0.2)};
   const Findings found = conclusions_from(rig, {member("torsional_windup")});
   EXPECT_LT(found.checks.ljung_box_p, 1e-6);
   EXPECT_LT(found.checks.remaining_sigmas, 4) << "slow structure would be enough by itself";

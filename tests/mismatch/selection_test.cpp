@@ -95,10 +95,6 @@ TEST(Select, StepsLostInTwoRecordingsOfSix) {
 
 // The insertion rattles: what is left is no noise, whatever is named.
 TEST(Select, NoStepsLostWhileReadingsHangTogether) {
-  const auto rattle = [](std::vector<model::ActuatorState>& base) {
-    for (auto& state : base)
-      state.insertion_mm += 0.3 * std::sin(13.7e-6 * static_cast<double>(state.utime - base.front().utime));
-  };
   SimulatedRig rig{
       .effects_in =
           [](int r) {
@@ -106,7 +102,7 @@ TEST(Select, NoStepsLostWhileReadingsHangTogether) {
           },
       .recordings = 6};
   EXPECT_THAT(select(rig, 1).names, Contains("lost_steps"));
-  rig.true_motion = rattle;
+  rig.true_motion = rattle(0.3);
   EXPECT_THAT(select(rig, 1).names, Not(Contains("lost_steps")));
 }
 

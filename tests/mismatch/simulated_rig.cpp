@@ -2,6 +2,13 @@
 
 namespace bevel::diagnosis::testing {
 
+std::function<void(std::vector<model::ActuatorState>&)> rattle(double size_mm) {
+  return [size_mm](std::vector<model::ActuatorState>& base) {
+    for (auto& state : base)
+      state.insertion_mm += size_mm * std::sin(13.7e-6 * static_cast<double>(state.utime - base.front().utime));
+  };
+}
+
 model::testing::Script script_of(int recording) {
   const double turn = 2.5 + 0.5 * (recording % 4);
   const double sense = recording % 2 == 0 ? 1 : -1;

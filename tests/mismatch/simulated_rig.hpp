@@ -29,6 +29,9 @@ struct SimulatedRig {
   double dropped_share = 0;
 };
 
+// A true motion: the insertion swings by so much, two times a second. Too quick for any curve or name.
+std::function<void(std::vector<model::ActuatorState>&)> rattle(double size_mm);
+
 // 7 to 9 s, 60 to 75 mm: turns both ways at several depths, two speeds, a rest, steady turning, retraction.
 model::testing::Script script_of(int recording);
 
