@@ -18,16 +18,22 @@ struct SteeringGains {
   double parameter_uncertainty = 0.3;  // relative error of k and f that the drift bound covers
 };
 
+// Ages and times are parts of the 200 ms within which the needle must rest after any fault; docs/hazards.md has the sum.
 struct SafetyLimits {
-  double state_age_s = 0.15;     // of NEEDLE_STATE
-  double actuator_age_s = 0.15;  // of ACTUATOR_STATE
+  double state_age_s = 0.08;     // of NEEDLE_STATE
+  double actuator_age_s = 0.08;  // of ACTUATOR_STATE
   double position_sd_mm = 3.0;   // largest along any axis
   double depth_min_mm = -2.0;    // workspace of the tip in {A}
   double depth_max_mm = 140.0;
   double lateral_max_mm = 60.0;
-  double tracking_error_mm_s = 5.0;  // commanded against reported insertion rate, for tracking_error_s
-  double tracking_error_rad_s = 6.0;
-  double tracking_error_s = 0.4;
+  // Reported rates outside what was commanded within axis_delay_s, by more than this, for tracking_error_s.
+  double tracking_error_mm_s = 1.5;
+  double tracking_error_rad_s = 1.5;
+  double tracking_error_s = 0.06;
+  double axis_delay_s = 0.08;       // from a command to the report of what it did
+  double resting_motion_mm = 0.5;   // by which axes that are told to rest may move
+  double resting_motion_rad = 0.2;
+  double enabling_s = 3.0;          // from armed to both axes enabled
   double target_miss_max_mm = 5.0;  // predicted miss above which a target is refused before insertion
 };
 

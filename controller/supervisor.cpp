@@ -4,7 +4,12 @@
 #include <cmath>
 #include <utility>
 
+#include "model/age.hpp"
+
 namespace bevel::controller {
+namespace {
+constexpr double kDeviations = 4;  // of the estimate's own standard deviation
+}
 
 const char* to_string(State state) {
   switch (state) {
@@ -54,6 +59,16 @@ const char* to_string(Reason reason) {
       return "tip outside the model's domain";
     case Reason::overrun:
       return "control loop too late";
+    case Reason::resting_axes_moved:
+      return "axes moved though told to rest";
+    case Reason::resting_tip_moved:
+      return "needle state moved though the axes rest";
+    case Reason::off_the_axes:
+      return "needle state farther from the entry than the needle was inserted";
+    case Reason::input_refused:
+      return "input cannot be trusted";
+    case Reason::ending:
+      return "told to end";
   }
   return "?";
 }
@@ -86,6 +101,7 @@ void Supervisor::request(Request request, const std::optional<Target>& target, s
       return;
     case Request::hold:
       if (status_.state == State::steering) status_.state = State::hold;
+      resting_.reset();
       return;
     case Request::start:
       if (status_.state != State::armed && status_.state != State::hold) return;
@@ -93,7 +109,6 @@ void Supervisor::request(Request request, const std::optional<Target>& target, s
       for (const auto axis : actuator_->axis_status)  // not an error yet: the drives may still be switching on
         if (axis != static_cast<std::int32_t>(model::AxisStatus::enabled)) return;
       reset_count_ = needle_state_->reset_count;
-      tracking_bad_s_ = 0;
       status_.state = State::steering;
       return;
     case Request::arm:
@@ -112,12 +127,16 @@ void Supervisor::request(Request request, const std::optional<Target>& target, s
   if (!reach.reachable) return stop(Reason::target_unreachable, reach.miss_mm, "mm predicted miss");
   target_ = target;
   status_.state = State::armed;
+  axes_were_enabled_ = false;
+  enabling_s_ = tracking_bad_s_ = 0;
+  commands_ = 0;
+  resting_.reset();
 }
 
 // Everything that must hold for motion; latches the first thing that does not.
 bool Supervisor::check_inputs(std::int64_t now_utime) {
   const SafetyLimits& safety = config_.safety;
-  const auto age_s = [now_utime](std::int64_t utime) { return static_cast<double>(now_utime - utime) * 1e-6; };
+  const auto age_s = [now_utime](std::int64_t utime) { return model::age_s(now_utime, utime); };
   const auto refuse = [this](Reason reason, double value, const char* unit) {
     stop(reason, value, unit);
     return false;
@@ -140,18 +159,43 @@ bool Supervisor::check_inputs(std::int64_t now_utime) {
     return refuse(Reason::workspace, depth, "mm deep");
   const double lateral = n.pose.p_mm.head<2>().norm();
   if (!(lateral <= safety.lateral_max_mm)) return refuse(Reason::workspace, lateral, "mm lateral");
+  // Tissue that moves with its camera, and an entry point that was not quite met, are within the bound on the error.
+  const double beyond = n.pose.p_mm.norm() - std::abs(actuator_->insertion_mm);
+  if (!(beyond <= safety.position_sd_mm + kDeviations * std::sqrt(n.position_variance_mm2)))
+    return refuse(Reason::off_the_axes, beyond, "mm too far");
   return true;
 }
 
+bool Supervisor::check_axes(double dt_s) {
+  const auto not_enabled = [](std::int32_t axis) { return axis != static_cast<std::int32_t>(model::AxisStatus::enabled); };
+  const auto bad = std::ranges::find_if(actuator_->axis_status, not_enabled);
+  if (bad == actuator_->axis_status.end()) {
+    axes_were_enabled_ = true;
+    return true;
+  }
+  // Armed a moment ago, they may still be switching on, or be shown as they stood before.
+  enabling_s_ += dt_s;
+  if (!axes_were_enabled_ && status_.state == State::armed && enabling_s_ <= config_.safety.enabling_s) return true;
+  stop(Reason::axes_not_enabled, *bad, "(axis status)");
+  return false;
+}
+
+void Supervisor::remember(const Rates& commanded) { commanded_[commands_++ % kCommands] = commanded; }
+
+// The axes do what they were told within the last axis_delay_s, at any time in it.
 bool Supervisor::check_tracking(double dt_s) {
   const SafetyLimits& safety = config_.safety;
-  for (const auto axis : actuator_->axis_status)
-    if (axis != static_cast<std::int32_t>(model::AxisStatus::enabled)) {
-      stop(Reason::axes_not_enabled, axis, "(axis status)");
-      return false;
-    }
-  const double insertion = std::abs(actuator_->insertion_rate_mm_s - rates_.insertion_mm_s);
-  const double rotation = std::abs(actuator_->rotation_rate_rad_s - rates_.rotation_rad_s);
+  if (commands_ == 0) return true;
+  const auto window = static_cast<std::size_t>(std::ceil(safety.axis_delay_s / config_.period_s)) + 1;
+  Rates low, high;  // zero is always among them: a limit of the axes may hold them back
+  for (std::size_t i = 1; i <= std::min({window, commands_, kCommands}); ++i) {
+    const Rates& r = commanded_[(commands_ - i) % kCommands];
+    low = {std::min(low.insertion_mm_s, r.insertion_mm_s), std::min(low.rotation_rad_s, r.rotation_rad_s)};
+    high = {std::max(high.insertion_mm_s, r.insertion_mm_s), std::max(high.rotation_rad_s, r.rotation_rad_s)};
+  }
+  const auto outside = [](double value, double from, double to) { return std::max({from - value, value - to, 0.0}); };
+  const double insertion = outside(actuator_->insertion_rate_mm_s, low.insertion_mm_s, high.insertion_mm_s);
+  const double rotation = outside(actuator_->rotation_rate_rad_s, low.rotation_rad_s, high.rotation_rad_s);
   const bool bad = !(insertion <= safety.tracking_error_mm_s && rotation <= safety.tracking_error_rad_s);
   tracking_bad_s_ = bad ? tracking_bad_s_ + dt_s : 0;
   if (tracking_bad_s_ <= safety.tracking_error_s) return true;
@@ -160,15 +204,52 @@ bool Supervisor::check_tracking(double dt_s) {
   return false;
 }
 
+// What was told to rest rests: axes by their positions, which catches what is too slow for rates, and the estimate.
+bool Supervisor::check_rest() {
+  const SafetyLimits& safety = config_.safety;
+  const auto settled = static_cast<std::size_t>(std::ceil(2 * safety.axis_delay_s / config_.period_s)) + 1;
+  if (!axes_were_enabled_ || commands_ < settled) return true;
+  for (std::size_t i = 1; i <= std::min(settled, kCommands); ++i) {
+    const Rates& r = commanded_[(commands_ - i) % kCommands];
+    if (r.insertion_mm_s != 0 || r.rotation_rad_s != 0) {
+      resting_.reset();
+      return true;
+    }
+  }
+  if (!resting_)
+    resting_ = Resting{actuator_->insertion_mm, actuator_->rotation_rad, needle_state_->pose.p_mm};
+  const double moved_mm = std::abs(actuator_->insertion_mm - resting_->insertion_mm);
+  const double turned_rad = std::abs(actuator_->rotation_rad - resting_->rotation_rad);
+  const double tip_mm = (needle_state_->pose.p_mm - resting_->tip_mm).norm();
+  if (!(moved_mm <= safety.resting_motion_mm)) return stop(Reason::resting_axes_moved, moved_mm, "mm"), false;
+  if (!(turned_rad <= safety.resting_motion_rad)) return stop(Reason::resting_axes_moved, turned_rad, "rad"), false;
+  // Tissue relaxes and breathes: only what could not be that.
+  const double room_mm = safety.position_sd_mm + kDeviations * std::sqrt(needle_state_->position_variance_mm2);
+  if (!(tip_mm <= room_mm)) return stop(Reason::resting_tip_moved, tip_mm, "mm"), false;
+  return true;
+}
+
+bool Supervisor::watch(std::int64_t now_utime) { return !in_motion_states() || check_inputs(now_utime); }
+
 model::MotionCommand Supervisor::step(std::int64_t now_utime, double dt_s) {
   model::MotionCommand command;
   command.utime = now_utime;
   command.seq = seq_++;
-  if (status_.state != State::steering) {
+  if (!in_motion_states()) {
     rates_ = {};
     return command;
   }
-  if (!check_inputs(now_utime) || !check_tracking(dt_s)) return command;
+  if (!check_inputs(now_utime) || !check_axes(dt_s) || !check_tracking(dt_s)) return command;
+  if (status_.state != State::steering) {
+    rates_ = ramp(rates_, {}, dt_s, config_.limits);
+    if (!check_rest()) return command;
+    remember(rates_);
+    command.mode = status_.state == State::hold ? 1 : 0;
+    command.insertion_rate_mm_s = rates_.insertion_mm_s;
+    command.rotation_rate_rad_s = rates_.rotation_rad_s;
+    return command;
+  }
+  resting_.reset();
   if (needle_state_->reset_count != reset_count_) {
     stop(Reason::state_reset, needle_state_->reset_count, "resets");
     return command;
@@ -179,11 +260,23 @@ model::MotionCommand Supervisor::step(std::int64_t now_utime, double dt_s) {
     stop(Reason::outside_model, model::tilt_rad(needle_state_->pose), "rad tilt");
     return command;
   }
-  if (status_.geometry.ahead_mm <= 0) {  // closest approach
+  Rates wanted;
+  if (status_.geometry.ahead_mm <= 0) {  // closest approach: what still turns comes to rest by the ramp
     status_.state = State::hold;
-    rates_ = {};
-    return command;
+  } else {
+    wanted = steer();
   }
+  rates_ = ramp(rates_, wanted, dt_s, config_.limits);
+  remember(rates_);
+  status_.predicted_miss_mm = status_.geometry.aim_mm.norm();
+  command.mode = 1;
+  command.insertion_rate_mm_s = rates_.insertion_mm_s;
+  command.rotation_rate_rad_s = rates_.rotation_rad_s;
+  return command;
+}
+
+// What the law wants at this instant, without ramps.
+Rates Supervisor::steer() const {
   const double tolerance_mm = target_->tolerance_mm > 0 ? target_->tolerance_mm : config_.gains.tolerance_mm;
   Rates wanted = steering_rates(status_.geometry, actuator_->rotation_rad, tolerance_mm, config_);
   if (axes_.turns_late()) {
@@ -194,12 +287,7 @@ model::MotionCommand Supervisor::step(std::int64_t now_utime, double dt_s) {
   // Come to rest at the closest approach: never faster than the ramp can stop within what is left.
   const double braking = std::sqrt(2 * 0.5 * config_.limits.insertion_acceleration_mm_s2 * status_.geometry.ahead_mm);
   wanted.insertion_mm_s = std::min(wanted.insertion_mm_s, braking);
-  rates_ = ramp(rates_, wanted, dt_s, config_.limits);
-  status_.predicted_miss_mm = status_.geometry.aim_mm.norm();
-  command.mode = 1;
-  command.insertion_rate_mm_s = rates_.insertion_mm_s;
-  command.rotation_rate_rad_s = rates_.rotation_rad_s;
-  return command;
+  return wanted;
 }
 
 }  // namespace bevel::controller

@@ -2,6 +2,7 @@
 // When the needle may move. States: off, armed, steering, hold, stopped (latched, with its reason), fault. Motion fails
 // safe: whatever is missing, stale, unhealthy or out of bounds stops within one period, and only an operator's word
 // starts it again.
+#include <array>
 #include <cstdint>
 #include <optional>
 #include <string>
@@ -29,6 +30,11 @@ enum class Reason {
   target_unreachable,  // refused before insertion, with the predicted miss
   outside_model,       // the pose left the model's domain
   overrun,             // the loop could not keep its period
+  resting_axes_moved,  // axes that were told to rest did not
+  resting_tip_moved,   // the estimate moved while the axes rested
+  off_the_axes,        // the tip is said to be farther from the entry than the needle was inserted
+  input_refused,       // what comes in cannot be trusted: two senders, motion that cannot be, the clock was set
+  ending,              // the process was told to end
 };
 const char* to_string(State state);
 const char* to_string(Reason reason);
@@ -76,12 +82,16 @@ class Supervisor {
   }
 
   // An operator's word. arm: takes the target and leaves off, hold or stopped; refused (reason latched) when out of
-  // reach. start: from armed or hold to steering, once
-  // both axes are enabled. hold: stands still, may go on. stop: latched.
+  // reach. start: from armed or hold to steering, once both axes are enabled. hold: comes to rest within the limits of
+  // acceleration, may go on. stop: latched.
   void request(Request request, const std::optional<Target>& target, std::int64_t now_utime);
-  void report_overrun() { stop(Reason::overrun, 0, ""); }
+  // Latches what others found: overrun, input_refused, ending.
+  void report(Reason reason) { stop(reason, 0, ""); }
 
-  // One period: rates to command now. Zero unless steering. Does not allocate.
+  // Between periods, when something has come in: whether motion may go on. False once: it was latched just now.
+  bool watch(std::int64_t now_utime);
+
+  // One period: rates to command now. mode 1 while steering and holding, else 0: stop. Does not allocate.
   model::MotionCommand step(std::int64_t now_utime, double dt_s);
 
   const Status& status() const { return status_; }
@@ -89,8 +99,15 @@ class Supervisor {
  private:
   void stop(Reason reason, double value, const char* unit);
   bool check_inputs(std::int64_t now_utime);
+  bool check_axes(double dt_s);
   bool check_tracking(double dt_s);
+  bool check_rest();
+  Rates steer() const;
+  void remember(const Rates& commanded);
   model::NeedleParameters needle_now() const;
+  bool in_motion_states() const {
+    return status_.state == State::armed || status_.state == State::steering || status_.state == State::hold;
+  }
 
   ControllerConfig config_;
   model::NeedleParameters needle_;
@@ -103,6 +120,18 @@ class Supervisor {
   std::int64_t seq_ = 0;
   std::int32_t reset_count_ = 0;
   double tracking_bad_s_ = 0;
+  bool axes_were_enabled_ = false;  // since armed
+  double enabling_s_ = 0;
+  // What was commanded within the delay of the axes, newest last.
+  static constexpr std::size_t kCommands = 64;
+  std::array<Rates, kCommands> commanded_{};
+  std::size_t commands_ = 0;  // since armed
+  // Where everything stood when the axes had come to rest.
+  struct Resting {
+    double insertion_mm, rotation_rad;
+    Eigen::Vector3d tip_mm;
+  };
+  std::optional<Resting> resting_;
 };
 
 }  // namespace bevel::controller

@@ -31,14 +31,18 @@ struct ProcessNoise {
 struct Gate {
   double probability = 0.9999;        // share of good measurements that pass
   int rejects_before_unhealthy = 5;   // in a row
+  int camera_rejects_before_unhealthy = 4;  // in a row, of one camera: another's good ones do not outweigh it
   int rejects_before_reset = 20;      // in a row: then a declared reset
-  double reset_position_sd_mm = 5.0;  // covariance of the pose after a reset
+  // Covariance of the pose after a reset, at least: as far as the measurement that brought it, and what the needle can
+  // have bent, are within it in any case.
+  double reset_position_sd_mm = 5.0;
   double reset_tilt_sd_rad = 0.1;
 };
 
 struct HealthLimits {
-  double measurement_age_s = 0.13;  // 30 Hz and 50 ms of latency pass, one lost frame too; rest within 200 ms
-  double actuator_age_s = 0.1;
+  double measurement_age_s = 0.13;     // of capture: 30 Hz and 50 ms of latency pass, one lost frame too
+  double measurement_silence_s = 0.09;  // since one arrived, by the steady clock: two lost frames do not pass
+  double actuator_age_s = 0.08;
   double position_sd_mm = 3.0;  // largest standard deviation along any axis
 };
 
@@ -59,6 +63,9 @@ struct EstimatorConfig {
   // the midpoint rule, off by less than a thousandth of what the step does. False: by those of the step itself, as
   // longer ones, at 1.2 times the time. The path is the same.
   bool midpoint_derivatives = true;
+  // Live: the axes count from the entry point, so the first actuator state says how deep the needle is and how it is
+  // turned. False: wherever the axes stand at first is the entry, as in recordings made elsewhere.
+  bool start_at_axes = false;
 };
 
 }  // namespace bevel::estimator

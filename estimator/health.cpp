@@ -7,6 +7,10 @@ std::string describe_health(std::int32_t health) {
       {kNoMeasurement, "no measurement yet"},   {kMeasurementStale, "measurements stale"},
       {kActuatorStale, "actuator state stale"}, {kUncertain, "position too uncertain"},
       {kRejecting, "rejecting measurements"},   {kOutsideModel, "outside the model's domain"},
+      {kNotFromEntry, "not there from the entry: retract to the entry point, or confirm"},
+      {kCameraSilent, "a camera fell silent"},
+      {kCameraFrozen, "a camera is frozen"},
+      {kInputRefused, "input cannot be trusted"},
   };
   std::string text;
   for (const auto& [bit, word] : kWords)

@@ -13,6 +13,10 @@ enum Health : std::int32_t {
   kUncertain = 8,         // position variance above its bound
   kRejecting = 16,        // the gate refused several measurements in a row
   kOutsideModel = 32,     // the pose left the domain of the slip law; propagation stopped
+  kNotFromEntry = 64,     // began with the needle in the tissue: its path up to there is not known
+  kCameraSilent = 128,    // a camera that was heard is heard no more
+  kCameraFrozen = 256,    // a camera says the same to the last bit while the needle moves
+  kInputRefused = 512,    // two senders, or motion that cannot be; until armed anew
 };
 
 std::string describe_health(std::int32_t health);

@@ -5,6 +5,7 @@
 #include <tuple>
 
 #include "estimator/health.hpp"
+#include "model/age.hpp"
 
 namespace bevel::estimator {
 
@@ -108,7 +109,11 @@ void NeedleEstimator::add(const model::ActuatorState& actuator) {
   }
   made->insertion_mm = actuator.insertion_mm;
   made->rotation_rad = actuator.rotation_rad;
-  if (index == 0) made->state = filter_.initial(made->insertion_mm, made->rotation_rad);
+  if (index == 0) {
+    made->state = filter_.config().start_at_axes ? filter_.inserted(made->insertion_mm, made->rotation_rad)
+                                                 : filter_.initial(made->insertion_mm, made->rotation_rad);
+    made->state.reset_count = resets_before_;
+  }
   // Measurements since the previous actuator state are interpolated anew.
   std::size_t from = index;
   while (from > 1 && node(from - 1).kind == Kind::measurement) --from;
@@ -139,6 +144,28 @@ void NeedleEstimator::add(const model::TipMeasurement& stamped) {
   if (index < processed_) ++counters_.late;
   process_from(index);
   relinearise_if_due();
+}
+
+void NeedleEstimator::restart() {
+  if (processed_ > 0) resets_before_ = node(processed_ - 1).state.reset_count + 1;
+  free_.insert(free_.end(), order_.begin(), order_.end());
+  order_.clear();
+  processed_ = 0;
+  past_started_ = false;
+  newest_update_ = {};
+  newest_update_utime_ = 0;
+}
+
+void NeedleEstimator::shift_time(std::int64_t by_us) {
+  for (const std::uint32_t slot : order_) {
+    Node& n = pool_[slot];
+    n.utime += by_us;
+    n.measurement.utime += by_us;
+    if (n.state.measurement_utime != 0) n.state.measurement_utime += by_us;
+    ++n.state.reset_count;
+  }
+  newest_update_utime_ += by_us;
+  past_started_ = false;  // its states carry other times
 }
 
 void NeedleEstimator::interpolate(std::size_t index) {
@@ -198,7 +225,7 @@ Estimate NeedleEstimator::estimate(std::int64_t now_utime) const {
   result.newest_update = newest_update_;
   result.health = kHealthy;
   const auto older_than = [now_utime](std::int64_t utime, double limit_s) {
-    return static_cast<double>(now_utime - utime) > limit_s * 1e6;
+    return model::age_s(now_utime, utime) > limit_s;
   };
   if (older_than(newest.utime, limits.actuator_age_s)) result.health |= kActuatorStale;
   if (state.measurement_utime == 0) {
@@ -208,7 +235,11 @@ Estimate NeedleEstimator::estimate(std::int64_t now_utime) const {
   }
   const double largest_variance = state.covariance.diagonal().head<3>().maxCoeff();
   if (!(largest_variance < limits.position_sd_mm * limits.position_sd_mm)) result.health |= kUncertain;
-  if (state.rejects_in_row >= filter_.config().gate.rejects_before_unhealthy) result.health |= kRejecting;
+  const Gate& gate = filter_.config().gate;
+  if (state.rejects_in_row >= gate.rejects_before_unhealthy ||
+      std::ranges::any_of(state.camera_rejects_in_row,
+                          [&gate](int rejects) { return rejects >= gate.camera_rejects_before_unhealthy; }))
+    result.health |= kRejecting;
   if (state.outside_model) result.health |= kOutsideModel;
   return result;
 }

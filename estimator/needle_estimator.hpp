@@ -39,6 +39,11 @@ class NeedleEstimator {
   void add(const model::ActuatorState& actuator);
   void add(const model::TipMeasurement& measurement);
 
+  // Begins anew, a declared reset, with the next actuator state.
+  void restart();
+  // The clock that stamps everything was set by so much: what is known stays, under its new times; a declared reset.
+  void shift_time(std::int64_t by_us);
+
   // The newest estimate. `now_utime` is only for the age limits of health; pass the newest sample's time in a replay.
   Estimate estimate(std::int64_t now_utime) const;
 
@@ -96,6 +101,7 @@ class NeedleEstimator {
   Counters counters_;
   Update newest_update_;
   std::int64_t newest_update_utime_ = 0;
+  std::int32_t resets_before_ = 0;  // declared by restarts
   Observer observer_ = nullptr;
   void* observer_context_ = nullptr;
 };

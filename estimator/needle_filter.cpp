@@ -2,9 +2,11 @@
 
 #include <Eigen/Cholesky>
 #include <Eigen/Eigenvalues>
+#include <Eigen/Geometry>
 #include <algorithm>
 #include <boost/math/distributions/chi_squared.hpp>
 #include <cmath>
+#include <limits>
 #include <numbers>
 
 #include "estimator/error_state.hpp"
@@ -18,6 +20,8 @@ constexpr double kRankTolerance = 1e-9;
 constexpr double kLambda2Max = 0.9;                             // (24) with room: 1 - lambda2 stays away from zero
 constexpr double kWheelbaseMin_mm = 2, kWheelbaseMax_mm = 990;  // of the model's (1, 1000), with room
 constexpr double kVarianceFloor = 1e-14;
+constexpr double kAtEntry_mm = 1.0;  // not inserted yet: within what an entry point is met by
+constexpr std::int32_t kCamerasCounted = 4;
 constexpr double kShort_mm = 0.5, kShort_rad = 0.05;  // see EstimatorConfig::midpoint_derivatives
 
 double square(double x) { return x * x; }
@@ -144,6 +148,31 @@ FilterState NeedleFilter::initial(double insertion_mm, double rotation_rad) cons
   return state;
 }
 
+FilterState NeedleFilter::inserted(double insertion_mm, double rotation_rad) const {
+  FilterState state = initial(insertion_mm, rotation_rad);
+  const Eigen::Matrix3d turned = Eigen::AngleAxisd(rotation_rad, Eigen::Vector3d::UnitZ()).toRotationMatrix();
+  state.pose.R = turned * state.pose.R;
+  if (std::abs(insertion_mm) <= kAtEntry_mm) return state;
+  state.pose.p_mm += insertion_mm * state.pose.R.col(2);
+  widen_by_bend(state, insertion_mm);
+  const ProcessNoise& noise = config_.process;
+  state.covariance(5, 5) += square(noise.roll_rad) * std::abs(insertion_mm) +
+                            square(noise.roll_per_sqrt_rad) * std::abs(rotation_rad);
+  return state;
+}
+
+// An arc of the curvature that the prior allows, to any side: its end lies k L^2 / 2 aside and k^2 L^3 / 6 short, and is
+// inclined by k L.
+void NeedleFilter::widen_by_bend(FilterState& state, double inserted_mm) const {
+  const double length_mm = std::abs(inserted_mm);
+  const double k = std::abs(config_.prior.needle.curvature_per_mm) + config_.prior.curvature_sd_per_mm;
+  const double bend_rad = k * length_mm;
+  const double aside_mm = 0.5 * bend_rad * length_mm, short_mm = square(bend_rad) * length_mm / 6;
+  Eigen::Matrix<double, 6, 1> variance;
+  variance << square(aside_mm), square(aside_mm), square(short_mm), square(bend_rad), square(bend_rad), 0;
+  state.covariance.diagonal().head<6>() += variance;
+}
+
 model::SlipParameters NeedleFilter::slip_of(const FilterState& state) const {
   model::SlipParameters slip = slip_;
   slip.lambda1_per_rad = state.lambda1_per_rad;
@@ -219,21 +248,28 @@ template <int kSize>
 Update NeedleFilter::update_sized(FilterState& state, const model::TipMeasurement& measurement) const {
   const SeenAxes seen = seen_axes(measurement.information_per_mm2);
   if (seen.rank == 0) return {};  // sees nothing: no rejection either
-  Update result;
-  if (config_.effects.empty()) {
-    result = update_seen<kSize, 3>(state, state.pose.R, seen, measurement.position_mm - state.pose.p_mm, gate_);
-  } else {
+  const auto apply = [&]() -> Update {
+    if (config_.effects.empty())
+      return update_seen<kSize, 3>(state, state.pose.R, seen, measurement.position_mm - state.pose.p_mm, gate_);
     const model::TipReading at = reading(state);
-    result = update_seen<kSize, kSize>(state, at.D, seen, measurement.position_mm - at.position_mm, gate_);
-  }
+    return update_seen<kSize, kSize>(state, at.D, seen, measurement.position_mm - at.position_mm, gate_);
+  };
+  Update result = apply();
+  std::uint8_t& camera_rejects = state.camera_rejects_in_row.at(
+      static_cast<std::size_t>(std::clamp<std::int32_t>(measurement.camera, 0, kCamerasCounted - 1)));
   if (result.accepted) {
     state.measurement_utime = measurement.utime;
     state.rejects_in_row = 0;
+    camera_rejects = 0;
     keep_in_domain<kSize>(state);
-  } else if (++state.rejects_in_row >= config_.gate.rejects_before_reset) {
-    declare_reset(state);
-    result.reset = true;
+    return result;
   }
+  if (camera_rejects < std::numeric_limits<std::uint8_t>::max()) ++camera_rejects;
+  if (++state.rejects_in_row < config_.gate.rejects_before_reset) return result;
+  declare_reset(state, result.innovation.norm());
+  const Update reached = apply();  // the reset begins with what was measured, or it would be followed by another
+  result.reset = true;
+  if (reached.accepted) state.measurement_utime = measurement.utime;
   return result;
 }
 
@@ -272,17 +308,20 @@ void NeedleFilter::keep_in_domain(FilterState& state) const {
 template void NeedleFilter::keep_in_domain<9>(FilterState&) const;
 template void NeedleFilter::keep_in_domain<10>(FilterState&) const;
 
-void NeedleFilter::declare_reset(FilterState& state) const {
+void NeedleFilter::declare_reset(FilterState& state, double reach_mm) const {
   // The pose is believed no more; the parameters are, but less: their prior widths come back, correlations go.
   const FilterState prior = initial();
   const Gate& gate = config_.gate;
   state.covariance = prior.covariance;
   state.wheelbase_covariance.setZero();
   state.wheelbase_variance_mm2 = prior.wheelbase_variance_mm2;
-  state.covariance.diagonal().head<6>() << Eigen::Vector3d::Constant(square(gate.reset_position_sd_mm)),
+  state.covariance.diagonal().head<6>() << Eigen::Vector3d::Constant(
+      square(std::max(gate.reset_position_sd_mm, reach_mm))),
       square(gate.reset_tilt_sd_rad), square(gate.reset_tilt_sd_rad),
       square(std::max(gate.reset_tilt_sd_rad, config_.prior.roll_sd_rad));
+  widen_by_bend(state, state.pose.p_mm.z());
   state.rejects_in_row = 0;
+  state.camera_rejects_in_row = {};
   state.measurement_utime = 0;
   ++state.reset_count;
 }

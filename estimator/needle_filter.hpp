@@ -40,6 +40,7 @@ struct FilterState {
   double wheelbase_variance_mm2 = 0;
   std::int64_t measurement_utime = 0;  // newest accepted; 0 before the first
   std::int32_t rejects_in_row = 0;
+  std::array<std::uint8_t, 4> camera_rejects_in_row{};  // cameras 0 to 3; higher numbers share the last
   std::int32_t reset_count = 0;
   bool outside_model = false;
   EffectState effects;
@@ -84,6 +85,10 @@ class NeedleFilter {
   // The prior at the entry point: heading along z_A but for what effects say, bevel as the model file says, the base
   // where it stands then.
   FilterState initial(double insertion_mm = 0, double rotation_rad = 0) const;
+
+  // The same for a needle that was inserted before anybody watched: as deep and turned as the axes say, straight, and as
+  // uncertain as it can have bent on the way. Without depth it is initial(), turned.
+  FilterState inserted(double insertion_mm, double rotation_rad) const;
 
   // Moves the state by increments of the two axes in so much time (which only effects ask for). Where the model has no
   // answer the pose stays, and outside_model is set.
@@ -137,7 +142,8 @@ class NeedleFilter {
   model::SlipParameters slip_of(const FilterState& state) const;
   model::AugmentedState augmented(const FilterState& state) const;
   model::TipReading reading(const FilterState& state) const;
-  void declare_reset(FilterState& state) const;
+  void widen_by_bend(FilterState& state, double inserted_mm) const;
+  void declare_reset(FilterState& state, double reach_mm) const;
 
   EstimatorConfig config_;
   std::array<double, 3> gate_{};  // chi-square quantile by rank

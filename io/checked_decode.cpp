@@ -65,13 +65,8 @@ class TextWalk {
 // First fault among the fields.
 class FieldCheck {
  public:
-  explicit FieldCheck(const TimeBounds& bounds) : bounds_(bounds) {}
   void time(const char* name, std::int64_t utime) {
-    if (utime <= 0) return fail(DecodeFault::time, name);
-    if (bounds_.reference_utime <= 0) return;
-    // Both are positive, so the difference cannot overflow.
-    const std::int64_t age_us = bounds_.reference_utime - utime;
-    if (age_us > bounds_.max_age_us || -age_us > bounds_.max_ahead_us) fail(DecodeFault::time, name);
+    if (utime <= 0) fail(DecodeFault::time, name);
   }
   void count(const char* name, std::int64_t value) {
     if (value < 0) fail(DecodeFault::out_of_range, name);
@@ -94,7 +89,6 @@ class FieldCheck {
   const std::optional<DecodeError>& error() const { return error_; }
 
  private:
-  const TimeBounds& bounds_;
   std::optional<DecodeError> error_;
 };
 
@@ -161,8 +155,8 @@ std::string describe(const DecodeError& error) {
 }
 
 template <class Message>
-std::optional<DecodeError> check_fields(const Message& message, const TimeBounds& bounds) noexcept {
-  FieldCheck check(bounds);
+std::optional<DecodeError> check_fields(const Message& message) noexcept {
+  FieldCheck check;
   visit_fields(message, check);
   if (check.error()) return check.error();
   if (const char* field = find_inconsistency(message)) return DecodeError{DecodeFault::inconsistent, field};
@@ -170,7 +164,7 @@ std::optional<DecodeError> check_fields(const Message& message, const TimeBounds
 }
 
 template <class Message>
-Decoded<Message> checked_decode(const void* data, std::size_t size, const TimeBounds& bounds) noexcept {
+Decoded<Message> checked_decode(const void* data, std::size_t size) noexcept {
   Decoded<Message> decoded;
   constexpr bool has_text = std::is_same_v<Message, process_status_t>;
   const bool size_possible = has_text ? size >= fixed_size<Message>() : size == fixed_size<Message>();
@@ -193,45 +187,23 @@ Decoded<Message> checked_decode(const void* data, std::size_t size, const TimeBo
   if (decoded.message.decode(data, 0, static_cast<int>(size)) != static_cast<int>(size)) {
     decoded.error = DecodeError{DecodeFault::size, ""};
   } else {
-    decoded.error = check_fields(decoded.message, bounds);
+    decoded.error = check_fields(decoded.message);
   }
   if (decoded.error) decoded.message = Message{};
   return decoded;
 }
 
-template Decoded<tip_measurement_t> checked_decode(const void*, std::size_t, const TimeBounds&) noexcept;
-template Decoded<actuator_state_t> checked_decode(const void*, std::size_t, const TimeBounds&) noexcept;
-template Decoded<motion_command_t> checked_decode(const void*, std::size_t, const TimeBounds&) noexcept;
-template Decoded<needle_state_t> checked_decode(const void*, std::size_t, const TimeBounds&) noexcept;
-template Decoded<steering_target_t> checked_decode(const void*, std::size_t, const TimeBounds&) noexcept;
-template Decoded<process_status_t> checked_decode(const void*, std::size_t, const TimeBounds&) noexcept;
-template std::optional<DecodeError> check_fields(const tip_measurement_t&, const TimeBounds&) noexcept;
-template std::optional<DecodeError> check_fields(const actuator_state_t&, const TimeBounds&) noexcept;
-template std::optional<DecodeError> check_fields(const motion_command_t&, const TimeBounds&) noexcept;
-template std::optional<DecodeError> check_fields(const needle_state_t&, const TimeBounds&) noexcept;
-template std::optional<DecodeError> check_fields(const steering_target_t&, const TimeBounds&) noexcept;
-template std::optional<DecodeError> check_fields(const process_status_t&, const TimeBounds&) noexcept;
-
-SeqStep SeqWatch::step(std::int64_t seq, std::int64_t utime) noexcept {
-  if (!started_) {
-    started_ = true;
-    newest_seq_ = seq;
-    newest_utime_ = utime;
-    return SeqStep::first;
-  }
-  if (seq == newest_seq_) return SeqStep::duplicate;
-  if (seq < newest_seq_ && utime <= newest_utime_) return SeqStep::late;
-  SeqStep step = SeqStep::next;
-  if (seq < newest_seq_) {
-    step = SeqStep::restarted;
-    ++restarts_;
-  } else if (seq - newest_seq_ > 1) {
-    step = SeqStep::gap;
-    lost_ += seq - newest_seq_ - 1;
-  }
-  newest_seq_ = seq;
-  newest_utime_ = utime;
-  return step;
-}
+template Decoded<tip_measurement_t> checked_decode(const void*, std::size_t) noexcept;
+template Decoded<actuator_state_t> checked_decode(const void*, std::size_t) noexcept;
+template Decoded<motion_command_t> checked_decode(const void*, std::size_t) noexcept;
+template Decoded<needle_state_t> checked_decode(const void*, std::size_t) noexcept;
+template Decoded<steering_target_t> checked_decode(const void*, std::size_t) noexcept;
+template Decoded<process_status_t> checked_decode(const void*, std::size_t) noexcept;
+template std::optional<DecodeError> check_fields(const tip_measurement_t&) noexcept;
+template std::optional<DecodeError> check_fields(const actuator_state_t&) noexcept;
+template std::optional<DecodeError> check_fields(const motion_command_t&) noexcept;
+template std::optional<DecodeError> check_fields(const needle_state_t&) noexcept;
+template std::optional<DecodeError> check_fields(const steering_target_t&) noexcept;
+template std::optional<DecodeError> check_fields(const process_status_t&) noexcept;
 
 }  // namespace bevel::io

@@ -4,7 +4,6 @@
 #pragma once
 
 #include <cstdint>
-#include <limits>
 #include <optional>
 #include <string>
 #include <vector>
@@ -20,7 +19,7 @@ enum class DecodeFault {
   not_finite,    // NaN or infinity
   out_of_range,  // a code without meaning, a negative counter, a magnitude that no bench has
   inconsistent,  // a quaternion without unit length, a covariance that is none
-  time,          // not positive, or outside the bounds around the reference
+  time,          // not positive
 };
 inline constexpr int kDecodeFaultCount = 7;
 const char* name_of(DecodeFault fault);
@@ -41,19 +40,12 @@ struct Decoded {
   const Message* operator->() const { return &message; }
 };
 
-// Bounds on utime around a reference clock. Without a reference (0) only "positive" is asked.
-struct TimeBounds {
-  std::int64_t reference_utime = 0;
-  std::int64_t max_age_us = std::numeric_limits<std::int64_t>::max();
-  std::int64_t max_ahead_us = std::numeric_limits<std::int64_t>::max();
-};
-
 template <class Message>
-Decoded<Message> checked_decode(const void* data, std::size_t size, const TimeBounds& bounds = {}) noexcept;
+Decoded<Message> checked_decode(const void* data, std::size_t size) noexcept;
 
 // The same checks on a message that is already a structure: before it is sent, or after memory-to-memory transport.
 template <class Message>
-std::optional<DecodeError> check_fields(const Message& message, const TimeBounds& bounds = {}) noexcept;
+std::optional<DecodeError> check_fields(const Message& message) noexcept;
 
 template <class Message>
 std::vector<std::uint8_t> encode(const Message& message) {
@@ -61,29 +53,5 @@ std::vector<std::uint8_t> encode(const Message& message) {
   message.encode(bytes.data(), 0, static_cast<int>(bytes.size()));
   return bytes;
 }
-
-// How a message's seq and utime stand to those before it from the same sender.
-enum class SeqStep {
-  first,
-  next,       // newer
-  gap,        // newer, and some between were lost
-  duplicate,  // the same seq as the newest
-  late,       // older than the newest in seq and in time
-  restarted,  // seq fell back while time went on: the sender was started anew
-};
-
-class SeqWatch {
- public:
-  SeqStep step(std::int64_t seq, std::int64_t utime) noexcept;
-  std::int64_t lost() const { return lost_; }  // messages missing in gaps; late ones are not taken off again
-  std::int64_t restarts() const { return restarts_; }
-
- private:
-  bool started_ = false;
-  std::int64_t newest_seq_ = 0;
-  std::int64_t newest_utime_ = 0;
-  std::int64_t lost_ = 0;
-  std::int64_t restarts_ = 0;
-};
 
 }  // namespace bevel::io

@@ -46,13 +46,19 @@ struct Range {
   double highest = std::numeric_limits<double>::infinity();
   bool lowest_open = false;
   bool highest_open = false;
+  const char* reason = nullptr;  // static text: what a value outside would break
 
   bool contains(double value) const;
-  std::string describe() const;  // "from 0 to 5", "above 0", "at least 1", "any finite number"
+  std::string describe() const;  // "from 0 to 5", "above 0", "at least 1", "any finite number"; then the reason
+  constexpr Range because(const char* why) const {
+    Range range = *this;
+    range.reason = why;
+    return range;
+  }
 };
-constexpr Range in_range(double lowest, double highest) { return {lowest, highest, false, false}; }
-constexpr Range at_least(double lowest) { return {lowest, std::numeric_limits<double>::infinity(), false, false}; }
-constexpr Range above(double lowest) { return {lowest, std::numeric_limits<double>::infinity(), true, false}; }
+constexpr Range in_range(double lowest, double highest) { return {lowest, highest}; }
+constexpr Range at_least(double lowest) { return {lowest, std::numeric_limits<double>::infinity()}; }
+constexpr Range above(double lowest) { return {lowest, std::numeric_limits<double>::infinity(), true}; }
 constexpr Range any_finite() { return {}; }
 
 template <class Enum>

@@ -23,7 +23,8 @@ void read_estimator_config(Section section, estimator::EstimatorConfig& config) 
 
   Section gate = section.section("gate", optional);
   gate.read("probability", config.gate.probability, optional, in_range(0.5, 0.9999999));
-  gate.read("rejects_before_unhealthy", config.gate.rejects_before_unhealthy, optional, in_range(1, 1000));
+  gate.read("rejects_before_unhealthy", config.gate.rejects_before_unhealthy, optional, in_range(1, 20));
+  gate.read("camera_rejects_before_unhealthy", config.gate.camera_rejects_before_unhealthy, optional, in_range(1, 20));
   gate.read("rejects_before_reset", config.gate.rejects_before_reset, optional, in_range(1, 10000));
   gate.read("reset_position_sd_mm", config.gate.reset_position_sd_mm, optional, in_range(0.01, 1000));
   gate.read("reset_tilt_sd_rad", config.gate.reset_tilt_sd_rad, optional, in_range(1e-4, 3));
@@ -31,9 +32,12 @@ void read_estimator_config(Section section, estimator::EstimatorConfig& config) 
   section.read("relinearised_steps", config.relinearised_steps, optional, in_range(0, 100000));
 
   Section limits = section.section("limits", optional);
-  limits.read("measurement_age_s", config.limits.measurement_age_s, optional, above(0));
-  limits.read("actuator_age_s", config.limits.actuator_age_s, optional, above(0));
-  limits.read("position_sd_mm", config.limits.position_sd_mm, optional, above(0));
+  constexpr const char* kStop = "the needle must rest within 200 ms of a fault";
+  limits.read("measurement_age_s", config.limits.measurement_age_s, optional, in_range(0.02, 0.15).because(kStop));
+  limits.read("measurement_silence_s", config.limits.measurement_silence_s, optional,
+              in_range(0.02, 0.12).because(kStop));
+  limits.read("actuator_age_s", config.limits.actuator_age_s, optional, in_range(0.01, 0.12).because(kStop));
+  limits.read("position_sd_mm", config.limits.position_sd_mm, optional, in_range(0.05, 10));
 }
 
 }  // namespace bevel::io

@@ -85,7 +85,8 @@ template <MessageOf<steering_target_t> Message, class Visitor>
 void visit_fields(Message& m, Visitor&& v) {
   v.time("utime", m.utime);
   v.count("seq", m.seq);
-  v.code("request", m.request, 0, 3);
+  v.code("request", m.request, 0, 5);
+  for (auto& session : m.session) v.count("session", session);
   v.number("position_mm", m.position_mm, 3, kLargestLength_mm);
   v.number("tolerance_mm", &m.tolerance_mm, 1, kLargestLength_mm);
 }
@@ -94,6 +95,7 @@ template <MessageOf<process_status_t> Message, class Visitor>
 void visit_fields(Message& m, Visitor&& v) {
   v.time("utime", m.utime);
   v.count("seq", m.seq);
+  v.count("session", m.session);
   v.text("process", m.process);
   v.text("state", m.state);
   v.text("reason", m.reason);

@@ -4,7 +4,13 @@
 
 namespace bevel::nodes {
 
-CameraNode::CameraNode(lcm::LCM& lcm, const SystemConfig& config) : port_(lcm), status_(port_, "bevel-camera", 0) {
+std::string camera_process_name(const SystemConfig& config) {
+  const bool all = config.source.kind == camera::SourceKind::stream || config.cameras.size() < 2;
+  return all ? "bevel-camera" : "bevel-camera-" + std::to_string(config.source.camera);
+}
+
+CameraNode::CameraNode(lcm::LCM& lcm, const SystemConfig& config)
+    : port_(lcm), status_(port_, camera_process_name(config), 0) {
   if (config.cameras.empty()) throw std::invalid_argument("no [[camera]] in the configuration: at least one is needed");
   std::vector<camera::CameraSetup> setups;
   for (const CameraViewConfig& c : config.cameras)
@@ -18,9 +24,15 @@ CameraNode::CameraNode(lcm::LCM& lcm, const SystemConfig& config) : port_(lcm), 
       2);
 }
 
-CameraNode::Outcome CameraNode::step(std::int64_t now_utime, int timeout_ms) {
+CameraNode::Outcome CameraNode::step(const Now& now, int timeout_ms) {
+  port_.tell_time(now);
+  port_.rethrow();
   const auto result = pipeline_->next(std::chrono::milliseconds(timeout_ms));
-  status_.report(now_utime, "running", "");
+  if (status_.name_taken()) {
+    failure_ = "another process for the same camera is heard on this network";
+    return Outcome::failed;
+  }
+  status_.report("running", "");
   if (std::holds_alternative<camera::FrameTimeout>(result)) return Outcome::nothing;
   if (std::holds_alternative<camera::EndOfFrames>(result)) return Outcome::ended;
   if (const auto* failure = std::get_if<camera::SourceFailure>(&result)) {
@@ -31,7 +43,7 @@ CameraNode::Outcome CameraNode::step(std::int64_t now_utime, int timeout_ms) {
   status_.note_run(seen.run_s);
   tip_measurement_t m{};
   m.utime = seen.capture_utime;
-  m.seq = seq_++;
+  m.seq = seq_[seen.camera]++;
   m.camera = seen.camera;
   m.status = static_cast<std::int32_t>(seen.status);
   for (std::size_t i = 0; i < 3; ++i) m.position_mm[i] = seen.position_mm[i];

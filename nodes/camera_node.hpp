@@ -1,18 +1,25 @@
 #pragma once
 // bevel-camera: frames in, TIP_MEASUREMENT out. The estimate, if there is one, says where to look.
+#include <map>
+
 #include "drivers/camera/pipeline.hpp"
-#include "nodes/lcm_port.hpp"
+#include "nodes/status_reporter.hpp"
 #include "nodes/system_config.hpp"
 
 namespace bevel::nodes {
+
+// bevel-camera, or bevel-camera-N for one that serves camera N of several.
+std::string camera_process_name(const SystemConfig& config);
 
 class CameraNode {
  public:
   // Throws camera::SourceError or std::invalid_argument, naming what is wrong.
   CameraNode(lcm::LCM& lcm, const SystemConfig& config);
   enum class Outcome { frame, nothing, ended, failed };
+  void tell_time(const Now& now) { port_.tell_time(now); }
   // Waits at most timeout_ms for a frame and publishes what it shows.
-  Outcome step(std::int64_t now_utime, int timeout_ms);
+  Outcome step(const Now& now, int timeout_ms);
+  LcmPort& port() { return port_; }
   const std::string& failure() const { return failure_; }
   const camera::CameraCounters& counters() const { return pipeline_->counters(); }
   // Called with each observation, for programs that print them.
@@ -23,7 +30,7 @@ class CameraNode {
   std::unique_ptr<camera::CameraPipeline> pipeline_;
   StatusReporter status_;
   std::string failure_;
-  std::int64_t seq_ = 0;
+  std::map<int, std::int64_t> seq_;  // each camera counts for itself
 };
 
 }  // namespace bevel::nodes

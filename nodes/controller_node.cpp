@@ -1,15 +1,34 @@
 #include "nodes/controller_node.hpp"
 
 #include <Eigen/Eigenvalues>
+#include <cmath>
 #include <cstdio>
+#include <utility>
 
+#include "estimator/health.hpp"
 #include "nodes/needle_pose.hpp"
 
 namespace bevel::nodes {
 namespace {
+
 // A loop this late has lost the needle: at 5 mm/s it is half a millimetre.
 constexpr double kLateStop_s = 0.1;
+constexpr double kFastestCycle_hz = 1200;  // of drives; the estimator sends a state for each of theirs
+
+io::SenderLimits input_limits(double age_s) {
+  const auto age_us = std::llround(age_s * 1e6);
+  return {.longest_age_us = age_us, .fastest_hz = kFastestCycle_hz, .silence_us = age_us};
+}
+
+bool latched(controller::State state) {
+  return state == controller::State::stopped || state == controller::State::fault;
+}
+
 }  // namespace
+
+io::MotionBounds motion_bounds(const stepper::StepperConfig& config) {
+  return {config.axes[stepper::kInsertion].rate_limit_unit_s, config.axes[stepper::kRotation].rate_limit_unit_s};
+}
 
 controller::NeedleView to_view(const needle_state_t& m) {
   controller::NeedleView v;
@@ -29,38 +48,95 @@ controller::NeedleView to_view(const needle_state_t& m) {
   return v;
 }
 
-ControllerNode::ControllerNode(lcm::LCM& lcm, const controller::ControllerConfig& config,
-                               const model::NeedleParameters& needle, const std::vector<model::ActiveEffect>& effects)
-    : config_(config),
+ControllerNode::ControllerNode(lcm::LCM& lcm, const SystemConfig& config)
+    : config_(config.controller),
       port_(lcm),
       // An effect may be of the needle itself, its direction of slip for instance.
-      supervisor_(config, model::AugmentedNeedle(needle, effects).needle(), effects),
-      status_(port_, "bevel-controller", config.period_s) {
-  port_.subscribe<needle_state_t>(io::channel::kNeedleState,
-                                  [this](const needle_state_t& m) { supervisor_.set_needle(to_view(m)); });
-  port_.subscribe<actuator_state_t>(io::channel::kActuatorState,
-                                    [this](const actuator_state_t& m) { supervisor_.set_actuator(io::to_sample(m)); });
-  port_.subscribe<steering_target_t>(io::channel::kSteeringTarget, [this](const steering_target_t& m) {
-    const controller::Target target{{m.position_mm[0], m.position_mm[1], m.position_mm[2]}, m.tolerance_mm};
-    supervisor_.request(static_cast<controller::Request>(m.request), target, now_utime_);
-  });
+      supervisor_(config.controller, model::AugmentedNeedle(config.needle, config.live_effects.active).needle(),
+                  config.live_effects.active),
+      status_(port_, "bevel-controller", config.controller.period_s),
+      words_(port_, status_, Receiver::controller,
+             [this](Word word, const steering_target_t& m) { on_word(word, m); }) {
+  const io::MotionBounds bounds = motion_bounds(config.stepper);
+  port_.on_trouble = [this](const InputTrouble& trouble) { on_trouble(trouble); };
+  port_.subscribe<needle_state_t>(
+      io::channel::kNeedleState, input_limits(config_.safety.state_age_s),
+      [this](const needle_state_t& m) {
+        supervisor_.set_needle(to_view(m));
+        if (!supervisor_.watch(port_.now().utime)) command(0);
+      },
+      [bounds](const needle_state_t& before, const needle_state_t& next) {
+        return io::check_motion(before, next, bounds);
+      });
+  port_.subscribe<actuator_state_t>(
+      io::channel::kActuatorState, input_limits(config_.safety.actuator_age_s),
+      [this](const actuator_state_t& m) { supervisor_.set_actuator(io::to_sample(m)); },
+      [bounds](const actuator_state_t& before, const actuator_state_t& next) {
+        return io::check_motion(before, next, bounds);
+      });
 }
 
-void ControllerNode::step(std::int64_t now_utime, double late_s) {
-  now_utime_ = now_utime;
+void ControllerNode::on_word(Word word, const steering_target_t& m) {
+  if (word == Word::entry || word == Word::confirm) return;  // for those who count and estimate
+  if (word == Word::arm) port_.forget_senders();
+  const controller::Target target{{m.position_mm[0], m.position_mm[1], m.position_mm[2]}, m.tolerance_mm};
+  supervisor_.request(static_cast<controller::Request>(word), target, port_.now().utime);
+  if (word == Word::stop) command(0);
+}
+
+void ControllerNode::on_trouble(const InputTrouble& trouble) {
+  if (latched(supervisor_.status().state)) return;
+  stop(controller::Reason::input_refused, describe(trouble));
+}
+
+void ControllerNode::stop(controller::Reason reason, std::string detail) {
+  const bool was = latched(supervisor_.status().state);
+  supervisor_.report(reason);
+  if (was) return;
+  command(0);
+  detail_ = std::move(detail);
+}
+
+// Sends what the supervisor commands now.
+void ControllerNode::command(double dt_s) {
+  port_.publish(io::channel::kMotionCommand, io::to_message(supervisor_.step(port_.now().utime, dt_s)));
+  const bool is = latched(supervisor_.status().state);
+  if (is && !was_latched_) status_.renew_session();
+  if (!is) detail_.clear();
+  was_latched_ = is;
+}
+
+void ControllerNode::step(const Now& now, double late_s) {
+  port_.tell_time(now);
+  port_.rethrow();
   if (late_s > kLateStop_s && supervisor_.status().state == controller::State::steering) {
     status_.note_overrun();
-    supervisor_.report_overrun();
+    stop(controller::Reason::overrun);
   }
-  port_.publish(io::channel::kMotionCommand, io::to_message(supervisor_.step(now_utime, config_.period_s)));
+  if (status_.name_taken())
+    stop(controller::Reason::input_refused, "another bevel-controller is heard on this network");
+  command(config_.period_s);
+  report();
+}
+
+void ControllerNode::end() {
+  stop(controller::Reason::ending);
+  report();
+}
+
+void ControllerNode::report() {
   const controller::Status& s = supervisor_.status();
   std::string reason = controller::to_string(s.reason);
   char number[96];
-  if (s.reason != controller::Reason::none && s.unit[0] != '\0') {
+  if (s.reason == controller::Reason::state_unhealthy) {
+    reason += ": " + estimator::describe_health(static_cast<std::int32_t>(s.value));
+  } else if (s.reason != controller::Reason::none && s.unit[0] != '\0') {
     std::snprintf(number, sizeof number, " (%.3g %s)", s.value, s.unit);
     reason += number;
   }
-  status_.report(now_utime, controller::to_string(s.state), reason);
+  if (!detail_.empty()) reason += ": " + detail_;
+  if (s.reason == controller::Reason::none) reason = words_.refusal();
+  status_.report(controller::to_string(s.state), reason);
 }
 
 }  // namespace bevel::nodes

@@ -1,27 +1,43 @@
 #pragma once
-// bevel-controller: NEEDLE_STATE, ACTUATOR_STATE and STEERING_TARGET in, MOTION_COMMAND out at a fixed rate.
+// bevel-controller: NEEDLE_STATE, ACTUATOR_STATE and STEERING_TARGET in, MOTION_COMMAND out at a fixed rate, and at once
+// when motion must stop.
 #include "controller/supervisor.hpp"
-#include "nodes/lcm_port.hpp"
+#include "nodes/operator_words.hpp"
+#include "nodes/system_config.hpp"
 
 namespace bevel::nodes {
 
 controller::NeedleView to_view(const needle_state_t& message);
 
+// What no axis of the rig exceeds, of the stepper's limits.
+io::MotionBounds motion_bounds(const stepper::StepperConfig& config);
+
 class ControllerNode {
  public:
-  // `effects`: those that the estimator has, so that both believe in the same needle (SystemConfig::live_effects).
-  ControllerNode(lcm::LCM& lcm, const controller::ControllerConfig& config, const model::NeedleParameters& needle,
-                 const std::vector<model::ActiveEffect>& effects);
-  // One period; call at config.period_s. late_s: how much later than due; run past a bound it stops motion.
-  void step(std::int64_t now_utime, double late_s);
+  ControllerNode(lcm::LCM& lcm, const SystemConfig& config);
+  void tell_time(const Now& now) { port_.tell_time(now); }
+  // One period; call at config.controller.period_s. late_s: how much later than due; past a bound it stops motion.
+  void step(const Now& now, double late_s);
+  // Says stop, because this process ends.
+  void end();
+
+  LcmPort& port() { return port_; }
   const controller::Supervisor& supervisor() const { return supervisor_; }
 
  private:
+  void on_word(Word word, const steering_target_t& m);
+  void on_trouble(const InputTrouble& trouble);
+  void stop(controller::Reason reason, std::string detail = "");
+  void command(double dt_s);
+  void report();
+
   controller::ControllerConfig config_;
   LcmPort port_;
   controller::Supervisor supervisor_;
   StatusReporter status_;
-  std::int64_t now_utime_ = 0;
+  OperatorWords words_;
+  bool was_latched_ = false;
+  std::string detail_;  // of the latched stop
 };
 
 }  // namespace bevel::nodes

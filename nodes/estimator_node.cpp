@@ -1,9 +1,38 @@
 #include "nodes/estimator_node.hpp"
 
+#include <cmath>
+
 #include "estimator/health.hpp"
 #include "nodes/needle_pose.hpp"
 
 namespace bevel::nodes {
+namespace {
+
+constexpr double kPeriod_s = 0.01;
+constexpr double kFastestCamera_hz = 1000, kFastestCycle_hz = 1200;
+// How late a picture may be and still count; the history of the filter is shorter at 100 Hz.
+constexpr std::int64_t kLatestPicture_us = 600'000;
+// Beyond these an axis that is off did not creep.
+constexpr double kNewZero_mm = 0.05, kNewZero_rad = 0.05;
+
+io::SenderLimits tip_limits(const estimator::HealthLimits& limits) {
+  return {.longest_age_us = kLatestPicture_us,
+          .fastest_hz = kFastestCamera_hz,
+          .silence_us = std::llround(limits.measurement_silence_s * 1e6),
+          .reorder_us = kLatestPicture_us};
+}
+
+io::SenderLimits axes_limits(const estimator::HealthLimits& limits) {
+  const auto age_us = std::llround(limits.actuator_age_s * 1e6);
+  return {.longest_age_us = age_us, .fastest_hz = kFastestCycle_hz, .silence_us = age_us};
+}
+
+estimator::EstimatorConfig live(estimator::EstimatorConfig config) {
+  config.start_at_axes = true;
+  return config;
+}
+
+}  // namespace
 
 needle_state_t to_message(const estimator::Estimate& estimate, std::int64_t seq) {
   needle_state_t m{};
@@ -24,28 +53,101 @@ needle_state_t to_message(const estimator::Estimate& estimate, std::int64_t seq)
   return m;
 }
 
-EstimatorNode::EstimatorNode(lcm::LCM& lcm, const estimator::EstimatorConfig& config)
-    : port_(lcm), estimator_(config), status_(port_, "bevel-estimator", 0) {
-  port_.subscribe<tip_measurement_t>(io::channel::kTipMeasurement,
-                                     [this](const tip_measurement_t& m) { estimator_.add(io::to_sample(m)); });
-  port_.subscribe<actuator_state_t>(io::channel::kActuatorState, [this](const actuator_state_t& m) {
-    estimator_.add(io::to_sample(m));
-    publish();
-  });
+EstimatorNode::EstimatorNode(lcm::LCM& lcm, const estimator::EstimatorConfig& config, const io::MotionBounds& bounds)
+    : port_(lcm),
+      estimator_(live(config)),
+      status_(port_, "bevel-estimator", kPeriod_s),
+      words_(port_, status_, Receiver::estimator, [this](Word word, const steering_target_t&) { on_word(word); }),
+      cameras_(config.limits.measurement_silence_s) {
+  port_.on_trouble = [this](const InputTrouble& trouble) { on_trouble(trouble); };
+  port_.subscribe<tip_measurement_t>(io::channel::kTipMeasurement, tip_limits(config.limits),
+                                     [this](const tip_measurement_t& m) { on_tip(m); });
+  port_.subscribe<actuator_state_t>(
+      io::channel::kActuatorState, axes_limits(config.limits), [this](const actuator_state_t& m) { on_axes(m); },
+      [bounds](const actuator_state_t& before, const actuator_state_t& next) {
+        return io::check_motion(before, next, bounds);
+      });
+}
+
+void EstimatorNode::on_axes(const actuator_state_t& m) {
+  // Axes that are off do not move: what jumps is their zero, and the estimate begins where they now count from.
+  const bool new_zero = axes_ && io::at_rest_and_off(*axes_) && io::at_rest_and_off(m) &&
+                        (std::abs(m.insertion_mm - axes_->insertion_mm) > kNewZero_mm ||
+                         std::abs(m.rotation_rad - axes_->rotation_rad) > kNewZero_rad);
+  axes_ = m;
+  if (new_zero) entry_.restart();
+  if (entry_.see_axes(m.insertion_mm) || new_zero) estimator_.restart();
+  estimator_.add(io::to_sample(m));
+  publish();
+}
+
+void EstimatorNode::on_tip(const tip_measurement_t& m) {
+  cameras_.hear(m, axes_ ? axes_->insertion_mm : 0, port_.now().ns);
+  if (m.status == 0 && m.information_per_mm2[8] > 0) entry_.see_tip(m.position_mm[2]);
+  estimator_.add(io::to_sample(m));
+}
+
+void EstimatorNode::on_word(Word word) {
+  switch (word) {
+    case Word::arm:
+      break;
+    case Word::entry:
+      estimator_.restart();
+      entry_.restart();
+      break;
+    case Word::confirm:
+      entry_.confirm();
+      break;
+    case Word::stop:
+    case Word::start:
+    case Word::hold:
+      return;  // of motion
+  }
+  port_.forget_senders();
+  cameras_.restart();
+  input_refused_ = false;
+  remark_.clear();
+}
+
+void EstimatorNode::on_trouble(const InputTrouble& trouble) {
+  if (trouble.kind == InputTrouble::Kind::clock_step) {
+    const std::int64_t step_us = std::llround(trouble.clock_step_s * 1e6);
+    estimator_.shift_time(step_us);
+    published_utime_ += step_us;
+  } else {
+    if (input_refused_) return;  // the first reason stays
+    input_refused_ = true;
+    status_.renew_session();
+  }
+  remark_ = describe(trouble);
+}
+
+std::int32_t EstimatorNode::health() const {
+  std::int32_t health = estimator_.estimate(port_.now().utime).health | cameras_.health(port_.now().ns);
+  if (axes_ && !entry_.from_entry()) health |= estimator::kNotFromEntry;
+  if (input_refused_) health |= estimator::kInputRefused;
+  return health;
 }
 
 void EstimatorNode::publish() {
-  // Between steps the newest actuator state is the newest time that is known.
-  const estimator::Estimate estimate = estimator_.estimate(now_utime_);
+  estimator::Estimate estimate = estimator_.estimate(port_.now().utime);
   if (estimate.utime <= published_utime_) return;
   published_utime_ = estimate.utime;
+  estimate.health = health();
   port_.publish(io::channel::kNeedleState, to_message(estimate, seq_++));
 }
 
-void EstimatorNode::step(std::int64_t now_utime) {
-  now_utime_ = now_utime;
-  const estimator::Estimate estimate = estimator_.estimate(now_utime);
-  status_.report(now_utime, estimate.utime == 0 ? "waiting" : "running", estimator::describe_health(estimate.health));
+void EstimatorNode::step(const Now& now) {
+  port_.tell_time(now);
+  port_.rethrow();
+  if (status_.name_taken() && !input_refused_) {
+    input_refused_ = true;
+    remark_ = "another bevel-estimator is heard on this network";
+  }
+  std::string reason = estimator::describe_health(health());
+  for (const std::string& more : {remark_, words_.refusal()})
+    if (!more.empty()) reason += "; " + more;
+  status_.report(axes_ ? "running" : "waiting", reason);
 }
 
 }  // namespace bevel::nodes

@@ -1,7 +1,16 @@
 #pragma once
 // bevel-estimator: TIP_MEASUREMENT and ACTUATOR_STATE in, NEEDLE_STATE out, one for each actuator state.
+//
+// Of the operator's words (nodes/operator_words.hpp) it obeys `entry` (the tip is at the entry point: begin there),
+// `confirm` (go on from where the axes say the needle is, although nobody watched it go there) and `arm` (inputs that
+// were refused are believed again).
+#include <optional>
+#include <string>
+
 #include "estimator/needle_estimator.hpp"
-#include "nodes/lcm_port.hpp"
+#include "nodes/camera_watch.hpp"
+#include "nodes/entry_watch.hpp"
+#include "nodes/operator_words.hpp"
 
 namespace bevel::nodes {
 
@@ -9,21 +18,35 @@ needle_state_t to_message(const estimator::Estimate& estimate, std::int64_t seq)
 
 class EstimatorNode {
  public:
-  EstimatorNode(lcm::LCM& lcm, const estimator::EstimatorConfig& config);
-  // Health and status; everything else happens when messages arrive. The age limits of health are judged against this
-  // time, so call it often (every 20 ms).
-  void step(std::int64_t now_utime);
+  // `bounds`: what no axis of the rig exceeds.
+  EstimatorNode(lcm::LCM& lcm, const estimator::EstimatorConfig& config, const io::MotionBounds& bounds);
+  void tell_time(const Now& now) { port_.tell_time(now); }
+  // Health and status; everything else happens when messages arrive. Call it often (every 10 ms).
+  void step(const Now& now);
+
+  LcmPort& port() { return port_; }
   const estimator::NeedleEstimator& estimator() const { return estimator_; }
+  // Of the newest estimate and of what arrives; bits of estimator/health.hpp.
+  std::int32_t health() const;
 
  private:
+  void on_axes(const actuator_state_t& m);
+  void on_tip(const tip_measurement_t& m);
+  void on_word(Word word);
+  void on_trouble(const InputTrouble& trouble);
   void publish();
 
   LcmPort port_;
   estimator::NeedleEstimator estimator_;
   StatusReporter status_;
-  std::int64_t now_utime_ = 0;
+  OperatorWords words_;
+  CameraWatch cameras_;
+  EntryWatch entry_;
+  std::optional<actuator_state_t> axes_;
   std::int64_t published_utime_ = 0;
   std::int64_t seq_ = 0;
+  bool input_refused_ = false;
+  std::string remark_;  // what the last trouble was
 };
 
 }  // namespace bevel::nodes

@@ -1,10 +1,26 @@
 #include "nodes/lcm_port.hpp"
 
-#include "nodes/runtime.hpp"
+#include <cstdio>
+#include <utility>
 
 namespace bevel::nodes {
-namespace {
-constexpr std::int64_t kStatusPeriod_us = 500'000;
+
+std::string describe(const InputTrouble& trouble) {
+  char text[160] = "";
+  switch (trouble.kind) {
+    case InputTrouble::Kind::second_sender:
+      std::snprintf(text, sizeof text, "a second sender on %s, or old messages sent again", trouble.channel);
+      break;
+    case InputTrouble::Kind::implausible:
+      std::snprintf(text, sizeof text, "%s: %s of %.4g %s, possible is %.3g", trouble.channel,
+                    trouble.implausible.what, trouble.implausible.value, trouble.implausible.unit,
+                    trouble.implausible.allowed);
+      break;
+    case InputTrouble::Kind::clock_step:
+      std::snprintf(text, sizeof text, "the wall clock was set by %+.3f s", trouble.clock_step_s);
+      break;
+  }
+  return text;
 }
 
 LcmPort::~LcmPort() {
@@ -12,31 +28,49 @@ LcmPort::~LcmPort() {
     if (s->lcm_subscription) lcm_.unsubscribe(s->lcm_subscription);
 }
 
+void LcmPort::add(std::unique_ptr<SubscriptionBase> subscription, int keep) {
+  subscription->attach(lcm_, keep);
+  subscriptions_.push_back(std::move(subscription));
+}
+
+void LcmPort::tell_time(const Now& now) {
+  now_ = now;
+  if (const std::int64_t step_us = clock_.step_us(now)) {
+    // Stamps of before and after do not compare; who sends is found out anew.
+    restart_watches("");
+    report({InputTrouble::Kind::clock_step, "", {}, static_cast<double>(step_us) * 1e-6});
+  }
+  if (injector_) injector_->flush(now.ns, [this](const char* channel, std::span<const std::uint8_t> bytes) {
+    lcm_.publish(channel, bytes.data(), static_cast<unsigned>(bytes.size()));
+  });
+}
+
+void LcmPort::restart_watches(std::string_view but) {
+  for (const auto& s : subscriptions_)
+    if (s->name() != but) s->restart();
+}
+
+void LcmPort::report(const InputTrouble& trouble) {
+  if (on_trouble) on_trouble(trouble);
+}
+
+void LcmPort::rethrow() {
+  if (thrown_) std::rethrow_exception(std::exchange(thrown_, nullptr));
+}
+
+bool LcmPort::send(const char* channel, const std::vector<std::uint8_t>& bytes) {
+  if (injector_ && injector_->concerns(channel)) {
+    injector_->pass(channel, bytes, now_.ns, now_.utime);
+    injector_->flush(now_.ns, [this](const char* to, std::span<const std::uint8_t> out) {
+      lcm_.publish(to, out.data(), static_cast<unsigned>(out.size()));
+    });
+    return true;
+  }
+  return lcm_.publish(channel, bytes.data(), static_cast<unsigned>(bytes.size())) == 0;
+}
+
 void LcmPort::publish_text(const char* channel, const std::string& text) {
   lcm_.publish(channel, text.data(), static_cast<unsigned>(text.size()));
-}
-
-StatusReporter::StatusReporter(LcmPort& port, std::string process, double period_s) : port_(port) {
-  message_.process = std::move(process);
-  message_.loop_period_s = period_s;
-}
-
-void StatusReporter::report(std::int64_t now_utime, const std::string& state, const std::string& reason) {
-  const bool changed = state != message_.state || reason != message_.reason;
-  if (!changed && now_utime - last_utime_ < kStatusPeriod_us && now_utime >= last_utime_) return;
-  message_.utime = now_utime;
-  message_.state = state;
-  message_.reason = reason;
-  const LoopTimes loop = take_loop_times();
-  message_.loop_late_max_s = loop.late_max_s;
-  message_.loop_run_max_s = std::max(loop.run_max_s, run_max_s_);
-  message_.overruns = loop.overruns + overruns_;
-  message_.received = port_.counters().received;
-  message_.rejected = port_.counters().rejected;
-  port_.publish(io::channel::kProcessStatus, message_);
-  ++message_.seq;
-  run_max_s_ = 0;
-  last_utime_ = now_utime;
 }
 
 }  // namespace bevel::nodes

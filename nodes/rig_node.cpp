@@ -1,6 +1,7 @@
 #include "nodes/rig_node.hpp"
 
 #include <cmath>
+#include <stdexcept>
 
 #include "nodes/needle_pose.hpp"
 
@@ -20,7 +21,7 @@ rig::SimulatedDriveConfig drive_config(const stepper::AxisConfig& axis) {
 
 RigNode::RigNode(lcm::LCM& lcm, can::Bus& insertion_bus, can::Bus& rotation_bus, const SystemConfig& config,
                  rig::FrameServer* frames)
-    : config_(config), port_(lcm), status_(port_, "bevel-rig", 0.001), frames_(frames) {
+    : config_(config), port_(lcm), status_(port_, "bevel-rig", 0.001), buses_{&insertion_bus, &rotation_bus}, frames_(frames) {
   drives_[0] = std::make_unique<rig::SimulatedDrive>(insertion_bus, drive_config(config.stepper.axes[0]));
   drives_[1] = std::make_unique<rig::SimulatedDrive>(rotation_bus, drive_config(config.stepper.axes[1]));
   plant_ = std::make_unique<rig::KinematicPlant>(config.rig.truth, io::active_effects(config.rig.effects, ""),
@@ -38,7 +39,26 @@ RigNode::RigNode(lcm::LCM& lcm, can::Bus& insertion_bus, can::Bus& rotation_bus,
   }
 }
 
-void RigNode::step(std::int64_t now_ns, std::int64_t now_utime) {
+void RigNode::break_drive(const Fault& fault, std::int64_t start_ns, std::uint64_t seed) {
+  if (fault.component != Component::insertion_drive && fault.component != Component::rotation_drive)
+    throw std::invalid_argument(std::string("fault: the rig has no ") + name_of(fault.component) +
+                                "; allowed: insertion_drive, rotation_drive");
+  const std::size_t axis = fault.component == Component::insertion_drive ? 0 : 1;
+  const std::int64_t from_ns = start_ns + std::llround(fault.at_s * 1e9);
+  if (fault.kind == FaultKind::stuck) {
+    blocked_axis_ = axis;
+    blocked_from_ns_ = from_ns;
+    return;
+  }
+  const stepper::AxisConfig& drive = config_.stepper.axes.at(axis);
+  faulty_bus_ = std::make_unique<FaultyBus>(*buses_.at(axis), drive.node_id, fault.kind, from_ns, seed);
+  drives_.at(axis) = std::make_unique<rig::SimulatedDrive>(*faulty_bus_, drive_config(drive));
+}
+
+void RigNode::step(const Now& now) {
+  const auto [now_ns, now_utime] = now;
+  port_.tell_time(now);
+  if (blocked_axis_) drives_.at(*blocked_axis_)->set_motor_blocked(now_ns >= blocked_from_ns_);
   for (auto& drive : drives_) drive->step(now_ns);
   move_plant(now_ns);
   if (now_ns >= next_truth_ns_) {
@@ -51,7 +71,7 @@ void RigNode::step(std::int64_t now_ns, std::int64_t now_utime) {
     take_frames(now_utime);
   }
   publish_frames(now_utime);
-  status_.report(now_utime, "running", "");
+  status_.report("running", "");
 }
 
 void RigNode::move_plant(std::int64_t now_ns) {

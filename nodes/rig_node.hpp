@@ -3,10 +3,12 @@
 // socket, the true tip on NEEDLE_TRUTH. The rest of the software cannot tell it from a bench.
 #include <deque>
 #include <memory>
+#include <optional>
 #include <vector>
 
 #include "drivers/can/bus.hpp"
-#include "nodes/lcm_port.hpp"
+#include "nodes/faulty_bus.hpp"
+#include "nodes/status_reporter.hpp"
 #include "nodes/system_config.hpp"
 #include "rig/camera/frame_server.hpp"
 #include "rig/camera/needle_renderer.hpp"
@@ -20,8 +22,11 @@ class RigNode {
   // One bus for each drive: two on one would eat each other's frames. `frames` may be null: no pictures.
   RigNode(lcm::LCM& lcm, can::Bus& insertion_bus, can::Bus& rotation_bus, const SystemConfig& config,
           rig::FrameServer* frames);
-  // Call about every millisecond. now_ns: steady clock; now_utime: the same instant since the epoch.
-  void step(std::int64_t now_ns, std::int64_t now_utime);
+  // Call about every millisecond.
+  void step(const Now& now);
+
+  // A fault of one of the drives, from start_ns + fault.at_s on (steady clock). Before the first step.
+  void break_drive(const Fault& fault, std::int64_t start_ns, std::uint64_t seed = 1);
 
   const rig::Plant& plant() const { return *plant_; }
   rig::SimulatedDrive& drive(std::size_t axis) { return *drives_[axis]; }
@@ -40,7 +45,11 @@ class RigNode {
   SystemConfig config_;
   LcmPort port_;
   StatusReporter status_;
+  std::array<can::Bus*, 2> buses_;
+  std::unique_ptr<FaultyBus> faulty_bus_;
   std::array<std::unique_ptr<rig::SimulatedDrive>, 2> drives_;
+  std::optional<std::size_t> blocked_axis_;
+  std::int64_t blocked_from_ns_ = 0;
   std::unique_ptr<rig::KinematicPlant> plant_;
   rig::FrameServer* frames_;
   std::vector<Eye> eyes_;

@@ -3,8 +3,8 @@
 #include <poll.h>
 #include <sched.h>
 #include <sys/mman.h>
-#include <sys/socket.h>
-#include <sys/un.h>
+#include <sys/prctl.h>
+#include <unistd.h>
 
 #include <algorithm>
 #include <cerrno>
@@ -12,7 +12,7 @@
 #include <cmath>
 #include <csignal>
 #include <cstring>
-#include <stdexcept>
+#include <exception>
 
 namespace bevel::nodes {
 namespace {
@@ -23,6 +23,7 @@ static_assert(std::atomic<bool>::is_always_lock_free, "set from a signal handler
 void on_signal(int) { stop_flag = true; }
 
 constexpr int kMaxMessagesAtOnce = 256;
+constexpr std::int64_t kTogether_ns = 1'000'000;  // two readings that belong together
 
 thread_local LoopTimes loop_times;
 
@@ -30,8 +31,16 @@ thread_local LoopTimes loop_times;
 
 Now now() {
   using namespace std::chrono;
-  return {duration_cast<nanoseconds>(steady_clock::now().time_since_epoch()).count(),
-          duration_cast<microseconds>(system_clock::now().time_since_epoch()).count()};
+  const auto steady_ns = [] { return duration_cast<nanoseconds>(steady_clock::now().time_since_epoch()).count(); };
+  // A process that was put aside between two readings must not take that for a step of the wall clock.
+  Now at;
+  for (int tries = 0; tries < 5; ++tries) {
+    const std::int64_t before_ns = steady_ns();
+    at.utime = duration_cast<microseconds>(system_clock::now().time_since_epoch()).count();
+    at.ns = steady_ns();
+    if (at.ns - before_ns < kTogether_ns) break;
+  }
+  return at;
 }
 
 void catch_signals() {
@@ -44,18 +53,9 @@ void catch_signals() {
 
 bool stop_requested() { return stop_flag; }
 
-void claim_name(const std::string& name) {
-  // An abstract socket lives in the network namespace and goes with the process, even after kill -9.
-  const int fd = socket(AF_UNIX, SOCK_STREAM | SOCK_CLOEXEC, 0);
-  if (fd < 0) throw std::runtime_error(std::string("cannot make a socket: ") + std::strerror(errno));
-  sockaddr_un address{};
-  address.sun_family = AF_UNIX;
-  const std::string path = "bevel/" + name;
-  std::memcpy(address.sun_path + 1, path.data(), std::min(path.size(), sizeof address.sun_path - 1));
-  const auto size = static_cast<socklen_t>(offsetof(sockaddr_un, sun_path) + 1 + path.size());
-  if (bind(fd, reinterpret_cast<const sockaddr*>(&address), size) != 0)
-    throw std::runtime_error("another " + name + " is running here; two would fight over the needle");
-  // Not closed: held for the life of the process.
+void end_with(int parent) {
+  prctl(PR_SET_PDEATHSIG, SIGTERM);
+  if (getppid() != parent) stop_flag = true;
 }
 
 std::string try_realtime(int priority) {
@@ -77,37 +77,69 @@ LoopTimes take_loop_times() {
   return taken;
 }
 
-void run_periodic(lcm::LCM& lcm, double period_s, const std::function<bool(const Now&, double late_s)>& step) {
-  const auto period_ns = std::llround(period_s * 1e9);
+namespace {
+
+template <class GoOn>
+void run_loop(lcm::LCM& lcm, const Loop& loop, const GoOn& go_on) {
+  const auto period_ns = std::llround(loop.period_s * 1e9);
   std::int64_t due_ns = now().ns;
   loop_times = {};
   const auto note_run = [period_ns](std::int64_t run_ns) {
     loop_times.run_max_s = std::max(loop_times.run_max_s, static_cast<double>(run_ns) * 1e-9);
     if (run_ns > period_ns) ++loop_times.overruns;
   };
-  while (!stop_requested()) {
-    const std::int64_t wait_ns = due_ns - now().ns;
+  const auto tell = [&loop](const Now& at) {
+    if (loop.tell) loop.tell(at);
+  };
+  while (go_on()) {
+    const Now waking = now();
+    const std::int64_t wait_ns = due_ns - waking.ns;
     if (wait_ns > 0) {
       pollfd fd{lcm.getFileno(), POLLIN, 0};
       const timespec timeout{wait_ns / 1'000'000'000, wait_ns % 1'000'000'000};
       if (ppoll(&fd, 1, &timeout, nullptr) <= 0) continue;
-      const std::int64_t begun_ns = now().ns;
+      const Now begun = now();
+      tell(begun);
       lcm.handleTimeout(0);
-      note_run(now().ns - begun_ns);
+      note_run(now().ns - begun.ns);
       continue;
     }
-    const std::int64_t begun_ns = now().ns;
+    tell(waking);
     pump(lcm);
     const Now at = now();
     const double late_s = static_cast<double>(at.ns - due_ns) * 1e-9;
     loop_times.late_max_s = std::max(loop_times.late_max_s, late_s);
-    const bool go_on = step(at, late_s);
+    const bool more = loop.step(at, late_s);
     const std::int64_t done_ns = now().ns;
-    note_run(done_ns - begun_ns);
-    if (!go_on) return;
+    note_run(done_ns - waking.ns);
+    if (!more) return;
     due_ns += period_ns;
     if (done_ns - due_ns > period_ns) due_ns = done_ns;
   }
+}
+
+}  // namespace
+
+void run_periodic(lcm::LCM& lcm, const Loop& loop) {
+  run_loop(lcm, loop, [] { return !stop_requested(); });
+}
+
+void run_to_end(lcm::LCM& lcm, const Loop& loop, double longest_s) {
+  const std::int64_t end_ns = now().ns + std::llround(longest_s * 1e9);
+  run_loop(lcm, loop, [end_ns] { return now().ns < end_ns; });
+}
+
+void run_with_end(lcm::LCM& lcm, const Loop& loop, const std::function<void()>& before_end, const Loop& end,
+                  double longest_s) {
+  std::exception_ptr failure;
+  try {
+    run_periodic(lcm, loop);
+  } catch (...) {
+    failure = std::current_exception();
+  }
+  before_end();
+  run_to_end(lcm, end, longest_s);
+  if (failure) std::rethrow_exception(failure);
 }
 
 }  // namespace bevel::nodes

@@ -6,29 +6,36 @@
 #include <lcm/lcm-cpp.hpp>
 #include <string>
 
+#include "nodes/clock_watch.hpp"
+
 namespace bevel::nodes {
 
-// Both clocks at one instant. Loops run on the steady clock; utime only stamps.
-struct Now {
-  std::int64_t ns = 0;     // steady
-  std::int64_t utime = 0;  // us since the epoch
-};
 Now now();
 
 // Set by SIGINT and SIGTERM once catch_signals() was called.
 void catch_signals();
 bool stop_requested();
 
-// Refuses a second process of this name in the same network namespace (where it would share the LCM channels); throws
-// std::runtime_error. The name is held until the process ends, however it ends.
-void claim_name(const std::string& name);
+// Asks the kernel for SIGTERM when process `parent`, which started this one, is gone, however it goes; at once if it
+// already is.
+void end_with(int parent);
 
 // SCHED_FIFO and locked memory; an empty string, or why it was refused (the loop runs all the same).
 std::string try_realtime(int priority);
 
-// Calls step(now, late_s) every period_s until a stop is requested or step returns false, handling LCM messages as they
-// arrive in between. After a stall the missed periods are skipped, not caught up.
-void run_periodic(lcm::LCM& lcm, double period_s, const std::function<bool(const Now&, double late_s)>& step);
+struct Loop {
+  double period_s = 0.01;
+  std::function<void(const Now&)> tell;               // the time, before messages are handled
+  std::function<bool(const Now&, double late_s)> step;  // false ends the loop
+};
+// Calls step every period until a stop is requested or step returns false, handling LCM messages as they arrive in
+// between. After a stall the missed periods are skipped, not caught up.
+void run_periodic(lcm::LCM& lcm, const Loop& loop);
+// The same whether or not a stop was requested, for at most so long: what a process still has to do before it ends.
+void run_to_end(lcm::LCM& lcm, const Loop& loop, double longest_s);
+// Both, also when the first ends by an exception, which is raised again at the end: nothing that moves is left alone.
+void run_with_end(lcm::LCM& lcm, const Loop& loop, const std::function<void()>& before_end, const Loop& end,
+                  double longest_s);
 
 // How the loop on this thread keeps its time. One process has one loop, and its status is reported from within.
 struct LoopTimes {

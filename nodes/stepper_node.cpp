@@ -1,53 +1,150 @@
 #include "nodes/stepper_node.hpp"
 
+#include <algorithm>
+#include <cmath>
+
 namespace bevel::nodes {
+namespace {
+
+// At a start nearer to the drives' own zero than this, nothing has been inserted yet.
+constexpr double kAtZero_mm = 0.5;
+constexpr double kAtZero_rad = 0.1;
+constexpr double kAtRest_unit_s = 0.05;
+constexpr double kFastestController_hz = 600;  // controller.period_s is at least 2 ms
+
+io::SenderLimits command_limits(const stepper::StepperConfig& config) {
+  return {.longest_age_us = config.setpoint_stop_age_ns / 1000,
+          .longest_ahead_us = config.period_ns / 1000,
+          .fastest_hz = kFastestController_hz,
+          .silence_us = config.setpoint_stop_age_ns / 1000};
+}
+
+}  // namespace
 
 StepperNode::StepperNode(lcm::LCM& lcm, can::Bus& bus, const stepper::StepperConfig& config)
-    : port_(lcm), driver_(bus, config), status_(port_, "bevel-stepper", static_cast<double>(config.period_ns) * 1e-9) {
-  port_.subscribe<motion_command_t>(io::channel::kMotionCommand, [this](const motion_command_t& m) {
-    // Commands that overtook each other: only a newer one counts. A controller that was started anew begins at 0.
-    if (m.utime <= setpoint_utime_ && m.seq <= last_seq_) return;
-    setpoint_ = stepper::MotionSetpoint{0, m.mode == 1, m.insertion_rate_mm_s, m.rotation_rate_rad_s};
-    setpoint_utime_ = m.utime;
-    last_seq_ = m.seq;
-  });
-  port_.subscribe<steering_target_t>(io::channel::kSteeringTarget,
-                                     [this](const steering_target_t& m) { on_target(m); });
+    : config_(config),
+      port_(lcm),
+      driver_(bus, config),
+      status_(port_, "bevel-stepper", static_cast<double>(config.period_ns) * 1e-9),
+      words_(port_, status_, Receiver::stepper, [this](Word word, const steering_target_t&) { on_word(word); }) {
+  port_.on_trouble = [this](const InputTrouble& trouble) { on_trouble(trouble); };
+  port_.subscribe<motion_command_t>(io::channel::kMotionCommand, command_limits(config),
+                                    [this](const motion_command_t& m) { on_command(m); });
 }
 
-void StepperNode::on_target(const steering_target_t& target) {
-  if (target.request == 0) {
-    driver_.request_stop();
-    enable_wanted_ = false;
-  } else if (target.request == 1) {
-    driver_.rearm();
-    enable_wanted_ = true;
-  }
+void StepperNode::on_command(const motion_command_t& m) {
+  // Its age now, by the wall clock; from here on by the steady one.
+  const std::int64_t age_us = std::max<std::int64_t>(model::age_us(port_.now().utime, m.utime), 0);
+  setpoint_made_ns_ = port_.now().ns - age_us * 1000;  // the watch has bounded the age
+  const bool ran = setpoint_ && setpoint_->run;
+  setpoint_ = stepper::MotionSetpoint{0, m.mode == 1, m.insertion_rate_mm_s, m.rotation_rate_rad_s};
+  // A stop does not wait for the next cycle.
+  if (ran && !setpoint_->run && driver_.moving()) stop(stepper::StopReason::controller_stop);
 }
 
-void StepperNode::step(std::int64_t now_ns, std::int64_t now_utime) {
-  if (setpoint_) setpoint_->age_ns = (now_utime - setpoint_utime_) * 1000;
-  driver_.step(now_ns, setpoint_);
-  const stepper::AxesReport report = driver_.report();
-  std::string refusal;
-  if (enable_wanted_ && report.state == stepper::DriverState::ready) {
-    if (!zero_taken_) {
+void StepperNode::on_word(Word word) {
+  switch (word) {
+    case Word::stop:
+      stop(stepper::StopReason::operator_stop);
+      enable_wanted_ = false;
+      break;
+    case Word::arm:
+      port_.forget_senders();
+      driver_.rearm();
+      enable_wanted_ = true;
+      refusal_.clear();
+      break;
+    case Word::entry:
+      if (driver_.report().state == stepper::DriverState::enabled) break;  // not while something may move
       driver_.set_zero();
-      zero_taken_ = true;
-    }
-    const auto answer = driver_.enable();
-    if (answer == stepper::EnableAnswer::accepted) enable_wanted_ = false;
-    if (answer == stepper::EnableAnswer::position_not_trusted) refusal = "position not trusted: a drive was lost";
+      zero_known_ = true;
+      break;
+    case Word::confirm:
+      driver_.confirm_position();
+      zero_known_ = true;
+      break;
+    case Word::start:
+    case Word::hold:
+      break;  // the controller's
   }
-  if (report.sampled_ns > published_ns_) publish(now_ns, now_utime, report);
-  const std::string reason = report.stop.reason == stepper::StopReason::none ? refusal : stepper::describe(report.stop);
-  status_.report(now_utime, stepper::to_string(report.state), reason);
 }
 
-void StepperNode::publish(std::int64_t now_ns, std::int64_t now_utime, const stepper::AxesReport& report) {
+void StepperNode::on_trouble(const InputTrouble& trouble) {
+  stop(stepper::StopReason::input_refused, describe(trouble));
+}
+
+void StepperNode::stop(stepper::StopReason reason, std::string detail) {
+  const stepper::DriverState state = driver_.report().state;
+  if (state == stepper::DriverState::stopped || state == stepper::DriverState::fault) return;
+  driver_.stop_now(reason, port_.now().ns);
+  note_latch();
+  detail_ = std::move(detail);
+}
+
+void StepperNode::note_latch() {
+  const stepper::DriverState state = driver_.report().state;
+  const bool latched = state == stepper::DriverState::stopped || state == stepper::DriverState::fault;
+  if (latched && !was_latched_) {
+    status_.renew_session();
+    enable_wanted_ = false;
+  }
+  if (!latched) detail_.clear();
+  was_latched_ = latched;
+}
+
+void StepperNode::enable_if_wanted(const stepper::AxesReport& report) {
+  if (!enable_wanted_ || report.state != stepper::DriverState::ready) return;
+  if (!zero_known_ && std::abs(report.insertion_mm) < kAtZero_mm && std::abs(report.rotation_rad) < kAtZero_rad) {
+    driver_.set_zero();
+    zero_known_ = true;
+  }
+  if (!zero_known_) {
+    refusal_ = "axes stand off their zero and were not watched since the entry: retract and say entry, or confirm";
+    enable_wanted_ = false;
+    return;
+  }
+  switch (driver_.enable()) {
+    case stepper::EnableAnswer::accepted:
+      refusal_.clear();
+      enable_wanted_ = false;
+      break;
+    case stepper::EnableAnswer::position_not_trusted:
+      refusal_ = "a drive was lost, its position is not trusted: retract and say entry, or confirm";
+      enable_wanted_ = false;
+      break;
+    case stepper::EnableAnswer::not_ready:
+      break;
+  }
+}
+
+void StepperNode::step(const Now& now) {
+  port_.tell_time(now);
+  port_.rethrow();
+  if (status_.name_taken()) stop(stepper::StopReason::input_refused, "another bevel-stepper is heard on this network");
+  if (setpoint_) setpoint_->age_ns = model::difference_saturated(now.ns, setpoint_made_ns_);
+  driver_.step(now.ns, setpoint_);
+  const stepper::AxesReport report = driver_.report();
+  enable_if_wanted(report);
+  note_latch();
+  if (report.sampled_ns > published_ns_) publish(report);
+  std::string reason = stepper::describe(report.stop);
+  if (report.stop.reason == stepper::StopReason::none) reason = refusal_.empty() ? words_.refusal() : refusal_;
+  if (!detail_.empty()) reason += ": " + detail_;
+  status_.report(stepper::to_string(report.state), reason);
+}
+
+void StepperNode::end() { stop(stepper::StopReason::ending); }
+
+bool StepperNode::at_rest() const {
+  const stepper::AxesReport report = driver_.report();
+  return std::abs(report.insertion_rate_mm_s) < kAtRest_unit_s && std::abs(report.rotation_rate_rad_s) < kAtRest_unit_s;
+}
+
+void StepperNode::publish(const stepper::AxesReport& report) {
   published_ns_ = report.sampled_ns;
   actuator_state_t m{};
-  m.utime = now_utime - (now_ns - report.sampled_ns) / 1000;  // the time of the positions, not of sending
+  // The time of the positions, not of sending.
+  m.utime = port_.now().utime - (port_.now().ns - report.sampled_ns) / 1000;
   m.seq = seq_++;
   for (std::size_t i = 0; i < 2; ++i) m.axis_status[i] = static_cast<std::int32_t>(report.status[i]);
   m.insertion_mm = report.insertion_mm;

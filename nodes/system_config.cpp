@@ -16,14 +16,19 @@ using io::optional;
 using io::required;
 using io::Section;
 
+// One link of the chain from a fault to rest; docs/hazards.md has the sum.
+constexpr io::Range kShareOfStop =
+    in_range(0.01, 0.12).because("the needle must rest within 200 ms of a fault");
+
 void read_controller(Section s, controller::ControllerConfig& c) {
-  s.read("period_s", c.period_s, optional, in_range(0.002, 0.2));
+  s.read("period_s", c.period_s, optional,
+         in_range(0.002, 0.03).because("set-points must be renewed before the driver takes them for old"));
   Section l = s.section("limits", optional);
   l.read("insertion_rate_mm_s", c.limits.insertion_rate_mm_s, optional, in_range(0.01, 100));
   l.read("insertion_rate_min_share", c.limits.insertion_rate_min_share, optional, in_range(0.01, 1));
   l.read("rotation_rate_rad_s", c.limits.rotation_rate_rad_s, optional, in_range(0.01, 100));
-  l.read("rotation_acceleration_rad_s2", c.limits.rotation_acceleration_rad_s2, optional, in_range(0.1, 10000));
-  l.read("insertion_acceleration_mm_s2", c.limits.insertion_acceleration_mm_s2, optional, in_range(0.1, 10000));
+  l.read("rotation_acceleration_rad_s2", c.limits.rotation_acceleration_rad_s2, optional, in_range(1, 10000));
+  l.read("insertion_acceleration_mm_s2", c.limits.insertion_acceleration_mm_s2, optional, in_range(1, 10000));
   l.read("total_rotation_rad", c.limits.total_rotation_rad, optional, in_range(6.2831853, 1e6));
   Section g = s.section("gains", optional);
   g.read("convergence_rad_s", c.gains.convergence_rad_s, optional, in_range(0.01, 100));
@@ -31,16 +36,23 @@ void read_controller(Section s, controller::ControllerConfig& c) {
   g.read("tolerance_mm", c.gains.tolerance_mm, optional, in_range(0, 10));
   g.read("parameter_uncertainty", c.gains.parameter_uncertainty, optional, in_range(0, 2));
   Section f = s.section("safety", optional);
-  f.read("state_age_s", c.safety.state_age_s, optional, in_range(0.005, 0.2));
-  f.read("actuator_age_s", c.safety.actuator_age_s, optional, in_range(0.005, 0.2));
-  f.read("position_sd_mm", c.safety.position_sd_mm, optional, above(0));
-  f.read("depth_min_mm", c.safety.depth_min_mm, optional, in_range(-1000, 1000));
-  f.read("depth_max_mm", c.safety.depth_max_mm, optional, in_range(-1000, 1000));
-  f.read("lateral_max_mm", c.safety.lateral_max_mm, optional, above(0));
-  f.read("tracking_error_mm_s", c.safety.tracking_error_mm_s, optional, above(0));
-  f.read("tracking_error_rad_s", c.safety.tracking_error_rad_s, optional, above(0));
-  f.read("tracking_error_s", c.safety.tracking_error_s, optional, above(0));
-  f.read("target_miss_max_mm", c.safety.target_miss_max_mm, optional, above(0));
+  controller::SafetyLimits& safety = c.safety;
+  f.read("state_age_s", safety.state_age_s, optional, kShareOfStop);
+  f.read("actuator_age_s", safety.actuator_age_s, optional, kShareOfStop);
+  f.read("position_sd_mm", safety.position_sd_mm, optional, in_range(0.05, 10));
+  f.read("depth_min_mm", safety.depth_min_mm, optional, in_range(-20, 0));
+  f.read("depth_max_mm", safety.depth_max_mm, optional, in_range(1, 400));
+  f.read("lateral_max_mm", safety.lateral_max_mm, optional, in_range(1, 200));
+  // A rate is wrong by less than the axis can do, or the limit never acts.
+  f.read("tracking_error_mm_s", safety.tracking_error_mm_s, optional, in_range(0.1, 0.5 * c.limits.insertion_rate_mm_s));
+  f.read("tracking_error_rad_s", safety.tracking_error_rad_s, optional,
+         in_range(0.1, 0.5 * c.limits.rotation_rate_rad_s));
+  f.read("tracking_error_s", safety.tracking_error_s, optional, kShareOfStop);
+  f.read("axis_delay_s", safety.axis_delay_s, optional, kShareOfStop);
+  f.read("resting_motion_mm", safety.resting_motion_mm, optional, in_range(0.02, 2));
+  f.read("resting_motion_rad", safety.resting_motion_rad, optional, in_range(0.02, 1));
+  f.read("enabling_s", safety.enabling_s, optional, in_range(0.1, 30));
+  f.read("target_miss_max_mm", safety.target_miss_max_mm, optional, in_range(0.05, 20));
 }
 
 void read_axis(Section s, stepper::AxisConfig& axis) {
@@ -60,7 +72,7 @@ void read_stepper(Section s, stepper::StepperConfig& c) {
   read_axis(s.section("rotation", optional), c.axes[stepper::kRotation]);
   const auto read_ms = [&s](const char* key, std::int64_t& ns) {
     double ms = static_cast<double>(ns) * 1e-6;
-    s.read(key, ms, optional, in_range(1, 10000));
+    s.read(key, ms, optional, in_range(1, 1000));
     ns = std::llround(ms * 1e6);
   };
   read_ms("period_ms", c.period_ns);

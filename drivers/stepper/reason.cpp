@@ -10,6 +10,12 @@ const char* to_string(StopReason reason) {
       return "none";
     case StopReason::operator_stop:
       return "stopped by the operator";
+    case StopReason::controller_stop:
+      return "stopped by the controller";
+    case StopReason::input_refused:
+      return "commands cannot be trusted";
+    case StopReason::ending:
+      return "told to end";
     case StopReason::setpoint_stale:
       return "set-points too old";
     case StopReason::setpoint_invalid:

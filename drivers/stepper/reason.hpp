@@ -8,7 +8,10 @@ namespace bevel::stepper {
 
 enum class StopReason : std::uint8_t {
   none,
-  operator_stop,     // request_stop()
+  operator_stop,
+  controller_stop,   // a set-point that says stop while the axes move
+  input_refused,     // what commands the axes cannot be trusted: two senders, the clock was set
+  ending,            // the process that drives them was told to end
   setpoint_stale,    // no set-point younger than setpoint_stop_age_ns
   setpoint_invalid,  // non-finite set-points, or ages below zero, for as long
   driver_overrun,    // step() was called too late

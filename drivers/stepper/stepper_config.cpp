@@ -7,6 +7,9 @@ namespace bevel::stepper {
 namespace {
 
 constexpr double kLargestCounts = 1e9;  // rates travel as 32-bit integers
+// Of the 200 ms from any fault to rest: 120 to notice it, 20 to pass it on, 60 to stop.
+constexpr std::int64_t kLongestNotice_ns = 120 * kMs;
+constexpr double kLongestQuickStop_s = 0.06 + 1e-9;
 
 class Checker {
  public:
@@ -36,6 +39,9 @@ void check_axis(Checker& check, const AxisConfig& axis, const std::string& name)
   rate(axis.rate_limit_unit_s, ".rate_limit_unit_s");
   rate(axis.acceleration_unit_s2, ".acceleration_unit_s2");
   rate(axis.quick_stop_unit_s2, ".quick_stop_unit_s2");
+  const double stop_s = axis.rate_limit_unit_s / axis.quick_stop_unit_s2;
+  check.require(stop_s <= kLongestQuickStop_s, name + ".quick_stop_unit_s2", axis.quick_stop_unit_s2,
+                "at least rate_limit_unit_s / 0.06 s: the needle must rest within 200 ms of a fault");
   check.require(axis.position_min_unit < axis.position_max_unit, name + ".position_min_unit", axis.position_min_unit,
                 "below position_max_unit");
 }
@@ -55,20 +61,25 @@ std::vector<std::string> problems_of(const StepperConfig& config) {
     check.require(value >= least_ns && value <= 10'000 * kMs, key, value,
                   "no shorter than what it supervises, at most 10 s");
   };
-  duration(config.period_ns, "period_ns", kMs);
+  const auto notice = [&](std::int64_t value, const char* key, std::int64_t least_ns) {
+    check.require(value >= least_ns && value <= kLongestNotice_ns, key, value,
+                  "no shorter than what it supervises, at most 120 ms: the needle must rest within 200 ms of a fault");
+  };
+  check.require(config.period_ns >= kMs && config.period_ns <= 20 * kMs, "period_ns", config.period_ns,
+                "1 to 20 ms: a stop is passed on within two periods at most");
   duration(config.listen_ns, "listen_ns", config.master_heartbeat_ns);
   duration(config.master_heartbeat_ns, "master_heartbeat_ns", config.period_ns);
-  duration(config.master_heartbeat_timeout_ns, "master_heartbeat_timeout_ns", 2 * config.master_heartbeat_ns);
+  notice(config.master_heartbeat_timeout_ns, "master_heartbeat_timeout_ns", 2 * config.master_heartbeat_ns);
   duration(config.drive_heartbeat_ns, "drive_heartbeat_ns", kMs);
-  duration(config.drive_heartbeat_timeout_ns, "drive_heartbeat_timeout_ns", 2 * config.drive_heartbeat_ns);
+  notice(config.drive_heartbeat_timeout_ns, "drive_heartbeat_timeout_ns", 2 * config.drive_heartbeat_ns);
   duration(config.sdo_timeout_ns, "sdo_timeout_ns", config.period_ns);
   duration(config.transition_timeout_ns, "transition_timeout_ns", 10 * config.period_ns);
-  duration(config.tpdo_timeout_ns, "tpdo_timeout_ns", 3 * config.period_ns);
-  duration(config.echo_timeout_ns, "echo_timeout_ns", 2 * config.period_ns);
-  duration(config.overrun_stop_ns, "overrun_stop_ns", 2 * config.period_ns);
-  duration(config.setpoint_zero_age_ns, "setpoint_zero_age_ns", config.period_ns);
-  duration(config.setpoint_stop_age_ns, "setpoint_stop_age_ns", config.setpoint_zero_age_ns);
-  duration(config.not_following_ns, "not_following_ns", config.period_ns);
+  notice(config.tpdo_timeout_ns, "tpdo_timeout_ns", 3 * config.period_ns);
+  notice(config.echo_timeout_ns, "echo_timeout_ns", 2 * config.period_ns);
+  notice(config.overrun_stop_ns, "overrun_stop_ns", 2 * config.period_ns);
+  notice(config.setpoint_zero_age_ns, "setpoint_zero_age_ns", config.period_ns);
+  notice(config.setpoint_stop_age_ns, "setpoint_stop_age_ns", config.setpoint_zero_age_ns);
+  notice(config.not_following_ns, "not_following_ns", config.period_ns);
   check.require(config.sdo_retries >= 0 && config.sdo_retries <= 10, "sdo_retries", config.sdo_retries, "0 to 10");
   check.require(config.queue_full_limit >= 1, "queue_full_limit", config.queue_full_limit, "at least 1");
   check.require(config.quick_stop_option == 2 || config.quick_stop_option == 6, "quick_stop_option",

@@ -49,18 +49,18 @@ struct StepperConfig {
   std::int64_t period_ns = 10 * kMs;                     // of step(), hence of SYNC
   std::int64_t listen_ns = 300 * kMs;                    // silence demanded before our first frame: no second driver
   std::int64_t master_heartbeat_ns = 30 * kMs;           // ours
-  std::int64_t master_heartbeat_timeout_ns = 120 * kMs;  // after which a drive stops by itself (0x1016)
+  std::int64_t master_heartbeat_timeout_ns = 100 * kMs;  // after which a drive stops by itself (0x1016)
   std::int64_t drive_heartbeat_ns = 30 * kMs;            // theirs (0x1017)
-  std::int64_t drive_heartbeat_timeout_ns = 120 * kMs;
+  std::int64_t drive_heartbeat_timeout_ns = 100 * kMs;
   std::int64_t sdo_timeout_ns = 500 * kMs;
   int sdo_retries = 1;
   std::int64_t transition_timeout_ns = 1000 * kMs;  // NMT start, mode change, enabling, fault reset
   std::int64_t tpdo_timeout_ns = 60 * kMs;          // no fresh position
   std::int64_t echo_timeout_ns = 60 * kMs;          // a frame of ours that does not get onto the wire
   std::int64_t overrun_stop_ns = 100 * kMs;         // step() called this late while enabled
-  std::int64_t setpoint_zero_age_ns = 80 * kMs;     // older: rate 0 by the normal ramp
-  std::int64_t setpoint_stop_age_ns = 150 * kMs;    // older: quick stop, latched
-  std::int64_t not_following_ns = 300 * kMs;        // actual rate far from the commanded one for this long
+  std::int64_t setpoint_zero_age_ns = 60 * kMs;     // older: rate 0 by the normal ramp
+  std::int64_t setpoint_stop_age_ns = 100 * kMs;    // older: quick stop, latched
+  std::int64_t not_following_ns = 100 * kMs;        // actual rate far from the commanded one for this long
   int queue_full_limit = 5;                         // refused frames in a row
   std::int16_t quick_stop_option = 6;               // 0x605A: 6 stays in quick stop with torque, 2 lets go
 };

@@ -62,9 +62,11 @@ void StepperDriver::disable() {
   for (auto& shaper : shapers_) shaper.reset();
 }
 
-void StepperDriver::request_stop() {
+void StepperDriver::stop_now(StopReason reason, std::int64_t now_ns) {
   if (latched()) return;
-  latch({StopReason::operator_stop, -1, 0});
+  receive(now_ns);  // echoes, so that nothing holds the stop back
+  latch({reason, -1, 0});
+  if (bus_.is_open() && !silent_) send_commands(now_ns);
 }
 
 bool StepperDriver::rearm() {
@@ -291,6 +293,10 @@ void StepperDriver::run_ready(std::int64_t now_ns) {
   }
 }
 
+bool StepperDriver::moving() const {
+  return std::any_of(shapers_.begin(), shapers_.end(), [](const RateShaper& s) { return s.rate_unit_s() != 0; });
+}
+
 std::array<double, kAxes> StepperDriver::wanted_rates(std::int64_t now_ns,
                                                       const std::optional<MotionSetpoint>& setpoint) {
   std::array<double, kAxes> rates{};
@@ -303,6 +309,7 @@ std::array<double, kAxes> StepperDriver::wanted_rates(std::int64_t now_ns,
     } else {
       fresh_setpoint_ns_ = std::max(fresh_setpoint_ns_, now_ns - std::max<std::int64_t>(setpoint->age_ns, 0));
       if (setpoint->run) rates = {setpoint->insertion_rate_mm_s, setpoint->rotation_rate_rad_s};
+      if (!setpoint->run && moving()) latch({StopReason::controller_stop, -1, 0});
     }
   }
   const std::int64_t age_ns = now_ns - fresh_setpoint_ns_;
@@ -365,8 +372,7 @@ std::uint16_t StepperDriver::controlword_for(const DriveNode& node) const {
   return cia402::controlword_towards(on ? Goal::enabled : Goal::ready, node.state());
 }
 
-void StepperDriver::transmit(std::int64_t now_ns) {
-  if (state_ == DriverState::off || silent_ || !bus_.is_open()) return;
+void StepperDriver::send_commands(std::int64_t now_ns) {
   for (std::size_t axis = 0; axis < kAxes; ++axis) {
     const DriveNode& node = nodes_.at(axis);
     // A stop is meant for every drive, also for one that we do not see.
@@ -374,6 +380,11 @@ void StepperDriver::transmit(std::int64_t now_ns) {
     const double rate = state_ == DriverState::enabled ? shapers_.at(axis).rate_unit_s() : 0.0;
     node.command(controlword_for(node), rate, now_ns, out_);
   }
+}
+
+void StepperDriver::transmit(std::int64_t now_ns) {
+  if (state_ == DriverState::off || silent_ || !bus_.is_open()) return;
+  send_commands(now_ns);
   if (out_.send(cia301::sync(), now_ns))
     for (auto& node : nodes_) node.on_sync(now_ns);
   if (now_ns >= next_heartbeat_ns_ &&

@@ -24,7 +24,7 @@ namespace bevel::stepper {
 
 struct MotionSetpoint {
   std::int64_t age_ns = 0;           // since it was made; more than a cycle below zero is refused
-  bool run = false;                  // false: rates are taken as zero
+  bool run = false;                  // false: stop; while the axes are being moved that is a latched quick stop
   double insertion_rate_mm_s = 0.0;  // + into the tissue
   double rotation_rate_rad_s = 0.0;
 };
@@ -90,11 +90,12 @@ class StepperDriver {
 
   EnableAnswer enable();    // carried out by the following steps
   void disable();           // the drives ramp down and let go; back to ready
-  void request_stop();      // quick stop, latched
+  void stop_now(StopReason reason, std::int64_t now_ns);  // quick stop, latched, and sent at once
   bool rearm();             // out of stopped or fault: configure again, reset faults. False: nothing is latched
   void set_zero();          // both axes are at their zero now
   void confirm_position();  // the drives' positions still hold, although a drive was out of sight
 
+  bool moving() const;  // a rate other than zero is commanded
   AxesReport report() const;
 
  private:
@@ -112,6 +113,7 @@ class StepperDriver {
   void supervise_motion(std::int64_t now_ns);
   std::array<double, kAxes> wanted_rates(std::int64_t now_ns, const std::optional<MotionSetpoint>& setpoint);
   void transmit(std::int64_t now_ns);
+  void send_commands(std::int64_t now_ns);
   std::uint16_t controlword_for(const DriveNode& node) const;
   bool latched() const { return state_ == DriverState::stopped || state_ == DriverState::fault; }
   bool all_in(cia402::State state) const;

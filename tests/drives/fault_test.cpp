@@ -243,14 +243,14 @@ TEST_F(Fault, LinkDownIsReopenedButStaysLatched) {
 }
 
 TEST_F(Fault, OperatorStop) {
-  bench.driver->request_stop();
+  bench.driver->stop_now(StopReason::operator_stop, bench.now_ns);
   expect_rest_within_ms(100);
   expect_latched(StopReason::operator_stop, DriverState::stopped);
   expect_rearm_works();
 }
 
 TEST_F(Fault, TheFirstReasonStays) {
-  bench.driver->request_stop();
+  bench.driver->stop_now(StopReason::operator_stop, bench.now_ns);
   bench.run_ms(50);
   bench.insertion.raise_fault(0x4310);
   bench.run_ms(50);

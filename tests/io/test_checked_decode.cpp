@@ -42,8 +42,8 @@ Message valid_message() {
 }
 
 template <class Message>
-Decoded<Message> decode_bytes(const std::vector<std::uint8_t>& bytes, const TimeBounds& bounds = {}) {
-  return checked_decode<Message>(bytes.data(), bytes.size(), bounds);
+Decoded<Message> decode_bytes(const std::vector<std::uint8_t>& bytes) {
+  return checked_decode<Message>(bytes.data(), bytes.size());
 }
 
 template <class Message>
@@ -183,23 +183,9 @@ TYPED_TEST(CheckedDecode, random_damage_is_refused_or_harmless) {
   EXPECT_GT(refused, 0);
 }
 
-TYPED_TEST(CheckedDecode, time_bounds_hold_on_both_sides) {
-  const auto message = valid_message<TypeParam>();
-  const auto bytes = encode(message);
-  const auto with_reference = [&](std::int64_t reference_utime) {
-    return decode_bytes<TypeParam>(bytes, {reference_utime, 200'000, 10'000});
-  };
-  EXPECT_TRUE(with_reference(message.utime + 200'000));
-  EXPECT_FALSE(with_reference(message.utime + 200'001));
-  EXPECT_TRUE(with_reference(message.utime - 10'000));
-  EXPECT_FALSE(with_reference(message.utime - 10'001));
-  EXPECT_FALSE(with_reference(std::numeric_limits<std::int64_t>::max()));
-  EXPECT_FALSE(with_reference(1));
-}
-
 TEST(CheckedDecodeText, lengths_that_crash_the_generated_decoder_are_refused) {
   const auto original = encode(valid_message<process_status_t>());
-  const std::size_t length_at = 8 + 8 + 8;  // fingerprint, utime, seq; then the length of `process`
+  const std::size_t length_at = 8 + 8 + 8 + 8;  // fingerprint, utime, seq, session; then the length of `process`
   for (const std::uint32_t length : {0U, 0xffffffffU, 0x80000000U, 0x7fffffffU, 0x10000000U, 4097U, 17U, 15U}) {
     auto bytes = original;
     for (std::size_t i = 0; i < 4; ++i) bytes[length_at + i] = static_cast<std::uint8_t>(length >> (24 - 8 * i));
@@ -245,20 +231,6 @@ TEST(Samples, conversion_there_and_back_loses_nothing) {
   auto command = valid_message<motion_command_t>();
   command.rotation_rate_rad_s = 0.25;
   EXPECT_EQ(encode(to_message(to_sample(command))), encode(command));
-}
-
-TEST(SeqWatch, tells_gaps_duplicates_late_ones_and_restarts) {
-  SeqWatch watch;
-  EXPECT_EQ(watch.step(10, 1000), SeqStep::first);
-  EXPECT_EQ(watch.step(11, 2000), SeqStep::next);
-  EXPECT_EQ(watch.step(11, 2000), SeqStep::duplicate);
-  EXPECT_EQ(watch.step(14, 5000), SeqStep::gap);
-  EXPECT_EQ(watch.lost(), 2);
-  EXPECT_EQ(watch.step(12, 3000), SeqStep::late);
-  EXPECT_EQ(watch.step(15, 6000), SeqStep::next);
-  EXPECT_EQ(watch.step(0, 7000), SeqStep::restarted);
-  EXPECT_EQ(watch.step(1, 8000), SeqStep::next);
-  EXPECT_EQ(watch.restarts(), 1);
 }
 
 }  // namespace

@@ -5,6 +5,8 @@
 #include <fstream>
 #include <stdexcept>
 
+#include "nodes/claim_name.hpp"
+#include "nodes/fault_injector.hpp"
 #include "nodes/system_config.hpp"
 #include "tools/demo_loop/loop_figures.hpp"
 #include "tools/demo_loop/process_group.hpp"
@@ -23,12 +25,14 @@ std::string tail_of(const std::string& path) {
   return text;
 }
 
+constexpr double kFarewell_s = 0.3;  // for the stop and what follows it to reach the log
+
 enum class End { arrived, stopped, died, timed_out, interrupted };
 
 End steer(SteeringSession& session, ProcessGroup& processes, lcm::LCM& lcm, const DemoOptions& options) {
   End end = End::interrupted;
   const std::int64_t start_ns = nodes::now().ns;
-  nodes::run_periodic(lcm, 0.01, [&](const nodes::Now& now, double) {
+  const auto step = [&](const nodes::Now& now, double) {
     const auto progress = session.step(now);
     if (const auto death = processes.first_death()) {
       const std::string name = death->substr(0, death->find(':'));
@@ -45,21 +49,44 @@ End steer(SteeringSession& session, ProcessGroup& processes, lcm::LCM& lcm, cons
       return false;
     }
     return progress == SteeringSession::Progress::going_on;
-  });
-  session.stop(nodes::now().utime);
+  };
+  const auto tell = [&session](const nodes::Now& now) { session.tell_time(now); };
+  // The operator's stop is said however this ends, and heard of.
+  nodes::run_with_end(lcm, {0.01, tell, step}, [&session] { session.stop(); },
+                      {0.01, tell, [](const nodes::Now&, double) { return true; }}, kFarewell_s);
   return end;
+}
+
+// Where each program's faults are made: drives are the rig's.
+std::string program_of(const nodes::Fault& fault) {
+  switch (fault.component) {
+    case nodes::Component::camera:
+      return "bevel-camera";
+    case nodes::Component::estimator:
+      return "bevel-estimator";
+    case nodes::Component::controller:
+      return "bevel-controller";
+    case nodes::Component::stepper:
+      return "bevel-stepper";
+    case nodes::Component::insertion_drive:
+    case nodes::Component::rotation_drive:
+      break;
+  }
+  return "bevel-rig";
 }
 
 }  // namespace
 
 int run_demo(const DemoOptions& options) {
   const nodes::SystemConfig config = nodes::load_system_config(options.config_path);
+  if (!options.fault.empty()) (void)nodes::parse_fault(options.fault);  // before anything is started
   std::filesystem::create_directories(options.out);
   const std::string log_path = options.out + "/insertion.lcm";
   lcm::LCM lcm(config.lcm_url);
   if (!lcm.good()) throw std::runtime_error("LCM does not start; is multicast routed? (see docs/running.md)");
   nodes::catch_signals();
   const Eigen::Vector3d target(options.target_mm[0], options.target_mm[1], options.target_mm[2]);
+  nodes::claim_name(lcm, config.lcm_url, "bevel-demo");
   SteeringSession session(lcm, log_path, target);
   nodes::LcmPort(lcm).publish_text(io::channel::kConfig, config.text);
 
@@ -67,12 +94,17 @@ int run_demo(const DemoOptions& options) {
   bool clean = false;
   {
     ProcessGroup processes;
-    for (const char* program : kPrograms)
-      processes.start(program, {options.programs + "/" + program, "--config", options.config_path},
-                      options.out + "/" + program + ".txt");
+    for (const char* program : kPrograms) {
+      std::vector<std::string> command{options.programs + "/" + program, "--config", options.config_path};
+      if (!options.fault.empty() && program_of(nodes::parse_fault(options.fault)) == program)
+        command.insert(command.end(), {"--fault", options.fault});
+      processes.start(program, command, options.out + "/" + program + ".txt");
+    }
     end = steer(session, processes, lcm, options);
     clean = processes.stop_all();
   }
+  if (!session.log_failure().empty())
+    std::fprintf(stderr, "bevel-demo: the needle was stopped because nothing is recorded any more\n");
   session.close_log();
   if (!clean) std::fprintf(stderr, "bevel-demo: a process did not end when asked and was killed\n");
   switch (end) {

@@ -17,9 +17,12 @@ ProcessGroup::~ProcessGroup() { stop_all(); }
 
 void ProcessGroup::start(const std::string& name, const std::vector<std::string>& command,
                          const std::string& log_path) {
+  std::vector<std::string> words = command;
+  // However this process goes, its children hear of it and end in order.
+  words.insert(words.end(), {"--end-with", std::to_string(getpid())});
   std::vector<char*> argv;
-  argv.reserve(command.size() + 1);
-  for (const std::string& word : command) argv.push_back(const_cast<char*>(word.c_str()));
+  argv.reserve(words.size() + 1);
+  for (std::string& word : words) argv.push_back(word.data());
   argv.push_back(nullptr);
   posix_spawn_file_actions_t files;
   posix_spawn_file_actions_init(&files);

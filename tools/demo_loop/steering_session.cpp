@@ -1,6 +1,7 @@
 #include "tools/demo_loop/steering_session.hpp"
 
 #include <cstdio>
+#include <stdexcept>
 
 namespace bevel::tools {
 namespace {
@@ -22,19 +23,36 @@ SteeringSession::SteeringSession(lcm::LCM& lcm, const std::string& log_path, con
 SteeringSession::~SteeringSession() { lcm_.unsubscribe(everything_); }
 
 void SteeringSession::on_any(const lcm::ReceiveBuffer* buffer, const std::string& channel) {
-  log_.write(buffer->recv_utime, channel, {static_cast<const std::uint8_t*>(buffer->data), buffer->data_size});
+  if (!log_failure_.empty()) return;
+  try {
+    log_.write(buffer->recv_utime, channel, {static_cast<const std::uint8_t*>(buffer->data), buffer->data_size});
+  } catch (const std::exception& e) {
+    log_failure_ = e.what();
+  }
 }
 
-void SteeringSession::say(int request, std::int64_t utime) {
+void SteeringSession::say(nodes::Word word) {
   steering_target_t m{};
-  m.utime = utime;
+  m.utime = nodes::now().utime;
   m.seq = seq_++;
-  m.request = request;
+  m.request = static_cast<std::int32_t>(word);
   for (int i = 0; i < 3; ++i) m.position_mm[i] = target_mm_[i];
+  const char* const receivers[] = {"bevel-controller", "bevel-stepper", "bevel-estimator"};  // as nodes::Receiver
+  for (int i = 0; i < 3; ++i) m.session[i] = session_of(receivers[i]);
   port_.publish(io::channel::kSteeringTarget, m);
 }
 
-void SteeringSession::stop(std::int64_t utime) { say(0, utime); }
+void SteeringSession::stop() { say(nodes::Word::stop); }
+
+void SteeringSession::close_log() {
+  if (!log_failure_.empty()) throw std::runtime_error(log_failure_);
+  log_.close();
+}
+
+std::int64_t SteeringSession::session_of(const std::string& process) const {
+  const auto found = processes_.find(process);
+  return found == processes_.end() ? 0 : found->second.session;
+}
 
 std::string SteeringSession::state_of(const std::string& process) const {
   const auto found = processes_.find(process);
@@ -51,6 +69,7 @@ std::string SteeringSession::reason() const {
 
 SteeringSession::Progress SteeringSession::step(const nodes::Now& now) {
   if (start_ns_ == 0) start_ns_ = now.ns;
+  if (!log_failure_.empty()) return Progress::stopped;
   print_progress(now);
   const std::string controller = state_of("bevel-controller");
   if (steering_seen_ && controller == "hold") {
@@ -65,9 +84,9 @@ SteeringSession::Progress SteeringSession::step(const nodes::Now& now) {
   const std::string stepper = state_of("bevel-stepper");
   const bool seen = estimate_ && estimate_->health == 0;
   if (controller == "armed" && stepper == "enabled") {
-    say(2, now.utime);
+    say(nodes::Word::start);
   } else if (seen && controller != "armed" && (stepper == "ready" || stepper == "enabled")) {
-    say(1, now.utime);
+    say(nodes::Word::arm);
   }
   return Progress::going_on;
 }

@@ -7,7 +7,7 @@
 #include <string>
 
 #include "io/log_writer.hpp"
-#include "nodes/lcm_port.hpp"
+#include "nodes/operator_words.hpp"
 #include "nodes/runtime.hpp"
 
 namespace bevel::tools {
@@ -21,16 +21,20 @@ class SteeringSession {
   // Call about every 10 ms.
   Progress step(const nodes::Now& now);
   // The operator's stop, sent also when the session ends early.
-  void stop(std::int64_t utime);
+  void stop();
+  // Why the log cannot be written any more; "" while it can. The needle is stopped then: what is not recorded is lost.
+  const std::string& log_failure() const { return log_failure_; }
   // Why the needle was stopped, or what is still waited for.
   std::string reason() const;
-  void close_log() { log_.close(); }
+  void close_log();  // throws what is wrong with it
+  void tell_time(const nodes::Now& now) { port_.tell_time(now); }
 
  private:
   void on_any(const lcm::ReceiveBuffer* buffer, const std::string& channel);
-  void say(int request, std::int64_t utime);
+  void say(nodes::Word word);
   void print_progress(const nodes::Now& now);
   std::string state_of(const std::string& process) const;
+  std::int64_t session_of(const std::string& process) const;
 
   lcm::LCM& lcm_;
   nodes::LcmPort port_;
@@ -46,6 +50,7 @@ class SteeringSession {
   std::int64_t arrived_ns_ = 0;
   std::int64_t seq_ = 0;
   bool steering_seen_ = false;
+  std::string log_failure_;
 };
 
 }  // namespace bevel::tools

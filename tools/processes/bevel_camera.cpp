@@ -9,11 +9,13 @@ int main(int argc, char** argv) {
   bool print = false;
   command_line.option("--source", source, "path instead of the file's source.path");
   command_line.flag("--print", print, "print each observation as CSV");
-  return tools::process_main(command_line, argc, argv, [&](nodes::SystemConfig& config, lcm::LCM& lcm) {
+  return tools::process_main(command_line, argc, argv, nodes::camera_process_name, [&](tools::ProcessContext& context) {
+    nodes::SystemConfig& config = context.config;
     if (!source.empty()) config.source.path = source;
     if (config.source.kind == camera::SourceKind::folder || config.source.kind == camera::SourceKind::video)
       config.source.start_utime = nodes::now().utime;
-    nodes::CameraNode node(lcm, config);
+    nodes::CameraNode node(context.lcm, config);
+    tools::inject(context, node.port());
     if (print) {
       std::puts("utime,seq,camera,status,x_mm,y_mm,z_mm,u_px,v_px,reason");
       node.on_observation = [](const camera::TipObservation& o) {
@@ -23,8 +25,8 @@ int main(int argc, char** argv) {
       };
     }
     while (!nodes::stop_requested()) {
-      nodes::pump(lcm);
-      const auto outcome = node.step(nodes::now().utime, 50);
+      nodes::pump(context.lcm);
+      const auto outcome = node.step(nodes::now(), 50);
       if (outcome == nodes::CameraNode::Outcome::failed) throw std::runtime_error(node.failure());
       if (outcome == nodes::CameraNode::Outcome::ended) break;
     }

@@ -6,15 +6,18 @@ int main(int argc, char** argv) {
   using namespace bevel;
   tools::CommandLine command_line(
       "bevel-controller", "Steers the needle to the target on STEERING_TARGET, and stops it when anything is wrong.");
-  return tools::process_main(command_line, argc, argv, [](nodes::SystemConfig& config, lcm::LCM& lcm) {
-    nodes::claim_name("bevel-controller");
-    tools::warn_of_effects_left_out(config, "bevel-controller");
-    tools::go_realtime(config, "bevel-controller", 40);
-    nodes::ControllerNode node(lcm, config.controller, config.needle, config.live_effects.active);
-    nodes::run_periodic(lcm, config.controller.period_s, [&](const nodes::Now& now, double late_s) {
-      node.step(now.utime, late_s);
-      return true;
-    });
+  const auto name = [](const nodes::SystemConfig&) { return "bevel-controller"; };
+  return tools::process_main(command_line, argc, argv, name, [](tools::ProcessContext& context) {
+    tools::warn_of_effects_left_out(context.config, "bevel-controller");
+    tools::go_realtime(context.config, "bevel-controller", 40);
+    nodes::ControllerNode node(context.lcm, context.config);
+    tools::inject(context, node.port());
+    const nodes::Loop loop{context.config.controller.period_s, [&](const nodes::Now& now) { node.tell_time(now); },
+                           [&](const nodes::Now& now, double late_s) {
+                             node.step(now, late_s);
+                             return true;
+                           }};
+    nodes::run_with_end(context.lcm, loop, [&] { node.end(); }, {}, 0);
     return 0;
   });
 }

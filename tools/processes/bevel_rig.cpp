@@ -10,8 +10,9 @@ int main(int argc, char** argv) {
   using namespace bevel;
   tools::CommandLine command_line("bevel-rig",
                                   "Simulates needle, cameras and drives; the other processes cannot tell.");
-  return tools::process_main(command_line, argc, argv, [](nodes::SystemConfig& config, lcm::LCM& lcm) {
-    nodes::claim_name("bevel-rig");
+  const auto name = [](const nodes::SystemConfig&) { return "bevel-rig"; };
+  return tools::process_main(command_line, argc, argv, name, [](tools::ProcessContext& context) {
+    const nodes::SystemConfig& config = context.config;
     // On a local bus the rig is also the hub; a CAN interface needs none.
     constexpr std::string_view kLocal = "unix:";
     std::unique_ptr<can::LocalHub> hub;
@@ -22,11 +23,12 @@ int main(int argc, char** argv) {
     }
     const auto insertion = can::open_bus(config.can), rotation = can::open_bus(config.can);
     rig::FrameServer frames(config.rig.frames_socket);
-    nodes::RigNode node(lcm, *insertion, *rotation, config, &frames);
-    nodes::run_periodic(lcm, 0.001, [&](const nodes::Now& now, double) {
-      node.step(now.ns, now.utime);
-      return true;
-    });
+    nodes::RigNode node(context.lcm, *insertion, *rotation, config, &frames);
+    if (context.fault) node.break_drive(*context.fault, context.started_ns);
+    nodes::run_periodic(context.lcm, {0.001, {}, [&](const nodes::Now& now, double) {
+                                        node.step(now);
+                                        return true;
+                                      }});
     return 0;
   });
 }

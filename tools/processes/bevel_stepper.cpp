@@ -5,18 +5,27 @@
 
 int main(int argc, char** argv) {
   using namespace bevel;
+  constexpr double kLongestStop_s = 0.5;
   tools::CommandLine command_line("bevel-stepper", "Drives the insertion and rotation axes over CANopen.");
   std::string can;
   command_line.option("--can", can, "bus instead of the file's: can0, or unix:/path for the rig's local bus");
-  return tools::process_main(command_line, argc, argv, [&](nodes::SystemConfig& config, lcm::LCM& lcm) {
-    nodes::claim_name("bevel-stepper");
-    tools::go_realtime(config, "bevel-stepper", 50);
-    const auto bus = can::open_bus(can.empty() ? config.can : can, stepper::StepperDriver::listen_ids(config.stepper));
-    nodes::StepperNode node(lcm, *bus, config.stepper);
-    nodes::run_periodic(lcm, static_cast<double>(config.stepper.period_ns) * 1e-9, [&](const nodes::Now& now, double) {
-      node.step(now.ns, now.utime);
-      return true;
-    });
+  const auto name = [](const nodes::SystemConfig&) { return "bevel-stepper"; };
+  return tools::process_main(command_line, argc, argv, name, [&](tools::ProcessContext& context) {
+    const stepper::StepperConfig& config = context.config.stepper;
+    tools::go_realtime(context.config, "bevel-stepper", 50);
+    const auto bus = can::open_bus(can.empty() ? context.config.can : can, stepper::StepperDriver::listen_ids(config));
+    nodes::StepperNode node(context.lcm, *bus, config);
+    tools::inject(context, node.port());
+    const auto loop = [&](bool to_rest) {
+      return nodes::Loop{static_cast<double>(config.period_ns) * 1e-9,
+                         [&](const nodes::Now& now) { node.tell_time(now); },
+                         [&, to_rest](const nodes::Now& now, double) {
+                           node.step(now);
+                           return !(to_rest && node.at_rest());
+                         }};
+    };
+    // The axes are brought to rest before this ends, and others hear of it.
+    nodes::run_with_end(context.lcm, loop(false), [&] { node.end(); }, loop(true), kLongestStop_s);
     return 0;
   });
 }

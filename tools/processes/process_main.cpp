@@ -1,21 +1,45 @@
 #include "tools/processes/process_main.hpp"
 
+#include <cmath>
 #include <cstdio>
+#include <limits>
+#include <memory>
 #include <stdexcept>
 
-namespace bevel::tools {
+#include "nodes/claim_name.hpp"
 
-int process_main(CommandLine& command_line, int argc, char** argv, const ProcessBody& body) {
-  std::string config_path, lcm_url;
+namespace bevel::tools {
+namespace {
+constexpr std::uint64_t kFaultSeed = 1;
+}
+
+int process_main(CommandLine& command_line, int argc, char** argv, const ProcessName& name, const ProcessBody& body) {
+  std::string config_path, lcm_url, fault;
+  int parent = 0;
   command_line.option("-c,--config", config_path, "system file (TOML); config/demo.toml is one", true)
-      .option("--lcm-url", lcm_url, "LCM provider; default: system.lcm_url, then LCM_DEFAULT_URL");
+      .option("--lcm-url", lcm_url, "LCM provider; default: system.lcm_url, then LCM_DEFAULT_URL")
+      .option("--fault", fault, "for tests: spoil what this process sends, as in camera:off@5s")
+      .option("--end-with", parent, "id of the process that started this one: end, in order, when it is gone", 0,
+              std::numeric_limits<int>::max());
   return command_line.run(argc, argv, [&] {
-    nodes::SystemConfig config = nodes::load_system_config(config_path);
-    lcm::LCM lcm(lcm_url.empty() ? config.lcm_url : lcm_url);
-    if (!lcm.good()) throw std::runtime_error("LCM does not start; is multicast routed? (see docs/running.md)");
     nodes::catch_signals();
-    return body(config, lcm);
+    if (parent != 0) nodes::end_with(parent);
+    nodes::SystemConfig config = nodes::load_system_config(config_path);
+    if (lcm_url.empty()) lcm_url = config.lcm_url;
+    lcm::LCM lcm(lcm_url);
+    if (!lcm.good()) throw std::runtime_error("LCM does not start; is multicast routed? (see docs/running.md)");
+    ProcessContext context{config, lcm, {}, nodes::now().ns};
+    if (!fault.empty()) context.fault = nodes::parse_fault(fault);
+    nodes::claim_name(lcm, lcm_url, name(config));
+    return body(context);
   });
+}
+
+void inject(const ProcessContext& context, nodes::LcmPort& port) {
+  if (!context.fault) return;
+  const auto& [component, kind, at_s] = *context.fault;
+  const std::int64_t start_ns = context.started_ns + std::llround(at_s * 1e9);
+  port.inject(std::make_unique<nodes::FaultInjector>(nodes::channel_of(component), kind, start_ns, kFaultSeed));
 }
 
 void go_realtime(const nodes::SystemConfig& config, const char* program, int priority) {

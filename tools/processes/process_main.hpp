@@ -1,17 +1,32 @@
 #pragma once
-// What the five processes' mains share: the system file and LCM.
+// What the five processes' mains share: the system file, LCM, their name on the rig, and how they end.
 #include <lcm/lcm-cpp.hpp>
+#include <optional>
 
+#include "nodes/fault_injector.hpp"
+#include "nodes/lcm_port.hpp"
 #include "nodes/runtime.hpp"
 #include "nodes/system_config.hpp"
 #include "tools/common/command_line.hpp"
 
 namespace bevel::tools {
 
-using ProcessBody = std::function<int(nodes::SystemConfig& config, lcm::LCM& lcm)>;
+struct ProcessContext {
+  nodes::SystemConfig& config;
+  lcm::LCM& lcm;
+  std::optional<nodes::Fault> fault;  // to be injected into what this process sends; counted from its start
+  std::int64_t started_ns = 0;
+};
+using ProcessBody = std::function<int(ProcessContext& context)>;
+// Which name the process claims, so that there is one of it on a rig.
+using ProcessName = std::function<std::string(const nodes::SystemConfig& config)>;
 
-// Adds --config and --lcm-url, parses, loads, starts LCM, catches signals, runs. Returns the exit status.
-int process_main(CommandLine& command_line, int argc, char** argv, const ProcessBody& body);
+// Adds --config, --lcm-url, --fault and --end-with, parses, loads, starts LCM, catches signals, claims the name, runs.
+// Returns the exit status.
+int process_main(CommandLine& command_line, int argc, char** argv, const ProcessName& name, const ProcessBody& body);
+
+// Makes what the port sends suffer the fault that was asked for, if any.
+void inject(const ProcessContext& context, nodes::LcmPort& port);
 
 // Asks for real-time scheduling where the file wants it; a refusal is said and not fatal.
 void go_realtime(const nodes::SystemConfig& config, const char* program, int priority);

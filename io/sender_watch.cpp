@@ -1,0 +1,63 @@
+#include "io/sender_watch.hpp"
+
+#include "model/age.hpp"
+
+namespace bevel::io {
+namespace {
+// Beyond what the rate explains: stamps are not sent at even times.
+constexpr double kSlackMessages = 8;
+}  // namespace
+
+const char* name_of(Standing standing) {
+  switch (standing) {
+    case Standing::fresh:
+      return "fresh";
+    case Standing::late:
+      return "late";
+    case Standing::duplicate:
+      return "duplicate";
+    case Standing::old:
+      return "too old";
+    case Standing::ahead:
+      return "from the future";
+    case Standing::foreign:
+      return "from a second sender";
+  }
+  return "?";
+}
+
+Standing SenderWatch::judge(std::int64_t seq, std::int64_t utime, std::uint64_t digest, std::int64_t now_utime,
+                            std::int64_t now_ns) noexcept {
+  using model::age_us;
+  const std::int64_t age = age_us(now_utime, utime);
+  const bool alive = heard_ && model::difference_saturated(now_ns, heard_ns_) <= limits_.silence_us * 1000;
+  if (age < -limits_.longest_ahead_us) return alive ? Standing::foreign : Standing::ahead;
+
+  if (alive) {
+    if (seq == newest_seq_) {
+      return utime == newest_utime_ && digest == newest_digest_ ? Standing::duplicate : Standing::foreign;
+    }
+    if (seq < newest_seq_) {
+      const bool reordered = limits_.reorder_us > 0 && utime < newest_utime_ &&
+                             age_us(newest_utime_, utime) <= limits_.reorder_us && age <= limits_.longest_age_us;
+      return reordered ? Standing::late : Standing::foreign;
+    }
+    if (utime < newest_utime_) return Standing::foreign;
+    const double room = 1e-6 * static_cast<double>(age_us(utime, newest_utime_)) * limits_.fastest_hz + kSlackMessages;
+    const std::int64_t step = model::difference_saturated(seq, newest_seq_);
+    if (static_cast<double>(step) > room) return Standing::foreign;
+    lost_ += step - 1;
+  } else if (age > limits_.longest_age_us) {
+    return Standing::old;  // not followed: what a replay begins with must not become the sender
+  } else if (heard_ && seq <= newest_seq_) {
+    ++restarts_;
+  }
+  heard_ = true;
+  newest_seq_ = seq;
+  newest_utime_ = utime;
+  newest_digest_ = digest;
+  heard_ns_ = now_ns;
+  return age > limits_.longest_age_us ? Standing::old : Standing::fresh;
+}
+
+}  // namespace bevel::io

@@ -1,0 +1,13 @@
+#pragma once
+// One of each process on a rig.
+#include <lcm/lcm-cpp.hpp>
+#include <string>
+
+namespace bevel::nodes {
+
+// Refuses a second process of this name on the same rig; throws std::runtime_error. On this machine the name is held
+// until the process ends, however it ends; on the network a process of that name is listened for, which takes 0.6 s.
+// One rig is one LCM network: `lcm_url` as the process uses it.
+void claim_name(lcm::LCM& lcm, const std::string& lcm_url, const std::string& name);
+
+}  // namespace bevel::nodes

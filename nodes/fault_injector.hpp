@@ -1,0 +1,79 @@
+#pragma once
+// Spoils what one component sends, as failing cameras, processes and networks do, to prove that motion stops: in
+// simulated time by the thousand (tests/faults) and live (bevel-demo --fault camera:off@5s). Nothing else uses it.
+#include <cstdint>
+#include <deque>
+#include <functional>
+#include <random>
+#include <span>
+#include <string>
+#include <string_view>
+#include <vector>
+
+namespace bevel::nodes {
+
+enum class FaultKind {
+  off,            // sends nothing any more
+  stuck,          // the newest message for ever: byte for byte, or with new stamps and numbers
+  garbage,        // bytes that mean nothing, of the right type or not
+  wrong,          // well-formed and false: a tip 10 mm aside, axes that jump, a command nobody computed
+  slow,           // one message in a quarter of a second
+  delayed,        // each message late by 0.15 to 0.5 s
+  intermittent,   // gaps of 0.15 to 0.4 s
+  replayed,       // beside its own messages those of a second before
+  second_sender,  // beside its own messages those of another, false and in good form
+};
+inline constexpr int kFaultKinds = 9;
+const char* name_of(FaultKind kind);
+
+enum class Component { camera, estimator, controller, stepper, insertion_drive, rotation_drive };
+inline constexpr int kComponents = 6;
+const char* name_of(Component component);
+// The channel on which a process speaks to the others; "" for drives, which are on the bus.
+const char* channel_of(Component component);
+
+struct Fault {
+  Component component = Component::camera;
+  FaultKind kind = FaultKind::off;
+  double at_s = 0;  // after the start of the process, or of the simulation
+};
+// "camera:off@5s". Throws std::invalid_argument saying what is allowed.
+Fault parse_fault(const std::string& text);
+
+class FaultInjector {
+ public:
+  using Emit = std::function<void(const char* channel, std::span<const std::uint8_t> bytes)>;
+
+  // Acts from start_ns (steady clock) on. The seed draws the variant, lengths and bytes.
+  FaultInjector(const char* channel, FaultKind kind, std::int64_t start_ns, std::uint64_t seed);
+
+  bool concerns(const char* channel) const { return channel_ == channel; }
+  // Takes a message that its component sends; what comes out of it is emitted by flush().
+  void pass(const char* channel, const std::vector<std::uint8_t>& bytes, std::int64_t now_ns, std::int64_t now_utime);
+  // Emits what is due.
+  void flush(std::int64_t now_ns, const Emit& emit);
+
+ private:
+  using Bytes = std::vector<std::uint8_t>;
+  struct Due {
+    std::int64_t at_ns;
+    Bytes bytes;
+  };
+  void emit_at(std::int64_t at_ns, Bytes bytes) { due_.push_back({at_ns, std::move(bytes)}); }  // at_ns never falls
+  double uniform(double low, double high) { return std::uniform_real_distribution<double>(low, high)(rng_); }
+  Bytes garbage(const Bytes& like);
+
+  std::string channel_;
+  FaultKind kind_;
+  std::int64_t start_ns_;
+  std::mt19937_64 rng_;
+  bool variant_;
+  std::int64_t shift_ns_;            // of delays and replays
+  std::int64_t pass_until_ns_ = 0;   // intermittent
+  std::int64_t block_until_ns_ = 0;  // intermittent, slow
+  std::int64_t own_seq_ = 0;         // of the second sender
+  std::deque<Due> past_;             // of the last second
+  std::deque<Due> due_;
+};
+
+}  // namespace bevel::nodes

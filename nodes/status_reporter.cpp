@@ -1,0 +1,49 @@
+#include "nodes/status_reporter.hpp"
+
+#include <random>
+
+#include "nodes/runtime.hpp"
+
+namespace bevel::nodes {
+namespace {
+
+constexpr std::int64_t kStatusPeriod_ns = 500'000'000;
+constexpr int kStopBits = 20;  // of a session: a million stops of one run
+
+std::int64_t draw_run() {
+  std::random_device source;
+  return static_cast<std::int64_t>((std::uint64_t{source()} << 32U | source()) >> (kStopBits + 1));
+}
+
+}  // namespace
+
+StatusReporter::StatusReporter(LcmPort& port, std::string process, double period_s) : port_(port), run_(draw_run()) {
+  message_.process = std::move(process);
+  message_.loop_period_s = period_s;
+  message_.session = run_ << kStopBits;
+  port_.subscribe<process_status_t>(io::channel::kProcessStatus, [this](const process_status_t& m) {
+    if (m.process == message_.process && m.session >> kStopBits != run_) name_taken_ = true;
+  });
+}
+
+void StatusReporter::report(const std::string& state, const std::string& reason) {
+  const Now& now = port_.now();
+  const bool changed = state != message_.state || reason != message_.reason || message_.session != last_session_;
+  if (!changed && now.ns - last_ns_ < kStatusPeriod_ns) return;
+  message_.utime = now.utime;
+  message_.state = state;
+  message_.reason = reason;
+  const LoopTimes loop = take_loop_times();
+  message_.loop_late_max_s = loop.late_max_s;
+  message_.loop_run_max_s = std::max(loop.run_max_s, run_max_s_);
+  message_.overruns = loop.overruns + overruns_;
+  message_.received = port_.counters().received;
+  message_.rejected = port_.counters().rejected;
+  port_.publish(io::channel::kProcessStatus, message_);
+  ++message_.seq;
+  run_max_s_ = 0;
+  last_ns_ = now.ns;
+  last_session_ = message_.session;
+}
+
+}  // namespace bevel::nodes
