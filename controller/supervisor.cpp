@@ -105,9 +105,10 @@ void Supervisor::request(Request request, const std::optional<Target>& target, s
       return;
     case Request::start:
       if (status_.state != State::armed && status_.state != State::hold) return;
-      if (!target_ || !check_inputs(now_utime)) return;
-      for (const auto axis : actuator_->axis_status)  // not an error yet: the drives may still be switching on
-        if (axis != static_cast<std::int32_t>(model::AxisStatus::enabled)) return;
+      if (!target_ || (status_.state == State::armed && !axes_were_enabled_)) return;
+      if (!check_inputs(now_utime)) return;
+      if (!all_enabled()) return;  // not an error yet: the drives may still be switching on
+      axes_were_enabled_ = true;
       reset_count_ = needle_state_->reset_count;
       status_.state = State::steering;
       return;
@@ -166,17 +167,30 @@ bool Supervisor::check_inputs(std::int64_t now_utime) {
   return true;
 }
 
-bool Supervisor::check_axes(double dt_s) {
-  const auto not_enabled = [](std::int32_t axis) { return axis != static_cast<std::int32_t>(model::AxisStatus::enabled); };
-  const auto bad = std::ranges::find_if(actuator_->axis_status, not_enabled);
-  if (bad == actuator_->axis_status.end()) {
-    axes_were_enabled_ = true;
-    return true;
-  }
-  // Armed a moment ago, they may still be switching on, or be shown as they stood before.
+bool Supervisor::all_enabled() const {
+  return std::ranges::all_of(actuator_->axis_status, [](std::int32_t axis) {
+    return axis == static_cast<std::int32_t>(model::AxisStatus::enabled);
+  });
+}
+
+// Armed a moment ago, drives are being reset, configured and switched on, and what is known of the axes is of before:
+// nothing can move, so there is nothing to judge, but not for ever.
+bool Supervisor::waits_for_axes(std::int64_t now_utime, double dt_s) {
+  if (status_.state != State::armed || axes_were_enabled_) return false;
+  const bool fresh = std::abs(model::age_s(now_utime, actuator_->utime)) <= config_.safety.actuator_age_s &&
+                     std::abs(model::age_s(now_utime, needle_state_->utime)) <= config_.safety.state_age_s;
+  axes_were_enabled_ = fresh && all_enabled();
   enabling_s_ += dt_s;
-  if (!axes_were_enabled_ && status_.state == State::armed && enabling_s_ <= config_.safety.enabling_s) return true;
-  stop(Reason::axes_not_enabled, *bad, "(axis status)");
+  if (axes_were_enabled_ || enabling_s_ <= config_.safety.enabling_s) return !axes_were_enabled_;
+  stop(Reason::axes_not_enabled, enabling_s_, "s after arming");
+  return true;
+}
+
+bool Supervisor::check_axes() {
+  if (all_enabled()) return true;
+  const auto& axes = actuator_->axis_status;
+  const bool first = axes[0] != static_cast<std::int32_t>(model::AxisStatus::enabled);
+  stop(Reason::axes_not_enabled, first ? axes[0] : axes[1], first ? "(status of insertion)" : "(status of rotation)");
   return false;
 }
 
@@ -229,7 +243,10 @@ bool Supervisor::check_rest() {
   return true;
 }
 
-bool Supervisor::watch(std::int64_t now_utime) { return !in_motion_states() || check_inputs(now_utime); }
+bool Supervisor::watch(std::int64_t now_utime) {
+  const bool enabling = status_.state == State::armed && !axes_were_enabled_;
+  return !in_motion_states() || enabling || check_inputs(now_utime);
+}
 
 model::MotionCommand Supervisor::step(std::int64_t now_utime, double dt_s) {
   model::MotionCommand command;
@@ -239,7 +256,8 @@ model::MotionCommand Supervisor::step(std::int64_t now_utime, double dt_s) {
     rates_ = {};
     return command;
   }
-  if (!check_inputs(now_utime) || !check_axes(dt_s) || !check_tracking(dt_s)) return command;
+  if (waits_for_axes(now_utime, dt_s)) return command;
+  if (!check_inputs(now_utime) || !check_axes() || !check_tracking(dt_s)) return command;
   if (status_.state != State::steering) {
     rates_ = ramp(rates_, {}, dt_s, config_.limits);
     if (!check_rest()) return command;

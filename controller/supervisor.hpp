@@ -99,7 +99,9 @@ class Supervisor {
  private:
   void stop(Reason reason, double value, const char* unit);
   bool check_inputs(std::int64_t now_utime);
-  bool check_axes(double dt_s);
+  bool all_enabled() const;
+  bool waits_for_axes(std::int64_t now_utime, double dt_s);
+  bool check_axes();
   bool check_tracking(double dt_s);
   bool check_rest();
   Rates steer() const;

@@ -33,14 +33,7 @@ actuator_state_t axes_of(const stepper::AxesReport& report, std::int64_t utime, 
 
 class Attack : public Loop {
  protected:
-  void arm() {
-    ASSERT_TRUE(run(5, [this] { return stepper->report().state == stepper::DriverState::ready; }));
-    run(0.3);
-    say(Word::arm, {6, -9, 100});
-    ASSERT_TRUE(run(5, [this] { return stepper->report().state == stepper::DriverState::enabled; }));
-    run(0.2);
-    ASSERT_EQ(state(), controller::State::armed);
-  }
+  void arm() { ASSERT_EQ(SimulatedLoop::arm({6, -9, 100}), ""); }
 };
 
 TEST_F(Attack, ASecondSenderOfCommandsIsDeclaredBeforeTheNeedleMovesAMillimetre) {

@@ -31,7 +31,7 @@ TEST_F(Loop, ACameraThatFallsSilentStopsTheNeedleAndNothingRestartsByItself) {
   // The newest picture was taken up to 33 ms ago and is still on its way.
   EXPECT_LT(ms_to_rest(), 200 + latency_us / 1000);
   EXPECT_EQ(reason(), controller::Reason::state_unhealthy);
-  EXPECT_EQ(said("bevel-controller").reason, "needle state unhealthy: a camera fell silent");
+  EXPECT_EQ(said("bevel-controller").reason, "needle state unhealthy: measurements stale");
   const Eigen::Vector3d stopped = tip();
   see = good;
   run(1);

@@ -34,6 +34,7 @@ TEST_P(Restart, AnEstimatorBegunInTheTissueIsNotReadyUntilConfirmedAndThenArrive
   EXPECT_NE(needle_state->health & estimator::kNotFromEntry, 0);
   EXPECT_NE(said("bevel-estimator").reason.find("retract to the entry point, or confirm"), std::string::npos);
   EXPECT_NE(steer_to(kTarget), "") << "it must not steer";
+  run(1.5);  // the axes are switched on anew
   say(Word::confirm);
   run(0.5);
   EXPECT_EQ(needle_state->health & estimator::kNotFromEntry, 0);

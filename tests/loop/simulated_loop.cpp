@@ -121,20 +121,27 @@ bool SimulatedLoop::run(double seconds, const std::function<bool()>& until) {
   return false;
 }
 
-std::string SimulatedLoop::steer_to(const Eigen::Vector3d& target) {
+std::string SimulatedLoop::arm(const Eigen::Vector3d& target) {
   using enum stepper::DriverState;
   const auto why = [this] {
     return said("bevel-controller").reason + " / " + said("bevel-stepper").reason + " / " +
            said("bevel-estimator").reason;
   };
-  const auto settled = [this] { return stepper->report().state == ready || stepper->report().state == stopped ||
-                                       stepper->report().state == fault; };
+  const auto settled = [this] {
+    const stepper::DriverState at = stepper->report().state;
+    return at == ready || at == enabled || at == stopped || at == fault;
+  };
   if (!run(5, settled)) return "axes not ready: " + why();
   run(0.3);
   say(nodes::Word::arm, target);
   if (state() != controller::State::armed) return "not armed: " + std::string(controller::to_string(reason()));
   if (!run(5, [this] { return stepper->report().state == enabled; })) return "axes not enabled: " + why();
   run(0.1);
+  return "";
+}
+
+std::string SimulatedLoop::steer_to(const Eigen::Vector3d& target) {
+  if (const std::string failure = arm(target); !failure.empty()) return failure;
   say(nodes::Word::start, target);
   if (state() != controller::State::steering) return "not steering: " + std::string(controller::to_string(reason()));
   return "";

@@ -40,7 +40,8 @@ class SimulatedLoop {
   // An operator's word, meant for the processes as they are now.
   void say(nodes::Word word, const Eigen::Vector3d& target = Eigen::Vector3d::Zero());
   steering_target_t word(nodes::Word word, const Eigen::Vector3d& target);
-  // Runs until the axes are ready, arms and starts. "" or what did not come about.
+  // Runs until the axes can be armed, and are enabled; then starts. "" or what did not come about.
+  std::string arm(const Eigen::Vector3d& target);
   std::string steer_to(const Eigen::Vector3d& target);
 
   // A process that is killed, or stands still, is one that is not there: reset() its pointer. Starting one again puts a
