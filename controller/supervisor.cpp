@@ -49,8 +49,10 @@ const char* to_string(Reason reason) {
       return "actuator state stale or missing";
     case Reason::axes_not_enabled:
       return "axes not enabled";
-    case Reason::tracking_error:
-      return "axes do not follow the command";
+    case Reason::insertion_tracking:
+      return "insertion does not follow the command";
+    case Reason::rotation_tracking:
+      return "rotation does not follow the command";
     case Reason::workspace:
       return "tip outside the workspace";
     case Reason::target_unreachable:
@@ -105,10 +107,10 @@ void Supervisor::request(Request request, const std::optional<Target>& target, s
       return;
     case Request::start:
       if (status_.state != State::armed && status_.state != State::hold) return;
-      if (!target_ || (status_.state == State::armed && !axes_were_enabled_)) return;
+      // Not an error yet: the drives may still be switching on.
+      if (!target_ || (status_.state == State::armed && !axes_were_enabled_ && !see_enabled(now_utime))) return;
       if (!check_inputs(now_utime)) return;
-      if (!all_enabled()) return;  // not an error yet: the drives may still be switching on
-      axes_were_enabled_ = true;
+      if (!check_axes()) return;
       reset_count_ = needle_state_->reset_count;
       status_.state = State::steering;
       return;
@@ -173,15 +175,19 @@ bool Supervisor::all_enabled() const {
   });
 }
 
-// Armed a moment ago, drives are being reset, configured and switched on, and what is known of the axes is of before:
-// nothing can move, so there is nothing to judge, but not for ever.
-bool Supervisor::waits_for_axes(std::int64_t now_utime, double dt_s) {
-  if (status_.state != State::armed || axes_were_enabled_) return false;
+bool Supervisor::see_enabled(std::int64_t now_utime) {
   const bool fresh = std::abs(model::age_s(now_utime, actuator_->utime)) <= config_.safety.actuator_age_s &&
                      std::abs(model::age_s(now_utime, needle_state_->utime)) <= config_.safety.state_age_s;
   axes_were_enabled_ = fresh && all_enabled();
+  return axes_were_enabled_;
+}
+
+// Armed a moment ago, drives are being reset, configured and switched on, and what is known of the axes is of before:
+// nothing can move, so there is nothing to judge, but not for ever.
+bool Supervisor::waits_for_axes(std::int64_t now_utime, double dt_s) {
+  if (status_.state != State::armed || axes_were_enabled_ || see_enabled(now_utime)) return false;
   enabling_s_ += dt_s;
-  if (axes_were_enabled_ || enabling_s_ <= config_.safety.enabling_s) return !axes_were_enabled_;
+  if (enabling_s_ <= config_.safety.enabling_s) return true;
   stop(Reason::axes_not_enabled, enabling_s_, "s after arming");
   return true;
 }
@@ -201,8 +207,8 @@ bool Supervisor::check_tracking(double dt_s) {
   const SafetyLimits& safety = config_.safety;
   if (commands_ == 0) return true;
   const auto window = static_cast<std::size_t>(std::ceil(safety.axis_delay_s / config_.period_s)) + 1;
-  Rates low, high;  // zero is always among them: a limit of the axes may hold them back
-  for (std::size_t i = 1; i <= std::min({window, commands_, kCommands}); ++i) {
+  Rates low = commanded_[(commands_ - 1) % kCommands], high = low;
+  for (std::size_t i = 2; i <= std::min({window, commands_, kCommands}); ++i) {
     const Rates& r = commanded_[(commands_ - i) % kCommands];
     low = {std::min(low.insertion_mm_s, r.insertion_mm_s), std::min(low.rotation_rad_s, r.rotation_rad_s)};
     high = {std::max(high.insertion_mm_s, r.insertion_mm_s), std::max(high.rotation_rad_s, r.rotation_rad_s)};
@@ -213,8 +219,8 @@ bool Supervisor::check_tracking(double dt_s) {
   const bool bad = !(insertion <= safety.tracking_error_mm_s && rotation <= safety.tracking_error_rad_s);
   tracking_bad_s_ = bad ? tracking_bad_s_ + dt_s : 0;
   if (tracking_bad_s_ <= safety.tracking_error_s) return true;
-  insertion > safety.tracking_error_mm_s ? stop(Reason::tracking_error, insertion, "mm/s off")
-                                         : stop(Reason::tracking_error, rotation, "rad/s off");
+  insertion > safety.tracking_error_mm_s ? stop(Reason::insertion_tracking, insertion, "mm/s off")
+                                         : stop(Reason::rotation_tracking, rotation, "rad/s off");
   return false;
 }
 

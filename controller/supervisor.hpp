@@ -25,7 +25,8 @@ enum class Reason {
   state_not_finite,
   actuator_stale,
   axes_not_enabled,    // quick stop, fault or off during motion
-  tracking_error,      // the axes do not do what is commanded
+  insertion_tracking,  // an axis does not do what is commanded
+  rotation_tracking,
   workspace,           // the tip left the allowed space
   target_unreachable,  // refused before insertion, with the predicted miss
   outside_model,       // the pose left the model's domain
@@ -95,11 +96,13 @@ class Supervisor {
   model::MotionCommand step(std::int64_t now_utime, double dt_s);
 
   const Status& status() const { return status_; }
+  const Rates& commanded() const { return rates_; }  // by the last step
 
  private:
   void stop(Reason reason, double value, const char* unit);
   bool check_inputs(std::int64_t now_utime);
   bool all_enabled() const;
+  bool see_enabled(std::int64_t now_utime);
   bool waits_for_axes(std::int64_t now_utime, double dt_s);
   bool check_axes();
   bool check_tracking(double dt_s);

@@ -25,10 +25,37 @@ double largest_sd(const needle_state_t& m, int first) {
   return std::sqrt(variance);
 }
 
+// Reports at 100 Hz of an axis that moves differ by many encoder counts at these rates.
+constexpr double kMoving_mm_s = 0.5;
+constexpr double kMoving_rad_s = 0.5;
+constexpr int kStillReports = 5;
+
 }  // namespace
+
+Implausible StandstillCheck::see(const actuator_state_t& before, const actuator_state_t& next) {
+  const auto count = [](int& still, bool same, bool moving) { still = same && moving ? still + 1 : 0; };
+  count(still_[0], next.insertion_mm == before.insertion_mm, std::abs(next.insertion_rate_mm_s) > kMoving_mm_s);
+  count(still_[1], next.rotation_rad == before.rotation_rad, std::abs(next.rotation_rate_rad_s) > kMoving_rad_s);
+  if (still_[0] >= kStillReports)
+    return {"insertion that stands still at a rate", next.insertion_rate_mm_s, kMoving_mm_s, "mm/s"};
+  if (still_[1] >= kStillReports)
+    return {"rotation that stands still at a rate", next.rotation_rate_rad_s, kMoving_rad_s, "rad/s"};
+  return {};
+}
 
 bool at_rest_and_off(const actuator_state_t& state) {
   return state.axis_status[0] <= 1 && state.axis_status[1] <= 1;  // off or ready
+}
+
+Implausible check_jump(const actuator_state_t& before, const actuator_state_t& next, const MotionBounds& bounds) {
+  const double dt_s = std::abs(seconds(before.utime, next.utime));
+  const double moved_mm = std::abs(next.insertion_mm - before.insertion_mm);
+  const double room_mm = kRateShare * bounds.insertion_rate_mm_s * dt_s + kSlack_mm;
+  if (!(moved_mm <= room_mm)) return {"jump of the insertion", moved_mm, room_mm, "mm"};
+  const double turned_rad = std::abs(next.rotation_rad - before.rotation_rad);
+  const double room_rad = kRateShare * bounds.rotation_rate_rad_s * dt_s + kSlack_rad;
+  if (!(turned_rad <= room_rad)) return {"jump of the rotation", turned_rad, room_rad, "rad"};
+  return {};
 }
 
 Implausible check_motion(const actuator_state_t& before, const actuator_state_t& next, const MotionBounds& bounds) {
@@ -39,14 +66,7 @@ Implausible check_motion(const actuator_state_t& before, const actuator_state_t&
   if (!(std::abs(next.rotation_rate_rad_s) <= fastest_rad_s))
     return {"rotation rate", next.rotation_rate_rad_s, fastest_rad_s, "rad/s"};
   if (at_rest_and_off(before) && at_rest_and_off(next)) return {};
-  const double dt_s = std::abs(seconds(before.utime, next.utime));
-  const double moved_mm = std::abs(next.insertion_mm - before.insertion_mm);
-  const double room_mm = fastest_mm_s * dt_s + kSlack_mm;
-  if (!(moved_mm <= room_mm)) return {"jump of the insertion", moved_mm, room_mm, "mm"};
-  const double turned_rad = std::abs(next.rotation_rad - before.rotation_rad);
-  const double room_rad = fastest_rad_s * dt_s + kSlack_rad;
-  if (!(turned_rad <= room_rad)) return {"jump of the rotation", turned_rad, room_rad, "rad"};
-  return {};
+  return check_jump(before, next, bounds);
 }
 
 Implausible check_motion(const needle_state_t& before, const needle_state_t& next, const MotionBounds& bounds) {

@@ -3,6 +3,9 @@
 // sent again. Pure: both clocks come in as arguments.
 #pragma once
 
+#include <array>
+#include <bit>
+#include <cstddef>
 #include <cstdint>
 
 namespace bevel::io {
@@ -18,7 +21,7 @@ struct SenderLimits {
 enum class Standing {
   fresh,      // newer than all before, or the first of a sender after silence
   late,       // older than the newest, within reorder_us
-  duplicate,  // the newest once more, byte for byte: a network may do that
+  duplicate,  // one of the last once more, byte for byte: a network may do that
   old,        // continues its sender's stream, but beyond longest_age_us; or the first, too old
   ahead,      // the first, and stamped in the future
   foreign,    // does not continue the stream of a sender that is alive
@@ -37,15 +40,27 @@ class SenderWatch {
   // The next message may be anybody's: after the operator's word, or a step of the clock.
   void restart() noexcept { heard_ = false; }
 
+  // More than one of the last eight came late: a network swaps two now and then, two senders do it all the time.
+  bool out_of_order() const { return std::popcount(lates_) > 1; }
   std::int64_t lost() const { return lost_; }          // missing numbers
   std::int64_t restarts() const { return restarts_; }  // senders that began anew after silence
 
  private:
+  struct Used {
+    std::int64_t seq = -1;
+    std::uint64_t digest = 0;
+  };
+  const Used* find(std::int64_t seq) const noexcept;
+  void note(std::int64_t seq, std::uint64_t digest) noexcept;
+
   SenderLimits limits_;
   bool heard_ = false;
   std::int64_t newest_seq_ = 0;
   std::int64_t newest_utime_ = 0;
-  std::uint64_t newest_digest_ = 0;
+  // The last ones: a number that comes again with other content is somebody else's.
+  std::array<Used, 16> used_{};
+  std::size_t next_used_ = 0;
+  std::uint8_t lates_ = 0;  // of the last eight, a bit each
   std::int64_t heard_ns_ = 0;  // when its stream was last continued
   std::int64_t lost_ = 0;
   std::int64_t restarts_ = 0;

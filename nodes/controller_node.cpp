@@ -1,6 +1,7 @@
 #include "nodes/controller_node.hpp"
 
 #include <Eigen/Eigenvalues>
+#include <algorithm>
 #include <cmath>
 #include <cstdio>
 #include <utility>
@@ -13,6 +14,7 @@ namespace {
 
 // A loop this late has lost the needle: at 5 mm/s it is half a millimetre.
 constexpr double kLateStop_s = 0.1;
+constexpr double kSeenToMove_mm = 0.1;     // of insertion within which an estimate must have moved
 constexpr double kFastestCycle_hz = 1200;  // of drives; the estimator sends a state for each of theirs
 
 io::SenderLimits input_limits(double age_s) {
@@ -62,6 +64,7 @@ ControllerNode::ControllerNode(lcm::LCM& lcm, const SystemConfig& config)
   port_.subscribe<needle_state_t>(
       io::channel::kNeedleState, input_limits(config_.safety.state_age_s),
       [this](const needle_state_t& m) {
+        check_alive(m);
         supervisor_.set_needle(to_view(m));
         if (!supervisor_.watch(port_.now().utime)) command(0);
       },
@@ -70,10 +73,25 @@ ControllerNode::ControllerNode(lcm::LCM& lcm, const SystemConfig& config)
       });
   port_.subscribe<actuator_state_t>(
       io::channel::kActuatorState, input_limits(config_.safety.actuator_age_s),
-      [this](const actuator_state_t& m) { supervisor_.set_actuator(io::to_sample(m)); },
-      [bounds](const actuator_state_t& before, const actuator_state_t& next) {
-        return io::check_motion(before, next, bounds);
-      });
+      [this](const actuator_state_t& m) {
+        insertion_mm_ = m.insertion_mm;
+        supervisor_.set_actuator(io::to_sample(m));
+      },
+      io::axes_check(bounds));
+}
+
+// An estimate moves with the axes, if only by its prediction.
+void ControllerNode::check_alive(const needle_state_t& m) {
+  if (!std::equal(same_position_mm_.begin(), same_position_mm_.end(), m.position_mm)) {
+    std::copy_n(m.position_mm, 3, same_position_mm_.begin());
+    same_since_insertion_mm_ = insertion_mm_;
+  }
+  const double inserted_mm = std::abs(insertion_mm_ - same_since_insertion_mm_);
+  if (inserted_mm > kSeenToMove_mm)
+    on_trouble({InputTrouble::Kind::implausible,
+                io::channel::kNeedleState,
+                {"the same position to the last bit after an insertion", inserted_mm, kSeenToMove_mm, "mm"},
+                0});
 }
 
 void ControllerNode::on_word(Word word, const steering_target_t& m) {
@@ -93,17 +111,20 @@ void ControllerNode::stop(controller::Reason reason, std::string detail) {
   const bool was = latched(supervisor_.status().state);
   supervisor_.report(reason);
   if (was) return;
-  command(0);
   detail_ = std::move(detail);
+  command(0);
 }
 
 // Sends what the supervisor commands now.
 void ControllerNode::command(double dt_s) {
   port_.publish(io::channel::kMotionCommand, io::to_message(supervisor_.step(port_.now().utime, dt_s)));
   const bool is = latched(supervisor_.status().state);
-  if (is && !was_latched_) status_.renew_session();
+  const bool stopped_now = is && !was_latched_;
   if (!is) detail_.clear();
   was_latched_ = is;
+  if (!stopped_now) return;
+  status_.renew_session();
+  report();
 }
 
 void ControllerNode::step(const Now& now, double late_s) {

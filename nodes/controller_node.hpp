@@ -1,6 +1,8 @@
 #pragma once
 // bevel-controller: NEEDLE_STATE, ACTUATOR_STATE and STEERING_TARGET in, MOTION_COMMAND out at a fixed rate, and at once
 // when motion must stop.
+#include <array>
+
 #include "controller/supervisor.hpp"
 #include "nodes/operator_words.hpp"
 #include "nodes/system_config.hpp"
@@ -25,6 +27,7 @@ class ControllerNode {
   const controller::Supervisor& supervisor() const { return supervisor_; }
 
  private:
+  void check_alive(const needle_state_t& m);
   void on_word(Word word, const steering_target_t& m);
   void on_trouble(const InputTrouble& trouble);
   void stop(controller::Reason reason, std::string detail = "");
@@ -36,6 +39,8 @@ class ControllerNode {
   controller::Supervisor supervisor_;
   StatusReporter status_;
   OperatorWords words_;
+  std::array<double, 3> same_position_mm_{};
+  double insertion_mm_ = 0, same_since_insertion_mm_ = 0;
   bool was_latched_ = false;
   std::string detail_;  // of the latched stop
 };

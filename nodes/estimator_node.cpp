@@ -12,8 +12,6 @@ constexpr double kPeriod_s = 0.01;
 constexpr double kFastestCamera_hz = 1000, kFastestCycle_hz = 1200;
 // How late a picture may be and still count; the history of the filter is shorter at 100 Hz.
 constexpr std::int64_t kLatestPicture_us = 600'000;
-// Beyond these an axis that is off did not creep.
-constexpr double kNewZero_mm = 0.05, kNewZero_rad = 0.05;
 
 io::SenderLimits tip_limits(const estimator::HealthLimits& limits) {
   return {.longest_age_us = kLatestPicture_us,
@@ -54,7 +52,8 @@ needle_state_t to_message(const estimator::Estimate& estimate, std::int64_t seq)
 }
 
 EstimatorNode::EstimatorNode(lcm::LCM& lcm, const estimator::EstimatorConfig& config, const io::MotionBounds& bounds)
-    : port_(lcm),
+    : bounds_(bounds),
+      port_(lcm),
       estimator_(live(config)),
       status_(port_, "bevel-estimator", kPeriod_s),
       words_(port_, status_, Receiver::estimator, [this](Word word, const steering_target_t&) { on_word(word); }),
@@ -64,16 +63,13 @@ EstimatorNode::EstimatorNode(lcm::LCM& lcm, const estimator::EstimatorConfig& co
                                      [this](const tip_measurement_t& m) { on_tip(m); });
   port_.subscribe<actuator_state_t>(
       io::channel::kActuatorState, axes_limits(config.limits), [this](const actuator_state_t& m) { on_axes(m); },
-      [bounds](const actuator_state_t& before, const actuator_state_t& next) {
-        return io::check_motion(before, next, bounds);
-      });
+      io::axes_check(bounds));
 }
 
 void EstimatorNode::on_axes(const actuator_state_t& m) {
   // Axes that are off do not move: what jumps is their zero, and the estimate begins where they now count from.
-  const bool new_zero = axes_ && io::at_rest_and_off(*axes_) && io::at_rest_and_off(m) &&
-                        (std::abs(m.insertion_mm - axes_->insertion_mm) > kNewZero_mm ||
-                         std::abs(m.rotation_rad - axes_->rotation_rad) > kNewZero_rad);
+  const bool new_zero =
+      axes_ && io::at_rest_and_off(*axes_) && io::at_rest_and_off(m) && io::check_jump(*axes_, m, bounds_);
   axes_ = m;
   if (new_zero) entry_.restart();
   if (entry_.see_axes(m.insertion_mm) || new_zero) estimator_.restart();

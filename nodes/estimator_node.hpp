@@ -36,6 +36,7 @@ class EstimatorNode {
   void on_trouble(const InputTrouble& trouble);
   void publish();
 
+  io::MotionBounds bounds_;
   LcmPort port_;
   estimator::NeedleEstimator estimator_;
   StatusReporter status_;

@@ -115,8 +115,11 @@ Fault parse_fault(const std::string& text) {
   return fault;
 }
 
-FaultInjector::FaultInjector(const char* channel, FaultKind kind, std::int64_t start_ns, std::uint64_t seed)
-    : channel_(channel), kind_(kind), start_ns_(start_ns), rng_(seed), variant_((rng_() & 1U) != 0) {
+void FaultInjector::begin(FaultKind kind, std::int64_t start_ns, std::uint64_t seed) {
+  kind_ = kind;
+  start_ns_ = start_ns;
+  rng_.seed(seed);
+  variant_ = (rng_() & 1U) != 0;
   shift_ns_ = static_cast<std::int64_t>(uniform(150, 500)) * kMs;
   block_until_ns_ = start_ns + static_cast<std::int64_t>(uniform(150, 400)) * kMs;
 }

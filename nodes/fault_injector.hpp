@@ -4,6 +4,7 @@
 #include <cstdint>
 #include <deque>
 #include <functional>
+#include <limits>
 #include <random>
 #include <span>
 #include <string>
@@ -44,8 +45,10 @@ class FaultInjector {
  public:
   using Emit = std::function<void(const char* channel, std::span<const std::uint8_t> bytes)>;
 
+  // Lets everything pass until begin().
+  explicit FaultInjector(const char* channel) : channel_(channel) {}
   // Acts from start_ns (steady clock) on. The seed draws the variant, lengths and bytes.
-  FaultInjector(const char* channel, FaultKind kind, std::int64_t start_ns, std::uint64_t seed);
+  void begin(FaultKind kind, std::int64_t start_ns, std::uint64_t seed);
 
   bool concerns(const char* channel) const { return channel_ == channel; }
   // Takes a message that its component sends; what comes out of it is emitted by flush().
@@ -64,11 +67,11 @@ class FaultInjector {
   Bytes garbage(const Bytes& like);
 
   std::string channel_;
-  FaultKind kind_;
-  std::int64_t start_ns_;
+  FaultKind kind_ = FaultKind::off;
+  std::int64_t start_ns_ = std::numeric_limits<std::int64_t>::max();
   std::mt19937_64 rng_;
-  bool variant_;
-  std::int64_t shift_ns_;            // of delays and replays
+  bool variant_ = false;
+  std::int64_t shift_ns_ = 0;        // of delays
   std::int64_t pass_until_ns_ = 0;   // intermittent
   std::int64_t block_until_ns_ = 0;  // intermittent, slow
   std::int64_t own_seq_ = 0;         // of the second sender

@@ -12,8 +12,10 @@ constexpr std::uint32_t kPositionPdo = 0x280, kCommandPdo = 0x200;
 
 }  // namespace
 
-FaultyBus::FaultyBus(can::Bus& inner, std::uint8_t node_id, FaultKind kind, std::int64_t start_ns, std::uint64_t seed)
-    : inner_(inner), node_id_(node_id), kind_(kind), start_ns_(start_ns), rng_(seed) {
+void FaultyBus::begin(FaultKind kind, std::int64_t start_ns, std::uint64_t seed) {
+  kind_ = kind;
+  start_ns_ = start_ns;
+  rng_.seed(seed);
   shift_ns_ = static_cast<std::int64_t>(150 + rng_() % 350) * kMs;
   block_until_ns_ = start_ns + static_cast<std::int64_t>(150 + rng_() % 250) * kMs;
 }

@@ -2,7 +2,7 @@
 // A drive's place on the bus, spoiled from one instant on: the counterpart of FaultInjector for what is on CAN. For the
 // simulated rig alone.
 #include <deque>
-#include <memory>
+#include <limits>
 #include <random>
 
 #include "drivers/can/bus.hpp"
@@ -12,9 +12,11 @@ namespace bevel::nodes {
 
 class FaultyBus : public can::Bus {
  public:
-  // `inner` must outlive this. Acts from start_ns on (the clock of maintain()). FaultKind::stuck is the motor's, not the
-  // bus's: nothing happens here.
-  FaultyBus(can::Bus& inner, std::uint8_t node_id, FaultKind kind, std::int64_t start_ns, std::uint64_t seed);
+  // `inner` must outlive this. Lets everything pass until begin().
+  FaultyBus(can::Bus& inner, std::uint8_t node_id) : inner_(inner), node_id_(node_id) {}
+  // Acts from start_ns on (the clock of maintain()). FaultKind::stuck is the motor's, not the bus's: nothing happens.
+  void begin(FaultKind kind, std::int64_t start_ns, std::uint64_t seed);
+  void end() { start_ns_ = std::numeric_limits<std::int64_t>::max(); }
 
   can::SendResult send(const can::Frame& frame) override;
   can::Reception receive() override;
@@ -34,10 +36,10 @@ class FaultyBus : public can::Bus {
 
   can::Bus& inner_;
   std::uint8_t node_id_;
-  FaultKind kind_;
-  std::int64_t start_ns_;
+  FaultKind kind_ = FaultKind::off;
+  std::int64_t start_ns_ = std::numeric_limits<std::int64_t>::max();
   std::mt19937_64 rng_;
-  std::int64_t shift_ns_;
+  std::int64_t shift_ns_ = 0;
   std::int64_t now_ns_ = 0;
   std::int64_t pass_until_ns_ = 0, block_until_ns_ = 0;
   std::int64_t next_command_ns_ = 0;

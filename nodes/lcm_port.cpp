@@ -11,6 +11,9 @@ std::string describe(const InputTrouble& trouble) {
     case InputTrouble::Kind::second_sender:
       std::snprintf(text, sizeof text, "a second sender on %s, or old messages sent again", trouble.channel);
       break;
+    case InputTrouble::Kind::out_of_order:
+      std::snprintf(text, sizeof text, "%s comes out of order: delayed, or from two senders", trouble.channel);
+      break;
     case InputTrouble::Kind::implausible:
       std::snprintf(text, sizeof text, "%s: %s of %.4g %s, possible is %.3g", trouble.channel,
                     trouble.implausible.what, trouble.implausible.value, trouble.implausible.unit,

@@ -36,7 +36,7 @@ struct PortCounters {
 };
 
 struct InputTrouble {
-  enum class Kind { second_sender, implausible, clock_step };
+  enum class Kind { second_sender, out_of_order, implausible, clock_step };
   Kind kind = Kind::second_sender;
   const char* channel = "";    // static text; "" for the clock
   io::Implausible implausible;  // of that kind
@@ -193,6 +193,7 @@ bool LcmPort::Subscription<Message>::passes(const Message& message, const lcm::R
   const io::Standing standing = sender.watch.judge(message.seq, message.utime, std::hash<std::string_view>{}(bytes),
                                                    port.now_.utime, port.now_.ns);
   if (standing == io::Standing::foreign) port.report({InputTrouble::Kind::second_sender, channel, {}, 0});
+  if (sender.watch.out_of_order()) port.report({InputTrouble::Kind::out_of_order, channel, {}, 0});
   if (!io::usable(standing)) {
     if (port.on_refused) port.on_refused(channel, standing);
     return false;

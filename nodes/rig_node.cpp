@@ -21,9 +21,14 @@ rig::SimulatedDriveConfig drive_config(const stepper::AxisConfig& axis) {
 
 RigNode::RigNode(lcm::LCM& lcm, can::Bus& insertion_bus, can::Bus& rotation_bus, const SystemConfig& config,
                  rig::FrameServer* frames)
-    : config_(config), port_(lcm), status_(port_, "bevel-rig", 0.001), buses_{&insertion_bus, &rotation_bus}, frames_(frames) {
-  drives_[0] = std::make_unique<rig::SimulatedDrive>(insertion_bus, drive_config(config.stepper.axes[0]));
-  drives_[1] = std::make_unique<rig::SimulatedDrive>(rotation_bus, drive_config(config.stepper.axes[1]));
+    : config_(config),
+      port_(lcm),
+      status_(port_, "bevel-rig", 0.001),
+      buses_{FaultyBus(insertion_bus, config.stepper.axes[0].node_id),
+             FaultyBus(rotation_bus, config.stepper.axes[1].node_id)},
+      frames_(frames) {
+  drives_[0] = std::make_unique<rig::SimulatedDrive>(buses_[0], drive_config(config.stepper.axes[0]));
+  drives_[1] = std::make_unique<rig::SimulatedDrive>(buses_[1], drive_config(config.stepper.axes[1]));
   plant_ = std::make_unique<rig::KinematicPlant>(config.rig.truth, io::active_effects(config.rig.effects, ""),
                                                  config.rig.roll_error_rad);
   for (const CameraViewConfig& c : config.cameras) {
@@ -50,9 +55,7 @@ void RigNode::break_drive(const Fault& fault, std::int64_t start_ns, std::uint64
     blocked_from_ns_ = from_ns;
     return;
   }
-  const stepper::AxisConfig& drive = config_.stepper.axes.at(axis);
-  faulty_bus_ = std::make_unique<FaultyBus>(*buses_.at(axis), drive.node_id, fault.kind, from_ns, seed);
-  drives_.at(axis) = std::make_unique<rig::SimulatedDrive>(*faulty_bus_, drive_config(drive));
+  buses_.at(axis).begin(fault.kind, from_ns, seed);
 }
 
 void RigNode::step(const Now& now) {

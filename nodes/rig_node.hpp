@@ -26,7 +26,8 @@ class RigNode {
   void step(const Now& now);
 
   // A fault of one of the drives, from start_ns + fault.at_s on (steady clock). Before the first step.
-  void break_drive(const Fault& fault, std::int64_t start_ns, std::uint64_t seed = 1);
+  void break_drive(const Fault& fault, std::int64_t start_ns, std::uint64_t seed);
+  FaultyBus& faulty_bus(std::size_t axis) { return buses_.at(axis); }
 
   const rig::Plant& plant() const { return *plant_; }
   rig::SimulatedDrive& drive(std::size_t axis) { return *drives_[axis]; }
@@ -45,8 +46,7 @@ class RigNode {
   SystemConfig config_;
   LcmPort port_;
   StatusReporter status_;
-  std::array<can::Bus*, 2> buses_;
-  std::unique_ptr<FaultyBus> faulty_bus_;
+  std::array<FaultyBus, 2> buses_;
   std::array<std::unique_ptr<rig::SimulatedDrive>, 2> drives_;
   std::optional<std::size_t> blocked_axis_;
   std::int64_t blocked_from_ns_ = 0;

@@ -30,6 +30,11 @@ StepperNode::StepperNode(lcm::LCM& lcm, can::Bus& bus, const stepper::StepperCon
   port_.on_trouble = [this](const InputTrouble& trouble) { on_trouble(trouble); };
   port_.subscribe<motion_command_t>(io::channel::kMotionCommand, command_limits(config),
                                     [this](const motion_command_t& m) { on_command(m); });
+  // A second way for a stop, should the first be what is broken.
+  port_.subscribe<process_status_t>(io::channel::kProcessStatus, [this](const process_status_t& m) {
+    const bool stopped = m.state == "stopped" || m.state == "fault";
+    if (m.process == "bevel-controller" && stopped && driver_.moving()) stop(stepper::StopReason::controller_stop);
+  });
 }
 
 void StepperNode::on_command(const motion_command_t& m) {

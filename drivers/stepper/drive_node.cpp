@@ -1,5 +1,6 @@
 #include "drivers/stepper/drive_node.hpp"
 
+#include <algorithm>
 #include <cmath>
 
 namespace bevel::stepper {
@@ -8,6 +9,7 @@ namespace {
 using cia301::NmtCommand;
 using cia301::NmtState;
 
+constexpr int kSurplusPdos = 5;  // a frame that a bus error doubled is one
 constexpr std::int64_t kResetPause_ns = 500 * kMs;
 constexpr std::int64_t kStartPause_ns = 100 * kMs;
 constexpr std::uint8_t kStatusPdoBytes = 6;    // 6041, 606C
@@ -62,6 +64,7 @@ void DriveNode::on_frame(const can::Frame& frame, std::int64_t now_ns) {
       ++counters_.malformed;
       return;
     }
+    if (!status_pdo_due_) ++surplus_pdos_;
     statusword_ = cia301::get_u16(frame, 0);
     rate_counts_s_ = static_cast<std::int32_t>(cia301::get_u32(frame, 2));
     status_pdo_ns_ = now_ns;
@@ -85,6 +88,7 @@ void DriveNode::on_position(const can::Frame& frame, std::int64_t now_ns) {
     position_counts_ = raw;
     have_position_ = true;
   }
+  if (!position_pdo_due_) ++surplus_pdos_;
   raw_position_ = raw;
   position_pdo_ns_ = now_ns;
   position_pdo_due_ = false;
@@ -134,6 +138,11 @@ void DriveNode::on_emergency(const can::Frame& frame) {
 void DriveNode::on_sync(std::int64_t now_ns) {
   if (phase_ != Phase::operational && phase_ != Phase::starting) return;
   if (status_pdo_due_ || position_pdo_due_) ++counters_.missed_pdos;
+  // One that was late comes beside the next, and was missed before; what goes on coming is not this drive's.
+  const int missed = (status_pdo_due_ ? 1 : 0) + (position_pdo_due_ ? 1 : 0);
+  surplus_balance_ = std::max(surplus_balance_ + (surplus_pdos_ > 0 ? surplus_pdos_ : -1) - missed, 0);
+  surplus_pdos_ = 0;
+  if (phase_ == Phase::operational && surplus_balance_ >= kSurplusPdos) trouble(StopReason::second_drive);
   status_pdo_due_ = position_pdo_due_ = true;
   sync_ns_ = now_ns;
 }

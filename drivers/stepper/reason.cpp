@@ -60,6 +60,8 @@ const char* to_string(StopReason reason) {
       return "drive does not become operational";
     case StopReason::wrong_mode:
       return "drive left the profile velocity mode";
+    case StopReason::second_drive:
+      return "two drives answer with one node id";
     case StopReason::foreign_master:
       return "another master commands the drives";
   }

@@ -35,6 +35,7 @@ enum class StopReason : std::uint8_t {
   sdo_timeout,           // code: index << 8 | sub
   start_timeout,         // configured, but does not become operational
   wrong_mode,            // 0x6061 is no longer profile velocity
+  second_drive,          // more answers than questions: two drives with one node id, or old frames sent again
   foreign_master,        // another driver commands our drives; code: the CAN id it used
 };
 

@@ -9,6 +9,7 @@ namespace bevel::stepper {
 namespace {
 
 constexpr int kReceptionsPerCall = 256;
+constexpr std::int64_t kBehind_ns = 30 * kMs;  // longer than a drive's answer to a new rate takes
 constexpr std::int64_t kPurgePause_ns = 500 * kMs;
 constexpr std::uint64_t kFaultResetSteps =
     4;  // half a period of the fault reset bit, long enough to survive a lost PDO
@@ -91,6 +92,9 @@ void StepperDriver::confirm_position() {
 
 void StepperDriver::latch(const Stop& stop) {
   enable_wanted_ = false;
+  if (!latched())
+    for (std::size_t axis = 0; axis < kAxes; ++axis)
+      held_back_.at(axis) = state_ == DriverState::enabled && last_step_ns_ - following_ns_.at(axis) > kBehind_ns;
   for (auto& shaper : shapers_) shaper.reset();
   if (latched()) {
     ++counters_.later_stops;
@@ -364,7 +368,12 @@ void StepperDriver::supervise_motion(std::int64_t now_ns) {
 
 std::uint16_t StepperDriver::controlword_for(const DriveNode& node) const {
   using cia402::Goal;
-  if (latched()) return cia402::controlword_towards(Goal::stop, node.state());
+  if (latched()) {
+    // An axis that was held back would jump by what it is behind when it comes free: once it rests it is let go.
+    const bool held_back = held_back_.at(&node == &nodes_[kInsertion] ? kInsertion : kRotation);
+    if (held_back && node.state() == cia402::State::quick_stop_active) return cia402::controlword::kDisableVoltage;
+    return cia402::controlword_towards(Goal::stop, node.state());
+  }
   if (state_ == DriverState::configuring && reset_faults_ && node.state() == cia402::State::fault)
     return counters_.steps / kFaultResetSteps % 2 == 0 ? cia402::controlword::kFaultReset
                                                        : cia402::controlword::kDisableVoltage;

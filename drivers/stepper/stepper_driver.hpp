@@ -138,6 +138,7 @@ class StepperDriver {
   std::int64_t fresh_setpoint_ns_ = 0;  // when the newest usable set-point was made
   bool refusing_setpoints_ = false;
   std::array<std::int64_t, kAxes> following_ns_{};  // last time each axis followed
+  std::array<bool, kAxes> held_back_{};             // it did not when the stop was latched
   DriverCounters counters_;
 };
 

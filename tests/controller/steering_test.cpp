@@ -148,6 +148,7 @@ class SupervisorTest : public ::testing::Test {
     model::ActuatorState a;
     a.utime = utime;
     a.axis_status = {2, 2};
+    a.insertion_mm = 0;
     a.insertion_rate_mm_s = following.insertion_rate_mm_s;
     a.rotation_rate_rad_s = following.rotation_rate_rad_s;
     return a;
@@ -268,7 +269,7 @@ TEST_F(SupervisorTest, EveryConditionStopsWithinOnePeriodAndLatches) {
          v.pose.p_mm.x() = 70;
          supervisor.set_needle(v);
        }},
-      {Reason::overrun, [&] { supervisor.report_overrun(); }},
+      {Reason::overrun, [&] { supervisor.report(Reason::overrun); }},
   };
   for (const Case& c : cases) {
     start();
@@ -290,7 +291,7 @@ TEST_F(SupervisorTest, AxesThatDoNotFollowAreATrackingError) {
     supervisor.set_actuator(a);
     supervisor.step(now, 0.02);
   }
-  EXPECT_EQ(supervisor.status().reason, Reason::tracking_error);
+  EXPECT_EQ(supervisor.status().reason, Reason::insertion_tracking);
 }
 
 TEST_F(SupervisorTest, UnreachableTargetIsRefusedWithTheMiss) {
@@ -308,8 +309,107 @@ TEST_F(SupervisorTest, HoldsAtTheClosestApproach) {
   auto v = view(now);
   v.pose.p_mm = {2, -8, 100.1};
   supervisor.set_needle(v);
-  EXPECT_EQ(supervisor.step(now, 0.02).mode, 0);
-  EXPECT_EQ(supervisor.status().state, State::hold);
+  auto a = axes(now, last);
+  a.insertion_mm = 100.5;
+  supervisor.set_actuator(a);
+  last = supervisor.step(now, 0.02);
+  EXPECT_EQ(supervisor.status().state, State::hold) << to_string(supervisor.status().reason);
+  EXPECT_EQ(last.mode, 1) << "what moves comes to rest by the ramp";
+  for (int i = 0; i < 20; ++i) {
+    now += 20'000;
+    v.utime = now;
+    supervisor.set_needle(v);
+    a = axes(now, last);
+    a.insertion_mm = 100.5;
+    supervisor.set_actuator(a);
+    last = supervisor.step(now, 0.02);
+  }
+  EXPECT_EQ(supervisor.status().state, State::hold) << to_string(supervisor.status().reason);
+  EXPECT_EQ(last.insertion_rate_mm_s, 0);
+  EXPECT_EQ(last.rotation_rate_rad_s, 0);
+}
+
+// Too slow for any limit on rates.
+TEST_F(SupervisorTest, AxesThatCreepWhileToldToRestAreNoticed) {
+  for (const bool rotation : {false, true}) {
+    supervisor.set_needle(view(now));
+    supervisor.set_actuator(axes(now));
+    supervisor.request(Request::arm, Target{{2, -8, 100}, 0}, now);
+    double moved = 0;
+    for (int i = 0; i < 400 && supervisor.status().state == State::armed; ++i) {
+      now += 20'000;
+      supervisor.set_needle(view(now));
+      auto a = axes(now);
+      moved += 0.004;  // 0.2 mm/s or rad/s
+      (rotation ? a.rotation_rad : a.insertion_mm) = moved;
+      supervisor.set_actuator(a);
+      EXPECT_EQ(supervisor.step(now, 0.02).mode, 0);
+    }
+    EXPECT_EQ(supervisor.status().reason, Reason::resting_axes_moved) << to_string(supervisor.status().reason);
+    EXPECT_LT(moved, 0.7);
+  }
+}
+
+TEST_F(SupervisorTest, AnEstimateThatWandersOffRestingAxesIsNoticed) {
+  supervisor.set_needle(view(now));
+  supervisor.set_actuator(axes(now));
+  supervisor.request(Request::arm, Target{{2, -8, 100}, 0}, now);
+  for (int i = 0; i < 100 && supervisor.status().state == State::armed; ++i) {
+    now += 20'000;
+    auto v = view(now);
+    v.pose.p_mm.x() = 0.1 * i;
+    supervisor.set_needle(v);
+    auto a = axes(now);
+    a.insertion_mm = 50;  // so that it is not too far from the entry
+    supervisor.set_actuator(a);
+    supervisor.step(now, 0.02);
+  }
+  EXPECT_EQ(supervisor.status().reason, Reason::resting_tip_moved) << to_string(supervisor.status().reason);
+}
+
+TEST_F(SupervisorTest, ATipFartherThanTheNeedleIsLongIsNotBelieved) {
+  start();
+  good_step();
+  auto v = view(now);
+  v.pose.p_mm = {10, 0, 0};
+  supervisor.set_needle(v);
+  expect_stopped(Reason::off_the_axes);
+}
+
+TEST_F(SupervisorTest, ArmedWithAxesInFaultOrNeverEnabledStops) {
+  // Enabled once, then in fault: at once.
+  supervisor.set_needle(view(now));
+  supervisor.set_actuator(axes(now));
+  supervisor.request(Request::arm, Target{{2, -8, 100}, 0}, now);
+  good_step();
+  auto a = axes(now);
+  a.axis_status = {2, 4};
+  supervisor.set_actuator(a);
+  supervisor.step(now, 0.02);
+  EXPECT_EQ(supervisor.status().reason, Reason::axes_not_enabled);
+  // Never: after a while.
+  supervisor.request(Request::arm, Target{{2, -8, 100}, 0}, now);
+  double waited_s = 0;
+  for (; waited_s < 10 && supervisor.status().state == State::armed; waited_s += 0.02) {
+    now += 20'000;
+    supervisor.set_needle(view(now));
+    a.utime = now;
+    supervisor.set_actuator(a);
+    supervisor.step(now, 0.02);
+  }
+  EXPECT_EQ(supervisor.status().reason, Reason::axes_not_enabled);
+  EXPECT_NEAR(waited_s, config.safety.enabling_s, 0.1);
+}
+
+TEST_F(SupervisorTest, StampsAtTheEndsOfTimeAreNotFresh) {
+  for (const std::int64_t stamp : {std::numeric_limits<std::int64_t>::min(), std::numeric_limits<std::int64_t>::max(),
+                                   std::int64_t{0}, now + 18'446'744'073'709'552}) {
+    start();
+    good_step();
+    supervisor.set_needle(view(stamp));
+    expect_stopped(Reason::state_stale);
+    supervisor.request(Request::stop, std::nullopt, now);  // so that the next can arm
+  }
 }
 
 }  // namespace

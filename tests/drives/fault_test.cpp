@@ -53,7 +53,7 @@ class Fault : public testing::Test {
 
 TEST_F(Fault, DriveHeartbeatLostStopsBothAxes) {
   bench.wire.set_tap([](can::Frame& frame) { return frame.id != 0x701; });
-  expect_rest_within_ms(250);  // 30 ms between heartbeats, 120 ms of patience, and the ramp
+  expect_rest_within_ms(200);  // 30 ms between heartbeats, 100 ms of patience, and the quick stop
   expect_latched(StopReason::drive_heartbeat_lost, DriverState::stopped);
 }
 
@@ -130,11 +130,17 @@ TEST_F(Fault, FaultIsFoundWithoutItsEmergency) {
   EXPECT_EQ(bench.report().error_code[1], 0x4310U);  // read from 0x603F
 }
 
+// Noticed by the driver before the drive's own window of following error has passed; and what frees the motor later
+// does not make the needle jump by what it is behind.
 TEST_F(Fault, BlockedMotor) {
   bench.insertion.set_motor_blocked(true);
-  expect_latched(StopReason::drive_emergency, DriverState::fault);
-  EXPECT_EQ(bench.report().stop.code, 0x8611U);
-  EXPECT_TRUE(bench.at_rest());
+  expect_rest_within_ms(200);
+  expect_latched(StopReason::not_following, DriverState::stopped);
+  EXPECT_EQ(bench.report().stop.axis, 0);
+  const double before = bench.insertion.position_unit();
+  bench.insertion.set_motor_blocked(false);
+  bench.run_ms(500);
+  EXPECT_NEAR(bench.insertion.position_unit(), before, 1e-3);
 }
 
 TEST_F(Fault, LostPdosStopTheAxes) {

@@ -83,9 +83,9 @@ TEST(RigWithEffects, FramesOfALateCameraComeLateAndAreStampedThen) {
   nodes::RigNode rig(lcm, *insertion, *rotation, config, &frames);
   const std::int64_t start = 1'700'000'000'000'000;
   using namespace std::chrono_literals;
-  for (std::int64_t ms = 1; ms < 101; ++ms) rig.step(ms * 1'000'000, start + ms * 1000);
+  for (std::int64_t ms = 1; ms < 101; ++ms) rig.step({ms * 1'000'000, start + ms * 1000});
   EXPECT_TRUE(std::holds_alternative<camera::FrameTimeout>(source->next(20ms)));
-  rig.step(101'000'000, start + 101'000);
+  rig.step({101'000'000, start + 101'000});
   const auto got = source->next(5000ms);
   ASSERT_TRUE(std::holds_alternative<camera::Frame>(got));
   EXPECT_EQ(std::get<camera::Frame>(got).capture_utime, start + 101'000);  // taken at 1 ms

@@ -118,17 +118,19 @@ TEST_F(SystemFile, TheLiveNodeAppliesItsEffectsAsAReplayWithTheSameFileDoes) {
   const auto config = nodes::load_system_config(system_path);
   const auto data = insertion(rng, config.estimator.prior);
   lcm::LCM lcm("memq://");
-  nodes::EstimatorNode node(lcm, config.estimator);
+  nodes::EstimatorNode node(lcm, config.estimator, {});
   nodes::LcmPort port(lcm);
   std::vector<needle_state_t> live;
   port.subscribe<needle_state_t>(io::channel::kNeedleState, [&live](const needle_state_t& m) { live.push_back(m); });
   in_order(
       data,
       [&](const model::ActuatorState& a) {
+        node.tell_time({a.utime * 1000, a.utime});
         port.publish(io::channel::kActuatorState, io::to_message(a));
         nodes::pump(lcm);
       },
       [&](const model::TipMeasurement& m) {
+        node.tell_time({m.utime * 1000, m.utime});
         port.publish(io::channel::kTipMeasurement, io::to_message(m));
         nodes::pump(lcm);
       });

@@ -36,7 +36,9 @@ SystemConfig system_of(const std::string& text) {
 std::vector<model::MotionCommand> commands_of(const SystemConfig& config, int periods) {
   lcm::LCM lcm("memq://");
   LcmPort port(lcm);
-  ControllerNode node(lcm, config.controller, config.needle, config.live_effects.active);
+  ControllerNode node(lcm, config);
+  std::int64_t session = 0;
+  port.subscribe<process_status_t>(io::channel::kProcessStatus, [&](const process_status_t& m) { session = m.session; });
   std::vector<model::MotionCommand> commands;
   port.subscribe<motion_command_t>(io::channel::kMotionCommand,
                                    [&](const motion_command_t& m) { commands.push_back(io::to_sample(m)); });
@@ -54,16 +56,23 @@ std::vector<model::MotionCommand> commands_of(const SystemConfig& config, int pe
   for (int period = 0; period < periods; ++period) {
     const std::int64_t utime = kStart_utime + period * kPeriod_us;
     state.utime = state.measurement_utime = axes.utime = target.utime = utime;
+    ++state.seq;
+    ++axes.seq;
+    const Now now{utime * 1000, utime};
+    node.tell_time(now);
+    port.tell_time(now);
     port.publish(io::channel::kNeedleState, state);
     port.publish(io::channel::kActuatorState, io::to_message(axes));
     pump(lcm);
     for (const auto request : {controller::Request::arm, controller::Request::start}) {
       if (period != 1) break;  // in the first the node learns the time
       target.request = static_cast<std::int32_t>(request);
+      ++target.seq;
+      target.session[0] = session;
       port.publish(io::channel::kSteeringTarget, target);
       pump(lcm);
     }
-    node.step(utime, 0);
+    node.step(now, 0);
     pump(lcm);
   }
   return commands;

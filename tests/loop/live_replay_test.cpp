@@ -38,7 +38,7 @@ TEST(LiveReplay, TheNodesStatesAreThoseOfAReplayOfItsLog) {
   std::stable_sort(events.begin(), events.end(), [](const Event& a, const Event& b) { return a.arrival < b.arrival; });
 
   lcm::LCM lcm("memq://");
-  nodes::EstimatorNode node(lcm, config);
+  nodes::EstimatorNode node(lcm, config, {});
   nodes::LcmPort port(lcm);
   std::vector<needle_state_t> live;
   port.subscribe<needle_state_t>(io::channel::kNeedleState, [&live](const needle_state_t& m) { live.push_back(m); });
@@ -47,7 +47,8 @@ TEST(LiveReplay, TheNodesStatesAreThoseOfAReplayOfItsLog) {
   {
     io::LogWriter log(path);
     for (const Event& event : events) {
-      node.step(event.arrival);
+      node.step({event.arrival * 1000, event.arrival});
+      port.tell_time({event.arrival * 1000, event.arrival});
       if (event.actuator != SIZE_MAX) {
         const auto message = io::to_message(data.actuators[event.actuator]);
         port.publish(io::channel::kActuatorState, message);

@@ -30,6 +30,7 @@ SimulatedLoop::SimulatedLoop(std::uint64_t seed, const nodes::SystemConfig& sett
     drive_buses = {network.attach(), network.attach()};
   }
   rig = std::make_unique<nodes::RigNode>(lcm, *drive_buses[0], *drive_buses[1], config, nullptr);
+  install_injector(nodes::Component::camera, camera_port);
   start_stepper();
   start_estimator();
   start_controller();
@@ -37,21 +38,31 @@ SimulatedLoop::SimulatedLoop(std::uint64_t seed, const nodes::SystemConfig& sett
   port.subscribe<process_status_t>(io::channel::kProcessStatus,
                                    [this](const process_status_t& m) { statuses[m.process] = m; });
   port.subscribe<needle_state_t>(io::channel::kNeedleState, [this](const needle_state_t& m) { needle_state = m; });
+  port.subscribe<motion_command_t>(io::channel::kMotionCommand, [this](const motion_command_t& m) { sent = m; });
+}
+
+void SimulatedLoop::install_injector(nodes::Component component, nodes::LcmPort& to) {
+  auto injector = std::make_unique<nodes::FaultInjector>(nodes::channel_of(component));
+  injectors_.at(static_cast<std::size_t>(component)) = injector.get();
+  to.inject(std::move(injector));
 }
 
 void SimulatedLoop::start_stepper() {
   stepper.reset();
   stepper = std::make_unique<nodes::StepperNode>(lcm, *stepper_bus, config.stepper);
+  install_injector(nodes::Component::stepper, stepper->port());
 }
 
 void SimulatedLoop::start_estimator() {
   estimator.reset();
   estimator = std::make_unique<nodes::EstimatorNode>(lcm, config.estimator, nodes::motion_bounds(config.stepper));
+  install_injector(nodes::Component::estimator, estimator->port());
 }
 
 void SimulatedLoop::start_controller() {
   controller.reset();
   controller = std::make_unique<nodes::ControllerNode>(lcm, config);
+  install_injector(nodes::Component::controller, controller->port());
 }
 
 tip_measurement_t SimulatedLoop::picture(const Eigen::Vector3d& tip, int which) {
@@ -105,12 +116,15 @@ void SimulatedLoop::step_one_ms() {
   for (; !in_flight_.empty() && in_flight_.front().first <= ms * 1000; in_flight_.pop())
     camera_port.publish(io::channel::kTipMeasurement, in_flight_.front().second);
   nodes::pump(lcm);
-  if (ms % 10 == 0 && stepper) stepper->step(at);
-  nodes::pump(lcm);
-  if (ms % 10 == 0 && estimator) estimator->step(at);
-  nodes::pump(lcm);
-  if (ms % 20 == 0 && controller) controller->step(at, 0);
-  nodes::pump(lcm);
+  if (ms % 10 == 0) {
+    if (stepper) stepper->step(at);
+    nodes::pump(lcm);
+    if (estimator) estimator->step(at);
+    nodes::pump(lcm);
+    if (ms % 20 == 0 && controller) controller->step(at, 0);
+    nodes::pump(lcm);
+  }
+  if (each_ms) each_ms();
 }
 
 bool SimulatedLoop::run(double seconds, const std::function<bool()>& until) {

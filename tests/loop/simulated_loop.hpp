@@ -59,6 +59,8 @@ class SimulatedLoop {
   Eigen::Vector3d tip() const { return rig->plant().tip().p_mm; }
   double speed(std::size_t axis) { return std::abs(rig->drive(axis).velocity_unit_s()); }
   bool at_rest() { return speed(0) < kRest_unit_s && speed(1) < kRest_unit_s; }
+  // What the component sends passes through it from the start; idle until it is told to begin.
+  nodes::FaultInjector* injector(nodes::Component component) { return injectors_.at(static_cast<std::size_t>(component)); }
   // Newest of a process on PROCESS_STATUS; empty before the first.
   process_status_t said(const std::string& process) const;
 
@@ -83,8 +85,13 @@ class SimulatedLoop {
   bool real_can = false;
   std::map<std::string, process_status_t> statuses;
   std::optional<needle_state_t> needle_state;
+  motion_command_t sent{};        // newest of the controller
+  std::function<void()> each_ms;  // called at the end of each, if set
 
  private:
+  void install_injector(nodes::Component component, nodes::LcmPort& port);
+
+  std::array<nodes::FaultInjector*, 4> injectors_{};
   std::queue<std::pair<std::int64_t, tip_measurement_t>> in_flight_;  // by steady time of arrival, us
   std::array<std::int64_t, 2> camera_seq_{};
 };

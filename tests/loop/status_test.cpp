@@ -4,7 +4,7 @@
 #include <thread>
 #include <vector>
 
-#include "nodes/lcm_port.hpp"
+#include "nodes/status_reporter.hpp"
 #include "nodes/runtime.hpp"
 
 namespace bevel::nodes {
@@ -19,15 +19,15 @@ TEST(ProcessStatus, TellsTheLongestStepTheLatestStartAndTheOverrunsOfTheLoop) {
   port.subscribe<process_status_t>(io::channel::kProcessStatus,
                                    [&said](const process_status_t& m) { said.push_back(m); });
   StatusReporter status(port, "bevel-test", kPeriod_s);
-  const std::int64_t utime = now().utime;
+  port.tell_time(now());
   int steps = 0;
-  run_periodic(lcm, kPeriod_s, [&](const Now&, double) {
-    if (++steps == 1) std::this_thread::sleep_for(150ms);  // so that the next starts at least 50 ms late
-    if (steps == 2) status.report(utime, "running", "");
-    return steps < 2;
-  });
-  status.report(utime, "stopped", "");
-  status.report(utime, "gone", "");
+  run_periodic(lcm, {kPeriod_s, {}, [&](const Now&, double) {
+                       if (++steps == 1) std::this_thread::sleep_for(150ms);  // so that the next starts 50 ms late
+                       if (steps == 2) status.report("running", "");
+                       return steps < 2;
+                     }});
+  status.report("stopped", "");
+  status.report("gone", "");
   pump(lcm);
   ASSERT_EQ(said.size(), 3U);
   EXPECT_GE(said[0].loop_run_max_s, 0.15);
@@ -52,8 +52,9 @@ TEST(ProcessStatus, TellsTheLongestRunOfAProcessThatItsInputDrives) {
     StatusReporter status(port, "bevel-test", 0);
     status.note_run(0.02);
     status.note_run(0.01);
-    status.report(1, "running", "");
-    status.report(2, "stopped", "");
+    port.tell_time({1'000, 1});
+    status.report("running", "");
+    status.report("stopped", "");
   })
       .join();
   pump(lcm);
@@ -61,6 +62,24 @@ TEST(ProcessStatus, TellsTheLongestRunOfAProcessThatItsInputDrives) {
   EXPECT_EQ(said[0].loop_run_max_s, 0.02);
   EXPECT_EQ(said[0].overruns, 0);
   EXPECT_EQ(said[1].loop_run_max_s, 0);
+}
+
+TEST(ProcessStatus, KnowsAnotherRunOfItsOwnProcess) {
+  lcm::LCM lcm("memq://");
+  LcmPort port(lcm), other_port(lcm);
+  StatusReporter status(port, "bevel-test", 0), stranger(other_port, "bevel-other", 0);
+  port.tell_time(now());
+  other_port.tell_time(now());
+  status.report("running", "");
+  status.renew_session();  // the same run after a stop
+  status.report("running", "");
+  stranger.report("running", "");
+  pump(lcm);
+  EXPECT_FALSE(status.name_taken());
+  StatusReporter second(other_port, "bevel-test", 0);
+  second.report("running", "");
+  pump(lcm);
+  EXPECT_TRUE(status.name_taken());
 }
 
 }  // namespace

@@ -24,7 +24,7 @@ int main(int argc, char** argv) {
     const auto insertion = can::open_bus(config.can), rotation = can::open_bus(config.can);
     rig::FrameServer frames(config.rig.frames_socket);
     nodes::RigNode node(context.lcm, *insertion, *rotation, config, &frames);
-    if (context.fault) node.break_drive(*context.fault, context.started_ns);
+    if (context.fault) node.break_drive(*context.fault, context.started_ns, tools::kFaultSeed);
     nodes::run_periodic(context.lcm, {0.001, {}, [&](const nodes::Now& now, double) {
                                         node.step(now);
                                         return true;

@@ -9,9 +9,6 @@
 #include "nodes/claim_name.hpp"
 
 namespace bevel::tools {
-namespace {
-constexpr std::uint64_t kFaultSeed = 1;
-}
 
 int process_main(CommandLine& command_line, int argc, char** argv, const ProcessName& name, const ProcessBody& body) {
   std::string config_path, lcm_url, fault;
@@ -39,7 +36,9 @@ void inject(const ProcessContext& context, nodes::LcmPort& port) {
   if (!context.fault) return;
   const auto& [component, kind, at_s] = *context.fault;
   const std::int64_t start_ns = context.started_ns + std::llround(at_s * 1e9);
-  port.inject(std::make_unique<nodes::FaultInjector>(nodes::channel_of(component), kind, start_ns, kFaultSeed));
+  auto injector = std::make_unique<nodes::FaultInjector>(nodes::channel_of(component));
+  injector->begin(kind, start_ns, kFaultSeed);
+  port.inject(std::move(injector));
 }
 
 void go_realtime(const nodes::SystemConfig& config, const char* program, int priority) {

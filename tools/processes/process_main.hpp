@@ -17,6 +17,8 @@ struct ProcessContext {
   std::optional<nodes::Fault> fault;  // to be injected into what this process sends; counted from its start
   std::int64_t started_ns = 0;
 };
+inline constexpr std::uint64_t kFaultSeed = 1;
+
 using ProcessBody = std::function<int(ProcessContext& context)>;
 // Which name the process claims, so that there is one of it on a rig.
 using ProcessName = std::function<std::string(const nodes::SystemConfig& config)>;
