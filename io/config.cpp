@@ -3,13 +3,11 @@
 #include <toml++/toml.h>
 
 #include <algorithm>
-#include <cerrno>
 #include <cmath>
-#include <cstring>
-#include <filesystem>
-#include <fstream>
 #include <set>
 #include <sstream>
+
+#include "io/file_bytes.hpp"
 
 namespace bevel::io {
 
@@ -313,10 +311,12 @@ ConfigFile::ConfigFile(ConfigFile&&) noexcept = default;
 ConfigFile::~ConfigFile() = default;
 
 ConfigFile ConfigFile::load(const std::string& path) {
-  if (std::filesystem::is_directory(path)) throw ConfigError({path + ": is a directory, not a TOML file"});
-  std::ifstream stream(path, std::ios::binary);
-  if (!stream) throw ConfigError({path + ": cannot be read: " + std::strerror(errno)});
-  const std::string text{std::istreambuf_iterator<char>(stream), {}};
+  std::string text;
+  try {
+    text = read_text_file(path);
+  } catch (const std::runtime_error& unreadable) {
+    throw ConfigError({unreadable.what()});
+  }
   return parse(text, path);
 }
 

@@ -1,16 +1,27 @@
 #include "io/csv_import.hpp"
 
+#include <algorithm>
 #include <charconv>
 #include <cmath>
-#include <fstream>
+#include <filesystem>
 #include <map>
+#include <sstream>
 #include <stdexcept>
 
+#include "io/file_bytes.hpp"
 #include "io/log_writer.hpp"
 #include "io/messages.hpp"
+#include "io/plausibility.hpp"
 
 namespace bevel::io {
 namespace {
+
+// Seconds since the epoch until the year 2286, or of any clock of its own.
+constexpr double kLatest_s = 1e10;
+// Where a recording begins whose clock began at 0 or later: messages have a positive utime.
+constexpr std::int64_t kOwnEpoch_us = 1'000'000;
+constexpr double kMostRowsLeftOut = 0.2;
+constexpr std::size_t kRemarks = 10;
 
 SignedColumn signed_column(const std::string& text) {
   if (text.starts_with('-')) return {text.substr(1), -1};
@@ -38,8 +49,7 @@ std::vector<std::string> split(const std::string& line) {
 // One CSV file, a row at a time; every fault names file, line and column.
 class Table {
  public:
-  explicit Table(const std::string& path) : path_(path), file_(path) {
-    if (!file_) throw std::runtime_error(path + ": cannot be read");
+  explicit Table(const std::string& path) : path_(path), file_(read_text_file(path)) {
     std::string header;
     if (!std::getline(file_, header)) throw std::runtime_error(path + ": is empty");
     const auto names = split(header);
@@ -58,6 +68,33 @@ class Table {
   }
 
   double operator[](const std::string& column) const {
+    const std::string& cell = text(column);
+    double value = 0;
+    const auto [end, error] = std::from_chars(cell.data(), cell.data() + cell.size(), value);
+    if (error != std::errc{} || end != cell.data() + cell.size() || !std::isfinite(value))
+      fail(column, "not a finite number");
+    return value;
+  }
+  // In range once multiplied by sign and scale, so that the messages made of it are what readers accept.
+  double within(const SignedColumn& column, double lowest, double highest, const char* unit, double scale = 1) const {
+    const double value = scale * column.sign * (*this)[column.name];
+    if (!(value >= lowest && value <= highest))
+      fail(column.name, "outside what is allowed, " + format_number(lowest) + " to " + format_number(highest) + " " +
+                            unit + (scale == 1 ? "" : " after scaling by " + format_number(scale)));
+    return value;
+  }
+  double length_mm(const SignedColumn& column) const {
+    return within(column, -kLargestLength_mm, kLargestLength_mm, "mm");
+  }
+  [[noreturn]] void fail(const std::string& column, const std::string& why) const {
+    throw std::runtime_error(place(line_) + "column '" + column + "' is '" + text(column) + "', " + why);
+  }
+  std::string place(int line) const { return path_ + ":" + std::to_string(line) + ": "; }
+  int line() const { return line_; }
+
+ private:
+  const std::string& text(const std::string& column) const {
+    static const std::string kNothing;
     const auto found = index_.find(column);
     if (found == index_.end()) {
       std::vector<std::string> names;
@@ -65,23 +102,67 @@ class Table {
       throw std::runtime_error(path_ + ": no column '" + column + "'; the nearest is '" + nearest_name(column, names) +
                                "'");
     }
-    double value = 0;
-    const std::string cell = found->second < cells_.size() ? cells_[found->second] : "";
-    const auto [end, error] = std::from_chars(cell.data(), cell.data() + cell.size(), value);
-    if (error != std::errc{} || end != cell.data() + cell.size() || !std::isfinite(value))
-      throw std::runtime_error(path_ + ":" + std::to_string(line_) + ": column '" + column + "' is '" + cell +
-                               "', not a finite number");
-    return value;
+    return found->second < cells_.size() ? cells_[found->second] : kNothing;
   }
-  double operator[](const SignedColumn& column) const { return column.sign * (*this)[column.name]; }
 
- private:
   std::string path_;
-  std::ifstream file_;
+  std::istringstream file_;
   std::map<std::string, std::size_t> index_;
   std::vector<std::string> cells_;
   int line_ = 1;
 };
+
+// What one row says, and where it stands.
+struct Row {
+  model::ActuatorState axes;
+  model::TipMeasurement tip;
+  int line = 0;
+};
+
+std::int64_t utime_of(const Table& row, const ColumnMap& map, int index) {
+  if (map.seconds.empty()) return kOwnEpoch_us + std::llround(index * 1e6 / map.rate_hz);
+  std::int64_t utime = std::llround(row.within({map.seconds, 1}, -kLatest_s, kLatest_s, "s") * 1e6);
+  if (!map.nanoseconds.empty()) utime += std::llround(row.within({map.nanoseconds, 1}, 0, 1e9, "ns") * 1e-3);
+  return utime;
+}
+
+model::TipMeasurement tip_of(const Table& row, const ColumnMap& map, const Eigen::Vector3d& origin) {
+  model::TipMeasurement m;
+  for (std::size_t i = 0; i < 3; ++i) {
+    const auto axis = static_cast<Eigen::Index>(i);
+    const double sigma = map.sigma_mm[i];
+    if (!(sigma > 0)) continue;
+    m.information_per_mm2(axis, axis) = 1 / (sigma * sigma);
+    m.position_mm[axis] = row.length_mm(map.tip[i]) - origin[axis];
+    if (!(std::abs(m.position_mm[axis]) <= kLargestLength_mm))
+      row.fail(map.tip[i].name, format_number(m.position_mm[axis]) + " mm from the origin; allowed " +
+                                    format_number(kLargestLength_mm) + " mm either way");
+  }
+  return m;
+}
+
+// Each row's lines of what is implausible in it, and the rows without it.
+void leave_out_the_implausible(const Table& table, std::vector<Row>& rows, ImportedRecording& out) {
+  for (;;) {
+    std::vector<model::ActuatorState> axes;
+    std::vector<model::TipMeasurement> tips;
+    for (const Row& row : rows) axes.push_back(row.axes), tips.push_back(row.tip);
+    const Judgement of_axes = judge(axes);
+    const Judgement of_tips = judge(tips, axes);
+    std::vector<Row> kept;
+    for (std::size_t i = 0; i < rows.size(); ++i)
+      if (!of_axes.left_out[i] && !of_tips.left_out[i]) kept.push_back(rows[i]);
+    for (const auto* oddities : {&of_axes.oddities, &of_tips.oddities})
+      for (const Oddity& oddity : *oddities) {
+        const auto row = std::ranges::find(rows, oddity.utime, [](const Row& r) { return r.axes.utime; });
+        const std::string text = table.place(row->line) + oddity.what;
+        if (!oddity.left_out) throw std::runtime_error(text + "; it lasts, and is no recording of one insertion");
+        out.left_out.push_back(text + "; the row is left out");
+      }
+    if (kept.size() == rows.size()) return;
+    rows = std::move(kept);
+  }
+}
 
 }  // namespace
 
@@ -94,7 +175,7 @@ ColumnMap load_column_map(const std::string& path) {
   Section time = file.section("time", required);
   time.read("seconds", map.seconds, optional);
   time.read("nanoseconds", map.nanoseconds, optional);
-  time.read("rate_hz", map.rate_hz, optional, above(0));
+  time.read("rate_hz", map.rate_hz, optional, in_range(1e-3, 1e6));
   if (time.present() && map.seconds.empty() == (map.rate_hz == 0))
     time.fail("", "either seconds (a column) or rate_hz must be given, and not both");
   Section tip = file.section("tip", required);
@@ -102,6 +183,9 @@ ColumnMap load_column_map(const std::string& path) {
   read_columns(tip, "axes", axes, required);
   read_columns(tip, "origin", origin, optional);
   tip.read("sigma_mm", map.sigma_mm, required, at_least(0));
+  for (const double sigma_mm : map.sigma_mm)  // whose information is still a number that readers accept
+    if (sigma_mm != 0 && !(sigma_mm >= 1e-6 && sigma_mm <= 1e6))
+      tip.fail("sigma_mm", "is " + format_number(sigma_mm) + " for an axis; allowed are 0, or 1e-06 to 1e+06");
   for (std::size_t i = 0; i < axes.size() && i < 3; ++i) map.tip[i] = signed_column(axes[i]);
   for (const std::string& column : origin) map.origin.push_back(signed_column(column));
   Section insertion = file.section("insertion", required);
@@ -120,72 +204,101 @@ ColumnMap load_column_map(const std::string& path) {
 }
 
 ImportedRecording import_csv(const std::string& csv_path, const ColumnMap& map) {
-  Table row(csv_path);
+  Table table(csv_path);
   ImportedRecording out;
+  std::vector<Row> rows;
   Eigen::Vector3d origin = Eigen::Vector3d::Zero();
-  bool started = false;
   double last_insertion = 0;
-  while (row.next()) {
+  while (table.next()) {
     const int index = out.rows++;
-    bool empty = false;
-    for (const std::string& column : map.nonzero) empty = empty || row[column] == 0;
+    const bool empty = std::ranges::any_of(map.nonzero, [&](const std::string& column) { return table[column] == 0; });
     if (empty) {
       ++out.rows_without_data;
       continue;
     }
-    const double insertion = row[map.insertion];
-    if (!started)
-      for (std::size_t i = 0; i < map.origin.size(); ++i) origin[static_cast<Eigen::Index>(i)] = row[map.origin[i]];
-    if (started && map.settled && insertion == last_insertion) {
+    const double insertion = table.length_mm(map.insertion);
+    if (rows.empty())
+      for (std::size_t i = 0; i < map.origin.size(); ++i)
+        origin[static_cast<Eigen::Index>(i)] = table.length_mm(map.origin[i]);
+    if (!rows.empty() && map.settled && insertion == last_insertion) {
       ++out.rows_unsettled;
       continue;
     }
-    started = true;
     last_insertion = insertion;
+    Row row;
+    row.line = table.line();
+    row.axes.utime = utime_of(table, map, index);
+    if (!rows.empty() && row.axes.utime <= rows.back().axes.utime)
+      table.fail(map.seconds, "but time does not grow; allowed: later than the row before");
+    row.axes.seq = static_cast<std::int64_t>(rows.size());
+    row.axes.axis_status = {2, 2};
+    row.axes.insertion_mm = insertion;
+    if (!map.rotation.empty())
+      row.axes.rotation_rad =
+          table.within(map.rotation[0], -kLargestAngle_rad, kLargestAngle_rad, "rad", map.rotation_scale);
+    row.tip = tip_of(table, map, origin);
+    row.tip.utime = row.axes.utime;
+    row.tip.seq = row.axes.seq;
+    rows.push_back(row);
+  }
+  if (rows.empty()) throw std::runtime_error(csv_path + ": no row with data by this column map");
 
-    std::int64_t utime = 0;
-    if (map.seconds.empty()) {
-      utime = 1'000'000 + std::llround(index * 1e6 / map.rate_hz);
-    } else {
-      utime = std::llround(row[map.seconds] * 1e6);
-      if (!map.nanoseconds.empty()) utime += std::llround(row[map.nanoseconds] * 1e-3);
-    }
-    model::ActuatorState a;
-    a.utime = utime;
-    a.seq = static_cast<std::int64_t>(out.actuators.size());
-    a.axis_status = {2, 2};
-    a.insertion_mm = insertion;
-    if (!map.rotation.empty()) a.rotation_rad = map.rotation_scale * row[map.rotation[0]];
+  const std::size_t found = rows.size();
+  leave_out_the_implausible(table, rows, out);
+  if (static_cast<double>(found - rows.size()) > kMostRowsLeftOut * static_cast<double>(found))
+    throw std::runtime_error(out.left_out.front() + ", as are " + std::to_string(found - rows.size() - 1) +
+                             " others of " + std::to_string(found) + "; at most 20 % may be");
+  if (rows.front().axes.utime <= 0)
+    out.time_shift_s = static_cast<double>(kOwnEpoch_us - rows.front().axes.utime) * 1e-6;
+  const std::int64_t shift_us = std::llround(out.time_shift_s * 1e6);
+  for (Row& row : rows) {
+    model::ActuatorState& a = row.axes;
+    a.utime += shift_us;
+    row.tip.utime += shift_us;
     if (!out.actuators.empty()) {
-      const double dt_s = static_cast<double>(utime - out.actuators.back().utime) * 1e-6;
-      if (!(dt_s > 0)) throw std::runtime_error(csv_path + ": time does not grow at row " + std::to_string(index + 1));
+      const double dt_s = static_cast<double>(a.utime - out.actuators.back().utime) * 1e-6;
       a.insertion_rate_mm_s = (a.insertion_mm - out.actuators.back().insertion_mm) / dt_s;
       a.rotation_rate_rad_s = (a.rotation_rad - out.actuators.back().rotation_rad) / dt_s;
     }
+    const auto require_readable = [&](const auto& message) {
+      if (const auto error = check_fields(message))
+        throw std::runtime_error(table.place(row.line) + "readers would refuse the message made of this row (" +
+                                 io::describe(*error) + ")");
+    };
+    require_readable(to_message(a));
+    require_readable(to_message(row.tip));
     out.actuators.push_back(a);
-
-    model::TipMeasurement m;
-    m.utime = utime;
-    m.seq = a.seq;
-    for (std::size_t i = 0; i < 3; ++i) {
-      const auto axis = static_cast<Eigen::Index>(i);
-      const double sigma = map.sigma_mm[i];
-      m.information_per_mm2(axis, axis) = sigma > 0 ? 1 / (sigma * sigma) : 0;
-      m.position_mm[axis] = sigma > 0 ? row[map.tip[i]] - origin[axis] : 0;
-    }
-    out.tips.push_back(m);
+    out.tips.push_back(row.tip);
   }
-  if (out.tips.empty()) throw std::runtime_error(csv_path + ": no row with data by this column map");
   return out;
 }
 
+std::string ImportedRecording::remarks(const std::string& name) const {
+  std::string text;
+  for (std::size_t i = 0; i < std::min(left_out.size(), kRemarks); ++i) text += left_out[i] + "\n";
+  if (left_out.size() > kRemarks)
+    text += name + ": and " + std::to_string(left_out.size() - kRemarks) + " more such rows\n";
+  if (time_shift_s != 0)
+    text += name + ": time starts at " + format_number(1e-6 * static_cast<double>(kOwnEpoch_us) - time_shift_s) +
+            " s, and messages need a time after 0; shifted by " + format_number(time_shift_s) + " s\n";
+  return text;
+}
+
 void write_log(const ImportedRecording& recording, const std::string& log_path) {
-  LogWriter log(log_path);
-  for (std::size_t i = 0; i < recording.actuators.size(); ++i) {
-    log.write_message(recording.actuators[i].utime, channel::kActuatorState, to_message(recording.actuators[i]));
-    log.write_message(recording.tips[i].utime, channel::kTipMeasurement, to_message(recording.tips[i]));
+  const std::string unfinished = log_path + ".unfinished";
+  try {
+    LogWriter log(unfinished);
+    for (std::size_t i = 0; i < recording.actuators.size(); ++i) {
+      log.write_message(recording.actuators[i].utime, channel::kActuatorState, to_message(recording.actuators[i]));
+      log.write_message(recording.tips[i].utime, channel::kTipMeasurement, to_message(recording.tips[i]));
+    }
+    log.close();
+    std::filesystem::rename(unfinished, log_path);
+  } catch (...) {
+    std::error_code ignored;
+    std::filesystem::remove(unfinished, ignored);
+    throw;
   }
-  log.close();
 }
 
 }  // namespace bevel::io

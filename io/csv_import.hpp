@@ -48,11 +48,17 @@ struct ImportedRecording {
   int rows = 0;
   int rows_without_data = 0;
   int rows_unsettled = 0;
+  std::vector<std::string> left_out;  // a line for each row that is implausible beside its neighbours
+  double time_shift_s = 0;            // added where the file's clock begins at 0 or below; a log's times are positive
+
+  std::string remarks(const std::string& name) const;  // the last two in lines for stderr; "" if there is nothing
 };
-// Throws std::runtime_error naming the file, the line and the column that is missing or not a number.
+// What it returns reads back intact. Throws std::runtime_error naming the file, the line and the column that is
+// missing, not a number or out of range, and for motion that no rig makes and that lasts.
 ImportedRecording import_csv(const std::string& csv_path, const ColumnMap& map);
 
-// Both on their channels, in time order; receipt time is the sample's own.
+// Both on their channels, in time order; receipt time is the sample's own. Throws std::runtime_error, and leaves no
+// file.
 void write_log(const ImportedRecording& recording, const std::string& log_path);
 
 }  // namespace bevel::io

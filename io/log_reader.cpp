@@ -1,15 +1,8 @@
 #include "io/log_reader.hpp"
 
-#include <fcntl.h>
-#include <sys/mman.h>
-#include <sys/stat.h>
-#include <unistd.h>
-
 #include <algorithm>
 #include <array>
-#include <cerrno>
 #include <cstring>
-#include <stdexcept>
 
 namespace bevel::io {
 namespace {
@@ -104,28 +97,6 @@ std::optional<LogEvent> LogReader::next() {
     ++damage_.regions;
   }
   return std::nullopt;
-}
-
-MappedFile::MappedFile(const std::string& path) {
-  const auto fail = [&path](const std::string& reason) { throw std::runtime_error(path + ": " + reason); };
-  const int file = ::open(path.c_str(), O_RDONLY | O_CLOEXEC);
-  if (file < 0) fail(std::strerror(errno));
-  struct stat status {};
-  if (::fstat(file, &status) != 0 || !S_ISREG(status.st_mode)) {
-    ::close(file);
-    fail("is not a regular file");
-  }
-  const auto size = static_cast<std::size_t>(status.st_size);
-  void* memory = size == 0 ? nullptr : ::mmap(nullptr, size, PROT_READ, MAP_PRIVATE, file, 0);
-  const int error = errno;
-  ::close(file);
-  if (memory == MAP_FAILED) fail(std::strerror(error));
-  bytes_ = {static_cast<const std::uint8_t*>(memory), size};
-}
-
-MappedFile::~MappedFile() {
-  // munmap takes a pointer to non-const memory, which it does not write.
-  if (!bytes_.empty()) ::munmap(const_cast<std::uint8_t*>(bytes_.data()), bytes_.size());
 }
 
 }  // namespace bevel::io

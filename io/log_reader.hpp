@@ -49,17 +49,4 @@ class LogReader {
   LogDamage damage_;
 };
 
-// A file mapped into memory for reading. Throws std::runtime_error naming the file and the reason.
-class MappedFile {
- public:
-  explicit MappedFile(const std::string& path);
-  ~MappedFile();
-  MappedFile(const MappedFile&) = delete;
-  MappedFile& operator=(const MappedFile&) = delete;
-  std::span<const std::uint8_t> bytes() const { return bytes_; }
-
- private:
-  std::span<const std::uint8_t> bytes_;
-};
-
 }  // namespace bevel::io

@@ -1,18 +1,28 @@
 #include "io/recording.hpp"
 
+#include <algorithm>
+#include <limits>
+#include <sstream>
+#include <stdexcept>
+
+#include "io/file_bytes.hpp"
 #include "io/messages.hpp"
 
 namespace bevel::io {
 namespace {
 
+constexpr double kLargestShareLeftOut = 0.2;
+
+// False if the message was refused.
 template <class Message, class Store>
-void decode_into(Recording& recording, const LogEvent& event, Store&& store) {
+bool decode_into(Recording& recording, const LogEvent& event, Store&& store) {
   const auto decoded = checked_decode<Message>(event.data.data(), event.data.size());
   if (decoded) {
     store(*decoded);
   } else {
     ++recording.rejects[std::string(event.channel)][static_cast<std::size_t>(decoded.error->fault)];
   }
+  return !decoded.error;
 }
 
 void add_event(Recording& recording, const LogEvent& event) {
@@ -22,10 +32,15 @@ void add_event(Recording& recording, const LogEvent& event) {
   const auto as_is_in = [](auto& messages) {
     return [&messages](const auto& message) { messages.push_back(message); };
   };
+  const auto note = [&recording](bool taken, Arrival::Channel channel, std::size_t size) {
+    if (taken) recording.arrivals.push_back({channel, size - 1});
+  };
   if (event.channel == channel::kTipMeasurement) {
-    decode_into<tip_measurement_t>(recording, event, to_sample_in(recording.tips));
+    const bool taken = decode_into<tip_measurement_t>(recording, event, to_sample_in(recording.tips));
+    note(taken, Arrival::Channel::tip, recording.tips.size());
   } else if (event.channel == channel::kActuatorState) {
-    decode_into<actuator_state_t>(recording, event, to_sample_in(recording.actuators));
+    const bool taken = decode_into<actuator_state_t>(recording, event, to_sample_in(recording.actuators));
+    note(taken, Arrival::Channel::actuator, recording.actuators.size());
   } else if (event.channel == channel::kMotionCommand) {
     decode_into<motion_command_t>(recording, event, to_sample_in(recording.commands));
   } else if (event.channel == channel::kSteeringTarget) {
@@ -41,6 +56,46 @@ void add_event(Recording& recording, const LogEvent& event) {
   }
 }
 
+// Takes what was left out of `samples` and of the arrivals.
+template <class Sample>
+void drop(Recording& recording, Arrival::Channel channel, std::vector<Sample>& samples,
+          const std::vector<bool>& left_out) {
+  if (std::find(left_out.begin(), left_out.end(), true) == left_out.end()) return;
+  std::vector<std::size_t> place(samples.size());
+  std::vector<Sample> kept;
+  for (std::size_t i = 0; i < samples.size(); ++i) {
+    place[i] = kept.size();
+    if (!left_out[i]) kept.push_back(samples[i]);
+  }
+  samples = std::move(kept);
+  std::erase_if(recording.arrivals, [&](const Arrival& a) { return a.channel == channel && left_out[a.index]; });
+  for (Arrival& a : recording.arrivals)
+    if (a.channel == channel) a.index = place[a.index];
+}
+
+void leave_out_the_implausible(Recording& recording) {
+  Judgement axes = judge(recording.actuators);
+  drop(recording, Arrival::Channel::actuator, recording.actuators, axes.left_out);
+  recording.actuator_oddities = std::move(axes.oddities);
+  std::vector<model::ActuatorState> sorted = recording.actuators;
+  std::ranges::stable_sort(sorted, {}, &model::ActuatorState::utime);
+  Judgement tips = judge(recording.tips, sorted);
+  drop(recording, Arrival::Channel::tip, recording.tips, tips.left_out);
+  recording.tip_oddities = std::move(tips.oddities);
+}
+
+std::string one_line(std::string text) {
+  while (text.ends_with('\n')) text.pop_back();
+  return text;
+}
+
+std::string too_much_left_out(const std::vector<Oddity>& oddities, std::size_t kept, const char* channel) {
+  const auto lost = static_cast<std::size_t>(std::ranges::count_if(oddities, &Oddity::left_out));
+  if (static_cast<double>(lost) <= kLargestShareLeftOut * static_cast<double>(lost + kept)) return "";
+  return "damaged beyond use: " + std::to_string(lost) + " of " + std::to_string(lost + kept) + " " + channel +
+         " are implausible beside their neighbours; at most 20 % may be";
+}
+
 }  // namespace
 
 std::int64_t Recording::rejected() const {
@@ -53,6 +108,7 @@ std::int64_t Recording::rejected() const {
 
 std::string Recording::describe_faults() const {
   std::string text;
+  if (!file_change.empty()) text += file_change + "\n";
   if (!damage.intact()) text += "log: " + damage.describe() + "\n";
   for (const auto& [channel, counts] : rejects) {
     for (std::size_t fault = 0; fault < counts.size(); ++fault) {
@@ -61,23 +117,59 @@ std::string Recording::describe_faults() const {
               ")\n";
     }
   }
+  std::int64_t start_utime = std::numeric_limits<std::int64_t>::max();
+  for (const auto& a : actuators) start_utime = std::min(start_utime, a.utime);
+  if (actuators.empty())
+    for (const auto& t : tips) start_utime = std::min(start_utime, t.utime);
+  return text + describe(actuator_oddities, channel::kActuatorState, start_utime) +
+         describe(tip_oddities, channel::kTipMeasurement, start_utime);
+}
+
+std::string Recording::remarks(const std::string& name) const {
+  std::istringstream faults(describe_faults());
+  std::string text, line;
+  while (std::getline(faults, line)) text += name + ": damaged: " + line + "\n";
   return text;
+}
+
+std::string Recording::refusal() const {
+  if (events == 0)
+    return "no LCM event in its " + std::to_string(bytes) + " bytes; " +
+           (bytes == 0 ? "the file is empty" : "not a log, or damaged throughout");
+  if (tips.empty() && actuators.empty() && commands.empty() && targets.empty() && estimates.empty() && truths.empty())
+    return "no usable message in its " + std::to_string(events) + " events; " + std::to_string(rejected()) +
+           " were refused, the others are on channels that are not read here";
+  for (const Oddity& oddity : actuator_oddities)
+    if (oddity.kind == Oddity::Kind::motion && !oddity.left_out)
+      return "damaged beyond use: " + one_line(describe({oddity}, channel::kActuatorState, actuators.front().utime)) +
+             ", so that where the base was is not known";
+  const std::string axes = too_much_left_out(actuator_oddities, actuators.size(), channel::kActuatorState);
+  return axes.empty() ? too_much_left_out(tip_oddities, tips.size(), channel::kTipMeasurement) : axes;
 }
 
 Recording read_recording(std::span<const std::uint8_t> log) {
   Recording recording;
+  recording.bytes = static_cast<std::int64_t>(log.size());
   LogReader reader(log);
   while (const auto event = reader.next()) {
     ++recording.events;
     add_event(recording, *event);
   }
   recording.damage = reader.damage();
+  leave_out_the_implausible(recording);
   return recording;
 }
 
 Recording read_recording(const std::string& path) {
-  const MappedFile file(path);
-  return read_recording(file.bytes());
+  const FileBytes file(path);
+  Recording recording = read_recording(file.bytes());
+  recording.file_change = file.change();
+  return recording;
+}
+
+void require_usable(const std::string& name, const Recording& recording) {
+  const std::string refusal = recording.refusal();
+  if (!refusal.empty()) throw std::runtime_error(name + ": " + refusal);
 }
 
 }  // namespace bevel::io

@@ -3,6 +3,7 @@
 #include <Eigen/Eigenvalues>
 #include <algorithm>
 #include <cmath>
+#include <numbers>
 #include <optional>
 #include <stdexcept>
 
@@ -101,8 +102,10 @@ Insertion make_insertion(std::string name, const std::vector<model::ActuatorStat
   out.name = std::move(name);
   std::vector<Waypoint> way = merge(actuators, measurements, out.skipped);
   // The pose is known at the entry point only: from there to the first sample the shaft is taken to have gone straight
-  // to its roll and then in.
-  way.insert(way.begin(), {{0, 0, std::nullopt}, {0, way.front().rotation_rad, std::nullopt}});
+  // to its roll and then in. Whole turns on the way there change nothing: an axis may have turned for days before.
+  const double roll_rad = way.front().rotation_rad;
+  const double turns_rad = roll_rad - std::remainder(roll_rad, 2 * std::numbers::pi);
+  way.insert(way.begin(), {{0, turns_rad, std::nullopt}, {0, roll_rad, std::nullopt}});
 
   for (std::size_t first = 0; first + 1 < way.size();) {
     std::size_t last = first + 1;

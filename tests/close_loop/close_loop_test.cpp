@@ -6,6 +6,7 @@
 
 #include <iostream>
 #include <nlohmann/json.hpp>
+#include <sstream>
 
 #include "tests/close_loop/made_case.hpp"
 #include "tests/support/temporary_folder.hpp"
@@ -33,7 +34,7 @@ struct CloseTheLoop : ::testing::Test {
   }
   static std::string refusal(const Options& o) {
     try {
-      close_the_loop(o);
+      close_the_loop(o, std::cerr);
     } catch (const std::exception& e) {
       return e.what();
     }
@@ -66,7 +67,19 @@ TEST_F(CloseTheLoop, WindUpFoundMakesRigEstimatorAndControllerBetter) {
   testing::make_case(folder / "windup", truth);
   Options o = options("windup");
   o.targeting.seeds = 6;
-  expect_all_three_better(close_the_loop(o), "torsional_windup");
+  expect_all_three_better(close_the_loop(o, std::cerr), "torsional_windup");
+}
+
+TEST_F(CloseTheLoop, ALogCutOffIsSaidAndStatusThree) {
+  testing::make_case(folder / "torn", {model::testing::agar(), {}});
+  Options o = options("torn");
+  o.diagnosis_draws = 10;
+  o.targeting.seeds = 1;
+  const fs::path torn = folder / "torn/rec01.lcm";
+  fs::resize_file(torn, fs::file_size(torn) - 40);  // a recorder that was killed
+  std::ostringstream out, err;
+  EXPECT_EQ(run(o, out, err), 3);
+  EXPECT_THAT(err.str(), HasSubstr("rec01.lcm: damaged (log: the last event is cut off"));
 }
 
 TEST_F(CloseTheLoop, InsertionScaleFoundMakesAllThreeBetterAndTheFilesSaySo) {
@@ -74,8 +87,11 @@ TEST_F(CloseTheLoop, InsertionScaleFoundMakesAllThreeBetterAndTheFilesSaySo) {
   testing::make_case(folder / "scale", truth);
   Options o = options("scale");
   o.targeting.seeds = 16;  // a forgiving filter gains 7 um by the model: seen in 192 insertions, not in 36
-  const ClosedLoop loop = close_the_loop(o);
+  std::ostringstream err;
+  const ClosedLoop loop = close_the_loop(o, err);
   expect_all_three_better(loop, "insertion_scale");
+  EXPECT_FALSE(loop.input_damaged);
+  EXPECT_EQ(err.str(), "");
   EXPECT_GT(loop.targeting.gain_forgiving_mm.low, 0) << "also where the filter is told to forgive";
 
   EXPECT_THAT(table_text(loop), HasSubstr("scale: found insertion_scale (ratio 0.93)"));

@@ -96,6 +96,16 @@ TEST_F(Program, FindsAConcealedEffectAndWritesAllThreeFiles) {
   EXPECT_EQ(text_of(folder / "again/verdict.json"), text_of(folder / "out/verdict.json"));
 }
 
+TEST_F(Program, ALogCutOffIsDiagnosedSaidAndStatusThree) {
+  write_logs({});
+  fs::resize_file(logs[3], fs::file_size(logs[3]) - 40);
+  const Said said = run(usual("out", {"--quiet"}));
+  EXPECT_EQ(said.status, 3);
+  EXPECT_THAT(said.err, HasSubstr("rec04.lcm: damaged (log: the last event is cut off"));
+  EXPECT_THAT(said.out, HasSubstr("rec04.lcm: damaged"));
+  EXPECT_THAT(text_of(folder / "out/report.html"), HasSubstr("rec04.lcm: damaged"));
+}
+
 TEST_F(Program, EndedFromOutsideItLeavesNothing) {
   write_logs({});
   for (const int signal : {SIGINT, SIGTERM}) {

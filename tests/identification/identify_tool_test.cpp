@@ -3,6 +3,7 @@
 
 #include <filesystem>
 #include <fstream>
+#include <iostream>
 #include <nlohmann/json.hpp>
 #include <sstream>
 
@@ -49,7 +50,7 @@ struct IdentifyTool : ::testing::Test {
 
 TEST_F(IdentifyTool, WritesAModelThatOtherProgramsAcceptAndFiguresToMatch) {
   std::ostringstream out;
-  ASSERT_EQ(run(options, out), 0) << out.str();
+  ASSERT_EQ(run(options, out, std::cerr), 0) << out.str();
   const auto needle = io::load_model_file(options.out_folder + "/model.toml").needle;
   std::ifstream file(options.out_folder + "/figures.json");
   const auto figures = nlohmann::json::parse(file);
@@ -62,13 +63,13 @@ TEST_F(IdentifyTool, WritesAModelThatOtherProgramsAcceptAndFiguresToMatch) {
 }
 
 TEST_F(IdentifyTool, MethodsAndPriorsAreHeard) {
-  const auto plain = identify(options);
+  const auto plain = identify(options, std::cerr);
   options.prior = "table1-plastisol";
-  const auto with_prior = identify(options);
+  const auto with_prior = identify(options, std::cerr);
   EXPECT_GT(with_prior.fit.find(diagnosis::kLambda1)->prior_share, 0);
   EXPECT_LT(with_prior.chosen.lambda1_per_rad, plain.chosen.lambda1_per_rad);
   options.method = "angle-rate";
-  const auto rate = identify(options);
+  const auto rate = identify(options, std::cerr);
   EXPECT_EQ(rate.chosen, rate.angle_rate.needle);
 }
 
@@ -76,7 +77,7 @@ TEST_F(IdentifyTool, AModelWithEffectsIsRefusedByName) {
   io::ModelFile file{truth, {{"torsional_windup", {{"lag_at_100mm_rad", 0.6}}}}};
   io::save_model_file(file, options.model_path);
   try {
-    identify(options);
+    identify(options, std::cerr);
     FAIL() << "accepted";
   } catch (const std::runtime_error& e) {
     EXPECT_NE(std::string(e.what()).find("torsional_windup"), std::string::npos);

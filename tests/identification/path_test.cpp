@@ -4,6 +4,7 @@
 #include <gtest/gtest.h>
 
 #include <iostream>
+#include <numbers>
 
 #include "tests/identification/simulated_insertion.hpp"
 
@@ -94,6 +95,22 @@ TEST(Insertion, MeasurementsThatCannotBeUsedAreCounted) {
   for (auto& tip : r.tips) tip.status = 1;
   EXPECT_THROW(make_insertion("r", r.actuators, r.tips), std::invalid_argument);
   EXPECT_THROW(make_insertion("r", {r.actuators[0]}, r.tips), std::invalid_argument);
+}
+
+// An axis that turned for days before the recording: only the rest of a turn is a motion of the needle.
+TEST(Insertion, WholeTurnsBeforeTheFirstSampleChangeNothing) {
+  std::mt19937_64 random(5);
+  SimulatedRecording r = simulate(agar(), {}, random);
+  for (auto& a : r.actuators) a.rotation_rad += 0.4;
+  const Insertion still = make_insertion("r", r.actuators, r.tips);
+  for (auto& a : r.actuators) a.rotation_rad += 2 * std::numbers::pi * 16'000;
+  const Insertion turned = make_insertion("r", r.actuators, r.tips);
+  ASSERT_EQ(turned.legs.size(), still.legs.size());
+  Path path_still, path_turned;
+  ASSERT_TRUE(integrate(still, agar(), Entry::Zero(), false, path_still));
+  ASSERT_TRUE(integrate(turned, agar(), Entry::Zero(), false, path_turned));
+  for (std::size_t i = 0; i < path_still.position_mm.size(); ++i)
+    EXPECT_LT((path_turned.position_mm[i] - path_still.position_mm[i]).norm(), 1e-6);
 }
 
 TEST(Insertion, RetractionAndRestsKeepTheirPlace) {

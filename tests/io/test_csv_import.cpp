@@ -1,14 +1,19 @@
+#include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
 #include <filesystem>
+#include <functional>
 
 #include "io/csv_export.hpp"
 #include "io/csv_import.hpp"
+#include "tests/support/run_program.hpp"
 #include "tests/support/shared_recordings.hpp"
 #include "tests/support/temporary_folder.hpp"
 
 namespace bevel::io {
 namespace {
+
+using ::testing::HasSubstr;
 
 class CsvImport : public ::testing::Test {
  protected:
@@ -75,6 +80,119 @@ TEST_F(CsvImport, FaultsNameFileLineColumnAndTheNearestName) {
             std::string::npos);
 }
 
+// A CSV of time, depth, roll and tip, a row each 0.1 s.
+class PlainCsv : public CsvImport {
+ protected:
+  std::string columns =
+      file("plain.toml",
+           "[time]\nseconds = \"t\"\nnanoseconds = \"ns\"\n[tip]\naxes = [\"x\", \"y\", \"z\"]\n"
+           "sigma_mm = [0.1, 0.1, 0.2]\n[insertion]\ncolumn = \"depth\"\n[rotation]\ncolumn = \"roll\"\n");
+  std::string csv(const std::function<void(int, std::vector<std::string>&)>& change = [](int, auto&) {}) const {
+    std::string text = "t,ns,depth,roll,x,y,z\n";
+    for (int i = 0; i < 40; ++i) {
+      const std::string depth = std::to_string(0.5 * i);
+      std::vector<std::string> cells{std::to_string(1'700'000'000 + i), "0", depth, "0.1", "0", "0", depth};
+      change(i, cells);
+      for (std::size_t c = 0; c < cells.size(); ++c) text += (c > 0 ? "," : "") + cells[c];
+      text += '\n';
+    }
+    return file("plain.csv", text);
+  }
+  test::Said import(const std::string& path) const {
+    return test::run_program(folder, "bevel-import",
+                             "-c " + columns + " -o " + (folder / "logs").string() + " " + path);
+  }
+  std::string log() const { return (folder / "logs/plain.lcm").string(); }
+};
+
+TEST_F(PlainCsv, ReadsBackIntact) {
+  const test::Said said = import(csv());
+  EXPECT_EQ(said.status, 0) << said.err;
+  EXPECT_EQ(said.err, "");
+  const Recording back = read_recording(log());
+  EXPECT_TRUE(back.intact()) << back.describe_faults();
+  EXPECT_EQ(back.actuators.size(), 40U);
+  EXPECT_EQ(back.actuators.front().utime, 1'700'000'000'000'000);
+}
+
+TEST_F(PlainCsv, ATimeThatStartsAtZeroOrBelowIsShiftedAndThatIsSaid) {
+  for (const int start : {0, -7, -100}) {
+    const test::Said said = import(csv([start](int i, auto& cells) { cells[0] = std::to_string(start + i); }));
+    EXPECT_EQ(said.status, 0) << said.err;
+    EXPECT_THAT(said.err, HasSubstr("plain.csv: time starts at " + std::to_string(start) + " s"));
+    EXPECT_THAT(said.err, HasSubstr("shifted by " + std::to_string(1 - start) + " s"));
+    const Recording back = read_recording(log());
+    EXPECT_TRUE(back.intact()) << back.describe_faults();
+    ASSERT_EQ(back.tips.size(), 40U);
+    EXPECT_EQ(back.tips.front().utime, 1'000'000);
+    EXPECT_EQ(back.tips.back().utime, 40'000'000);
+  }
+}
+
+TEST_F(PlainCsv, WhatReadersWouldRefuseIsRefusedWithItsPlaceAndLeavesNoFile) {
+  struct Case {
+    std::size_t column;
+    std::string value, said;
+  };
+  for (const Case& wrong : {Case{0, "9e18", "column 't' is '9e18', outside what is allowed, -1e+10 to 1e+10 s"},
+                            {1, "-3", "column 'ns' is '-3', outside what is allowed, 0 to 1e+09 ns"},
+                            {2, "1e308", "column 'depth' is '1e308', outside what is allowed, -1e+05 to 1e+05 mm"},
+                            {3, "-2e7", "column 'roll' is '-2e7', outside what is allowed, -1e+07 to 1e+07 rad"},
+                            {5, "1e6", "column 'y' is '1e6', outside what is allowed, -1e+05 to 1e+05 mm"},
+                            {6, "nan", "column 'z' is 'nan', not a finite number"},
+                            {0, "1700000003", "column 't' is '1700000003', but time does not grow"}}) {
+    const test::Said said = import(csv([&wrong](int i, auto& cells) {
+      if (i == 20) cells[wrong.column] = wrong.value;
+    }));
+    EXPECT_EQ(said.status, 1) << wrong.value;
+    EXPECT_THAT(said.err, HasSubstr("plain.csv:22: " + wrong.said));
+    EXPECT_TRUE(std::filesystem::is_empty(folder / "logs")) << wrong.value;
+  }
+}
+
+TEST_F(PlainCsv, AnImplausibleRowIsLeftOutAndSaidAJumpThatLastsIsRefused) {
+  const test::Said spike = import(csv([](int i, auto& cells) {
+    if (i == 20) cells[2] = "800";
+    if (i == 30) cells[4] = "-999";
+  }));
+  EXPECT_EQ(spike.status, 3);
+  EXPECT_THAT(spike.err,
+              HasSubstr("plain.csv:22: insertion jumps by 790.5 mm in 1 s; allowed 250.5 mm; the row is left"));
+  EXPECT_THAT(spike.err, HasSubstr("plain.csv:32: the tip jumps by 999 mm"));
+  const Recording back = read_recording(log());
+  EXPECT_TRUE(back.intact()) << back.describe_faults();
+  EXPECT_EQ(back.actuators.size(), 38U);
+  EXPECT_NEAR(back.actuators[20].insertion_rate_mm_s, 0.5, 1e-9) << "over the row left out";
+
+  std::filesystem::remove(log());
+  const test::Said jump = import(csv([](int i, auto& cells) {
+    if (i >= 20) cells[2] = std::to_string(800 + i);
+  }));
+  EXPECT_EQ(jump.status, 1);
+  EXPECT_THAT(jump.err, HasSubstr("plain.csv:22: insertion jumps by 810.5 mm"));
+  EXPECT_TRUE(std::filesystem::is_empty(folder / "logs"));
+}
+
+TEST_F(PlainCsv, AFolderThatCannotBeWrittenToIsNamedAndNothingIsLeft) {
+  std::filesystem::create_directories(folder / "logs/plain.lcm/in-the-way");
+  const test::Said said = import(csv());
+  EXPECT_EQ(said.status, 1);
+  EXPECT_THAT(said.err, HasSubstr("plain.lcm"));
+  EXPECT_FALSE(std::filesystem::exists(log() + ".unfinished"));
+}
+
+TEST_F(PlainCsv, SigmasWithoutInformationThatReadersAcceptAreRefused) {
+  const std::string wild = file("wild.toml",
+                                "[time]\nrate_hz = 30.0\n[tip]\naxes = [\"x\", \"y\", \"z\"]\n"
+                                "sigma_mm = [1e-9, 0.1, 0]\n[insertion]\ncolumn = \"depth\"\n");
+  try {
+    load_column_map(wild);
+    FAIL() << "taken";
+  } catch (const ConfigError& e) {
+    EXPECT_THAT(e.what(), HasSubstr("tip.sigma_mm: is 1e-09"));
+  }
+}
+
 TEST_F(CsvImport, RealInsertionsBecomeLogsOfTwentyOneSteps) {
   const std::filesystem::path real = test::shared_recordings() / "real/bwh";
   BEVEL_SKIP_WITHOUT(real);
@@ -85,6 +203,9 @@ TEST_F(CsvImport, RealInsertionsBecomeLogsOfTwentyOneSteps) {
     ++files;
     const ImportedRecording r = import_csv(entry.path().string(), columns);
     EXPECT_EQ(r.tips.size(), 21u) << entry.path();
+    write_log(r, (folder / "real.lcm").string());
+    const Recording back = read_recording((folder / "real.lcm").string());
+    EXPECT_TRUE(back.intact() && r.remarks("").empty()) << entry.path() << back.describe_faults() << r.remarks("");
     EXPECT_EQ(r.actuators.back().insertion_mm, 100) << entry.path();
     for (std::size_t i = 1; i < r.tips.size(); ++i)
       EXPECT_NEAR(r.tips[i].position_mm.z(), r.actuators[i].insertion_mm, 4.0) << entry.path() << " step " << i;

@@ -6,6 +6,7 @@
 #include <cstdlib>
 #include <random>
 #include <set>
+#include <span>
 
 #include "io/log_reader.hpp"
 #include "io/log_writer.hpp"
@@ -137,6 +138,64 @@ TEST(Log, flipped_at_every_byte_costs_at_most_one_event) {
   }
 }
 
+// What a flipped byte can do to an axis without a word is no more than the axis could do between two samples.
+TEST(Recording, a_flipped_byte_moves_no_axis_in_silence) {
+  const TemporaryLog file("axes.lcm");
+  constexpr std::int64_t kSamples = 24;
+  {
+    LogWriter writer(file.path());
+    for (std::int64_t i = 1; i <= kSamples; ++i) {
+      actuator_state_t message = actuator(i);
+      message.insertion_mm = 20 + 0.1 * static_cast<double>(i);  // 10 mm/s
+      message.rotation_rad = 1 + 0.02 * static_cast<double>(i);  // 2 rad/s
+      writer.write_message(message.utime, channel::kActuatorState, message);
+      if (i % 3 == 0) writer.write_message(message.utime, channel::kTipMeasurement, tip(i / 3));
+    }
+    writer.close();
+  }
+  const Bytes log = file.bytes();
+  const Recording original = read_recording(log);
+  ASSERT_TRUE(original.intact()) << original.describe_faults();
+  int told = 0, flips = 0;
+  double largest_mm = 0, largest_rad = 0;
+  for (std::size_t at = 0; at < log.size(); ++at)
+    for (const std::uint8_t mask : {0x01, 0x10, 0x40, 0x80, 0xff}) {
+      Bytes flipped = log;
+      flipped[at] ^= mask;
+      const Recording recording = read_recording(flipped);
+      EXPECT_EQ(recording.refusal(), "") << "byte " << at << " mask " << int{mask};
+      EXPECT_GE(recording.actuators.size() + 1, original.actuators.size()) << "byte " << at << " mask " << int{mask};
+      EXPECT_EQ(recording.intact(), recording.remarks("x").empty());
+      ++flips;
+      if (!recording.intact()) ++told;
+      for (const auto& a : recording.actuators) {
+        const auto same = std::ranges::find(original.actuators, a.seq, &model::ActuatorState::seq);
+        if (same == original.actuators.end() || a.seq == 1 || a.seq == kSamples) continue;  // one neighbour only
+        largest_mm = std::max(largest_mm, std::abs(a.insertion_mm - same->insertion_mm));
+        largest_rad = std::max(largest_rad, std::abs(a.rotation_rad - same->rotation_rad));
+      }
+    }
+  std::printf("%d of %d flipped bytes told; of the others the largest moves an axis by %.2f mm, %.2f rad\n", told,
+              flips, largest_mm, largest_rad);
+  EXPECT_LT(largest_mm, 1);
+  EXPECT_LT(largest_rad, 0.5);
+}
+
+TEST(Recording, cut_at_every_byte_it_is_damaged_unless_the_cut_is_between_events) {
+  const Bytes log = small_log();
+  LogDamage damage;
+  std::set<std::size_t> ends{0};
+  for (const auto& event : read_all(log, damage))
+    ends.insert(event.offset + 28 + event.channel.size() + event.data.size());
+  for (std::size_t size = 0; size <= log.size(); ++size) {
+    const Recording recording = read_recording(std::span(log).first(size));
+    EXPECT_EQ(recording.intact(), ends.count(size) == 1) << "cut at " << size;
+    const bool has_message = recording.tips.size() + recording.actuators.size() > 0;
+    EXPECT_EQ(recording.refusal().empty(), has_message) << "cut at " << size;
+  }
+  EXPECT_THAT(read_recording(std::span(log).first(0)).refusal(), ::testing::HasSubstr("the file is empty"));
+}
+
 TEST(Log, damage_of_several_bytes_and_rubbish_between_events_are_skipped_and_counted) {
   const Bytes log = small_log();
   LogDamage damage;
@@ -178,9 +237,24 @@ TEST(Log, random_bytes_full_of_magics_are_read_in_linear_time) {
 }
 
 TEST(Log, files_that_cannot_be_opened_are_named) {
-  EXPECT_THROW(MappedFile("/nonexistent.lcm"), std::runtime_error);
-  EXPECT_THROW(MappedFile("/tmp"), std::runtime_error);
+  EXPECT_THROW(read_recording("/nonexistent.lcm"), std::runtime_error);
+  EXPECT_THROW(read_recording("/tmp"), std::runtime_error);
   EXPECT_THROW(LogWriter("/nonexistent/out.lcm"), std::runtime_error);
+}
+
+TEST(Log, a_full_disk_is_said_with_the_files_name) {
+  const auto fill = [](int messages) -> std::string {
+    try {
+      LogWriter writer("/dev/full");
+      for (std::int64_t i = 1; i <= messages; ++i) writer.write_message(i, channel::kActuatorState, actuator(i));
+      writer.close();
+    } catch (const std::runtime_error& e) {
+      return e.what();
+    }
+    return "written";
+  };
+  EXPECT_EQ(fill(1), "/dev/full: cannot be written: No space left on device");       // at close()
+  EXPECT_EQ(fill(10'000), "/dev/full: cannot be written: No space left on device");  // at a write()
 }
 
 TEST(Recording, sorts_channels_counts_rejects_and_skips_what_it_does_not_know) {

@@ -3,6 +3,7 @@
 
 #include <random>
 
+#include "io/file_bytes.hpp"
 #include "io/log_reader.hpp"
 #include "io/log_writer.hpp"
 #include "nodes/estimator_node.hpp"
@@ -62,7 +63,7 @@ TEST(LiveReplay, TheNodesStatesAreThoseOfAReplayOfItsLog) {
     }
     log.close();
   }
-  const io::MappedFile file(path);
+  const io::FileBytes file(path);
   const auto replay = replay::replay_log(file.bytes(), "live", config);
 
   ASSERT_EQ(live.size(), replay.states.size());

@@ -16,6 +16,7 @@ int main(int argc, char** argv) {
       "bevel-close-the-loop",
       "Diagnoses a case, and shows what rig, estimator and controller make of the model before and after.");
   command_line.arguments("CASE", folders, "folder with model.toml and rec*.lcm")
+      .reads_recordings()
       .option("-o,--out", o.out_folder, "folder for the results; out/close-the-loop/CASE if not given")
       .option("-c,--config", o.estimator_path, "the estimator's settings for the replays (TOML)")
       .option("--seed", o.diagnosis_seed, "of the diagnosis", 0, 1'000'000'000)
@@ -28,6 +29,6 @@ int main(int argc, char** argv) {
     o.folder = folders.front();
     if (o.out_folder.empty())
       o.out_folder = "out/close-the-loop/" + std::filesystem::weakly_canonical(o.folder).filename().string();
-    return bevel::close_loop::run(o, std::cout);
+    return bevel::close_loop::run(o, std::cout, std::cerr);
   });
 }

@@ -1,9 +1,11 @@
 #include "tools/close_loop/close_loop.hpp"
 
 #include <ostream>
+#include <utility>
 
 #include "io/estimator_config.hpp"
 #include "tools/close_loop/report.hpp"
+#include "tools/common/exit_status.hpp"
 #include "tools/diagnose/diagnose_tool.hpp"
 #include "tools/diagnose/progress.hpp"
 #include "tools/diagnose/read_case.hpp"
@@ -24,7 +26,7 @@ estimator::EstimatorConfig load_estimator(const std::string& path) {
 
 }  // namespace
 
-ClosedLoop close_the_loop(const Options& options) {
+ClosedLoop close_the_loop(const Options& options, std::ostream& err) {
   const CaseFiles files = find_case(options.folder);
   const estimator::EstimatorConfig estimator = load_estimator(options.estimator_path);
   ClosedLoop loop;
@@ -36,7 +38,9 @@ ClosedLoop close_the_loop(const Options& options) {
   diagnosis.bootstrap_draws = options.diagnosis_draws;
   diagnosis.threads = options.threads;
   diagnosis.quiet = options.quiet;
-  loop.findings = diagnose::find(diagnosis);
+  diagnose::Found found = diagnose::find(diagnosis, err);
+  loop.findings = std::move(found.findings);
+  loop.input_damaged = found.input_damaged;
   const diagnosis::Findings& findings = loop.findings;
 
   // Through the file and back: what is shown is what the other programs will read.
@@ -70,13 +74,13 @@ void write_results(const ClosedLoop& loop, const std::string& model_path, const 
                                         {"close-the-loop.json", to_json(loop)}});
 }
 
-int run(const Options& options, std::ostream& out) {
+int run(const Options& options, std::ostream& out, std::ostream& err) {
   diagnose::check_writable(options.out_folder);
-  const ClosedLoop loop = close_the_loop(options);
+  const ClosedLoop loop = close_the_loop(options, err);
   write_results(loop, find_case(options.folder).model_path, options.out_folder);
   out << table_text(loop) << "\nwritten: " << options.out_folder
       << "/close-the-loop.html, close-the-loop.json, and the diagnosis: verdict.json, report.html, model.toml\n";
-  return 0;
+  return loop.input_damaged ? tools::kDamagedInput : tools::kOk;
 }
 
 }  // namespace bevel::close_loop

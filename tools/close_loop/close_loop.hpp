@@ -30,6 +30,7 @@ struct EstimatorFigures {
 struct ClosedLoop {
   std::string case_name;
   diagnosis::Findings findings;
+  bool input_damaged = false;  // as in diagnose::Found
   Models models;
   std::array<RigFigure, kStages> rig;
   EstimatorFigures estimator;
@@ -37,14 +38,14 @@ struct ClosedLoop {
 };
 
 // Throws std::runtime_error, std::invalid_argument or io::ConfigError with one sentence for a case that cannot be used.
-// Writes nothing.
-ClosedLoop close_the_loop(const Options& options);
+// Writes nothing, and says on `err` what of the input is damaged.
+ClosedLoop close_the_loop(const Options& options, std::ostream& err);
 
 // The mismatch tool's three files, close-the-loop.json and close-the-loop.html, all or none. Throws std::runtime_error
 // naming the file and the reason.
 void write_results(const ClosedLoop& loop, const std::string& model_path, const std::string& out_folder);
 
 // All of it, the table on `out`. Returns the exit status.
-int run(const Options& options, std::ostream& out);
+int run(const Options& options, std::ostream& out, std::ostream& err);
 
 }  // namespace bevel::close_loop

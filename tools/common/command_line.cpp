@@ -3,6 +3,8 @@
 #include <CLI/CLI.hpp>
 #include <cstdio>
 
+#include "tools/common/exit_status.hpp"
+
 namespace bevel::tools {
 
 struct CommandLine::Impl {
@@ -68,6 +70,11 @@ CommandLine& CommandLine::flag(const std::string& names, bool& value, const std:
   return *this;
 }
 
+CommandLine& CommandLine::reads_recordings() {
+  impl_->app.footer("Exit status: 0 ok, 1 failed, 2 usage, 3 done, but the input was damaged (said on stderr).");
+  return *this;
+}
+
 CommandLine& CommandLine::arguments(const std::string& name, std::vector<std::string>& values, const std::string& help,
                                     bool required) {
   impl_->app.add_option(name, values, help)->required(required);
@@ -80,13 +87,13 @@ int CommandLine::run(int argc, char** argv, const std::function<int()>& body) {
     for (const auto& check : impl_->checks)
       if (const std::string problem = check(); !problem.empty()) throw CLI::ValidationError(problem);
   } catch (const CLI::ParseError& e) {
-    return impl_->app.exit(e) == 0 ? 0 : 2;
+    return impl_->app.exit(e) == 0 ? kOk : kUsage;
   }
   try {
     return body();
   } catch (const std::exception& e) {
     std::fprintf(stderr, "%s: %s\n", impl_->app.get_name().c_str(), e.what());
-    return 1;
+    return kFailed;
   }
 }
 

@@ -1,6 +1,6 @@
 #pragma once
 // Command lines for all programs, with CLI11 behind it: that header costs ten seconds a main, here it is compiled once.
-// Exit status everywhere: 0 ok, 1 failed, 2 usage.
+// Exit status everywhere: 0 ok, 1 failed, 2 usage; of what reads recordings also 3, see exit_status.hpp.
 #include <functional>
 #include <memory>
 #include <optional>
@@ -29,6 +29,9 @@ class CommandLine {
   // Arguments without a name, at least one of them if required.
   CommandLine& arguments(const std::string& name, std::vector<std::string>& values, const std::string& help,
                          bool required = true);
+
+  // Says in --help what status 3 means.
+  CommandLine& reads_recordings();
 
   // For what one option alone cannot say: `problem` is asked after parsing; text it returns is a usage error.
   CommandLine& check(std::function<std::string()> problem);

@@ -6,6 +6,7 @@
 #include <numbers>
 #include <stdexcept>
 
+#include "io/file_bytes.hpp"
 #include "io/log_reader.hpp"
 #include "io/messages.hpp"
 
@@ -33,7 +34,7 @@ double rate_hz(std::size_t count, std::int64_t first_utime, std::int64_t last_ut
 
 // Latencies need the times of arrival, which only the log's events carry.
 void measure_latencies(const std::string& log_path, LoopFigures& f) {
-  const io::MappedFile file(log_path);
+  const io::FileBytes file(log_path);
   io::LogReader reader(file.bytes());
   std::vector<double> to_measurement, to_command, periods;
   std::int64_t newest_used = 0, answered = 0, last_command = 0;

@@ -7,6 +7,7 @@
 
 #include "diagnosis/mismatch/diagnose.hpp"
 #include "io/model_file.hpp"
+#include "tools/common/exit_status.hpp"
 #include "tools/diagnose/figures.hpp"
 #include "tools/diagnose/progress.hpp"
 #include "tools/diagnose/read_case.hpp"
@@ -42,11 +43,12 @@ std::string listed(const std::vector<std::string>& names) {
 
 }  // namespace
 
-Findings find(const Options& options) {
+Found find(const Options& options, std::ostream& err) {
   Progress progress(options.quiet ? nullptr : stderr);
   const io::ModelFile model = load_model(options.model_path);
   progress.say("reading " + std::to_string(options.logs.size()) + " logs");
   ReadCase input = read_case(options.logs);
+  for (const auto& remark : input.remarks) err << remark << std::endl;  // before the minutes of work
   const double reading_s = progress.seconds();
   DiagnosisOptions how;
   how.seed = static_cast<std::uint64_t>(options.seed);
@@ -56,7 +58,7 @@ Findings find(const Options& options) {
   Findings findings = diagnosis::diagnose(input.recorded, model.needle, how);
   findings.remarks.insert(findings.remarks.begin(), input.remarks.begin(), input.remarks.end());
   findings.times.insert(findings.times.begin(), {"reading the logs", reading_s});
-  return findings;
+  return {std::move(findings), !input.remarks.empty()};
 }
 
 void print_verdict(std::ostream& out, const Findings& f) {
@@ -82,15 +84,16 @@ void print_verdict(std::ostream& out, const Findings& f) {
   out << "  seed " << f.seed << '\n';
 }
 
-int run(const Options& options, std::ostream& out) {
+int run(const Options& options, std::ostream& out, std::ostream& err) {
   check_writable(options.out_folder);
-  const Findings findings = find(options);
+  const Found found = find(options, err);
+  const Findings& findings = found.findings;
   write_together(options.out_folder, {{"report.html", report_html(findings, options.model_path)},
                                       {"model.toml", io::to_toml(model_of(findings))},
                                       {"verdict.json", verdict_json(findings)}});
   print_verdict(out, findings);
   out << "\nwritten: " << options.out_folder << "/verdict.json, report.html, model.toml\n";
-  return 0;
+  return found.input_damaged ? tools::kDamagedInput : tools::kOk;
 }
 
 }  // namespace bevel::diagnose

@@ -18,13 +18,18 @@ struct Options {
   bool quiet = false;  // no progress on stderr
 };
 
+struct Found {
+  diagnosis::Findings findings;
+  bool input_damaged = false;  // so that it did not stand in the way; the findings' remarks say how
+};
+
 // Throws std::runtime_error or std::invalid_argument with one sentence for input that cannot be diagnosed. Writes
-// nothing.
-diagnosis::Findings find(const Options& options);
+// nothing, and says on `err` what of the input is damaged.
+Found find(const Options& options, std::ostream& err);
 
 void print_verdict(std::ostream& out, const diagnosis::Findings& findings);
 
 // All of it; returns the exit status.
-int run(const Options& options, std::ostream& out);
+int run(const Options& options, std::ostream& out, std::ostream& err);
 
 }  // namespace bevel::diagnose

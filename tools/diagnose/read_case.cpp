@@ -6,7 +6,7 @@
 #include <map>
 #include <stdexcept>
 
-#include "io/log_reader.hpp"
+#include "io/file_bytes.hpp"
 #include "tools/diagnose/figures.hpp"
 
 namespace bevel::diagnose {
@@ -69,13 +69,11 @@ void check_each_once(const std::vector<std::string>& logs) {
 
 }  // namespace
 
-std::string judge_damage(const std::string& name, const io::Recording& recording, std::size_t bytes) {
+std::string judge_damage(const std::string& name, const io::Recording& recording) {
+  io::require_usable(name, recording);
   const std::string faults = one_line(recording.describe_faults());
-  if (recording.events == 0)
-    throw std::runtime_error(name + ": no LCM event in its " + std::to_string(bytes) + " bytes; " +
-                             (bytes == 0 ? "the file is empty" : "not a log, or damaged throughout"));
   const double lost = static_cast<double>(recording.damage.skipped_bytes + recording.damage.torn_tail_bytes);
-  if (lost > kLargestLoss * static_cast<double>(bytes) ||
+  if (lost > kLargestLoss * static_cast<double>(recording.bytes) ||
       lost_much(refused_on(recording, "TIP_MEASUREMENT"), recording.tips.size()) ||
       lost_much(refused_on(recording, "ACTUATOR_STATE"), recording.actuators.size()))
     throw std::runtime_error(name + ": damaged beyond use (" + faults + "); at most " + percent(kLargestLoss) +
@@ -89,17 +87,18 @@ ReadCase read_case(const std::vector<std::string>& logs) {
   check_each_once(logs);
   ReadCase result;
   std::vector<diagnosis::RawRecording> raw;
-  std::vector<std::unique_ptr<io::MappedFile>> files;
+  std::vector<io::FileBytes> files;
   for (std::size_t i = 0; i < logs.size(); ++i) {
-    files.push_back(std::make_unique<io::MappedFile>(logs[i]));
-    const auto bytes = files.back()->bytes();
+    files.emplace_back(logs[i]);
+    const auto bytes = files.back().bytes();
     for (std::size_t k = 0; k < i; ++k)
-      if (!bytes.empty() && std::ranges::equal(bytes, files[k]->bytes()))
+      if (!bytes.empty() && std::ranges::equal(bytes, files[k].bytes()))
         throw std::runtime_error(logs[i] + ": the same recording as " + logs[k] +
                                  "; counted twice it would make everything look surer than it is");
     io::Recording recording = io::read_recording(bytes);
+    recording.file_change = files.back().change();
     const std::string name = fs::path(logs[i]).filename().string();
-    const std::string remark = judge_damage(name, recording, bytes.size());
+    const std::string remark = judge_damage(name, recording);
     if (!remark.empty()) result.remarks.push_back(remark);
     raw.push_back({name, std::move(recording.actuators), std::move(recording.tips)});
   }

@@ -20,6 +20,6 @@ ReadCase read_case(const std::vector<std::string>& logs);
 
 // What of a log is missing: "" if nothing, a remark if it does not matter; throws if it does, a motion unknown for a
 // while above all: physics would be blamed for it.
-std::string judge_damage(const std::string& name, const io::Recording& recording, std::size_t bytes);
+std::string judge_damage(const std::string& name, const io::Recording& recording);
 
 }  // namespace bevel::diagnose

@@ -9,6 +9,7 @@ int main(int argc, char** argv) {
   bevel::tools::CommandLine command_line("bevel-identify",
                                          "The needle's parameters from recorded insertions, with their uncertainty.");
   command_line.arguments("LOG", o.logs, "logs, one insertion each")
+      .reads_recordings()
       .option("-m,--model", o.model_path, "model file to start from (TOML); what is not fitted stays", true)
       .option("-o,--out", o.out_folder, "folder for model.toml, figures.json and report.html")
       .choice("--method", o.method, "trajectory (default) or angle-rate, as printed in the paper",
@@ -22,5 +23,5 @@ int main(int argc, char** argv) {
       .non_negative("--entry-offset-mm", o.entry_offset_mm, "standard deviation of each entry's lateral place")
       .non_negative("--late-entry-mm", o.late_entry_mm,
                     "standard deviation of the insertion at which the tip met the tissue");
-  return command_line.run(argc, argv, [&] { return bevel::identify::run(o, std::cout); });
+  return command_line.run(argc, argv, [&] { return bevel::identify::run(o, std::cout, std::cerr); });
 }

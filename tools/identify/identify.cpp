@@ -8,6 +8,7 @@
 
 #include "io/model_file.hpp"
 #include "io/recording.hpp"
+#include "tools/common/exit_status.hpp"
 
 namespace bevel::identify {
 
@@ -30,14 +31,16 @@ FitOptions fit_options(const Options& options, const model::NeedleParameters& st
   return options.bicycle ? bicycle_options(fit) : fit;
 }
 
-Insertion read_insertion(const std::string& path, std::vector<std::string>& faults) {
+Insertion read_insertion(const std::string& path, std::ostream& err, std::vector<std::string>& faults) {
   io::Recording recording = io::read_recording(path);
-  const std::string name = fs::path(path).stem().string();
-  if (!recording.intact()) faults.push_back(name + ": " + recording.describe_faults());
+  const std::string remarks = recording.remarks(path);
+  if (!remarks.empty()) faults.push_back(remarks.substr(0, remarks.size() - 1));
+  err << remarks;
+  io::require_usable(path, recording);
   const auto by_time = [](const auto& a, const auto& b) { return a.utime < b.utime; };
   std::stable_sort(recording.actuators.begin(), recording.actuators.end(), by_time);
   std::stable_sort(recording.tips.begin(), recording.tips.end(), by_time);
-  return make_insertion(name, recording.actuators, recording.tips);
+  return make_insertion(fs::path(path).stem().string(), recording.actuators, recording.tips);
 }
 
 void write_text(const fs::path& path, const std::string& text) {
@@ -47,7 +50,7 @@ void write_text(const fs::path& path, const std::string& text) {
 
 }  // namespace
 
-Identification identify(const Options& options) {
+Identification identify(const Options& options, std::ostream& err) {
   const io::ModelFile model = io::load_model_file(options.model_path);
   if (!model.effects.empty())
     throw std::runtime_error(options.model_path + ": has [[effect]] \"" + model.effects.front().name +
@@ -56,7 +59,7 @@ Identification identify(const Options& options) {
   result.start = model.needle;
   result.method = options.method;
   result.prior = options.prior;
-  for (const auto& log : options.logs) result.insertions.push_back(read_insertion(log, result.faults));
+  for (const auto& log : options.logs) result.insertions.push_back(read_insertion(log, err, result.faults));
 
   const FitOptions fit = fit_options(options, model.needle);
   result.fit = fit_from_many_starts(result.insertions, fit);
@@ -83,8 +86,8 @@ Identification identify(const Options& options) {
   return result;
 }
 
-int run(const Options& options, std::ostream& out) {
-  const Identification result = identify(options);
+int run(const Options& options, std::ostream& out, std::ostream& err) {
+  const Identification result = identify(options, err);
   print_table(out, result);
   if (!options.out_folder.empty()) {
     const fs::path folder(options.out_folder);
@@ -94,7 +97,8 @@ int run(const Options& options, std::ostream& out) {
     save_report(result, (folder / "report.html").string());
     out << "\nwritten: " << (folder / "model.toml").string() << ", figures.json, report.html\n";
   }
-  return result.fit.converged ? 0 : 1;
+  if (!result.fit.converged) return tools::kFailed;
+  return result.faults.empty() ? tools::kOk : tools::kDamagedInput;
 }
 
 }  // namespace bevel::identify

@@ -38,12 +38,13 @@ struct Identification {
   diagnosis::ErrorFigures before, after;
 };
 
-Identification identify(const Options& options);
+// What is wrong with a log goes to `err` as well as into the report.
+Identification identify(const Options& options, std::ostream& err);
 void print_table(std::ostream& out, const Identification& result);
 std::string figures_json(const Identification& result);
 void save_report(const Identification& result, const std::string& path);
 
 // All of it; returns the exit status.
-int run(const Options& options, std::ostream& out);
+int run(const Options& options, std::ostream& out, std::ostream& err);
 
 }  // namespace bevel::identify

@@ -12,6 +12,7 @@ int main(int argc, char** argv) {
       "Integrates the model with its effects from ACTUATOR_STATE alone; CSV on stdout, one line per TIP_MEASUREMENT.");
   command_line.option("-m,--model", model_path, "model file (TOML)", true)
       .arguments("LOG", logs, "the log, one insertion")
+      .reads_recordings()
       .check([&]() -> std::string { return logs.size() > 1 ? "one LOG at a time" : ""; });
   return command_line.run(argc, argv,
                           [&] { return bevel::predict::run(model_path, logs.front(), std::cout, std::cerr); });

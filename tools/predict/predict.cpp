@@ -10,6 +10,7 @@
 
 #include "io/model_file.hpp"
 #include "io/recording.hpp"
+#include "tools/common/exit_status.hpp"
 
 namespace bevel::predict {
 namespace {
@@ -53,7 +54,8 @@ std::vector<Prediction> predict(const model::AugmentedNeedle& needle, std::span<
 int run(const std::string& model_path, const std::string& log_path, std::ostream& out, std::ostream& err) {
   const io::ModelFile model = io::load_model_file(model_path);
   const io::Recording recording = io::read_recording(log_path);
-  if (!recording.intact()) err << log_path << ": damaged; " << recording.describe_faults() << '\n';
+  err << recording.remarks(log_path);
+  io::require_usable(log_path, recording);
   const model::AugmentedNeedle needle(model.needle, io::active_effects(model, log_path));
   std::vector<Prediction> predictions;
   try {
@@ -69,7 +71,7 @@ int run(const std::string& model_path, const std::string& log_path, std::ostream
     out << line.data();
   }
   if (!(out << std::flush)) throw std::runtime_error("the output cannot be written");
-  return recording.intact() ? 0 : 1;
+  return recording.intact() ? tools::kOk : tools::kDamagedInput;
 }
 
 }  // namespace bevel::predict

@@ -20,7 +20,7 @@ struct Prediction {
 std::vector<Prediction> predict(const model::AugmentedNeedle& needle, std::span<const model::ActuatorState> actuators,
                                 std::span<const model::TipMeasurement> tips);
 
-// All of it; returns the exit status: 1 for a damaged log, whose readable part is predicted all the same.
+// All of it; returns the exit status: 3 for a damaged log, whose readable part is predicted all the same.
 int run(const std::string& model_path, const std::string& log_path, std::ostream& out, std::ostream& err);
 
 }  // namespace bevel::predict

@@ -40,11 +40,15 @@ std::vector<Replay> replay_logs(const std::vector<std::string>& logs,
 std::vector<Replay> replay_logs(const std::vector<std::string>& logs, const estimator::EstimatorConfig& config,
                                 const ReplayOptions& options = {});
 
-// Prints, writes, and returns the exit status: 1 if a log was damaged or a message refused.
-int run(const BatchOptions& options, std::ostream& out, std::ostream& speed);
+// Says on `err` what is damaged. Returns the exit status so far: 3 if anything is, else 0.
+int tell_damage(const std::vector<Replay>& replays, std::ostream& err);
+
+// Prints, writes, and returns the exit status. Damage and speed go to `err`, so that the output of the same logs is the
+// same bytes.
+int run(const BatchOptions& options, std::ostream& out, std::ostream& err);
 
 // For each case: the camera's noise measured without the model, innovations under that noise, and whether they are
 // what a complete model would leave.
-int run_cases(const BatchOptions& options, std::ostream& out);
+int run_cases(const BatchOptions& options, std::ostream& out, std::ostream& err);
 
 }  // namespace bevel::replay

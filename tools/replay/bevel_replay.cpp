@@ -10,6 +10,7 @@ int main(int argc, char** argv) {
   bevel::tools::CommandLine command_line(
       "bevel-replay", "Replays logs through the estimator: consistency, parameters, error against the truth.");
   command_line.arguments("LOG", options.paths, "logs, or folders of them; with --cases folders of cases")
+      .reads_recordings()
       .option("-m,--model", options.model_path, "model file (TOML); not with --cases")
       .option("-s,--system", options.system_path, "instead of -m and -c: the rig's file, with its estimator's settings")
       .option("-c,--config", options.config_path, "estimator settings (TOML); see docs/estimator.md")
@@ -25,7 +26,7 @@ int main(int argc, char** argv) {
         if (options.cases && options.held_out) return "--cases excludes --held-out";
         return options.system_path.empty() || options.config_path.empty() ? "" : "--system excludes --config";
       });
-  // Speed goes to stderr, so that the output of the same logs is the same bytes.
-  return command_line.run(
-      argc, argv, [&] { return options.cases ? run_cases(options, std::cout) : run(options, std::cout, std::cerr); });
+  return command_line.run(argc, argv, [&] {
+    return options.cases ? run_cases(options, std::cout, std::cerr) : run(options, std::cout, std::cerr);
+  });
 }

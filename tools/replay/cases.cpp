@@ -19,9 +19,10 @@ struct CaseFigures {
   ChiSquareMean white;  // after its measured colour and size
   int series = 0, coloured = 0;
   std::int64_t rejected = 0, measurements = 0;
+  int status = 0;  // of the program: whether logs were damaged
 };
 
-CaseFigures figures_of(const std::string& folder, const BatchOptions& options) {
+CaseFigures figures_of(const std::string& folder, const BatchOptions& options, std::ostream& err) {
   const auto logs = find_logs({folder});
   BatchOptions own = options;
   own.model_path = (fs::path(folder) / "model.toml").string();
@@ -30,6 +31,7 @@ CaseFigures figures_of(const std::string& folder, const BatchOptions& options) {
   ReplayOptions calibrated;
   calibrated.effects = setup.effects;
   const auto first = replay_logs(logs, setup.config, calibrated);
+  result.status = tell_damage(first, err);
   for (int axis = 0; axis < 3; ++axis) {
     std::vector<std::vector<AxisSample>> readings;
     readings.reserve(first.size());
@@ -58,7 +60,7 @@ CaseFigures figures_of(const std::string& folder, const BatchOptions& options) {
 
 }  // namespace
 
-int run_cases(const BatchOptions& options, std::ostream& out) {
+int run_cases(const BatchOptions& options, std::ostream& out, std::ostream& err) {
   std::vector<std::string> folders;
   for (const std::string& path : options.paths) {
     if (!fs::is_directory(path)) throw std::runtime_error(path + ": no such folder of cases");
@@ -69,8 +71,10 @@ int run_cases(const BatchOptions& options, std::ostream& out) {
   std::sort(folders.begin(), folders.end());
   out << "case      noise x y z (mm)    rho x y z          NIS as stated  NIS calibrated [95 % band]  not white  "
          "rejected   consistent\n";
+  int status = 0;
   for (const std::string& folder : folders) {
-    const CaseFigures f = figures_of(folder, options);
+    const CaseFigures f = figures_of(folder, options, err);
+    status = std::max(status, f.status);
     // Series that fail a test at 1 % although they are white: as many as happen by chance 99 times in 100.
     const boost::math::binomial by_chance(std::max(1, f.series), 0.01);
     const bool white = f.coloured <= boost::math::quantile(boost::math::complement(by_chance, 0.01));
@@ -85,7 +89,7 @@ int run_cases(const BatchOptions& options, std::ostream& out) {
         consistent ? "yes" : "NO");
     out << line;
   }
-  return 0;
+  return status;
 }
 
 }  // namespace bevel::replay

@@ -4,10 +4,10 @@
 #include <chrono>
 #include <cmath>
 #include <ctime>
+#include <stdexcept>
 #include <utility>
 
-#include "io/checked_decode.hpp"
-#include "io/messages.hpp"
+#include "io/recording.hpp"
 
 namespace bevel::replay {
 namespace {
@@ -132,52 +132,42 @@ Replay replay_log(std::span<const std::uint8_t> log, const std::string& name, co
   // An actuator state takes about 100 bytes of a log, a measurement 170.
   result.states.reserve(log.size() / 150 + 16);
   result.innovations.reserve(log.size() / 250 + 16);
-  std::vector<needle_state_t> truths;
   estimator::NeedleEstimator estimator(config, options.history);
   Sink sink{&result.innovations, &estimator.filter()};
   estimator.observe(&Sink::take, &sink);
 
   const auto start = std::chrono::steady_clock::now();
   const double start_processor_s = processor_s();
-  io::LogReader reader(log);
-  while (const auto event = reader.next()) {
-    if (event->channel == io::channel::kActuatorState) {
-      const auto message = io::checked_decode<actuator_state_t>(event->data.data(), event->data.size());
-      if (!message) {
-        ++result.refused_messages;
-        continue;
-      }
-      const model::ActuatorState actuator = io::to_sample(*message);
-      estimator.add(actuator);
-      const estimator::Estimate estimate = estimator.estimate(actuator.utime);
-      if (estimate.utime != actuator.utime) continue;
-      StateRow& row = result.states.emplace_back();
-      row.utime = actuator.utime;
-      row.insertion_mm = actuator.insertion_mm;
-      row.rotation_rad = actuator.rotation_rad;
-      row.state = estimate.state;
-      if (!config.effects.empty()) result.effects.push_back(estimate.state.effects);
-      row.test_ratio = estimate.newest_update.test_ratio;
-      row.health = estimate.health;
-    } else if (event->channel == io::channel::kTipMeasurement) {
-      const auto message = io::checked_decode<tip_measurement_t>(event->data.data(), event->data.size());
-      if (!message) {
-        ++result.refused_messages;
-        continue;
-      }
-      estimator.add(with_noise(io::to_sample(*message), options.noise_by_axis));
-    } else if (event->channel == io::channel::kNeedleTruth) {
-      const auto message = io::checked_decode<needle_state_t>(event->data.data(), event->data.size());
-      message ? truths.push_back(*message) : void(++result.refused_messages);
-    }
+  const io::Recording recording = io::read_recording(log);
+  io::require_usable(name, recording);
+  result.remarks = recording.remarks(name);
+  for (const io::Arrival& arrival : recording.arrivals) {
+    if (arrival.channel == io::Arrival::Channel::tip)
+      estimator.add(with_noise(recording.tips[arrival.index], options.noise_by_axis));
+    if (arrival.channel != io::Arrival::Channel::actuator) continue;
+    const model::ActuatorState& actuator = recording.actuators[arrival.index];
+    estimator.add(actuator);
+    const estimator::Estimate estimate = estimator.estimate(actuator.utime);
+    if (estimate.utime != actuator.utime) continue;
+    StateRow& row = result.states.emplace_back();
+    row.utime = actuator.utime;
+    row.insertion_mm = actuator.insertion_mm;
+    row.rotation_rad = actuator.rotation_rad;
+    row.state = estimate.state;
+    if (!config.effects.empty()) result.effects.push_back(estimate.state.effects);
+    row.test_ratio = estimate.newest_update.test_ratio;
+    row.health = estimate.health;
   }
   result.processor_s = processor_s() - start_processor_s;
   result.run_s = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
-  result.damage = reader.damage();
+  result.damage = recording.damage;
+  result.refused_messages = recording.rejected();
   result.counters = estimator.counters();
-  if (!result.states.empty())
-    result.log_s = static_cast<double>(result.states.back().utime - result.states.front().utime) * 1e-6;
-  compare(result, truths, estimator.filter());
+  if (result.states.empty())
+    throw std::runtime_error(name + ": no state estimated from its " + std::to_string(recording.actuators.size()) +
+                             " ACTUATOR_STATE messages; at least one is needed");
+  result.log_s = static_cast<double>(result.states.back().utime - result.states.front().utime) * 1e-6;
+  compare(result, recording.truths, estimator.filter());
   return result;
 }
 

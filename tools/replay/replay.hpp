@@ -67,9 +67,10 @@ struct Replay {
   estimator::Counters counters;
   std::int64_t refused_messages = 0;  // by the checked decode
   io::LogDamage damage;
-  TruthFigures truth;  // count 0: the log has no NEEDLE_TRUTH
-  double log_s = 0;    // newest minus oldest actuator state
-  double run_s = 0;    // wall time of decoding and estimating
+  std::string remarks;  // on damage of any kind, lines for stderr; "" if the log is intact
+  TruthFigures truth;   // count 0: the log has no NEEDLE_TRUTH
+  double log_s = 0;     // newest minus oldest actuator state
+  double run_s = 0;     // wall time of decoding and estimating
   double processor_s = 0;
   estimator::EstimatorConfig config;
   Foretold next;   // one measurement ahead; both by replay_logs, if asked
@@ -87,6 +88,8 @@ struct ReplayOptions {
   std::vector<io::EffectEntry> effects{};  // of the model file, for replay_logs: some are a recording's own
 };
 
+// Throws std::runtime_error, with the name, for a log of which nothing can be made: io::Recording::refusal(), or no
+// ACTUATOR_STATE.
 Replay replay_log(std::span<const std::uint8_t> log, const std::string& name, const estimator::EstimatorConfig& config,
                   const ReplayOptions& options = {});
 
