@@ -83,26 +83,29 @@ void SdoClient::download(ObjectAddress object, std::uint32_t value, std::uint8_t
 
 void SdoClient::cancel() {
   status_ = Status::idle;
-  abort_pending_ = false;
+  abort_.reset();
 }
 
-Frame SdoClient::abort_frame(std::uint32_t code) const {
+void SdoClient::give_up(Status end, std::uint32_t code) {
+  // Made now: when it is sent, the client may already be about another object.
   Frame frame{sdo_request_id(node_), 8, {kAbort}};
   put_u16(frame, 1, object_.index);
   frame.data[3] = object_.sub;
   put_u32(frame, 4, code);
-  return frame;
+  abort_ = frame;
+  abort_code_ = code;
+  status_ = end;
 }
 
 std::optional<Frame> SdoClient::frame_to_send() const {
-  if (abort_pending_) return abort_frame(abort_code_);
+  if (abort_) return abort_;
   if (status_ == Status::to_send) return request_;
   return std::nullopt;
 }
 
 void SdoClient::sent(std::int64_t now_ns) {
-  if (abort_pending_) {
-    abort_pending_ = false;
+  if (abort_) {
+    abort_.reset();
   } else if (status_ == Status::to_send) {
     status_ = Status::waiting;
     sent_ns_ = now_ns;
@@ -111,9 +114,7 @@ void SdoClient::sent(std::int64_t now_ns) {
 
 void SdoClient::check_time(std::int64_t now_ns) {
   if (status_ != Status::waiting || now_ns - sent_ns_ < timeout_ns_) return;
-  abort_code_ = kAbortTimeout;
-  abort_pending_ = true;
-  status_ = Status::timed_out;
+  give_up(Status::timed_out, kAbortTimeout);
 }
 
 void SdoClient::on_response(const Frame& frame) {
@@ -134,9 +135,7 @@ void SdoClient::on_response(const Frame& frame) {
     value_ = get_u32(frame, 4) & (0xFFFFFFFFU >> (8 * unused));
     status_ = Status::done;
   } else if (is_upload_ && (command & kUploadMask) == kUpload) {
-    abort_code_ = kAbortCommand;  // segmented: nothing read here is longer than 4 bytes
-    abort_pending_ = true;
-    status_ = Status::aborted;
+    give_up(Status::aborted, kAbortCommand);  // segmented: nothing read here is longer than 4 bytes
   } else {
     ++ignored_;
   }

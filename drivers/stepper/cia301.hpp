@@ -62,11 +62,11 @@ class SdoClient {
  public:
   enum class Status : std::uint8_t {
     idle,
-    to_send,  // take_frame() has a frame to send
+    to_send,  // frame_to_send() has a frame to send
     waiting,
     done,       // value() is valid after an upload
     aborted,    // abort_code() says why
-    timed_out,  // an abort is to be sent first: take_frame()
+    timed_out,  // an abort is to be sent first: frame_to_send()
   };
 
   SdoClient(std::uint8_t node, std::int64_t timeout_ns) : node_(node), timeout_ns_(timeout_ns) {}
@@ -87,7 +87,7 @@ class SdoClient {
 
  private:
   void begin(Frame request, ObjectAddress object, bool is_upload);
-  Frame abort_frame(std::uint32_t code) const;
+  void give_up(Status end, std::uint32_t code);
 
   std::uint8_t node_;
   std::int64_t timeout_ns_;
@@ -95,7 +95,7 @@ class SdoClient {
   Frame request_{};
   ObjectAddress object_{};
   bool is_upload_ = false;
-  bool abort_pending_ = false;
+  std::optional<Frame> abort_;  // of a transfer given up, yet to be sent
   std::int64_t sent_ns_ = 0;
   std::uint32_t value_ = 0;
   std::uint32_t abort_code_ = 0;

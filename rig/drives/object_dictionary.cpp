@@ -91,6 +91,11 @@ void ObjectDictionary::set(std::uint16_t index, std::uint8_t sub, std::uint32_t 
   objects_.at({index, sub}).value = value;
 }
 
+void ObjectDictionary::restore(const ObjectDictionary& source, std::uint16_t first, std::uint16_t last) {
+  for (auto& [key, object] : objects_)
+    if (key.first >= first && key.first <= last) object.value = source.objects_.at(key).value;
+}
+
 Abort ObjectDictionary::check_presence(std::uint16_t index, std::uint8_t sub) const {
   if (objects_.contains({index, sub})) return Abort::none;
   const auto next = objects_.lower_bound({index, std::uint8_t{0}});

@@ -49,6 +49,9 @@ class ObjectDictionary {
   std::int32_t get_signed(std::uint16_t index, std::uint8_t sub = 0) const;
   void set(std::uint16_t index, std::uint8_t sub, std::uint32_t value);  // by the drive itself: no access check
 
+  // Every object from index `first` to `last` has its value in `source` again.
+  void restore(const ObjectDictionary& source, std::uint16_t first, std::uint16_t last);
+
   Abort check_presence(std::uint16_t index, std::uint8_t sub) const;
   Abort check_write(std::uint16_t index, std::uint8_t sub, std::uint32_t value, unsigned bytes) const;
 

@@ -54,10 +54,7 @@ void SimulatedDrive::boot() {
 
 void SimulatedDrive::reset_communication() {
   // Objects 0x1000 to 0x1FFF fall back to their power-on values, the profile's objects stay.
-  const ObjectDictionary factory = factory_dictionary(config_.node_id, config_.identity);
-  for (std::uint16_t index = 0x1000; index < 0x2000; ++index)
-    for (std::uint8_t sub = 0; sub <= 8; ++sub)
-      if (const Object* object = factory.find(index, sub)) od_.set(index, sub, object->value);
+  od_.restore(factory_dictionary(config_.node_id, config_.identity), 0x1000, 0x1FFF);
   boot();
 }
 

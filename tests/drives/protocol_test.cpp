@@ -29,6 +29,17 @@ TEST(Sdo, UploadTakesTheSizeFromTheAnswer) {
   EXPECT_EQ(client.value(), 3U);
 }
 
+TEST(Sdo, ATransferGivenUpIsEndedUnderItsOwnObjectBeforeTheNext) {
+  auto client = waiting_for(0x6061);
+  client.check_time(kTimeout_ns);
+  client.upload({0x1000, 0});
+  EXPECT_EQ(*client.frame_to_send(), (Frame{0x601, 8, {0x80, 0x61, 0x60, 0x00, 0x00, 0x00, 0x04, 0x05}}));
+  client.sent(kTimeout_ns);
+  EXPECT_EQ(*client.frame_to_send(), (Frame{0x601, 8, {0x40, 0x00, 0x10, 0x00}}));
+  client.sent(kTimeout_ns);
+  EXPECT_EQ(client.status(), SdoClient::Status::waiting);
+}
+
 class Unfit : public testing::TestWithParam<Frame> {};
 
 TEST_P(Unfit, AnswersAreIgnoredUntilTheTimeIsUp) {

@@ -145,6 +145,9 @@ INSTANTIATE_TEST_SUITE_P(
         BadFile{"text_for_number",
                 "[needle]\ncurvature_per_mm = \"0.004\"\n",
                 {"test.toml:2:", "needle.curvature_per_mm", "is text", "a number is wanted"}},
+        BadFile{"array_for_number",
+                "[needle]\ncurvature_per_mm = [0.02, -9223372036854775808, {a = 1}, [2], \"b\"]\n",
+                {"curvature_per_mm = [0.02, -9223372036854775808, {...}, [...], \"b\"] is an array"}},
         BadFile{"truth_for_number", "[needle]\ncurvature_per_mm = true\n", {"is true or false", "a number is wanted"}},
         BadFile{"fraction_for_whole_number",
                 "[needle]\ncurvature_per_mm = 0\ncount = 2.5\n",
@@ -172,6 +175,8 @@ INSTANTIATE_TEST_SUITE_P(
                 "[needle]\ncurvature_per_mm = 0\n[camera]\nid = 1\n",
                 {"camera", "array of tables [[camera]]"}},
         BadFile{"not_toml", "[needle]\ncurvature_per_mm = \n", {"test.toml:2:", "not TOML"}},
+        BadFile{"letter_that_is_not_ascii", "[needle]\nslip = \u00f6\n", {"test.toml:2:", "not TOML"}},
+        BadFile{"header_without_a_key", "[[[needle]]]\n", {"test.toml:1:", "not TOML"}},
         BadFile{
             "same_key_twice", "[needle]\ncurvature_per_mm = 0\ncurvature_per_mm = 1\n", {"test.toml:3:", "not TOML"}}),
     [](const auto& test) { return std::string(test.param.name); });
