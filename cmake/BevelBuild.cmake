@@ -27,7 +27,7 @@ target_compile_options(bevel_options INTERFACE -Wall -Wextra -Wpedantic -Wshadow
 target_compile_options(bevel_options INTERFACE
   "$<$<CXX_COMPILER_ID:GNU>:-Wno-null-dereference;-Wno-maybe-uninitialized;-Wno-restrict>")
 target_include_directories(bevel_options INTERFACE ${CMAKE_SOURCE_DIR})
-if(NOT BEVEL_SANITIZE STREQUAL "")
+if(BEVEL_SANITIZE)  # OFF, of folders configured before there was a choice, is none
   set(flags_for_address -fsanitize=address,undefined -fno-sanitize-recover=all)
   set(flags_for_thread -fsanitize=thread)
   if(NOT DEFINED flags_for_${BEVEL_SANITIZE})

@@ -29,7 +29,7 @@ struct SafetyLimits {
   // Reported rates outside what was commanded within axis_delay_s, by more than this, for tracking_error_s.
   double tracking_error_mm_s = 1.5;
   double tracking_error_rad_s = 1.5;
-  double tracking_error_s = 0.04;
+  double tracking_error_s = 0.02;
   double axis_delay_s = 0.06;       // from a command to the report of what it did
   double resting_motion_mm = 0.5;   // by which axes that are told to rest may move
   double resting_motion_rad = 0.2;

@@ -48,6 +48,10 @@ bool Range::contains(double value) const {
 }
 
 std::string Range::describe() const {
+  return describe_limits() + (reason ? std::string(": ") + reason : "");
+}
+
+std::string Range::describe_limits() const {
   const bool bounded_below = std::isfinite(lowest);
   const bool bounded_above = std::isfinite(highest);
   if (!bounded_below && !bounded_above) return "any finite number";

@@ -20,7 +20,7 @@ enum class StopReason : std::uint8_t {
   drive_left_operation,  // not operational, or no longer enabled, without having been told to
   pdo_lost,              // no positions within tpdo_timeout_ns
   enable_timeout,
-  not_following,  // moves far off the commanded rate
+  not_following,  // is not where the commanded rate should have brought it
   bus_error_passive,
   bus_off,
   link_down,  // the interface is down or gone

@@ -60,7 +60,7 @@ struct StepperConfig {
   std::int64_t overrun_stop_ns = 100 * kMs;         // step() called this late while enabled
   std::int64_t setpoint_zero_age_ns = 60 * kMs;     // older: rate 0 by the normal ramp
   std::int64_t setpoint_stop_age_ns = 100 * kMs;    // older: quick stop, latched
-  std::int64_t not_following_ns = 100 * kMs;        // actual rate far from the commanded one for this long
+  std::int64_t not_following_ns = 80 * kMs;         // by which an axis may lag behind the commanded rate
   int queue_full_limit = 5;                         // refused frames in a row
   std::int16_t quick_stop_option = 6;               // 0x605A: 6 stays in quick stop with torque, 2 lets go
 };

@@ -9,7 +9,7 @@ namespace bevel::stepper {
 namespace {
 
 constexpr int kReceptionsPerCall = 256;
-constexpr std::int64_t kBehind_ns = 30 * kMs;  // longer than a drive's answer to a new rate takes
+constexpr double kHeldBack = 0.5;  // of the lag that is allowed: more than a drive's answer to a new rate
 constexpr std::int64_t kPurgePause_ns = 500 * kMs;
 constexpr std::uint64_t kFaultResetSteps =
     4;  // half a period of the fault reset bit, long enough to survive a lost PDO
@@ -28,7 +28,9 @@ StepperDriver::StepperDriver(can::Bus& bus, const StepperConfig& config)
       bus_(bus),
       out_(bus, config_),
       nodes_{DriveNode(config_, kInsertion), DriveNode(config_, kRotation)},
-      shapers_{RateShaper(config_.axes[kInsertion]), RateShaper(config_.axes[kRotation])} {}
+      shapers_{RateShaper(config_.axes[kInsertion]), RateShaper(config_.axes[kRotation])},
+      follows_{FollowWatch(config_.not_following_ns, config_.period_ns),
+               FollowWatch(config_.not_following_ns, config_.period_ns)} {}
 
 std::vector<std::uint32_t> StepperDriver::listen_ids(const StepperConfig& config) {
   // What we send is heard too: as our echoes, and as a sign of another master.
@@ -94,7 +96,7 @@ void StepperDriver::latch(const Stop& stop) {
   enable_wanted_ = false;
   if (!latched())
     for (std::size_t axis = 0; axis < kAxes; ++axis)
-      held_back_.at(axis) = state_ == DriverState::enabled && last_step_ns_ - following_ns_.at(axis) > kBehind_ns;
+      held_back_.at(axis) = state_ == DriverState::enabled && follows_.at(axis).newest_share() > kHeldBack;
   for (auto& shaper : shapers_) shaper.reset();
   if (latched()) {
     ++counters_.later_stops;
@@ -291,7 +293,7 @@ void StepperDriver::run_ready(std::int64_t now_ns) {
     state_ = DriverState::enabled;
     fresh_setpoint_ns_ = now_ns;
     refusing_setpoints_ = false;
-    following_ns_.fill(now_ns);
+    for (auto& follow : follows_) follow.begin(now_ns);
   } else if (now_ns - enable_since_ns_ > config_.transition_timeout_ns) {
     latch({StopReason::enable_timeout, -1, 0});
   }
@@ -358,10 +360,7 @@ void StepperDriver::supervise_motion(std::int64_t now_ns) {
       default:
         return latch({StopReason::drive_left_operation, static_cast<int>(axis), node.statusword()});
     }
-    const double commanded = shapers_.at(axis).rate_unit_s();
-    const double tolerance = std::max(0.5 * std::abs(commanded), 0.1 * config_.axes.at(axis).rate_limit_unit_s);
-    if (std::abs(node.rate_unit_s() - commanded) <= tolerance) following_ns_.at(axis) = now_ns;
-    if (now_ns - following_ns_.at(axis) > config_.not_following_ns)
+    if (follows_.at(axis).lag_share(now_ns, shapers_.at(axis).rate_unit_s(), node.position_unit()) > 1)
       return latch({StopReason::not_following, static_cast<int>(axis), 0});
   }
 }

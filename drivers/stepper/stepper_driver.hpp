@@ -15,6 +15,7 @@
 
 #include "drivers/can/bus.hpp"
 #include "drivers/stepper/drive_node.hpp"
+#include "drivers/stepper/follow_watch.hpp"
 #include "drivers/stepper/rate_shaper.hpp"
 #include "drivers/stepper/reason.hpp"
 #include "drivers/stepper/stepper_config.hpp"
@@ -123,6 +124,7 @@ class StepperDriver {
   Transmitter out_;
   std::array<DriveNode, kAxes> nodes_;
   std::array<RateShaper, kAxes> shapers_;
+  std::array<FollowWatch, kAxes> follows_;
 
   DriverState state_ = DriverState::off;
   Stop stop_{};
@@ -137,7 +139,6 @@ class StepperDriver {
   std::int64_t next_purge_ns_ = INT64_MIN;
   std::int64_t fresh_setpoint_ns_ = 0;  // when the newest usable set-point was made
   bool refusing_setpoints_ = false;
-  std::array<std::int64_t, kAxes> following_ns_{};  // last time each axis followed
   std::array<bool, kAxes> held_back_{};             // it did not when the stop was latched
   DriverCounters counters_;
 };

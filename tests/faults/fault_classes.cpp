@@ -80,8 +80,8 @@ std::vector<std::string> causes_of(Component component, FaultKind kind) {
   return causes;
 }
 
-// A blocked motor shows while it is to move by more than it may lag, a controller whose commands stand still while it
-// means others. What shows only now and then lets the needle deviate by little.
+// A blocked motor shows once it is behind by a tenth of a millimetre or radian, a controller whose commands stand still
+// while it means others: until then the needle does what it should.
 std::function<bool(const SimulatedLoop&)> shows(Component component, FaultKind kind) {
   if (kind != FaultKind::stuck) return {};
   if (component == Component::controller)
@@ -93,10 +93,7 @@ std::function<bool(const SimulatedLoop&)> shows(Component component, FaultKind k
     };
   if (nodes::channel_of(component)[0] != '\0') return {};
   const std::size_t axis = axis_of(component);
-  return [axis](const SimulatedLoop& loop) {
-    const double commanded = axis == 0 ? loop.sent.insertion_rate_mm_s : loop.sent.rotation_rate_rad_s;
-    return std::abs(commanded) > 0.12 * loop.config.stepper.axes.at(axis).rate_limit_unit_s;
-  };
+  return [axis](const SimulatedLoop& loop) { return std::abs(loop.commanded.at(axis)) > 0.1; };
 }
 
 FaultClass process_fault(Component component, FaultKind kind) {
@@ -134,6 +131,7 @@ FaultClass drive_fault(Component component, FaultKind kind) {
   c.causes = causes_of(component, kind);
   c.inject = [component, kind](SimulatedLoop& loop, std::mt19937_64& rng) {
     if (kind == FaultKind::stuck) {
+      loop.commanded = {};
       loop.rig->drive(axis_of(component)).set_motor_blocked(true);
     } else {
       loop.rig->faulty_bus(axis_of(component)).begin(kind, loop.ns(), rng());

@@ -13,7 +13,7 @@ namespace {
 constexpr int kAllowed_ms = 200;
 constexpr double kObserved_s = 0.8;  // from the fault
 constexpr double kAfter_s = 0.5;     // from when it has passed
-constexpr double kMoved_mm = 0.01, kMoved_rad = 0.01;
+constexpr double kMoved_mm = 0.06, kMoved_rad = 0.06;  // a motor that comes free relaxes by so much
 
 double uniform(std::mt19937_64& rng, double low, double high) {
   return std::uniform_real_distribution<double>(low, high)(rng);

@@ -130,7 +130,7 @@ class Bench {
         bus_.enable_accepted = false;
         break;
       case 8:
-        driver_.request_stop();
+        driver_.stop_now(stepper::StopReason::operator_stop, now_ns_);
         BEVEL_MUST(is_latched(driver_.report().state));
         bus_.enable_accepted = false;
         break;

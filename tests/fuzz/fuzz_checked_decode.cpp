@@ -39,17 +39,6 @@ bool is_accepted(const std::uint8_t* data, std::size_t size) {
   io::visit_fields(message, look);
   BEVEL_MUST(look.good);
 
-  // Bounds in time, around the message's own: inside at the edge, outside beyond it.
-  const std::int64_t utime = message.utime;
-  BEVEL_MUST(io::checked_decode<Message>(data, size, {utime, 0, 0}));
-  if (utime < std::numeric_limits<std::int64_t>::max()) {
-    const auto old = io::checked_decode<Message>(data, size, {utime + 1, 0, 0});
-    BEVEL_MUST(!old && old.error->fault == DecodeFault::time);
-  }
-  if (utime > 1) {
-    const auto early = io::checked_decode<Message>(data, size, {utime - 1, 0, 0});
-    BEVEL_MUST(!early && early.error->fault == DecodeFault::time);
-  }
   // A message has one length: neither a byte less nor a byte more.
   BEVEL_MUST(!io::checked_decode<Message>(data, size - 1));
   std::vector<std::uint8_t> longer(data, data + size);

@@ -1,6 +1,7 @@
 #!/usr/bin/env bash
-# The five processes for real, in a network namespace: an insertion that arrives, Ctrl-C, a process that dies, a second
-# controller. Usage: processes_test.sh BIN_DIR SOURCE_DIR CASE. Exit status 77: no network namespaces here, skipped.
+# The five processes for real, in a network namespace: an insertion that arrives, and all the ways in which one may end
+# before. Usage: processes_test.sh BIN_DIR SOURCE_DIR CASE [TRIALS SEED]. Exit status 77: no network namespaces here,
+# skipped.
 set -uo pipefail
 bin=$1 source=$2 case=$3
 if [ -z "${BEVEL_ISOLATED:-}" ]; then
@@ -48,6 +49,54 @@ case $case in
     "$bin/bevel-controller" --config "$work/demo.toml" >"$work/second.txt" 2>&1 && fail "a second controller ran"
     grep -q "another bevel-controller" "$work/second.txt" || fail "does not say why"
     kill $pid; wait $pid || fail "the first ended with status $?"
+    ;;
+  second_camera)
+    "${demo[@]}" >"$work/demo.txt" 2>&1 & pid=$!
+    wait_for steering
+    "$bin/bevel-camera" --config "$work/demo.toml" >"$work/second.txt" 2>&1 && fail "a second camera ran"
+    grep -q "another bevel-camera" "$work/second.txt" || fail "does not say why"
+    wait $pid || fail "the insertion ended with status $?"
+    ;;
+  parent_killed)  # nobody is left to say stop; the children hear of it
+    "${demo[@]}" >"$work/demo.txt" 2>&1 & pid=$!
+    wait_for steering
+    sleep 1
+    kill -KILL $pid
+    wait $pid 2>/dev/null
+    for _ in $(seq 30); do [ -z "$(left_over)" ] && break; sleep 0.1; done
+    "$bin/bevel-export" "$work/out/insertion.lcm" --out "$work/csv" >/dev/null 2>&1
+    ;;
+  stepper_terminated)
+    "${demo[@]}" >"$work/demo.txt" 2>&1 & pid=$!
+    wait_for steering
+    sleep 1
+    kill -TERM "$(pgrep -f "bevel-stepper --config $work/demo.toml")"
+    wait $pid; status=$?
+    [ $status -eq 1 ] || fail "exit status $status, wanted 1"
+    grep -q "bevel-stepper: exit status 0" "$work/demo.txt" || fail "it does not end in order"
+    # Its last words: told to end, at rest.
+    "$bin/bevel-export" "$work/out/insertion.lcm" --out "$work/csv" >"$work/export.txt" 2>&1 || fail "export: $?"
+    tail -n 1 "$work/csv/actuator_state.csv" | awk -F, '{exit !($6 < 0.05 && $6 > -0.05 && $8 < 0.05 && $8 > -0.05)}' ||
+      fail "ended while moving: $(tail -n 1 "$work/csv/actuator_state.csv")"
+    grep -aq "told to end" "$work/out/insertion.lcm" || fail "it does not say why it stopped"
+    ;;
+  full_disk)
+    mkdir -p "$work/out"
+    ln -s /dev/full "$work/out/insertion.lcm"
+    "${demo[@]}" >"$work/demo.txt" 2>&1; status=$?
+    [ $status -eq 1 ] || fail "exit status $status, wanted 1"
+    grep -q "insertion.lcm" "$work/demo.txt" || fail "does not name the file"
+    ;;
+  fault)
+    "${demo[@]}" --fault camera:off@5s >"$work/demo.txt" 2>&1; status=$?
+    cat "$work/demo.txt"
+    [ $status -eq 1 ] || fail "exit status $status, wanted 1"
+    grep -qE "measurements stale|a camera fell silent" "$work/demo.txt" || fail "does not say why"
+    "${demo[@]}" --fault camera:off >"$work/demo.txt" 2>&1 && fail "a fault without a time was taken"
+    grep -q "camera:off@5s" "$work/demo.txt" || fail "does not say how a fault is given"
+    ;;
+  kills)
+    "$bin/kill_study" "$bin" "$work/demo.toml" "$work/out" "unix:$work/s-can.sock" "${4:-3}" "${5:-1}" || fail "see above"
     ;;
   *) fail "no case '$case'" ;;
 esac

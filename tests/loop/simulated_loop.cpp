@@ -124,6 +124,8 @@ void SimulatedLoop::step_one_ms() {
     if (ms % 20 == 0 && controller) controller->step(at, 0);
     nodes::pump(lcm);
   }
+  commanded[0] += 1e-3 * sent.insertion_rate_mm_s;
+  commanded[1] += 1e-3 * sent.rotation_rate_rad_s;
   if (each_ms) each_ms();
 }
 

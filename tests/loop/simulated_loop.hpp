@@ -86,6 +86,7 @@ class SimulatedLoop {
   std::map<std::string, process_status_t> statuses;
   std::optional<needle_state_t> needle_state;
   motion_command_t sent{};        // newest of the controller
+  std::array<double, 2> commanded{};  // integral of those, mm and rad; a test may set it to zero
   std::function<void()> each_ms;  // called at the end of each, if set
 
  private:
