@@ -29,8 +29,8 @@ struct SafetyLimits {
   // Reported rates outside what was commanded within axis_delay_s, by more than this, for tracking_error_s.
   double tracking_error_mm_s = 1.5;
   double tracking_error_rad_s = 1.5;
-  double tracking_error_s = 0.02;
-  double axis_delay_s = 0.06;       // from a command to the report of what it did
+  double tracking_error_s = 0.04;
+  double axis_delay_s = 0.12;       // from a command to the report of what it did
   double resting_motion_mm = 0.5;   // by which axes that are told to rest may move
   double resting_motion_rad = 0.2;
   double enabling_s = 3.0;          // from armed to both axes enabled

@@ -1,5 +1,6 @@
 #include "tests/faults/fault_matrix.hpp"
 
+#include <algorithm>
 #include <cmath>
 
 namespace bevel::test {
@@ -80,16 +81,19 @@ std::vector<std::string> causes_of(Component component, FaultKind kind) {
   return causes;
 }
 
-// A blocked motor shows once it is behind by a tenth of a millimetre or radian, a controller whose commands stand still
-// while it means others: until then the needle does what it should.
+// A blocked motor shows once it is behind by a tenth of a millimetre or radian; a controller whose commands stand still,
+// once they are none of what it meant within the delay of the axes. Until then the needle does what it should.
 std::function<bool(const SimulatedLoop&)> shows(Component component, FaultKind kind) {
   if (kind != FaultKind::stuck) return {};
   if (component == Component::controller)
     return [](const SimulatedLoop& loop) {
-      const controller::Rates& meant = loop.controller->supervisor().commanded();
       const controller::SafetyLimits& limits = loop.config.controller.safety;
-      return std::abs(meant.insertion_mm_s - loop.sent.insertion_rate_mm_s) > limits.tracking_error_mm_s ||
-             std::abs(meant.rotation_rad_s - loop.sent.rotation_rate_rad_s) > limits.tracking_error_rad_s;
+      const auto off = [&](double sent, double controller::Rates::*rate, double allowed) {
+        return std::ranges::all_of(loop.meant,
+                                   [&](const controller::Rates& r) { return std::abs(r.*rate - sent) > allowed; });
+      };
+      return off(loop.sent.insertion_rate_mm_s, &controller::Rates::insertion_mm_s, limits.tracking_error_mm_s) ||
+             off(loop.sent.rotation_rate_rad_s, &controller::Rates::rotation_rad_s, limits.tracking_error_rad_s);
     };
   if (nodes::channel_of(component)[0] != '\0') return {};
   const std::size_t axis = axis_of(component);

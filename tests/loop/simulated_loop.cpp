@@ -124,6 +124,8 @@ void SimulatedLoop::step_one_ms() {
     if (ms % 20 == 0 && controller) controller->step(at, 0);
     nodes::pump(lcm);
   }
+  if (controller) meant.push_back(controller->supervisor().commanded());
+  while (static_cast<double>(meant.size()) > 1e3 * config.controller.safety.axis_delay_s) meant.pop_front();
   commanded[0] += 1e-3 * sent.insertion_rate_mm_s;
   commanded[1] += 1e-3 * sent.rotation_rate_rad_s;
   if (each_ms) each_ms();

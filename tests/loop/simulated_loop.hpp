@@ -5,6 +5,7 @@
 #pragma once
 
 #include <array>
+#include <deque>
 #include <functional>
 #include <map>
 #include <memory>
@@ -86,6 +87,7 @@ class SimulatedLoop {
   std::map<std::string, process_status_t> statuses;
   std::optional<needle_state_t> needle_state;
   motion_command_t sent{};        // newest of the controller
+  std::deque<controller::Rates> meant;  // by the controller, each millisecond within the delay of the axes
   std::array<double, 2> commanded{};  // integral of those, mm and rad; a test may set it to zero
   std::function<void()> each_ms;  // called at the end of each, if set
 
