@@ -27,8 +27,8 @@ struct SafetyLimits {
   double depth_max_mm = 140.0;
   double lateral_max_mm = 60.0;
   // Reported rates outside what was commanded within axis_delay_s, by more than this, for tracking_error_s.
-  double tracking_error_mm_s = 1.5;
-  double tracking_error_rad_s = 1.5;
+  double tracking_error_mm_s = 2.0;
+  double tracking_error_rad_s = 2.5;
   double tracking_error_s = 0.04;
   double axis_delay_s = 0.12;       // from a command to the report of what it did
   double resting_motion_mm = 0.5;   // by which axes that are told to rest may move

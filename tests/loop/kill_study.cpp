@@ -35,27 +35,37 @@ constexpr double kMoving_unit_s = 1.0;
 constexpr std::int64_t kMs = 1'000'000;
 constexpr std::int64_t kAllowed_ns = 200 * kMs;
 
-// What the drives say of their rates (TPDO1: 6041, 606C).
+// What the drives say of their rates (606C), in TPDO1 or when asked.
 class Listener {
  public:
   Listener(const std::string& bus, const stepper::StepperConfig& config) : config_(config) {
     std::vector<std::uint32_t> ids;
-    for (const auto& axis : config.axes) ids.push_back(stepper::cia301::tpdo1_id(axis.node_id));
+    for (const auto& axis : config.axes) {
+      ids.push_back(stepper::cia301::tpdo1_id(axis.node_id));
+      ids.push_back(stepper::cia301::sdo_response_id(axis.node_id));
+    }
     bus_ = can::open_bus(bus, ids);
   }
   void listen() {
     bus_->maintain(nodes::now().ns);
     for (can::Reception r = bus_->receive(); r.kind != can::Reception::Kind::nothing; r = bus_->receive()) {
       if (r.kind != can::Reception::Kind::frame) continue;
-      for (std::size_t axis = 0; axis < 2; ++axis)
-        if (r.frame.id == stepper::cia301::tpdo1_id(config_.axes.at(axis).node_id))
-          heard_ns_ = nodes::now().ns, rate_.at(axis) = static_cast<std::int32_t>(stepper::cia301::get_u32(r.frame, 2)) /
-                           config_.axes.at(axis).counts_per_unit;
+      for (std::size_t axis = 0; axis < 2; ++axis) {
+        const auto node = config_.axes.at(axis).node_id;
+        const bool answer = r.frame.id == stepper::cia301::sdo_response_id(node) && r.frame.data[0] == 0x43 &&
+                            stepper::cia301::get_u16(r.frame, 1) == 0x606C;
+        if (!answer && r.frame.id != stepper::cia301::tpdo1_id(node)) continue;
+        const auto counts_s = static_cast<std::int32_t>(stepper::cia301::get_u32(r.frame, answer ? 4 : 2));
+        rate_.at(axis) = counts_s / config_.axes.at(axis).counts_per_unit;
+        if (!answer) heard_ns_ = nodes::now().ns;
+      }
     }
   }
-  // Where no driver asks any more, somebody has to: a SYNC makes the drives answer, and is no master's heartbeat.
+  // Where no driver asks any more somebody has to: an SDO for 606C, which a drive answers in any state.
   void ask_if_silent() {
-    if (nodes::now().ns - heard_ns_ > 25 * kMs) (void)bus_->send(stepper::cia301::sync());
+    if (nodes::now().ns - heard_ns_ < 25 * kMs) return;
+    for (const auto& axis : config_.axes)
+      (void)bus_->send({stepper::cia301::sdo_request_id(axis.node_id), 8, {0x40, 0x6C, 0x60, 0x00}});
   }
   double rate(std::size_t axis) const { return std::abs(rate_.at(axis)); }
   bool at_rest() const { return rate(0) < kRest_unit_s && rate(1) < kRest_unit_s; }
@@ -129,6 +139,8 @@ Trial run_trial(const std::string& bin, const std::string& config_path, const st
   const pid_t victim = target == "bevel-demo" ? demo : (children.contains(target) ? children.at(target) : 0);
   if (!moving || victim == 0) {
     trial.problem = "did not get to steering";
+  } else if (listener->at_rest()) {
+    trial.problem = "at rest before";
   } else {
     // A stalled demo is no fault of the loop: its recording pauses, the needle is steered on. Not tried.
     const int sent = target == "bevel-demo" ? SIGKILL : signal;
@@ -156,6 +168,14 @@ Trial run_trial(const std::string& bin, const std::string& config_path, const st
         listener->listen();
         if (!listener->at_rest()) trial.problem = "moves again";
       }
+    }
+  }
+  if (!trial.problem.empty()) {
+    sleep_ms(1500);  // for the demo to say what it thinks of it
+    for (std::ifstream text(out + "-demo.txt"); !text.eof();) {
+      std::string line;
+      std::getline(text, line);
+      std::printf("    | %s\n", line.c_str());
     }
   }
   kill(demo, SIGINT);

@@ -8,6 +8,7 @@
 
 int main(int argc, char** argv) {
   using namespace bevel;
+  constexpr double kOutlives_s = 0.5;
   tools::CommandLine command_line("bevel-rig",
                                   "Simulates needle, cameras and drives; the other processes cannot tell.");
   const auto name = [](const nodes::SystemConfig&) { return "bevel-rig"; };
@@ -25,10 +26,12 @@ int main(int argc, char** argv) {
     rig::FrameServer frames(config.rig.frames_socket);
     nodes::RigNode node(context.lcm, *insertion, *rotation, config, &frames);
     if (context.fault) node.break_drive(*context.fault, context.started_ns, tools::kFaultSeed);
-    nodes::run_periodic(context.lcm, {0.001, {}, [&](const nodes::Now& now, double) {
-                                        node.step(now);
-                                        return true;
-                                      }});
+    const nodes::Loop loop{0.001, {}, [&](const nodes::Now& now, double) {
+                             node.step(now);
+                             return true;
+                           }};
+    // A bench is still there when the programs that drive it have gone: its axes come to rest.
+    nodes::run_with_end(context.lcm, loop, [] {}, loop, kOutlives_s);
     return 0;
   });
 }
