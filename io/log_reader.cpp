@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <array>
 #include <cstring>
+#include <limits>
 
 namespace bevel::io {
 namespace {
@@ -45,7 +46,8 @@ bool LogReader::can_follow(std::size_t offset, std::int64_t number) const {
   const std::size_t magic_bytes = std::min(left, kMagic.size());
   if (std::memcmp(bytes_.data() + offset, kMagic.data(), magic_bytes) == 0) return true;
   if (left < kMagic.size() + sizeof(number)) return true;  // too little to tell
-  return big_endian<std::int64_t>(bytes_.data() + offset + kMagic.size()) - 1 == number;
+  return number < std::numeric_limits<std::int64_t>::max() &&
+         big_endian<std::int64_t>(bytes_.data() + offset + kMagic.size()) == number + 1;
 }
 
 bool LogReader::event_at(std::size_t offset, LogEvent& event, std::size_t& end) const {

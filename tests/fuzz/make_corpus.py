@@ -60,7 +60,7 @@ def decode():
 
 
 def event(number, channel, data, data_length=None, channel_length=None, magic=0xEDA1DA01):
-    return struct.pack(">IqqII", magic, number, 1000 + number,
+    return struct.pack(">IqqII", magic, number, 1000 + number % 2**32,
                        len(channel) if channel_length is None else channel_length,
                        len(data) if data_length is None else data_length) + channel + data
 
@@ -86,6 +86,8 @@ def logs():
     keep("log_reader", "channel_unprintable", event(0, b"A\nB", b"x") + actuator)
     keep("log_reader", "garbage_between", first + b"\xed\xa1 between \xed\xa1\xda\x01" + tip + actuator)
     keep("log_reader", "damaged_magic", first + event(1, b"TIP_MEASUREMENT", TIP, magic=0xEDA1DA00) + actuator)
+    keep("log_reader", "number_smallest", event(0, b"A", b"x") + b"\0" * 4 + struct.pack(">q", -(2**63)) + tip)
+    keep("log_reader", "number_largest", event(2**63 - 1, b"A", b"x") + b"\0" * 4 + struct.pack(">q", -(2**63)) + tip)
     keep("log_reader", "event_inside_data", event(0, b"RAW", tip) + actuator)
     keep("log_reader", "array_length_2_28", event(0, b"OTHER", b"\x01" * 8 + struct.pack(">i", 2**28)) + tip)
     keep("log_reader", "wrong_type", event(0, b"TIP_MEASUREMENT", ACTUATOR) + actuator)
