@@ -18,7 +18,8 @@ struct SteeringGains {
   double parameter_uncertainty = 0.3;  // relative error of k and f that the drift bound covers
 };
 
-// Ages and times are parts of the 200 ms within which the needle must rest after any fault; docs/hazards.md has the sum.
+// Ages and times are parts of the 200 ms within which the needle must rest after any fault; docs/hazards.md has the
+// sum.
 struct SafetyLimits {
   double state_age_s = 0.08;     // of NEEDLE_STATE
   double actuator_age_s = 0.08;  // of ACTUATOR_STATE
@@ -30,8 +31,8 @@ struct SafetyLimits {
   double tracking_error_mm_s = 2.0;
   double tracking_error_rad_s = 2.5;
   double tracking_error_s = 0.04;
-  double axis_delay_s = 0.12;       // from a command to the report of what it did
-  double resting_motion_mm = 0.5;   // by which axes that are told to rest may move
+  double axis_delay_s = 0.12;      // from a command to the report of what it did
+  double resting_motion_mm = 0.5;  // by which axes that are told to rest may move
   double resting_motion_rad = 0.2;
   double enabling_s = 3.0;          // from armed to both axes enabled
   double target_miss_max_mm = 5.0;  // predicted miss above which a target is refused before insertion

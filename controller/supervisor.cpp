@@ -236,8 +236,7 @@ bool Supervisor::check_rest() {
       return true;
     }
   }
-  if (!resting_)
-    resting_ = Resting{actuator_->insertion_mm, actuator_->rotation_rad, needle_state_->pose.p_mm};
+  if (!resting_) resting_ = Resting{actuator_->insertion_mm, actuator_->rotation_rad, needle_state_->pose.p_mm};
   const double moved_mm = std::abs(actuator_->insertion_mm - resting_->insertion_mm);
   const double turned_rad = std::abs(actuator_->rotation_rad - resting_->rotation_rad);
   const double tip_mm = (needle_state_->pose.p_mm - resting_->tip_mm).norm();

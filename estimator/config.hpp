@@ -29,10 +29,10 @@ struct ProcessNoise {
 };
 
 struct Gate {
-  double probability = 0.9999;        // share of good measurements that pass
-  int rejects_before_unhealthy = 5;   // in a row
+  double probability = 0.9999;              // share of good measurements that pass
+  int rejects_before_unhealthy = 5;         // in a row
   int camera_rejects_before_unhealthy = 4;  // in a row, of one camera: another's good ones do not outweigh it
-  int rejects_before_reset = 20;      // in a row: then a declared reset
+  int rejects_before_reset = 20;            // in a row: then a declared reset
   // Covariance of the pose after a reset, at least: as far as the measurement that brought it, and what the needle can
   // have bent, are within it in any case.
   double reset_position_sd_mm = 5.0;
@@ -40,7 +40,7 @@ struct Gate {
 };
 
 struct HealthLimits {
-  double measurement_age_s = 0.13;     // of capture: 30 Hz and 50 ms of latency pass, one lost frame too
+  double measurement_age_s = 0.13;      // of capture: 30 Hz and 50 ms of latency pass, one lost frame too
   double measurement_silence_s = 0.09;  // since one arrived, by the steady clock: two lost frames do not pass
   double actuator_age_s = 0.08;
   double position_sd_mm = 3.0;  // largest standard deviation along any axis

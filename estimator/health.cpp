@@ -4,9 +4,12 @@ namespace bevel::estimator {
 
 std::string describe_health(std::int32_t health) {
   static constexpr std::pair<Health, const char*> kWords[] = {
-      {kNoMeasurement, "no measurement yet"},   {kMeasurementStale, "measurements stale"},
-      {kActuatorStale, "actuator state stale"}, {kUncertain, "position too uncertain"},
-      {kRejecting, "rejecting measurements"},   {kOutsideModel, "outside the model's domain"},
+      {kNoMeasurement, "no measurement yet"},
+      {kMeasurementStale, "measurements stale"},
+      {kActuatorStale, "actuator state stale"},
+      {kUncertain, "position too uncertain"},
+      {kRejecting, "rejecting measurements"},
+      {kOutsideModel, "outside the model's domain"},
       {kNotFromEntry, "not there from the entry: retract to the entry point, or confirm"},
       {kCameraSilent, "a camera fell silent"},
       {kCameraFrozen, "a camera is frozen"},

@@ -156,13 +156,13 @@ FilterState NeedleFilter::inserted(double insertion_mm, double rotation_rad) con
   state.pose.p_mm += insertion_mm * state.pose.R.col(2);
   widen_by_bend(state, insertion_mm);
   const ProcessNoise& noise = config_.process;
-  state.covariance(5, 5) += square(noise.roll_rad) * std::abs(insertion_mm) +
-                            square(noise.roll_per_sqrt_rad) * std::abs(rotation_rad);
+  state.covariance(5, 5) +=
+      square(noise.roll_rad) * std::abs(insertion_mm) + square(noise.roll_per_sqrt_rad) * std::abs(rotation_rad);
   return state;
 }
 
-// An arc of the curvature that the prior allows, to any side: its end lies k L^2 / 2 aside and k^2 L^3 / 6 short, and is
-// inclined by k L.
+// An arc of the curvature that the prior allows, to any side: its end lies k L^2 / 2 aside and k^2 L^3 / 6 short, and
+// is inclined by k L.
 void NeedleFilter::widen_by_bend(FilterState& state, double inserted_mm) const {
   const double length_mm = std::abs(inserted_mm);
   const double k = std::abs(config_.prior.needle.curvature_per_mm) + config_.prior.curvature_sd_per_mm;

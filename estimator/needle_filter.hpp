@@ -86,8 +86,8 @@ class NeedleFilter {
   // where it stands then.
   FilterState initial(double insertion_mm = 0, double rotation_rad = 0) const;
 
-  // The same for a needle that was inserted before anybody watched: as deep and turned as the axes say, straight, and as
-  // uncertain as it can have bent on the way. Without depth it is initial(), turned.
+  // The same for a needle that was inserted before anybody watched: as deep and turned as the axes say, straight, and
+  // as uncertain as it can have bent on the way. Without depth it is initial(), turned.
   FilterState inserted(double insertion_mm, double rotation_rad) const;
 
   // Moves the state by increments of the two axes in so much time (which only effects ask for). Where the model has no

@@ -49,7 +49,7 @@ struct Range {
   const char* reason = nullptr;  // static text: what a value outside would break
 
   bool contains(double value) const;
-  std::string describe() const;  // "from 0 to 5", "above 0", "at least 1", "any finite number"; then the reason
+  std::string describe() const;         // "from 0 to 5", "above 0", "at least 1", "any finite number"; then the reason
   std::string describe_limits() const;  // without the reason
   constexpr Range because(const char* why) const {
     Range range = *this;

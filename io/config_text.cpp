@@ -47,9 +47,7 @@ bool Range::contains(double value) const {
   return (lowest_open ? value > lowest : value >= lowest) && (highest_open ? value < highest : value <= highest);
 }
 
-std::string Range::describe() const {
-  return describe_limits() + (reason ? std::string(": ") + reason : "");
-}
+std::string Range::describe() const { return describe_limits() + (reason ? std::string(": ") + reason : ""); }
 
 std::string Range::describe_limits() const {
   const bool bounded_below = std::isfinite(lowest);

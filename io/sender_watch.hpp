@@ -60,7 +60,7 @@ class SenderWatch {
   // The last ones: a number that comes again with other content is somebody else's.
   std::array<Used, 16> used_{};
   std::size_t next_used_ = 0;
-  std::uint8_t lates_ = 0;  // of the last eight, a bit each
+  std::uint8_t lates_ = 0;     // of the last eight, a bit each
   std::int64_t heard_ns_ = 0;  // when its stream was last continued
   std::int64_t lost_ = 0;
   std::int64_t restarts_ = 0;

@@ -1,6 +1,6 @@
 #pragma once
-// bevel-controller: NEEDLE_STATE, ACTUATOR_STATE and STEERING_TARGET in, MOTION_COMMAND out at a fixed rate, and at once
-// when motion must stop.
+// bevel-controller: NEEDLE_STATE, ACTUATOR_STATE and STEERING_TARGET in, MOTION_COMMAND out at a fixed rate, and at
+// once when motion must stop.
 #include <array>
 
 #include "controller/supervisor.hpp"

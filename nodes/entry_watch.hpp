@@ -1,7 +1,7 @@
 #pragma once
 // Whether the estimate has been there since the needle entered the tissue. An estimator that begins with the needle
-// inside knows where the axes stand, but not the way: its attitude is a guess that measurements of position mend slowly.
-// Pure; lengths in mm, depths along z of {A}.
+// inside knows where the axes stand, but not the way: its attitude is a guess that measurements of position mend
+// slowly. Pure; lengths in mm, depths along z of {A}.
 namespace bevel::nodes {
 
 class EntryWatch {

@@ -132,7 +132,7 @@ FaultInjector::Bytes FaultInjector::garbage(const Bytes& like) {
   return bytes;
 }
 
-void FaultInjector::pass(const char* /*channel*/, const Bytes& bytes, std::int64_t now_ns, std::int64_t now_utime) {
+void FaultInjector::pass(const Bytes& bytes, std::int64_t now_ns, std::int64_t now_utime) {
   if (now_ns < start_ns_) {
     past_.push_back({now_ns, bytes});
     while (past_.front().at_ns < now_ns - kRemembered_ns) past_.pop_front();

@@ -52,7 +52,7 @@ class FaultInjector {
 
   bool concerns(const char* channel) const { return channel_ == channel; }
   // Takes a message that its component sends; what comes out of it is emitted by flush().
-  void pass(const char* channel, const std::vector<std::uint8_t>& bytes, std::int64_t now_ns, std::int64_t now_utime);
+  void pass(const std::vector<std::uint8_t>& bytes, std::int64_t now_ns, std::int64_t now_utime);
   // Emits what is due.
   void flush(std::int64_t now_ns, const Emit& emit);
 

@@ -60,7 +60,8 @@ can::SendResult FaultyBus::send(const can::Frame& frame) {
       for (std::uint8_t i = 0; i < out.size; ++i) out.data[i] = static_cast<std::uint8_t>(rng_());
       break;
     case FaultKind::wrong:
-      if (frame.id == kPositionPdo + node_id_) out.data[2] = static_cast<std::uint8_t>(out.data[2] + 1);  // 65536 counts
+      if (frame.id == kPositionPdo + node_id_)
+        out.data[2] = static_cast<std::uint8_t>(out.data[2] + 1);  // 65536 counts
       break;
     case FaultKind::slow:
       if (now_ns_ < block_until_ns_) return SendResult::sent;

@@ -15,9 +15,8 @@ std::string describe(const InputTrouble& trouble) {
       std::snprintf(text, sizeof text, "%s comes out of order: delayed, or from two senders", trouble.channel);
       break;
     case InputTrouble::Kind::implausible:
-      std::snprintf(text, sizeof text, "%s: %s of %.4g %s, possible is %.3g", trouble.channel,
-                    trouble.implausible.what, trouble.implausible.value, trouble.implausible.unit,
-                    trouble.implausible.allowed);
+      std::snprintf(text, sizeof text, "%s: %s of %.4g %s, possible is %.3g", trouble.channel, trouble.implausible.what,
+                    trouble.implausible.value, trouble.implausible.unit, trouble.implausible.allowed);
       break;
     case InputTrouble::Kind::clock_step:
       std::snprintf(text, sizeof text, "the wall clock was set by %+.3f s", trouble.clock_step_s);
@@ -43,9 +42,7 @@ void LcmPort::tell_time(const Now& now) {
     restart_watches("");
     report({InputTrouble::Kind::clock_step, "", {}, static_cast<double>(step_us) * 1e-6});
   }
-  if (injector_) injector_->flush(now.ns, [this](const char* channel, std::span<const std::uint8_t> bytes) {
-    lcm_.publish(channel, bytes.data(), static_cast<unsigned>(bytes.size()));
-  });
+  if (injector_) flush_injector();
 }
 
 void LcmPort::restart_watches(std::string_view but) {
@@ -61,12 +58,16 @@ void LcmPort::rethrow() {
   if (thrown_) std::rethrow_exception(std::exchange(thrown_, nullptr));
 }
 
+void LcmPort::flush_injector() {
+  injector_->flush(now_.ns, [this](const char* channel, std::span<const std::uint8_t> bytes) {
+    lcm_.publish(channel, bytes.data(), static_cast<unsigned>(bytes.size()));
+  });
+}
+
 bool LcmPort::send(const char* channel, const std::vector<std::uint8_t>& bytes) {
   if (injector_ && injector_->concerns(channel)) {
-    injector_->pass(channel, bytes, now_.ns, now_.utime);
-    injector_->flush(now_.ns, [this](const char* to, std::span<const std::uint8_t> out) {
-      lcm_.publish(to, out.data(), static_cast<unsigned>(out.size()));
-    });
+    injector_->pass(bytes, now_.ns, now_.utime);
+    flush_injector();
     return true;
   }
   return lcm_.publish(channel, bytes.data(), static_cast<unsigned>(bytes.size())) == 0;

@@ -1,9 +1,9 @@
 #pragma once
 // LCM for the nodes. Every message that comes in passes the one checked decode, the watch over its sender (io/
-// sender_watch.hpp) and, where the channel carries motion, a check that it can be true (io/motion_bounds.hpp); every one
-// that goes out is checked before. What does not pass is counted and never handed on; what tells of a second sender, of
-// motion that cannot be or of a clock that was set is a trouble that the node must stop for.
-// One lcm::LCM per thread; no exception leaves a handler: it is kept, and step() of the node raises it.
+// sender_watch.hpp) and, where the channel carries motion, a check that it can be true (io/motion_bounds.hpp); every
+// one that goes out is checked before. What does not pass is counted and never handed on; what tells of a second
+// sender, of motion that cannot be or of a clock that was set is a trouble that the node must stop for. One lcm::LCM
+// per thread; no exception leaves a handler: it is kept, and step() of the node raises it.
 #include <bevel/actuator_state_t.hpp>
 #include <bevel/motion_command_t.hpp>
 #include <bevel/needle_state_t.hpp>
@@ -38,7 +38,7 @@ struct PortCounters {
 struct InputTrouble {
   enum class Kind { second_sender, out_of_order, implausible, clock_step };
   Kind kind = Kind::second_sender;
-  const char* channel = "";    // static text; "" for the clock
+  const char* channel = "";     // static text; "" for the clock
   io::Implausible implausible;  // of that kind
   double clock_step_s = 0;      // of that kind
 };
@@ -159,6 +159,7 @@ class LcmPort {
   void report(const InputTrouble& trouble);
   void restart_watches(std::string_view but);
   bool send(const char* channel, const std::vector<std::uint8_t>& bytes);
+  void flush_injector();
 
   lcm::LCM& lcm_;
   Now now_;

@@ -1,5 +1,7 @@
 #include "nodes/operator_words.hpp"
 
+#include <string_view>
+
 namespace bevel::nodes {
 namespace {
 
@@ -19,6 +21,11 @@ OperatorWords::OperatorWords(LcmPort& port, const StatusReporter& status, Receiv
   });
   port_.subscribe<steering_target_t>(io::channel::kSteeringTarget, kLimits,
                                      [this](const steering_target_t& m) { hear(m); });
+  port_.on_refused = [this](const char* channel, io::Standing standing) {
+    if (std::string_view(channel) != io::channel::kSteeringTarget) return;
+    if (standing == io::Standing::old) refuse("an operator's word came too late and was refused");
+    if (standing == io::Standing::ahead) refuse("an operator's word from the future was refused");
+  };
 }
 
 void OperatorWords::hear(const steering_target_t& m) {
@@ -35,8 +42,6 @@ void OperatorWords::refuse(const char* why) {
   refused_ns_ = port_.now().ns;
 }
 
-std::string OperatorWords::refusal() const {
-  return port_.now().ns - refused_ns_ < kRefusalShown_ns ? refusal_ : "";
-}
+std::string OperatorWords::refusal() const { return port_.now().ns - refused_ns_ < kRefusalShown_ns ? refusal_ : ""; }
 
 }  // namespace bevel::nodes

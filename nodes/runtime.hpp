@@ -25,7 +25,7 @@ std::string try_realtime(int priority);
 
 struct Loop {
   double period_s = 0.01;
-  std::function<void(const Now&)> tell;               // the time, before messages are handled
+  std::function<void(const Now&)> tell;                 // the time, before messages are handled
   std::function<bool(const Now&, double late_s)> step;  // false ends the loop
 };
 // Calls step every period until a stop is requested or step returns false, handling LCM messages as they arrive in

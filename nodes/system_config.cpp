@@ -17,8 +17,7 @@ using io::required;
 using io::Section;
 
 // One link of the chain from a fault to rest; docs/hazards.md has the sum.
-constexpr io::Range kShareOfStop =
-    in_range(0.01, 0.12).because("the needle must rest within 200 ms of a fault");
+constexpr io::Range kShareOfStop = in_range(0.01, 0.12).because("the needle must rest within 200 ms of a fault");
 
 void read_controller(Section s, controller::ControllerConfig& c) {
   s.read("period_s", c.period_s, optional,
@@ -44,7 +43,8 @@ void read_controller(Section s, controller::ControllerConfig& c) {
   f.read("depth_max_mm", safety.depth_max_mm, optional, in_range(1, 400));
   f.read("lateral_max_mm", safety.lateral_max_mm, optional, in_range(1, 200));
   // A rate is wrong by less than the axis can do, or the limit never acts.
-  f.read("tracking_error_mm_s", safety.tracking_error_mm_s, optional, in_range(0.1, 0.5 * c.limits.insertion_rate_mm_s));
+  f.read("tracking_error_mm_s", safety.tracking_error_mm_s, optional,
+         in_range(0.1, 0.5 * c.limits.insertion_rate_mm_s));
   f.read("tracking_error_rad_s", safety.tracking_error_rad_s, optional,
          in_range(0.1, 0.5 * c.limits.rotation_rate_rad_s));
   f.read("tracking_error_s", safety.tracking_error_s, optional, kShareOfStop);

@@ -1,6 +1,6 @@
-// Whether an axis goes where it is told: over the last quarter of a second, its way against the integral of the commanded
-// rate. What it is behind (or ahead) may be what the allowed lag in time makes of the largest rate in that time, and a
-// little more. Pure.
+// Whether an axis goes where it is told: over the last quarter of a second, its way against the integral of the
+// commanded rate. What it is behind (or ahead) may be what the allowed lag in time makes of the largest rate in that
+// time, and a little more. Pure.
 #pragma once
 
 #include <algorithm>

@@ -89,8 +89,8 @@ class StepperDriver {
   // Optional, between steps, when the bus is readable: takes in frames early.
   void receive(std::int64_t now_ns);
 
-  EnableAnswer enable();    // carried out by the following steps
-  void disable();           // the drives ramp down and let go; back to ready
+  EnableAnswer enable();                                  // carried out by the following steps
+  void disable();                                         // the drives ramp down and let go; back to ready
   void stop_now(StopReason reason, std::int64_t now_ns);  // quick stop, latched, and sent at once
   bool rearm();             // out of stopped or fault: configure again, reset faults. False: nothing is latched
   void set_zero();          // both axes are at their zero now
@@ -139,7 +139,7 @@ class StepperDriver {
   std::int64_t next_purge_ns_ = INT64_MIN;
   std::int64_t fresh_setpoint_ns_ = 0;  // when the newest usable set-point was made
   bool refusing_setpoints_ = false;
-  std::array<bool, kAxes> held_back_{};             // it did not when the stop was latched
+  std::array<bool, kAxes> held_back_{};  // it did not when the stop was latched
   DriverCounters counters_;
 };
 

@@ -1,5 +1,5 @@
-// The hub as bevel-rig runs it, on a thread of its own, with clients on two others: every frame reaches the other client
-// in the order sent, every echo its sender, and the end asked for is an end.
+// The hub as bevel-rig runs it, on a thread of its own, with clients on two others: every frame reaches the other
+// client in the order sent, every echo its sender, and the end asked for is an end.
 #include <gtest/gtest.h>
 
 #include <algorithm>

@@ -72,7 +72,8 @@ std::vector<std::string> causes_of(Component component, FaultKind kind) {
   if (!process) {
     causes.push_back("another master commands the drives");
     if (kind == FaultKind::stuck)
-      causes.push_back(component == Component::insertion_drive ? "insertion does not follow" : "rotation does not follow");
+      causes.push_back(component == Component::insertion_drive ? "insertion does not follow"
+                                                               : "rotation does not follow");
     // Positions that are not those of the shaft are known by their jumps.
     const std::string what = component == Component::insertion_drive ? "insertion" : "rotation";
     causes.push_back("ACTUATOR_STATE: jump of the " + what);
@@ -81,8 +82,8 @@ std::vector<std::string> causes_of(Component component, FaultKind kind) {
   return causes;
 }
 
-// A blocked motor shows once it is behind by a tenth of a millimetre or radian; a controller whose commands stand still,
-// once they are none of what it meant within the delay of the axes. Until then the needle does what it should.
+// A blocked motor shows once it is behind by a tenth of a millimetre or radian; a controller whose commands stand
+// still, once they are none of what it meant within the delay of the axes. Until then the needle does what it should.
 std::function<bool(const SimulatedLoop&)> shows(Component component, FaultKind kind) {
   if (kind != FaultKind::stuck) return {};
   if (component == Component::controller)

@@ -11,8 +11,8 @@ namespace bevel::test {
 namespace {
 
 constexpr int kAllowed_ms = 200;
-constexpr double kObserved_s = 0.8;  // from the fault
-constexpr double kAfter_s = 0.5;     // from when it has passed
+constexpr double kObserved_s = 0.8;                    // from the fault
+constexpr double kAfter_s = 0.5;                       // from when it has passed
 constexpr double kMoved_mm = 0.06, kMoved_rad = 0.06;  // a motor that comes free relaxes by so much
 
 double uniform(std::mt19937_64& rng, double low, double high) {
@@ -28,9 +28,7 @@ Eigen::Vector3d draw_target(std::mt19937_64& rng, double curvature_per_mm) {
 }
 
 // Most early, where all of the machinery is the same, some deep.
-double draw_instant_s(std::mt19937_64& rng) {
-  return rng() % 20 == 0 ? uniform(rng, 3, 15) : uniform(rng, 0.2, 2);
-}
+double draw_instant_s(std::mt19937_64& rng) { return rng() % 20 == 0 ? uniform(rng, 3, 15) : uniform(rng, 0.2, 2); }
 
 std::string all_reasons(const SimulatedLoop& loop) {
   std::string text;
@@ -146,8 +144,8 @@ std::string table(const std::vector<FaultClass>& classes, const std::vector<Verd
     std::ranges::sort(rest);
     char line[160];
     if (rest.empty()) {
-      std::snprintf(line, sizeof line, "%-30s %8d %10d %7s %9s  %-12s %11d\n", classes[c].name.c_str(), injected, silent,
-                    "-", "-", "", violations);
+      std::snprintf(line, sizeof line, "%-30s %8d %10d %7s %9s  %-12s %11d\n", classes[c].name.c_str(), injected,
+                    silent, "-", "-", "", violations);
     } else {
       std::snprintf(line, sizeof line, "%-30s %8d %10d %7d %9d  (%-10llu) %11d\n", classes[c].name.c_str(), injected,
                     silent, rest[rest.size() / 2].first, rest.back().first,

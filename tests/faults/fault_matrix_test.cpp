@@ -27,8 +27,7 @@ TEST(FaultMatrix, EveryFaultEndsInALatchedDeclaredStopWithin200ms) {
     if (v.ms_to_rest >= 0 && (!worst || v.ms_to_rest > worst->ms_to_rest)) worst = &v;
     if (v.violation.empty()) continue;
     ++violations;
-    if (++shown <= 25)
-      std::cout << classes[v.fault_class].name << " seed " << v.seed << ": " << v.violation << "\n";
+    if (++shown <= 25) std::cout << classes[v.fault_class].name << " seed " << v.seed << ": " << v.violation << "\n";
   }
   if (worst)
     std::cout << "worst: " << worst->ms_to_rest << " ms, " << classes[worst->fault_class].name << ", seed "

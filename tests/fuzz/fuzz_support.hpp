@@ -1,4 +1,5 @@
-// What the fuzz targets share: an assertion that no build switches off, numbers out of the input, a file without a disk.
+// What the fuzz targets share: an assertion that no build switches off, numbers out of the input, a file without a
+// disk.
 #pragma once
 
 #include <sys/mman.h>

@@ -25,7 +25,8 @@ actuator_state_t axes_of(const stepper::AxesReport& report, std::int64_t utime, 
   actuator_state_t m{};
   m.utime = utime;
   m.seq = seq;
-  for (int i = 0; i < 2; ++i) m.axis_status[i] = static_cast<std::int32_t>(report.status.at(static_cast<std::size_t>(i)));
+  for (int i = 0; i < 2; ++i)
+    m.axis_status[i] = static_cast<std::int32_t>(report.status.at(static_cast<std::size_t>(i)));
   m.insertion_mm = report.insertion_mm;
   m.rotation_rad = report.rotation_rad;
   return m;
@@ -74,7 +75,8 @@ TEST_F(Attack, StampsAtTheEndsOfTimeMoveNothingAndLockNobodyOut) {
 TEST_F(Attack, AnOldWordOfTheOperatorClearsNoStop) {
   steer({6, -9, 100});
   run(2);
-  const steering_target_t armed_before = word(Word::arm, {6, -9, 100}), started_before = word(Word::start, {6, -9, 100});
+  const steering_target_t armed_before = word(Word::arm, {6, -9, 100}),
+                          started_before = word(Word::start, {6, -9, 100});
   say(Word::stop);
   run(0.5);
   const Eigen::Vector3d stopped = tip();

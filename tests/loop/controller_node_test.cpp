@@ -38,7 +38,8 @@ std::vector<model::MotionCommand> commands_of(const SystemConfig& config, int pe
   LcmPort port(lcm);
   ControllerNode node(lcm, config);
   std::int64_t session = 0;
-  port.subscribe<process_status_t>(io::channel::kProcessStatus, [&](const process_status_t& m) { session = m.session; });
+  port.subscribe<process_status_t>(io::channel::kProcessStatus,
+                                   [&](const process_status_t& m) { session = m.session; });
   std::vector<model::MotionCommand> commands;
   port.subscribe<motion_command_t>(io::channel::kMotionCommand,
                                    [&](const motion_command_t& m) { commands.push_back(io::to_sample(m)); });

@@ -119,8 +119,8 @@ Trial run_trial(const std::string& bin, const std::string& config_path, const st
   const double wait_s = std::uniform_real_distribution<double>(0.2, 4)(rng);
   Trial trial{target + (signal == SIGKILL ? " killed" : " stalled"), -1, ""};
 
-  const pid_t demo = spawn({bin + "/bevel-demo", "--config", config_path, "--out", out, "--target", "4,-6,110"},
-                           out + "-demo.txt");
+  const pid_t demo =
+      spawn({bin + "/bevel-demo", "--config", config_path, "--out", out, "--target", "4,-6,110"}, out + "-demo.txt");
   const auto sleep_ms = [](int ms) { std::this_thread::sleep_for(std::chrono::milliseconds(ms)); };
   std::unique_ptr<Listener> listener;
   for (int i = 0; i < 1500 && (!listener || listener->rate(0) < kMoving_unit_s); ++i) {

@@ -41,22 +41,22 @@ constexpr const char* kSafety = "controller.safety";
 constexpr const char* kLimits = "estimator.limits";
 INSTANTIATE_TEST_SUITE_P(
     Table, SafetyKeys,
-    ::testing::Values(
-        Refused{kLimits, "measurement_age_s", "100.0"}, Refused{kLimits, "measurement_age_s", "0.0"},
-        Refused{kLimits, "measurement_silence_s", "1.0"}, Refused{kLimits, "actuator_age_s", "1.0"},
-        Refused{kLimits, "position_sd_mm", "1e9"}, Refused{kSafety, "state_age_s", "0.2"},
-        Refused{kSafety, "actuator_age_s", "0.2"}, Refused{kSafety, "position_sd_mm", "1e6"},
-        Refused{kSafety, "depth_max_mm", "-1000"}, Refused{kSafety, "depth_max_mm", "1e5"},
-        Refused{kSafety, "depth_min_mm", "50"}, Refused{kSafety, "lateral_max_mm", "1e5"},
-        Refused{kSafety, "tracking_error_mm_s", "1e3"}, Refused{kSafety, "tracking_error_rad_s", "1e3"},
-        Refused{kSafety, "tracking_error_s", "10"}, Refused{kSafety, "axis_delay_s", "10"},
-        Refused{kSafety, "resting_motion_mm", "100"}, Refused{kSafety, "enabling_s", "1e6"},
-        Refused{kSafety, "target_miss_max_mm", "1e4"}, Refused{"controller", "period_s", "0.2"},
-        Refused{"stepper", "setpoint_stop_age_ms", "10000"}, Refused{"stepper", "setpoint_zero_age_ms", "500"},
-        Refused{"stepper", "master_heartbeat_timeout_ms", "1000"},
-        Refused{"stepper", "drive_heartbeat_timeout_ms", "1000"}, Refused{"stepper", "period_ms", "50"},
-        Refused{"stepper.insertion", "quick_stop_unit_s2", "1e-6"},
-        Refused{"stepper.rotation", "quick_stop_unit_s2", "1.0"}));
+    ::testing::Values(Refused{kLimits, "measurement_age_s", "100.0"}, Refused{kLimits, "measurement_age_s", "0.0"},
+                      Refused{kLimits, "measurement_silence_s", "1.0"}, Refused{kLimits, "actuator_age_s", "1.0"},
+                      Refused{kLimits, "position_sd_mm", "1e9"}, Refused{kSafety, "state_age_s", "0.2"},
+                      Refused{kSafety, "actuator_age_s", "0.2"}, Refused{kSafety, "position_sd_mm", "1e6"},
+                      Refused{kSafety, "depth_max_mm", "-1000"}, Refused{kSafety, "depth_max_mm", "1e5"},
+                      Refused{kSafety, "depth_min_mm", "50"}, Refused{kSafety, "lateral_max_mm", "1e5"},
+                      Refused{kSafety, "tracking_error_mm_s", "1e3"}, Refused{kSafety, "tracking_error_rad_s", "1e3"},
+                      Refused{kSafety, "tracking_error_s", "10"}, Refused{kSafety, "axis_delay_s", "10"},
+                      Refused{kSafety, "resting_motion_mm", "100"}, Refused{kSafety, "enabling_s", "1e6"},
+                      Refused{kSafety, "target_miss_max_mm", "1e4"}, Refused{"controller", "period_s", "0.2"},
+                      Refused{"stepper", "setpoint_stop_age_ms", "10000"},
+                      Refused{"stepper", "setpoint_zero_age_ms", "500"},
+                      Refused{"stepper", "master_heartbeat_timeout_ms", "1000"},
+                      Refused{"stepper", "drive_heartbeat_timeout_ms", "1000"}, Refused{"stepper", "period_ms", "50"},
+                      Refused{"stepper.insertion", "quick_stop_unit_s2", "1e-6"},
+                      Refused{"stepper.rotation", "quick_stop_unit_s2", "1.0"}));
 
 TEST(SafetyKeysTogether, TheMessageSaysWhy) {
   const test::TemporaryFolder folder;

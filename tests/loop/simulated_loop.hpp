@@ -37,7 +37,8 @@ class SimulatedLoop {
   tip_measurement_t picture(const Eigen::Vector3d& tip, int which);
   void step_one_ms();
   // Runs for so long, or until `until`.
-  bool run(double seconds, const std::function<bool()>& until = [] { return false; });
+  bool run(
+      double seconds, const std::function<bool()>& until = [] { return false; });
   // An operator's word, meant for the processes as they are now.
   void say(nodes::Word word, const Eigen::Vector3d& target = Eigen::Vector3d::Zero());
   steering_target_t word(nodes::Word word, const Eigen::Vector3d& target);
@@ -61,7 +62,9 @@ class SimulatedLoop {
   double speed(std::size_t axis) { return std::abs(rig->drive(axis).velocity_unit_s()); }
   bool at_rest() { return speed(0) < kRest_unit_s && speed(1) < kRest_unit_s; }
   // What the component sends passes through it from the start; idle until it is told to begin.
-  nodes::FaultInjector* injector(nodes::Component component) { return injectors_.at(static_cast<std::size_t>(component)); }
+  nodes::FaultInjector* injector(nodes::Component component) {
+    return injectors_.at(static_cast<std::size_t>(component));
+  }
   // Newest of a process on PROCESS_STATUS; empty before the first.
   process_status_t said(const std::string& process) const;
 
@@ -86,10 +89,10 @@ class SimulatedLoop {
   bool real_can = false;
   std::map<std::string, process_status_t> statuses;
   std::optional<needle_state_t> needle_state;
-  motion_command_t sent{};        // newest of the controller
+  motion_command_t sent{};              // newest of the controller
   std::deque<controller::Rates> meant;  // by the controller, each millisecond within the delay of the axes
-  std::array<double, 2> commanded{};  // integral of those, mm and rad; a test may set it to zero
-  std::function<void()> each_ms;  // called at the end of each, if set
+  std::array<double, 2> commanded{};    // integral of those, mm and rad; a test may set it to zero
+  std::function<void()> each_ms;        // called at the end of each, if set
 
  private:
   void install_injector(nodes::Component component, nodes::LcmPort& port);

@@ -4,8 +4,8 @@
 #include <thread>
 #include <vector>
 
-#include "nodes/status_reporter.hpp"
 #include "nodes/runtime.hpp"
+#include "nodes/status_reporter.hpp"
 
 namespace bevel::nodes {
 namespace {

@@ -13,7 +13,8 @@ void* operator new(std::size_t size) {
   if (void* memory = std::malloc(size)) return memory;
   throw std::bad_alloc();
 }
-// Of std::stable_sort's buffer. In its own words too, as the sanitizers have theirs for each form of new that is not here.
+// Of std::stable_sort's buffer. In its own words too, as the sanitizers have theirs for each form of new that is not
+// here.
 void* operator new(std::size_t size, const std::nothrow_t&) noexcept {
   ++bevel::testing::allocations;
   return std::malloc(size);

@@ -52,8 +52,9 @@ End steer(SteeringSession& session, ProcessGroup& processes, lcm::LCM& lcm, cons
   };
   const auto tell = [&session](const nodes::Now& now) { session.tell_time(now); };
   // The operator's stop is said however this ends, and heard of.
-  nodes::run_with_end(lcm, {0.01, tell, step}, [&session] { session.stop(); },
-                      {0.01, tell, [](const nodes::Now&, double) { return true; }}, kFarewell_s);
+  nodes::run_with_end(
+      lcm, {0.01, tell, step}, [&session] { session.stop(); },
+      {0.01, tell, [](const nodes::Now&, double) { return true; }}, kFarewell_s);
   return end;
 }
 

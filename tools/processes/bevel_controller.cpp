@@ -17,7 +17,8 @@ int main(int argc, char** argv) {
                              node.step(now, late_s);
                              return true;
                            }};
-    nodes::run_with_end(context.lcm, loop, [&] { node.end(); }, {}, 0);
+    nodes::run_with_end(
+        context.lcm, loop, [&] { node.end(); }, {}, 0);
     return 0;
   });
 }

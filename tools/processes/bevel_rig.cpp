@@ -31,7 +31,8 @@ int main(int argc, char** argv) {
                              return true;
                            }};
     // A bench is still there when the programs that drive it have gone: its axes come to rest.
-    nodes::run_with_end(context.lcm, loop, [] {}, loop, kOutlives_s);
+    nodes::run_with_end(
+        context.lcm, loop, [] {}, loop, kOutlives_s);
     return 0;
   });
 }

@@ -25,7 +25,8 @@ int main(int argc, char** argv) {
                          }};
     };
     // The axes are brought to rest before this ends, and others hear of it.
-    nodes::run_with_end(context.lcm, loop(false), [&] { node.end(); }, loop(true), kLongestStop_s);
+    nodes::run_with_end(
+        context.lcm, loop(false), [&] { node.end(); }, loop(true), kLongestStop_s);
     return 0;
   });
 }
