@@ -40,8 +40,8 @@ struct Gate {
 };
 
 struct HealthLimits {
-  double measurement_age_s = 0.13;      // of capture: 30 Hz and 50 ms of latency pass, one lost frame too
-  double measurement_silence_s = 0.09;  // since one arrived, by the steady clock: two lost frames do not pass
+  double measurement_age_s = 0.13;     // of capture: 30 Hz and 50 ms of latency pass, one lost frame too
+  double measurement_silence_s = 0.1;  // since one arrived, by the steady clock: two lost frames pass, three do not
   double actuator_age_s = 0.08;
   double position_sd_mm = 3.0;  // largest standard deviation along any axis
 };

@@ -3,6 +3,8 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <ostream>
+
 #include "io/config.hpp"
 #include "nodes/system_config.hpp"
 #include "tests/support/temporary_folder.hpp"
@@ -20,6 +22,8 @@ struct Refused {
   const char* key;
   const char* value;
 };
+
+void PrintTo(const Refused& r, std::ostream* out) { *out << r.section << "." << r.key << " = " << r.value; }
 
 class SafetyKeys : public ::testing::TestWithParam<Refused> {};
 
