@@ -83,6 +83,7 @@ void read_stepper(Section s, stepper::StepperConfig& c) {
   read_ms("master_heartbeat_ms", c.master_heartbeat_ns);
   read_ms("master_heartbeat_timeout_ms", c.master_heartbeat_timeout_ns);
   for (const std::string& problem : stepper::problems_of(c)) s.fail("", problem);
+  for (const std::string& problem : stepper::safety_problems_of(c)) s.fail("", problem);
 }
 
 void read_source(Section s, camera::SourceConfig& source) {

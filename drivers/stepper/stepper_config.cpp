@@ -42,9 +42,6 @@ void check_axis(Checker& check, const AxisConfig& axis, const std::string& name)
   rate(axis.rate_limit_unit_s, ".rate_limit_unit_s");
   rate(axis.acceleration_unit_s2, ".acceleration_unit_s2");
   rate(axis.quick_stop_unit_s2, ".quick_stop_unit_s2");
-  const double stop_s = axis.rate_limit_unit_s / axis.quick_stop_unit_s2;
-  check.require(stop_s <= kLongestQuickStop_s, name + ".quick_stop_unit_s2", axis.quick_stop_unit_s2,
-                "at least rate_limit_unit_s / 0.06 s: the needle must rest within 200 ms of a fault");
   check.require(axis.position_min_unit < axis.position_max_unit, name + ".position_min_unit", axis.position_min_unit,
                 "below position_max_unit");
 }
@@ -64,29 +61,50 @@ std::vector<std::string> problems_of(const StepperConfig& config) {
     check.require(value >= least_ns && value <= 10'000 * kMs, key, in_ms(value),
                   "no shorter than what it supervises, at most 10 s");
   };
-  const auto notice = [&](std::int64_t value, const char* key, std::int64_t least_ns) {
-    check.require(value >= least_ns && value <= kLongestNotice_ns, key, in_ms(value),
-                  "no shorter than what it supervises, at most 120 ms: the needle must rest within 200 ms of a fault");
-  };
-  check.require(config.period_ns >= kMs && config.period_ns <= 20 * kMs, "period_ms", in_ms(config.period_ns),
-                "1 to 20 ms: a stop is passed on within two periods at most");
+  duration(config.period_ns, "period_ms", kMs);
   duration(config.listen_ns, "listen_ms", config.master_heartbeat_ns);
   duration(config.master_heartbeat_ns, "master_heartbeat_ms", config.period_ns);
-  notice(config.master_heartbeat_timeout_ns, "master_heartbeat_timeout_ms", 2 * config.master_heartbeat_ns);
+  duration(config.master_heartbeat_timeout_ns, "master_heartbeat_timeout_ms", 2 * config.master_heartbeat_ns);
   duration(config.drive_heartbeat_ns, "drive_heartbeat_ms", kMs);
-  notice(config.drive_heartbeat_timeout_ns, "drive_heartbeat_timeout_ms", 2 * config.drive_heartbeat_ns);
+  duration(config.drive_heartbeat_timeout_ns, "drive_heartbeat_timeout_ms", 2 * config.drive_heartbeat_ns);
   duration(config.sdo_timeout_ns, "sdo_timeout_ms", config.period_ns);
   duration(config.transition_timeout_ns, "transition_timeout_ms", 10 * config.period_ns);
-  notice(config.tpdo_timeout_ns, "tpdo_timeout_ms", 3 * config.period_ns);
-  notice(config.echo_timeout_ns, "echo_timeout_ms", 2 * config.period_ns);
-  notice(config.overrun_stop_ns, "overrun_stop_ms", 2 * config.period_ns);
-  notice(config.setpoint_zero_age_ns, "setpoint_zero_age_ms", config.period_ns);
-  notice(config.setpoint_stop_age_ns, "setpoint_stop_age_ms", config.setpoint_zero_age_ns);
-  notice(config.not_following_ns, "not_following_ms", config.period_ns);
+  duration(config.tpdo_timeout_ns, "tpdo_timeout_ms", 3 * config.period_ns);
+  duration(config.echo_timeout_ns, "echo_timeout_ms", 2 * config.period_ns);
+  duration(config.overrun_stop_ns, "overrun_stop_ms", 2 * config.period_ns);
+  duration(config.setpoint_zero_age_ns, "setpoint_zero_age_ms", config.period_ns);
+  duration(config.setpoint_stop_age_ns, "setpoint_stop_age_ms", config.setpoint_zero_age_ns);
+  duration(config.not_following_ns, "not_following_ms", config.period_ns);
   check.require(config.sdo_retries >= 0 && config.sdo_retries <= 10, "sdo_retries", config.sdo_retries, "0 to 10");
   check.require(config.queue_full_limit >= 1, "queue_full_limit", config.queue_full_limit, "at least 1");
   check.require(config.quick_stop_option == 2 || config.quick_stop_option == 6, "quick_stop_option",
                 config.quick_stop_option, "2 or 6");
+  return check.take();
+}
+
+std::vector<std::string> safety_problems_of(const StepperConfig& config) {
+  Checker check;
+  for (std::size_t i = 0; i < kAxes; ++i) {
+    const AxisConfig& axis = config.axes.at(i);
+    check.require(axis.rate_limit_unit_s <= kLongestQuickStop_s * axis.quick_stop_unit_s2,
+                  std::string(i == kInsertion ? "insertion" : "rotation") + ".quick_stop_unit_s2",
+                  axis.quick_stop_unit_s2,
+                  "at least rate_limit_unit_s / 0.06 s: the needle must rest within 200 ms of a fault");
+  }
+  const auto notice = [&](std::int64_t value, const char* key) {
+    check.require(value <= kLongestNotice_ns, key, in_ms(value),
+                  "at most 120 ms: the needle must rest within 200 ms of a fault");
+  };
+  check.require(config.period_ns <= 20 * kMs, "period_ms", in_ms(config.period_ns),
+                "at most 20 ms: a stop is passed on within a period");
+  notice(config.master_heartbeat_timeout_ns, "master_heartbeat_timeout_ms");
+  notice(config.drive_heartbeat_timeout_ns, "drive_heartbeat_timeout_ms");
+  notice(config.tpdo_timeout_ns, "tpdo_timeout_ms");
+  notice(config.echo_timeout_ns, "echo_timeout_ms");
+  notice(config.overrun_stop_ns, "overrun_stop_ms");
+  notice(config.setpoint_zero_age_ns, "setpoint_zero_age_ms");
+  notice(config.setpoint_stop_age_ns, "setpoint_stop_age_ms");
+  notice(config.not_following_ns, "not_following_ms");
   return check.take();
 }
 

@@ -68,4 +68,7 @@ struct StepperConfig {
 // What is wrong with a configuration, one sentence each (key, value, allowed range); empty when it can be used.
 std::vector<std::string> problems_of(const StepperConfig& config);
 
+// What of it would keep a needle from resting within 200 ms of a fault: for rigs, not for buses in slow emulators.
+std::vector<std::string> safety_problems_of(const StepperConfig& config);
+
 }  // namespace bevel::stepper

@@ -221,7 +221,7 @@ TEST(Configuration, ProblemsNameKeyValueAndRange) {
   EXPECT_THAT(stepper::problems_of(config),
               testing::UnorderedElementsAre(testing::HasSubstr("rotation.node_id = 1"),
                                             testing::HasSubstr("insertion.counts_per_unit = 0"),
-                                            testing::HasSubstr("drive_heartbeat_timeout_ns = 1")));
+                                            testing::HasSubstr("drive_heartbeat_timeout_ms = 1e-06")));
   can::MemoryNetwork wire;
   const auto bus = wire.attach();
   EXPECT_THROW(stepper::StepperDriver(*bus, config), std::invalid_argument);
