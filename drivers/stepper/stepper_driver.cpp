@@ -9,7 +9,9 @@ namespace bevel::stepper {
 namespace {
 
 constexpr int kReceptionsPerCall = 256;
-constexpr double kHeldBack = 0.5;  // of the lag that is allowed: more than a drive's answer to a new rate
+constexpr double kHeldBack_unit = 0.04;  // mm or rad that an axis may jump by when it comes free
+constexpr double kResting_unit_s = 0.05;
+constexpr double kTold_s = 0.03;  // from a command to its effect: two cycles and the drive's own
 constexpr std::int64_t kPurgePause_ns = 500 * kMs;
 constexpr std::uint64_t kFaultResetSteps =
     4;  // half a period of the fault reset bit, long enough to survive a lost PDO
@@ -85,7 +87,10 @@ bool StepperDriver::rearm() {
 }
 
 void StepperDriver::set_zero() {
-  for (auto& node : nodes_) node.set_zero();
+  for (std::size_t axis = 0; axis < kAxes; ++axis) {
+    nodes_.at(axis).set_zero();
+    follows_.at(axis).begin(last_step_ns_, 0);
+  }
 }
 
 void StepperDriver::confirm_position() {
@@ -94,9 +99,11 @@ void StepperDriver::confirm_position() {
 
 void StepperDriver::latch(const Stop& stop) {
   enable_wanted_ = false;
-  if (!latched())
-    for (std::size_t axis = 0; axis < kAxes; ++axis)
-      held_back_.at(axis) = state_ == DriverState::enabled && follows_.at(axis).newest_share() > kHeldBack;
+  if (!latched()) {
+    for (std::size_t axis = 0; axis < kAxes; ++axis) stopped_from_unit_s_.at(axis) = nodes_.at(axis).rate_unit_s();
+    judged_.fill(state_ != DriverState::enabled);
+    held_back_.fill(false);
+  }
   for (auto& shaper : shapers_) shaper.reset();
   if (latched()) {
     ++counters_.later_stops;
@@ -240,6 +247,7 @@ void StepperDriver::step(std::int64_t now_ns, const std::optional<MotionSetpoint
       break;
     case DriverState::stopped:
     case DriverState::fault:
+      judge_rest(now_ns);
       if (!silent_)
         for (auto& node : nodes_) node.read_error_code(now_ns, out_);
       break;
@@ -293,7 +301,7 @@ void StepperDriver::run_ready(std::int64_t now_ns) {
     state_ = DriverState::enabled;
     fresh_setpoint_ns_ = now_ns;
     refusing_setpoints_ = false;
-    for (auto& follow : follows_) follow.begin(now_ns);
+    for (std::size_t axis = 0; axis < kAxes; ++axis) follows_.at(axis).begin(now_ns, nodes_.at(axis).position_unit());
   } else if (now_ns - enable_since_ns_ > config_.transition_timeout_ns) {
     latch({StopReason::enable_timeout, -1, 0});
   }
@@ -360,8 +368,24 @@ void StepperDriver::supervise_motion(std::int64_t now_ns) {
       default:
         return latch({StopReason::drive_left_operation, static_cast<int>(axis), node.statusword()});
     }
-    if (follows_.at(axis).lag_share(now_ns, shapers_.at(axis).rate_unit_s(), node.position_unit()) > 1)
+    if (!follows_.at(axis).follows(now_ns, shapers_.at(axis).rate_unit_s(), node.position_unit()))
       return latch({StopReason::not_following, static_cast<int>(axis), 0});
+  }
+}
+
+// Once an axis rests after a stop: is it where it should be, or was it held back?
+void StepperDriver::judge_rest(std::int64_t now_ns) {
+  for (std::size_t axis = 0; axis < kAxes; ++axis) {
+    const DriveNode& node = nodes_.at(axis);
+    if (judged_.at(axis) || std::abs(node.rate_unit_s()) > kResting_unit_s) continue;
+    judged_.at(axis) = true;
+    FollowWatch& follow = follows_.at(axis);
+    follow.follows(now_ns, 0, node.position_unit());
+    // What moved went on by the way of the quick stop, and by what it moved before it was told.
+    const double rate = stopped_from_unit_s_.at(axis);
+    const double stopping = 0.5 * rate * std::abs(rate) / config_.axes.at(axis).quick_stop_unit_s2;
+    const double behind = std::abs(follow.behind_unit() + stopping);
+    held_back_.at(axis) = behind > kHeldBack_unit + kTold_s * std::abs(rate);
   }
 }
 

@@ -112,6 +112,7 @@ class StepperDriver {
   void run_ready(std::int64_t now_ns);
   void run_enabled(std::int64_t now_ns, const std::optional<MotionSetpoint>& setpoint);
   void supervise_motion(std::int64_t now_ns);
+  void judge_rest(std::int64_t now_ns);
   std::array<double, kAxes> wanted_rates(std::int64_t now_ns, const std::optional<MotionSetpoint>& setpoint);
   void transmit(std::int64_t now_ns);
   void send_commands(std::int64_t now_ns);
@@ -139,7 +140,9 @@ class StepperDriver {
   std::int64_t next_purge_ns_ = INT64_MIN;
   std::int64_t fresh_setpoint_ns_ = 0;  // when the newest usable set-point was made
   bool refusing_setpoints_ = false;
-  std::array<bool, kAxes> held_back_{};  // it did not when the stop was latched
+  // Of a stop: how fast each axis was, whether it has come to rest since, and whether it was behind then.
+  std::array<double, kAxes> stopped_from_unit_s_{};
+  std::array<bool, kAxes> judged_{}, held_back_{};
   DriverCounters counters_;
 };
 

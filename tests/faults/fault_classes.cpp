@@ -10,6 +10,7 @@ using nodes::Component;
 using nodes::FaultKind;
 
 constexpr double kHour_us = 3.6e9;
+constexpr double kBehind_unit = 0.05;  // mm or rad
 
 std::size_t axis_of(Component drive) { return drive == Component::insertion_drive ? 0 : 1; }
 
@@ -82,8 +83,9 @@ std::vector<std::string> causes_of(Component component, FaultKind kind) {
   return causes;
 }
 
-// A blocked motor shows once it is behind by a tenth of a millimetre or radian; a controller whose commands stand
-// still, once they are none of what it meant within the delay of the axes. Until then the needle does what it should.
+// A blocked motor shows once it stands nowhere it was told to be within what an axis may lag; a controller whose
+// commands stand still, once they are none of what it meant within the delay of the axes. Until then the needle does
+// what it should.
 std::function<bool(const SimulatedLoop&)> shows(Component component, FaultKind kind) {
   if (kind != FaultKind::stuck) return {};
   if (component == Component::controller)
@@ -98,7 +100,11 @@ std::function<bool(const SimulatedLoop&)> shows(Component component, FaultKind k
     };
   if (nodes::channel_of(component)[0] != '\0') return {};
   const std::size_t axis = axis_of(component);
-  return [axis](const SimulatedLoop& loop) { return std::abs(loop.commanded.at(axis)) > 0.1; };
+  return [axis](const SimulatedLoop& loop) {
+    const double shaft = loop.rig->drive(axis).position_unit();
+    return std::ranges::all_of(loop.told, [&](const auto& told) { return told.at(axis) > shaft + kBehind_unit; }) ||
+           std::ranges::all_of(loop.told, [&](const auto& told) { return told.at(axis) < shaft - kBehind_unit; });
+  };
 }
 
 FaultClass process_fault(Component component, FaultKind kind) {
@@ -136,7 +142,6 @@ FaultClass drive_fault(Component component, FaultKind kind) {
   c.causes = causes_of(component, kind);
   c.inject = [component, kind](SimulatedLoop& loop, std::mt19937_64& rng) {
     if (kind == FaultKind::stuck) {
-      loop.commanded = {};
       loop.rig->drive(axis_of(component)).set_motor_blocked(true);
     } else {
       loop.rig->faulty_bus(axis_of(component)).begin(kind, loop.ns(), rng());

@@ -126,8 +126,10 @@ void SimulatedLoop::step_one_ms() {
   }
   if (controller) meant.push_back(controller->supervisor().commanded());
   while (static_cast<double>(meant.size()) > 1e3 * config.controller.safety.axis_delay_s) meant.pop_front();
-  commanded[0] += 1e-3 * sent.insertion_rate_mm_s;
-  commanded[1] += 1e-3 * sent.rotation_rate_rad_s;
+  const std::array<double, 2> before = told.empty() ? std::array<double, 2>{} : told.back();
+  told.push_back({before[0] + 1e-3 * sent.insertion_rate_mm_s, before[1] + 1e-3 * sent.rotation_rate_rad_s});
+  while (static_cast<double>(told.size()) > 1e-6 * static_cast<double>(config.stepper.not_following_ns))
+    told.pop_front();
   if (each_ms) each_ms();
 }
 

@@ -91,7 +91,7 @@ class SimulatedLoop {
   std::optional<needle_state_t> needle_state;
   motion_command_t sent{};              // newest of the controller
   std::deque<controller::Rates> meant;  // by the controller, each millisecond within the delay of the axes
-  std::array<double, 2> commanded{};    // integral of those, mm and rad; a test may set it to zero
+  std::deque<std::array<double, 2>> told;  // integral of what was sent, mm and rad, within what an axis may lag
   std::function<void()> each_ms;        // called at the end of each, if set
 
  private:
