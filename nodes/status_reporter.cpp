@@ -21,9 +21,11 @@ StatusReporter::StatusReporter(LcmPort& port, std::string process, double period
   message_.process = std::move(process);
   message_.loop_period_s = period_s;
   message_.session = run_ << kStopBits;
-  port_.subscribe<process_status_t>(io::channel::kProcessStatus, [this](const process_status_t& m) {
-    if (m.process == message_.process && m.session >> kStopBits != run_) name_taken_ = true;
-  });
+  // The port may outlive this: what it calls holds all that it needs.
+  port_.subscribe<process_status_t>(io::channel::kProcessStatus,
+                                    [name = message_.process, run = run_, taken = name_taken_](const auto& m) {
+                                      if (m.process == name && m.session >> kStopBits != run) *taken = true;
+                                    });
 }
 
 void StatusReporter::report(const std::string& state, const std::string& reason) {
