@@ -10,24 +10,6 @@ namespace {
 constexpr double kSlackMessages = 8;
 }  // namespace
 
-const char* name_of(Standing standing) {
-  switch (standing) {
-    case Standing::fresh:
-      return "fresh";
-    case Standing::late:
-      return "late";
-    case Standing::duplicate:
-      return "duplicate";
-    case Standing::old:
-      return "too old";
-    case Standing::ahead:
-      return "from the future";
-    case Standing::foreign:
-      return "from a second sender";
-  }
-  return "?";
-}
-
 const SenderWatch::Used* SenderWatch::find(std::int64_t seq) const noexcept {
   const auto found = std::find_if(used_.begin(), used_.end(), [seq](const Used& used) { return used.seq == seq; });
   return found == used_.end() ? nullptr : &*found;

@@ -27,7 +27,6 @@ enum class Standing {
   foreign,    // does not continue the stream of a sender that is alive
 };
 constexpr bool usable(Standing standing) { return standing == Standing::fresh || standing == Standing::late; }
-const char* name_of(Standing standing);
 
 class SenderWatch {
  public:

@@ -19,6 +19,10 @@ io::SenderLimits command_limits(const stepper::StepperConfig& config) {
           .silence_us = config.setpoint_stop_age_ns / 1000};
 }
 
+bool is_latched(const stepper::AxesReport& report) {
+  return report.state == stepper::DriverState::stopped || report.state == stepper::DriverState::fault;
+}
+
 }  // namespace
 
 StepperNode::StepperNode(lcm::LCM& lcm, can::Bus& bus, const stepper::StepperConfig& config)
@@ -79,16 +83,14 @@ void StepperNode::on_trouble(const InputTrouble& trouble) {
 }
 
 void StepperNode::stop(stepper::StopReason reason, std::string detail) {
-  const stepper::DriverState state = driver_.report().state;
-  if (state == stepper::DriverState::stopped || state == stepper::DriverState::fault) return;
+  if (is_latched(driver_.report())) return;
   driver_.stop_now(reason, port_.now().ns);
   note_latch();
   detail_ = std::move(detail);
 }
 
 void StepperNode::note_latch() {
-  const stepper::DriverState state = driver_.report().state;
-  const bool latched = state == stepper::DriverState::stopped || state == stepper::DriverState::fault;
+  const bool latched = is_latched(driver_.report());
   if (latched && !was_latched_) {
     status_.renew_session();
     enable_wanted_ = false;
