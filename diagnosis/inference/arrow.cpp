@@ -1,0 +1,87 @@
+#include "diagnosis/inference/arrow.hpp"
+
+#include <Eigen/Cholesky>
+#include <algorithm>
+#include <numbers>
+
+namespace bevel::inference {
+
+using Eigen::Index;
+using Eigen::MatrixXd;
+using Eigen::VectorXd;
+
+namespace {
+double log_det(const Eigen::LLT<MatrixXd>& factor) { return 2 * factor.matrixLLT().diagonal().array().log().sum(); }
+}  // namespace
+
+ArrowBlock make_block(const MatrixXd& L, const MatrixXd& Z, const VectorXd& w) {
+  ArrowBlock out;
+  out.ll.noalias() = L.transpose() * L;
+  out.lz.noalias() = L.transpose() * Z;
+  out.zz.noalias() = Z.transpose() * Z;
+  out.lw.noalias() = L.transpose() * w;
+  out.zw.noalias() = Z.transpose() * w;
+  out.ww = w.squaredNorm();
+  return out;
+}
+
+ArrowSolution solve(const std::vector<ArrowBlock>& blocks, const MatrixXd& precision, const VectorXd& centre,
+                    const ArrowRules& rules) {
+  ArrowSolution out;
+  const Index n = precision.rows();
+  MatrixXd H = precision;
+  VectorXd g = precision * centre;
+  out.least = centre.dot(g);
+  const auto uses = [&](std::size_t r) { return rules.used.empty() || rules.used[r]; };
+  std::vector<Eigen::LLT<MatrixXd>> factors(blocks.size());
+  std::vector<VectorXd> pulls(blocks.size());
+  for (std::size_t r = 0; r < blocks.size(); ++r) {
+    const ArrowBlock& block = blocks[r];
+    if (!uses(r)) continue;
+    MatrixXd inner = block.ll;
+    inner.diagonal() += block.precision;
+    inner.diagonal() *= 1 + rules.damping;
+    factors[r].compute(inner);
+    if (factors[r].info() != Eigen::Success) return out;
+    pulls[r] = block.lw + block.precision.cwiseProduct(block.centre);
+    const VectorXd own = factors[r].solve(pulls[r]);
+    const MatrixXd across = factors[r].solve(block.lz);
+    H += block.zz;
+    H.noalias() -= block.lz.transpose() * across;
+    g += block.zw;
+    g.noalias() -= block.lz.transpose() * own;
+    out.least += block.ww + block.centre.dot(block.precision.cwiseProduct(block.centre)) - pulls[r].dot(own);
+    out.log_volume_ratio += log_det(factors[r]) - block.precision.array().log().sum();
+  }
+  for (const Index i : rules.held) {
+    H.row(i).setZero();
+    H.col(i).setZero();
+    H(i, i) = precision(i, i) + 0.5 * std::numbers::pi * g[i] * g[i];
+    g[i] = 0;
+  }
+  out.information = H;
+  H.diagonal() *= 1 + rules.damping;
+  // In units of each unknown's own error, so that all can stand together.
+  const VectorXd unit = H.diagonal().cwiseSqrt().cwiseInverse();
+  if (!unit.allFinite()) return out;
+  const MatrixXd scaled = unit.asDiagonal() * H * unit.asDiagonal();
+  const Eigen::LLT<MatrixXd> factor(scaled);
+  if (factor.info() != Eigen::Success) return out;
+  out.covariance = unit.asDiagonal() * factor.solve(MatrixXd::Identity(n, n)) * unit.asDiagonal();
+  out.shared = out.covariance * g;
+  out.least -= g.dot(out.shared);
+  out.log_volume_ratio += log_det(factor) - 2 * unit.array().log().sum();
+  for (const Index i : rules.held) out.covariance(i, i) = 0;
+  const Eigen::LLT<MatrixXd> prior(precision);
+  if (n > 0) {
+    if (prior.info() != Eigen::Success) return out;
+    out.log_volume_ratio -= log_det(prior);
+  }
+  out.local.resize(blocks.size());
+  for (std::size_t r = 0; r < blocks.size(); ++r)
+    if (uses(r)) out.local[r] = factors[r].solve(pulls[r] - blocks[r].lz * out.shared);
+  out.valid = out.shared.allFinite();
+  return out;
+}
+
+}  // namespace bevel::inference

@@ -1,0 +1,44 @@
+#pragma once
+// Least squares in which each recording has unknowns of its own beside those that all share: the normal equations have
+// the shape of an arrow, and each recording's own part is eliminated by its Schur complement.
+//
+//   minimise  sum_r |w_r - L_r l_r - Z_r z|^2 + (l_r - l0_r)' T_r (l_r - l0_r) + (z - z0)' P (z - z0)
+#include <Eigen/Core>
+#include <vector>
+
+namespace bevel::inference {
+
+// Inner products of one recording's columns, and the prior of what is its own.
+struct ArrowBlock {
+  Eigen::MatrixXd ll, lz, zz;
+  Eigen::VectorXd lw, zw;
+  double ww = 0;
+  Eigen::VectorXd precision, centre;  // T_r (diagonal), l0_r
+};
+
+struct ArrowSolution {
+  double least = 0;        // the minimum
+  Eigen::VectorXd shared;  // z
+  std::vector<Eigen::VectorXd> local;
+  Eigen::MatrixXd information;  // of z, all else eliminated: the Schur complement plus P
+  Eigen::MatrixXd covariance;   // its inverse
+  // log det of the whole Hessian less that of the priors' precisions: what the posterior's volume lost.
+  double log_volume_ratio = 0;
+  bool valid = false;
+};
+
+// Z_r and L_r from columns; the precision and the centre are left to the caller.
+ArrowBlock make_block(const Eigen::MatrixXd& L, const Eigen::MatrixXd& Z, const Eigen::VectorXd& w);
+
+// damping: of Levenberg and Marquardt, on the diagonals; `precision` P may be full. used: recordings that take part;
+// empty: all. held: shared unknowns that stay at zero, pressed against a bound: what is left of their posterior is the
+// exponential tail exp(-|gradient| distance), which has a normal one's volume in log_volume_ratio.
+struct ArrowRules {
+  double damping = 0;
+  std::vector<bool> used{};
+  std::vector<Eigen::Index> held{};
+};
+ArrowSolution solve(const std::vector<ArrowBlock>& blocks, const Eigen::MatrixXd& precision,
+                    const Eigen::VectorXd& centre, const ArrowRules& rules = {});
+
+}  // namespace bevel::inference

@@ -1,0 +1,43 @@
+#pragma once
+// The discrepancy that nobody has a name for: a Gaussian process of one covariate in one component (Kennedy and O'Hagan
+// 2001, J. R. Stat. Soc. B 63), linear through the sensitivities, beside any set of effects.
+#include "diagnosis/inference/likelihood.hpp"
+
+namespace bevel::inference {
+
+// Scales and lengths that are integrated over.
+inline constexpr double kCurveScales[] = {0.25, 0.5, 1, 2, 4, 8, 16, 32, 64};
+inline constexpr double kCurveLengths[] = {1.0, 0.2};
+
+struct CurveFactor {
+  CurvePrior prior;
+  double log_bayes_factor = 0;  // against no discrepancy
+};
+
+class Discrepancy {
+ public:
+  // About a fit of the base alone.
+  Discrepancy(const Likelihood& likelihood, const Fit& base);
+
+  // Whitened by the noise of this likelihood, which may be another.
+  CurveColumns columns(const Likelihood& likelihood, const CurvePrior& prior) const;
+  // All curves at all scales and lengths beside a fit (without a curve), by the linear model and the noise that this
+  // was made with: the likeliest first.
+  std::vector<CurveFactor> scan(const Fit& fit, const std::vector<ArrowBlock>& blocks,
+                                const Likelihood& likelihood) const;
+  std::size_t choices() const { return first_.size() * std::size(kCurveScales) * std::size(kCurveLengths); }
+  // The root mean square over the readings, in standard deviations of the noise, of the part of a curve's values that
+  // the base's own parameters do not absorb.
+  double visible_size(const CurvePrior& prior, const Eigen::VectorXd& values) const;
+
+ private:
+  Eigen::MatrixXd unit_covariance(std::size_t curve, double length) const;
+
+  const System* system_;
+  std::vector<Eigen::Index> first_, size_;    // columns of each curve
+  std::vector<Eigen::MatrixXf> raw_, white_;  // per recording, of all curves
+  std::vector<Eigen::MatrixXf> square_;       // per recording: inner products within each curve, side by side
+  std::vector<Eigen::MatrixXd> visible_;      // per curve: mean square over readings, as a quadratic form
+};
+
+}  // namespace bevel::inference

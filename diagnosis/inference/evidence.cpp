@@ -1,0 +1,348 @@
+#include "diagnosis/inference/evidence.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+#include "diagnosis/inference/log_sum.hpp"
+
+namespace bevel::inference {
+
+using Eigen::Index;
+using Eigen::MatrixXd;
+using Eigen::VectorXd;
+
+namespace {
+
+constexpr double kWorthARefit = 0.2;  // of log evidence
+constexpr int kRefits = 12;           // with the standard deviations and the curve at their likeliest
+constexpr double kLikelyCurve = 3;    // log Bayes factor from which a curve is fitted
+constexpr int kFiner = 5;
+constexpr int kPhases = 12;
+constexpr int kScans = 4;                // by one noise
+constexpr double kInstantWidth_s = 0.1;  // of an instant's posterior, while it is not known yet
+constexpr double kNegligible = 20;       // of chi2: readings beyond it have no part in an integral
+
+double beta_binomial(int happened, int recordings) {
+  const auto beta = [](double a, double b) { return std::lgamma(a) + std::lgamma(b) - std::lgamma(a + b); };
+  return beta(kHappens + happened, kHappensNot + recordings - happened) - beta(kHappens, kHappensNot);
+}
+
+// What an instant has to bring in a recording to be taken for one, in chi2: its expected odds.
+double instant_cost(double duration_s) { return 2 * std::log(kHappensNot / kHappens * duration_s / kInstantWidth_s); }
+
+// log of the integral over one instant, relative to the likelihood at it, its uniform prior included.
+double log_width_of(const Likelihood& likelihood, const Fit& fit, const CurveColumns& curve, std::size_t r,
+                    std::size_t local) {
+  const double duration_s = fit.layout.upper(local, r);
+  const double at_s = fit.local[r][static_cast<Index>(local)];
+  Residuals residuals;
+  VectorXd values = fit.local[r];
+  const auto chi2_at = [&](double value) {
+    values[static_cast<Index>(local)] = value;
+    if (!likelihood.evaluate(fit.layout, r, fit.shared, values, false, residuals))
+      return std::numeric_limits<double>::infinity();
+    if (curve) residuals.white -= curve.columns[r] * fit.curve_values;
+    return residuals.white.squaredNorm();
+  };
+  const double best = chi2_at(at_s);
+  // Outwards with growing steps until nothing is left.
+  double integral = 0;
+  for (const double direction : {-1.0, 1.0}) {
+    double step = 0.002, at = 0, before = 1;
+    for (int i = 0; i < 60; ++i) {
+      at += step;
+      const double where = at_s + direction * at;
+      if (where <= 0 || where >= duration_s) break;
+      const double now = std::min(1.0, std::exp(-0.5 * (chi2_at(where) - best)));
+      integral += 0.5 * step * (before + now);
+      before = now;
+      if (now < std::exp(-0.5 * kNegligible)) break;
+      step = std::min(step * 1.3, 0.1);
+    }
+  }
+  return std::log(std::max(integral, 1e-4) / duration_s);
+}
+
+double log_prior_of_instants(const Likelihood& likelihood, const Fit& fit, const CurveColumns& curve) {
+  double sum = 0;
+  for (std::size_t i = 0; i < fit.layout.local().size(); ++i) {
+    if (!fit.layout.is_instant(i)) continue;
+    int happened = 0;
+    for (std::size_t r = 0; r < fit.local.size(); ++r)
+      if (fit.local[r][static_cast<Index>(i)] > 0) {
+        ++happened;
+        sum += log_width_of(likelihood, fit, curve, r, i);
+      }
+    sum += beta_binomial(happened, static_cast<int>(fit.local.size()));
+  }
+  return sum;
+}
+
+double log_density_ratios(const Fit& fit, const MatrixXd& covariance) {
+  double sum = 0;
+  for (Index i = 0; i < fit.shared.size(); ++i)
+    sum += log_density_ratio(fit.layout.shared()[static_cast<std::size_t>(i)].parameter->prior, fit.shared[i],
+                             std::sqrt(std::max(covariance(i, i), 0.0)));
+  return sum;
+}
+
+struct GridEvidence {
+  double log_here = -std::numeric_limits<double>::infinity();      // at the standard deviations of the fit
+  double log_promised = -std::numeric_limits<double>::infinity();  // at the best of the grid, by the linear model
+  double log_mean = -std::numeric_limits<double>::infinity();      // over the grid
+  Index best = 0;
+  VectorXd weights;
+};
+
+// Over the grid of the nuisances' standard deviations, about one mode. The mode's own cost is that of the nonlinear
+// model; the linear one says how it changes over the grid, and what it promises elsewhere counts for no more than what
+// was found here (settle() goes and looks).
+GridEvidence over_nuisances(const Fit& fit, const CurveColumns& curve, const NuisanceGrid& grid) {
+  GridEvidence out;
+  const Likelihood& likelihood = *fit.likelihood;
+  auto blocks = linearise(likelihood, fit, curve);
+  if (blocks.empty()) return out;
+  const double here = solve_about(fit, blocks, curve).least;
+  std::vector<double> logs;
+  Fit about = fit;
+  for (Index k = 0; k < grid.log_prior.size(); ++k) {
+    about.scales.nuisance_sd = grid.standard_deviations.col(k);
+    const VectorXd precision = local_precision_of(fit.layout, about.scales);
+    for (auto& block : blocks) block.precision = precision;
+    const ArrowSolution solution = solve_about(about, blocks, curve);
+    logs.push_back(solution.valid ? -0.5 * (fit.cost + solution.least - here + solution.log_volume_ratio) +
+                                        log_density_ratios(fit, solution.covariance) + grid.log_prior[k]
+                                  : -std::numeric_limits<double>::infinity());
+    if (grid.standard_deviations.col(k) == fit.scales.nuisance_sd) out.log_here = logs.back();
+  }
+  out.best = std::max_element(logs.begin(), logs.end()) - logs.begin();
+  out.log_promised = logs[static_cast<std::size_t>(out.best)];
+  for (double& log : logs) log = std::min(log, out.log_here);
+  const double all = log_sum(logs);
+  out.weights.resize(grid.log_prior.size());
+  for (Index k = 0; k < out.weights.size(); ++k) out.weights[k] = std::exp(logs[static_cast<std::size_t>(k)] - all);
+  const double constant = likelihood.log_weights() + log_prior_of_instants(likelihood, fit, curve);
+  out.log_here += constant;
+  out.log_promised += constant;
+  out.log_mean = all + constant;
+  return out;
+}
+
+// The likeliest noise for what a fit leaves.
+Noise noise_about(const Fit& fit, const CurveColumns& curve) {
+  const Likelihood& likelihood = *fit.likelihood;
+  Errors errors(likelihood.recordings());
+  for (std::size_t r = 0; r < errors.size(); ++r) {
+    VectorXd all = likelihood.errors(fit.layout, r, fit.shared, fit.local[r]);
+    if (curve) all -= curve.raw[r] * fit.curve_values;
+    Index row = 0;
+    for (const Series& series : likelihood.data().recordings[r].series) {
+      errors[r].push_back(all.segment(row, static_cast<Index>(series.time_s.size())));
+      row += static_cast<Index>(series.time_s.size());
+    }
+  }
+  return refine_noise(likelihood.data(), errors, likelihood.noise());
+}
+
+// Fit, noise and the nuisances' standard deviations in turn, until none changes.
+// Each instant in turn taken out, all else fitted anew: kept out where it is not missed. What a scan finds beside
+// parameters that are still off may hold them there.
+void doubt_instants(const Likelihood& likelihood, const CurveColumns& curve, Fit& fitted) {
+  const Layout& layout = fitted.layout;
+  for (std::size_t i = 0; i < layout.local().size(); ++i) {
+    if (!layout.is_instant(i)) continue;
+    for (std::size_t r = 0; r < fitted.local.size(); ++r) {
+      if (!(fitted.local[r][static_cast<Index>(i)] > 0)) continue;
+      auto local = fitted.local;
+      local[r][static_cast<Index>(i)] = 0;
+      Fit without = fit(likelihood, layout, fitted.shared, local, fitted.scales, curve);
+      if (!without.valid) continue;
+      scan_local(likelihood, layout, without.shared, without.local);
+      Fit again = fit(likelihood, layout, without.shared, without.local, fitted.scales, curve);
+      const auto happened = [&](const Fit& f) {
+        return std::count_if(f.local.begin(), f.local.end(),
+                             [&](const VectorXd& l) { return l[static_cast<Index>(i)] > 0; });
+      };
+      const double cost = instant_cost(layout.upper(i, r));
+      if (again.valid && again.cost + cost * static_cast<double>(happened(again)) <
+                             fitted.cost + cost * static_cast<double>(happened(fitted)))
+        fitted = std::move(again);
+    }
+  }
+}
+
+bool has_scanned(const Layout& layout) { return layout.local().size() > layout.system().nuisances().size(); }
+
+struct Settled {
+  Fit fit;
+  GridEvidence over;
+};
+Settled settle(const Likelihood& likelihood, const Discrepancy* discrepancy, const Layout& layout, VectorXd shared,
+               std::vector<VectorXd> local, Scales scales, const NuisanceGrid& grid, double give_up_below) {
+  auto now = std::make_shared<const Likelihood>(likelihood);
+  CurveColumns curve;
+  Settled best{.fit = Fit(layout), .over = {}};
+  bool noise_moved = false;
+  for (int pass = 0; pass < kRefits; ++pass) {
+    if (scales.curve) curve = discrepancy->columns(*now, *scales.curve);
+    Settled one{.fit = fit(*now, layout, shared, local, scales, curve), .over = {}};
+    if (!one.fit.valid) break;
+    // Phases and instants have many local minima: they are scanned, with the rest as it now stands.
+    for (int scan = 0; scan < kScans && (pass == 0 || noise_moved) && has_scanned(layout); ++scan) {
+      auto scanned = one.fit.local;
+      scan_local(*now, layout, one.fit.shared, scanned);
+      if (scanned == one.fit.local) break;
+      Fit again = fit(*now, layout, one.fit.shared, scanned, scales, curve);
+      const bool better = again.valid && again.cost < one.fit.cost;
+      if (again.valid) one.fit = std::move(again);
+      if (!better) break;
+    }
+    if (pass == 0 || noise_moved) doubt_instants(*now, curve, one.fit);
+    one.fit.likelihood = now;
+    one.over = over_nuisances(one.fit, curve, grid);
+    const bool better = one.over.log_here > best.over.log_here + kWorthARefit;
+    if (one.over.log_here > best.over.log_here) best = one;
+    if (!better && !noise_moved) break;
+    // Not before the noise had its turn: what a wrong model leaves passes for noise.
+    if (pass > 1 && one.over.log_promised < give_up_below) break;
+    // The noise first, then what differs between recordings: by a wrong noise they do not differ.
+    const Noise noise = noise_about(one.fit, curve);
+    noise_moved = !alike(noise, now->noise());
+    if (noise_moved) {
+      now = std::make_shared<const Likelihood>(likelihood, noise);
+    } else if (grid.standard_deviations.col(one.over.best) != scales.nuisance_sd) {
+      scales.nuisance_sd = grid.standard_deviations.col(one.over.best);
+    } else {
+      break;
+    }
+    shared = one.fit.shared;
+    local = one.fit.local;
+  }
+  return best;
+}
+
+}  // namespace
+
+NuisanceGrid nuisance_grid(const System& system) {
+  const auto& groups = system.nuisance_groups();
+  Index count = 1;
+  for (const auto& group : groups) count *= static_cast<Index>(group.standard_deviations.size());
+  NuisanceGrid out{.standard_deviations = MatrixXd(static_cast<Index>(groups.size()), count),
+                   .log_prior = VectorXd::Zero(count)};
+  for (Index k = 0; k < count; ++k) {
+    Index rest = k;
+    for (std::size_t g = 0; g < groups.size(); ++g) {
+      const auto& values = groups[g].standard_deviations;
+      const std::size_t which = static_cast<std::size_t>(rest) % values.size();
+      out.standard_deviations(static_cast<Index>(g), k) = values[which];
+      if (values.size() > 1)
+        out.log_prior[k] -= std::log(which == 0 ? 2.0 : 2.0 * static_cast<double>(values.size() - 1));
+      rest /= static_cast<Index>(values.size());
+    }
+  }
+  return out;
+}
+
+std::pair<Fit, double> moved_to(const std::shared_ptr<const Likelihood>& likelihood, const Fit& from,
+                                const Discrepancy& discrepancy) {
+  const auto curve_of = [&](const Likelihood& by) {
+    return from.scales.curve ? discrepancy.columns(by, *from.scales.curve) : CurveColumns{};
+  };
+  const auto log_evidence = [&](const Fit& at, const CurveColumns& curve) {
+    const auto blocks = linearise(*at.likelihood, at, curve);
+    if (blocks.empty()) return -std::numeric_limits<double>::infinity();
+    return at.likelihood->log_weights() - 0.5 * (at.cost + solve_about(at, blocks, curve).log_volume_ratio);
+  };
+  const CurveColumns curve = curve_of(*likelihood);
+  Fit there = fit(*likelihood, from.layout, from.shared, from.local, from.scales, curve);
+  there.likelihood = likelihood;
+  if (!there.valid) return {std::move(there), -std::numeric_limits<double>::infinity()};
+  const double change = log_evidence(there, curve) - log_evidence(from, curve_of(*from.likelihood));
+  return {std::move(there), change};
+}
+
+void scan_local(const Likelihood& likelihood, const Layout& layout, const VectorXd& shared,
+                std::vector<VectorXd>& local) {
+  Residuals residuals;
+  for (std::size_t i = 0; i < layout.local().size(); ++i) {
+    if (!layout.is_scanned(i)) continue;
+    const bool instant = layout.is_instant(i);
+    const auto at = static_cast<Index>(i);
+    for (std::size_t r = 0; r < local.size(); ++r) {
+      const double lower = layout.local()[i].parameter->lower, upper = layout.upper(i, r);
+      const double cost = instant ? instant_cost(upper) : 0;
+      VectorXd trial = local[r];
+      const auto cost_at = [&](double value) {
+        trial[at] = value;
+        if (!likelihood.evaluate(layout, r, shared, trial, false, residuals))
+          return std::numeric_limits<double>::infinity();
+        return residuals.white.squaredNorm() + (instant && value > 0 ? cost : 0);
+      };
+      double best = local[r][at], least = cost_at(best);
+      const auto try_at = [&](double value) {
+        const double there = cost_at(value);
+        if (there < least) least = there, best = value;
+      };
+      if (instant) try_at(0);
+      const int count =
+          instant ? std::max(4, static_cast<int>(std::lround((upper - lower) / kInstantSpacing_s))) : kPhases;
+      for (int k = 0; k < count; ++k) try_at(lower + (upper - lower) * (k + 0.5) / count);
+      double spacing_s = kInstantSpacing_s;
+      for (int finer = 0; finer < 2 && instant && best > 0; ++finer) {
+        spacing_s /= kFiner;
+        const double middle = best;
+        for (int k = -kFiner; k <= kFiner; ++k)
+          if (const double at_s = middle + k * spacing_s; at_s > lower && at_s < upper) try_at(at_s);
+      }
+      local[r][at] = best;
+    }
+  }
+}
+
+Evaluated evaluate(const Likelihood& likelihood, const Discrepancy* discrepancy, const Layout& layout,
+                   const VectorXd& shared, const std::vector<VectorXd>& local, const VectorXd& nuisance_sd,
+                   double give_up_below) {
+  const NuisanceGrid grid = nuisance_grid(likelihood.system());
+  Settled plain = settle(likelihood, nullptr, layout, shared, local, {.nuisance_sd = nuisance_sd, .curve = {}}, grid,
+                         give_up_below);
+  Evaluated out(std::move(plain.fit));
+  out.log_evidence = plain.over.log_mean;
+  out.nuisance_weights = plain.over.weights;
+  out.valid = out.fit.valid && std::isfinite(out.log_evidence);
+  if (out.valid && discrepancy) add_discrepancy(likelihood, *discrepancy, out);
+  return out;
+}
+
+void add_discrepancy(const Likelihood& likelihood, const Discrepancy& discrepancy, Evaluated& out) {
+  out.with_discrepancy = true;
+  // By the noise that the curves were prepared with.
+  auto blocks = linearise(likelihood, out.fit, {});
+  out.curves = discrepancy.scan(out.fit, blocks, likelihood);
+  if (out.curves.empty()) return;
+  std::vector<double> logs;
+  for (const auto& one : out.curves) logs.push_back(one.log_bayes_factor);
+  const double spread = log_sum(logs) - logs.front();  // the rest of them, by the linear model
+  const double choices = std::log(static_cast<double>(logs.size()));
+  out.log_bayes_factor_curve = logs.front() + spread - choices;
+  if (logs.front() < kLikelyCurve) return;
+  // The likeliest, where the model is nonlinear: about the mode that it moves to.
+  Scales scales = out.fit.scales;
+  scales.curve = out.curves.front().prior;
+  Settled with = settle(*out.fit.likelihood, &discrepancy, out.fit.layout, out.fit.shared, out.fit.local, scales,
+                        nuisance_grid(likelihood.system()), -std::numeric_limits<double>::infinity());
+  if (!std::isfinite(with.over.log_mean)) return;
+  // Beside the curve another local minimum may have been found: it counts without the curve too.
+  Settled again = settle(*with.fit.likelihood, nullptr, out.fit.layout, with.fit.shared, with.fit.local,
+                         {.nuisance_sd = with.fit.scales.nuisance_sd, .curve = {}}, nuisance_grid(likelihood.system()),
+                         out.log_evidence);
+  if (again.over.log_mean > out.log_evidence) {
+    out.fit = std::move(again.fit);
+    out.log_evidence = again.over.log_mean;
+    out.nuisance_weights = again.over.weights;
+  }
+  out.log_bayes_factor_curve = with.over.log_mean + spread - choices - out.log_evidence;
+  out.fit_with_curve = std::move(with.fit);
+}
+
+}  // namespace bevel::inference

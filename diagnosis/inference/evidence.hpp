@@ -1,0 +1,55 @@
+#pragma once
+// The evidence of a set of effects: the integral of likelihood times prior over everything unknown. By Laplace's method
+// in what is nonlinear, exactly in what is linear about the mode; over grids for the standard deviations of the
+// nuisances and for the discrepancy's curve, scale and length.
+#include <limits>
+
+#include "diagnosis/inference/discrepancy.hpp"
+
+namespace bevel::inference {
+
+// Prior of "it happens at an instant in this recording": Beta(kHappens, kHappensNot), the instant uniform.
+inline constexpr double kHappens = 1, kHappensNot = 3;
+
+// Between instants that are tried.
+inline constexpr double kInstantSpacing_s = 0.3;
+
+// A set at its mode, with its evidence. Logarithms, natural; all of one Likelihood stand on one scale.
+struct Evaluated {
+  explicit Evaluated(Fit f) : fit(std::move(f)) {}
+  Fit fit;                            // without a curve, at the likeliest standard deviations
+  std::optional<Fit> fit_with_curve;  // with the likeliest curve, where one is likely at all
+  double log_evidence = 0;            // without a discrepancy
+  double log_bayes_factor_curve = 0;  // of a discrepancy, against none
+  std::vector<CurveFactor> curves;    // each of them, the likeliest first
+  Eigen::VectorXd nuisance_weights;   // posterior over the grid of standard deviations
+  bool with_discrepancy = false;      // whether that was asked
+  bool valid = false;
+};
+
+// Every combination of the groups' standard deviations, one column each, and the logarithms of their probabilities.
+struct NuisanceGrid {
+  Eigen::MatrixXd standard_deviations;
+  Eigen::VectorXd log_prior;
+};
+NuisanceGrid nuisance_grid(const System& system);
+
+// Starting values; scales.nuisance_sd is where the standard deviations begin.
+// discrepancy: null where its part is not asked for. The noise is fitted too; `likelihood` is where it begins. Once the
+// evidence is so low, it is left as it is.
+Evaluated evaluate(const Likelihood& likelihood, const Discrepancy* discrepancy, const Layout& layout,
+                   const Eigen::VectorXd& shared, const std::vector<Eigen::VectorXd>& local,
+                   const Eigen::VectorXd& nuisance_sd, double give_up_below = -std::numeric_limits<double>::infinity());
+
+// The discrepancy's part, added to a set that was evaluated without.
+void add_discrepancy(const Likelihood& likelihood, const Discrepancy& discrepancy, Evaluated& evaluated);
+
+// The same mode sought again by the noise of another likelihood, and by how much its evidence is more there.
+std::pair<Fit, double> moved_to(const std::shared_ptr<const Likelihood>& likelihood, const Fit& from,
+                                const Discrepancy& discrepancy);
+
+// Every phase and instant at the best of a grid, all else as it is.
+void scan_local(const Likelihood& likelihood, const Layout& layout, const Eigen::VectorXd& shared,
+                std::vector<Eigen::VectorXd>& local);
+
+}  // namespace bevel::inference

@@ -1,0 +1,292 @@
+#include "diagnosis/inference/likelihood.hpp"
+
+#include <Eigen/LU>
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <numbers>
+
+namespace bevel::inference {
+
+using Eigen::Index;
+using Eigen::MatrixXd;
+using Eigen::VectorXd;
+
+namespace {
+constexpr double kNone_sd = 1e-9;  // relative: a nuisance that does not vary
+}
+
+MatrixXd correlation_of(const Curve& curve, double length) {
+  const auto n = static_cast<Index>(curve.at.size());
+  const double range = curve.periodic ? 2 * std::numbers::pi : curve.at.back() - curve.at.front();
+  MatrixXd out(n, n);
+  for (Index i = 0; i < n; ++i)
+    for (Index j = 0; j < n; ++j) {
+      double apart = std::abs(curve.at[static_cast<std::size_t>(i)] - curve.at[static_cast<std::size_t>(j)]) / range;
+      if (curve.periodic) apart = std::min(apart, 1 - apart);
+      out(i, j) = std::exp(-apart / length);
+    }
+  return out;
+}
+
+Likelihood::Likelihood(const System& system, Readings outliers, Noise noise)
+    : system_(&system), data_(without(system.data(), outliers)), rows_(rows_left(system.data(), outliers)) {
+  for (const SeriesSet& recording : data_.recordings) {
+    VectorXd measured(recording.rows());
+    Index row = 0;
+    for (const Series& series : recording.series)
+      for (const double value : series.measured) measured[row++] = value;
+    measured_.push_back(std::move(measured));
+  }
+  set_noise(std::move(noise));
+}
+
+Likelihood::Likelihood(const Likelihood& other, Noise noise) : Likelihood(other) { set_noise(std::move(noise)); }
+
+void Likelihood::set_noise(Noise noise) {
+  noise_ = std::move(noise);
+  log_weights_ = 0;
+  whitening_.assign(data_.recordings.size(), {});
+  for (std::size_t r = 0; r < data_.recordings.size(); ++r)
+    for (std::size_t c = 0; c < data_.recordings[r].series.size(); ++c) {
+      whitening_[r].push_back(make_whitening(data_.recordings[r].series[c], noise_, noise_.sigma[c]));
+      for (const double weight : whitening_[r].back().weight) log_weights_ += std::log(weight);
+    }
+}
+
+void Likelihood::whiten_rows(std::size_t r, Eigen::Ref<MatrixXd> rows) const {
+  Index row = 0;
+  for (const Whitening& whitening : whitening_[r]) {
+    const auto count = static_cast<Index>(whitening.weight.size());
+    whiten(whitening, rows.middleRows(row, count));
+    row += count;
+  }
+}
+
+MatrixXd Likelihood::kept(std::size_t r, const MatrixXd& columns) const {
+  if (static_cast<std::size_t>(columns.rows()) == rows_[r].size()) return columns;
+  return columns(rows_[r], Eigen::all);
+}
+
+MatrixXd Likelihood::whitened(std::size_t r, const MatrixXd& columns) const {
+  MatrixXd out = kept(r, columns);
+  whiten_rows(r, out);
+  return out;
+}
+
+VectorXd Likelihood::errors(const Layout& layout, std::size_t r, const VectorXd& shared, const VectorXd& local) const {
+  Prediction prediction;
+  if (!system_->predict(layout.set(), r, shared, local, false, prediction)) return {};
+  return measured_[r] - kept(r, prediction.reading);
+}
+
+bool Likelihood::evaluate(const Layout& layout, std::size_t r, const VectorXd& shared, const VectorXd& local,
+                          bool derivatives, Residuals& out) const {
+  thread_local Prediction prediction;
+  if (!system_->predict(layout.set(), r, shared, local, derivatives, prediction)) return false;
+  MatrixXd white = measured_[r] - kept(r, prediction.reading);
+  whiten_rows(r, white);
+  out.white = white;
+  if (derivatives) {
+    out.by_shared = whitened(r, prediction.by_shared);
+    out.by_local = whitened(r, prediction.by_local);
+  }
+  return out.white.allFinite();
+}
+
+std::vector<Index> free_locals(const Layout& layout) {
+  std::vector<Index> out;
+  for (std::size_t i = 0; i < layout.local().size(); ++i)
+    if (!layout.is_instant(i)) out.push_back(static_cast<Index>(i));
+  return out;
+}
+
+VectorXd nuisance_centre(const Layout& layout, const VectorXd& local) {
+  const auto free = free_locals(layout);
+  VectorXd out = VectorXd::Zero(static_cast<Index>(free.size()));
+  for (std::size_t i = 0; i < free.size(); ++i)
+    if (!layout.is_scanned(static_cast<std::size_t>(free[i]))) out[static_cast<Index>(i)] = -local[free[i]];
+  return out;
+}
+
+Pulls pulls_of(const Layout& layout, const VectorXd& shared, const Scales& scales, const VectorXd& curve_values,
+               const MatrixXd& curve_covariance) {
+  Pulls out;
+  const Index n = shared.size(), m = curve_values.size();
+  out.precision = MatrixXd::Zero(n + m, n + m);
+  out.centre = VectorXd::Zero(n + m);
+  for (Index i = 0; i < n; ++i) {
+    const Prior& prior = layout.shared()[static_cast<std::size_t>(i)].parameter->prior;
+    out.precision(i, i) = precision_of(prior);
+    out.centre[i] = centre_of(prior, shared[i]) - shared[i];
+  }
+  if (m > 0) {
+    out.precision.bottomRightCorner(m, m) = curve_covariance.inverse();
+    out.centre.tail(m) = -curve_values;
+  }
+  out.local_precision = local_precision_of(layout, scales);
+  return out;
+}
+
+VectorXd local_precision_of(const Layout& layout, const Scales& scales) {
+  const auto free = free_locals(layout);
+  VectorXd out(static_cast<Index>(free.size()));
+  for (std::size_t i = 0; i < free.size(); ++i) {
+    const auto at = static_cast<std::size_t>(free[i]);
+    double& precision = out[static_cast<Index>(i)];
+    if (layout.is_scanned(at)) {
+      precision = precision_of(layout.local()[at].parameter->prior);
+    } else {
+      const auto group = layout.system().nuisances()[at].group;
+      const double sd = std::max(scales.nuisance_sd[static_cast<Index>(group)], kNone_sd);
+      precision = 1 / (sd * sd);
+    }
+  }
+  return out;
+}
+
+namespace {
+
+bool make_blocks(const Likelihood& likelihood, const Fit& fit, const CurveColumns& curve, bool derivatives,
+                 const std::vector<bool>& used, std::vector<ArrowBlock>* blocks, double* chi2) {
+  Residuals residuals;
+  *chi2 = 0;
+  if (blocks) blocks->assign(likelihood.recordings(), {});
+  const auto free = free_locals(fit.layout);
+  for (std::size_t r = 0; r < likelihood.recordings(); ++r) {
+    if (!used.empty() && !used[r]) continue;
+    if (!likelihood.evaluate(fit.layout, r, fit.shared, fit.local[r], derivatives, residuals)) return false;
+    if (curve) residuals.white -= curve.columns[r] * fit.curve_values;
+    *chi2 += residuals.white.squaredNorm();
+    if (!derivatives) continue;
+    MatrixXd Z = residuals.by_shared;
+    if (curve) {
+      Z.conservativeResize(Eigen::NoChange, Z.cols() + curve.columns[r].cols());
+      Z.rightCols(curve.columns[r].cols()) = curve.columns[r];
+    }
+    (*blocks)[r] = make_block(residuals.by_local(Eigen::all, free), Z, residuals.white);
+  }
+  return true;
+}
+
+double cost_of_priors(const Pulls& pulls, const std::vector<VectorXd>& centres, const std::vector<bool>& used) {
+  double cost = pulls.centre.dot(pulls.precision * pulls.centre);
+  for (std::size_t r = 0; r < centres.size(); ++r)
+    if (used.empty() || used[r]) cost += centres[r].dot(pulls.local_precision.cwiseProduct(centres[r]));
+  return cost;
+}
+
+std::vector<VectorXd> centres_of(const Fit& fit) {
+  std::vector<VectorXd> out;
+  for (const auto& local : fit.local) out.push_back(nuisance_centre(fit.layout, local));
+  return out;
+}
+
+// What presses against a bound stays there.
+ArrowSolution solve_within(const Fit& now, const std::vector<ArrowBlock>& blocks, const Pulls& pulls, ArrowRules& how) {
+  how.held.clear();
+  ArrowSolution step = solve(blocks, pulls.precision, pulls.centre, how);
+  for (int pass = 0; step.valid && pass < 3; ++pass) {
+    const auto before = how.held.size();
+    for (Index i = 0; i < now.shared.size(); ++i) {
+      const Parameter& p = *now.layout.shared()[static_cast<std::size_t>(i)].parameter;
+      const bool outwards = !p.periodic && ((now.shared[i] <= p.lower && step.shared[i] < 0) ||
+                                            (now.shared[i] >= p.upper && step.shared[i] > 0));
+      if (outwards) how.held.push_back(i);
+    }
+    if (how.held.size() == before) break;
+    step = solve(blocks, pulls.precision, pulls.centre, how);
+  }
+  return step;
+}
+
+}  // namespace
+
+ArrowSolution solve_about(const Fit& fit, const std::vector<ArrowBlock>& blocks, const CurveColumns& curve) {
+  const Pulls pulls = pulls_of(fit.layout, fit.shared, fit.scales, fit.curve_values, curve.covariance);
+  ArrowRules how;
+  return solve_within(fit, blocks, pulls, how);
+}
+
+std::vector<ArrowBlock> linearise(const Likelihood& likelihood, const Fit& fit, const CurveColumns& curve) {
+  std::vector<ArrowBlock> blocks;
+  double chi2 = 0;
+  if (!make_blocks(likelihood, fit, curve, true, {}, &blocks, &chi2)) return {};
+  const Pulls pulls = pulls_of(fit.layout, fit.shared, fit.scales, fit.curve_values, curve.covariance);
+  const auto centres = centres_of(fit);
+  for (std::size_t r = 0; r < blocks.size(); ++r) {
+    blocks[r].precision = pulls.local_precision;
+    blocks[r].centre = centres[r];
+  }
+  return blocks;
+}
+
+Fit fit(const Likelihood& likelihood, const Layout& layout, const VectorXd& shared, const std::vector<VectorXd>& local,
+        const Scales& scales, const CurveColumns& curve, const FitRules& rules) {
+  Fit now(layout);
+  now.scales = scales;
+  now.shared = shared;
+  now.local = local;
+  if (curve) now.curve_values = VectorXd::Zero(curve.covariance.rows());
+  layout.clamp(now.shared, now.local);
+  const auto free = free_locals(layout);
+  // Derivatives come with the cost: most steps are taken.
+  struct Point {
+    std::vector<ArrowBlock> blocks;
+    Pulls pulls;
+  };
+  const auto look = [&](Fit& at, Point& point) {
+    at.cost = std::numeric_limits<double>::infinity();
+    if (!make_blocks(likelihood, at, curve, true, rules.used, &point.blocks, &at.chi2)) return;
+    point.pulls = pulls_of(layout, at.shared, scales, at.curve_values, curve.covariance);
+    const auto centres = centres_of(at);
+    for (std::size_t r = 0; r < point.blocks.size(); ++r) {
+      point.blocks[r].precision = point.pulls.local_precision;
+      point.blocks[r].centre = centres[r];
+    }
+    at.cost = at.chi2 + cost_of_priors(point.pulls, centres, rules.used);
+  };
+  Point here, there;
+  look(now, here);
+  now.valid = std::isfinite(now.cost);
+  double damping = 1e-4;
+  for (int iteration = 0; now.valid && iteration < rules.max_iterations; ++iteration) {
+    now.iterations = iteration + 1;
+    ArrowRules how{.damping = damping, .used = rules.used};
+    bool moved = false, small = false;
+    while (how.damping < 1e8) {
+      const ArrowSolution step = solve_within(now, here.blocks, here.pulls, how);
+      if (!step.valid) {
+        how.damping = std::max(how.damping * 6, 1e-6);
+        continue;
+      }
+      // What the linear model expects to gain is too little to look for.
+      if (now.cost - step.least < rules.tolerance && how.damping < 1e-2) {
+        now.held = how.held;
+        break;
+      }
+      Fit trial = now;
+      trial.shared += step.shared.head(now.shared.size());
+      if (curve) trial.curve_values += step.shared.tail(now.curve_values.size());
+      for (std::size_t r = 0; r < trial.local.size(); ++r)
+        if (step.local[r].size() > 0)
+          for (std::size_t i = 0; i < free.size(); ++i) trial.local[r][free[i]] += step.local[r][static_cast<Index>(i)];
+      layout.clamp(trial.shared, trial.local);
+      look(trial, there);
+      if (trial.cost < now.cost) {
+        trial.held = how.held;
+        small = now.cost - trial.cost < rules.tolerance;
+        now = std::move(trial);
+        std::swap(here, there);
+        damping = std::max(how.damping * 0.2, 1e-7);
+        moved = true;
+        break;
+      }
+      how.damping *= 6;
+    }
+    if (!moved || small) break;
+  }
+  return now;
+}
+
+}  // namespace bevel::inference

@@ -1,0 +1,128 @@
+#pragma once
+// The likelihood of readings under a set of effects, a discrepancy and autocorrelated noise, and its mode.
+//
+//   y_r = h(shared, local_r) + C_r c + e_r        e_r ~ noise;  local_r: nuisances ~ N(0, sd^2), phases, instants
+//                                                 c ~ N(0, K): the discrepancy, one curve
+//
+// Solution: Gauss-Newton with Levenberg's damping on the arrow-shaped normal equations, bounds by an active set.
+#include <memory>
+#include <optional>
+
+#include "diagnosis/inference/arrow.hpp"
+#include "diagnosis/inference/layout.hpp"
+#include "diagnosis/inference/noise.hpp"
+
+namespace bevel::inference {
+
+// Covariance of a curve's values: scale^2 exp(-|distance| / length), lengths as a share of the covariate's range. The
+// scale is the root mean square over all readings of what such a curve does to them beside the base's own parameters,
+// in standard deviations of the noise.
+struct CurvePrior {
+  std::size_t curve = 0;
+  double scale = 0;
+  double length = 0;
+  bool operator==(const CurvePrior&) const = default;
+};
+Eigen::MatrixXd correlation_of(const Curve& curve, double length);
+
+// What is held while the mode is sought.
+struct Scales {
+  Eigen::VectorXd nuisance_sd;  // per group; 0: the recordings do not differ
+  std::optional<CurvePrior> curve;
+};
+
+struct Residuals {
+  Eigen::VectorXd white;      // measured - predicted
+  Eigen::MatrixXd by_shared;  // d(prediction)/d(unknown), whitened
+  Eigen::MatrixXd by_local;
+};
+
+// A system, its readings but for the outliers, and the noise.
+class Likelihood {
+ public:
+  Likelihood(const System& system, Readings outliers, Noise noise);
+  // The same readings with another noise.
+  Likelihood(const Likelihood& other, Noise noise);
+
+  const System& system() const { return *system_; }
+  const Dataset& data() const { return data_; }
+  const Noise& noise() const { return noise_; }
+  std::size_t recordings() const { return data_.recordings.size(); }
+  // Sum of the logarithms of the whitened readings' weights: minus half of log det of the noise's covariance.
+  double log_weights() const { return log_weights_; }
+
+  // False outside the model's domain.
+  bool evaluate(const Layout& layout, std::size_t recording, const Eigen::VectorXd& shared,
+                const Eigen::VectorXd& local, bool derivatives, Residuals& out) const;
+  // Measured - predicted in the channels' units, outliers left out.
+  Eigen::VectorXd errors(const Layout& layout, std::size_t recording, const Eigen::VectorXd& shared,
+                         const Eigen::VectorXd& local) const;
+  // Columns of all of the system's rows: outliers taken out, whitened.
+  Eigen::MatrixXd whitened(std::size_t recording, const Eigen::MatrixXd& columns) const;
+  Eigen::MatrixXd kept(std::size_t recording, const Eigen::MatrixXd& columns) const;
+
+ private:
+  void set_noise(Noise noise);
+  void whiten_rows(std::size_t recording, Eigen::Ref<Eigen::MatrixXd> rows) const;
+
+  const System* system_;
+  Dataset data_;
+  Noise noise_;
+  std::vector<std::vector<Eigen::Index>> rows_;    // of the system's, that are left
+  std::vector<std::vector<Whitening>> whitening_;  // per recording and channel
+  std::vector<Eigen::VectorXd> measured_;          // per recording
+  double log_weights_ = 0;
+};
+
+// The mode of a set of effects, and the likelihood about it.
+struct Fit {
+  explicit Fit(Layout l) : layout(std::move(l)) {}
+  Layout layout;
+  Scales scales;
+  Eigen::VectorXd shared;
+  std::vector<Eigen::VectorXd> local;
+  Eigen::VectorXd curve_values;                  // in units of `unit` of the curve; empty: no curve
+  std::shared_ptr<const Likelihood> likelihood;  // by whose noise it was fitted
+  double cost = 0;                               // squared whitened residuals and priors' pulls
+  double chi2 = 0;                               // the first part
+  std::vector<Eigen::Index> held;                // shared unknowns that press against a bound
+  int iterations = 0;
+  bool valid = false;
+};
+
+struct FitRules {
+  int max_iterations = 25;
+  double tolerance = 0.02;   // of the cost
+  std::vector<bool> used{};  // recordings; empty: all
+};
+
+// Curves' columns, whitened, per recording: rows x values; the values' prior covariance is `covariance`.
+struct CurveColumns {
+  std::vector<Eigen::MatrixXd> columns;
+  std::vector<Eigen::MatrixXd> raw;  // the same, not whitened
+  Eigen::MatrixXd covariance;
+  explicit operator bool() const { return !columns.empty(); }
+};
+
+Fit fit(const Likelihood& likelihood, const Layout& layout, const Eigen::VectorXd& shared,
+        const std::vector<Eigen::VectorXd>& local, const Scales& scales, const CurveColumns& curve = {},
+        const FitRules& rules = {});
+
+// The normal equations about a fit, unknowns as steps from the mode: shared, then the curve's values.
+std::vector<ArrowBlock> linearise(const Likelihood& likelihood, const Fit& fit, const CurveColumns& curve);
+// Priors of the same: precision and centre of the shared part, and of each recording's own.
+struct Pulls {
+  Eigen::MatrixXd precision;
+  Eigen::VectorXd centre;
+  Eigen::VectorXd local_precision;
+};
+Pulls pulls_of(const Layout& layout, const Eigen::VectorXd& shared, const Scales& scales,
+               const Eigen::VectorXd& curve_values, const Eigen::MatrixXd& curve_covariance);
+// Local unknowns in the arrow: all but instants, in order.
+Eigen::VectorXd local_precision_of(const Layout& layout, const Scales& scales);
+// The linear model about a fit, what presses against a bound held.
+ArrowSolution solve_about(const Fit& fit, const std::vector<ArrowBlock>& blocks, const CurveColumns& curve);
+std::vector<Eigen::Index> free_locals(const Layout& layout);
+Eigen::VectorXd nuisance_centre(const Layout& layout, const Eigen::VectorXd& local);
+
+}  // namespace bevel::inference

@@ -1,0 +1,348 @@
+#include "diagnosis/inference/noise.hpp"
+
+#include <Eigen/Cholesky>
+#include <Eigen/QR>
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+namespace bevel::inference {
+namespace {
+
+constexpr double kLargestAr1 = 0.98;
+constexpr double kLowestAr2 = -0.7, kHighestAr2 = 0.5;
+constexpr double kSecondOrder = 10.8;  // fall of the deviance that chance brings once in 1000
+// Sum over a message's axes of squared errors against its neighbours, each in standard deviations. A Gaussian message
+// of three axes passes this once in 3e5.
+constexpr double kOutlier = 28.0;
+constexpr double kGrossOutlier = 200.0;  // beside whatever
+constexpr int kOutlierPasses = 12;
+constexpr double kClipped = 3.0;  // deviations, by the median of their size, while outliers are still in
+
+struct Whitened {
+  double rss = 0;
+  double dof = 0;
+  double log_terms = 0;  // log|V| + log|X^T V^-1 X|, for sigma = 1
+};
+
+Whitened project(const Series& series, const Eigen::VectorXd& error, const Eigen::MatrixXd* basis, const Noise& noise) {
+  const Whitening whitening = make_whitening(series, noise, 1.0);
+  Eigen::VectorXd e = error;
+  whiten(whitening, e);
+  Whitened out;
+  out.dof = static_cast<double>(e.size());
+  for (double weight : whitening.weight) out.log_terms -= 2 * std::log(weight);
+  if (basis) {
+    Eigen::MatrixXd X = *basis;
+    whiten(whitening, X);
+    const Eigen::HouseholderQR<Eigen::MatrixXd> qr(X);
+    const Eigen::VectorXd rotated = qr.householderQ().transpose() * e;
+    out.rss = rotated.tail(rotated.size() - X.cols()).squaredNorm();
+    out.dof -= static_cast<double>(X.cols());
+    for (Eigen::Index i = 0; i < X.cols(); ++i)
+      out.log_terms += 2 * std::log(std::max(std::abs(qr.matrixQR()(i, i)), 1e-12));
+  } else {
+    out.rss = e.squaredNorm();
+  }
+  return out;
+}
+
+// Minus twice the restricted log-likelihood at this ar1, with each channel's sigma at its best.
+double deviance(const Dataset& data, const Errors& errors, const std::vector<std::vector<Eigen::MatrixXd>>* bases,
+                Noise& noise) {
+  double sum = 0;
+  noise.sigma.assign(data.claimed_sd.size(), 0);
+  for (std::size_t c = 0; c < data.claimed_sd.size(); ++c) {
+    Whitened total;
+    for (std::size_t r = 0; r < data.recordings.size(); ++r) {
+      const Series& series = data.recordings[r].series[c];
+      if (series.time_s.empty()) continue;
+      const Whitened one = project(series, errors[r][c], bases ? &(*bases)[r][c] : nullptr, noise);
+      total.rss += one.rss;
+      total.dof += one.dof;
+      total.log_terms += one.log_terms;
+    }
+    const double variance = std::max(total.rss / std::max(total.dof, 1.0), 1e-18);
+    noise.sigma[c] = std::sqrt(variance);
+    sum += total.dof * std::log(variance) + total.log_terms;
+  }
+  return sum;
+}
+
+// Correlation of errors so many seconds apart; of second order by its recursion over frames, and between them a line.
+class Correlations {
+ public:
+  explicit Correlations(const Noise& noise) : ar1_(noise.ar1), frame_s_(noise.frame_s) {
+    if (noise.ar2 == 0) return;
+    by_frames_ = {1, noise.ar1};
+    while (by_frames_.size() < kFrames)
+      by_frames_.push_back(noise.ar1 * (1 - noise.ar2) * by_frames_.back() +
+                           noise.ar2 * by_frames_[by_frames_.size() - 2]);
+  }
+  double operator()(double apart_s) const {
+    const double frames = apart_s / frame_s_;
+    if (by_frames_.empty()) return std::pow(ar1_, frames);
+    const auto whole = static_cast<std::size_t>(frames);
+    if (whole + 1 >= kFrames) return 0;
+    const double share = frames - static_cast<double>(whole);
+    return by_frames_[whole] * (1 - share) + by_frames_[whole + 1] * share;
+  }
+
+ private:
+  static constexpr std::size_t kFrames = 256;
+  double ar1_, frame_s_;
+  std::vector<double> by_frames_;
+};
+
+// Where a function with one minimum in [low, high] is least, to within `width`.
+template <class Function>
+double minimum_of(double low, double high, double width, Function&& f) {
+  constexpr double kGolden = 0.6180339887498949;
+  double a = high - kGolden * (high - low), b = low + kGolden * (high - low);
+  double fa = f(a), fb = f(b);
+  while (high - low > width) {
+    if (fa < fb) {
+      high = b, b = a, fb = fa, a = high - kGolden * (high - low), fa = f(a);
+    } else {
+      low = a, a = b, fa = fb, b = low + kGolden * (high - low), fb = f(b);
+    }
+  }
+  return 0.5 * (low + high);
+}
+
+// Errors of readings against what their neighbours (and the curve) predict, squared in standard deviations. The noise
+// is taken as of first order: neighbours are enough to tell an outlier.
+Eigen::VectorXd surprise(const Series& series, Eigen::VectorXd error, const Noise& noise, double sigma) {
+  const Eigen::Index n = error.size();
+  Noise first_order = noise;
+  first_order.ar2 = 0;
+  const Whitening whitening = make_whitening(series, first_order, 1.0);
+  Eigen::MatrixXd X = spline_basis(series, kKnot_s);
+  const Eigen::MatrixXd curve = X;
+  Eigen::VectorXd e = error;
+  whiten(whitening, X);
+  whiten(whitening, e);
+  error -= curve * X.householderQr().solve(e).eval();
+  for (Eigen::Index i = 0; i < n; ++i) error[i] /= series.relative_sd[static_cast<std::size_t>(i)];
+  Eigen::VectorXd squared(n);
+  for (Eigen::Index i = 0; i < n; ++i) {
+    // Conditional mean and variance given the neighbours, of a Markov process: precision is tridiagonal.
+    double precision = 1, pull = 0;
+    const auto join = [&](Eigen::Index j, double carry) {
+      precision += carry * carry / (1 - carry * carry);
+      pull += carry / (1 - carry * carry) * error[j];
+    };
+    if (i > 0)
+      join(i - 1, whitening.carry[static_cast<std::size_t>(i)] * series.relative_sd[static_cast<std::size_t>(i - 1)] /
+                      series.relative_sd[static_cast<std::size_t>(i)]);
+    if (i + 1 < n)
+      join(i + 1, whitening.carry[static_cast<std::size_t>(i + 1)] * series.relative_sd[static_cast<std::size_t>(i)] /
+                      series.relative_sd[static_cast<std::size_t>(i + 1)]);
+    const double residual = error[i] - pull / precision;
+    squared[i] = residual * residual * precision / (sigma * sigma);
+  }
+  return squared;
+}
+
+// The error with what a flexible curve leaves of it clipped: outliers would pass for white noise of their size.
+Eigen::VectorXd clipped(const Series& series, const Eigen::VectorXd& error) {
+  if (error.size() < 8) return error;
+  const Eigen::MatrixXd X = spline_basis(series, kKnot_s);
+  const Eigen::HouseholderQR<Eigen::MatrixXd> qr(X);
+  Eigen::VectorXd curve = X * qr.solve(error);
+  for (int pass = 0; pass < 2; ++pass) {
+    Eigen::VectorXd left = error - curve;
+    for (Eigen::Index i = 0; i < left.size(); ++i) left[i] /= series.relative_sd[static_cast<std::size_t>(i)];
+    std::vector<double> sizes(static_cast<std::size_t>(left.size()));
+    for (std::size_t i = 0; i < sizes.size(); ++i) sizes[i] = std::abs(left[static_cast<Eigen::Index>(i)]);
+    const auto middle = sizes.begin() + static_cast<std::ptrdiff_t>(sizes.size() / 2);
+    std::nth_element(sizes.begin(), middle, sizes.end());
+    const double limit = kClipped * 1.4826 * *middle;
+    for (Eigen::Index i = 0; i < left.size(); ++i)
+      left[i] = std::clamp(left[i], -limit, limit) * series.relative_sd[static_cast<std::size_t>(i)];
+    left += curve;
+    if (pass == 1) return left;
+    curve = X * qr.solve(left);
+  }
+  return error;
+}
+
+}  // namespace
+
+Whitening make_whitening(const Series& series, const Noise& noise, double sigma) {
+  Whitening out;
+  const std::size_t n = series.time_s.size();
+  out.carry.assign(n, 0);
+  out.carry2.assign(n, 0);
+  out.weight.resize(n);
+  const Correlations correlation(noise);
+  for (std::size_t i = 0; i < n; ++i) {
+    double left = 1;
+    if (i > 0 && noise.ar1 > 0) {
+      const auto between = [&](std::size_t a, std::size_t b) {
+        return correlation(series.time_s[a] - series.time_s[b]);
+      };
+      const double near = between(i, i - 1);
+      double first = near, second = 0;
+      if (i > 1 && noise.ar2 != 0) {
+        const double apart = between(i - 1, i - 2), far = between(i, i - 2);
+        second = (far - near * apart) / (1 - apart * apart);
+        first = near - second * apart;
+        left -= second * far;
+      }
+      left -= first * near;
+      // The process is of errors in units of their claimed standard deviations.
+      out.carry[i] = first * series.relative_sd[i] / series.relative_sd[i - 1];
+      if (second != 0) out.carry2[i] = second * series.relative_sd[i] / series.relative_sd[i - 2];
+    }
+    out.weight[i] = 1 / (sigma * series.relative_sd[i] * std::sqrt(left));
+  }
+  return out;
+}
+
+Eigen::MatrixXd spline_basis(const Series& series, double knot_s) {
+  const auto n = static_cast<Eigen::Index>(series.time_s.size());
+  const double start_s = series.time_s.front();
+  const double span_s = std::max(series.time_s.back() - start_s, 1e-9);
+  // No more curve than a quarter of the readings can bear.
+  const auto intervals =
+      std::max<Eigen::Index>(1, std::min(static_cast<Eigen::Index>(std::lround(span_s / knot_s)), n / 4 - 3));
+  Eigen::MatrixXd X = Eigen::MatrixXd::Zero(n, intervals + 3);
+  for (Eigen::Index i = 0; i < n; ++i) {
+    const double x = (series.time_s[static_cast<std::size_t>(i)] - start_s) / span_s * static_cast<double>(intervals);
+    const auto k = std::clamp<Eigen::Index>(static_cast<Eigen::Index>(x), 0, intervals - 1);
+    const double t = x - static_cast<double>(k);
+    const double u = 1 - t;
+    X(i, k) = u * u * u / 6;
+    X(i, k + 1) = (3 * t * t * t - 6 * t * t + 4) / 6;
+    X(i, k + 2) = (-3 * t * t * t + 3 * t * t + 3 * t + 1) / 6;
+    X(i, k + 3) = t * t * t / 6;
+  }
+  return X;
+}
+
+Noise estimate_noise(const Dataset& data, const Errors& errors, bool flexible, bool second_order) {
+  std::vector<std::vector<Eigen::MatrixXd>> bases(data.recordings.size());
+  for (std::size_t r = 0; flexible && r < bases.size(); ++r)
+    for (const auto& series : data.recordings[r].series)
+      bases[r].push_back(series.time_s.empty() ? Eigen::MatrixXd() : spline_basis(series, kKnot_s));
+  const auto* in_use = flexible ? &bases : nullptr;
+  Noise noise;
+  noise.frame_s = data.frame_s;
+  const auto at = [&](double ar1, double ar2) {
+    noise.ar1 = ar1;
+    noise.ar2 = ar2;
+    return deviance(data, errors, in_use, noise);
+  };
+  // The deviance in ar1 has one minimum: a coarse scan, then golden-section steps.
+  const auto best_ar1 = [&](double ar2) {
+    double best = 0, best_value = std::numeric_limits<double>::infinity();
+    for (int i = 0; i <= 12; ++i) {
+      const double ar1 = kLargestAr1 * i / 12;
+      const double value = at(ar1, ar2);
+      if (value < best_value) best = ar1, best_value = value;
+    }
+    const double found =
+        minimum_of(std::max(0.0, best - kLargestAr1 / 12), std::min(kLargestAr1, best + kLargestAr1 / 12), 0.004,
+                   [&](double ar1) { return at(ar1, ar2); });
+    return found < 0.004 ? 0.0 : found;
+  };
+  double ar1 = best_ar1(0), ar2 = 0;
+  if (second_order && ar1 > 0) {
+    const double first_order = at(ar1, 0);
+    double other1 = ar1, other2 = 0;
+    for (int turn = 0; turn < 3; ++turn) {
+      other2 = minimum_of(kLowestAr2, kHighestAr2, 0.004, [&](double x) { return at(other1, x); });
+      other1 = best_ar1(other2);
+    }
+    if (first_order - at(other1, other2) > kSecondOrder) ar1 = other1, ar2 = other2;
+  }
+  // What is slow has the innovations' variance, which is well known, over (1 - ar1)^2. (Deviance: minus twice the
+  // logarithm of the likelihood, so that a curvature of two is a standard error of one.)
+  double slow_error = 0;
+  if (ar1 > 0) {
+    const double step = std::min(0.25 * (1 - ar1), 0.5 * ar1);
+    const double curvature = (at(ar1 + step, ar2) + at(ar1 - step, ar2) - 2 * at(ar1, ar2)) / (step * step);
+    if (curvature > 0) slow_error = 2 / (1 - ar1) * std::sqrt(2 / curvature);
+  }
+  at(ar1, ar2);
+  noise.slow_error = slow_error;
+  return noise;
+}
+
+Calibration calibrate_noise(const Dataset& data, const Errors& errors, bool flexible) {
+  Calibration out;
+  out.outliers.resize(data.recordings.size());
+  Dataset now = data;
+  Errors left = errors;
+  std::size_t messages = 0, dropped = 0;
+  for (const auto& recording : data.recordings) messages += recording.messages;
+  for (int pass = 0; pass < kOutlierPasses; ++pass) {
+    Errors without_outliers = left;
+    for (std::size_t r = 0; r < left.size(); ++r)
+      for (std::size_t c = 0; c < left[r].size(); ++c)
+        without_outliers[r][c] = clipped(now.recordings[r].series[c], left[r][c]);
+    out.noise = estimate_noise(now, without_outliers, flexible, false);
+    bool found = false;
+    for (std::size_t r = 0; r < now.recordings.size(); ++r) {
+      const auto& recording = now.recordings[r];
+      std::vector<double> sum(recording.messages, 0);
+      for (std::size_t c = 0; c < now.claimed_sd.size(); ++c) {
+        const Series& series = recording.series[c];
+        if (series.time_s.size() < 8) continue;
+        const Eigen::VectorXd squared = surprise(series, left[r][c], out.noise, out.noise.sigma[c]);
+        for (std::size_t i = 0; i < series.message.size(); ++i)
+          sum[series.message[i]] += squared[static_cast<Eigen::Index>(i)];
+      }
+      for (std::size_t i = 0; i < sum.size(); ++i) {
+        // An outlier makes its neighbours look bad too: only the worst of three goes, the others are looked at again.
+        const bool worst = (i == 0 || sum[i] >= sum[i - 1]) && (i + 1 == sum.size() || sum[i] >= sum[i + 1]);
+        // Small outliers come alone: a run of them may be physics that acts for a moment, a membrane or a jump.
+        const auto flagged = [&](std::size_t j) {
+          return std::find(out.outliers[r].begin(), out.outliers[r].end(), j) != out.outliers[r].end();
+        };
+        const bool alone = !(i > 0 && flagged(i - 1)) && !flagged(i + 1);
+        if (worst && (sum[i] > kGrossOutlier || (sum[i] > kOutlier && alone)))
+          out.outliers[r].push_back(i), ++dropped, found = true;
+      }
+    }
+    if (!found) break;
+    for (auto& readings : out.outliers) std::sort(readings.begin(), readings.end());
+    now = without(data, out.outliers);
+    for (std::size_t r = 0; r < now.recordings.size(); ++r)
+      for (std::size_t c = 0; c < now.claimed_sd.size(); ++c) {
+        const auto& all = data.recordings[r].series[c].message;
+        const auto& kept = now.recordings[r].series[c].message;
+        left[r][c].resize(static_cast<Eigen::Index>(kept.size()));
+        for (std::size_t i = 0, j = 0; i < kept.size(); ++i, ++j) {
+          while (all[j] != kept[i]) ++j;
+          left[r][c][static_cast<Eigen::Index>(i)] = errors[r][c][static_cast<Eigen::Index>(j)];
+        }
+      }
+  }
+  out.noise = estimate_noise(now, left, flexible);
+  out.noise.outlier_share = static_cast<double>(dropped) / static_cast<double>(std::max<std::size_t>(messages, 1));
+  return out;
+}
+
+Noise refine_noise(const Dataset& data, const Errors& errors, const Noise& start) {
+  Noise noise = start;
+  const auto at = [&](double ar1) {
+    noise.ar1 = ar1;
+    return deviance(data, errors, nullptr, noise);
+  };
+  constexpr double kWidth = 0.002;
+  const double found = minimum_of(0, kLargestAr1, kWidth, at);
+  at(found < kWidth ? 0 : found);
+  return noise;
+}
+
+bool alike(const Noise& a, const Noise& b) {
+  constexpr double kShare = 0.01, kCorrelation = 0.01;
+  if (std::abs(a.ar1 - b.ar1) > kCorrelation || std::abs(a.ar2 - b.ar2) > kCorrelation) return false;
+  for (std::size_t c = 0; c < a.sigma.size(); ++c)
+    if (std::abs(a.sigma[c] - b.sigma[c]) > kShare * b.sigma[c]) return false;
+  return true;
+}
+
+}  // namespace bevel::inference

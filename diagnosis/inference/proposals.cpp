@@ -1,0 +1,415 @@
+#include "diagnosis/inference/proposals.hpp"
+
+#include <Eigen/Cholesky>
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+#include "diagnosis/inference/evidence.hpp"
+#include "diagnosis/inference/log_sum.hpp"
+#include "diagnosis/inference/parallel.hpp"
+
+namespace bevel::inference {
+
+using Eigen::Index;
+using Eigen::MatrixXd;
+using Eigen::MatrixXf;
+using Eigen::VectorXd;
+
+namespace {
+
+constexpr double kFarthest = 4.0;  // sizes promised reach to so many times their start
+constexpr double kNever = -1e3;
+
+// Every combination of starts of the shared parameters.
+std::vector<VectorXd> starts_of(const Effect& effect) {
+  std::vector<std::vector<double>> all = {{}};
+  for (const Parameter& p : effect.parameters) {
+    const std::vector<double> values = p.scope == Scope::shared ? p.starts : std::vector<double>{0.0};
+    std::vector<std::vector<double>> longer;
+    for (const auto& head : all)
+      for (const double value : values) {
+        longer.push_back(head);
+        longer.back().push_back(value);
+      }
+    all = std::move(longer);
+  }
+  std::vector<VectorXd> out;
+  for (const auto& one : all) out.push_back(Eigen::Map<const VectorXd>(one.data(), static_cast<Index>(one.size())));
+  return out;
+}
+
+// Shared and local unknowns of the base with one effect at these values of its parameters.
+std::pair<VectorXd, VectorXd> unknowns_with(const Layout& layout, const Fit& base, std::size_t r,
+                                            const VectorXd& values) {
+  VectorXd shared = layout.shared_from(base.layout, base.shared);
+  VectorXd local = layout.local_from(base.layout, base.local[r]);
+  for (Index p = 0; p < values.size(); ++p) {
+    if (const int i = layout.find_shared(0, static_cast<std::size_t>(p)); i >= 0) shared[i] = values[p];
+    if (const int i = layout.find_local(0, static_cast<std::size_t>(p)); i >= 0) local[i] = values[p];
+  }
+  return {shared, local};
+}
+
+// Sizes as shares of the start, back to parameters; false for one beyond a bound at which the effect vanishes.
+bool apply_shares(const Effect& effect, const std::vector<std::size_t>& amplitudes, const VectorXd& shares,
+                  VectorXd& values) {
+  for (std::size_t a = 0; a < amplitudes.size(); ++a) {
+    const Parameter& p = effect.parameters[amplitudes[a]];
+    double& value = values[static_cast<Index>(amplitudes[a])];
+    const double share = std::clamp(shares[static_cast<Index>(a)], -kFarthest, kFarthest);
+    const double there = p.none + share * (value - p.none);
+    if (p.none <= p.lower && there <= p.lower) return false;
+    value = std::clamp(there, p.lower, p.upper);
+  }
+  return true;
+}
+
+VectorXd shared_part(const Effect& effect, const VectorXd& values) {
+  std::vector<double> out;
+  for (std::size_t p = 0; p < effect.parameters.size(); ++p)
+    if (effect.parameters[p].scope == Scope::shared) out.push_back(values[static_cast<Index>(p)]);
+  return Eigen::Map<const VectorXd>(out.data(), static_cast<Index>(out.size()));
+}
+
+void keep_best(std::vector<StartPoint>& starts, std::size_t count) {
+  std::stable_sort(starts.begin(), starts.end(),
+                   [](const auto& a, const auto& b) { return a.log_bayes_factor > b.log_bayes_factor; });
+  if (starts.size() > count) starts.resize(count);
+}
+
+}  // namespace
+
+// The fit, ready for inner products with any column.
+struct Proposals::Beside {
+  std::vector<MatrixXf> LZ;  // [L Z] per recording
+  std::vector<Eigen::VectorXf> w;
+  std::vector<MatrixXd> inner;  // (L'L + T)^-1
+  std::vector<MatrixXd> lz;     // L'Z
+  MatrixXd covariance;          // of the shared part
+  std::vector<VectorXd> pull;   // L'w and the priors' part
+  VectorXd step;                // of the shared part, to the mode
+};
+
+Proposals::Proposals(const Likelihood& likelihood, const Fit& base, int threads) : system_(&likelihood.system()) {
+  candidates_.resize(system_->effects().size());
+  parallel_for(candidates_.size(), threads,
+               [&](std::size_t e) { candidates_[e] = make_candidate(likelihood, base, e); });
+}
+
+Proposals::Candidate Proposals::make_candidate(const Likelihood& likelihood, const Fit& base, std::size_t e) const {
+  const Effect& effect = system_->effects()[e];
+  Candidate out;
+  for (std::size_t p = 0; p < effect.parameters.size(); ++p) {
+    const Parameter& parameter = effect.parameters[p];
+    if (parameter.scope != Scope::shared)
+      out.local = static_cast<int>(p), out.instant = parameter.scope == Scope::instant;
+    else if (!std::isnan(parameter.none))
+      out.amplitudes.push_back(p);
+  }
+  if (!system_->allows({e})) return out;
+  const Layout layout(*system_, {e});
+  std::vector<VectorXd> path;
+  Prediction prediction;
+  for (std::size_t r = 0; r < likelihood.recordings(); ++r) {
+    system_->predict({}, r, base.shared, base.local[r], false, prediction);
+    path.push_back(prediction.reading);
+    std::vector<double> choices;
+    if (out.local >= 0) {
+      const Parameter& parameter = effect.parameters[static_cast<std::size_t>(out.local)];
+      choices = parameter.starts;
+      if (out.instant) {
+        choices.clear();
+        const double duration_s = likelihood.data().recordings[r].duration_s;
+        const int count = std::max(4, static_cast<int>(std::lround(duration_s / kInstantSpacing_s)));
+        for (int i = 0; i < count; ++i) choices.push_back(duration_s * (i + 0.5) / count);
+      }
+    }
+    out.choices.push_back(std::move(choices));
+  }
+  const auto starts = starts_of(effect);
+  for (std::size_t r = 0; r < likelihood.recordings(); ++r) {
+    const auto per_start = out.local >= 0 ? static_cast<Index>(out.choices[r].size()) : out.width();
+    MatrixXd raw = MatrixXd::Zero(path[r].size(), per_start * static_cast<Index>(starts.size()));
+    Index column = 0;
+    for (const VectorXd& start : starts)
+      for (Index c = 0; c < per_start; ++c, ++column) {
+        VectorXd values = start;
+        if (out.local >= 0)
+          values[out.local] = out.choices[r][static_cast<std::size_t>(c)];
+        else
+          for (std::size_t a = 0; a < out.amplitudes.size(); ++a)
+            if (static_cast<Index>(a) != c)
+              values[static_cast<Index>(out.amplitudes[a])] = effect.parameters[out.amplitudes[a]].none;
+        const auto [shared, local] = unknowns_with(layout, base, r, values);
+        if (system_->predict({e}, r, shared, local, false, prediction)) raw.col(column) = prediction.reading - path[r];
+      }
+    out.columns.push_back(likelihood.whitened(r, raw).cast<float>());
+  }
+  for (std::size_t s = 0; s < starts.size(); ++s)
+    out.signatures.push_back({starts[s], out.local >= 0 ? static_cast<Index>(s) : static_cast<Index>(s) * out.width()});
+  return out;
+}
+
+std::vector<Proposal> Proposals::beside(const Likelihood& likelihood, const Fit& fit, const CurveColumns& curve,
+                                        std::size_t starts) const {
+  Beside beside;
+  const auto blocks = linearise(likelihood, fit, curve);
+  if (blocks.empty()) return {};
+  const ArrowSolution solution = solve_about(fit, blocks, curve);
+  if (!solution.valid) return {};
+  beside.covariance = solution.covariance;
+  beside.step = solution.shared;
+  const auto free = free_locals(fit.layout);
+  Residuals residuals;
+  for (std::size_t r = 0; r < blocks.size(); ++r) {
+    likelihood.evaluate(fit.layout, r, fit.shared, fit.local[r], true, residuals);
+    if (curve) residuals.white -= curve.columns[r] * fit.curve_values;
+    const Index m = curve ? curve.columns[r].cols() : 0;
+    MatrixXf LZ(residuals.white.size(), static_cast<Index>(free.size()) + fit.shared.size() + m);
+    LZ.leftCols(static_cast<Index>(free.size())) = residuals.by_local(Eigen::all, free).cast<float>();
+    LZ.middleCols(static_cast<Index>(free.size()), fit.shared.size()) = residuals.by_shared.cast<float>();
+    if (m > 0) LZ.rightCols(m) = curve.columns[r].cast<float>();
+    beside.LZ.push_back(std::move(LZ));
+    beside.w.emplace_back(residuals.white.cast<float>());
+    MatrixXd inner = blocks[r].ll;
+    inner.diagonal() += blocks[r].precision;
+    beside.inner.emplace_back(inner.llt().solve(MatrixXd::Identity(inner.rows(), inner.cols())));
+    beside.lz.push_back(blocks[r].lz);
+    beside.pull.emplace_back(blocks[r].lw + blocks[r].precision.cwiseProduct(blocks[r].centre));
+  }
+  std::vector<Proposal> out;
+  for (std::size_t e = 0; e < candidates_.size(); ++e) {
+    if (contains(fit.layout.set(), e) || candidates_[e].signatures.empty()) continue;
+    if (!system_->allows(with(fit.layout.set(), e))) continue;
+    out.push_back(candidates_[e].local >= 0 ? judge_local(candidates_[e], e, beside, starts)
+                                            : judge(candidates_[e], e, beside, starts));
+  }
+  std::stable_sort(out.begin(), out.end(),
+                   [](const auto& a, const auto& b) { return a.log_bayes_factor > b.log_bayes_factor; });
+  return out;
+}
+
+Proposal Proposals::judge(const Candidate& candidate, std::size_t e, const Beside& beside, std::size_t starts) const {
+  const Effect& effect = system_->effects()[e];
+  const Index columns = candidate.columns.front().cols(), width = candidate.width();
+  MatrixXd XX = MatrixXd::Zero(width, columns), XZ = MatrixXd::Zero(columns, beside.covariance.rows());
+  VectorXd Xw = VectorXd::Zero(columns);
+  for (std::size_t r = 0; r < beside.w.size(); ++r) {
+    const MatrixXf& X = candidate.columns[r];
+    const MatrixXd products = (X.transpose() * beside.LZ[r]).cast<double>();
+    const Index nl = beside.inner[r].rows();
+    const MatrixXd own = products.leftCols(nl) * beside.inner[r];
+    XZ += products.rightCols(products.cols() - nl) - own * beside.lz[r];
+    Xw += (X.transpose() * beside.w[r]).cast<double>() - own * beside.pull[r];
+    for (Index c = 0; c < columns; c += width)
+      XX.middleCols(c, width) += (X.middleCols(c, width).transpose() * X.middleCols(c, width)).cast<double>() -
+                                 own.middleRows(c, width) * products.block(c, 0, width, nl).transpose();
+  }
+  Xw -= XZ * beside.step;
+  Proposal out{.effect = e, .starts = {}};
+  std::vector<double> logs;
+  for (const Signature& signature : candidate.signatures) {
+    const auto across = XZ.middleRows(signature.first, width);
+    MatrixXd square = XX.middleCols(signature.first, width) - across * beside.covariance * across.transpose();
+    const VectorXd pull = Xw.segment(signature.first, width);
+    StartPoint start{.shared = shared_part(effect, signature.values), .local = {}, .log_bayes_factor = kNever};
+    if (candidate.amplitudes.empty()) {
+      start.log_bayes_factor = pull[0] - 0.5 * square(0, 0);
+    } else {
+      // The prior of each size, in shares of the start.
+      MatrixXd precision = MatrixXd::Zero(width, width);
+      double log_prior = 0;
+      for (Index a = 0; a < width; ++a) {
+        const Parameter& p = effect.parameters[candidate.amplitudes[static_cast<std::size_t>(a)]];
+        const double unit =
+            signature.values[static_cast<Index>(candidate.amplitudes[static_cast<std::size_t>(a)])] - p.none;
+        precision(a, a) = unit * unit * precision_of(p.prior);
+        log_prior += std::log(precision(a, a));
+      }
+      const MatrixXd both = square + precision;
+      const Eigen::LDLT<MatrixXd> factor(both);
+      const VectorXd shares = factor.solve(pull);
+      VectorXd values = signature.values;
+      if (apply_shares(effect, candidate.amplitudes, shares, values)) {
+        start.shared = shared_part(effect, values);
+        start.log_bayes_factor =
+            0.5 * (pull.dot(shares) + log_prior - factor.vectorD().array().max(1e-300).log().sum());
+      }
+    }
+    logs.push_back(start.log_bayes_factor);
+    out.starts.push_back(std::move(start));
+  }
+  out.log_bayes_factor = log_sum(logs) - std::log(static_cast<double>(logs.size()));
+  keep_best(out.starts, starts);
+  return out;
+}
+
+Proposal Proposals::judge_local(const Candidate& candidate, std::size_t e, const Beside& beside,
+                                std::size_t starts) const {
+  const Effect& effect = system_->effects()[e];
+  const std::size_t recordings = beside.w.size();
+  std::vector<VectorXd> pull(recordings), square(recordings);
+  for (std::size_t r = 0; r < recordings; ++r) {
+    const MatrixXf& X = candidate.columns[r];
+    const MatrixXd products = (X.transpose() * beside.LZ[r]).cast<double>();
+    const Index nl = beside.inner[r].rows();
+    const MatrixXd own = products.leftCols(nl) * beside.inner[r];
+    const MatrixXd XZ = products.rightCols(products.cols() - nl) - own * beside.lz[r];
+    pull[r] = (X.transpose() * beside.w[r]).cast<double>() - own * beside.pull[r] - XZ * beside.step;
+    square[r] = X.colwise().squaredNorm().transpose().cast<double>();
+    square[r] -= (own.cwiseProduct(products.leftCols(nl)).rowwise().sum() +
+                  (XZ * beside.covariance).cwiseProduct(XZ).rowwise().sum());
+    square[r] = square[r].cwiseMax(0);
+  }
+  Proposal out{.effect = e, .starts = {}};
+  std::vector<double> logs;
+  for (std::size_t s = 0; s < candidate.signatures.size(); ++s) {
+    // Sizes, as shares of the start, that a recording by itself would ask for.
+    std::vector<double> shares;
+    for (std::size_t r = 0; r < recordings; ++r) {
+      const auto count = static_cast<Index>(candidate.choices[r].size());
+      double best = 0, share = 0;
+      for (Index c = 0; c < count; ++c) {
+        const Index column = static_cast<Index>(s) * count + c;
+        const double b = pull[r][column], q = square[r][column];
+        if (q > 1e-9 && b > 0 && b * b / q > best) best = b * b / q, share = b / q;
+      }
+      if (share > 0) shares.push_back(std::min(share, kFarthest)), shares.push_back(0.5 * std::min(share, kFarthest));
+    }
+    StartPoint found{
+        .shared = shared_part(effect, candidate.signatures[s].values), .local = {}, .log_bayes_factor = kNever};
+    for (const double share : shares) {
+      double sum = 0, curvature = 0;
+      std::vector<VectorXd> local;
+      for (std::size_t r = 0; r < recordings; ++r) {
+        const auto count = static_cast<Index>(candidate.choices[r].size());
+        std::vector<double> gains;
+        for (Index c = 0; c < count; ++c) {
+          const Index column = static_cast<Index>(s) * count + c;
+          gains.push_back(share * pull[r][column] - 0.5 * share * share * square[r][column]);
+        }
+        const auto best = static_cast<std::size_t>(std::max_element(gains.begin(), gains.end()) - gains.begin());
+        const double mean = log_sum(gains) - std::log(static_cast<double>(count));
+        bool happens = true;
+        if (candidate.instant) {
+          const double odds = kHappens / (kHappens + kHappensNot);
+          const double terms[] = {std::log(1 - odds), std::log(odds) + mean};
+          sum += log_sum(terms);
+          happens = terms[1] > terms[0];
+        } else {
+          sum += mean;
+        }
+        if (happens) curvature += square[r][static_cast<Index>(s) * count + static_cast<Index>(best)];
+        local.push_back(VectorXd::Constant(1, happens ? candidate.choices[r][best] : 0.0));
+      }
+      VectorXd values = candidate.signatures[s].values;
+      const VectorXd all = VectorXd::Constant(static_cast<Index>(candidate.amplitudes.size()), share);
+      if (!apply_shares(effect, candidate.amplitudes, all, values)) continue;
+      const Parameter& size = effect.parameters[candidate.amplitudes.front()];
+      const double unit = candidate.signatures[s].values[static_cast<Index>(candidate.amplitudes.front())] - size.none;
+      const double log_factor = sum - 0.5 * std::log1p(curvature / (unit * unit * precision_of(size.prior)));
+      if (log_factor > found.log_bayes_factor) {
+        found.log_bayes_factor = log_factor;
+        found.shared = shared_part(effect, values);
+        found.local = std::move(local);
+      }
+    }
+    logs.push_back(found.log_bayes_factor);
+    if (!found.local.empty()) out.starts.push_back(std::move(found));
+  }
+  out.log_bayes_factor = log_sum(logs) - std::log(static_cast<double>(logs.size()));
+  keep_best(out.starts, starts);
+  return out;
+}
+
+std::vector<std::pair<double, ModelSet>> Proposals::pairs(const Likelihood& likelihood, const Fit& base,
+                                                          std::size_t count) const {
+  const auto blocks = linearise(likelihood, base, {});
+  const ArrowSolution solution = solve_about(base, blocks, {});
+  const auto free = free_locals(base.layout);
+  // The likeliest signature of each effect, side by side.
+  const auto single = beside(likelihood, base, {}, 1);
+  std::vector<std::size_t> effects;
+  std::vector<Index> first, width;
+  Index columns = 0;
+  for (const auto& one : single) {
+    const Candidate& candidate = candidates_[one.effect];
+    if (candidate.local >= 0 || one.starts.empty()) continue;
+    effects.push_back(one.effect);
+    first.push_back(columns);
+    width.push_back(candidate.width());
+    columns += candidate.width();
+  }
+  MatrixXd XX = MatrixXd::Zero(columns, columns), XZ = MatrixXd::Zero(columns, base.shared.size());
+  VectorXd Xw = VectorXd::Zero(columns), precision = VectorXd::Zero(columns);
+  std::vector<Index> chosen(effects.size());
+  // The signature whose shape is nearest to the best start's.
+  for (std::size_t k = 0; k < effects.size(); ++k) {
+    const Candidate& candidate = candidates_[effects[k]];
+    const Effect& effect = system_->effects()[effects[k]];
+    VectorXd wanted;
+    for (const auto& one : single)
+      if (one.effect == effects[k]) wanted = one.starts.front().shared;
+    double nearest = std::numeric_limits<double>::infinity();
+    for (const Signature& signature : candidate.signatures) {
+      VectorXd apart = shared_part(effect, signature.values) - wanted;
+      Index i = 0;
+      for (std::size_t p = 0; p < effect.parameters.size(); ++p)
+        if (effect.parameters[p].scope == Scope::shared) {
+          if (!std::isnan(effect.parameters[p].none)) apart[i] = 0;
+          ++i;
+        }
+      if (apart.norm() < nearest) nearest = apart.norm(), chosen[k] = signature.first;
+    }
+    for (std::size_t a = 0; a < candidate.amplitudes.size(); ++a) {
+      const Parameter& p = effect.parameters[candidate.amplitudes[a]];
+      const Index s = chosen[k] / candidate.width();
+      const double unit =
+          candidate.signatures[static_cast<std::size_t>(s)].values[static_cast<Index>(candidate.amplitudes[a])] -
+          p.none;
+      precision[first[k] + static_cast<Index>(a)] = unit * unit * precision_of(p.prior);
+    }
+    if (candidate.amplitudes.empty()) precision[first[k]] = 1;
+  }
+  Residuals residuals;
+  for (std::size_t r = 0; r < blocks.size(); ++r) {
+    likelihood.evaluate(base.layout, r, base.shared, base.local[r], true, residuals);
+    MatrixXd X(residuals.white.size(), columns);
+    for (std::size_t k = 0; k < effects.size(); ++k)
+      X.middleCols(first[k], width[k]) =
+          candidates_[effects[k]].columns[r].middleCols(chosen[k], width[k]).cast<double>();
+    const MatrixXd L = residuals.by_local(Eigen::all, free);
+    MatrixXd inner = blocks[r].ll;
+    inner.diagonal() += blocks[r].precision;
+    const MatrixXd XL = X.transpose() * L;
+    const MatrixXd own = inner.llt().solve(XL.transpose());
+    XX += X.transpose() * X - XL * own;
+    XZ += X.transpose() * residuals.by_shared - own.transpose() * blocks[r].lz;
+    Xw += X.transpose() * residuals.white -
+          own.transpose() * (blocks[r].lw + blocks[r].precision.cwiseProduct(blocks[r].centre));
+  }
+  Xw -= XZ * solution.shared;
+  XX -= XZ * solution.covariance * XZ.transpose();
+  std::vector<std::pair<double, ModelSet>> out;
+  for (std::size_t i = 0; i < effects.size(); ++i)
+    for (std::size_t j = 0; j < i; ++j) {
+      const ModelSet set = with({effects[i]}, effects[j]);
+      if (!system_->allows(set)) continue;
+      std::vector<Index> both;
+      for (Index a = 0; a < width[i]; ++a) both.push_back(first[i] + a);
+      for (Index a = 0; a < width[j]; ++a) both.push_back(first[j] + a);
+      MatrixXd square = XX(both, both);
+      const VectorXd pull = Xw(both), prior = precision(both);
+      square.diagonal() += prior;
+      const Eigen::LDLT<MatrixXd> factor(square);
+      out.emplace_back(0.5 * (pull.dot(factor.solve(pull)) + prior.array().log().sum() -
+                              factor.vectorD().array().max(1e-300).log().sum()),
+                       set);
+    }
+  std::stable_sort(out.begin(), out.end(), [](const auto& a, const auto& b) { return a.first > b.first; });
+  if (out.size() > count) out.resize(count);
+  return out;
+}
+
+}  // namespace bevel::inference

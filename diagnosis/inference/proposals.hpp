@@ -1,0 +1,57 @@
+#pragma once
+// What each effect would do to the readings, from a grid of starts, once, about the base; and from it, without any fit,
+// what each promises beside a set that was fitted: an estimate of its log Bayes factor, and where to begin.
+#include "diagnosis/inference/likelihood.hpp"
+
+namespace bevel::inference {
+
+struct StartPoint {
+  Eigen::VectorXd shared;              // of the effect's shared parameters, in their order
+  std::vector<Eigen::VectorXd> local;  // of its others, per recording
+  double log_bayes_factor = 0;
+};
+
+struct Proposal {
+  std::size_t effect = 0;
+  double log_bayes_factor = 0;     // averaged over the starts
+  std::vector<StartPoint> starts;  // the likeliest first
+};
+
+class Proposals {
+ public:
+  // About a fit of the base alone.
+  Proposals(const Likelihood& likelihood, const Fit& base, int threads);
+
+  // Every effect that may join the set, the likeliest first.
+  std::vector<Proposal> beside(const Likelihood& likelihood, const Fit& fit, const CurveColumns& curve,
+                               std::size_t starts) const;
+  // Pairs beside the base, by their joint estimate, the likeliest first.
+  std::vector<std::pair<double, ModelSet>> pairs(const Likelihood& likelihood, const Fit& base,
+                                                 std::size_t count) const;
+
+ private:
+  struct Signature {
+    Eigen::VectorXd values;  // the effect's parameters at this start
+    Eigen::Index first = 0;  // column; as many as the effect has amplitudes
+  };
+  struct Candidate {
+    std::vector<std::size_t> amplitudes;
+    int local = -1;  // parameter that each recording has for itself
+    bool instant = false;
+    std::vector<Signature> signatures;
+    std::vector<std::vector<double>> choices;  // of the local parameter, per recording
+    std::vector<Eigen::MatrixXf> columns;      // per recording; with a local parameter: signatures x choices
+    Eigen::Index width() const {
+      return local >= 0 ? 1 : std::max<Eigen::Index>(1, static_cast<Eigen::Index>(amplitudes.size()));
+    }
+  };
+  struct Beside;
+  Candidate make_candidate(const Likelihood& likelihood, const Fit& base, std::size_t effect) const;
+  Proposal judge(const Candidate& candidate, std::size_t effect, const Beside& beside, std::size_t starts) const;
+  Proposal judge_local(const Candidate& candidate, std::size_t effect, const Beside& beside, std::size_t starts) const;
+
+  const System* system_;
+  std::vector<Candidate> candidates_;
+};
+
+}  // namespace bevel::inference

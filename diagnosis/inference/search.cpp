@@ -1,0 +1,233 @@
+#include "diagnosis/inference/search.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <stdexcept>
+
+#include "diagnosis/inference/log_sum.hpp"
+#include "diagnosis/inference/parallel.hpp"
+
+namespace bevel::inference {
+namespace {
+
+// So near that what is promised beside one is not far from what is beside the other.
+bool near(const Noise& a, const Noise& b) {
+  constexpr double kShare = 0.1, kCorrelation = 0.05;
+  for (std::size_t c = 0; c < a.sigma.size(); ++c)
+    if (std::abs(std::log(a.sigma[c] / b.sigma[c])) > kShare) return false;
+  return std::abs(a.ar1 - b.ar1) < kCorrelation;
+}
+
+}  // namespace
+
+using Eigen::Index;
+using Eigen::VectorXd;
+
+double Visited::log_posterior() const {
+  const double both[] = {log_without_curve, log_with_curve};
+  return log_sum(both);
+}
+
+double Search::log_prior(const ModelSet& set) const {
+  return rules_.log_prior_odds_effect * static_cast<double>(set.size());
+}
+
+const Visited& Search::best() const {
+  return std::max_element(
+             visited_.begin(), visited_.end(),
+             [](const auto& a, const auto& b) { return a.second.log_posterior() < b.second.log_posterior(); })
+      ->second;
+}
+
+double Search::log_not_visited() const {
+  std::vector<double> logs;
+  for (const auto& [set, log] : promised_)
+    if (!is_visited(set)) logs.push_back(log);
+  return log_sum(logs);
+}
+
+Search::Job Search::job_from(const Fit& fit, std::size_t effect, const StartPoint& start) const {
+  Job job{.set = with(fit.layout.set(), effect),
+          .layout = Layout(system_, with(fit.layout.set(), effect)),
+          .shared = {},
+          .local = {},
+          .nuisance_sd = fit.scales.nuisance_sd};
+  job.shared = job.layout.shared_from(fit.layout, fit.shared);
+  const auto member = static_cast<std::size_t>(std::find(job.set.begin(), job.set.end(), effect) - job.set.begin());
+  const auto& parameters = system_.effects()[effect].parameters;
+  for (std::size_t r = 0; r < fit.local.size(); ++r) {
+    job.local.push_back(job.layout.local_from(fit.layout, fit.local[r]));
+    Index shared = 0, local = 0;
+    for (std::size_t p = 0; p < parameters.size(); ++p) {
+      if (parameters[p].scope == Scope::shared) {
+        job.shared[job.layout.find_shared(member, p)] = start.shared[shared++];
+      } else if (r < start.local.size()) {
+        job.local[r][job.layout.find_local(member, p)] = start.local[r][local++];
+      }
+    }
+  }
+  return job;
+}
+
+void Search::keep(const ModelSet& set, std::shared_ptr<const Evaluated> at) {
+  Visited one{.set = set, .at = at, .log_prior = log_prior(set)};
+  const double curve = std::exp(rules_.log_prior_odds_curve);
+  one.log_without_curve = one.log_prior + at->log_evidence - (std::log1p(curve));
+  one.log_with_curve = at->with_discrepancy
+                           ? one.log_without_curve + rules_.log_prior_odds_curve + at->log_bayes_factor_curve
+                           : -std::numeric_limits<double>::infinity();
+  const auto known = visited_.find(set);
+  // Another local minimum of the same set: the likelier counts.
+  if (known == visited_.end() || known->second.log_posterior() <= one.log_posterior())
+    visited_.insert_or_assign(set, std::move(one));
+}
+
+void Search::evaluate_all(std::vector<Job> jobs) {
+  fits_ += jobs.size();
+  const double best = best_log();
+  std::vector<std::shared_ptr<const Evaluated>> results(jobs.size());
+  parallel_for(jobs.size(), rules_.threads, [&](std::size_t i) {
+    Job& job = jobs[i];
+    auto one = evaluate(*likelihood_, nullptr, job.layout, job.shared, job.local, job.nuisance_sd,
+                        best - rules_.window - rules_.doubt - log_prior(job.set));
+    if (one.valid && (job.beside_curve || log_prior(job.set) + one.log_evidence > best - rules_.curve_window))
+      add_discrepancy(*likelihood_, *discrepancy_, one);
+    results[i] = std::make_shared<const Evaluated>(std::move(one));
+  });
+  for (std::size_t i = 0; i < jobs.size(); ++i)
+    if (results[i]->valid) keep(jobs[i].set, results[i]);
+}
+
+void Search::expand(const ModelSet& set) {
+  expanded_[set] = true;
+  const Visited here = visited_.at(set);
+  std::vector<Job> jobs;
+  if (set.size() < rules_.largest) {
+    // What is promised is relative to this set by the reference's noise.
+    const auto [plain, change] = moved_to(likelihood_, here.at->fit, *discrepancy_);
+    const double best = best_log();
+    const auto add = [&](const Fit& fit, const std::vector<Proposal>& list, double from, bool beside_curve) {
+      for (const Proposal& one : list) {
+        const ModelSet larger = with(set, one.effect);
+        const double promised = from + one.log_bayes_factor + rules_.log_prior_odds_effect;
+        auto& known = promised_.try_emplace(larger, -std::numeric_limits<double>::infinity()).first->second;
+        known = std::max(known, promised);
+        if (is_visited(larger) ||
+            promised + rules_.optimism + rules_.linear_error * std::max(0.0, one.log_bayes_factor) <
+                best - rules_.window)
+          continue;
+        for (const StartPoint& start : one.starts)
+          if (start.log_bayes_factor > one.starts.front().log_bayes_factor - rules_.window)
+            jobs.push_back(job_from(fit, one.effect, start)), jobs.back().beside_curve = beside_curve;
+      }
+    };
+    if (here.at->fit_with_curve && here.log_with_curve > here.log_without_curve) {
+      const auto [beside_curve, more] = moved_to(likelihood_, *here.at->fit_with_curve, *discrepancy_);
+      const CurveColumns curve = discrepancy_->columns(*likelihood_, *beside_curve.scales.curve);
+      add(beside_curve, proposals_->beside(*likelihood_, beside_curve, curve, rules_.starts),
+          here.log_with_curve + more, true);
+    }
+    // Without the curve too: an effect may take its place.
+    add(plain, proposals_->beside(*likelihood_, plain, {}, rules_.starts), here.log_without_curve + change, false);
+  }
+  // Smaller sets, from which swaps come.
+  for (const std::size_t effect : set) {
+    const ModelSet smaller = without(set, effect);
+    if (is_visited(smaller)) continue;
+    const Fit& fit = here.at->fit;
+    Job job{.set = smaller,
+            .layout = Layout(system_, smaller),
+            .shared = {},
+            .local = {},
+            .nuisance_sd = fit.scales.nuisance_sd};
+    job.shared = job.layout.shared_from(fit.layout, fit.shared);
+    for (const auto& local : fit.local) job.local.push_back(job.layout.local_from(fit.layout, local));
+    jobs.push_back(std::move(job));
+  }
+  evaluate_all(std::move(jobs));
+}
+
+double Search::best_log() const { return visited_.empty() ? 0 : best().log_posterior(); }
+
+void Search::run(const Readings& outliers, const Noise& noise) {
+  const Layout nothing(system_, {});
+  VectorXd shared = nothing.shared_start();
+  std::vector<VectorXd> local(system_.data().recordings.size(), nothing.local_start());
+  // From the middle of each group's.
+  VectorXd nuisance_sd(static_cast<Index>(system_.nuisance_groups().size()));
+  for (Index g = 0; g < nuisance_sd.size(); ++g) {
+    const auto& values = system_.nuisance_groups()[static_cast<std::size_t>(g)].standard_deviations;
+    nuisance_sd[g] = values[values.size() / 2];
+  }
+  Noise reference = noise;
+  for (std::size_t round = 0; round < rules_.rounds; ++round) {
+    likelihood_ = std::make_shared<const Likelihood>(system_, outliers, reference);
+    Evaluated base = evaluate(*likelihood_, nullptr, nothing, shared, local, nuisance_sd);
+    if (!base.valid) throw std::domain_error("the model cannot follow the recordings");
+    discrepancy_ = std::make_unique<const Discrepancy>(*likelihood_, base.fit);
+    add_discrepancy(*likelihood_, *discrepancy_, base);
+    shared = base.fit.shared, local = base.fit.local, nuisance_sd = base.fit.scales.nuisance_sd;
+    if (round == 0) {
+      // A curve takes up most of what is missing: the noise beside it is nearer to the truth.
+      if (base.fit_with_curve)
+        reference = base.fit_with_curve->likelihood->noise();
+      else
+        reference = base.fit.likelihood->noise();
+      likelihood_ = std::make_shared<const Likelihood>(system_, outliers, reference);
+      discrepancy_ = std::make_unique<const Discrepancy>(*likelihood_, base.fit);
+    }
+    proposals_ = std::make_unique<const Proposals>(*likelihood_, base.fit, rules_.threads);
+    keep({}, std::make_shared<const Evaluated>(base));
+    expanded_.clear();
+    promised_.clear();
+    fits_ = 0;
+    look_around();
+    const Visited& best = this->best();
+    const Fit& fit = best.log_with_curve > best.log_without_curve ? *best.at->fit_with_curve : best.at->fit;
+    if (near(fit.likelihood->noise(), reference)) break;
+    reference = fit.likelihood->noise();
+  }
+}
+
+void Search::look_around() {
+  expand({});
+  // Pairs of which neither by itself comes near.
+  std::vector<Job> jobs;
+  for (const auto& [promise, set] : proposals_->pairs(*likelihood_, visited_.at({}).at->fit, rules_.pairs)) {
+    if (is_visited(set)) continue;
+    for (const std::size_t first : set) {
+      const auto single = visited_.find({first});
+      if (single == visited_.end()) continue;
+      const std::size_t second = set[0] == first ? set[1] : set[0];
+      for (const Proposal& one : proposals_->beside(*likelihood_, single->second.at->fit, {}, 1))
+        if (one.effect == second && !one.starts.empty())
+          jobs.push_back(job_from(single->second.at->fit, second, one.starts.front()));
+      break;
+    }
+  }
+  evaluate_all(std::move(jobs));
+  while (fits_ < rules_.most_fits) {
+    const double best = best_log();
+    const ModelSet top = this->best().set;
+    const ModelSet* next = nullptr;
+    double next_log = -std::numeric_limits<double>::infinity();
+    for (const auto& [set, one] : visited_) {
+      if (expanded_.contains(set)) continue;
+      const bool subset = std::includes(top.begin(), top.end(), set.begin(), set.end()) && set.size() + 1 == top.size();
+      const double log = subset ? best : one.log_posterior();
+      if (log >= best - rules_.window && log > next_log) next = &set, next_log = log;
+    }
+    if (!next) break;
+    const ModelSet set = *next;
+    const auto at = visited_.at(set).at;
+    if (!at->with_discrepancy) {
+      auto with = std::make_shared<Evaluated>(*at);
+      add_discrepancy(*likelihood_, *discrepancy_, *with);
+      keep(set, with);
+    }
+    expand(set);
+  }
+}
+
+}  // namespace bevel::inference

@@ -1,0 +1,81 @@
+#pragma once
+// Which sets of effects are likely: an Occam window (Madigan and Raftery 1994, JASA 89) over all sets of up to
+// `largest`, searched from a queue by adding, dropping and swapping, with refits where the linear model comes near.
+#include <functional>
+#include <map>
+#include <memory>
+
+#include "diagnosis/inference/evidence.hpp"
+#include "diagnosis/inference/proposals.hpp"
+
+namespace bevel::inference {
+
+struct SearchRules {
+  std::size_t largest = 3;
+  double window = 3.5;         // in log posterior: sets below are not looked at further (odds of 30)
+  double curve_window = 15.0;  // without a discrepancy: sets further below are not looked at with one
+  double optimism = 2.0;       // by which a refit may exceed what the linear model promised
+  double doubt = 12.0;         // below by that after a first fit: noise and variation are not fitted
+  double linear_error = 0.15;  // of what the linear model promises, as a share of it
+  std::size_t starts = 2;      // of an effect, that are fitted
+  std::size_t pairs = 8;
+  std::size_t most_fits = 90;
+  double log_prior_odds_effect = -5.0;  // of one effect being in the model, against not
+  double log_prior_odds_curve = -4.0;   // of a discrepancy
+  std::size_t rounds = 3;
+  int threads = 2;
+};
+
+// One set, with its share in the posterior (not normalised).
+struct Visited {
+  ModelSet set;
+  std::shared_ptr<const Evaluated> at;
+  double log_prior = 0;
+  double log_without_curve = 0, log_with_curve = 0;  // log of prior x evidence
+  double log_posterior() const;
+};
+
+class Search {
+ public:
+  Search(const System& system, const SearchRules& rules) : system_(system), rules_(rules) {}
+
+  // From readings without those outliers, and a noise to begin with. What the linear model promises depends on the
+  // noise: it is asked again with that of the likeliest set, until that is the same.
+  void run(const Readings& outliers, const Noise& noise);
+  const std::map<ModelSet, Visited>& visited() const { return visited_; }
+  const Visited& best() const;
+  const Discrepancy& discrepancy() const { return *discrepancy_; }
+  // Log of the share of sets that were judged by the linear model alone, by its estimate.
+  double log_not_visited() const;
+  double log_prior(const ModelSet& set) const;
+
+ private:
+  struct Job {
+    ModelSet set;
+    Layout layout;
+    Eigen::VectorXd shared;
+    std::vector<Eigen::VectorXd> local;
+    Eigen::VectorXd nuisance_sd;
+    bool beside_curve = false;
+  };
+  void expand(const ModelSet& set);
+  void keep(const ModelSet& set, std::shared_ptr<const Evaluated> at);
+  void evaluate_all(std::vector<Job> jobs);
+  Job job_from(const Fit& fit, std::size_t effect, const StartPoint& start) const;
+  double best_log() const;
+  bool is_visited(const ModelSet& set) const { return visited_.contains(set); }
+
+  void look_around();
+
+  const System& system_;
+  SearchRules rules_;
+  std::shared_ptr<const Likelihood> likelihood_;  // for what is linear; each set is judged by its own noise
+  std::unique_ptr<const Discrepancy> discrepancy_;
+  std::unique_ptr<const Proposals> proposals_;
+  std::map<ModelSet, Visited> visited_;
+  std::map<ModelSet, bool> expanded_;
+  std::map<ModelSet, double> promised_;  // log posterior of sets that were not fitted
+  std::size_t fits_ = 0;
+};
+
+}  // namespace bevel::inference

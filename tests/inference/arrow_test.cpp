@@ -1,0 +1,108 @@
+// The arrow's solution against the same least squares written out in full.
+#include <gtest/gtest.h>
+
+#include <Eigen/Cholesky>
+#include <Eigen/LU>
+#include <random>
+
+#include "diagnosis/inference/arrow.hpp"
+
+namespace bevel::inference {
+namespace {
+
+using Eigen::Index;
+using Eigen::MatrixXd;
+using Eigen::VectorXd;
+
+struct Problem {
+  std::vector<ArrowBlock> blocks;
+  MatrixXd A, precision;  // all unknowns: shared, then each recording's
+  VectorXd w, centre;
+};
+
+Problem random_problem(std::uint64_t seed) {
+  constexpr Index kRows = 30, kShared = 4, kLocal = 3, kRecordings = 5;
+  std::mt19937_64 random(seed);
+  std::normal_distribution<double> normal;
+  const auto draw = [&](Index rows, Index columns) {
+    return MatrixXd(MatrixXd::NullaryExpr(rows, columns, [&] { return normal(random); }));
+  };
+  Problem out;
+  const Index all = kShared + kLocal * kRecordings;
+  out.A = MatrixXd::Zero(kRows * kRecordings, all);
+  out.precision = MatrixXd::Zero(all, all);
+  const MatrixXd root = draw(kShared, kShared);
+  out.precision.topLeftCorner(kShared, kShared) = root * root.transpose() + MatrixXd::Identity(kShared, kShared);
+  out.w.resize(kRows * kRecordings);
+  out.centre = draw(all, 1);
+  for (Index r = 0; r < kRecordings; ++r) {
+    const MatrixXd L = draw(kRows, kLocal), Z = draw(kRows, kShared);
+    const VectorXd w = draw(kRows, 1);
+    ArrowBlock block = make_block(L, Z, w);
+    block.precision = draw(kLocal, 1).cwiseAbs() + VectorXd::Constant(kLocal, 0.1);
+    block.centre = out.centre.segment(kShared + r * kLocal, kLocal);
+    out.A.block(r * kRows, 0, kRows, kShared) = Z;
+    out.A.block(r * kRows, kShared + r * kLocal, kRows, kLocal) = L;
+    out.precision.block(kShared + r * kLocal, kShared + r * kLocal, kLocal, kLocal) = block.precision.asDiagonal();
+    out.w.segment(r * kRows, kRows) = w;
+    out.blocks.push_back(block);
+  }
+  return out;
+}
+
+TEST(Arrow, SolvesAsTheWholeSystemDoes) {
+  for (std::uint64_t seed = 1; seed <= 5; ++seed) {
+    const Problem p = random_problem(seed);
+    const Index n = 4;
+    const ArrowSolution s = solve(p.blocks, p.precision.topLeftCorner(n, n), p.centre.head(n));
+    ASSERT_TRUE(s.valid);
+    const MatrixXd H = p.A.transpose() * p.A + p.precision;
+    const VectorXd x = H.ldlt().solve(p.A.transpose() * p.w + p.precision * p.centre);
+    EXPECT_LT((s.shared - x.head(n)).norm(), 1e-10);
+    for (std::size_t r = 0; r < p.blocks.size(); ++r)
+      EXPECT_LT((s.local[r] - x.segment(n + 3 * static_cast<Index>(r), 3)).norm(), 1e-10);
+    const VectorXd off = x - p.centre;
+    EXPECT_NEAR(s.least, (p.w - p.A * x).squaredNorm() + off.dot(p.precision * off), 1e-9);
+    EXPECT_LT((s.covariance - MatrixXd(H.inverse()).topLeftCorner(n, n)).norm(), 1e-10);
+    const auto log_det = [](const MatrixXd& M) { return M.ldlt().vectorD().array().log().sum(); };
+    EXPECT_NEAR(s.log_volume_ratio, log_det(H) - log_det(p.precision), 1e-9);
+  }
+}
+
+TEST(Arrow, WithoutARecordingIsTheRestAlone) {
+  const Problem p = random_problem(9);
+  ArrowRules rules;
+  rules.used = {true, false, true, true, true};
+  const ArrowSolution s = solve(p.blocks, p.precision.topLeftCorner(4, 4), p.centre.head(4), rules);
+  auto rest = p.blocks;
+  rest.erase(rest.begin() + 1);
+  const ArrowSolution t = solve(rest, p.precision.topLeftCorner(4, 4), p.centre.head(4));
+  EXPECT_LT((s.shared - t.shared).norm(), 1e-12);
+  EXPECT_NEAR(s.least, t.least, 1e-10);
+  EXPECT_NEAR(s.log_volume_ratio, t.log_volume_ratio, 1e-10);
+}
+
+TEST(Arrow, WhatIsHeldStaysAndHasTheVolumeOfItsTail) {
+  const Problem p = random_problem(4);
+  ArrowRules rules;
+  rules.held = {2};
+  MatrixXd precision = p.precision.topLeftCorner(4, 4).diagonal().asDiagonal();
+  const ArrowSolution s = solve(p.blocks, precision, VectorXd::Zero(4), rules);
+  ASSERT_TRUE(s.valid);
+  EXPECT_EQ(s.shared[2], 0);
+  EXPECT_EQ(s.covariance(2, 2), 0);
+  // The same problem without that unknown.
+  auto blocks = p.blocks;
+  const std::vector<Index> rest = {0, 1, 3};
+  for (auto& block : blocks) {
+    block.lz = MatrixXd(block.lz(Eigen::all, rest));
+    block.zz = MatrixXd(block.zz(rest, rest));
+    block.zw = VectorXd(block.zw(rest));
+  }
+  const ArrowSolution t = solve(blocks, MatrixXd(precision(rest, rest)), VectorXd::Zero(3));
+  EXPECT_NEAR(s.least, t.least, 1e-9);
+  EXPECT_GT(s.log_volume_ratio, t.log_volume_ratio);
+}
+
+}  // namespace
+}  // namespace bevel::inference

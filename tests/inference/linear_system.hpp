@@ -1,0 +1,116 @@
+#pragma once
+// A client of the engine whose evidence is known in closed form: readings linear in everything.
+#include <Eigen/Cholesky>
+#include <Eigen/LU>
+#include <cmath>
+#include <random>
+
+#include "diagnosis/inference/system.hpp"
+
+namespace bevel::inference::testing {
+
+// One channel, `count` readings a recording at 10 Hz; base: offset and slope; effects: a parabola, a step; a nuisance
+// that adds a cosine; one curve of the reading by time.
+class LinearSystem final : public System {
+ public:
+  static constexpr int kCount = 60;
+  double sigma = 0.1;
+
+  LinearSystem(std::size_t recordings, std::uint64_t seed, double parabola, double nuisance_sd, double bump) {
+    std::mt19937_64 random(seed);
+    std::normal_distribution<double> normal;
+    data_.claimed_sd = {sigma};
+    data_.frame_s = 0.1;
+    for (std::size_t r = 0; r < recordings; ++r) {
+      SeriesSet set;
+      set.messages = kCount;
+      set.duration_s = 0.1 * kCount;
+      Series series;
+      const double own = nuisance_sd * normal(random);
+      for (int i = 0; i < kCount; ++i) {
+        const double t = 0.1 * i;
+        series.message.push_back(static_cast<std::size_t>(i));
+        series.time_s.push_back(t);
+        series.relative_sd.push_back(1);
+        series.measured.push_back(0.3 + 0.2 * t + parabola * parabola_of(t) + own * std::cos(t) +
+                                  bump * std::exp(-4 * (t - 3) * (t - 3)) + sigma * normal(random));
+      }
+      set.series.push_back(std::move(series));
+      data_.recordings.push_back(std::move(set));
+    }
+    base_ = {{.name = "offset", .lower = -10, .upper = 10, .none = 0, .starts = {}, .prior = normal_prior(0, 1)},
+             {.name = "slope", .lower = -10, .upper = 10, .none = 0, .starts = {}, .prior = normal_prior(0, 1)}};
+    const auto effect = [](const char* name) {
+      return Effect{
+          .name = name,
+          .label = name,
+          .parameters = {
+              {.name = "size", .lower = -10, .upper = 10, .none = 0, .starts = {0.1}, .prior = normal_prior(0, 0.5)}}};
+    };
+    effects_ = {effect("parabola"), effect("step")};
+    nuisances_ = {{"cosine", 0}};
+    groups_ = {{"cosine", "mm", {0.0, 0.2}}};
+    Curve curve{.component = "reading", .unit = "mm", .covariate = "time_s", .at = {}};
+    for (int i = 0; i < 6; ++i) curve.at.push_back(1.2 * i);
+    curves_ = {curve};
+  }
+
+  const Dataset& data() const override { return data_; }
+  const std::vector<Parameter>& base() const override { return base_; }
+  const std::vector<Effect>& effects() const override { return effects_; }
+  const std::vector<Nuisance>& nuisances() const override { return nuisances_; }
+  const std::vector<NuisanceGroup>& nuisance_groups() const override { return groups_; }
+  const std::vector<Curve>& curves() const override { return curves_; }
+  bool allows(const ModelSet&) const override { return true; }
+
+  static Eigen::MatrixXd design(const ModelSet& set) {
+    Eigen::MatrixXd out(kCount, 2 + static_cast<Eigen::Index>(set.size()));
+    for (int i = 0; i < kCount; ++i) {
+      const double t = 0.1 * i;
+      out(i, 0) = 1;
+      out(i, 1) = t;
+      for (std::size_t m = 0; m < set.size(); ++m)
+        out(i, 2 + static_cast<Eigen::Index>(m)) = set[m] == 0 ? parabola_of(t) : (t > 2 ? 1 : 0);
+    }
+    return out;
+  }
+  static Eigen::MatrixXd cosine() {
+    Eigen::MatrixXd out(kCount, 1);
+    for (int i = 0; i < kCount; ++i) out(i, 0) = std::cos(0.1 * i);
+    return out;
+  }
+  bool predict(const ModelSet& set, std::size_t, const Eigen::VectorXd& shared, const Eigen::VectorXd& local,
+               bool derivatives, Prediction& out) const override {
+    const Eigen::MatrixXd X = design(set), L = cosine();
+    out.reading = X * shared + L * local;
+    if (derivatives) out.by_shared = X, out.by_local = L;
+    return true;
+  }
+  Eigen::MatrixXd by_curves(std::size_t, const Eigen::VectorXd&) const override {
+    Eigen::MatrixXd out = Eigen::MatrixXd::Zero(kCount, 6);
+    for (int i = 0; i < kCount; ++i) {
+      const double u = 0.1 * i / 1.2;
+      const int k = std::min(static_cast<int>(u), 4);
+      out(i, k) = 1 - (u - k);
+      out(i, k + 1) = u - k;
+    }
+    return out;
+  }
+
+ private:
+  static double parabola_of(double t) { return (t - 3) * (t - 3) / 9; }
+  Dataset data_;
+  std::vector<Parameter> base_;
+  std::vector<Effect> effects_;
+  std::vector<Nuisance> nuisances_;
+  std::vector<NuisanceGroup> groups_;
+  std::vector<Curve> curves_;
+};
+
+// log N(y; 0, C) without the constant of 2 pi.
+inline double log_normal(const Eigen::VectorXd& y, const Eigen::MatrixXd& covariance) {
+  const Eigen::PartialPivLU<Eigen::MatrixXd> lu(covariance);
+  return -0.5 * (y.dot(lu.solve(y)) + lu.matrixLU().diagonal().array().abs().log().sum());
+}
+
+}  // namespace bevel::inference::testing

@@ -1,0 +1,114 @@
+// The noise: found beside structure that is no noise, its outliers, and again about a model.
+#include <gtest/gtest.h>
+
+#include <random>
+
+#include "diagnosis/inference/noise.hpp"
+
+namespace bevel::inference {
+namespace {
+
+struct Made {
+  Dataset data;
+  Errors errors;
+  Readings outliers;
+};
+
+// Two channels of autocorrelated noise at 30 Hz over a slow curve, outliers of 10 to 50 deviations in both.
+Made make(double ar1, double outlier_share, double dropped_share, std::uint64_t seed) {
+  constexpr std::size_t kMessages = 400, kRecordings = 6;
+  std::mt19937_64 random(seed);
+  std::normal_distribution<double> normal;
+  std::uniform_real_distribution<double> uniform;
+  const double sigma[] = {0.1, 0.25};
+  Made out;
+  out.data.claimed_sd = {0.1, 0.25};
+  out.data.frame_s = 1.0 / 30;
+  out.outliers.resize(kRecordings);
+  for (std::size_t r = 0; r < kRecordings; ++r) {
+    SeriesSet set;
+    set.messages = kMessages;
+    set.series.resize(2);
+    std::vector<std::vector<double>> values(2);
+    double state[] = {normal(random), normal(random)};
+    for (std::size_t i = 0; i < kMessages; ++i) {
+      const bool dropped = uniform(random) < dropped_share;
+      const bool outlier = !dropped && uniform(random) < outlier_share;
+      if (outlier) out.outliers[r].push_back(i);
+      const double size = outlier ? 10 + 40 * uniform(random) : 0, angle = 6.28 * uniform(random);
+      for (std::size_t c = 0; c < 2; ++c) {
+        state[c] = ar1 * state[c] + std::sqrt(1 - ar1 * ar1) * normal(random);
+        if (dropped) continue;
+        const double t = static_cast<double>(i) / 30;
+        set.series[c].message.push_back(i);
+        set.series[c].time_s.push_back(t);
+        set.series[c].relative_sd.push_back(1);
+        set.series[c].measured.push_back(0);
+        values[c].push_back(0.8 * std::sin(0.9 * t + static_cast<double>(r)) +
+                            sigma[c] * (state[c] + size * (c == 0 ? std::cos(angle) : std::sin(angle))));
+      }
+    }
+    out.errors.emplace_back();
+    for (const auto& one : values)
+      out.errors.back().emplace_back(
+          Eigen::Map<const Eigen::VectorXd>(one.data(), static_cast<Eigen::Index>(one.size())));
+    out.data.recordings.push_back(std::move(set));
+  }
+  return out;
+}
+
+class NoiseBesideACurve : public ::testing::TestWithParam<double> {};
+
+TEST_P(NoiseBesideACurve, IsFoundWithItsOutliers) {
+  const double ar1 = GetParam();
+  const Made made = make(ar1, 0.02, 0.05, 17);
+  const Calibration found = calibrate_noise(made.data, made.errors);
+  EXPECT_NEAR(found.noise.sigma[0], 0.1, 0.012);
+  EXPECT_NEAR(found.noise.sigma[1], 0.25, 0.03);
+  EXPECT_NEAR(found.noise.ar1, ar1, 0.05);
+  std::size_t planted = 0, hit = 0, all = 0;
+  for (std::size_t r = 0; r < made.outliers.size(); ++r) {
+    planted += made.outliers[r].size();
+    all += found.outliers[r].size();
+    EXPECT_TRUE(std::is_sorted(found.outliers[r].begin(), found.outliers[r].end()));
+    for (const auto i : made.outliers[r])
+      hit += std::binary_search(found.outliers[r].begin(), found.outliers[r].end(), i) ? 1 : 0;
+  }
+  EXPECT_GE(hit + 1, planted);        // but for one that another's neighbourhood hides
+  EXPECT_LE(all - hit, all / 5 + 3);  // and hardly any that is none
+}
+
+INSTANTIATE_TEST_SUITE_P(Autocorrelations, NoiseBesideACurve, ::testing::Values(0.0, 0.6, 0.85));
+
+TEST(Noise, WithoutItsOutliersTheRestIsLeft) {
+  const Made made = make(0.3, 0.02, 0, 5);
+  const Dataset rest = without(made.data, made.outliers);
+  const auto rows = rows_left(made.data, made.outliers);
+  for (std::size_t r = 0; r < rest.recordings.size(); ++r) {
+    EXPECT_EQ(rest.recordings[r].rows(),
+              made.data.recordings[r].rows() - 2 * static_cast<Eigen::Index>(made.outliers[r].size()));
+    EXPECT_EQ(static_cast<Eigen::Index>(rows[r].size()), rest.recordings[r].rows());
+  }
+}
+
+TEST(Noise, AboutAModelIsTheLikeliest) {
+  Made made = make(0.6, 0, 0.05, 3);
+  for (std::size_t r = 0; r < made.errors.size(); ++r)
+    for (std::size_t c = 0; c < 2; ++c)
+      for (Eigen::Index i = 0; i < made.errors[r][c].size(); ++i)
+        made.errors[r][c][i] -=
+            0.8 * std::sin(0.9 * made.data.recordings[r].series[c].time_s[static_cast<std::size_t>(i)] +
+                           static_cast<double>(r));
+  Noise start;
+  start.frame_s = made.data.frame_s;
+  start.ar1 = 0.95;
+  start.sigma = {1, 1};
+  const Noise found = refine_noise(made.data, made.errors, start);
+  EXPECT_NEAR(found.ar1, 0.6, 0.03);
+  EXPECT_NEAR(found.sigma[0], 0.1, 0.006);
+  EXPECT_NEAR(found.sigma[1], 0.25, 0.015);
+  EXPECT_TRUE(alike(found, refine_noise(made.data, made.errors, found)));
+}
+
+}  // namespace
+}  // namespace bevel::inference

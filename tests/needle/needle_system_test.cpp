@@ -1,0 +1,223 @@
+// The needle behind the engine's interface, against differences and against the model itself.
+#include "diagnosis/needle/needle_system.hpp"
+
+#include <gtest/gtest.h>
+
+#include <numbers>
+
+#include "diagnosis/inference/search.hpp"
+#include "diagnosis/needle/covariates.hpp"
+#include "diagnosis/needle/curves.hpp"
+#include "tests/mismatch/simulated_rig.hpp"
+
+namespace bevel::diagnosis {
+namespace {
+
+using Eigen::Index;
+using Eigen::MatrixXd;
+using Eigen::VectorXd;
+using testing::active;
+using testing::record_case;
+using testing::SimulatedRig;
+
+std::size_t effect_named(const NeedleSystem& system, std::string_view label) {
+  for (std::size_t e = 0; e < system.effects().size(); ++e)
+    if (system.effects()[e].label == label) return e;
+  throw std::invalid_argument(std::string(label));
+}
+
+struct Setting {
+  inference::ModelSet set;
+  VectorXd shared, local;
+};
+
+// A set away from every "none", with a recording that differs from the rest.
+Setting setting_of(const NeedleSystem& system, const std::vector<std::string>& labels) {
+  Setting out;
+  for (const auto& label : labels) out.set = inference::with(out.set, effect_named(system, label));
+  const inference::Layout layout(system, out.set);
+  out.shared = layout.shared_start();
+  for (Index i = kBaseParameters; i < out.shared.size(); ++i) {
+    const auto& p = *layout.shared()[static_cast<std::size_t>(i)].parameter;
+    out.shared[i] = p.starts[p.starts.size() / 2];
+  }
+  out.local = layout.local_start();
+  out.local.head<kVariations>() << 0.04, 0.01, -0.008, 0.05, 0.2, -0.1;
+  for (Index i = kVariations; i < out.local.size(); ++i) out.local[i] = 2.03;
+  return out;
+}
+
+class Derivatives : public ::testing::TestWithParam<std::vector<std::string>> {};
+
+TEST_P(Derivatives, AreThoseOfDifferences) {
+  const SimulatedRig rig;
+  const NeedleSystem system(record_case(rig, 1), rig.needle);
+  const Setting at = setting_of(system, GetParam());
+  inference::Prediction here, up, down;
+  ASSERT_TRUE(system.predict(at.set, 1, at.shared, at.local, true, here));
+  ASSERT_EQ(here.by_shared.cols(), at.shared.size());
+  ASSERT_EQ(here.by_local.cols(), at.local.size());
+  const auto check = [&](bool shared, Index i, const VectorXd& column) {
+    Setting more = at, less = at;
+    const double value = shared ? at.shared[i] : at.local[i];
+    const double step = 1e-5 * std::max(std::abs(value), 0.02);
+    (shared ? more.shared : more.local)[i] += step;
+    (shared ? less.shared : less.local)[i] -= step;
+    ASSERT_TRUE(system.predict(at.set, 1, more.shared, more.local, false, up));
+    ASSERT_TRUE(system.predict(at.set, 1, less.shared, less.local, false, down));
+    const VectorXd difference = (up.reading - down.reading) / (2 * step);
+    EXPECT_LT((column - difference).norm(), 2e-4 * difference.norm() + 1e-4) << (shared ? "shared " : "local ") << i;
+  };
+  for (Index i = 0; i < at.shared.size(); ++i) check(true, i, here.by_shared.col(i));
+  for (Index i = 0; i < at.local.size(); ++i) check(false, i, here.by_local.col(i));
+}
+
+INSTANTIATE_TEST_SUITE_P(Sets, Derivatives,
+                         ::testing::Values(std::vector<std::string>{},
+                                           std::vector<std::string>{"layer", "torsional_windup"},
+                                           std::vector<std::string>{"lost_steps (rotation)", "camera_scale"},
+                                           std::vector<std::string>{"tissue_motion", "entry_angle"},
+                                           std::vector<std::string>{"relaxation", "drilling", "bevel_offset"}));
+
+TEST(NeedleSystem, WithoutEffectsItIsTheModel) {
+  const SimulatedRig rig;
+  const NeedleSystem system(record_case(rig, 2), rig.needle);
+  const inference::Layout layout(system, {});
+  inference::Prediction prediction;
+  ASSERT_TRUE(system.predict({}, 0, layout.shared_start(), layout.local_start(), false, prediction));
+  model::OpenLoop path;
+  ASSERT_TRUE(model::predict(model::AugmentedNeedle(rig.needle), system.recorded().recordings[0].motion, path));
+  Index row = 0;
+  for (std::size_t c = 0; c < system.recorded().channels.size(); ++c)
+    for (const std::size_t reading : system.recorded().recordings[0].series[c].reading)
+      EXPECT_NEAR(prediction.reading[row++], system.recorded().channels[c].axis.dot(path.position_mm[reading]), 1e-9);
+}
+
+TEST(NeedleSystem, RegistrationShiftsEveryReading) {
+  const SimulatedRig rig;
+  const NeedleSystem system(record_case(rig, 2), rig.needle);
+  const inference::Layout layout(system, {});
+  inference::Prediction plain, shifted;
+  VectorXd local = layout.local_start();
+  ASSERT_TRUE(system.predict({}, 0, layout.shared_start(), local, false, plain));
+  local[kEntryX] = 0.3, local[kEntryY] = -0.2;
+  ASSERT_TRUE(system.predict({}, 0, layout.shared_start(), local, false, shifted));
+  Index row = 0;
+  for (std::size_t c = 0; c < system.recorded().channels.size(); ++c)
+    for (std::size_t i = 0; i < system.data().recordings[0].series[c].time_s.size(); ++i, ++row)
+      EXPECT_NEAR(shifted.reading[row] - plain.reading[row],
+                  0.3 * system.recorded().channels[c].axis.x() - 0.2 * system.recorded().channels[c].axis.y(), 1e-12);
+}
+
+TEST(NeedleSystem, KindsOfOneEffectAreNeverTogether) {
+  const SimulatedRig rig;
+  const NeedleSystem system(record_case(rig, 3), rig.needle);
+  const auto rotation = effect_named(system, "lost_steps (rotation)"),
+             insertion = effect_named(system, "lost_steps (insertion)");
+  EXPECT_TRUE(system.allows({rotation}));
+  EXPECT_FALSE(system.allows(inference::with({rotation}, insertion)));
+}
+
+// Each component once, where its form is plain: a reading is off by the curve's value; an advance is the integral.
+TEST(NeedleCurves, ShiftReadingsAndAdvanceTheTip) {
+  const SimulatedRig rig;
+  const NeedleSystem system(record_case(rig, 4), rig.needle);
+  const inference::Layout layout(system, {});
+  const MatrixXd C = system.by_curves(0, layout.shared_start());
+  const auto& recording = system.recorded().recordings[0];
+  Index first = 0;
+  int checked = 0;
+  for (const auto& curve : system.curves()) {
+    const auto count = static_cast<Index>(curve.at.size());
+    if (curve.covariate == "depth_mm" && curve.component == "reading along x") {
+      CovariateTracker tracker(recording.motion.nodes.front());
+      std::vector<VectorXd> weights = {weights_at(curve, tracker[model::Covariate::depth_mm])};
+      for (std::size_t i = 1; i < recording.motion.nodes.size(); ++i) {
+        tracker.advance(recording.motion.nodes[i - 1], recording.motion.nodes[i]);
+        weights.push_back(weights_at(curve, tracker[model::Covariate::depth_mm]));
+      }
+      Index row = 0;
+      for (std::size_t c = 0; c < system.recorded().channels.size(); ++c)
+        for (const std::size_t reading : recording.series[c].reading) {
+          const std::size_t node = recording.motion.at[reading];
+          if (node > 0) {
+            EXPECT_LT(
+                (C.row(row).segment(first, count).transpose() - system.recorded().channels[c].axis.x() * weights[node])
+                    .norm(),
+                1e-9);
+          }
+          ++row;
+        }
+      ++checked;
+    }
+    if (curve.component == "advance of the tip" && curve.covariate == "depth_mm") {
+      // All values one: the tip advances twice as fast. The last reading moves by what was inserted, along the heading.
+      const VectorXd moved = C.middleCols(first, count).rowwise().sum();
+      EXPECT_GT(moved.norm(), 1);
+      ++checked;
+    }
+    first += count;
+  }
+  EXPECT_EQ(checked, 2);
+  EXPECT_EQ(first, C.cols());
+}
+
+TEST(NeedleCurves, WeightsAddUpToOne) {
+  inference::Curve line{.component = "", .unit = "", .covariate = "", .at = {0, 1, 3, 4}};
+  inference::Curve circle{.component = "", .unit = "", .covariate = "", .at = {0, 1.5, 3.1, 4.7}, .periodic = true};
+  for (double x = -2; x < 9; x += 0.13) {
+    EXPECT_NEAR(weights_at(line, x).sum(), 1, 1e-12);
+    EXPECT_NEAR(weights_at(circle, x).sum(), 1, 1e-12);
+    EXPECT_LT((weights_at(circle, x) - weights_at(circle, x + 2 * std::numbers::pi)).norm(), 1e-9);
+  }
+  EXPECT_EQ(weights_at(line, 2), (VectorXd(4) << 0, 0.5, 0.5, 0).finished());
+}
+
+TEST(Covariates, FollowTheBase) {
+  CovariateTracker tracker({0, 5, 0});  // the entry at 5 mm
+  EXPECT_EQ(tracker[model::Covariate::since_reversal_mm], 0);
+  tracker.advance({0, 5, 0}, {1, 15, 0});
+  EXPECT_EQ(tracker[model::Covariate::speed_mm_s], 10);
+  EXPECT_EQ(tracker[model::Covariate::since_reversal_mm], 10);  // since the entry, where it never turned
+  EXPECT_EQ(tracker[model::Covariate::since_stop_s], 0);
+  tracker.advance({1, 15, 0}, {2, 15, 1});
+  EXPECT_EQ(tracker[model::Covariate::turn_rate_rad_s], 1);
+  EXPECT_EQ(tracker[model::Covariate::since_stop_s], 1);
+  EXPECT_EQ(tracker[model::Covariate::since_reversal_mm], 0);
+  CovariateTracker again(tracker.stopped_s(), tracker.turned_mm());
+  again.advance({2, 15, 1}, {2.5, 20, 1});
+  EXPECT_EQ(again[model::Covariate::since_reversal_mm], 5);
+}
+
+// End to end on the simulated rig: nothing, one effect, and one that is on no list.
+struct Said {
+  std::string set;
+  bool curve;
+};
+Said say(const SimulatedRig& rig, std::uint64_t seed) {
+  const NeedleSystem system(record_case(rig, seed), testing::SimulatedRig{}.needle);
+  inference::Noise noise;
+  noise.sigma = {0.15, 0.15, 0.2};
+  noise.frame_s = rig.frame_s;
+  inference::Search search(system, {});
+  search.run(inference::Readings(system.data().recordings.size()), noise);
+  const auto& best = search.best();
+  return {describe(system, best.set), best.log_with_curve > best.log_without_curve};
+}
+
+TEST(NeedleSearch, NothingOneAndUnlisted) {
+  EXPECT_EQ(say({}, 11).set, "nothing");
+  SimulatedRig scaled;
+  scaled.effects = {active("insertion_scale", {0.93})};
+  const Said named = say(scaled, 12);
+  EXPECT_EQ(named.set, "insertion_scale");
+  EXPECT_FALSE(named.curve);
+  SimulatedRig drifting;
+  drifting.true_motion = [](std::vector<model::ActuatorState>& states) {
+    for (auto& s : states) s.insertion_mm += 1.5 * std::sin(0.11 * s.insertion_mm) * std::sin(0.11 * s.insertion_mm);
+  };
+  EXPECT_TRUE(say(drifting, 13).curve);
+}
+
+}  // namespace
+}  // namespace bevel::diagnosis
