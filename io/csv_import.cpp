@@ -245,6 +245,7 @@ ImportedRecording import_csv(const std::string& csv_path, const ColumnMap& map) 
 
   const std::size_t found = rows.size();
   leave_out_the_implausible(table, rows, out);
+  out.rows_implausible = static_cast<int>(found - rows.size());
   if (static_cast<double>(found - rows.size()) > kMostRowsLeftOut * static_cast<double>(found))
     throw std::runtime_error(out.left_out.front() + ", as are " + std::to_string(found - rows.size() - 1) +
                              " others of " + std::to_string(found) + "; at most 20 % may be");

@@ -48,6 +48,7 @@ struct ImportedRecording {
   int rows = 0;
   int rows_without_data = 0;
   int rows_unsettled = 0;
+  int rows_implausible = 0;  // left out, each with a remark
   std::vector<std::string> left_out;  // a line for each row that is implausible beside its neighbours
   double time_shift_s = 0;            // added where the file's clock begins at 0 or below; a log's times are positive
 

@@ -25,8 +25,8 @@ int main(int argc, char** argv) {
       std::fprintf(stderr, "%s", recording.remarks(file).c_str());
       if (!recording.left_out.empty()) status = tools::kDamagedInput;
       io::write_log(recording, log);
-      std::printf("%s: %d rows, %d without data, %d between steps, %zu messages each to depth %.1f mm\n", log.c_str(),
-                  recording.rows, recording.rows_without_data, recording.rows_unsettled, recording.tips.size(),
+      std::printf("%s: %d rows, %d without data, %d between steps, %d left out, %zu messages each to depth %.1f mm\n", log.c_str(),
+                  recording.rows, recording.rows_without_data, recording.rows_unsettled, recording.rows_implausible, recording.tips.size(),
                   recording.actuators.back().insertion_mm);
     }
     return status;
