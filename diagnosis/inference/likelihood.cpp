@@ -45,12 +45,12 @@ Likelihood::Likelihood(const Likelihood& other, Noise noise) : Likelihood(other)
 
 void Likelihood::set_noise(Noise noise) {
   noise_ = std::move(noise);
-  log_weights_ = 0;
+  log_weights_ = VectorXd::Zero(static_cast<Index>(data_.recordings.size()));
   whitening_.assign(data_.recordings.size(), {});
   for (std::size_t r = 0; r < data_.recordings.size(); ++r)
     for (std::size_t c = 0; c < data_.recordings[r].series.size(); ++c) {
       whitening_[r].push_back(make_whitening(data_.recordings[r].series[c], noise_, noise_.sigma[c]));
-      for (const double weight : whitening_[r].back().weight) log_weights_ += std::log(weight);
+      for (const double weight : whitening_[r].back().weight) log_weights_[static_cast<Index>(r)] += std::log(weight);
     }
 }
 

@@ -49,7 +49,8 @@ class Likelihood {
   const Noise& noise() const { return noise_; }
   std::size_t recordings() const { return data_.recordings.size(); }
   // Sum of the logarithms of the whitened readings' weights: minus half of log det of the noise's covariance.
-  double log_weights() const { return log_weights_; }
+  double log_weights() const { return log_weights_.sum(); }
+  double log_weights(std::size_t recording) const { return log_weights_[static_cast<Eigen::Index>(recording)]; }
 
   // False outside the model's domain.
   bool evaluate(const Layout& layout, std::size_t recording, const Eigen::VectorXd& shared,
@@ -71,7 +72,7 @@ class Likelihood {
   std::vector<std::vector<Eigen::Index>> rows_;    // of the system's, that are left
   std::vector<std::vector<Whitening>> whitening_;  // per recording and channel
   std::vector<Eigen::VectorXd> measured_;          // per recording
-  double log_weights_ = 0;
+  Eigen::VectorXd log_weights_;                    // per recording
 };
 
 // The mode of a set of effects, and the likelihood about it.

@@ -44,6 +44,7 @@ class Search {
   void run(const Readings& outliers, const Noise& noise);
   const std::map<ModelSet, Visited>& visited() const { return visited_; }
   const Visited& best() const;
+  const System& system() const { return system_; }
   const Discrepancy& discrepancy() const { return *discrepancy_; }
   // Log of the share of sets that were judged by the linear model alone, by its estimate.
   double log_not_visited() const;

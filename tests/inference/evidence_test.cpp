@@ -3,6 +3,7 @@
 
 #include "diagnosis/inference/evidence.hpp"
 #include "diagnosis/inference/log_sum.hpp"
+#include "diagnosis/inference/posterior.hpp"
 #include "diagnosis/inference/proposals.hpp"
 #include "tests/inference/linear_system.hpp"
 
@@ -139,6 +140,31 @@ TEST(Evidence, ADiscrepancyScaleIsTheSizeOfItsVisiblePart) {
     square += std::pow(discrepancy.visible_size(prior, values), 2) / kDraws;
   }
   EXPECT_NEAR(square, 4, 0.2);
+}
+
+TEST(HeldOut, OfALinearModelIsTheConditionalDensity) {
+  const LinearSystem system(4, 7, 0.3, 0.2, 0);
+  const Evaluated at = evaluate_set(system, {0});
+  const auto blocks = linearise(*at.fit.likelihood, at.fit, {});
+  const Noise& noise = at.fit.likelihood->noise();
+  const double sd = at.fit.scales.nuisance_sd[0];
+  const VectorXd y = all_readings(system);
+  const MatrixXd covariance = covariance_of(system, {0}, noise, sd);
+  for (std::size_t r = 0; r < 4; ++r) {
+    std::vector<Index> others;
+    for (Index i = 0; i < y.size(); ++i)
+      if (i / LinearSystem::kCount != static_cast<Index>(r)) others.push_back(i);
+    const double without = log_normal(y(others), covariance(others, others));
+    EXPECT_NEAR(log_predictive(at.fit, blocks, {}, r), log_normal(y, covariance) - without, 1e-6);
+    // And the parameters: generalised least squares of the others.
+    MatrixXd X(y.size(), 3);
+    for (Index k = 0; k < 4; ++k)
+      X.middleRows(k * LinearSystem::kCount, LinearSystem::kCount) = LinearSystem::design({0});
+    const MatrixXd V = covariance_of(system, {0}, noise, sd)(others, others), Xo = X(others, Eigen::all);
+    const VectorXd prior = (VectorXd(3) << 1, 1, 0.25).finished();
+    const VectorXd expected = prior.asDiagonal() * Xo.transpose() * V.lu().solve(VectorXd(y(others)));
+    EXPECT_LT((shared_without(at.fit, blocks, {}, r) - expected).norm(), 1e-6);
+  }
 }
 
 TEST(Proposals, OfALinearModelAreExact) {

@@ -2,7 +2,7 @@
 // discrepancy where it is on no list.
 #include <gtest/gtest.h>
 
-#include "diagnosis/inference/search.hpp"
+#include "diagnosis/inference/posterior.hpp"
 #include "tests/inference/pendulum.hpp"
 
 namespace bevel::inference {
@@ -91,6 +91,30 @@ TEST(PendulumTest, WhatIsOnNoListIsADiscrepancy) {
   ASSERT_EQ(found.fit.curve_values.size(), 9);
   EXPECT_GT(found.fit.curve_values[5], found.fit.curve_values[4] + 0.4) << found.fit.curve_values.transpose();
   EXPECT_GT(found.fit.curve_values[5], found.fit.curve_values[6] + 0.4) << found.fit.curve_values.transpose();
+}
+
+TEST(PendulumTest, ProbabilitiesAddUpAndHeldOutIsBetterWithWhatWasFound) {
+  TruePendulum truth;
+  truth.dry_friction = 0.25;
+  const Pendulum system(truth, 6, 21);
+  Search search(system, {});
+  search.run(Readings(6), white());
+  const Posterior posterior = posterior_of(search, 0.5);
+  double sum = posterior.not_visited;
+  for (const auto& one : posterior.sets) {
+    sum += one.probability;
+    EXPECT_LE(one.with_discrepancy, one.probability + 1e-12);
+  }
+  EXPECT_NEAR(sum, 1, 1e-9);
+  EXPECT_EQ(posterior.named(), std::vector<std::string>{"dry_friction"});
+  EXPECT_GT(posterior.inclusion.at("dry_friction"), 0.9);
+  EXPECT_LT(posterior.discrepancy, 0.5);
+  const auto found = held_out_log_density(search);
+  ASSERT_EQ(found.size(), 6U);
+  // Each recording is likelier than by the base alone at its likeliest noise.
+  const Fit& base = search.visited().at({}).at->fit;
+  const auto blocks = linearise(*base.likelihood, base, {});
+  for (std::size_t r = 0; r < 6; ++r) EXPECT_GT(found[r], log_predictive(base, blocks, {}, r)) << "recording " << r;
 }
 
 TEST(PendulumTest, ManyThreadsSayTheSame) {
