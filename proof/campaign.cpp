@@ -72,7 +72,7 @@ void in_parallel(int count, int jobs, const std::function<void(int)>& work) {
   if (failure) std::rethrow_exception(failure);
 }
 
-// A folder belongs to one seed: trials of two would mix.
+// A folder belongs to one seed and one share of varied trials: trials of two would mix.
 void claim_folder(const CampaignOptions& options) {
   const fs::path path = options.out / "campaign.json";
   if (fs::exists(path)) {
@@ -80,9 +80,14 @@ void claim_folder(const CampaignOptions& options) {
     if (before.at("seed") != options.seed)
       throw std::runtime_error(options.out.string() + ": holds trials of seed " + before.at("seed").dump() + ", not " +
                                std::to_string(options.seed) + "; take that seed or another folder");
+    const double varied = before.value("varied", 0.0);  // campaigns before there was any
+    if (varied != options.varied)
+      throw std::runtime_error(options.out.string() + ": holds trials of which a share of " + json(varied).dump() +
+                               " is varied, not " + json(options.varied).dump() +
+                               "; take that share or another folder");
     return;
   }
-  write_atomically(path, json{{"seed", options.seed}}.dump(1) + "\n");
+  write_atomically(path, json{{"seed", options.seed}, {"varied", options.varied}}.dump(1) + "\n");
 }
 
 void write_commitments(const CampaignOptions& options) {
@@ -216,7 +221,7 @@ int run_campaign(const CampaignOptions& options, std::ostream& progress) {
     return interrupted != 0;
   };
   in_parallel(options.trials, options.jobs, [&](int i) {
-    if (prepare_trial(options.out, options.seed, i)) say(trial_name(i) + " drawn and sealed");
+    if (prepare_trial(options.out, options.seed, i, options.varied)) say(trial_name(i) + " drawn and sealed");
   });
   if (stopped()) return 130;
   write_commitments(options);
@@ -239,6 +244,7 @@ int run_campaign(const CampaignOptions& options, std::ostream& progress) {
   for (int i = 0; i < options.trials; ++i) scores.push_back(score_trial(options, i));
   const Tally sums = tally(scores);
   json results{{"seed", options.seed},
+               {"varied", options.varied},
                {"sealed", facts.sealed},
                {"tool_sha256", facts.tool_sha256},
                {"commitments_sha256", facts.commitments_sha256},

@@ -12,6 +12,7 @@ namespace bevel::proof {
 struct CampaignOptions {
   int trials = 100;
   std::uint64_t seed = 1;
+  double varied = 0.5;  // share of trials whose insertions differ
   std::filesystem::path out;
   std::filesystem::path diagnose;          // the tool under test; not needed for generate_only
   std::vector<std::string> also_readable;  // further folders that the tool may read

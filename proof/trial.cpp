@@ -1,5 +1,6 @@
 #include "proof/trial.hpp"
 
+#include <Eigen/Geometry>
 #include <algorithm>
 #include <array>
 #include <cmath>
@@ -14,6 +15,7 @@ namespace bevel::proof {
 namespace {
 
 constexpr std::uint64_t kClassStream = 1ULL << 40U;
+constexpr std::uint64_t kVariationStream = 1ULL << 41U;
 
 BaseNeedle draw_needle(Random& random) {
   return {random.uniform(0.003, 0.006), random.uniform(18, 30), random.uniform(0.12, 0.45), random.uniform(0.03, 0.22)};
@@ -168,8 +170,20 @@ Views conceal_in_kinematics(Truth& truth, Setting& setting, Random& random) {
 Views conceal_in_beam(Truth& truth, Setting& setting, Random& random) {
   truth.beam_config = draw_beam(random);
   Views seen;
-  for (std::size_t i = 0; i < setting.motions.size(); ++i)
-    seen.push_back(view(travel_beam(*truth.beam_config, setting.motions[i]), setting.frames[i].times_s, {}));
+  for (std::size_t i = 0; i < setting.motions.size(); ++i) {
+    const InsertionVariation own = setting.variation.empty() ? InsertionVariation{} : setting.variation[i];
+    model::BeamPlantConfig config = *truth.beam_config;
+    config.bevel_force_N *= 1.0 + own.curvature_share;
+    // A beam's guide stands as it stands: the whole path is turned instead of the entry, and about z for the roll.
+    const Eigen::Matrix3d turned = (Eigen::AngleAxisd(own.about_y_rad, Eigen::Vector3d::UnitY()) *
+                                    Eigen::AngleAxisd(own.about_x_rad, Eigen::Vector3d::UnitX()) *
+                                    Eigen::AngleAxisd(own.roll_rad, Eigen::Vector3d::UnitZ()))
+                                       .toRotationMatrix();
+    Eigen::Matrix3Xd path = view(travel_beam(config, setting.motions[i]), setting.frames[i].times_s, {});
+    path = turned * path;
+    path.colwise() += Eigen::Vector3d(own.entry_x_mm, own.entry_y_mm, 0);
+    seen.push_back(std::move(path));
+  }
   const Refit refit = refit_base(setting, seen, {0.002, truth.needle.wheelbase_mm, 0.1, 0.05}, {});
   truth.needle = refit.needle;
   truth.visible_sigmas = refit.sigmas;
@@ -213,7 +227,7 @@ TrialClass class_of(std::uint64_t seed, int number) {
   return block[static_cast<std::size_t>(number % kBlockSize)];
 }
 
-Trial draw_trial(std::uint64_t seed, int number) {
+Trial draw_trial(std::uint64_t seed, int number, double varied) {
   Random random = Random::stream(seed, static_cast<std::uint64_t>(number));
   Trial trial;
   Truth& truth = trial.truth;
@@ -233,6 +247,15 @@ Trial draw_trial(std::uint64_t seed, int number) {
     setting.whiteners.emplace_back(truth.noise, recording.frames);
     truth.script_kinds.push_back(script.kind);
     trial.recordings.push_back(std::move(recording));
+  }
+  // A stream of its own: trials without variation stay what they were.
+  Random between = Random::stream(seed, kVariationStream + static_cast<std::uint64_t>(number));
+  if (between.chance(varied)) {
+    truth.spread = draw_spread(between);
+    for (std::size_t i = 0; i < setting.motions.size(); ++i)
+      truth.variation.push_back(draw_variation(truth.spread, between));
+    setting.variation = truth.variation;
+    setting.absorbers = find_absorbers(setting, truth.needle, truth.spread);
   }
   const Views seen =
       truth.beam ? conceal_in_beam(truth, setting, random) : conceal_in_kinematics(truth, setting, random);

@@ -34,8 +34,10 @@ struct Truth {
   double departure = 1;         // of the forms, see HiddenPhysics
   double departure_sigmas = 0;  // what of it could be seen
   double ripple_sigmas = 0;     // what of the drives' periodic errors could be seen
-  BaseNeedle needle;            // for the beam: the closest bicycle
-  BaseNeedle believed;          // in the model file
+  VariationSpread spread;       // between insertions; zeros: none
+  std::vector<InsertionVariation> variation;  // per recording
+  BaseNeedle needle;                          // for the beam: the closest bicycle
+  BaseNeedle believed;                        // in the model file
   CameraNoise noise;
   DriveRipple ripple;
   std::vector<std::string> script_kinds;
@@ -59,7 +61,8 @@ struct Trial {
 };
 
 // The same trial for the same seed and number, on any machine.
-Trial draw_trial(std::uint64_t seed, int number);
+// varied: the share of trials whose insertions differ; 0 gives the trials of the campaigns up to the ninth.
+Trial draw_trial(std::uint64_t seed, int number, double varied = 0);
 TrialClass class_of(std::uint64_t seed, int number);
 
 // The distribution in words and tables (Markdown).

@@ -181,6 +181,18 @@ std::string truth_json(const Truth& truth) {
          {"rivals", json::array()}};
   for (const TruthEntry& entry : truth.entries) j["effects"].push_back(as_json(entry));
   for (const Rival& rival : truth.rivals) j["rivals"].push_back({{"name", rival.name}, {"sigmas", rival.sigmas}});
+  if (truth.spread.any()) {
+    j["variation"] = {{"curvature_share", truth.spread.curvature_share},
+                      {"entry_rad", truth.spread.entry_rad},
+                      {"registration_mm", truth.spread.registration_mm},
+                      {"roll_rad", truth.spread.roll_rad},
+                      {"recordings", json::array()}};
+    for (InsertionVariation one : truth.variation) {
+      json row = json::array();
+      for (int i = 0; i < InsertionVariation::kCount; ++i) row.push_back(one[i]);
+      j["variation"]["recordings"].push_back(row);
+    }
+  }
   if (truth.beam_config)
     j["beam"] = {{"foundation_modulus_kPa", truth.beam_config->foundation_modulus_kPa},
                  {"bevel_force_N", truth.beam_config->bevel_force_N},
@@ -228,9 +240,9 @@ void write_trial(const fs::path& out, const Trial& trial) {
                                            "\n");
 }
 
-bool prepare_trial(const fs::path& out, std::uint64_t seed, int number) {
+bool prepare_trial(const fs::path& out, std::uint64_t seed, int number, double varied) {
   if (fs::exists(TrialFolders(out, number).commitment)) return false;
-  write_trial(out, draw_trial(seed, number));
+  write_trial(out, draw_trial(seed, number, varied));
   return true;
 }
 

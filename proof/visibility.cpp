@@ -68,8 +68,16 @@ Search search_about(const BaseNeedle& start, Eigen::Index own, Residual residual
 Views views_of(const Setting& setting, const BaseNeedle& needle, const HiddenPhysics& physics) {
   Views views;
   for (std::size_t i = 0; i < setting.motions.size(); ++i) {
-    const TipPath path = travel(needle, setting.motions[i], physics, setting.ripple, static_cast<int>(i));
-    views.push_back(view(path, setting.frames[i].times_s, physics));
+    const InsertionVariation own = setting.variation.empty() ? InsertionVariation{} : setting.variation[i];
+    BaseNeedle varied = needle;
+    varied.curvature_per_mm *= 1.0 + own.curvature_share;
+    HiddenPhysics here = physics;
+    here.entry_about_x_rad += own.about_x_rad;
+    here.entry_about_y_rad += own.about_y_rad;
+    here.bevel_offset_rad += own.roll_rad;
+    const TipPath path = travel(varied, setting.motions[i], here, setting.ripple, static_cast<int>(i));
+    views.push_back(view(path, setting.frames[i].times_s, here));
+    views.back().colwise() += Eigen::Vector3d(own.entry_x_mm, own.entry_y_mm, 0);
   }
   return views;
 }
@@ -80,11 +88,34 @@ Eigen::VectorXd whitened_difference(const Setting& setting, const Views& a, cons
   Eigen::VectorXd all(total);
   Eigen::Index at = 0;
   for (std::size_t i = 0; i < a.size(); ++i) {
-    const Eigen::VectorXd part = setting.whiteners[i](a[i] - b[i]);
+    Eigen::VectorXd part = setting.whiteners[i](a[i] - b[i]);
+    if (!setting.absorbers.empty()) part = setting.absorbers[i](part);
     all.segment(at, part.size()) = part;
     at += part.size();
   }
   return all;
+}
+
+std::vector<Absorber> find_absorbers(const Setting& setting, const BaseNeedle& needle, const VariationSpread& spread) {
+  Setting here = setting;
+  here.absorbers.clear();
+  if (here.variation.empty()) here.variation.resize(here.motions.size());
+  const Views bare = views_of(here, needle, {});
+  std::vector<Eigen::MatrixXd> directions(here.motions.size());
+  for (int k = 0; k < InsertionVariation::kCount; ++k) {
+    constexpr double kStep = 0.1;  // of a standard deviation
+    Setting moved = here;
+    for (InsertionVariation& one : moved.variation) one[k] += kStep * spread[k];
+    const Views there = views_of(moved, needle, {});
+    for (std::size_t i = 0; i < directions.size(); ++i) {
+      const Eigen::VectorXd column = here.whiteners[i](there[i] - bare[i]) / kStep;
+      if (k == 0) directions[i].resize(column.size(), InsertionVariation::kCount);
+      directions[i].col(k) = column;
+    }
+  }
+  std::vector<Absorber> absorbers;
+  for (const auto& one : directions) absorbers.emplace_back(one);
+  return absorbers;
 }
 
 Refit refit_base(const Setting& setting, const Views& seen, const BaseNeedle& start, const HiddenPhysics& known) {

@@ -1,13 +1,14 @@
 #pragma once
 // How much of what is concealed can be seen at all: the part of its change of the paths that k, lambda1 and lambda2
-// cannot absorb, in standard deviations of the coloured noise, summed over a trial (the root of the sum of squares of
-// the whitened difference).
+// cannot absorb, nor variation between insertions where there is any, in standard deviations of the noise, summed over
+// a trial (the root of the sum of squares of the whitened difference).
 #include <Eigen/Core>
 #include <map>
 #include <string>
 #include <vector>
 
 #include "proof/camera_noise.hpp"
+#include "proof/insertion_variation.hpp"
 #include "proof/needle_path.hpp"
 
 namespace bevel::proof {
@@ -18,11 +19,15 @@ struct Setting {
   std::vector<Frames> frames;
   std::vector<Whitener> whiteners;
   DriveRipple ripple;
+  std::vector<InsertionVariation> variation;  // per recording; empty: none
+  std::vector<Absorber> absorbers;            // of such variation; empty: none
 };
 
 using Views = std::vector<Eigen::Matrix3Xd>;  // one a recording
 
 Views views_of(const Setting& setting, const BaseNeedle& needle, const HiddenPhysics& physics);
+// One Absorber a recording, for variation of this spread about a needle.
+std::vector<Absorber> find_absorbers(const Setting& setting, const BaseNeedle& needle, const VariationSpread& spread);
 Eigen::VectorXd whitened_difference(const Setting& setting, const Views& a, const Views& b);
 
 struct Refit {

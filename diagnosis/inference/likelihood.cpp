@@ -29,7 +29,7 @@ MatrixXd correlation_of(const Curve& curve, double length) {
   return out;
 }
 
-Likelihood::Likelihood(const System& system, Readings outliers, Noise noise)
+Likelihood::Likelihood(const System& system, const Readings& outliers, Noise noise)
     : system_(&system), data_(without(system.data(), outliers)), rows_(rows_left(system.data(), outliers)) {
   for (const SeriesSet& recording : data_.recordings) {
     VectorXd measured(recording.rows());

@@ -40,7 +40,7 @@ struct Residuals {
 // A system, its readings but for the outliers, and the noise.
 class Likelihood {
  public:
-  Likelihood(const System& system, Readings outliers, Noise noise);
+  Likelihood(const System& system, const Readings& outliers, Noise noise);
   // The same readings with another noise.
   Likelihood(const Likelihood& other, Noise noise);
 

@@ -70,7 +70,7 @@ Search::Job Search::job_from(const Fit& fit, std::size_t effect, const StartPoin
   return job;
 }
 
-void Search::keep(const ModelSet& set, std::shared_ptr<const Evaluated> at) {
+void Search::keep(const ModelSet& set, const std::shared_ptr<const Evaluated>& at) {
   Visited one{.set = set, .at = at, .log_prior = log_prior(set)};
   const double curve = std::exp(rules_.log_prior_odds_curve);
   one.log_without_curve = one.log_prior + at->log_evidence - (std::log1p(curve));

@@ -60,7 +60,7 @@ class Search {
     bool beside_curve = false;
   };
   void expand(const ModelSet& set);
-  void keep(const ModelSet& set, std::shared_ptr<const Evaluated> at);
+  void keep(const ModelSet& set, const std::shared_ptr<const Evaluated>& at);
   void evaluate_all(std::vector<Job> jobs);
   Job job_from(const Fit& fit, std::size_t effect, const StartPoint& start) const;
   double best_log() const;

@@ -59,6 +59,43 @@ TEST(Trial, StatesWhatItConceals) {
   EXPECT_EQ(opened.effects[0].visible_sigmas, two.truth.entries[0].visible_sigmas);
 }
 
+TEST(Trial, VariationIsDrawnBesideAndLeavesTheRestAsItWas) {
+  const int number = first_of(TrialClass::nothing);
+  const Trial plain = draw_trial(4, number), varied = draw_trial(4, number, 1.0);
+  EXPECT_FALSE(plain.truth.spread.any());
+  ASSERT_TRUE(varied.truth.spread.any());
+  ASSERT_EQ(varied.truth.variation.size(), varied.recordings.size());
+  EXPECT_EQ(plain.truth.needle.curvature_per_mm, varied.truth.needle.curvature_per_mm);
+  EXPECT_EQ(plain.recordings[3].frames.noise_mm, varied.recordings[3].frames.noise_mm);
+  // Where the needle has hardly entered, registration is all the difference there is.
+  for (std::size_t r = 0; r < varied.recordings.size(); ++r) {
+    const Eigen::Vector3d shift = varied.recordings[r].reported_mm.col(0) - plain.recordings[r].reported_mm.col(0);
+    EXPECT_NEAR(shift.x(), varied.truth.variation[r].entry_x_mm, 0.02);
+    EXPECT_NEAR(shift.y(), varied.truth.variation[r].entry_y_mm, 0.02);
+  }
+  EXPECT_TRUE(varied.truth.expected().empty());
+  EXPECT_NE(truth_json(varied.truth).find("variation"), std::string::npos);
+  EXPECT_EQ(truth_json(plain.truth).find("variation"), std::string::npos);
+}
+
+TEST(Trial, WhatVariationExplainsIsLessVisible) {
+  const int number = first_of(TrialClass::one);
+  const Trial plain = draw_trial(4, number), varied = draw_trial(4, number, 1.0);
+  EXPECT_EQ(plain.truth.entries[0].effect.name, varied.truth.entries[0].effect.name);
+  EXPECT_GT(varied.truth.entries[0].visible_sigmas, 0);
+}
+
+TEST(Absorber, TakesOutWhatTheDirectionsExplainByTheirSize) {
+  Eigen::MatrixXd directions(5, 2);
+  directions << 3, 0, 0, 0, 0, 0.5, 0, 0, 0, 0;
+  const Absorber absorber(directions);
+  // Against the definition: |a d|^2 = d' (I + U U')^-1 d.
+  const Eigen::VectorXd d = (Eigen::VectorXd(5) << 1, -2, 0.3, 4, 0).finished();
+  const Eigen::MatrixXd covariance = Eigen::MatrixXd::Identity(5, 5) + directions * directions.transpose();
+  EXPECT_NEAR(absorber(d).squaredNorm(), d.dot(covariance.ldlt().solve(d)), 1e-12);
+  EXPECT_EQ(Absorber()(d), d);
+}
+
 TEST(Trial, AnEffectBelowTheLimitIsNotExpected) {
   Truth truth;
   truth.entries = {{{"layer", "", {}, {}}, 4.9}, {{"unknown", "screw", {}, {}}, 5.1}};
