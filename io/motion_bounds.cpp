@@ -19,9 +19,9 @@ double seconds(std::int64_t from_utime, std::int64_t to_utime) {
 }
 
 // Root of the largest diagonal element among three, from `first`.
-double largest_sd(const needle_state_t& m, int first) {
+double largest_sd(const needle_state_t& m, std::size_t first) {
   double variance = 0;
-  for (int i = first; i < first + 3; ++i) variance = std::max(variance, m.covariance[10 * i]);
+  for (std::size_t i = first; i < first + 3; ++i) variance = std::max(variance, m.covariance[10 * i]);
   return std::sqrt(variance);
 }
 
