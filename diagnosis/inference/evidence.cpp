@@ -1,6 +1,7 @@
 #include "diagnosis/inference/evidence.hpp"
 
 #include <algorithm>
+#include <boost/math/special_functions/beta.hpp>
 #include <cmath>
 #include <limits>
 
@@ -24,8 +25,9 @@ constexpr double kInstantWidth_s = 0.1;  // of an instant's posterior, while it 
 constexpr double kNegligible = 20;       // of chi2: readings beyond it have no part in an integral
 
 double beta_binomial(int happened, int recordings) {
-  const auto beta = [](double a, double b) { return std::lgamma(a) + std::lgamma(b) - std::lgamma(a + b); };
-  return beta(kHappens + happened, kHappensNot + recordings - happened) - beta(kHappens, kHappensNot);
+  // Not std::lgamma: it writes its sign into a global of the C library, from every thread.
+  return std::log(boost::math::beta(kHappens + happened, kHappensNot + recordings - happened) /
+                  boost::math::beta(kHappens, kHappensNot));
 }
 
 // What an instant has to bring in a recording to be taken for one, in chi2: its expected odds.

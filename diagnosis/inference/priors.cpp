@@ -1,6 +1,7 @@
 #include "diagnosis/inference/priors.hpp"
 
 #include <algorithm>
+#include <boost/math/special_functions/beta.hpp>
 #include <cmath>
 #include <numbers>
 
@@ -11,9 +12,8 @@ constexpr double kSmallest = 1.0 / 30;  // of the scale: what is smaller is no e
 constexpr double kElsewhere = 0.05;
 
 double log_student(double x) {
-  static const double kNormalisation =
-      std::lgamma((kTail + 1) / 2) - std::lgamma(kTail / 2) - 0.5 * std::log(kTail * std::numbers::pi);
-  return kNormalisation - 0.5 * (kTail + 1) * std::log1p(x * x / kTail);
+  return -std::log(boost::math::beta(kTail / 2, 0.5)) - 0.5 * std::log(kTail) -
+         0.5 * (kTail + 1) * std::log1p(x * x / kTail);
 }
 }  // namespace
 
