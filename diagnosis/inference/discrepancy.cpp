@@ -89,40 +89,37 @@ double Discrepancy::visible_size(const CurvePrior& prior, const VectorXd& values
   return std::sqrt(std::max(0.0, values.dot(visible_[prior.curve] * values)));
 }
 
-std::vector<CurveFactor> Discrepancy::scan(const Fit& fit, const std::vector<ArrowBlock>& blocks,
-                                           const Likelihood& likelihood) const {
-  std::vector<CurveFactor> out;
-  if (first_.empty()) return out;
-  const ArrowSolution solution = solve_about(fit, blocks, {});
-  if (!solution.valid) return out;
-  const Index columns = white_.front().cols(), largest = square_.front().rows();
-  const auto free = free_locals(fit.layout);
-  MatrixXd CC = MatrixXd::Zero(largest, columns), CZ = MatrixXd::Zero(columns, fit.shared.size());
-  VectorXd Cw = VectorXd::Zero(columns);
-  Residuals residuals;
-  for (std::size_t r = 0; r < blocks.size(); ++r) {
-    if (!likelihood.evaluate(fit.layout, r, fit.shared, fit.local[r], true, residuals)) return {};
-    const MatrixXf L = residuals.by_local(Eigen::all, free).cast<float>();
-    const MatrixXf Z = residuals.by_shared.cast<float>();
-    const MatrixXd CL = (white_[r].transpose() * L).cast<double>();
-    MatrixXd inner = blocks[r].ll;
-    inner.diagonal() += blocks[r].precision;
-    const Eigen::LLT<MatrixXd> factor(inner);
-    const MatrixXd own = factor.solve(CL.transpose());
-    CZ += (white_[r].transpose() * Z).cast<double>() - own.transpose() * blocks[r].lz;
-    Cw += (white_[r].transpose() * residuals.white.cast<float>()).cast<double>() -
-          own.transpose() * (blocks[r].lw + blocks[r].precision.cwiseProduct(blocks[r].centre));
-    CC += square_[r].cast<double>();
-    for (std::size_t k = 0; k < first_.size(); ++k)
-      CC.block(0, first_[k], size_[k], size_[k]) -=
-          CL.middleRows(first_[k], size_[k]) * own.middleCols(first_[k], size_[k]);
+std::vector<Marginal::Added> Discrepancy::added(const Marginal& beside) const {
+  std::vector<Marginal::Added> out(first_.size());
+  std::vector<MatrixXd> across(first_.size());
+  for (std::size_t r = 0; r < white_.size(); ++r) {
+    const Marginal::Part part = beside.part(r, white_[r]);
+    for (std::size_t k = 0; k < first_.size(); ++k) {
+      const Index first = first_[k], size = size_[k];
+      if (r == 0) {
+        out[k] = {.square = MatrixXd::Zero(size, size), .pull = VectorXd::Zero(size)};
+        across[k] = MatrixXd::Zero(size, beside.step().size());
+      }
+      across[k] += part.across.middleRows(first, size);
+      out[k].pull += part.pull.segment(first, size);
+      // The columns' own products were made once, for all sets.
+      out[k].square += square_[r].block(0, first, size, size).cast<double>() -
+                       part.own.middleRows(first, size) * part.by_own.middleRows(first, size).transpose();
+    }
   }
-  Cw -= CZ * solution.shared;  // the fit may not be at the mode of this likelihood
   for (std::size_t k = 0; k < first_.size(); ++k) {
-    const auto across = CZ.middleRows(first_[k], size_[k]);
-    const MatrixXd square =
-        CC.block(0, first_[k], size_[k], size_[k]) - across * solution.covariance * across.transpose();
-    const VectorXd pull = Cw.segment(first_[k], size_[k]);
+    out[k].pull -= across[k] * beside.step();
+    out[k].square -= across[k] * beside.covariance() * across[k].transpose();
+  }
+  return out;
+}
+
+std::vector<CurveFactor> Discrepancy::scan(const Marginal& beside) const {
+  std::vector<CurveFactor> out;
+  if (first_.empty() || !beside.valid()) return out;
+  const auto curves = added(beside);
+  for (std::size_t k = 0; k < first_.size(); ++k) {
+    const auto& [square, pull] = curves[k];
     for (const double length : kCurveLengths) {
       const Eigen::LLT<MatrixXd> root(unit_covariance(k, length));
       const MatrixXd inner = root.matrixU() * square * root.matrixL();

@@ -1,7 +1,7 @@
 #pragma once
 // The discrepancy that nobody has a name for: a Gaussian process of one covariate in one component (Kennedy and O'Hagan
 // 2001, J. R. Stat. Soc. B 63), linear through the sensitivities, beside any set of effects.
-#include "diagnosis/inference/likelihood.hpp"
+#include "diagnosis/inference/marginal.hpp"
 
 namespace bevel::inference {
 
@@ -23,8 +23,9 @@ class Discrepancy {
   CurveColumns columns(const Likelihood& likelihood, const CurvePrior& prior) const;
   // All curves at all scales and lengths beside a fit (without a curve), by the linear model and the noise that this
   // was made with: the likeliest first.
-  std::vector<CurveFactor> scan(const Fit& fit, const std::vector<ArrowBlock>& blocks,
-                                const Likelihood& likelihood) const;
+  std::vector<CurveFactor> scan(const Marginal& beside) const;
+  // The likelihood of each curve's values beside a fit.
+  std::vector<Marginal::Added> added(const Marginal& beside) const;
   std::size_t choices() const { return first_.size() * std::size(kCurveScales) * std::size(kCurveLengths); }
   // The root mean square over the readings, in standard deviations of the noise, of the part of a curve's values that
   // the base's own parameters do not absorb.

@@ -33,39 +33,6 @@ double beta_binomial(int happened, int recordings) {
 // What an instant has to bring in a recording to be taken for one, in chi2: its expected odds.
 double instant_cost(double duration_s) { return 2 * std::log(kHappensNot / kHappens * duration_s / kInstantWidth_s); }
 
-// log of the integral over one instant, relative to the likelihood at it, its uniform prior included.
-double log_width_of(const Likelihood& likelihood, const Fit& fit, const CurveColumns& curve, std::size_t r,
-                    std::size_t local) {
-  const double duration_s = fit.layout.upper(local, r);
-  const double at_s = fit.local[r][static_cast<Index>(local)];
-  Residuals residuals;
-  VectorXd values = fit.local[r];
-  const auto chi2_at = [&](double value) {
-    values[static_cast<Index>(local)] = value;
-    if (!likelihood.evaluate(fit.layout, r, fit.shared, values, false, residuals))
-      return std::numeric_limits<double>::infinity();
-    if (curve) residuals.white -= curve.columns[r] * fit.curve_values;
-    return residuals.white.squaredNorm();
-  };
-  const double best = chi2_at(at_s);
-  // Outwards with growing steps until nothing is left.
-  double integral = 0;
-  for (const double direction : {-1.0, 1.0}) {
-    double step = 0.002, at = 0, before = 1;
-    for (int i = 0; i < 60; ++i) {
-      at += step;
-      const double where = at_s + direction * at;
-      if (where <= 0 || where >= duration_s) break;
-      const double now = std::min(1.0, std::exp(-0.5 * (chi2_at(where) - best)));
-      integral += 0.5 * step * (before + now);
-      before = now;
-      if (now < std::exp(-0.5 * kNegligible)) break;
-      step = std::min(step * 1.3, 0.1);
-    }
-  }
-  return std::log(std::max(integral, 1e-4) / duration_s);
-}
-
 double log_prior_of_instants(const Likelihood& likelihood, const Fit& fit, const CurveColumns& curve) {
   double sum = 0;
   for (std::size_t i = 0; i < fit.layout.local().size(); ++i) {
@@ -74,7 +41,7 @@ double log_prior_of_instants(const Likelihood& likelihood, const Fit& fit, const
     for (std::size_t r = 0; r < fit.local.size(); ++r)
       if (fit.local[r][static_cast<Index>(i)] > 0) {
         ++happened;
-        sum += log_width_of(likelihood, fit, curve, r, i);
+        sum += std::log(instant_posterior(likelihood, fit, curve, r, i).width_s / fit.layout.upper(i, r));
       }
     sum += beta_binomial(happened, static_cast<int>(fit.local.size()));
   }
@@ -147,7 +114,6 @@ Noise noise_about(const Fit& fit, const CurveColumns& curve) {
   return refine_noise(likelihood.data(), errors, likelihood.noise());
 }
 
-// Fit, noise and the nuisances' standard deviations in turn, until none changes.
 // Each instant in turn taken out, all else fitted anew: kept out where it is not missed. What a scan finds beside
 // parameters that are still off may hold them there.
 void doubt_instants(const Likelihood& likelihood, const CurveColumns& curve, Fit& fitted) {
@@ -180,6 +146,7 @@ struct Settled {
   Fit fit;
   GridEvidence over;
 };
+// Fit, noise and the nuisances' standard deviations in turn, until none changes.
 Settled settle(const Likelihood& likelihood, const Discrepancy* discrepancy, const Layout& layout, VectorXd shared,
                std::vector<VectorXd> local, Scales scales, const NuisanceGrid& grid, double give_up_below) {
   auto now = std::make_shared<const Likelihood>(likelihood);
@@ -246,6 +213,56 @@ NuisanceGrid nuisance_grid(const System& system) {
   return out;
 }
 
+InstantPosterior instant_posterior(const Likelihood& likelihood, const Fit& fit, const CurveColumns& curve,
+                                   std::size_t r, std::size_t local) {
+  const double duration_s = fit.layout.upper(local, r);
+  const double at_s = fit.local[r][static_cast<Index>(local)];
+  Residuals residuals;
+  VectorXd values = fit.local[r];
+  const auto chi2_at = [&](double value) {
+    values[static_cast<Index>(local)] = value;
+    if (!likelihood.evaluate(fit.layout, r, fit.shared, values, false, residuals))
+      return std::numeric_limits<double>::infinity();
+    if (curve) residuals.white -= curve.columns[r] * fit.curve_values;
+    return residuals.white.squaredNorm();
+  };
+  const double best = chi2_at(at_s);
+  // Outwards with growing steps until nothing is left; probabilities of the steps, in order of time.
+  std::vector<std::pair<double, double>> steps;
+  for (const double direction : {-1.0, 1.0}) {
+    double step_s = 0.002, away_s = 0, before = 1;
+    for (int i = 0; i < 60; ++i) {
+      away_s += step_s;
+      const double where_s = at_s + direction * away_s;
+      if (where_s <= 0 || where_s >= duration_s) break;
+      const double now = std::min(1.0, std::exp(-0.5 * (chi2_at(where_s) - best)));
+      steps.emplace_back(where_s - direction * 0.5 * step_s, 0.5 * step_s * (before + now));
+      before = now;
+      if (now < std::exp(-0.5 * kNegligible)) break;
+      step_s = std::min(step_s * 1.3, 0.1);
+    }
+    if (direction < 0) std::reverse(steps.begin(), steps.end());
+  }
+  InstantPosterior out;
+  double sum = 0, first = 0, second = 0;
+  for (const auto& [where_s, weight] : steps)
+    sum += weight, first += weight * where_s, second += weight * where_s * where_s;
+  out.width_s = std::max(sum, 1e-4);
+  if (!(sum > 0)) {
+    out.mean_s = out.low_s = out.high_s = at_s;
+    return out;
+  }
+  out.mean_s = first / sum;
+  out.sd_s = std::sqrt(std::max(0.0, second / sum - out.mean_s * out.mean_s));
+  double below = 0;
+  for (const auto& [where_s, weight] : steps) {
+    if (below < 0.025 * sum) out.low_s = where_s;
+    if (below < 0.975 * sum) out.high_s = where_s;
+    below += weight;
+  }
+  return out;
+}
+
 std::pair<Fit, double> moved_to(const std::shared_ptr<const Likelihood>& likelihood, const Fit& from,
                                 const Discrepancy& discrepancy) {
   const auto curve_of = [&](const Likelihood& by) {
@@ -302,9 +319,8 @@ void scan_local(const Likelihood& likelihood, const Layout& layout, const Vector
   }
 }
 
-Evaluated evaluate(const Likelihood& likelihood, const Discrepancy* discrepancy, const Layout& layout,
-                   const VectorXd& shared, const std::vector<VectorXd>& local, const VectorXd& nuisance_sd,
-                   double give_up_below) {
+Evaluated evaluate(const Likelihood& likelihood, const Layout& layout, const VectorXd& shared,
+                   const std::vector<VectorXd>& local, const VectorXd& nuisance_sd, double give_up_below) {
   const NuisanceGrid grid = nuisance_grid(likelihood.system());
   Settled plain = settle(likelihood, nullptr, layout, shared, local, {.nuisance_sd = nuisance_sd, .curve = {}}, grid,
                          give_up_below);
@@ -312,15 +328,13 @@ Evaluated evaluate(const Likelihood& likelihood, const Discrepancy* discrepancy,
   out.log_evidence = plain.over.log_mean;
   out.nuisance_weights = plain.over.weights;
   out.valid = out.fit.valid && std::isfinite(out.log_evidence);
-  if (out.valid && discrepancy) add_discrepancy(likelihood, *discrepancy, out);
   return out;
 }
 
 void add_discrepancy(const Likelihood& likelihood, const Discrepancy& discrepancy, Evaluated& out) {
   out.with_discrepancy = true;
   // By the noise that the curves were prepared with.
-  auto blocks = linearise(likelihood, out.fit, {});
-  out.curves = discrepancy.scan(out.fit, blocks, likelihood);
+  out.curves = discrepancy.scan(Marginal(likelihood, out.fit, {}));
   if (out.curves.empty()) return;
   std::vector<double> logs;
   for (const auto& one : out.curves) logs.push_back(one.log_bayes_factor);
@@ -345,6 +359,7 @@ void add_discrepancy(const Likelihood& likelihood, const Discrepancy& discrepanc
   }
   out.log_bayes_factor_curve = with.over.log_mean + spread - choices - out.log_evidence;
   out.fit_with_curve = std::move(with.fit);
+  out.nuisance_weights_with_curve = with.over.weights;
 }
 
 }  // namespace bevel::inference

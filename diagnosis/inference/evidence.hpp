@@ -23,7 +23,8 @@ struct Evaluated {
   double log_bayes_factor_curve = 0;  // of a discrepancy, against none
   std::vector<CurveFactor> curves;    // each of them, the likeliest first
   Eigen::VectorXd nuisance_weights;   // posterior over the grid of standard deviations
-  bool with_discrepancy = false;      // whether that was asked
+  Eigen::VectorXd nuisance_weights_with_curve;
+  bool with_discrepancy = false;  // whether that was asked
   bool valid = false;
 };
 
@@ -34,12 +35,11 @@ struct NuisanceGrid {
 };
 NuisanceGrid nuisance_grid(const System& system);
 
-// Starting values; scales.nuisance_sd is where the standard deviations begin.
-// discrepancy: null where its part is not asked for. The noise is fitted too; `likelihood` is where it begins. Once the
-// evidence is so low, it is left as it is.
-Evaluated evaluate(const Likelihood& likelihood, const Discrepancy* discrepancy, const Layout& layout,
-                   const Eigen::VectorXd& shared, const std::vector<Eigen::VectorXd>& local,
-                   const Eigen::VectorXd& nuisance_sd, double give_up_below = -std::numeric_limits<double>::infinity());
+// Starting values; nuisance_sd is where the standard deviations begin. Without a discrepancy. The noise is fitted too;
+// `likelihood` is where it begins. Once the evidence is so low, it is left as it is.
+Evaluated evaluate(const Likelihood& likelihood, const Layout& layout, const Eigen::VectorXd& shared,
+                   const std::vector<Eigen::VectorXd>& local, const Eigen::VectorXd& nuisance_sd,
+                   double give_up_below = -std::numeric_limits<double>::infinity());
 
 // The discrepancy's part, added to a set that was evaluated without.
 void add_discrepancy(const Likelihood& likelihood, const Discrepancy& discrepancy, Evaluated& evaluated);
@@ -47,6 +47,15 @@ void add_discrepancy(const Likelihood& likelihood, const Discrepancy& discrepanc
 // The same mode sought again by the noise of another likelihood, and by how much its evidence is more there.
 std::pair<Fit, double> moved_to(const std::shared_ptr<const Likelihood>& likelihood, const Fit& from,
                                 const Discrepancy& discrepancy);
+
+// Of one instant, all else at the mode: by an integral over it.
+struct InstantPosterior {
+  double mean_s = 0, sd_s = 0;
+  double low_s = 0, high_s = 0;  // 95 %
+  double width_s = 0;            // integral of the likelihood over the instant, relative to that at the mode
+};
+InstantPosterior instant_posterior(const Likelihood& likelihood, const Fit& fit, const CurveColumns& curve,
+                                   std::size_t recording, std::size_t local);
 
 // Every phase and instant at the best of a grid, all else as it is.
 void scan_local(const Likelihood& likelihood, const Layout& layout, const Eigen::VectorXd& shared,

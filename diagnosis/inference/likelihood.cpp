@@ -109,7 +109,7 @@ VectorXd nuisance_centre(const Layout& layout, const VectorXd& local) {
   return out;
 }
 
-Pulls pulls_of(const Layout& layout, const VectorXd& shared, const Scales& scales, const VectorXd& curve_values,
+Pulls pulls_of(const Layout& layout, const VectorXd& shared, const VectorXd& curve_values,
                const MatrixXd& curve_covariance) {
   Pulls out;
   const Index n = shared.size(), m = curve_values.size();
@@ -124,7 +124,6 @@ Pulls pulls_of(const Layout& layout, const VectorXd& shared, const Scales& scale
     out.precision.bottomRightCorner(m, m) = curve_covariance.inverse();
     out.centre.tail(m) = -curve_values;
   }
-  out.local_precision = local_precision_of(layout, scales);
   return out;
 }
 
@@ -147,39 +146,33 @@ VectorXd local_precision_of(const Layout& layout, const Scales& scales) {
 
 namespace {
 
-bool make_blocks(const Likelihood& likelihood, const Fit& fit, const CurveColumns& curve, bool derivatives,
-                 const std::vector<bool>& used, std::vector<ArrowBlock>* blocks, double* chi2) {
+bool make_blocks(const Likelihood& likelihood, const Fit& fit, const CurveColumns& curve,
+                 std::vector<ArrowBlock>& blocks) {
   Residuals residuals;
-  *chi2 = 0;
-  if (blocks) blocks->assign(likelihood.recordings(), {});
+  blocks.resize(likelihood.recordings());
   const auto free = free_locals(fit.layout);
+  const VectorXd precision = local_precision_of(fit.layout, fit.scales);
   for (std::size_t r = 0; r < likelihood.recordings(); ++r) {
-    if (!used.empty() && !used[r]) continue;
-    if (!likelihood.evaluate(fit.layout, r, fit.shared, fit.local[r], derivatives, residuals)) return false;
+    if (!likelihood.evaluate(fit.layout, r, fit.shared, fit.local[r], true, residuals)) return false;
     if (curve) residuals.white -= curve.columns[r] * fit.curve_values;
-    *chi2 += residuals.white.squaredNorm();
-    if (!derivatives) continue;
     MatrixXd Z = residuals.by_shared;
     if (curve) {
       Z.conservativeResize(Eigen::NoChange, Z.cols() + curve.columns[r].cols());
       Z.rightCols(curve.columns[r].cols()) = curve.columns[r];
     }
-    (*blocks)[r] = make_block(residuals.by_local(Eigen::all, free), Z, residuals.white);
+    blocks[r] = make_block(residuals.by_local(Eigen::all, free), Z, residuals.white);
+    blocks[r].precision = precision;
+    blocks[r].centre = nuisance_centre(fit.layout, fit.local[r]);
   }
   return true;
 }
 
-double cost_of_priors(const Pulls& pulls, const std::vector<VectorXd>& centres, const std::vector<bool>& used) {
+// Squared residuals and the priors' pulls.
+double cost_of(const Pulls& pulls, const std::vector<ArrowBlock>& blocks) {
   double cost = pulls.centre.dot(pulls.precision * pulls.centre);
-  for (std::size_t r = 0; r < centres.size(); ++r)
-    if (used.empty() || used[r]) cost += centres[r].dot(pulls.local_precision.cwiseProduct(centres[r]));
+  for (const ArrowBlock& block : blocks)
+    cost += block.ww + block.centre.dot(block.precision.cwiseProduct(block.centre));
   return cost;
-}
-
-std::vector<VectorXd> centres_of(const Fit& fit) {
-  std::vector<VectorXd> out;
-  for (const auto& local : fit.local) out.push_back(nuisance_centre(fit.layout, local));
-  return out;
 }
 
 // What presses against a bound stays there.
@@ -203,21 +196,14 @@ ArrowSolution solve_within(const Fit& now, const std::vector<ArrowBlock>& blocks
 }  // namespace
 
 ArrowSolution solve_about(const Fit& fit, const std::vector<ArrowBlock>& blocks, const CurveColumns& curve) {
-  const Pulls pulls = pulls_of(fit.layout, fit.shared, fit.scales, fit.curve_values, curve.covariance);
+  const Pulls pulls = pulls_of(fit.layout, fit.shared, fit.curve_values, curve.covariance);
   ArrowRules how;
   return solve_within(fit, blocks, pulls, how);
 }
 
 std::vector<ArrowBlock> linearise(const Likelihood& likelihood, const Fit& fit, const CurveColumns& curve) {
   std::vector<ArrowBlock> blocks;
-  double chi2 = 0;
-  if (!make_blocks(likelihood, fit, curve, true, {}, &blocks, &chi2)) return {};
-  const Pulls pulls = pulls_of(fit.layout, fit.shared, fit.scales, fit.curve_values, curve.covariance);
-  const auto centres = centres_of(fit);
-  for (std::size_t r = 0; r < blocks.size(); ++r) {
-    blocks[r].precision = pulls.local_precision;
-    blocks[r].centre = centres[r];
-  }
+  if (!make_blocks(likelihood, fit, curve, blocks)) blocks.clear();
   return blocks;
 }
 
@@ -237,14 +223,9 @@ Fit fit(const Likelihood& likelihood, const Layout& layout, const VectorXd& shar
   };
   const auto look = [&](Fit& at, Point& point) {
     at.cost = std::numeric_limits<double>::infinity();
-    if (!make_blocks(likelihood, at, curve, true, rules.used, &point.blocks, &at.chi2)) return;
-    point.pulls = pulls_of(layout, at.shared, scales, at.curve_values, curve.covariance);
-    const auto centres = centres_of(at);
-    for (std::size_t r = 0; r < point.blocks.size(); ++r) {
-      point.blocks[r].precision = point.pulls.local_precision;
-      point.blocks[r].centre = centres[r];
-    }
-    at.cost = at.chi2 + cost_of_priors(point.pulls, centres, rules.used);
+    if (!make_blocks(likelihood, at, curve, point.blocks)) return;
+    point.pulls = pulls_of(layout, at.shared, at.curve_values, curve.covariance);
+    at.cost = cost_of(point.pulls, point.blocks);
   };
   Point here, there;
   look(now, here);
@@ -252,7 +233,7 @@ Fit fit(const Likelihood& likelihood, const Layout& layout, const VectorXd& shar
   double damping = 1e-4;
   for (int iteration = 0; now.valid && iteration < rules.max_iterations; ++iteration) {
     now.iterations = iteration + 1;
-    ArrowRules how{.damping = damping, .used = rules.used};
+    ArrowRules how{.damping = damping};
     bool moved = false, small = false;
     while (how.damping < 1e8) {
       const ArrowSolution step = solve_within(now, here.blocks, here.pulls, how);

@@ -85,7 +85,6 @@ struct Fit {
   Eigen::VectorXd curve_values;                  // in units of `unit` of the curve; empty: no curve
   std::shared_ptr<const Likelihood> likelihood;  // by whose noise it was fitted
   double cost = 0;                               // squared whitened residuals and priors' pulls
-  double chi2 = 0;                               // the first part
   std::vector<Eigen::Index> held;                // shared unknowns that press against a bound
   int iterations = 0;
   bool valid = false;
@@ -93,8 +92,7 @@ struct Fit {
 
 struct FitRules {
   int max_iterations = 25;
-  double tolerance = 0.02;   // of the cost
-  std::vector<bool> used{};  // recordings; empty: all
+  double tolerance = 0.02;  // of the cost
 };
 
 // Curves' columns, whitened, per recording: rows x values; the values' prior covariance is `covariance`.
@@ -109,21 +107,21 @@ Fit fit(const Likelihood& likelihood, const Layout& layout, const Eigen::VectorX
         const std::vector<Eigen::VectorXd>& local, const Scales& scales, const CurveColumns& curve = {},
         const FitRules& rules = {});
 
-// The normal equations about a fit, unknowns as steps from the mode: shared, then the curve's values.
+// The normal equations about a fit, unknowns as steps from the mode: shared, then the curve's values. Empty outside the
+// model's domain.
 std::vector<ArrowBlock> linearise(const Likelihood& likelihood, const Fit& fit, const CurveColumns& curve);
-// Priors of the same: precision and centre of the shared part, and of each recording's own.
+// Priors of the shared part: precision and centre.
 struct Pulls {
   Eigen::MatrixXd precision;
   Eigen::VectorXd centre;
-  Eigen::VectorXd local_precision;
 };
-Pulls pulls_of(const Layout& layout, const Eigen::VectorXd& shared, const Scales& scales,
-               const Eigen::VectorXd& curve_values, const Eigen::MatrixXd& curve_covariance);
-// Local unknowns in the arrow: all but instants, in order.
+Pulls pulls_of(const Layout& layout, const Eigen::VectorXd& shared, const Eigen::VectorXd& curve_values,
+               const Eigen::MatrixXd& curve_covariance);
+// Local unknowns in the arrow: all but instants, in order; their priors' precision and centre.
+std::vector<Eigen::Index> free_locals(const Layout& layout);
 Eigen::VectorXd local_precision_of(const Layout& layout, const Scales& scales);
+Eigen::VectorXd nuisance_centre(const Layout& layout, const Eigen::VectorXd& local);
 // The linear model about a fit, what presses against a bound held.
 ArrowSolution solve_about(const Fit& fit, const std::vector<ArrowBlock>& blocks, const CurveColumns& curve);
-std::vector<Eigen::Index> free_locals(const Layout& layout);
-Eigen::VectorXd nuisance_centre(const Layout& layout, const Eigen::VectorXd& local);
 
 }  // namespace bevel::inference

@@ -221,18 +221,17 @@ Eigen::MatrixXd spline_basis(const Series& series, double knot_s) {
   return X;
 }
 
-Noise estimate_noise(const Dataset& data, const Errors& errors, bool flexible, bool second_order) {
+Noise estimate_noise(const Dataset& data, const Errors& errors, bool second_order) {
   std::vector<std::vector<Eigen::MatrixXd>> bases(data.recordings.size());
-  for (std::size_t r = 0; flexible && r < bases.size(); ++r)
+  for (std::size_t r = 0; r < bases.size(); ++r)
     for (const auto& series : data.recordings[r].series)
       bases[r].push_back(series.time_s.empty() ? Eigen::MatrixXd() : spline_basis(series, kKnot_s));
-  const auto* in_use = flexible ? &bases : nullptr;
   Noise noise;
   noise.frame_s = data.frame_s;
   const auto at = [&](double ar1, double ar2) {
     noise.ar1 = ar1;
     noise.ar2 = ar2;
-    return deviance(data, errors, in_use, noise);
+    return deviance(data, errors, &bases, noise);
   };
   // The deviance in ar1 has one minimum: a coarse scan, then golden-section steps.
   const auto best_ar1 = [&](double ar2) {
@@ -257,20 +256,11 @@ Noise estimate_noise(const Dataset& data, const Errors& errors, bool flexible, b
     }
     if (first_order - at(other1, other2) > kSecondOrder) ar1 = other1, ar2 = other2;
   }
-  // What is slow has the innovations' variance, which is well known, over (1 - ar1)^2. (Deviance: minus twice the
-  // logarithm of the likelihood, so that a curvature of two is a standard error of one.)
-  double slow_error = 0;
-  if (ar1 > 0) {
-    const double step = std::min(0.25 * (1 - ar1), 0.5 * ar1);
-    const double curvature = (at(ar1 + step, ar2) + at(ar1 - step, ar2) - 2 * at(ar1, ar2)) / (step * step);
-    if (curvature > 0) slow_error = 2 / (1 - ar1) * std::sqrt(2 / curvature);
-  }
   at(ar1, ar2);
-  noise.slow_error = slow_error;
   return noise;
 }
 
-Calibration calibrate_noise(const Dataset& data, const Errors& errors, bool flexible) {
+Calibration calibrate_noise(const Dataset& data, const Errors& errors) {
   Calibration out;
   out.outliers.resize(data.recordings.size());
   Dataset now = data;
@@ -282,7 +272,7 @@ Calibration calibrate_noise(const Dataset& data, const Errors& errors, bool flex
     for (std::size_t r = 0; r < left.size(); ++r)
       for (std::size_t c = 0; c < left[r].size(); ++c)
         without_outliers[r][c] = clipped(now.recordings[r].series[c], left[r][c]);
-    out.noise = estimate_noise(now, without_outliers, flexible, false);
+    out.noise = estimate_noise(now, without_outliers, false);
     bool found = false;
     for (std::size_t r = 0; r < now.recordings.size(); ++r) {
       const auto& recording = now.recordings[r];
@@ -320,7 +310,7 @@ Calibration calibrate_noise(const Dataset& data, const Errors& errors, bool flex
         }
       }
   }
-  out.noise = estimate_noise(now, left, flexible);
+  out.noise = estimate_noise(now, left);
   out.noise.outlier_share = static_cast<double>(dropped) / static_cast<double>(std::max<std::size_t>(messages, 1));
   return out;
 }

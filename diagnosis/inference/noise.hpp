@@ -1,9 +1,9 @@
 #pragma once
 // The sensors' noise: autocorrelated, of first order or second, one standard deviation per channel, and a share of
-// outliers. It is found before any physics is named, from what a flexible curve leaves of the residuals, so that
-// missing physics does not pass for noise; it is then held fixed while structures are compared. Source: restricted
-// maximum likelihood, Harville 1977, JASA 72; AR(1) over gaps as an Ornstein-Uhlenbeck process, AR(2) by its partial
-// correlations (Barndorff-Nielsen and Schou 1973, J. Multivar. Anal. 3).
+// outliers. It begins as what a flexible curve leaves of the residuals, so that missing physics does not pass for
+// noise; the evidence of each set then fits it anew (refine_noise). Source: restricted maximum likelihood, Harville
+// 1977, JASA 72; AR(1) over gaps as an Ornstein-Uhlenbeck process, AR(2) by its partial correlations (Barndorff-Nielsen
+// and Schou 1973, J. Multivar. Anal. 3).
 #include <span>
 #include <vector>
 
@@ -15,7 +15,6 @@ struct Noise {
   std::vector<double> sigma;  // per channel, of one reading (the process's own)
   double ar1 = 0;             // correlation of readings one frame apart
   double ar2 = 0;             // of readings two frames apart, given the one between; 0: of first order
-  double slow_error = 0;      // relative standard error of its power far below the frame rate, by that of ar1
   double outlier_share = 0;   // of messages
   double frame_s = 1.0 / 30;
 };
@@ -40,7 +39,7 @@ void whiten(const Whitening& whitening, Matrix&& rows) {
   if (rows.rows() > 0) rows.row(0) *= whitening.weight[0];
 }
 
-// Errors of a model per recording and channel, in mm.
+// Errors of a model per recording and channel, in the channels' units.
 using Errors = std::vector<std::vector<Eigen::VectorXd>>;
 
 // Cubic B-splines over a series with a knot about every knot_s seconds: the flexible curve. Rows are readings.
@@ -52,11 +51,10 @@ struct Calibration {
   std::vector<std::vector<std::size_t>> outliers;  // per recording: readings (indices into motion.at), ascending
 };
 
-// errors: of the model in use. With flexible = false the model is trusted and no curve is taken out.
-Calibration calibrate_noise(const Dataset& data, const Errors& errors, bool flexible = true);
-// Deviation and autocorrelation alone, of the readings as they are. With second_order, ar2 too, where the readings ask
-// for it.
-Noise estimate_noise(const Dataset& data, const Errors& errors, bool flexible, bool second_order = true);
+// errors: of the model in use, of which a flexible curve is taken out.
+Calibration calibrate_noise(const Dataset& data, const Errors& errors);
+// Deviation and autocorrelation alone, beside the curve. With second_order, ar2 too, where the readings ask for it.
+Noise estimate_noise(const Dataset& data, const Errors& errors, bool second_order = true);
 
 // The likeliest noise of errors that are taken as they are, of the order that it begins with.
 Noise refine_noise(const Dataset& data, const Errors& errors, const Noise& start);

@@ -1,10 +1,12 @@
 #include "diagnosis/inference/posterior.hpp"
 
 #include <algorithm>
+#include <boost/math/distributions/normal.hpp>
 #include <cmath>
 #include <set>
 
 #include "diagnosis/inference/log_sum.hpp"
+#include "diagnosis/parallel.hpp"
 
 namespace bevel::inference {
 
@@ -13,9 +15,12 @@ using Eigen::VectorXd;
 
 namespace {
 
+constexpr double kNegligible = 1e-3;  // share of a posterior that is not worth a computation
+constexpr double kFarBehind = 15;     // log posterior: what no recording that is left out brings back
+
 ArrowSolution solve_without(const Fit& fit, const std::vector<ArrowBlock>& blocks, const CurveColumns& curve,
                             std::size_t recording) {
-  const Pulls pulls = pulls_of(fit.layout, fit.shared, fit.scales, fit.curve_values, curve.covariance);
+  const Pulls pulls = pulls_of(fit.layout, fit.shared, fit.curve_values, curve.covariance);
   ArrowRules rules;
   rules.used.assign(blocks.size(), true);
   if (recording < blocks.size()) rules.used[recording] = false;
@@ -24,13 +29,6 @@ ArrowSolution solve_without(const Fit& fit, const std::vector<ArrowBlock>& block
 }
 
 }  // namespace
-
-std::vector<std::string> Posterior::named() const {
-  std::vector<std::string> out;
-  for (const auto& [name, probability] : inclusion)
-    if (probability > 0.5) out.push_back(name);
-  return out;
-}
 
 Posterior posterior_of(const Search& search, double discrepancy_size) {
   Posterior out;
@@ -45,11 +43,14 @@ Posterior posterior_of(const Search& search, double discrepancy_size) {
     std::set<std::string> names;
     for (const std::size_t e : set) names.insert(effects[e].name);
     for (const auto& name : names) out.inclusion[name] += share.probability;
+    double large = 0;
     if (one.at->fit_with_curve) {
       const Fit& fit = *one.at->fit_with_curve;
       if (search.discrepancy().visible_size(*fit.scales.curve, fit.curve_values) > discrepancy_size)
-        out.discrepancy += share.with_discrepancy;
+        large = share.with_discrepancy;
     }
+    out.discrepancy += large;
+    if (set.empty()) out.nothing += share.probability - large;
     out.sets.push_back(share);
   }
   std::stable_sort(out.sets.begin(), out.sets.end(),
@@ -57,45 +58,153 @@ Posterior posterior_of(const Search& search, double discrepancy_size) {
   return out;
 }
 
-double log_predictive(const Fit& fit, const std::vector<ArrowBlock>& blocks, const CurveColumns& curve,
-                      std::size_t recording) {
+CurveColumns curve_of(const Search& search, const Fit& fit) {
+  return fit.scales.curve ? search.discrepancy().columns(*fit.likelihood, *fit.scales.curve) : CurveColumns{};
+}
+
+double Mixture::mean() const {
+  double sum = 0, all = 0;
+  for (const Part& part : parts) sum += part.weight * part.mean, all += part.weight;
+  return sum / all;
+}
+
+double Mixture::sd() const {
+  const double middle = mean();
+  double sum = 0, all = 0;
+  for (const Part& part : parts) {
+    sum += part.weight * (part.sd * part.sd + (part.mean - middle) * (part.mean - middle));
+    all += part.weight;
+  }
+  return std::sqrt(sum / all);
+}
+
+double Mixture::quantile(double share) const {
+  const boost::math::normal normal;
+  double low = std::numeric_limits<double>::infinity(), high = -low, all = 0;
+  for (const Part& part : parts) {
+    low = std::min(low, part.mean - 8 * part.sd);
+    high = std::max(high, part.mean + 8 * part.sd);
+    all += part.weight;
+  }
+  for (int step = 0; step < 60 && high - low > 1e-12 * std::max(std::abs(low), std::abs(high)); ++step) {
+    const double middle = 0.5 * (low + high);
+    double below = 0;
+    for (const Part& part : parts)
+      below += part.weight * (part.sd > 0 ? boost::math::cdf(normal, (middle - part.mean) / part.sd)
+                                          : (part.mean <= middle ? 1.0 : 0.0));
+    (below < share * all ? low : high) = middle;
+  }
+  return 0.5 * (low + high);
+}
+
+Unknowns::Unknowns(const Search& search) : search_(&search) {
+  const double best = search.best().log_posterior();
+  const NuisanceGrid grid = nuisance_grid(search.system());
+  const auto add = [&](double weight, const Fit& fit, const VectorXd& over) {
+    if (weight < kNegligible) return;
+    const CurveColumns curve = curve_of(search, fit);
+    auto blocks = linearise(*fit.likelihood, fit, curve);
+    if (blocks.empty()) return;
+    Fit about = fit;
+    for (Index k = 0; k < over.size(); ++k) {
+      if (weight * over[k] < kNegligible) continue;
+      about.scales.nuisance_sd = grid.standard_deviations.col(k);
+      for (auto& block : blocks) block.precision = local_precision_of(fit.layout, about.scales);
+      const ArrowSolution solution = solve_about(about, blocks, curve);
+      if (!solution.valid) continue;
+      Part part{.weight = weight * over[k],
+                .layout = &fit.layout,
+                .mean = fit.shared,
+                .sd = fit.shared,
+                .nuisance_sd = about.scales.nuisance_sd};
+      for (Index i = 0; i < fit.shared.size(); ++i) {
+        part.mean[i] += solution.shared[i];
+        part.sd[i] = std::sqrt(std::max(0.0, solution.covariance(i, i)));
+      }
+      parts_.push_back(std::move(part));
+    }
+  };
+  for (const auto& [set, one] : search.visited()) {
+    add(std::exp(one.log_without_curve - best), one.at->fit, one.at->nuisance_weights);
+    if (one.at->fit_with_curve)
+      add(std::exp(one.log_with_curve - best), *one.at->fit_with_curve, one.at->nuisance_weights_with_curve);
+  }
+}
+
+Mixture Unknowns::of(int effect, std::size_t parameter) const {
+  Mixture out;
+  for (const Part& part : parts_) {
+    std::size_t at = parameter;
+    if (effect >= 0) {
+      const auto& set = part.layout->set();
+      const auto member = std::find(set.begin(), set.end(), static_cast<std::size_t>(effect));
+      if (member == set.end()) continue;
+      const int found = part.layout->find_shared(static_cast<std::size_t>(member - set.begin()), parameter);
+      if (found < 0) continue;
+      at = static_cast<std::size_t>(found);
+    }
+    out.parts.push_back({part.weight, part.mean[static_cast<Index>(at)], part.sd[static_cast<Index>(at)]});
+  }
+  return out;
+}
+
+VectorXd Unknowns::of_group(std::size_t group) const {
+  const auto& values = search_->system().nuisance_groups()[group].standard_deviations;
+  VectorXd out = VectorXd::Zero(static_cast<Index>(values.size()));
+  for (const Part& part : parts_)
+    for (std::size_t i = 0; i < values.size(); ++i)
+      if (part.nuisance_sd[static_cast<Index>(group)] == values[i]) out[static_cast<Index>(i)] += part.weight;
+  return out / std::max(out.sum(), 1e-300);
+}
+
+LeftOut leave_out(const Fit& fit, const std::vector<ArrowBlock>& blocks, const CurveColumns& curve,
+                  std::size_t recording) {
   const ArrowSolution all = solve_without(fit, blocks, curve, blocks.size());
   const ArrowSolution rest = solve_without(fit, blocks, curve, recording);
-  return fit.likelihood->log_weights(recording) -
-         0.5 * (all.least - rest.least + all.log_volume_ratio - rest.log_volume_ratio);
-}
-
-VectorXd shared_without(const Fit& fit, const std::vector<ArrowBlock>& blocks, const CurveColumns& curve,
-                        std::size_t recording) {
-  VectorXd shared = fit.shared + solve_without(fit, blocks, curve, recording).shared.head(fit.shared.size());
+  LeftOut out;
+  out.chi2 = all.least - rest.least;
+  out.log_density =
+      fit.likelihood->log_weights(recording) - 0.5 * (out.chi2 + all.log_volume_ratio - rest.log_volume_ratio);
+  out.shared = fit.shared + rest.shared.head(fit.shared.size());
+  out.curve_values = fit.curve_values + rest.shared.tail(fit.curve_values.size());
   std::vector<VectorXd> local = fit.local;
-  fit.layout.clamp(shared, local);
-  return shared;
+  fit.layout.clamp(out.shared, local);
+  return out;
 }
 
-std::vector<double> held_out_log_density(const Search& search) {
+std::vector<LeftOutSelection> leave_out_selection(const Search& search) {
   const std::size_t recordings = search.system().data().recordings.size();
-  // Per set, with and without its curve: log of prior times evidence, and each recording's part.
-  std::vector<double> whole;
-  std::vector<std::vector<double>> parts;
+  struct Model {
+    double log = 0;  // of prior times evidence
+    const Fit* fit = nullptr;
+    std::vector<LeftOut> parts;
+  };
+  std::vector<Model> models;
+  const double best = search.best().log_posterior();
   for (const auto& [set, one] : search.visited()) {
-    const auto add = [&](double log, const Fit& fit) {
-      const CurveColumns curve =
-          fit.scales.curve ? search.discrepancy().columns(*fit.likelihood, *fit.scales.curve) : CurveColumns{};
-      const auto blocks = linearise(*fit.likelihood, fit, curve);
-      if (blocks.empty()) return;
-      whole.push_back(log);
-      parts.emplace_back();
-      for (std::size_t r = 0; r < recordings; ++r) parts.back().push_back(log_predictive(fit, blocks, curve, r));
-    };
-    add(one.log_without_curve, one.at->fit);
-    if (one.at->fit_with_curve) add(one.log_with_curve, *one.at->fit_with_curve);
+    if (one.log_without_curve > best - kFarBehind) models.push_back({one.log_without_curve, &one.at->fit, {}});
+    if (one.at->fit_with_curve && one.log_with_curve > best - kFarBehind)
+      models.push_back({one.log_with_curve, &*one.at->fit_with_curve, {}});
   }
-  std::vector<double> out;
+  parallel_for(models.size(), search.rules().threads, [&](std::size_t m) {
+    const Fit& fit = *models[m].fit;
+    const CurveColumns curve = curve_of(search, fit);
+    const auto blocks = linearise(*fit.likelihood, fit, curve);
+    for (std::size_t r = 0; r < recordings && !blocks.empty(); ++r)
+      models[m].parts.push_back(leave_out(fit, blocks, curve, r));
+  });
+  std::erase_if(models, [](const Model& model) { return model.parts.empty(); });
+  std::vector<LeftOutSelection> out;
   for (std::size_t r = 0; r < recordings; ++r) {
-    std::vector<double> without;
-    for (std::size_t i = 0; i < whole.size(); ++i) without.push_back(whole[i] - parts[i][r]);
-    out.push_back(log_sum(whole) - log_sum(without));
+    std::vector<double> with, without;
+    const Model* likeliest = nullptr;
+    for (const Model& model : models) {
+      with.push_back(model.log);
+      without.push_back(model.log - model.parts[r].log_density);
+      if (!likeliest || without.back() > likeliest->log - likeliest->parts[r].log_density) likeliest = &model;
+    }
+    out.push_back(
+        {.log_density = log_sum(with) - log_sum(without), .fit = likeliest->fit, .of_fit = likeliest->parts[r]});
   }
   return out;
 }

@@ -1,6 +1,6 @@
 #pragma once
-// What follows from the sets that were visited: probabilities of sets, of each effect, of a discrepancy; what each
-// recording would have been given the others.
+// What follows from the sets that were visited: probabilities of sets, of each effect, of a discrepancy; each unknown's
+// posterior; what each recording would have been given the others.
 #include <map>
 
 #include "diagnosis/inference/search.hpp"
@@ -18,23 +18,62 @@ struct Posterior {
   double not_visited = 0;                   // the share of sets that were not fitted, by the linear model's estimate
   std::map<std::string, double> inclusion;  // of each effect by name: the sum over the sets that hold it
   double discrepancy = 0;                   // probability of one whose visible part exceeds the size asked for
-  // Names whose inclusion probability exceeds one half.
-  std::vector<std::string> named() const;
+  double nothing = 0;                       // of neither an effect nor such a discrepancy
 };
 
 // discrepancy_size: root mean square of its visible part, in standard deviations of the noise; smaller ones are errors
 // of form, which widen intervals and are not called missing physics.
 Posterior posterior_of(const Search& search, double discrepancy_size);
 
-// log of the predictive density of each recording given the others, constants of 2 pi left out: sets are weighed, and
-// their parameters fitted, without the recording, by the linear model about the mode. (Which sets were visited was
-// decided with all recordings.)
-std::vector<double> held_out_log_density(const Search& search);
-// Of one mode alone.
-double log_predictive(const Fit& fit, const std::vector<ArrowBlock>& blocks, const CurveColumns& curve,
-                      std::size_t recording);
-// The shared parameters that the other recordings give, bounds respected.
-Eigen::VectorXd shared_without(const Fit& fit, const std::vector<ArrowBlock>& blocks, const CurveColumns& curve,
-                               std::size_t recording);
+// The curve of a fit with one, whitened by the fit's own noise; none for a fit without.
+CurveColumns curve_of(const Search& search, const Fit& fit);
+
+// A mixture of normals: over sets, with and without their curves, and over the nuisances' standard deviations.
+struct Mixture {
+  struct Part {
+    double weight = 0, mean = 0, sd = 0;
+  };
+  std::vector<Part> parts;
+  double mean() const;
+  double sd() const;
+  double quantile(double share) const;
+};
+
+// Posteriors of shared unknowns, by the linear models about the modes.
+class Unknowns {
+ public:
+  explicit Unknowns(const Search& search);
+  // Over all sets that hold the effect; a parameter of the base where effect is -1. Empty where no set holds it.
+  Mixture of(int effect, std::size_t parameter) const;
+  // Posterior of one group's standard deviation, over the sets: probabilities of NuisanceGroup::standard_deviations.
+  Eigen::VectorXd of_group(std::size_t group) const;
+
+ private:
+  struct Part {
+    double weight = 0;
+    const Layout* layout = nullptr;
+    Eigen::VectorXd mean, sd, nuisance_sd;
+  };
+  const Search* search_;
+  std::vector<Part> parts_;
+};
+
+// One recording given the others, by the linear model about a mode.
+struct LeftOut {
+  Eigen::VectorXd shared, curve_values;  // as the others give them, bounds respected
+  double log_density = 0;                // of the recording; constants of 2 pi left out
+  double chi2 = 0;                       // of its readings under the predictive density
+};
+LeftOut leave_out(const Fit& fit, const std::vector<ArrowBlock>& blocks, const CurveColumns& curve,
+                  std::size_t recording);
+
+// Each recording given the others, sets and parameters: sets are weighed, and their parameters fitted, without it.
+// (Which sets were visited was decided with all recordings.)
+struct LeftOutSelection {
+  double log_density = 0;    // of the mixture
+  const Fit* fit = nullptr;  // the likeliest without the recording; it lives as long as the search
+  LeftOut of_fit;
+};
+std::vector<LeftOutSelection> leave_out_selection(const Search& search);
 
 }  // namespace bevel::inference

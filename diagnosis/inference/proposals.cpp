@@ -7,7 +7,7 @@
 
 #include "diagnosis/inference/evidence.hpp"
 #include "diagnosis/inference/log_sum.hpp"
-#include "diagnosis/inference/parallel.hpp"
+#include "diagnosis/parallel.hpp"
 
 namespace bevel::inference {
 
@@ -80,17 +80,6 @@ void keep_best(std::vector<StartPoint>& starts, std::size_t count) {
 
 }  // namespace
 
-// The fit, ready for inner products with any column.
-struct Proposals::Beside {
-  std::vector<MatrixXf> LZ;  // [L Z] per recording
-  std::vector<Eigen::VectorXf> w;
-  std::vector<MatrixXd> inner;  // (L'L + T)^-1
-  std::vector<MatrixXd> lz;     // L'Z
-  MatrixXd covariance;          // of the shared part
-  std::vector<VectorXd> pull;   // L'w and the priors' part
-  VectorXd step;                // of the shared part, to the mode
-};
-
 Proposals::Proposals(const Likelihood& likelihood, const Fit& base, int threads) : system_(&likelihood.system()) {
   candidates_.resize(system_->effects().size());
   parallel_for(candidates_.size(), threads,
@@ -151,67 +140,38 @@ Proposals::Candidate Proposals::make_candidate(const Likelihood& likelihood, con
   return out;
 }
 
-std::vector<Proposal> Proposals::beside(const Likelihood& likelihood, const Fit& fit, const CurveColumns& curve,
-                                        std::size_t starts) const {
-  Beside beside;
-  const auto blocks = linearise(likelihood, fit, curve);
-  if (blocks.empty()) return {};
-  const ArrowSolution solution = solve_about(fit, blocks, curve);
-  if (!solution.valid) return {};
-  beside.covariance = solution.covariance;
-  beside.step = solution.shared;
-  const auto free = free_locals(fit.layout);
-  Residuals residuals;
-  for (std::size_t r = 0; r < blocks.size(); ++r) {
-    likelihood.evaluate(fit.layout, r, fit.shared, fit.local[r], true, residuals);
-    if (curve) residuals.white -= curve.columns[r] * fit.curve_values;
-    const Index m = curve ? curve.columns[r].cols() : 0;
-    MatrixXf LZ(residuals.white.size(), static_cast<Index>(free.size()) + fit.shared.size() + m);
-    LZ.leftCols(static_cast<Index>(free.size())) = residuals.by_local(Eigen::all, free).cast<float>();
-    LZ.middleCols(static_cast<Index>(free.size()), fit.shared.size()) = residuals.by_shared.cast<float>();
-    if (m > 0) LZ.rightCols(m) = curve.columns[r].cast<float>();
-    beside.LZ.push_back(std::move(LZ));
-    beside.w.emplace_back(residuals.white.cast<float>());
-    MatrixXd inner = blocks[r].ll;
-    inner.diagonal() += blocks[r].precision;
-    beside.inner.emplace_back(inner.llt().solve(MatrixXd::Identity(inner.rows(), inner.cols())));
-    beside.lz.push_back(blocks[r].lz);
-    beside.pull.emplace_back(blocks[r].lw + blocks[r].precision.cwiseProduct(blocks[r].centre));
-  }
+std::vector<Proposal> Proposals::beside(const Marginal& marginal, std::size_t starts) const {
   std::vector<Proposal> out;
+  if (!marginal.valid()) return out;
   for (std::size_t e = 0; e < candidates_.size(); ++e) {
-    if (contains(fit.layout.set(), e) || candidates_[e].signatures.empty()) continue;
-    if (!system_->allows(with(fit.layout.set(), e))) continue;
-    out.push_back(candidates_[e].local >= 0 ? judge_local(candidates_[e], e, beside, starts)
-                                            : judge(candidates_[e], e, beside, starts));
+    if (contains(marginal.set(), e) || candidates_[e].signatures.empty()) continue;
+    if (!system_->allows(with(marginal.set(), e))) continue;
+    out.push_back(candidates_[e].local >= 0 ? judge_local(candidates_[e], e, marginal, starts)
+                                            : judge(candidates_[e], e, marginal, starts));
   }
   std::stable_sort(out.begin(), out.end(),
                    [](const auto& a, const auto& b) { return a.log_bayes_factor > b.log_bayes_factor; });
   return out;
 }
 
-Proposal Proposals::judge(const Candidate& candidate, std::size_t e, const Beside& beside, std::size_t starts) const {
+Proposal Proposals::judge(const Candidate& candidate, std::size_t e, const Marginal& beside, std::size_t starts) const {
   const Effect& effect = system_->effects()[e];
   const Index columns = candidate.columns.front().cols(), width = candidate.width();
-  MatrixXd XX = MatrixXd::Zero(width, columns), XZ = MatrixXd::Zero(columns, beside.covariance.rows());
+  MatrixXd XX = MatrixXd::Zero(width, columns), XZ = MatrixXd::Zero(columns, beside.step().size());
   VectorXd Xw = VectorXd::Zero(columns);
-  for (std::size_t r = 0; r < beside.w.size(); ++r) {
+  for (std::size_t r = 0; r < beside.recordings(); ++r) {
     const MatrixXf& X = candidate.columns[r];
-    const MatrixXd products = (X.transpose() * beside.LZ[r]).cast<double>();
-    const Index nl = beside.inner[r].rows();
-    const MatrixXd own = products.leftCols(nl) * beside.inner[r];
-    XZ += products.rightCols(products.cols() - nl) - own * beside.lz[r];
-    Xw += (X.transpose() * beside.w[r]).cast<double>() - own * beside.pull[r];
-    for (Index c = 0; c < columns; c += width)
-      XX.middleCols(c, width) += (X.middleCols(c, width).transpose() * X.middleCols(c, width)).cast<double>() -
-                                 own.middleRows(c, width) * products.block(c, 0, width, nl).transpose();
+    const Marginal::Part part = beside.part(r, X);
+    XZ += part.across;
+    Xw += part.pull;
+    for (Index c = 0; c < columns; c += width) XX.middleCols(c, width) += part.square(X, c, width);
   }
-  Xw -= XZ * beside.step;
+  Xw -= XZ * beside.step();
   Proposal out{.effect = e, .starts = {}};
   std::vector<double> logs;
   for (const Signature& signature : candidate.signatures) {
     const auto across = XZ.middleRows(signature.first, width);
-    MatrixXd square = XX.middleCols(signature.first, width) - across * beside.covariance * across.transpose();
+    MatrixXd square = XX.middleCols(signature.first, width) - across * beside.covariance() * across.transpose();
     const VectorXd pull = Xw.segment(signature.first, width);
     StartPoint start{.shared = shared_part(effect, signature.values), .local = {}, .log_bayes_factor = kNever};
     if (candidate.amplitudes.empty()) {
@@ -245,21 +205,18 @@ Proposal Proposals::judge(const Candidate& candidate, std::size_t e, const Besid
   return out;
 }
 
-Proposal Proposals::judge_local(const Candidate& candidate, std::size_t e, const Beside& beside,
+Proposal Proposals::judge_local(const Candidate& candidate, std::size_t e, const Marginal& beside,
                                 std::size_t starts) const {
   const Effect& effect = system_->effects()[e];
-  const std::size_t recordings = beside.w.size();
+  const std::size_t recordings = beside.recordings();
   std::vector<VectorXd> pull(recordings), square(recordings);
   for (std::size_t r = 0; r < recordings; ++r) {
     const MatrixXf& X = candidate.columns[r];
-    const MatrixXd products = (X.transpose() * beside.LZ[r]).cast<double>();
-    const Index nl = beside.inner[r].rows();
-    const MatrixXd own = products.leftCols(nl) * beside.inner[r];
-    const MatrixXd XZ = products.rightCols(products.cols() - nl) - own * beside.lz[r];
-    pull[r] = (X.transpose() * beside.w[r]).cast<double>() - own * beside.pull[r] - XZ * beside.step;
+    const Marginal::Part part = beside.part(r, X);
+    pull[r] = part.pull - part.across * beside.step();
     square[r] = X.colwise().squaredNorm().transpose().cast<double>();
-    square[r] -= (own.cwiseProduct(products.leftCols(nl)).rowwise().sum() +
-                  (XZ * beside.covariance).cwiseProduct(XZ).rowwise().sum());
+    square[r] -= (part.own.cwiseProduct(part.by_own).rowwise().sum() +
+                  (part.across * beside.covariance()).cwiseProduct(part.across).rowwise().sum());
     square[r] = square[r].cwiseMax(0);
   }
   Proposal out{.effect = e, .starts = {}};
@@ -323,85 +280,62 @@ Proposal Proposals::judge_local(const Candidate& candidate, std::size_t e, const
   return out;
 }
 
-std::vector<std::pair<double, ModelSet>> Proposals::pairs(const Likelihood& likelihood, const Fit& base,
-                                                          std::size_t count) const {
-  const auto blocks = linearise(likelihood, base, {});
-  const ArrowSolution solution = solve_about(base, blocks, {});
-  const auto free = free_locals(base.layout);
-  // The likeliest signature of each effect, side by side.
-  const auto single = beside(likelihood, base, {}, 1);
-  std::vector<std::size_t> effects;
-  std::vector<Index> first, width;
+VectorXd Proposals::prior_precision(const Side& side) const {
+  const Candidate& candidate = candidates_[side.effect];
+  VectorXd out = VectorXd::Ones(side.width);
+  for (std::size_t a = 0; a < candidate.amplitudes.size(); ++a) {
+    const Parameter& p = system_->effects()[side.effect].parameters[candidate.amplitudes[a]];
+    const double unit =
+        candidate.signatures[side.signature].values[static_cast<Index>(candidate.amplitudes[a])] - p.none;
+    out[static_cast<Index>(a)] = unit * unit * precision_of(p.prior);
+  }
+  return out;
+}
+
+std::vector<MatrixXf> Proposals::side_by_side(std::vector<Side>& sides) const {
   Index columns = 0;
-  for (const auto& one : single) {
-    const Candidate& candidate = candidates_[one.effect];
-    if (candidate.local >= 0 || one.starts.empty()) continue;
-    effects.push_back(one.effect);
-    first.push_back(columns);
-    width.push_back(candidate.width());
-    columns += candidate.width();
+  for (Side& side : sides) {
+    side.first = columns;
+    side.width = candidates_[side.effect].width();
+    columns += side.width;
   }
-  MatrixXd XX = MatrixXd::Zero(columns, columns), XZ = MatrixXd::Zero(columns, base.shared.size());
-  VectorXd Xw = VectorXd::Zero(columns), precision = VectorXd::Zero(columns);
-  std::vector<Index> chosen(effects.size());
-  // The signature whose shape is nearest to the best start's.
-  for (std::size_t k = 0; k < effects.size(); ++k) {
-    const Candidate& candidate = candidates_[effects[k]];
-    const Effect& effect = system_->effects()[effects[k]];
-    VectorXd wanted;
-    for (const auto& one : single)
-      if (one.effect == effects[k]) wanted = one.starts.front().shared;
-    double nearest = std::numeric_limits<double>::infinity();
-    for (const Signature& signature : candidate.signatures) {
-      VectorXd apart = shared_part(effect, signature.values) - wanted;
-      Index i = 0;
-      for (std::size_t p = 0; p < effect.parameters.size(); ++p)
-        if (effect.parameters[p].scope == Scope::shared) {
-          if (!std::isnan(effect.parameters[p].none)) apart[i] = 0;
-          ++i;
-        }
-      if (apart.norm() < nearest) nearest = apart.norm(), chosen[k] = signature.first;
+  std::vector<MatrixXf> out;
+  for (std::size_t r = 0; !sides.empty() && r < candidates_[sides.front().effect].columns.size(); ++r) {
+    MatrixXf X(candidates_[sides.front().effect].columns[r].rows(), columns);
+    for (const Side& side : sides) {
+      const Candidate& candidate = candidates_[side.effect];
+      Index from = candidate.signatures[side.signature].first;
+      if (candidate.local >= 0) {
+        const auto choices = static_cast<Index>(candidate.choices[r].size());
+        from = from * choices + choices / 2;
+      }
+      X.middleCols(side.first, side.width) = candidate.columns[r].middleCols(from, side.width);
     }
-    for (std::size_t a = 0; a < candidate.amplitudes.size(); ++a) {
-      const Parameter& p = effect.parameters[candidate.amplitudes[a]];
-      const Index s = chosen[k] / candidate.width();
-      const double unit =
-          candidate.signatures[static_cast<std::size_t>(s)].values[static_cast<Index>(candidate.amplitudes[a])] -
-          p.none;
-      precision[first[k] + static_cast<Index>(a)] = unit * unit * precision_of(p.prior);
-    }
-    if (candidate.amplitudes.empty()) precision[first[k]] = 1;
+    out.push_back(std::move(X));
   }
-  Residuals residuals;
-  for (std::size_t r = 0; r < blocks.size(); ++r) {
-    likelihood.evaluate(base.layout, r, base.shared, base.local[r], true, residuals);
-    MatrixXd X(residuals.white.size(), columns);
-    for (std::size_t k = 0; k < effects.size(); ++k)
-      X.middleCols(first[k], width[k]) =
-          candidates_[effects[k]].columns[r].middleCols(chosen[k], width[k]).cast<double>();
-    const MatrixXd L = residuals.by_local(Eigen::all, free);
-    MatrixXd inner = blocks[r].ll;
-    inner.diagonal() += blocks[r].precision;
-    const MatrixXd XL = X.transpose() * L;
-    const MatrixXd own = inner.llt().solve(XL.transpose());
-    XX += X.transpose() * X - XL * own;
-    XZ += X.transpose() * residuals.by_shared - own.transpose() * blocks[r].lz;
-    Xw += X.transpose() * residuals.white -
-          own.transpose() * (blocks[r].lw + blocks[r].precision.cwiseProduct(blocks[r].centre));
-  }
-  Xw -= XZ * solution.shared;
-  XX -= XZ * solution.covariance * XZ.transpose();
+  return out;
+}
+
+std::vector<std::pair<double, ModelSet>> Proposals::pairs(const Marginal& base, std::size_t count) const {
+  std::vector<Side> sides;
+  for (const Proposal& one : beside(base, 1))
+    if (candidates_[one.effect].local < 0 && !one.starts.empty())
+      sides.push_back({.effect = one.effect, .signature = nearest_signature(one)});
   std::vector<std::pair<double, ModelSet>> out;
-  for (std::size_t i = 0; i < effects.size(); ++i)
+  if (sides.empty()) return out;
+  const Marginal::Added all = base.added(side_by_side(sides));
+  for (std::size_t i = 0; i < sides.size(); ++i)
     for (std::size_t j = 0; j < i; ++j) {
-      const ModelSet set = with({effects[i]}, effects[j]);
+      const ModelSet set = with({sides[i].effect}, sides[j].effect);
       if (!system_->allows(set)) continue;
       std::vector<Index> both;
-      for (Index a = 0; a < width[i]; ++a) both.push_back(first[i] + a);
-      for (Index a = 0; a < width[j]; ++a) both.push_back(first[j] + a);
-      MatrixXd square = XX(both, both);
-      const VectorXd pull = Xw(both), prior = precision(both);
+      for (const Side& side : {sides[i], sides[j]})
+        for (Index a = 0; a < side.width; ++a) both.push_back(side.first + a);
+      VectorXd prior(static_cast<Index>(both.size()));
+      prior << prior_precision(sides[i]), prior_precision(sides[j]);
+      MatrixXd square = all.square(both, both);
       square.diagonal() += prior;
+      const VectorXd pull = all.pull(both);
       const Eigen::LDLT<MatrixXd> factor(square);
       out.emplace_back(0.5 * (pull.dot(factor.solve(pull)) + prior.array().log().sum() -
                               factor.vectorD().array().max(1e-300).log().sum()),
@@ -410,6 +344,22 @@ std::vector<std::pair<double, ModelSet>> Proposals::pairs(const Likelihood& like
   std::stable_sort(out.begin(), out.end(), [](const auto& a, const auto& b) { return a.first > b.first; });
   if (out.size() > count) out.resize(count);
   return out;
+}
+
+// The signature whose shape is nearest to that of the best start, sizes apart.
+std::size_t Proposals::nearest_signature(const Proposal& proposal) const {
+  const Effect& effect = system_->effects()[proposal.effect];
+  const auto& signatures = candidates_[proposal.effect].signatures;
+  std::size_t best = 0;
+  double nearest = std::numeric_limits<double>::infinity();
+  for (std::size_t s = 0; s < signatures.size(); ++s) {
+    VectorXd apart = shared_part(effect, signatures[s].values) - proposal.starts.front().shared;
+    Index i = 0;
+    for (const Parameter& p : effect.parameters)
+      if (p.scope == Scope::shared) apart[i] = std::isnan(p.none) ? apart[i] : 0, ++i;
+    if (apart.norm() < nearest) nearest = apart.norm(), best = s;
+  }
+  return best;
 }
 
 }  // namespace bevel::inference

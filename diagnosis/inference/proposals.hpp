@@ -1,7 +1,7 @@
 #pragma once
 // What each effect would do to the readings, from a grid of starts, once, about the base; and from it, without any fit,
 // what each promises beside a set that was fitted: an estimate of its log Bayes factor, and where to begin.
-#include "diagnosis/inference/likelihood.hpp"
+#include "diagnosis/inference/marginal.hpp"
 
 namespace bevel::inference {
 
@@ -17,17 +17,30 @@ struct Proposal {
   std::vector<StartPoint> starts;  // the likeliest first
 };
 
+// What these readings can show of each effect, beside the base.
+struct Reach {
+  struct Size {
+    std::size_t effect = 0, parameter = 0;
+    double one_deviation = 0;  // a size whose visible part has one standard deviation of the noise, over all readings
+    double typical = 0;        // where fits begin
+    double absorbed = 0;       // share of the signature, in squares, that the base and the nuisances take over
+  };
+  std::vector<Size> sizes;           // of every parameter at which an effect vanishes
+  std::vector<std::size_t> effects;  // rows of
+  Eigen::MatrixXd cosine;            // between visible parts
+};
+
 class Proposals {
  public:
   // About a fit of the base alone.
   Proposals(const Likelihood& likelihood, const Fit& base, int threads);
 
-  // Every effect that may join the set, the likeliest first.
-  std::vector<Proposal> beside(const Likelihood& likelihood, const Fit& fit, const CurveColumns& curve,
-                               std::size_t starts) const;
+  // Every effect that may join the set of a fit, the likeliest first.
+  std::vector<Proposal> beside(const Marginal& fit, std::size_t starts) const;
   // Pairs beside the base, by their joint estimate, the likeliest first.
-  std::vector<std::pair<double, ModelSet>> pairs(const Likelihood& likelihood, const Fit& base,
-                                                 std::size_t count) const;
+  std::vector<std::pair<double, ModelSet>> pairs(const Marginal& base, std::size_t count) const;
+  // Of effects in the middle of their starts; what happens at an instant, in the middle of every recording.
+  Reach reach(const Marginal& base) const;
 
  private:
   struct Signature {
@@ -45,10 +58,18 @@ class Proposals {
       return local >= 0 ? 1 : std::max<Eigen::Index>(1, static_cast<Eigen::Index>(amplitudes.size()));
     }
   };
-  struct Beside;
+  // One signature of an effect, among columns of several effects.
+  struct Side {
+    std::size_t effect = 0, signature = 0;
+    Eigen::Index first = 0, width = 0;
+  };
   Candidate make_candidate(const Likelihood& likelihood, const Fit& base, std::size_t effect) const;
-  Proposal judge(const Candidate& candidate, std::size_t effect, const Beside& beside, std::size_t starts) const;
-  Proposal judge_local(const Candidate& candidate, std::size_t effect, const Beside& beside, std::size_t starts) const;
+  Proposal judge(const Candidate& candidate, std::size_t effect, const Marginal& beside, std::size_t starts) const;
+  Proposal judge_local(const Candidate& candidate, std::size_t effect, const Marginal& beside,
+                       std::size_t starts) const;
+  std::size_t nearest_signature(const Proposal& proposal) const;
+  std::vector<Eigen::MatrixXf> side_by_side(std::vector<Side>& sides) const;
+  Eigen::VectorXd prior_precision(const Side& side) const;
 
   const System* system_;
   std::vector<Candidate> candidates_;

@@ -6,7 +6,7 @@
 #include <stdexcept>
 
 #include "diagnosis/inference/log_sum.hpp"
-#include "diagnosis/inference/parallel.hpp"
+#include "diagnosis/parallel.hpp"
 
 namespace bevel::inference {
 namespace {
@@ -71,9 +71,9 @@ Search::Job Search::job_from(const Fit& fit, std::size_t effect, const StartPoin
 }
 
 void Search::keep(const ModelSet& set, const std::shared_ptr<const Evaluated>& at) {
-  Visited one{.set = set, .at = at, .log_prior = log_prior(set)};
+  Visited one{.set = set, .at = at};
   const double curve = std::exp(rules_.log_prior_odds_curve);
-  one.log_without_curve = one.log_prior + at->log_evidence - (std::log1p(curve));
+  one.log_without_curve = log_prior(set) + at->log_evidence - std::log1p(curve);
   one.log_with_curve = at->with_discrepancy
                            ? one.log_without_curve + rules_.log_prior_odds_curve + at->log_bayes_factor_curve
                            : -std::numeric_limits<double>::infinity();
@@ -89,7 +89,7 @@ void Search::evaluate_all(std::vector<Job> jobs) {
   std::vector<std::shared_ptr<const Evaluated>> results(jobs.size());
   parallel_for(jobs.size(), rules_.threads, [&](std::size_t i) {
     Job& job = jobs[i];
-    auto one = evaluate(*likelihood_, nullptr, job.layout, job.shared, job.local, job.nuisance_sd,
+    auto one = evaluate(*likelihood_, job.layout, job.shared, job.local, job.nuisance_sd,
                         best - rules_.window - rules_.doubt - log_prior(job.set));
     if (one.valid && (job.beside_curve || log_prior(job.set) + one.log_evidence > best - rules_.curve_window))
       add_discrepancy(*likelihood_, *discrepancy_, one);
@@ -100,8 +100,9 @@ void Search::evaluate_all(std::vector<Job> jobs) {
 }
 
 void Search::expand(const ModelSet& set) {
-  expanded_[set] = true;
+  expanded_.insert(set);
   const Visited here = visited_.at(set);
+  if (progress_) progress_(describe(system_, set));
   std::vector<Job> jobs;
   if (set.size() < rules_.largest) {
     // What is promised is relative to this set by the reference's noise.
@@ -125,11 +126,12 @@ void Search::expand(const ModelSet& set) {
     if (here.at->fit_with_curve && here.log_with_curve > here.log_without_curve) {
       const auto [beside_curve, more] = moved_to(likelihood_, *here.at->fit_with_curve, *discrepancy_);
       const CurveColumns curve = discrepancy_->columns(*likelihood_, *beside_curve.scales.curve);
-      add(beside_curve, proposals_->beside(*likelihood_, beside_curve, curve, rules_.starts),
+      add(beside_curve, proposals_->beside(Marginal(*likelihood_, beside_curve, curve), rules_.starts),
           here.log_with_curve + more, true);
     }
     // Without the curve too: an effect may take its place.
-    add(plain, proposals_->beside(*likelihood_, plain, {}, rules_.starts), here.log_without_curve + change, false);
+    add(plain, proposals_->beside(Marginal(*likelihood_, plain, {}), rules_.starts), here.log_without_curve + change,
+        false);
   }
   // Smaller sets, from which swaps come.
   for (const std::size_t effect : set) {
@@ -148,9 +150,12 @@ void Search::expand(const ModelSet& set) {
   evaluate_all(std::move(jobs));
 }
 
+Marginal Search::base_marginal() const { return {*likelihood_, visited_.at({}).at->fit, {}}; }
+
 double Search::best_log() const { return visited_.empty() ? 0 : best().log_posterior(); }
 
-void Search::run(const Readings& outliers, const Noise& noise) {
+void Search::run(const Readings& outliers, const Noise& noise, const Progress& progress) {
+  progress_ = progress;
   const Layout nothing(system_, {});
   VectorXd shared = nothing.shared_start();
   std::vector<VectorXd> local(system_.data().recordings.size(), nothing.local_start());
@@ -163,7 +168,7 @@ void Search::run(const Readings& outliers, const Noise& noise) {
   Noise reference = noise;
   for (std::size_t round = 0; round < rules_.rounds; ++round) {
     likelihood_ = std::make_shared<const Likelihood>(system_, outliers, reference);
-    Evaluated base = evaluate(*likelihood_, nullptr, nothing, shared, local, nuisance_sd);
+    Evaluated base = evaluate(*likelihood_, nothing, shared, local, nuisance_sd);
     if (!base.valid) throw std::domain_error("the model cannot follow the recordings");
     discrepancy_ = std::make_unique<const Discrepancy>(*likelihood_, base.fit);
     add_discrepancy(*likelihood_, *discrepancy_, base);
@@ -194,17 +199,17 @@ void Search::look_around() {
   expand({});
   // Pairs of which neither by itself comes near.
   std::vector<Job> jobs;
-  for (const auto& [promise, set] : proposals_->pairs(*likelihood_, visited_.at({}).at->fit, rules_.pairs)) {
+  std::map<std::size_t, std::vector<Proposal>> known;  // beside one effect
+  for (const auto& [promise, set] : proposals_->pairs(base_marginal(), rules_.pairs)) {
     if (is_visited(set)) continue;
-    for (const std::size_t first : set) {
-      const auto single = visited_.find({first});
-      if (single == visited_.end()) continue;
-      const std::size_t second = set[0] == first ? set[1] : set[0];
-      for (const Proposal& one : proposals_->beside(*likelihood_, single->second.at->fit, {}, 1))
-        if (one.effect == second && !one.starts.empty())
-          jobs.push_back(job_from(single->second.at->fit, second, one.starts.front()));
-      break;
-    }
+    const std::size_t first = is_visited({set[0]}) ? set[0] : set[1], second = set[0] + set[1] - first;
+    const auto single = visited_.find({first});
+    if (single == visited_.end()) continue;
+    if (!known.contains(first))
+      known[first] = proposals_->beside(Marginal(*likelihood_, single->second.at->fit, {}), 1);
+    for (const Proposal& one : known[first])
+      if (one.effect == second && !one.starts.empty())
+        jobs.push_back(job_from(single->second.at->fit, second, one.starts.front()));
   }
   evaluate_all(std::move(jobs));
   while (fits_ < rules_.most_fits) {

@@ -4,6 +4,7 @@
 #include <functional>
 #include <map>
 #include <memory>
+#include <set>
 
 #include "diagnosis/inference/evidence.hpp"
 #include "diagnosis/inference/proposals.hpp"
@@ -30,7 +31,6 @@ struct SearchRules {
 struct Visited {
   ModelSet set;
   std::shared_ptr<const Evaluated> at;
-  double log_prior = 0;
   double log_without_curve = 0, log_with_curve = 0;  // log of prior x evidence
   double log_posterior() const;
 };
@@ -39,13 +39,22 @@ class Search {
  public:
   Search(const System& system, const SearchRules& rules) : system_(system), rules_(rules) {}
 
+  // Told what is looked around next; may throw to stop.
+  using Progress = std::function<void(const std::string&)>;
   // From readings without those outliers, and a noise to begin with. What the linear model promises depends on the
-  // noise: it is asked again with that of the likeliest set, until that is the same.
-  void run(const Readings& outliers, const Noise& noise);
+  // noise: it is asked again with that of the likeliest set, until that is the same. Throws std::domain_error where
+  // the model without effects cannot follow the recordings.
+  void run(const Readings& outliers, const Noise& noise, const Progress& progress = {});
   const std::map<ModelSet, Visited>& visited() const { return visited_; }
   const Visited& best() const;
   const System& system() const { return system_; }
   const Discrepancy& discrepancy() const { return *discrepancy_; }
+  const Proposals& proposals() const { return *proposals_; }
+  const SearchRules& rules() const { return rules_; }
+  // The base alone, by the noise that promises were made with.
+  Marginal base_marginal() const;
+  // Log posteriors of sets that the linear model promised, fitted since or not.
+  const std::map<ModelSet, double>& promised() const { return promised_; }
   // Log of the share of sets that were judged by the linear model alone, by its estimate.
   double log_not_visited() const;
   double log_prior(const ModelSet& set) const;
@@ -74,7 +83,8 @@ class Search {
   std::unique_ptr<const Discrepancy> discrepancy_;
   std::unique_ptr<const Proposals> proposals_;
   std::map<ModelSet, Visited> visited_;
-  std::map<ModelSet, bool> expanded_;
+  std::set<ModelSet> expanded_;
+  Progress progress_;
   std::map<ModelSet, double> promised_;  // log posterior of sets that were not fitted
   std::size_t fits_ = 0;
 };

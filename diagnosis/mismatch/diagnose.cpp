@@ -4,18 +4,24 @@
 #include <chrono>
 #include <cmath>
 #include <limits>
+#include <stdexcept>
 
-#include "diagnosis/mismatch/calibration.hpp"
-#include "diagnosis/mismatch/conclusions.hpp"
-#include "diagnosis/mismatch/gates.hpp"
+#include "diagnosis/mismatch/checks.hpp"
+#include "diagnosis/mismatch/found_effects.hpp"
+#include "diagnosis/mismatch/held_out.hpp"
 #include "diagnosis/mismatch/location.hpp"
-#include "diagnosis/mismatch/selection.hpp"
+#include "diagnosis/mismatch/reach.hpp"
+#include "diagnosis/mismatch/sentence.hpp"
 
 namespace bevel::diagnosis {
+
+using Eigen::Index;
+using Eigen::VectorXd;
+
 namespace {
 
-constexpr int kNoiseRounds = 3;
 constexpr std::size_t kFewReadings = 40;
+constexpr std::size_t kExplanations = 8;  // that are printed
 
 class Stages {
  public:
@@ -39,25 +45,35 @@ class Stages {
   std::chrono::steady_clock::time_point start_;
 };
 
-// Leave-one-out, before and after, with the figures per recording.
-HeldOut hold_out(const Evidence& evidence, const Fit& before, const Fit& after, int threads) {
-  HeldOut out;
-  const HeldOutFit without = leave_one_out(evidence, before, threads);
-  const HeldOutFit with = leave_one_out(evidence, after, threads);
-  std::size_t count_before = 0, count_after = 0;
-  for (std::size_t r = 0; r < evidence.recorded->recordings.size(); ++r) {
-    HeldOutRecording one{.log = evidence.recorded->recordings[r].name, .before = {}, .after = {}};
-    one.before = figures_of(evidence, before.hypothesis, r, without.values[r], out.before, count_before);
-    one.after = figures_of(evidence, after.hypothesis, r, with.values[r], out.after, count_after);
-    out.recordings.push_back(one);
+// The noise to begin with and the outliers: what a flexible curve leaves beside the needle alone.
+inference::Calibration calibrate(const NeedleSystem& system) {
+  const std::size_t recordings = system.data().recordings.size();
+  inference::Noise claimed;
+  claimed.frame_s = system.data().frame_s;
+  claimed.sigma = system.data().claimed_sd;
+  const inference::Layout nothing(system, {});
+  const std::vector<VectorXd> local(recordings, nothing.local_start());
+  const inference::Likelihood likelihood(system, inference::Readings(recordings), claimed);
+  VectorXd nuisance_sd(static_cast<Index>(system.nuisance_groups().size()));
+  for (Index g = 0; g < nuisance_sd.size(); ++g) {
+    const auto& values = system.nuisance_groups()[static_cast<std::size_t>(g)].standard_deviations;
+    nuisance_sd[g] = values[values.size() / 2];
   }
-  for (auto [figures, count] : {std::pair{&out.before, count_before}, std::pair{&out.after, count_after}}) {
-    const auto n = static_cast<double>(std::max<std::size_t>(count, 1));
-    figures->rmse_mm = std::sqrt(figures->rmse_mm / n);
-    figures->chi2_per_dof /= n;
+  const auto base = fit(likelihood, nothing, nothing.shared_start(), local, {.nuisance_sd = nuisance_sd, .curve = {}});
+  if (!base.valid)
+    throw std::invalid_argument(
+        "the model in use cannot follow these recordings: with it the tip leaves the domain of the slip law; check the "
+        "model file's curvature_per_mm and lambda, and that insertion and rotation are logged in mm and rad");
+  inference::Errors errors(recordings);
+  for (std::size_t r = 0; r < recordings; ++r) {
+    const VectorXd all = likelihood.errors(nothing, r, base.shared, base.local[r]);
+    Index row = 0;
+    for (const auto& series : system.data().recordings[r].series) {
+      errors[r].push_back(all.segment(row, static_cast<Index>(series.time_s.size())));
+      row += static_cast<Index>(series.time_s.size());
+    }
   }
-  out.gain = without.total() - with.total();
-  return out;
+  return calibrate_noise(system.data(), errors);
 }
 
 void remark_on_short_recordings(const RecordedCase& recorded, Findings& findings) {
@@ -69,98 +85,122 @@ void remark_on_short_recordings(const RecordedCase& recorded, Findings& findings
         " readings: the cameras' noise is hardly known, and what is quicker than a few readings cannot be seen");
 }
 
-// No name holds, and what the curves leave is no noise: there is nothing to measure the noise beside.
-bool hopeless(const Evidence& evidence, const Fit& fit) {
-  const EffectSet& set = fit.hypothesis.set();
-  return std::all_of(set.begin(), set.end(), is_correction) && examine_remains(evidence, fit).has_structure();
+void remark_on_bounds(Findings& findings) {
+  for (const FoundEffect& effect : findings.effects)
+    for (const FoundParameter& parameter : effect.parameters)
+      if (parameter.at_bound)
+        findings.remarks.push_back(effect.name + ": " + parameter.name +
+                                   " lies at the end of the range that fits allow; it is a limit, not a measurement");
 }
 
-// A name that does not foretell is not physics, and a nameless curve that does not is no description.
-void drop_what_does_not_foretell(Selection& selection, const Fit& base, EffectSet& set, Findings& findings,
-                                 int threads) {
-  const Evidence& evidence = selection.evidence();
-  const auto drop = [&](EffectSet::iterator member) {
-    const EffectSet rest = without_member(set, static_cast<std::size_t>(member - set.begin()));
-    findings.remarks.push_back(std::string(member->effect->name()) + " beside " + describe(rest) +
-                               " fits, but foretells recordings that it was not fitted on no better: it was dropped");
-    set = rest;
-    findings.held_out = hold_out(evidence, base, *selection.fit_of(set), threads);
-  };
-  const auto foretold = [&](const EffectSet& of) {
-    return leave_one_out(evidence, *selection.fit_of(of), threads).total();
-  };
-  const auto idle_curve = [&] {
-    if (std::none_of(set.begin(), set.end(), is_correction)) return set.end();
-    const double with = foretold(set);
-    return std::find_if(set.begin(), set.end(), [&](const Member& member) {
-      return is_correction(member) &&
-             !(with < foretold(without_member(set, static_cast<std::size_t>(&member - set.data()))));
-    });
-  };
-  for (auto idle = idle_curve(); idle != set.end(); idle = idle_curve()) drop(idle);
-  while (!set.empty() && findings.held_out.gain <= 0) drop(std::prev(set.end()));
+void list_explanations(const inference::Search& search, const inference::Posterior& posterior, Findings& findings) {
+  for (const auto& share : posterior.sets) {
+    if (findings.explanations.size() == kExplanations) break;
+    Explanation one{.effects = {}, .probability = share.probability, .with_discrepancy = share.with_discrepancy};
+    for (const std::size_t e : share.set) one.effects.push_back(search.system().effects()[e].label);
+    findings.explanations.push_back(std::move(one));
+  }
+  findings.nothing_probability = posterior.nothing;
+  findings.discrepancy_probability = posterior.discrepancy;
+  findings.not_visited = posterior.not_visited;
+}
+
+// The decision against what comes nearest to it.
+std::optional<NextExperiment> next_experiment(const inference::Search& search, const inference::Posterior& posterior,
+                                              const Decision& decision, const ChosenModel& base,
+                                              const Experiments& experiments) {
+  const auto& chosen = decision.model.fit->layout.set();
+  if (decision.verdict == Verdict::unknown_effect) {
+    // Against the likeliest explanation without a discrepancy, or the needle alone.
+    const DiscrepancyValues curve = decision.model.discrepancy();
+    for (const auto& share : posterior.sets)
+      if (!share.set.empty() && share.set != chosen) {
+        const auto& fit = search.visited().at(share.set).at->fit;
+        return experiments.best(imagined(*decision.model.fit, decision.model, &curve),
+                                imagined(fit, model_of(search, fit, 0)));
+      }
+    return experiments.best(imagined(*decision.model.fit, decision.model, &curve), imagined(*base.fit, base));
+  }
+  for (const auto& share : posterior.sets) {
+    if (share.set == chosen) continue;
+    const auto& fit = search.visited().at(share.set).at->fit;
+    const Imagined rival = imagined(fit, model_of(search, fit, 0));
+    const Imagined found = imagined(*decision.model.fit, decision.model);
+    // Where nothing was found, the rival would have to be true to be seen.
+    return chosen.empty() ? experiments.best(rival, found) : experiments.best(found, rival);
+  }
+  return std::nullopt;
 }
 
 }  // namespace
 
-Findings diagnose(const RecordedCase& original, const model::NeedleParameters& model, const DiagnosisOptions& options) {
+std::string_view name_of(Verdict verdict) {
+  switch (verdict) {
+    case Verdict::nothing_missing:
+      return "nothing-missing";
+    case Verdict::effects_found:
+      return "effects-found";
+    case Verdict::unknown_effect:
+      return "unknown-effect";
+  }
+  return "unknown-effect";
+}
+
+Findings diagnose(const RecordedCase& recorded, const model::NeedleParameters& model, const DiagnosisOptions& options) {
   Findings findings;
   findings.model_file = model;
-  findings.seed = options.seed;
-  findings.bootstrap_draws = options.bootstrap_draws;
-  for (const auto& channel : original.channels) findings.channels.push_back(channel.name);
+  for (const auto& channel : recorded.channels) findings.channels.push_back(channel.name);
   Stages stages(options, findings.times);
 
-  stages.begin("fitting the needle's own parameters");
-  Evidence evidence;
-  RecordedCase recorded = original;
-  evidence.recorded = &recorded;
-  evidence.belief = model;
-  evidence.noise.frame_s = original.frame_s;
-  for (const auto& channel : original.channels) evidence.noise.sigma_mm.push_back(channel.claimed_sigma_mm);
-  const Hypothesis nothing(model, {}, original);
-  Fit base = fit(evidence, nothing, nothing.start());
-  if (!base.valid)
-    throw std::invalid_argument(
-        "the model in use cannot follow these recordings: with it the tip leaves the domain of the slip law; check the "
-        "model file's curvature_per_mm and lambda, and that insertion and rotation are logged in mm and rad");
-
   stages.begin("measuring the cameras' noise");
-  Calibration calibration = calibrate_noise(original, errors_of(evidence, base));
-  SelectionRules rules;
-  rules.seed = options.seed;
-  rules.threads = options.threads;
-  rules.bootstrap_draws = options.bootstrap_draws;
-  rules.largest_set = options.largest_set;
-  EffectSet set;
-  std::unique_ptr<Selection> selection;
-  for (int round = 0;; ++round) {
-    recorded = without(original, calibration.outliers);
-    evidence.noise = calibration.noise;
-    base = fit(evidence, nothing, base.values);
-    stages.begin(round == 0 ? "trying every effect" : "trying again with the noise as it now stands");
-    selection = std::make_unique<Selection>(evidence, base, rules, options.progress);
-    set = selection->select();
-    if (round + 1 == kNoiseRounds) break;
-    // Missing physics may have passed for noise, or for outliers: with the best explanation both are measured again.
-    if (set.empty() || hopeless(evidence, *selection->fit_of(set))) break;
-    const Calibration again = calibrate_beside(original, evidence, *selection->fit_of(set));
-    if (settled(calibration, again)) break;
-    calibration = again;
-  }
-  findings.noise = evidence.noise;
-  remark_on_short_recordings(original, findings);
-  for (const auto& recording : original.recordings) findings.readings += recording.motion.at.size();
+  const NeedleSystem system(recorded, model);
+  const inference::Calibration calibration = calibrate(system);
+  for (const auto& recording : recorded.recordings) findings.readings += recording.motion.at.size();
   for (const auto& readings : calibration.outliers) findings.outliers += readings.size();
 
-  stages.begin("foretelling each recording from the others");
-  findings.held_out = hold_out(evidence, base, *selection->fit_of(set), options.threads);
-  drop_what_does_not_foretell(*selection, base, set, findings, options.threads);
+  stages.begin("comparing sets of effects");
+  inference::SearchRules rules;
+  rules.threads = options.threads;
+  rules.largest = options.largest_set;
+  inference::Search search(system, rules);
+  search.run(calibration.outliers, calibration.noise, [&](const std::string& set) {
+    if (options.progress) options.progress("comparing sets of effects: beside " + set);
+  });
+  const inference::Posterior posterior = posterior_of(search, kDiscrepancySize);
+  const Decision decision = decide(search, posterior);
+  findings.verdict = decision.verdict;
+  list_explanations(search, posterior, findings);
 
-  stages.begin("intervals, rivals and the next experiment");
-  conclude(*selection, base, set, findings, options.threads);
-  findings.where = set.empty() ? std::vector<Location>{} : locate(evidence, base, *selection->fit_of(set), 3);
-  findings.traces = make_traces(evidence, original, base, *selection->fit_of(set), model);
+  stages.begin("intervals and rivals");
+  const inference::Unknowns unknowns(search);
+  findings.noise = decision.model.fit->likelihood->noise();
+  findings.noise.outlier_share = calibration.noise.outlier_share;
+  const inference::Fit base_fit = refitted_base(search, *decision.model.fit);
+  const ChosenModel base = model_of(search, base_fit, 0);
+  findings.effects = found_effects(system, search, posterior, unknowns, decision.model);
+  findings.discrepancies = discrepancies_of(search, decision.model);
+  findings.variation = variation_of(search, unknowns);
+  findings.needle = needle_estimate(system, decision.model);
+  const inference::Fit& alone = search.visited().at({}).at->fit;
+  findings.base = needle_estimate(system, model_of(search, alone, 0));
+  findings.tried = tried_beside(search, {});
+  if (!decision.model.fit->layout.set().empty())
+    findings.beside = tried_beside(search, decision.model.fit->layout.set());
+  findings.checks = check_model(search, decision.model, calibration.outliers, calibration.noise);
+
+  stages.begin("predicting each recording from the others");
+  findings.held_out = hold_out(system, search, base);
+
+  stages.begin("what these recordings could have shown");
+  const Experiments experiments(system, findings.noise);
+  find_reach(system, search, base, experiments, findings);
+  findings.next_experiment = next_experiment(search, posterior, decision, base, experiments);
+
+  if (findings.verdict != Verdict::nothing_missing) findings.where = locate(system, base, decision.model, 3);
+  findings.traces = make_traces(system, calibration.outliers, base, decision.model, model);
+  remark_on_short_recordings(recorded, findings);
+  remark_on_bounds(findings);
+  findings.sentence = sentence_of(findings);
   stages.end();
   return findings;
 }

@@ -1,24 +1,20 @@
 #pragma once
-// From recordings and a model in use to a verdict: what physics was left out. The order of work is that of
-// docs/diagnosis.md; deterministic for a seed, whatever the number of threads.
+// From recordings and a model in use to a verdict: what physics was left out. Everything follows from one posterior
+// (diagnosis/inference); deterministic, whatever the number of threads.
 #include <functional>
 
 #include "diagnosis/mismatch/findings.hpp"
-#include "diagnosis/mismatch/hypothesis.hpp"
 
 namespace bevel::diagnosis {
 
 struct DiagnosisOptions {
-  std::uint64_t seed = 1;
   int threads = 2;
-  int bootstrap_draws = 400;
-  int largest_set = 3;
+  std::size_t largest_set = 3;
   // Called between stages with a sentence of progress; may throw to stop.
   std::function<void(const std::string&)> progress;
 };
 
-// `model` is what is in use. Throws std::invalid_argument with one
-// sentence for input that cannot be diagnosed.
+// `model` is what is in use. Throws std::invalid_argument with one sentence for input that cannot be diagnosed.
 Findings diagnose(const RecordedCase& recorded, const model::NeedleParameters& model, const DiagnosisOptions& options);
 
 }  // namespace bevel::diagnosis

@@ -7,6 +7,11 @@
 #include <numbers>
 
 namespace bevel::diagnosis {
+
+using Eigen::Index;
+using Eigen::MatrixXd;
+using Eigen::VectorXd;
+
 namespace {
 
 constexpr double kPi = std::numbers::pi;
@@ -47,6 +52,13 @@ class Script {
   double frame_s_;
   std::vector<model::ActuatorState> actuators_;
 };
+
+double deepest_mm(const RecordedCase& recorded) {
+  double depth = 0;
+  for (const auto& recording : recorded.recordings)
+    for (const auto& node : recording.motion.nodes) depth = std::max(depth, node.insertion_mm);
+  return depth;
+}
 
 }  // namespace
 
@@ -109,52 +121,77 @@ std::vector<MotionScript> motion_scripts(double depth_mm, double frame_s) {
   return all;
 }
 
-double separation(const Evidence& evidence, const MotionScript& script, const Fit& truth, const Fit& rival) {
-  RecordedCase imagined;
-  imagined.channels = evidence.recorded->channels;
-  imagined.frame_s = evidence.recorded->frame_s;
-  Recording recording;
-  recording.name = "imagined";
-  recording.motion = script.motion;
-  model::OpenLoop path;
-  // Phases and instants of a recording that is still to be made: those of the first one stand for them.
-  if (!model::predict(truth.hypothesis.make_needle(0, truth.values, false), script.motion, path)) return 0;
-  for (const auto& channel : imagined.channels) {
-    Series series;
+Experiments::Experiments(const NeedleSystem& system, const inference::Noise& noise)
+    : system_(system), scripts_(motion_scripts(deepest_mm(system.recorded()), system.data().frame_s)) {
+  RecordedCase planned;
+  planned.channels = system.recorded().channels;
+  planned.frame_s = system.recorded().frame_s;
+  for (const MotionScript& script : scripts_) {
+    Recording recording;
+    recording.name = script.text;
+    recording.motion = script.motion;
+    inference::Series series;
     for (std::size_t i = 0; i < script.motion.at.size(); ++i) {
-      series.reading.push_back(i);
+      series.message.push_back(i);
       series.time_s.push_back(script.motion.nodes[script.motion.at[i]].time_s);
-      series.measured_mm.push_back(channel.axis.dot(path.position_mm[i]));
+      series.measured.push_back(0);
       series.relative_sd.push_back(1);
     }
-    recording.series.push_back(std::move(series));
+    recording.series.assign(planned.channels.size(), series);
+    planned.recordings.push_back(std::move(recording));
   }
-  imagined.recordings.push_back(std::move(recording));
-  Evidence new_evidence = evidence;
-  new_evidence.recorded = &imagined;
-  Workspace workspace;
-  if (!evaluate(new_evidence, rival.hypothesis, 0, rival.values, true, workspace)) return 0;
-  // The rival may move its parameters, as far as what is recorded already lets it.
-  const auto& columns = rival.hypothesis.columns(0);
-  const auto n = static_cast<Eigen::Index>(columns.size());
-  Eigen::MatrixXd A = workspace.residuals.jacobian.transpose() * workspace.residuals.jacobian;
-  for (Eigen::Index i = 0; i < n; ++i)
-    for (Eigen::Index j = 0; j < n; ++j)
-      A(i, j) += rival.information(columns[static_cast<std::size_t>(i)], columns[static_cast<std::size_t>(j)]);
-  A.diagonal().array() += 1e-12 * A.diagonal().maxCoeff();
-  const Eigen::VectorXd b = workspace.residuals.jacobian.transpose() * workspace.residuals.white;
-  return std::max(0.0, workspace.residuals.white.squaredNorm() - b.dot(A.ldlt().solve(b)));
+  planned_ = std::make_unique<const NeedleSystem>(std::move(planned), system.model());
+  likelihood_ = std::make_unique<const inference::Likelihood>(*planned_, inference::Readings(scripts_.size()), noise);
 }
 
-NextExperiment best_experiment(const Evidence& evidence, const Fit& truth, const Fit& rival, double depth_mm) {
-  NextExperiment best;
-  best.separates = {describe(truth.hypothesis.set()), describe(rival.hypothesis.set())};
-  best.expected_gain = -1;
-  for (const auto& script : motion_scripts(depth_mm, evidence.recorded->frame_s)) {
-    const double gain = separation(evidence, script, truth, rival);
-    if (gain > best.expected_gain) best.script = script.text, best.expected_gain = gain;
-  }
-  return best;
+double Experiments::separation(std::size_t script, const Imagined& truth, const Imagined& rival) const {
+  const model::Motion& motion = scripts_[script].motion;
+  std::vector<Eigen::Vector3d> path;
+  if (!system_.tip_path(truth.set, motion, truth.shared, truth.local, truth.discrepancy, path)) return 0;
+  inference::Prediction prediction;
+  if (!planned_->predict(rival.set, script, rival.shared, rival.local, true, prediction)) return 0;
+  VectorXd difference = -prediction.reading;
+  Index row = 0;
+  for (const Channel& channel : system_.recorded().channels)
+    for (const auto& position : path) difference[row++] += channel.axis.dot(position);
+  const MatrixXd white = likelihood_->whitened(script, difference);
+  // The rival may move its parameters, as far as what is recorded already lets it, and call it another insertion.
+  MatrixXd J(difference.size(), prediction.by_shared.cols() + prediction.by_local.cols());
+  J << likelihood_->whitened(script, prediction.by_shared), likelihood_->whitened(script, prediction.by_local);
+  MatrixXd A = J.transpose() * J;
+  const Index shared = prediction.by_shared.cols();
+  A.topLeftCorner(shared, shared) += rival.information.topLeftCorner(shared, shared);
+  for (Index i = 0; i < prediction.by_local.cols(); ++i)
+    A(shared + i, shared + i) += i < rival.local_precision.size() ? rival.local_precision[i] : 0;
+  A.diagonal().array() += 1e-12 * A.diagonal().maxCoeff();
+  const VectorXd b = J.transpose() * white;
+  return std::max(0.0, white.squaredNorm() - b.dot(A.ldlt().solve(b)));
+}
+
+NextExperiment Experiments::best(const Imagined& truth, const Imagined& rival) const {
+  NextExperiment out;
+  out.separates = {describe(system_, truth.set), describe(system_, rival.set)};
+  if (truth.discrepancy) out.separates[0] = "a discrepancy beside " + out.separates[0];
+  out.expected_gain = -1;
+  for (std::size_t s = 0; s < scripts_.size(); ++s)
+    if (const double gain = separation(s, truth, rival); gain > out.expected_gain)
+      out.script = scripts_[s].text, out.expected_gain = gain;
+  return out;
+}
+
+Imagined imagined(const inference::Fit& fit, const ChosenModel& model, const DiscrepancyValues* discrepancy) {
+  Imagined out{.set = fit.layout.set(), .shared = fit.shared, .local = fit.local.front(), .discrepancy = discrepancy};
+  for (std::size_t i = 0; i < fit.layout.local().size(); ++i)
+    if (!fit.layout.is_scanned(i)) out.local[static_cast<Index>(i)] = 0;
+  out.information = solve_about(fit, model.blocks, model.curve).information;
+  out.local_precision = VectorXd::Zero(out.local.size());
+  for (std::size_t i = 0; i < fit.layout.local().size(); ++i)
+    if (!fit.layout.is_scanned(i)) {
+      const auto group = static_cast<Index>(fit.layout.system().nuisances()[i].group);
+      const double sd = std::max(fit.scales.nuisance_sd[group], 1e-9);
+      out.local_precision[static_cast<Index>(i)] = 1 / (sd * sd);
+    }
+  return out;
 }
 
 }  // namespace bevel::diagnosis

@@ -1,8 +1,7 @@
 #pragma once
 // What to record next: of a list of safe motions, the one in which two explanations would differ most, the rival's own
 // parameters refitted; or in which an effect that these recordings cannot show would show.
-#include "diagnosis/mismatch/findings.hpp"
-#include "diagnosis/mismatch/likelihood.hpp"
+#include "diagnosis/mismatch/decision.hpp"
 
 namespace bevel::diagnosis {
 
@@ -13,9 +12,30 @@ struct MotionScript {
 // Insertions of at most depth_mm, at most 10 mm/s and 2 pi rad/s; readings every frame_s.
 std::vector<MotionScript> motion_scripts(double depth_mm, double frame_s);
 
-// Expected fall of chi2 from `rival` to `truth` in one recording of the script.
-double separation(const Evidence& evidence, const MotionScript& script, const Fit& truth, const Fit& rival);
+// A model in a recording that is still to be made. Phases and instants: those of the first recording stand for them.
+struct Imagined {
+  inference::ModelSet set;
+  Eigen::VectorXd shared, local;
+  const DiscrepancyValues* discrepancy = nullptr;
+  Eigen::MatrixXd information{};      // of the shared unknowns, from what is recorded already
+  Eigen::VectorXd local_precision{};  // of what differs between insertions
+};
+Imagined imagined(const inference::Fit& fit, const ChosenModel& model, const DiscrepancyValues* discrepancy = nullptr);
 
-NextExperiment best_experiment(const Evidence& evidence, const Fit& truth, const Fit& rival, double depth_mm);
+class Experiments {
+ public:
+  // As deep as these recordings, with their cameras and this noise. The system has to outlive it.
+  Experiments(const NeedleSystem& system, const inference::Noise& noise);
+  const std::vector<MotionScript>& scripts() const { return scripts_; }
+  // Expected fall of chi2 from `rival` to `truth` in one recording of a script.
+  double separation(std::size_t script, const Imagined& truth, const Imagined& rival) const;
+  NextExperiment best(const Imagined& truth, const Imagined& rival) const;
+
+ private:
+  const NeedleSystem& system_;
+  std::vector<MotionScript> scripts_;
+  std::unique_ptr<const NeedleSystem> planned_;
+  std::unique_ptr<const inference::Likelihood> likelihood_;
+};
 
 }  // namespace bevel::diagnosis

@@ -5,7 +5,8 @@
 #include <string>
 #include <vector>
 
-#include "diagnosis/mismatch/noise.hpp"
+#include "diagnosis/inference/noise.hpp"
+#include "diagnosis/needle/recorded_case.hpp"
 
 namespace bevel::diagnosis {
 
@@ -14,9 +15,9 @@ std::string_view name_of(Verdict verdict);  // "nothing-missing", ...
 
 struct FoundParameter {
   std::string name;
-  double value = 0;
-  double std_error = 0;
-  std::array<double, 2> ci95{};  // profile likelihood; an instant's: where it may as well have been
+  double value = 0;      // of the model that is written
+  double std_error = 0;  // about it: over all explanations that hold the effect, with and without a discrepancy
+  std::array<double, 2> ci95{};
   bool at_bound = false;
 };
 
@@ -28,14 +29,13 @@ struct FoundInRecording {
 
 struct FoundEffect {
   std::string name;
-  std::string meaning;  // one clause
-  double probability = 0;
-  std::vector<std::string> ambiguous_with;
-  std::vector<FoundParameter> parameters;
-  std::vector<FoundInRecording> recordings;
-  double gain = 0;            // fall of chi2 when it is the last to enter
-  double threshold = 0;       // what chance brings, anywhere in the library, in 1 of 100
-  double visible_sigmas = 0;  // of the part that the needle's own parameters cannot absorb
+  std::string meaning;                        // one clause
+  double probability = 0;                     // of being in the model
+  std::vector<std::string> ambiguous_with{};  // at odds of less than 20 to 1 in its place
+  std::vector<FoundParameter> parameters{};
+  std::vector<FoundInRecording> recordings{};
+  double log_bayes_factor = 0;  // natural: beside the others, against its absence
+  double visible_sigmas = 0;    // root of the fall of chi2 that it brings beside the others
 };
 
 // Where the model in use (its needle refitted) goes wrong most.
@@ -48,26 +48,41 @@ struct Location {
   double share = 0;  // of the whole mismatch, in chi2
 };
 
+// Of scalar readings. chi2 counts what was not known beforehand too (parameters, variation between insertions): 1 is a
+// prediction that knows how sure it is.
 struct FitFigures {
-  double rmse_mm = 0, max_mm = 0, chi2_per_dof = 0;  // per scalar reading
+  double rmse_mm = 0, rmse_se_mm = 0;  // its standard error: from recording to recording
+  double max_mm = 0, chi2_per_dof = 0;
+  double log_density = 0, log_density_se = 0;  // predictive, natural, per reading, of mm
 };
 struct HeldOutRecording {
   std::string log;
   FitFigures before, after;
 };
+// Each recording predicted as a new insertion.
 struct HeldOut {
-  FitFigures before, after;  // leave one recording out: needle refitted, without and with what was found
+  FitFigures as_it_stands;   // by the model file; noise alone is known
+  FitFigures before, after;  // refitted to the others: the needle alone, and what the others select
+  FitFigures noise_floor;    // of a prediction that is true and sure
   std::vector<HeldOutRecording> recordings;
-  double gain = 0;  // fall of held-out chi2
+  double gain = 0;  // of log predictive density, natural, over all recordings
 };
 
-// One line of the ranking: an effect tried alone (or beside what was found).
+// A set of effects and its share in the posterior.
+struct Explanation {
+  std::vector<std::string> effects;
+  double probability = 0;
+  double with_discrepancy = 0;  // part of it
+};
+
+// One line of the ranking: an effect tried alone, or beside what was found.
 struct TriedEffect {
   std::string name;
-  std::string beside;  // "" = alone
-  double gain = 0, chance = 0, threshold = 0, evidence = 0;
-  std::vector<std::pair<std::string, double>> parameters;
-  bool passes = false;
+  std::string beside;           // "" = alone
+  double log_bayes_factor = 0;  // natural, against its absence
+  bool fitted = false;          // else estimated from the linear model
+  bool likelier = false;        // its prior odds included
+  std::vector<std::pair<std::string, double>> parameters{};
 };
 
 // The smallest size that these recordings would have shown.
@@ -75,17 +90,27 @@ struct DetectableSize {
   std::string effect, parameter;
   double size = 0;         // against "none"; infinite: cannot be shown at all
   double typical = 0;      // what the field reports, for comparison (a start of the fits)
-  double absorbed = 0;     // share of its signature that k, lambda1, lambda2 take over
+  double absorbed = 0;     // share of its signature that k, lambda1, lambda2 and the variation take over
   std::string experiment;  // motion that would show it, if this size is above typical
 };
 
 // What remains unexplained, described: which quantity of the motion is off by how much, against what.
-struct Correction {
+struct Discrepancy {
   std::string component;                       // "curvature toward the bevel", ...
   std::string unit;                            // of values
   std::string covariate;                       // "depth_mm", ...
+  bool periodic = false;                       // the covariate is an angle, `at` divides its circle
   std::vector<double> at, values, std_errors;  // a broken line
-  double gain = 0, threshold = 0;
+  double log_bayes_factor = 0;                 // natural, against none
+  double visible_size = 0;  // root mean square over the readings, in standard deviations of the noise
+};
+
+// How much insertions differ: the standard deviation of one quantity between them.
+struct VariationEstimate {
+  std::string name, unit;
+  double sd = 0;             // posterior mean
+  double none = 0;           // probability that they do not differ
+  double low = 0, high = 0;  // 95 %, of the values that were tried
 };
 
 struct NextExperiment {
@@ -110,13 +135,12 @@ struct Trace {
   std::vector<std::vector<double>> white_before, white_after;
 };
 
+// Printed for people; no verdict depends on them.
 struct Checks {
   double chi2_per_dof = 0;
   std::array<double, 2> band{};  // 99 % of it if the model is right and the noise as found
   double ljung_box_p = 1;        // smallest over the series, times their number
-  double remaining_sigmas = 0;   // slow structure left, in standard deviations of what chance leaves
-  double unexplained_share = 0;  // of the mismatch
-  bool clean = true;
+  bool clean = true;             // both as chance leaves them in 99 of 100
 };
 
 struct StageTime {
@@ -128,16 +152,21 @@ struct Findings {
   Verdict verdict = Verdict::nothing_missing;
   std::string sentence;  // what was found, in one
   std::vector<FoundEffect> effects;
+  std::vector<Explanation> explanations;  // the likeliest first
+  double nothing_probability = 0;         // of no effect, and no discrepancy of any consequence
+  double discrepancy_probability = 0;     // of one of consequence
+  double not_visited = 0;                 // share of sets that were judged by the linear model alone
   std::vector<Location> where;
-  Noise noise;
-  std::vector<std::string> channels;  // names, in the order of noise.sigma_mm
+  inference::Noise noise;
+  std::vector<std::string> channels;  // names, in the order of noise.sigma
+  std::vector<VariationEstimate> variation;
   HeldOut held_out;
   NeedleEstimate base, needle;  // refitted without, and with what was found
   model::NeedleParameters model_file;
   std::vector<TriedEffect> tried;   // alone, best first
   std::vector<TriedEffect> beside;  // beside what was found, best first
   std::vector<DetectableSize> detectable;
-  std::vector<Correction> corrections;  // unknown-effect only
+  std::vector<Discrepancy> discrepancies;  // unknown-effect only
   std::optional<NextExperiment> next_experiment;
   std::vector<std::string> confusion_names;
   Eigen::MatrixXd confusion;  // |cosine| between visible parts
@@ -145,8 +174,6 @@ struct Findings {
   std::vector<std::string> remarks;  // plain sentences: what was not usable, what cannot be told apart
   std::vector<Trace> traces;
   std::size_t readings = 0, outliers = 0;  // messages
-  int bootstrap_draws = 0;
-  std::uint64_t seed = 0;
   std::vector<StageTime> times;
 };
 

@@ -117,8 +117,7 @@ inference::Dataset data_of(const RecordedCase& recorded) {
     inference::SeriesSet set;
     set.messages = recording.motion.at.size();
     set.duration_s = recording.duration_s();
-    for (const auto& series : recording.series)
-      set.series.push_back({series.reading, series.time_s, series.measured_mm, series.relative_sd});
+    set.series = recording.series;
     out.recordings.push_back(std::move(set));
   }
   return out;
@@ -164,6 +163,7 @@ NeedleSystem::NeedleSystem(RecordedCase recorded, const model::NeedleParameters&
   for (const auto& recording : recorded_.recordings) motions.push_back(&recording.motion);
   for (const NeedleCurve& curve : find_curves(motions)) {
     curves_.push_back(curve.curve);
+    parts_of_curve_ = (curve.curve.at.size() + kValuesOfPart - 1) / kValuesOfPart;
     for (std::size_t first = 0; first < curve.curve.at.size(); first += kValuesOfPart)
       curve_physics_.push_back(make_curve_part(curve, first));
   }
@@ -194,7 +194,7 @@ MatrixXd NeedleSystem::rows_of(std::size_t r, const model::OpenLoop& path, bool 
   Index row = 0;
   for (std::size_t c = 0; c < recording.series.size(); ++c) {
     const Eigen::RowVector3d axis = recorded_.channels[c].axis.transpose();
-    for (const std::size_t reading : recording.series[c].reading) {
+    for (const std::size_t reading : recording.series[c].message) {
       if (derivatives)
         out.row(row++).noalias() = axis * path.jacobian.middleRows<3>(static_cast<Index>(3 * reading));
       else
@@ -204,18 +204,18 @@ MatrixXd NeedleSystem::rows_of(std::size_t r, const model::OpenLoop& path, bool 
   return out;
 }
 
-bool NeedleSystem::predict(const ModelSet& set, std::size_t r, const VectorXd& shared, const VectorXd& local,
-                           bool derivatives, inference::Prediction& out) const {
-  thread_local model::OpenLoop path;
+bool NeedleSystem::follow(const ModelSet& set, const model::Motion& motion, const VectorXd& shared,
+                          const VectorXd& local, const DiscrepancyValues* discrepancy, Columns* columns,
+                          model::OpenLoop& path) const {
   model::NeedleParameters needle = this->needle(shared);
   needle.curvature_per_mm *= 1 + local[kOwnCurvature];
   // Columns: the needle's three, tilt and roll, then the effects' in the order of the set.
   int column = kBaseParameters;
-  const auto unknown = [&](double value) { return model::Dual::unknown(value, derivatives ? column++ : -1); };
+  const auto unknown = [&](double value) { return model::Dual::unknown(value, columns ? column++ : -1); };
   std::vector<model::ActiveEffect> effects(1);
   effects[0].effect = &entry_variation();
   for (std::size_t i = 0; i < 3; ++i) effects[0].parameters[i] = unknown(local[kTiltX + static_cast<Index>(i)]);
-  std::vector<Index> shared_columns = {kCurvature, kU, kLambda2}, local_columns;
+  if (columns) *columns = {.shared = {kCurvature, kU, kLambda2}, .local = {}};
   Index next_shared = kBaseParameters, next_local = kVariations;
   for (const std::size_t e : set) {
     model::ActiveEffect active;
@@ -227,16 +227,44 @@ bool NeedleSystem::predict(const ModelSet& set, std::size_t r, const VectorXd& s
         continue;
       }
       const bool own = parameters[p].scope == model::Scope::recording;
-      (own ? local_columns : shared_columns).push_back(column);
+      if (columns) (own ? columns->local : columns->shared).push_back(column);
       active.parameters[p] = unknown(own ? local[next_local++] : shared[next_shared++]);
     }
     effects.push_back(active);
   }
+  if (discrepancy) {
+    for (std::size_t part = 0; part < parts_of_curve_; ++part) {
+      model::ActiveEffect active;
+      active.effect = curve_physics_[discrepancy->curve * parts_of_curve_ + part].get();
+      for (std::size_t p = 0; p < kValuesOfPart; ++p)
+        if (const auto i = static_cast<Index>(part * kValuesOfPart + p); i < discrepancy->values.size())
+          active.parameters[p] = discrepancy->values[i];
+      effects.push_back(active);
+    }
+  }
   const model::AugmentedNeedle augmented(
-      needle, std::move(effects), derivatives ? column : 0,
-      derivatives ? model::NeedleColumns{.curvature = 0, .lambda1 = 1, .lambda2 = 2, .wheelbase = -1}
-                  : model::NeedleColumns{});
-  if (!model::predict(augmented, recorded_.recordings[r].motion, path)) return false;
+      needle, std::move(effects), columns ? column : 0,
+      columns ? model::NeedleColumns{.curvature = 0, .lambda1 = 1, .lambda2 = 2, .wheelbase = -1}
+              : model::NeedleColumns{});
+  return model::predict(augmented, motion, path);
+}
+
+bool NeedleSystem::tip_path(const ModelSet& set, const model::Motion& motion, const VectorXd& shared,
+                            const VectorXd& local, const DiscrepancyValues* discrepancy,
+                            std::vector<Eigen::Vector3d>& out) const {
+  model::OpenLoop path;
+  if (!follow(set, motion, shared, local, discrepancy, nullptr, path)) return false;
+  out = path.position_mm;
+  for (auto& position : out) position.head<2>() += local.segment<2>(kEntryX);
+  return true;
+}
+
+bool NeedleSystem::predict(const ModelSet& set, std::size_t r, const VectorXd& shared, const VectorXd& local,
+                           bool derivatives, inference::Prediction& out) const {
+  thread_local model::OpenLoop path;
+  Columns columns;
+  if (!follow(set, recorded_.recordings[r].motion, shared, local, nullptr, derivatives ? &columns : nullptr, path))
+    return false;
   out.reading = rows_of(r, path, false);
   MatrixXd entry(out.reading.size(), 2);
   Index row = 0;
@@ -247,14 +275,14 @@ bool NeedleSystem::predict(const ModelSet& set, std::size_t r, const VectorXd& s
   if (!derivatives) return true;
   MatrixXd all = rows_of(r, path, true);
   all.col(kLambda2) += shared[kLambda2] / std::numbers::pi * all.col(kU);  // lambda1 = u + lambda2^2/(2 pi)
-  out.by_local.resize(all.rows(), kVariations + static_cast<Index>(local_columns.size()));
+  out.by_local.resize(all.rows(), kVariations + static_cast<Index>(columns.local.size()));
   out.by_local.col(kOwnCurvature) = shared[kCurvature] * all.col(kCurvature);
   all.col(kCurvature) *= 1 + local[kOwnCurvature];
   out.by_local.middleCols(kTiltX, 3) = all.middleCols(kBaseParameters, 3);
   out.by_local.middleCols(kEntryX, 2) = entry;
-  for (std::size_t i = 0; i < local_columns.size(); ++i)
-    out.by_local.col(kVariations + static_cast<Index>(i)) = all.col(local_columns[i]);
-  out.by_shared = all(Eigen::all, shared_columns);
+  for (std::size_t i = 0; i < columns.local.size(); ++i)
+    out.by_local.col(kVariations + static_cast<Index>(i)) = all.col(columns.local[i]);
+  out.by_shared = all(Eigen::all, columns.shared);
   return true;
 }
 

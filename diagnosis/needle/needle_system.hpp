@@ -3,7 +3,7 @@
 // differs between insertions, the effects of the library, and a discrepancy in each component of the tip's twist and
 // of the reading.
 #include "diagnosis/inference/system.hpp"
-#include "diagnosis/mismatch/recorded_case.hpp"
+#include "diagnosis/needle/recorded_case.hpp"
 
 namespace bevel::diagnosis {
 
@@ -13,11 +13,18 @@ enum BaseParameter : int { kCurvature, kU, kLambda2, kBaseParameters };
 // (rad), the bevel's roll there (rad), registration (mm).
 enum Variation : int { kOwnCurvature, kTiltX, kTiltY, kRoll, kEntryX, kEntryY, kVariations };
 
+// Values of one of the system's curves.
+struct DiscrepancyValues {
+  std::size_t curve = 0;
+  Eigen::VectorXd values;
+};
+
 class NeedleSystem final : public inference::System {
  public:
   NeedleSystem(RecordedCase recorded, const model::NeedleParameters& model);
 
   const RecordedCase& recorded() const { return recorded_; }
+  const model::NeedleParameters& model() const { return model_; }  // in use
   const inference::Dataset& data() const override { return data_; }
   const std::vector<inference::Parameter>& base() const override { return base_; }
   const std::vector<inference::Effect>& effects() const override { return effects_; }
@@ -29,8 +36,23 @@ class NeedleSystem final : public inference::System {
                const Eigen::VectorXd& local, bool derivatives, inference::Prediction& out) const override;
   Eigen::MatrixXd by_curves(std::size_t recording, const Eigen::VectorXd& base) const override;
 
- private:
   model::NeedleParameters needle(const Eigen::VectorXd& shared) const;
+  // The library's effect behind one of effects().
+  const model::Effect& physics(std::size_t effect) const { return *physics_[effect]; }
+  std::uint32_t variant(std::size_t effect) const { return variants_[effect]; }
+  // Positions of the tip at the readings of any motion, in {A}, mm; unknowns as for predict. discrepancy may be null.
+  bool tip_path(const inference::ModelSet& set, const model::Motion& motion, const Eigen::VectorXd& shared,
+                const Eigen::VectorXd& local, const DiscrepancyValues* discrepancy,
+                std::vector<Eigen::Vector3d>& out) const;
+
+ private:
+  // Which columns of a path's Jacobian are shared unknowns, and which a recording's own beside the variation.
+  struct Columns {
+    std::vector<Eigen::Index> shared, local;
+  };
+  bool follow(const inference::ModelSet& set, const model::Motion& motion, const Eigen::VectorXd& shared,
+              const Eigen::VectorXd& local, const DiscrepancyValues* discrepancy, Columns* columns,
+              model::OpenLoop& path) const;
   Eigen::MatrixXd rows_of(std::size_t recording, const model::OpenLoop& path, bool derivatives) const;
 
   RecordedCase recorded_;
@@ -43,7 +65,8 @@ class NeedleSystem final : public inference::System {
   std::vector<inference::Nuisance> nuisances_;
   std::vector<inference::NuisanceGroup> groups_;
   std::vector<inference::Curve> curves_;
-  std::vector<std::unique_ptr<model::Effect>> curve_physics_;  // one per curve
+  std::vector<std::unique_ptr<model::Effect>> curve_physics_;  // parts of each curve
+  std::size_t parts_of_curve_ = 0;
 };
 
 }  // namespace bevel::diagnosis

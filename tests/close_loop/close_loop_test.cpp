@@ -27,7 +27,6 @@ struct CloseTheLoop : ::testing::Test {
     o.folder = (folder / name).string();
     o.out_folder = (folder / "out").string();
     o.estimator_path = std::string(BEVEL_SOURCE_DIR) + "/tools/replay/strict.toml";
-    o.diagnosis_draws = 60;
     o.quiet = true;
     o.targeting.seeds = 3;
     return o;
@@ -73,7 +72,6 @@ TEST_F(CloseTheLoop, WindUpFoundMakesRigEstimatorAndControllerBetter) {
 TEST_F(CloseTheLoop, ALogCutOffIsSaidAndStatusThree) {
   testing::make_case(folder / "torn", {model::testing::agar(), {}});
   Options o = options("torn");
-  o.diagnosis_draws = 10;
   o.targeting.seeds = 1;
   const fs::path torn = folder / "torn/rec01.lcm";
   fs::resize_file(torn, fs::file_size(torn) - 40);  // a recorder that was killed

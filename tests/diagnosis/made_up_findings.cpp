@@ -4,7 +4,7 @@
 #include <limits>
 #include <random>
 
-#include "diagnosis/mismatch/recorded_case.hpp"
+#include "diagnosis/needle/recorded_case.hpp"
 #include "tests/diagnosis/recorded_logs.hpp"
 
 namespace bevel::diagnosis::testing {

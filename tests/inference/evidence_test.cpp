@@ -56,7 +56,9 @@ Evaluated evaluate_set(const LinearSystem& system, const ModelSet& set, const Di
   const Likelihood likelihood(system, Readings(system.data().recordings.size()), white(system));
   const Layout layout(system, set);
   const std::vector<VectorXd> local(system.data().recordings.size(), layout.local_start());
-  return evaluate(likelihood, discrepancy, layout, layout.shared_start(), local, VectorXd::Constant(1, 0.2));
+  Evaluated out = evaluate(likelihood, layout, layout.shared_start(), local, VectorXd::Constant(1, 0.2));
+  if (discrepancy) add_discrepancy(likelihood, *discrepancy, out);
+  return out;
 }
 
 TEST(Evidence, OfALinearModelIsTheNormalDensityOfAllReadings) {
@@ -105,7 +107,7 @@ TEST(Evidence, OfADiscrepancyIsTheRatioOfTwoNormalDensities) {
       fit(likelihood, layout, layout.shared_start(), local, {.nuisance_sd = VectorXd::Constant(1, 0.2), .curve = {}});
   base.likelihood = std::make_shared<const Likelihood>(likelihood);
   const Discrepancy discrepancy(likelihood, base);
-  const auto factors = discrepancy.scan(base, linearise(likelihood, base, {}), likelihood);
+  const auto factors = discrepancy.scan(Marginal(likelihood, base, {}));
   ASSERT_EQ(factors.size(), discrepancy.choices());
   const VectorXd y = all_readings(system);
   const double without = log_normal(y, covariance_of(system, {}, white(system), 0.2));
@@ -155,7 +157,7 @@ TEST(HeldOut, OfALinearModelIsTheConditionalDensity) {
     for (Index i = 0; i < y.size(); ++i)
       if (i / LinearSystem::kCount != static_cast<Index>(r)) others.push_back(i);
     const double without = log_normal(y(others), covariance(others, others));
-    EXPECT_NEAR(log_predictive(at.fit, blocks, {}, r), log_normal(y, covariance) - without, 1e-6);
+    EXPECT_NEAR(leave_out(at.fit, blocks, {}, r).log_density, log_normal(y, covariance) - without, 1e-6);
     // And the parameters: generalised least squares of the others.
     MatrixXd X(y.size(), 3);
     for (Index k = 0; k < 4; ++k)
@@ -163,7 +165,7 @@ TEST(HeldOut, OfALinearModelIsTheConditionalDensity) {
     const MatrixXd V = covariance_of(system, {0}, noise, sd)(others, others), Xo = X(others, Eigen::all);
     const VectorXd prior = (VectorXd(3) << 1, 1, 0.25).finished();
     const VectorXd expected = prior.asDiagonal() * Xo.transpose() * V.lu().solve(VectorXd(y(others)));
-    EXPECT_LT((shared_without(at.fit, blocks, {}, r) - expected).norm(), 1e-6);
+    EXPECT_LT((leave_out(at.fit, blocks, {}, r).shared - expected).norm(), 1e-6);
   }
 }
 
@@ -175,7 +177,7 @@ TEST(Proposals, OfALinearModelAreExact) {
   const Fit base =
       fit(*likelihood, layout, layout.shared_start(), local, {.nuisance_sd = VectorXd::Constant(1, 0.2), .curve = {}});
   const Proposals proposals(*likelihood, base, 2);
-  const auto found = proposals.beside(*likelihood, base, {}, 1);
+  const auto found = proposals.beside(Marginal(*likelihood, base, {}), 1);
   ASSERT_EQ(found.size(), 2U);
   const VectorXd y = all_readings(system);
   const double without = log_normal(y, covariance_of(system, {}, white(system), 0.2));
@@ -185,7 +187,7 @@ TEST(Proposals, OfALinearModelAreExact) {
         << system.effects()[one.effect].name;
   }
   EXPECT_EQ(system.effects()[found.front().effect].name, "parabola");
-  const auto pairs = proposals.pairs(*likelihood, base, 3);
+  const auto pairs = proposals.pairs(Marginal(*likelihood, base, {}), 3);
   ASSERT_EQ(pairs.size(), 1U);
   EXPECT_NEAR(pairs[0].first, log_normal(y, covariance_of(system, {0, 1}, white(system), 0.2)) - without, 0.05);
 }

@@ -106,15 +106,17 @@ TEST(PendulumTest, ProbabilitiesAddUpAndHeldOutIsBetterWithWhatWasFound) {
     EXPECT_LE(one.with_discrepancy, one.probability + 1e-12);
   }
   EXPECT_NEAR(sum, 1, 1e-9);
-  EXPECT_EQ(posterior.named(), std::vector<std::string>{"dry_friction"});
+  EXPECT_GT(posterior.inclusion.at("dry_friction"), 0.5);
+  for (const auto& [name, probability] : posterior.inclusion)
+    if (name != "dry_friction") EXPECT_LT(probability, 0.5) << name;
   EXPECT_GT(posterior.inclusion.at("dry_friction"), 0.9);
   EXPECT_LT(posterior.discrepancy, 0.5);
-  const auto found = held_out_log_density(search);
+  const auto found = leave_out_selection(search);
   ASSERT_EQ(found.size(), 6U);
   // Each recording is likelier than by the base alone at its likeliest noise.
   const Fit& base = search.visited().at({}).at->fit;
   const auto blocks = linearise(*base.likelihood, base, {});
-  for (std::size_t r = 0; r < 6; ++r) EXPECT_GT(found[r], log_predictive(base, blocks, {}, r)) << "recording " << r;
+  for (std::size_t r = 0; r < 6; ++r) EXPECT_GT(found[r].log_density, leave_out(base, blocks, {}, r).log_density) << "recording " << r;
 }
 
 }  // namespace

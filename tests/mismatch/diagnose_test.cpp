@@ -7,7 +7,7 @@
 
 #include "diagnosis/mismatch/conclusions.hpp"
 #include "diagnosis/mismatch/diagnose.hpp"
-#include "tests/mismatch/simulated_rig.hpp"
+#include "tests/needle/simulated_rig.hpp"
 
 namespace bevel::diagnosis::testing {
 namespace {

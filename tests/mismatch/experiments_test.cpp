@@ -6,7 +6,7 @@
 #include <set>
 
 #include "diagnosis/mismatch/experiments.hpp"
-#include "tests/mismatch/simulated_rig.hpp"
+#include "tests/needle/simulated_rig.hpp"
 
 namespace bevel::diagnosis::testing {
 namespace {

@@ -8,7 +8,7 @@
 #include "diagnosis/inference/search.hpp"
 #include "diagnosis/needle/covariates.hpp"
 #include "diagnosis/needle/curves.hpp"
-#include "tests/mismatch/simulated_rig.hpp"
+#include "tests/needle/simulated_rig.hpp"
 
 namespace bevel::diagnosis {
 namespace {
@@ -89,7 +89,7 @@ TEST(NeedleSystem, WithoutEffectsItIsTheModel) {
   ASSERT_TRUE(model::predict(model::AugmentedNeedle(rig.needle), system.recorded().recordings[0].motion, path));
   Index row = 0;
   for (std::size_t c = 0; c < system.recorded().channels.size(); ++c)
-    for (const std::size_t reading : system.recorded().recordings[0].series[c].reading)
+    for (const std::size_t reading : system.recorded().recordings[0].series[c].message)
       EXPECT_NEAR(prediction.reading[row++], system.recorded().channels[c].axis.dot(path.position_mm[reading]), 1e-9);
 }
 
@@ -138,7 +138,7 @@ TEST(NeedleCurves, ShiftReadingsAndAdvanceTheTip) {
       }
       Index row = 0;
       for (std::size_t c = 0; c < system.recorded().channels.size(); ++c)
-        for (const std::size_t reading : recording.series[c].reading) {
+        for (const std::size_t reading : recording.series[c].message) {
           const std::size_t node = recording.motion.at[reading];
           if (node > 0) {
             EXPECT_LT(

@@ -19,7 +19,6 @@ int main(int argc, char** argv) {
       .reads_recordings()
       .option("-o,--out", o.out_folder, "folder for the results; out/close-the-loop/CASE if not given")
       .option("-c,--config", o.estimator_path, "the estimator's settings for the replays (TOML)")
-      .option("--seed", o.diagnosis_seed, "of the diagnosis", 0, 1'000'000'000)
       .option("--insertions", o.targeting.seeds, "steered to each target with each model", 1, 1000)
       .option("--threads", o.threads, "at work at once; the results do not depend on it", 1, 64)
       .flag("-q,--quiet", o.quiet, "no progress on stderr")

@@ -34,8 +34,6 @@ ClosedLoop close_the_loop(const Options& options, std::ostream& err) {
   diagnose::Options diagnosis;
   diagnosis.model_path = files.model_path;
   diagnosis.logs = files.logs;
-  diagnosis.seed = options.diagnosis_seed;
-  diagnosis.bootstrap_draws = options.diagnosis_draws;
   diagnosis.threads = options.threads;
   diagnosis.quiet = options.quiet;
   diagnose::Found found = diagnose::find(diagnosis, err);

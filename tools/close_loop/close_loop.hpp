@@ -15,8 +15,6 @@ namespace bevel::close_loop {
 struct Options {
   std::string folder, out_folder;
   std::string estimator_path = "tools/replay/strict.toml";
-  int diagnosis_seed = 1;
-  int diagnosis_draws = 400;
   int threads = 2;
   bool quiet = false;  // no progress on stderr
   TargetingOptions targeting;

@@ -4,8 +4,6 @@
 #include <filesystem>
 #include <stdexcept>
 
-#include "diagnosis/mismatch/noise.hpp"
-
 namespace bevel::close_loop {
 namespace fs = std::filesystem;
 
@@ -33,7 +31,12 @@ diagnosis::RecordedCase without_outliers(const diagnosis::RecordedCase& recorded
     for (std::size_t i = 0; i < trace->outlier.size(); ++i)
       if (trace->outlier[i] != 0) outliers[r].push_back(i);
   }
-  return diagnosis::without(recorded, outliers);
+  diagnosis::RecordedCase out = recorded;
+  for (std::size_t r = 0; r < out.recordings.size(); ++r) {
+    inference::SeriesSet set{.series = std::move(out.recordings[r].series)};
+    out.recordings[r].series = inference::without({.recordings = {set}}, {outliers[r]}).recordings[0].series;
+  }
+  return out;
 }
 
 }  // namespace bevel::close_loop

@@ -6,7 +6,7 @@
 #include <vector>
 
 #include "diagnosis/mismatch/findings.hpp"
-#include "diagnosis/mismatch/recorded_case.hpp"
+#include "diagnosis/needle/recorded_case.hpp"
 #include "io/model_file.hpp"
 
 namespace bevel::close_loop {

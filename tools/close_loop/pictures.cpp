@@ -51,7 +51,7 @@ io::Plot rig_picture(const ClosedLoop& loop) {
     add(plot, s, rmse);
   }
   choose_scale(plot);
-  const auto& sigma = loop.findings.noise.sigma_mm;
+  const auto& sigma = loop.findings.noise.sigma;
   double variance = 0;
   for (const double s : sigma) variance += s * s / static_cast<double>(sigma.size());
   plot.references.push_back({io::ReferenceLine::Axis::horizontal, std::sqrt(variance), "camera's noise"});

@@ -51,7 +51,7 @@ std::vector<Eigen::Vector3d> simulate_recording(const diagnosis::Recording& reco
   return seen;
 }
 
-RigFigure simulate_rig(const diagnosis::RecordedCase& recorded, const diagnosis::Noise& noise,
+RigFigure simulate_rig(const diagnosis::RecordedCase& recorded, const inference::Noise& noise,
                        const io::ModelFile& model) {
   RigFigure figure;
   double squares = 0, chi2 = 0;
@@ -61,14 +61,14 @@ RigFigure simulate_rig(const diagnosis::RecordedCase& recorded, const diagnosis:
     std::size_t own = 0;
     for (std::size_t c = 0; c < recorded.channels.size(); ++c) {
       const diagnosis::Series& series = recording.series[c];
-      Eigen::VectorXd errors(static_cast<Eigen::Index>(series.reading.size()));
-      for (std::size_t i = 0; i < series.reading.size(); ++i)
+      Eigen::VectorXd errors(static_cast<Eigen::Index>(series.message.size()));
+      for (std::size_t i = 0; i < series.message.size(); ++i)
         errors[static_cast<Eigen::Index>(i)] =
-            series.measured_mm[i] - recorded.channels[c].axis.dot(seen[series.reading[i]]);
-      own += series.reading.size();
+            series.measured[i] - recorded.channels[c].axis.dot(seen[series.message[i]]);
+      own += series.message.size();
       own_squares += errors.squaredNorm();
       if (errors.size() > 0) figure.max_mm = std::max(figure.max_mm, errors.cwiseAbs().maxCoeff());
-      diagnosis::whiten(diagnosis::make_whitening(series, noise, noise.sigma_mm[c]), errors);
+      inference::whiten(inference::make_whitening(series, noise, noise.sigma[c]), errors);
       own_chi2 += errors.squaredNorm();
     }
     const auto n = static_cast<double>(std::max<std::size_t>(own, 1));

@@ -4,7 +4,7 @@
 #include <string>
 #include <vector>
 
-#include "diagnosis/mismatch/noise.hpp"
+#include "diagnosis/inference/noise.hpp"
 #include "io/model_file.hpp"
 
 namespace bevel::close_loop {
@@ -21,7 +21,7 @@ struct RigFigure {
   std::vector<RigRecording> recordings;
 };
 
-RigFigure simulate_rig(const diagnosis::RecordedCase& recorded, const diagnosis::Noise& noise,
+RigFigure simulate_rig(const diagnosis::RecordedCase& recorded, const inference::Noise& noise,
                        const io::ModelFile& model);
 
 // What the rig's cameras report at each reading of a recording, without noise.

@@ -22,7 +22,7 @@ class Cameras {
  public:
   Cameras(const SteeredRig& rig, std::uint64_t seed)
       : rig_(rig), random_(seed), coloured_mm_(rig.channels.size()), late_us_(0) {
-    for (std::size_t c = 0; c < coloured_mm_.size(); ++c) coloured_mm_[c] = rig.noise.sigma_mm[c] * normal_(random_);
+    for (std::size_t c = 0; c < coloured_mm_.size(); ++c) coloured_mm_[c] = rig.noise.sigma[c] * normal_(random_);
   }
 
   void take(const rig::KinematicPlant& plant, std::int64_t utime) {
@@ -33,7 +33,7 @@ class Cameras {
     const double rho = rig_.noise.ar1;
     for (std::size_t c = 0; c < rig_.channels.size(); ++c) {
       const diagnosis::Channel& channel = rig_.channels[c];
-      const double sigma_mm = rig_.noise.sigma_mm[c];
+      const double sigma_mm = rig_.noise.sigma[c];
       coloured_mm_[c] = rho * coloured_mm_[c] + std::sqrt(1 - rho * rho) * sigma_mm * normal_(random_);
       model::TipMeasurement& frame = frames[channel.camera];
       frame.position_mm += channel.axis * (channel.axis.dot(reading.position_mm) + coloured_mm_[c]);

@@ -6,8 +6,8 @@
 #include <vector>
 
 #include "controller/supervisor.hpp"
-#include "diagnosis/mismatch/noise.hpp"
-#include "diagnosis/mismatch/recorded_case.hpp"
+#include "diagnosis/inference/noise.hpp"
+#include "diagnosis/needle/recorded_case.hpp"
 #include "estimator/config.hpp"
 #include "rig/plant/plant.hpp"
 
@@ -18,7 +18,7 @@ struct SteeredRig {
   model::NeedleParameters needle;
   std::vector<model::ActiveEffect> effects;
   std::vector<diagnosis::Channel> channels;  // what its cameras see
-  diagnosis::Noise noise;                    // of those; outliers, of which only the share is known, are left out
+  inference::Noise noise;                    // of those; outliers, of which only the share is known, are left out
   double transport_s = 0.05;                 // from the picture to its measurement
 };
 

@@ -8,7 +8,7 @@
 #include <random>
 #include <stdexcept>
 
-#include "diagnosis/mismatch/parallel.hpp"
+#include "diagnosis/parallel.hpp"
 #include "io/live_effects.hpp"
 
 namespace bevel::close_loop {
@@ -106,7 +106,7 @@ std::vector<Eigen::Vector3d> choose_targets(const model::NeedleParameters& needl
   return targets;
 }
 
-TargetingFigures steer_all(const Models& models, const diagnosis::RecordedCase& recorded, const diagnosis::Noise& noise,
+TargetingFigures steer_all(const Models& models, const diagnosis::RecordedCase& recorded, const inference::Noise& noise,
                            const TargetingOptions& options) {
   double deepest_mm = 0;
   for (const auto& recording : recorded.recordings)
@@ -131,7 +131,7 @@ TargetingFigures steer_all(const Models& models, const diagnosis::RecordedCase& 
   const std::size_t count = figures.targets_mm.size() * figures.seeds.size();
   std::vector<std::vector<Insertion>> insertions(beliefs.size(), std::vector<Insertion>(count));
   const double nominal_s = deepest_mm / controller::SteeringLimits{}.insertion_rate_mm_s;
-  diagnosis::parallel_for(beliefs.size() * count, options.threads, [&](std::size_t job) {
+  parallel_for(beliefs.size() * count, options.threads, [&](std::size_t job) {
     const std::size_t belief = job / count, i = job % count, target = i / figures.seeds.size();
     const std::uint64_t seed = 1000 * figures.seeds[i % figures.seeds.size()] + target;
     const SteeredRig rig{truth.needle, for_one_insertion(truth, nominal_s, seed), recorded.channels, noise};

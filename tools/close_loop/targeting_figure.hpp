@@ -48,7 +48,7 @@ struct TargetingOptions {
 
 // The rig is the augmented model, its unknowns of single recordings (a phase, an instant) drawn anew for each
 // insertion; nobody tells the software these.
-TargetingFigures steer_all(const Models& models, const diagnosis::RecordedCase& recorded, const diagnosis::Noise& noise,
+TargetingFigures steer_all(const Models& models, const diagnosis::RecordedCase& recorded, const inference::Noise& noise,
                            const TargetingOptions& options);
 
 }  // namespace bevel::close_loop

@@ -1,7 +1,6 @@
 // bevel-diagnose: what physics the model in use leaves out, from recordings.
 #include <algorithm>
 #include <iostream>
-#include <limits>
 #include <thread>
 
 #include "tools/common/command_line.hpp"
@@ -17,8 +16,6 @@ int main(int argc, char** argv) {
       .reads_recordings()
       .option("-m,--model", o.model_path, "the model in use (TOML, [needle] alone)", true)
       .option("-o,--out", o.out_folder, "folder for verdict.json, report.html and model.toml", true)
-      .option("--seed", o.seed, "of the bootstrap; the same seed gives the same verdict", 0,
-              std::numeric_limits<int>::max())
       .option("--threads", o.threads, "at work at once; the verdict does not depend on it", 1, 64)
       .flag("-q,--quiet", o.quiet, "no progress on stderr");
   bevel::diagnose::end_on_signals("bevel-diagnose");

@@ -51,9 +51,7 @@ Found find(const Options& options, std::ostream& err) {
   for (const auto& remark : input.remarks) err << remark << std::endl;  // before the minutes of work
   const double reading_s = progress.seconds();
   DiagnosisOptions how;
-  how.seed = static_cast<std::uint64_t>(options.seed);
   how.threads = options.threads;
-  how.bootstrap_draws = options.bootstrap_draws;
   how.progress = [&](const std::string& text) { progress.say(text); };
   Findings findings = diagnosis::diagnose(input.recorded, model.needle, how);
   findings.remarks.insert(findings.remarks.begin(), input.remarks.begin(), input.remarks.end());
@@ -74,14 +72,19 @@ void print_verdict(std::ostream& out, const Findings& f) {
   out << "  needle: k " << with_error(n.value.curvature_per_mm, n.curvature_sd_per_mm) << " 1/mm, lambda1 "
       << with_error(n.value.lambda1_per_rad, n.lambda1_sd_per_rad) << ", lambda2 "
       << with_error(n.value.lambda2, n.lambda2_sd) << '\n';
-  out << "  held-out error: " << measured(f.held_out.before.rmse_mm) << " -> " << measured(f.held_out.after.rmse_mm)
-      << " mm rms, chi2 per reading " << measured(f.held_out.before.chi2_per_dof) << " -> "
-      << measured(f.held_out.after.chi2_per_dof) << '\n';
+  const HeldOut& h = f.held_out;
+  out << "  rms error per axis of recordings predicted from the others: as it stands "
+      << measured(h.as_it_stands.rmse_mm) << ", needle refitted " << measured(h.before.rmse_mm)
+      << ", with what was found " << measured(h.after.rmse_mm) << ", noise alone " << measured(h.noise_floor.rmse_mm)
+      << " mm; chi2 per reading, refitted " << measured(h.before.chi2_per_dof) << ", with what was found "
+      << measured(h.after.chi2_per_dof) << '\n';
+  out << "  insertions differ by (standard deviation):";
+  for (const auto& v : f.variation) out << (&v == f.variation.data() ? " " : ", ") << variation_in_words(v);
+  out << '\n';
   for (std::size_t i = 0; i < f.where.size() && i < 3; ++i)
     out << "  " << (i == 0 ? "worst: " : "       ") << f.where[i].log << " " << f.where[i].channel << ", "
         << number(f.where[i].from_s) << " to " << number(f.where[i].to_s) << " s\n";
   for (const auto& remark : f.remarks) out << "  - " << remark << '\n';
-  out << "  seed " << f.seed << '\n';
 }
 
 int run(const Options& options, std::ostream& out, std::ostream& err) {

@@ -12,9 +12,7 @@ namespace bevel::diagnose {
 struct Options {
   std::string model_path, out_folder;
   std::vector<std::string> logs;
-  int seed = 1;
   int threads = 2;
-  int bootstrap_draws = 400;
   bool quiet = false;  // no progress on stderr
 };
 

@@ -1,7 +1,7 @@
 #include <algorithm>
 #include <cmath>
 
-#include "diagnosis/mismatch/selection.hpp"
+#include "diagnosis/inference/search.hpp"
 #include "model/effects/effect.hpp"
 #include "tools/diagnose/drawing.hpp"
 #include "tools/diagnose/figures.hpp"
@@ -25,8 +25,8 @@ bool was_found(const Findings& findings, const std::string& name) {
                      [&](const auto& e) { return is_kind_of(name, e); });
 }
 
-// What an addition has to bring: more than the luckiest by chance, and enough to be visible.
-double mark_of(const TriedEffect& t) { return std::max(t.threshold, t.chance + kVisibleSigmas * kVisibleSigmas); }
+// Where an effect is likelier than not, as the search has it.
+constexpr double kMark = -inference::SearchRules{}.log_prior_odds_effect;
 
 // Below one the logarithm says nothing: a bar that short is none.
 double shown(double gain) { return std::isfinite(gain) ? std::max(gain, 1.0) : 1.0; }
@@ -34,20 +34,22 @@ double shown(double gain) { return std::isfinite(gain) ? std::max(gain, 1.0) : 1
 }  // namespace
 
 std::string ranking_picture(const Findings& findings, std::vector<TriedEffect> tried) {
-  std::stable_sort(tried.begin(), tried.end(), [](const auto& a, const auto& b) { return a.gain > b.gain; });
+  std::stable_sort(tried.begin(), tried.end(),
+                   [](const auto& a, const auto& b) { return a.log_bayes_factor > b.log_bayes_factor; });
   if (tried.empty()) return "";
   constexpr double kRow = 22;
   double most = 100;
-  for (const auto& t : tried) most = std::max({most, shown(t.gain), shown(mark_of(t))});
-  const Axis gain{1, std::pow(10.0, std::ceil(std::log10(most * 1.05))), "fall of chi2 (logarithmic)", true};
+  for (const auto& t : tried) most = std::max(most, shown(t.log_bayes_factor));
+  const Axis gain{1, std::pow(10.0, std::ceil(std::log10(most * 1.05))), "log Bayes factor (on a logarithmic scale)",
+                  true};
   const double height = kRow * static_cast<double>(tried.size());
   Drawing drawing(832, 34 + height + 40);
   draw_keys(drawing, {kNames, 14},
             {{ink::kAfter, "found"},
-             {"#8db8dc", findings.verdict == Verdict::unknown_effect ? "passes, but does not explain it"
-                                                                     : "passes, but another explains more"},
-             {"#c9c9c9", "does not pass"},
-             {"#111111", "mark: to be passed"}});
+             {"#8db8dc", findings.verdict == Verdict::unknown_effect ? "likely alone, but does not explain it"
+                                                                     : "likely alone, but another explains more"},
+             {"#c9c9c9", "not likely, or not fitted"},
+             {"#111111", "mark: likelier than not"}});
   const Box box{kNames, 30, 580, height};
   Axis upward{0, 1, ""};
   upward.ruled = false;
@@ -56,18 +58,16 @@ std::string ranking_picture(const Findings& findings, std::vector<TriedEffect> t
     const TriedEffect& t = tried[i];
     const double top = box.top + kRow * static_cast<double>(i);
     const bool found = was_found(findings, t.name);
-    const double right = panel.at(shown(t.gain), 0).x;
+    const double right = panel.at(shown(t.log_bayes_factor), 0).x;
     drawing.rectangle({box.left, top + 4, std::max(right - box.left, 1.0), kRow - 8},
-                      found      ? ink::kAfter
-                      : t.passes ? "#8db8dc"
-                                 : "#c9c9c9",
-                      1, t.name + ": fall of chi2 " + fall_of_chi2(t.gain) + ", to be passed " + number(mark_of(t)));
-    if (mark_of(t) > 1) {
-      const double mark = panel.at(mark_of(t), 0).x;
-      drawing.line({mark, top + 2}, {mark, top + kRow - 2}, {.colour = "#111111", .width = 2});
-    }
+                      found        ? ink::kAfter
+                      : t.likelier ? "#8db8dc"
+                                   : "#c9c9c9",
+                      1, t.name + ": log Bayes factor " + log_factor(t.log_bayes_factor));
+    const double mark = panel.at(kMark, 0).x;
+    drawing.line({mark, top + 2}, {mark, top + kRow - 2}, {.colour = "#111111", .width = 2});
     drawing.text({box.left - 8, top + 16}, t.name, name_lettering(found));
-    drawing.text({box.right() + 10, top + 16}, fall_of_chi2(t.gain), {.size = 11, .colour = ink::kSoft});
+    drawing.text({box.right() + 10, top + 16}, log_factor(t.log_bayes_factor), {.size = 11, .colour = ink::kSoft});
   }
   return drawing.svg();
 }
@@ -107,7 +107,7 @@ void draw_pairs(Drawing& drawing, const Box& box, const HeldOut& held_out, doubl
   drawing.line({one, box.top}, {one, box.bottom()}, {.colour = ink::kGood, .width = 1.2, .dashes = "4,3"});
   const bool on_the_left = one > box.left + box.width / 2;  // where there is room
   drawing.text(
-      {one + (on_the_left ? 4 : -4), box.top - 5}, "noise alone",
+      {one + (on_the_left ? 4 : -4), box.top - 5}, "as sure as it may be",
       {.anchor = on_the_left ? Lettering::Anchor::end : Lettering::Anchor::start, .size = 11, .colour = ink::kGood});
 }
 
@@ -208,13 +208,13 @@ std::string interval_picture(const Findings& findings) {
   return drawing.svg();
 }
 
-std::string correction_picture(const std::vector<Correction>& corrections) {
-  if (corrections.empty()) return "";
-  const std::size_t rows = (corrections.size() + 1) / 2;
+std::string discrepancy_picture(const std::vector<Discrepancy>& discrepancies) {
+  if (discrepancies.empty()) return "";
+  const std::size_t rows = (discrepancies.size() + 1) / 2;
   constexpr double kRow = 220;
   Drawing drawing(832, 8 + kRow * static_cast<double>(rows));
-  for (std::size_t i = 0; i < corrections.size(); ++i) {
-    const Correction& c = corrections[i];
+  for (std::size_t i = 0; i < discrepancies.size(); ++i) {
+    const Discrepancy& c = discrepancies[i];
     std::vector<double> low;
     std::vector<double> high;
     std::vector<double> all{0};

@@ -86,10 +86,18 @@ std::string percent(double share) {
 
 std::string probability(double p) { return p > 0.999 ? "> 99.9 %" : percent(p); }
 
-std::string fall_of_chi2(double gain) {
-  if (!std::isfinite(gain)) return "-";
-  if (gain < 0) return "worse";
-  return fixed(gain, gain < 100 ? 1 : 0);
+std::string log_factor(double log_bayes_factor) {
+  if (!std::isfinite(log_bayes_factor)) return "-";
+  return fixed(log_bayes_factor, std::abs(log_bayes_factor) < 100 ? 1 : 0);
+}
+
+std::string variation_in_words(const diagnosis::VariationEstimate& v) {
+  const bool relative = v.unit == "relative";
+  const double scale = relative ? 100 : 1;
+  std::string name = v.name;
+  std::replace(name.begin(), name.end(), '_', ' ');
+  return name + " " + number(scale * v.sd, 2) + (relative ? " %" : " " + v.unit) + " (none: " + probability(v.none) +
+         ")";
 }
 
 bool is_kind_of(std::string_view tried, std::string_view effect, std::string_view parameter) {

@@ -17,8 +17,10 @@ std::string with_error(double value, double std_error);
 // Both ends rounded alike: "0.76 to 0.89".
 std::string interval(const std::array<double, 2>& ends);
 std::string percent(double share);
-std::string probability(double p);      // never 100 %
-std::string fall_of_chi2(double gain);  // a tenth is as fine as it means anything
+std::string probability(double p);                // never 100 %
+std::string log_factor(double log_bayes_factor);  // a tenth is as fine as it means anything
+// "curvature 5 % (none: 2 %)"
+std::string variation_in_words(const diagnosis::VariationEstimate& variation);
 
 // The unit at the end of a name: "mm" of "depth_mm", "rad/s" of "turn_rate_rad_s"; "" if it has none.
 std::string unit_of(std::string_view name);

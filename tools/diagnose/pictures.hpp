@@ -27,7 +27,7 @@ std::string path_picture(const diagnosis::Findings& findings, const std::vector<
 // Indices of traces, those that the model before gets worst first.
 std::vector<std::size_t> worst_first(const diagnosis::Findings& findings);
 
-// Every effect tried, best first: its gain as a bar, a mark at what it has to pass.
+// Every effect tried, best first: its log Bayes factor as a bar, a mark where it is likelier than not.
 std::string ranking_picture(const diagnosis::Findings& findings, std::vector<diagnosis::TriedEffect> tried);
 std::string held_out_picture(const diagnosis::Findings& findings);
 // Parameters with their intervals, each on its own scale, with the value at which the effect would vanish.
@@ -35,6 +35,6 @@ std::string interval_picture(const diagnosis::Findings& findings);
 
 // |cosine| between what effects show, and what the needle's own parameters take of each.
 std::string confusion_picture(const diagnosis::Findings& findings);
-std::string correction_picture(const std::vector<diagnosis::Correction>& corrections);
+std::string discrepancy_picture(const std::vector<diagnosis::Discrepancy>& discrepancies);
 
 }  // namespace bevel::diagnose

@@ -4,7 +4,7 @@
 #include <string>
 #include <vector>
 
-#include "diagnosis/mismatch/recorded_case.hpp"
+#include "diagnosis/needle/recorded_case.hpp"
 #include "io/recording.hpp"
 
 namespace bevel::diagnose {

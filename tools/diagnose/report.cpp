@@ -42,10 +42,12 @@ std::string sizes_of(const FoundEffect& effect) {
 std::string held_out_sentence(const Findings& f) {
   const HeldOut& h = f.held_out;
   const std::string with =
-      f.corrections.empty() ? "with what was found" : "with the curves below that describe the rest";
-  return "On recordings that it was not fitted to, the model is off by " + measured(h.before.rmse_mm) +
-         " mm rms as it stands and by " + measured(h.after.rmse_mm) + " mm " + with + "; chi2 per reading goes from " +
-         measured(h.before.chi2_per_dof) + " to " + measured(h.after.chi2_per_dof) + " (1 is noise alone).";
+      f.discrepancies.empty() ? "with what was found" : "with the discrepancy below that describes the rest";
+  return "On recordings that it was not fitted to, the model file as it stands is off by " +
+         measured(h.as_it_stands.rmse_mm) + " mm (rms per axis), its needle refitted by " + measured(h.before.rmse_mm) +
+         " mm, and " + with + " by " + measured(h.after.rmse_mm) + " mm; noise alone would be " +
+         measured(h.noise_floor.rmse_mm) + " mm. chi2 per reading goes from " + measured(h.before.chi2_per_dof) +
+         " to " + measured(h.after.chi2_per_dof) + " (1: as far off as the model says it may be).";
 }
 
 io::Tone tone_of(Verdict verdict) {
@@ -76,11 +78,12 @@ void add_verdict(io::HtmlReport& page, const Findings& f) {
   std::string consequences;
   for (const auto& effect : f.effects) consequences += sizes_of(effect) + ". ";
   if (f.verdict == Verdict::nothing_missing)
-    consequences +=
-        "With its needle refitted, the model is off by " + measured(f.held_out.before.rmse_mm) +
-        " mm rms on recordings that it was not fitted to, chi2 per reading " +
-        measured(f.held_out.before.chi2_per_dof) +
-        " (1 is noise alone). Nothing above the sizes listed under \"What these recordings could have shown\".";
+    consequences += "With its needle refitted, the model is off by " + measured(f.held_out.before.rmse_mm) +
+                    " mm (rms per axis) on recordings that it was not fitted to, of which noise alone is " +
+                    measured(f.held_out.noise_floor.rmse_mm) + " mm; chi2 per reading " +
+                    measured(f.held_out.before.chi2_per_dof) +
+                    " (1: as far off as the model says it may be). Nothing above the sizes listed under \"What these "
+                    "recordings could have shown\".";
   else
     consequences += held_out_sentence(f);
   page.callout(tone_of(f.verdict), headline_of(f.verdict) + ". " + f.sentence, consequences);
@@ -95,12 +98,13 @@ void add_verdict(io::HtmlReport& page, const Findings& f) {
     return f.verdict == Verdict::nothing_missing ? before : before + " → " + measured(f.held_out.after.*figure);
   };
   const FitFigures& last = f.verdict == Verdict::nothing_missing ? f.held_out.before : f.held_out.after;
-  facts.push_back(
-      {"held-out error", change(&FitFigures::rmse_mm) + " mm", "rms, largest " + measured(last.max_mm) + " mm"});
-  facts.push_back({"chi2 per reading", change(&FitFigures::chi2_per_dof), "held out; 1 is noise alone"});
-  if (!f.corrections.empty())
+  facts.push_back({"held-out error", change(&FitFigures::rmse_mm) + " mm",
+                   "rms per axis, noise alone " + measured(f.held_out.noise_floor.rmse_mm) + " mm; largest " +
+                       measured(last.max_mm) + " mm"});
+  facts.push_back({"chi2 per reading", change(&FitFigures::chi2_per_dof), "held out; 1: as sure as it may be"});
+  if (!f.discrepancies.empty())
     facts.push_back(
-        {"unknown part", f.corrections.front().component, "against " + in_words(f.corrections.front().covariate)});
+        {"unknown part", f.discrepancies.front().component, "against " + in_words(f.discrepancies.front().covariate)});
   facts.push_back(
       {"readings", std::to_string(f.readings),
        "in " + std::to_string(f.traces.size()) + " recordings; " + std::to_string(f.outliers) + " outliers"});
@@ -131,12 +135,12 @@ void add_what_to_do(io::HtmlReport& page, const Findings& f) {
       todo.emplace_back(
           "Do not trust the model where the pictures below mark it: something acts there that is not on the list of "
           "effects.");
+      todo.emplace_back("model.toml carries the needle as fitted beside the discrepancy" +
+                        std::string(f.effects.empty() ? "" : ", the known part, " + listed(names_of(f.effects)) + ",") +
+                        " and the discrepancy itself, which has no name.");
       todo.emplace_back(
-          "model.toml carries the needle as fitted beside the curves" +
-          std::string(f.effects.empty() ? ", and no effect" : " and the known part, " + listed(names_of(f.effects))) +
-          ". What the curves describe is in verdict.json under corrections, and has no name.");
-      todo.emplace_back(
-          "Look for a cause that depends on what the curves are drawn against; docs/adding-an-effect.md tells how to "
+          "Look for a cause that depends on what the discrepancy is drawn against; docs/adding-an-effect.md tells how "
+          "to "
           "put an equation for it to the test.");
       break;
   }
@@ -147,9 +151,10 @@ void add_parameters(io::HtmlReport& page, const Findings& f) {
   page.heading("Parameters");
   const std::string picture = interval_picture(f);
   if (!picture.empty())
-    page.figure_svg(picture,
-                    "What was found, with 95 % intervals from the profile likelihood (everything else refitted at each "
-                    "value). An interval that reaches the diamond would be no evidence of an effect.");
+    page.figure_svg(
+        picture,
+        "What was found, with 95 % intervals over all explanations that hold the effect, with and without a "
+        "discrepancy beside it. An interval that reaches the diamond would be no evidence of an effect.");
   const auto fitted = [](const NeedleEstimate& n) {
     return std::array{with_error(n.value.curvature_per_mm, n.curvature_sd_per_mm),
                       with_error(n.value.lambda1_per_rad, n.lambda1_sd_per_rad),
@@ -160,7 +165,7 @@ void add_parameters(io::HtmlReport& page, const Findings& f) {
   constexpr const char* kNames[] = {"k (1/mm)", "lambda1 (1/rad)", "lambda2", "wheelbase (mm), not fitted"};
   const bool one_model = f.verdict == Verdict::nothing_missing;
   std::vector<std::string> header{"needle", "model file", one_model ? "refitted" : "refitted alone"};
-  if (!one_model) header.emplace_back(f.corrections.empty() ? "with what was found" : "beside the curves");
+  if (!one_model) header.emplace_back(f.discrepancies.empty() ? "with what was found" : "beside the discrepancy");
   std::vector<std::vector<std::string>> rows;
   for (std::size_t i = 0; i < given.size(); ++i) {
     rows.push_back({kNames[i], number(given[i], 4), fitted(f.base)[i]});
@@ -169,6 +174,23 @@ void add_parameters(io::HtmlReport& page, const Findings& f) {
   page.table(header, rows,
              "Value ± standard error. A wrong k, lambda1 or lambda2 is no missing physics: they are refitted before "
              "anything is named.");
+}
+
+void add_variation(io::HtmlReport& page, const Findings& f) {
+  if (f.variation.empty()) return;
+  page.subheading("How much insertions differ");
+  std::vector<std::vector<std::string>> rows;
+  for (const auto& v : f.variation) {
+    const bool relative = v.unit == "relative";
+    const double scale = relative ? 100 : 1;
+    const std::string unit = relative ? " %" : " " + v.unit;
+    std::string name = v.name;
+    std::replace(name.begin(), name.end(), '_', ' ');
+    rows.push_back({name, number(scale * v.sd, 2) + unit, number(scale * v.low, 2) + " to " + number(scale * v.high, 2),
+                    probability(v.none)});
+  }
+  page.table({"between insertions", "standard deviation", "95 %", "probability of none"}, rows,
+             "Of the values that were tried. A recording more makes the needle no surer than this allows.");
 }
 
 void add_location(io::HtmlReport& page, const Findings& f) {
@@ -190,21 +212,22 @@ void add_location(io::HtmlReport& page, const Findings& f) {
 }
 
 void add_unknown_part(io::HtmlReport& page, const Findings& f) {
-  if (f.corrections.empty()) return;
+  if (f.discrepancies.empty()) return;
   page.heading("The unknown part, described");
   page.paragraph(
-      "No effect on the list explains this. Each curve says by how much a quantity of the motion would have to be off, "
-      "and against what it varies, for the model to fit: zero is the model as it is. The curve is a description, not a "
+      "No effect on the list explains this. The discrepancy says by how much a quantity of the motion would have to be "
+      "off, and against what it varies, for the model to fit: zero is the model as it is. It is a description, not a "
       "cause.");
-  page.figure_svg(correction_picture(f.corrections), "Fitted corrections with bands of two standard errors.");
+  page.figure_svg(discrepancy_picture(f.discrepancies), "The discrepancy with a band of two standard errors.");
   std::vector<std::vector<std::string>> rows;
-  for (const auto& c : f.corrections) {
+  for (const auto& c : f.discrepancies) {
     double largest = 0;
     for (const double v : c.values) largest = std::abs(v) > std::abs(largest) ? v : largest;
-    rows.push_back(
-        {c.component, in_words(c.covariate), number(largest) + " " + c.unit, number(c.gain, 4), number(c.threshold)});
+    rows.push_back({c.component, in_words(c.covariate), number(largest) + " " + c.unit, log_factor(c.log_bayes_factor),
+                    number(c.visible_size, 2)});
   }
-  page.table({"what is off", "against", "largest", "fall of chi2", "by chance, 1 of 100"}, rows);
+  page.table({"what is off", "against", "largest", "log Bayes factor", "visible size (standard deviations of noise)"},
+             rows);
 }
 
 void add_residuals(io::HtmlReport& page, const Findings& f) {
@@ -263,6 +286,7 @@ std::string report_html(const Findings& findings, const std::string& model_path)
   add_verdict(page, findings);
   add_what_to_do(page, findings);
   add_parameters(page, findings);
+  add_variation(page, findings);
   add_location(page, findings);
   add_unknown_part(page, findings);
   add_residuals(page, findings);

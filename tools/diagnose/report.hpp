@@ -14,6 +14,7 @@ std::string report_html(const diagnosis::Findings& findings, const std::string& 
 void add_verdict(io::HtmlReport& page, const diagnosis::Findings& findings);
 void add_what_to_do(io::HtmlReport& page, const diagnosis::Findings& findings);
 void add_parameters(io::HtmlReport& page, const diagnosis::Findings& findings);
+void add_variation(io::HtmlReport& page, const diagnosis::Findings& findings);
 void add_location(io::HtmlReport& page, const diagnosis::Findings& findings);
 void add_unknown_part(io::HtmlReport& page, const diagnosis::Findings& findings);
 void add_residuals(io::HtmlReport& page, const diagnosis::Findings& findings);

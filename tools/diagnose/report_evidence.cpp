@@ -54,46 +54,55 @@ std::vector<std::string> experiments_of(const std::vector<DetectableSize>& sizes
 
 void add_evidence(io::HtmlReport& page, const Findings& f) {
   if (f.tried.empty()) return;
+  page.heading("Which explanations are likely");
+  std::vector<std::vector<std::string>> shares;
+  for (const auto& e : f.explanations) {
+    std::string names;
+    for (const auto& name : e.effects) names += (names.empty() ? "" : " + ") + name;
+    shares.push_back({names.empty() ? "no effect" : names, percent(e.probability), percent(e.with_discrepancy)});
+  }
+  page.table({"effects in the model", "probability", "of it with a discrepancy"}, shares,
+             "Neither an effect nor a discrepancy of any consequence: " + percent(f.nothing_probability) +
+                 ". Sets that were not fitted, by the linear model's estimate: " + percent(f.not_visited) + ".");
   page.heading("Every effect that was tried");
   page.paragraph(
-      "Each effect was fitted alone, all its parameters and the needle's together, through the whole of every "
-      "recording. The bar is how much better it then explains them. The black mark is what it has to pass: what the "
-      "luckiest of all these effects reaches by chance in 1 of 100 simulated cases without any effect, and at least "
-      "five standard deviations.");
+      "Each effect added to the needle alone. The bar is the natural logarithm of its Bayes factor: how much likelier "
+      "the recordings are with it than without, over all sizes that it may have. The black mark is where it is "
+      "likelier "
+      "than not, its prior odds included.");
   const char* const caption =
-      f.verdict == Verdict::nothing_missing ? "Effects fitted alone, best first. None passes its mark."
+      f.verdict == Verdict::nothing_missing ? "Effects alone, best first. None passes its mark."
       : f.verdict == Verdict::effects_found
-          ? "Effects fitted alone, best first. Several may pass because they look alike; the best explanation is kept "
-            "and the others are then tried beside it."
-          : "Effects fitted alone, best first. Many pass, because anything that bends the path a little explains some "
-            "of it; none leaves only noise, so none is named for it.";
+          ? "Effects alone, best first. Several may pass because they look alike; sets of effects are compared as a "
+            "whole, above."
+          : "Effects alone, best first. Many may pass, because anything that bends the path a little explains some of "
+            "it; a discrepancy without a name explains more.";
   page.figure_svg(ranking_picture(f, f.tried), caption);
   if (!f.beside.empty()) {
     const std::string beside = f.beside.front().beside;
     const auto shown = static_cast<std::ptrdiff_t>(std::min<std::size_t>(f.beside.size(), 8));
     page.figure_svg(ranking_picture(f, {f.beside.begin(), f.beside.begin() + shown}),
                     "The best of the others, tried beside what was found" +
-                        (beside.empty() ? std::string() : " (" + beside + ")") +
-                        ". No bar should reach its mark, or it would have been taken in.");
+                        (beside.empty() ? std::string() : " (" + beside + ")") + ".");
   }
   std::vector<std::vector<std::string>> rows;
   for (const auto& t : f.tried) {
     std::string sizes;
     for (const auto& [name, value] : t.parameters)
       sizes += (sizes.empty() ? "" : ", ") + in_words(name) + " " + number(value);
-    rows.push_back({t.name, fall_of_chi2(t.gain), number(t.chance, 2), number(t.threshold, 3), sizes});
+    rows.push_back({t.name, log_factor(t.log_bayes_factor), t.fitted ? "fitted" : "linear estimate", sizes});
   }
   page.folded("the figures", [&](io::HtmlReport& inside) {
-    inside.table({"effect, alone", "fall of chi2", "mean of chance", "1 of 100", "fitted"}, rows);
+    inside.table({"effect, alone", "log Bayes factor", "by", "size"}, rows);
   });
 }
 
 void add_held_out(io::HtmlReport& page, const Findings& f) {
   if (f.held_out.recordings.empty()) return;
-  page.heading("Recordings foretold");
+  page.heading("Recordings predicted");
   page.paragraph(
-      "Each recording in turn is put aside, everything is fitted to the others, and the one put aside is predicted. An "
-      "effect of the wrong name fits what it has seen and gets the rest wrong.");
+      "Each recording in turn is put aside, the effects are chosen and fitted by the others, and the one put aside is "
+      "predicted as a new insertion. An effect of the wrong name fits what it has seen and gets the rest wrong.");
   page.figure_svg(
       held_out_picture(f),
       f.verdict == Verdict::nothing_missing
@@ -147,22 +156,21 @@ void add_next_experiment(io::HtmlReport& page, const Findings& f) {
 void add_noise_and_checks(io::HtmlReport& page, const Findings& f) {
   page.heading("Noise and checks");
   std::vector<std::vector<std::string>> rows;
-  for (std::size_t c = 0; c < f.channels.size() && c < f.noise.sigma_mm.size(); ++c)
-    rows.push_back({f.channels[c], measured(f.noise.sigma_mm[c])});
+  for (std::size_t c = 0; c < f.channels.size() && c < f.noise.sigma.size(); ++c)
+    rows.push_back({f.channels[c], measured(f.noise.sigma[c])});
   page.paragraph(
-      "Noise of one reading, found before anything is named and held fixed from then on. Successive readings, " +
-      number(1 / f.noise.frame_s, 3) + " a second, correlate by " + number(f.noise.ar1, 2) +
+      "Noise of one reading, fitted beside what was found. Successive readings, " + number(1 / f.noise.frame_s, 3) +
+      " a second, correlate by " + number(f.noise.ar1, 2) +
       (f.noise.ar2 != 0 ? " (and those two apart, given the one between, by " + number(f.noise.ar2, 2) + ")" : "") +
       "; " + percent(f.noise.outlier_share) + " of them are outliers.");
   page.table({"channel", "standard deviation (mm)"}, rows);
   const auto& c = f.checks;
-  page.table({"check of the final model", "found", "passed if"},
-             {{"chi2 per reading", measured(c.chi2_per_dof, 4), interval(c.band)},
-              {"correlation left in the residuals (Ljung-Box p)",
-               c.ljung_box_p < 0.001 ? "< 0.001" : number(c.ljung_box_p, 2), "above 0.01"},
-              {"slow structure left (standard deviations of chance)", number(c.remaining_sigmas, 2), "near 0"},
-              {"share of the mismatch unexplained", percent(c.unexplained_share), "small"}},
-             c.clean ? "What is left is noise." : "What is left is more than noise: something is still missing.");
+  page.table(
+      {"check of the final model", "found", "passed if"},
+      {{"chi2 per reading, by the noise that a flexible curve leaves", measured(c.chi2_per_dof, 4), interval(c.band)},
+       {"correlation left in the residuals (Ljung-Box p)", c.ljung_box_p < 0.001 ? "< 0.001" : number(c.ljung_box_p, 2),
+        "above 0.01"}},
+      c.clean ? "What is left is noise." : "What is left is more than that noise; the verdict does not rest on this.");
   if (!f.remarks.empty()) page.subheading("Remarks").list(f.remarks);
 }
 
@@ -178,9 +186,8 @@ void add_making(io::HtmlReport& page, const Findings& f, const std::string& mode
   page.table({"stage", "seconds"}, rows);
   std::string logs;
   for (const auto& trace : f.traces) logs += (logs.empty() ? "" : ", ") + trace.log;
-  page.paragraph("Model in use: " + model_path + ". Recordings: " + logs + ". Seed " + std::to_string(f.seed) + ", " +
-                 std::to_string(f.bootstrap_draws) +
-                 " bootstrap draws; the same input and seed give the same verdict.");
+  page.paragraph("Model in use: " + model_path + ". Recordings: " + logs +
+                 ". Nothing is drawn at random: the same input and version give the same verdict.");
 }
 
 }  // namespace bevel::diagnose

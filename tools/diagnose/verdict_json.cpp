@@ -36,8 +36,7 @@ json as_json(const FoundEffect& effect) {
               {"parameters", as_json(effect.parameters)}};
   for (const auto& r : effect.recordings) one["recordings"][r.log] = as_json(r.parameters);
   one["meaning"] = effect.meaning;
-  one["gain"] = figure(effect.gain);
-  one["threshold"] = figure(effect.threshold);
+  one["log_bayes_factor"] = figure(effect.log_bayes_factor);
   one["visible_sigmas"] = figure(effect.visible_sigmas);
   return one;
 }
@@ -53,13 +52,17 @@ json as_json(const Location& w) {
 }
 
 json as_json(const FitFigures& f) {
-  return {{"rmse_mm", figure(f.rmse_mm)}, {"max_mm", figure(f.max_mm)}, {"chi2_per_dof", figure(f.chi2_per_dof)}};
+  return {{"rmse_mm", figure(f.rmse_mm)},         {"rmse_std_error_mm", figure(f.rmse_se_mm)},
+          {"max_mm", figure(f.max_mm)},           {"chi2_per_dof", figure(f.chi2_per_dof)},
+          {"log_density", figure(f.log_density)}, {"log_density_std_error", figure(f.log_density_se)}};
 }
 
 json as_json(const HeldOut& held_out) {
   json fit = {{"held_out", "leave-one-recording-out"},
+              {"as_it_stands", as_json(held_out.as_it_stands)},
               {"before", as_json(held_out.before)},
               {"after", as_json(held_out.after)},
+              {"noise_floor", as_json(held_out.noise_floor)},
               {"gain", figure(held_out.gain)},
               {"recordings", json::object()}};
   for (const auto& r : held_out.recordings)
@@ -81,11 +84,9 @@ json as_json(const std::vector<TriedEffect>& tried) {
     for (const auto& [name, value] : t.parameters) parameters[name] = figure(value);
     all.push_back({{"name", t.name},
                    {"beside", t.beside},
-                   {"gain", figure(t.gain)},
-                   {"chance", figure(t.chance)},
-                   {"threshold", figure(t.threshold)},
-                   {"evidence", figure(t.evidence)},
-                   {"passes", t.passes},
+                   {"log_bayes_factor", figure(t.log_bayes_factor)},
+                   {"fitted", t.fitted},
+                   {"likelier", t.likelier},
                    {"parameters", parameters}});
   }
   return all;
@@ -106,17 +107,37 @@ json absorption_json(const std::vector<DetectableSize>& sizes) {
   return all;
 }
 
-json as_json(const std::vector<Correction>& corrections) {
+json as_json(const std::vector<Discrepancy>& discrepancies) {
   json all = json::array();
-  for (const auto& c : corrections)
-    all.push_back({{"component", c.component},
-                   {"unit", c.unit},
-                   {"covariate", c.covariate},
-                   {"at", figures(c.at)},
-                   {"values", figures(c.values)},
-                   {"std_errors", figures(c.std_errors)},
-                   {"gain", figure(c.gain)},
-                   {"threshold", figure(c.threshold)}});
+  for (const auto& d : discrepancies)
+    all.push_back({{"component", d.component},
+                   {"unit", d.unit},
+                   {"covariate", d.covariate},
+                   {"periodic", d.periodic},
+                   {"at", figures(d.at)},
+                   {"values", figures(d.values)},
+                   {"std_errors", figures(d.std_errors)},
+                   {"log_bayes_factor", figure(d.log_bayes_factor)},
+                   {"visible_size", figure(d.visible_size)}});
+  return all;
+}
+
+json as_json(const std::vector<Explanation>& explanations) {
+  json all = json::array();
+  for (const auto& e : explanations)
+    all.push_back({{"effects", e.effects},
+                   {"probability", figure(e.probability)},
+                   {"with_discrepancy", figure(e.with_discrepancy)}});
+  return all;
+}
+
+json as_json(const std::vector<VariationEstimate>& variation) {
+  json all = json::object();
+  for (const auto& v : variation)
+    all[v.name] = {{"unit", v.unit},
+                   {"standard_deviation", figure(v.sd)},
+                   {"range95", {figure(v.low), figure(v.high)}},
+                   {"probability_of_none", figure(v.none)}};
   return all;
 }
 
@@ -138,8 +159,6 @@ json checks_json(const Checks& c) {
   return {{"chi2_per_dof", figure(c.chi2_per_dof)},
           {"band99", {figure(c.band[0]), figure(c.band[1])}},
           {"ljung_box_p", figure(c.ljung_box_p)},
-          {"remaining_sigmas", figure(c.remaining_sigmas)},
-          {"unexplained_share", figure(c.unexplained_share)},
           {"clean", c.clean}};
 }
 
@@ -150,7 +169,7 @@ std::string verdict_json(const Findings& f) {
       {"verdict", name_of(f.verdict)}, {"sentence", f.sentence}, {"effects", json::array()}, {"where", json::array()}};
   for (const auto& effect : f.effects) j["effects"].push_back(as_json(effect));
   for (const auto& location : f.where) j["where"].push_back(as_json(location));
-  j["noise"] = {{"sigma_mm", figures(f.noise.sigma_mm)},
+  j["noise"] = {{"sigma_mm", figures(f.noise.sigma)},
                 {"ar1", figure(f.noise.ar1)},
                 {"ar2", figure(f.noise.ar2)},
                 {"outlier_share", figure(f.noise.outlier_share)},
@@ -160,7 +179,12 @@ std::string verdict_json(const Findings& f) {
   j["detectable"] = detectable_json(f.detectable);
   j["next_experiment"] = experiment_json(f.next_experiment);
   j["needle"] = {{"before", as_json(f.base)}, {"after", as_json(f.needle)}};
-  j["corrections"] = as_json(f.corrections);
+  j["posterior"] = {{"nothing_missing", figure(f.nothing_probability)},
+                    {"discrepancy", figure(f.discrepancy_probability)},
+                    {"not_fitted", figure(f.not_visited)},
+                    {"explanations", as_json(f.explanations)}};
+  j["variation"] = as_json(f.variation);
+  j["discrepancies"] = as_json(f.discrepancies);
   j["checks"] = checks_json(f.checks);
   j["tried"] = as_json(f.tried);
   j["tried_beside"] = as_json(f.beside);
@@ -168,9 +192,7 @@ std::string verdict_json(const Findings& f) {
   j["confusion"] = confusion_json(f);
   j["remarks"] = f.remarks;
   j["measurements"] = {{"used", f.readings}, {"outliers", f.outliers}};
-  j["seed"] = f.seed;
-  j["bootstrap_draws"] = f.bootstrap_draws;
-  // Clock times are not here but on the page: the same input and seed give the same file, to the last bit.
+  // Clock times are not here but on the page: the same input gives the same file, to the last bit.
   return j.dump(2, ' ', false, json::error_handler_t::replace) + "\n";
 }
 

@@ -4,6 +4,7 @@
 #include <string>
 #include <vector>
 
+#include "diagnosis/inference/dataset.hpp"
 #include "model/effects/open_loop.hpp"
 
 namespace bevel::diagnosis {
@@ -17,13 +18,8 @@ struct Channel {
   double claimed_sigma_mm = 0;  // median of what the messages say
 };
 
-// One channel in one recording, in order of time.
-struct Series {
-  std::vector<std::size_t> reading;  // index into the recording's motion.at
-  std::vector<double> time_s;        // from the recording's start
-  std::vector<double> measured_mm;   // along the channel's axis
-  std::vector<double> relative_sd;   // claimed standard deviation over the channel's median
-};
+// One channel in one recording: message is an index into the recording's motion.at, measured is in mm along the axis.
+using inference::Series;
 
 struct Recording {
   std::string name;

@@ -4,7 +4,7 @@
 
 #include <numbers>
 
-#include "tests/mismatch/simulated_rig.hpp"
+#include "tests/needle/simulated_rig.hpp"
 
 namespace bevel::diagnosis::testing {
 namespace {
@@ -46,10 +46,10 @@ TEST(Channels, ADiagonalInformationSeesTheAxesItHasInformationAlong) {
   EXPECT_NEAR(recorded.channels[0].claimed_sigma_mm, 0.2, 1e-12);
   EXPECT_NEAR(recorded.channels[1].claimed_sigma_mm, 0.25, 1e-12);
   const auto& recording = recorded.recordings[0];
-  ASSERT_EQ(recording.series[0].measured_mm.size(), recording.position_mm.size());
+  ASSERT_EQ(recording.series[0].measured.size(), recording.position_mm.size());
   for (std::size_t i = 0; i < recording.position_mm.size(); ++i) {
-    EXPECT_EQ(recording.series[0].measured_mm[i], recording.position_mm[i].y());
-    EXPECT_EQ(recording.series[1].measured_mm[i], recording.position_mm[i].z());
+    EXPECT_EQ(recording.series[0].measured[i], recording.position_mm[i].y());
+    EXPECT_EQ(recording.series[1].measured[i], recording.position_mm[i].z());
   }
   EXPECT_EQ(recorded.measurements(),
             2 * (recorded.recordings[0].position_mm.size() + recorded.recordings[1].position_mm.size()));

@@ -9,7 +9,7 @@
 #include <thread>
 #include <vector>
 
-namespace bevel::inference {
+namespace bevel {
 
 // Calls work(i) for i in [0, count); the first exception thrown is thrown again here, once all threads have ended.
 template <class Work>
@@ -36,4 +36,4 @@ void parallel_for(std::size_t count, int threads, Work&& work) {
   if (failure) std::rethrow_exception(failure);
 }
 
-}  // namespace bevel::inference
+}  // namespace bevel

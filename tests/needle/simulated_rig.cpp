@@ -1,13 +1,6 @@
-#include "tests/mismatch/simulated_rig.hpp"
+#include "tests/needle/simulated_rig.hpp"
 
 namespace bevel::diagnosis::testing {
-
-std::function<void(std::vector<model::ActuatorState>&)> rattle(double size_mm) {
-  return [size_mm](std::vector<model::ActuatorState>& base) {
-    for (auto& state : base)
-      state.insertion_mm += size_mm * std::sin(13.7e-6 * static_cast<double>(state.utime - base.front().utime));
-  };
-}
 
 model::testing::Script script_of(int recording) {
   const double turn = 2.5 + 0.5 * (recording % 4);
@@ -76,41 +69,5 @@ std::vector<RawRecording> record(const SimulatedRig& rig, std::uint64_t seed) {
 }
 
 RecordedCase record_case(const SimulatedRig& rig, std::uint64_t seed) { return make_case(record(rig, seed)); }
-
-Evidence evidence_of(const RecordedCase& recorded, const SimulatedRig& rig) {
-  Evidence evidence;
-  evidence.recorded = &recorded;
-  evidence.noise = {.sigma_mm = {rig.sigma_mm[0], rig.sigma_mm[1], rig.sigma_mm[2]},
-                    .ar1 = rig.ar1,
-                    .outlier_share = 0,
-                    .frame_s = rig.frame_s};
-  evidence.belief = rig.needle;
-  return evidence;
-}
-
-Member member(std::string_view name, std::uint32_t variant) {
-  const model::Effect* effect = model::find_effect(name);
-  if (effect == nullptr) throw std::invalid_argument("no effect " + std::string(name));
-  return {effect, variant == ~0U ? effect->variants().front() : variant};
-}
-
-Member curve(const CorrectionLibrary& library, std::string_view name) {
-  for (const Member& one : library.members())
-    if (one.effect->name() == name) return one;
-  throw std::invalid_argument("no " + std::string(name));
-}
-
-Fit fit_of(const Evidence& evidence, const EffectSet& set) {
-  const Hypothesis hypothesis(evidence.belief, set, *evidence.recorded);
-  Eigen::VectorXd start = hypothesis.start();
-  // From where every effect does something: at "none" a lag or a width has no slope.
-  for (std::size_t i = kBaseUnknowns; i < hypothesis.unknowns().size(); ++i) {
-    const Unknown& u = hypothesis.unknowns()[i];
-    if (u.recording < 0)
-      start[static_cast<Eigen::Index>(i)] =
-          set[static_cast<std::size_t>(u.member)].effect->parameters()[static_cast<std::size_t>(u.parameter)].starts[0];
-  }
-  return fit(evidence, hypothesis, start);
-}
 
 }  // namespace bevel::diagnosis::testing

@@ -1,4 +1,4 @@
-#include "diagnosis/mismatch/recorded_case.hpp"
+#include "diagnosis/needle/recorded_case.hpp"
 
 #include <Eigen/Eigenvalues>
 #include <algorithm>
@@ -118,9 +118,9 @@ Recording make_recording(RawRecording& raw, std::vector<Channel>& channels) {
       Series& series = recording.series[c];
       const double time_s = seconds(usable[i].utime);
       if (!series.time_s.empty() && time_s <= series.time_s.back()) continue;  // the same picture twice
-      series.reading.push_back(i);
+      series.message.push_back(i);
       series.time_s.push_back(time_s);
-      series.measured_mm.push_back(axis.dot(usable[i].position_mm));
+      series.measured.push_back(axis.dot(usable[i].position_mm));
       series.relative_sd.push_back(1 / std::sqrt(information));
     }
   }

@@ -6,8 +6,7 @@
 #include <functional>
 #include <random>
 
-#include "diagnosis/mismatch/corrections.hpp"
-#include "diagnosis/mismatch/likelihood.hpp"
+#include "diagnosis/needle/recorded_case.hpp"
 #include "tests/effects/script.hpp"
 
 namespace bevel::diagnosis::testing {
@@ -29,25 +28,14 @@ struct SimulatedRig {
   double dropped_share = 0;
 };
 
-// A true motion: the insertion swings by so much, two times a second. Too quick for any curve or name.
-std::function<void(std::vector<model::ActuatorState>&)> rattle(double size_mm);
-
 // 7 to 9 s, 60 to 75 mm: turns both ways at several depths, two speeds, a rest, steady turning, retraction.
 model::testing::Script script_of(int recording);
 
 std::vector<RawRecording> record(const SimulatedRig& rig, std::uint64_t seed);
 RecordedCase record_case(const SimulatedRig& rig, std::uint64_t seed);
 
-// With the noise of the rig, known, and belief in its needle.
-Evidence evidence_of(const RecordedCase& recorded, const SimulatedRig& rig);
-
 // A stationary first-order process, sampled at these times: covariance sigma^2 ar1^(|dt|/frame_s).
 Eigen::VectorXd coloured_noise(const std::vector<double>& time_s, double sigma, double ar1, double frame_s,
                                std::mt19937_64& random);
-
-Member member(std::string_view name, std::uint32_t variant = ~0U);
-// "correction of the <component> by <covariate>".
-Member curve(const CorrectionLibrary& library, std::string_view name);
-Fit fit_of(const Evidence& evidence, const EffectSet& set);
 
 }  // namespace bevel::diagnosis::testing

@@ -5,7 +5,7 @@
 #include <stdexcept>
 #include <vector>
 
-#include "diagnosis/mismatch/parallel.hpp"
+#include "diagnosis/parallel.hpp"
 
 namespace bevel::diagnosis {
 namespace {

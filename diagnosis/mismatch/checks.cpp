@@ -1,0 +1,55 @@
+#include "diagnosis/mismatch/checks.hpp"
+
+#include <algorithm>
+#include <cmath>
+
+#include "diagnosis/statistics/ljung_box.hpp"
+
+namespace bevel::diagnosis {
+
+using Eigen::Index;
+using Eigen::VectorXd;
+
+Checks check_model(const inference::Search& search, const ChosenModel& model, const inference::Readings& outliers,
+                   const inference::Noise& measured) {
+  constexpr int kLags = 12;  // at most, and a third of the readings
+  constexpr Index kFewest = 8;
+  constexpr double kBandQuantile = 2.576, kChance = 0.01;
+  Checks out;
+  const inference::Fit& fit = *model.fit;
+  const inference::Likelihood by_measured(search.system(), outliers, measured);
+  const auto curve =
+      model.curve ? search.discrepancy().columns(by_measured, *fit.scales.curve) : inference::CurveColumns{};
+  inference::Residuals residuals;
+  double chi2 = 0, count = 0, smallest_p = 1;
+  int series_count = 0;
+  for (std::size_t r = 0; r < by_measured.recordings(); ++r) {
+    if (!by_measured.evaluate(fit.layout, r, fit.shared, fit.local[r], false, residuals)) continue;
+    if (model.curve) residuals.white -= curve.columns[r] * fit.curve_values;
+    chi2 += residuals.white.squaredNorm();
+    count += static_cast<double>(residuals.white.size());
+    if (!fit.likelihood->evaluate(fit.layout, r, fit.shared, fit.local[r], false, residuals)) continue;
+    if (model.curve) residuals.white -= model.curve.columns[r] * fit.curve_values;
+    Index row = 0;
+    for (const auto& series : fit.likelihood->data().recordings[r].series) {
+      const auto readings = static_cast<Index>(series.time_s.size());
+      if (readings >= kFewest) {
+        const auto& noise = fit.likelihood->noise();
+        const int lags = std::min(kLags, static_cast<int>(readings) / 3);
+        const int fitted = (noise.ar1 > 0 ? 1 : 0) + (noise.ar2 != 0 ? 1 : 0);
+        smallest_p = std::min(smallest_p, ljung_box(residuals.white.segment(row, readings), lags, fitted).p_value);
+        ++series_count;
+      }
+      row += readings;
+    }
+  }
+  out.chi2_per_dof = chi2 / std::max(count, 1.0);
+  // Noise and model were found on these same readings: the noise's own variance is in the band.
+  const double sd = std::sqrt(4 / std::max(count, 1.0));
+  out.band = {1 - kBandQuantile * sd, 1 + kBandQuantile * sd};
+  out.ljung_box_p = std::min(1.0, smallest_p * series_count);
+  out.clean = out.chi2_per_dof > out.band[0] && out.chi2_per_dof < out.band[1] && out.ljung_box_p > kChance;
+  return out;
+}
+
+}  // namespace bevel::diagnosis

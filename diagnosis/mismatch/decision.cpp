@@ -1,0 +1,69 @@
+#include "diagnosis/mismatch/decision.hpp"
+
+#include <set>
+
+namespace bevel::diagnosis {
+
+using inference::Fit;
+using inference::ModelSet;
+using inference::Posterior;
+using inference::Search;
+
+namespace {
+
+std::set<std::string> names_of(const Search& search, const ModelSet& set) {
+  std::set<std::string> out;
+  for (const std::size_t e : set) out.insert(search.system().effects()[e].name);
+  return out;
+}
+
+}  // namespace
+
+DiscrepancyValues ChosenModel::discrepancy() const { return {fit->scales.curve->curve, fit->curve_values}; }
+
+ChosenModel model_of(const Search& search, const Fit& fit, double log_posterior) {
+  ChosenModel out{.fit = &fit, .curve = curve_of(search, fit), .blocks = {}, .log_posterior = log_posterior};
+  out.blocks = linearise(*fit.likelihood, fit, out.curve);
+  return out;
+}
+
+Decision decide(const Search& search, const Posterior& posterior) {
+  Decision out;
+  const double something = 1 - posterior.nothing;
+  std::set<std::string> names;
+  bool unknown = false;
+  if (something > 0.5) {
+    for (const auto& [name, probability] : posterior.inclusion)
+      if (probability > 0.5 * something) names.insert(name);
+    unknown = posterior.discrepancy > 0.5 * something;
+    if (names.empty() && !unknown) {
+      for (const auto& share : posterior.sets)
+        if (!share.set.empty() && names.empty()) names = names_of(search, share.set);
+    }
+  }
+  out.verdict = unknown ? Verdict::unknown_effect : names.empty() ? Verdict::nothing_missing : Verdict::effects_found;
+  // The likeliest of those sets; of all, should no set that was visited hold just these.
+  const inference::Visited* best = nullptr;
+  for (const bool exactly : {true, false}) {
+    for (const auto& [set, one] : search.visited()) {
+      if ((exactly && names_of(search, set) != names) || (unknown && !one.at->fit_with_curve)) continue;
+      const auto log = [&](const inference::Visited& v) { return unknown ? v.log_with_curve : v.log_without_curve; };
+      if (!best || log(one) > log(*best)) best = &one;
+    }
+    if (best) break;
+  }
+  out.model = unknown ? model_of(search, *best->at->fit_with_curve, best->log_with_curve)
+                      : model_of(search, best->at->fit, best->log_without_curve);
+  return out;
+}
+
+Fit refitted_base(const Search& search, const Fit& like) {
+  const inference::Layout nothing(search.system(), {});
+  const Fit& base = search.visited().at({}).at->fit;
+  Fit out =
+      fit(*like.likelihood, nothing, base.shared, base.local, {.nuisance_sd = like.scales.nuisance_sd, .curve = {}});
+  out.likelihood = like.likelihood;
+  return out;
+}
+
+}  // namespace bevel::diagnosis

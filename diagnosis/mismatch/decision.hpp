@@ -1,0 +1,38 @@
+#pragma once
+// What the posterior says, as a verdict, and the model that stands for it.
+//
+//   nothing missing   neither an effect nor a discrepancy of any consequence is likelier than not
+//   otherwise, given that something is missing: an effect is named where it is likelier than not, and it is unknown
+//   where a discrepancy of consequence is. Where neither is (rivals share the probability), the likeliest set is named,
+//   and its rivals beside it.
+#include "diagnosis/inference/posterior.hpp"
+#include "diagnosis/mismatch/findings.hpp"
+#include "diagnosis/needle/needle_system.hpp"
+
+namespace bevel::diagnosis {
+
+// Root mean square over the readings, in standard deviations of one reading's noise, from which a discrepancy is of
+// consequence. Below it is an error of form that the intervals carry.
+inline constexpr double kDiscrepancySize = 0.5;
+
+// A model to write, to draw and to compare with: one mode of the posterior. Lives as long as the search.
+struct ChosenModel {
+  const inference::Fit* fit = nullptr;
+  inference::CurveColumns curve;
+  std::vector<inference::ArrowBlock> blocks;
+  double log_posterior = 0;
+  DiscrepancyValues discrepancy() const;  // where fit->scales.curve says so
+};
+
+struct Decision {
+  Verdict verdict = Verdict::nothing_missing;
+  ChosenModel model;
+};
+Decision decide(const inference::Search& search, const inference::Posterior& posterior);
+// Any other fit, ready for the same uses.
+ChosenModel model_of(const inference::Search& search, const inference::Fit& fit, double log_posterior);
+
+// The needle alone, refitted with the noise and the variation that go with another model.
+inference::Fit refitted_base(const inference::Search& search, const inference::Fit& like);
+
+}  // namespace bevel::diagnosis

@@ -1,0 +1,211 @@
+#include "diagnosis/mismatch/found_effects.hpp"
+
+#include <Eigen/Cholesky>
+#include <algorithm>
+#include <cmath>
+#include <numbers>
+#include <set>
+
+namespace bevel::diagnosis {
+
+using Eigen::Index;
+using Eigen::MatrixXd;
+using Eigen::VectorXd;
+using inference::Fit;
+using inference::ModelSet;
+using inference::Search;
+
+namespace {
+
+constexpr double kRivalOdds = 20;
+constexpr double k95 = 1.96;
+
+// Variances of a recording's own unknowns that are not instants, in the order of free_locals.
+VectorXd local_variances(const inference::ArrowBlock& block, const inference::ArrowSolution& solution) {
+  MatrixXd inner = block.ll;
+  inner.diagonal() += block.precision;
+  const Eigen::LLT<MatrixXd> factor(inner);
+  const MatrixXd through = factor.solve(block.lz);
+  const MatrixXd own = factor.solve(MatrixXd::Identity(inner.rows(), inner.cols()));
+  return (own + through * solution.covariance * through.transpose()).diagonal();
+}
+
+FoundParameter shared_parameter(const inference::Unknowns& unknowns, const ChosenModel& model, std::size_t member,
+                                std::size_t p) {
+  const auto& layout = model.fit->layout;
+  const int at = layout.find_shared(member, p);
+  const inference::Parameter& parameter = *layout.shared()[static_cast<std::size_t>(at)].parameter;
+  FoundParameter out{.name = parameter.name, .value = model.fit->shared[at]};
+  const auto mixture = unknowns.of(static_cast<int>(layout.set()[member]), p);
+  const double off = mixture.mean() - out.value;
+  out.std_error = std::sqrt(mixture.sd() * mixture.sd() + off * off);
+  out.ci95 = {std::min(mixture.quantile(0.025), out.value), std::max(mixture.quantile(0.975), out.value)};
+  if (!parameter.periodic)
+    for (double& end : out.ci95) end = std::clamp(end, parameter.lower, parameter.upper);
+  const auto& held = model.fit->held;
+  out.at_bound = std::find(held.begin(), held.end(), at) != held.end();
+  return out;
+}
+
+// Its phase or instant in one recording; false where it did not happen.
+bool local_parameter(const ChosenModel& model, std::size_t r, int at, const VectorXd& variances, double frame_s,
+                     FoundParameter& out) {
+  const Fit& fit = *model.fit;
+  const auto i = static_cast<std::size_t>(at);
+  out.name = fit.layout.local()[i].parameter->name;
+  out.value = fit.local[r][at];
+  if (fit.layout.is_instant(i)) {
+    if (!(out.value > 0)) return false;
+    const auto posterior = instant_posterior(*fit.likelihood, fit, model.curve, r, i);
+    // Between two readings nothing is seen: where in a frame it happened is known only by its assumed form.
+    const double between_s = frame_s / std::sqrt(12.0);
+    out.std_error = std::hypot(posterior.sd_s, between_s);
+    out.ci95 = {std::min(posterior.low_s, out.value - k95 * between_s),
+                std::max(posterior.high_s, out.value + k95 * between_s)};
+    return true;
+  }
+  const auto free = free_locals(fit.layout);
+  const auto place = std::find(free.begin(), free.end(), at) - free.begin();
+  out.std_error = std::sqrt(std::max(0.0, variances[place]));
+  out.ci95 = {out.value - k95 * out.std_error, out.value + k95 * out.std_error};
+  return true;
+}
+
+// Names that explain as much in its place, at odds of less than kRivalOdds to 1.
+std::vector<std::string> rivals_of(const Search& search, const ModelSet& set, std::size_t effect,
+                                   double log_posterior) {
+  std::set<std::string> names;
+  const auto& effects = search.system().effects();
+  const ModelSet rest = inference::without(set, effect);
+  for (const auto& [other, one] : search.visited()) {
+    if (other.size() != set.size() || one.log_posterior() < log_posterior - std::log(kRivalOdds)) continue;
+    std::vector<std::size_t> added;
+    std::set_difference(other.begin(), other.end(), rest.begin(), rest.end(), std::back_inserter(added));
+    if (added.size() == 1 && effects[added[0]].name != effects[effect].name) names.insert(effects[added[0]].name);
+  }
+  return {names.begin(), names.end()};
+}
+
+}  // namespace
+
+std::vector<FoundEffect> found_effects(const NeedleSystem& system, const Search& search,
+                                       const inference::Posterior& posterior, const inference::Unknowns& unknowns,
+                                       const ChosenModel& model) {
+  std::vector<FoundEffect> out;
+  const Fit& fit = *model.fit;
+  const ModelSet& set = fit.layout.set();
+  const auto solution = solve_about(fit, model.blocks, model.curve);
+  for (std::size_t m = 0; m < set.size(); ++m) {
+    const inference::Effect& effect = system.effects()[set[m]];
+    FoundEffect found{.name = effect.name,
+                      .meaning = std::string(system.physics(set[m]).meaning()),
+                      .probability = posterior.inclusion.at(effect.name),
+                      .ambiguous_with = rivals_of(search, set, set[m], search.visited().at(set).log_posterior())};
+    for (std::size_t p = 0; p < effect.parameters.size(); ++p)
+      if (effect.parameters[p].scope == inference::Scope::shared)
+        found.parameters.push_back(shared_parameter(unknowns, model, m, p));
+    for (std::size_t r = 0; r < fit.local.size(); ++r) {
+      FoundInRecording one{.log = system.recorded().recordings[r].name, .parameters = {}};
+      const VectorXd variances = local_variances(model.blocks[r], solution);
+      for (std::size_t p = 0; p < effect.parameters.size(); ++p)
+        if (const int at = fit.layout.find_local(m, p); at >= 0)
+          if (FoundParameter own; local_parameter(model, r, at, variances, system.data().frame_s, own))
+            one.parameters.push_back(own);
+      if (!one.parameters.empty()) found.recordings.push_back(std::move(one));
+    }
+    // Without it, by the same noise.
+    const ModelSet rest = inference::without(set, set[m]);
+    const inference::Layout smaller(system, rest);
+    std::vector<VectorXd> local;
+    for (const auto& own : fit.local) local.push_back(smaller.local_from(fit.layout, own));
+    const Fit less = inference::fit(*fit.likelihood, smaller, smaller.shared_from(fit.layout, fit.shared), local,
+                                    fit.scales, model.curve);
+    found.visible_sigmas = std::sqrt(std::max(0.0, less.cost - fit.cost));
+    if (const auto at = search.visited().find(rest); at != search.visited().end())
+      found.log_bayes_factor =
+          search.visited().at(set).log_posterior() - at->second.log_posterior() - search.rules().log_prior_odds_effect;
+    out.push_back(std::move(found));
+  }
+  return out;
+}
+
+std::vector<TriedEffect> tried_beside(const Search& search, const ModelSet& set) {
+  std::vector<TriedEffect> out;
+  const auto& effects = search.system().effects();
+  const double from = search.visited().at(set).log_posterior(), odds = search.rules().log_prior_odds_effect;
+  for (std::size_t e = 0; e < effects.size(); ++e) {
+    const ModelSet larger = inference::with(set, e);
+    if (inference::contains(set, e) || !search.system().allows(larger)) continue;
+    TriedEffect one{.name = effects[e].label, .beside = set.empty() ? "" : describe(search.system(), set)};
+    if (const auto at = search.visited().find(larger); at != search.visited().end()) {
+      one.fitted = true;
+      one.log_bayes_factor = at->second.log_posterior() - from - odds;
+      const Fit& fit = at->second.at->fit;
+      const auto member = std::find(larger.begin(), larger.end(), e) - larger.begin();
+      for (std::size_t p = 0; p < effects[e].parameters.size(); ++p)
+        if (const int i = fit.layout.find_shared(static_cast<std::size_t>(member), p); i >= 0)
+          one.parameters.emplace_back(effects[e].parameters[p].name, fit.shared[i]);
+    } else if (const auto promised = search.promised().find(larger); promised != search.promised().end()) {
+      one.log_bayes_factor = promised->second - from - odds;
+    } else {
+      continue;
+    }
+    one.likelier = one.fitted && one.log_bayes_factor + odds > 0;
+    out.push_back(std::move(one));
+  }
+  std::stable_sort(out.begin(), out.end(),
+                   [](const auto& a, const auto& b) { return a.log_bayes_factor > b.log_bayes_factor; });
+  return out;
+}
+
+NeedleEstimate needle_estimate(const NeedleSystem& system, const ChosenModel& model) {
+  NeedleEstimate out;
+  out.value = system.needle(model.fit->shared);
+  const MatrixXd covariance = solve_about(*model.fit, model.blocks, model.curve).covariance;
+  const Eigen::RowVector2d by(1, out.value.lambda2 / std::numbers::pi);  // lambda1 by (u, lambda2)
+  out.curvature_sd_per_mm = std::sqrt(covariance(kCurvature, kCurvature));
+  out.lambda1_sd_per_rad = std::sqrt((by * covariance.block<2, 2>(kU, kU) * by.transpose()).value());
+  out.lambda2_sd = std::sqrt(covariance(kLambda2, kLambda2));
+  return out;
+}
+
+std::vector<VariationEstimate> variation_of(const Search& search, const inference::Unknowns& unknowns) {
+  std::vector<VariationEstimate> out;
+  const auto& groups = search.system().nuisance_groups();
+  for (std::size_t g = 0; g < groups.size(); ++g) {
+    const VectorXd share = unknowns.of_group(g);
+    VariationEstimate one{.name = groups[g].name, .unit = groups[g].unit};
+    double below = 0;
+    for (Index i = 0; i < share.size(); ++i) {
+      const double value = groups[g].standard_deviations[static_cast<std::size_t>(i)];
+      one.sd += share[i] * value;
+      if (value == 0) one.none += share[i];
+      if (below < 0.025) one.low = value;
+      if (below < 0.975) one.high = value;
+      below += share[i];
+    }
+    out.push_back(std::move(one));
+  }
+  return out;
+}
+
+std::vector<Discrepancy> discrepancies_of(const Search& search, const ChosenModel& model) {
+  const Fit& fit = *model.fit;
+  if (!fit.scales.curve) return {};
+  const inference::Curve& curve = search.system().curves()[fit.scales.curve->curve];
+  const MatrixXd covariance = solve_about(fit, model.blocks, model.curve).covariance;
+  Discrepancy out{.component = curve.component,
+                  .unit = curve.unit,
+                  .covariate = curve.covariate,
+                  .periodic = curve.periodic,
+                  .at = curve.at,
+                  .values = {fit.curve_values.begin(), fit.curve_values.end()},
+                  .std_errors = {},
+                  .log_bayes_factor = search.visited().at(fit.layout.set()).at->log_bayes_factor_curve,
+                  .visible_size = search.discrepancy().visible_size(*fit.scales.curve, fit.curve_values)};
+  for (Index i = 0; i < fit.curve_values.size(); ++i)
+    out.std_errors.push_back(std::sqrt(std::max(0.0, covariance(fit.shared.size() + i, fit.shared.size() + i))));
+  return {out};
+}
+
+}  // namespace bevel::diagnosis

@@ -1,0 +1,17 @@
+#pragma once
+// The effects of a decision with their sizes and rivals, and the ranking of all that were tried.
+#include "diagnosis/mismatch/decision.hpp"
+
+namespace bevel::diagnosis {
+
+// Effects of the model that was chosen.
+std::vector<FoundEffect> found_effects(const NeedleSystem& system, const inference::Search& search,
+                                       const inference::Posterior& posterior, const inference::Unknowns& unknowns,
+                                       const ChosenModel& model);
+// Every effect of the library, added to a set that was visited.
+std::vector<TriedEffect> tried_beside(const inference::Search& search, const inference::ModelSet& set);
+NeedleEstimate needle_estimate(const NeedleSystem& system, const ChosenModel& model);
+std::vector<VariationEstimate> variation_of(const inference::Search& search, const inference::Unknowns& unknowns);
+std::vector<Discrepancy> discrepancies_of(const inference::Search& search, const ChosenModel& model);
+
+}  // namespace bevel::diagnosis

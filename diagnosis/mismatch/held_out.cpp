@@ -1,0 +1,130 @@
+#include "diagnosis/mismatch/held_out.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <numbers>
+
+namespace bevel::diagnosis {
+
+using Eigen::Index;
+using Eigen::VectorXd;
+using inference::Fit;
+using inference::Likelihood;
+
+namespace {
+
+// Sums over readings of one recording.
+struct Sums {
+  double squares = 0, largest = 0, chi2 = 0, log_density = 0;
+  double count = 0;
+};
+
+FitFigures figures_of(const std::vector<Sums>& all) {
+  FitFigures out;
+  Sums sum;
+  for (const Sums& one : all) {
+    sum.squares += one.squares, sum.chi2 += one.chi2, sum.log_density += one.log_density, sum.count += one.count;
+    out.max_mm = std::max(out.max_mm, one.largest);
+  }
+  const double n = std::max(sum.count, 1.0);
+  out.rmse_mm = std::sqrt(sum.squares / n);
+  out.chi2_per_dof = sum.chi2 / n;
+  out.log_density = sum.log_density / n;
+  if (all.size() < 2) return out;
+  // From recording to recording, weighed by their readings: of the mean square, and of the mean logarithm.
+  double square = 0, log = 0;
+  for (const Sums& one : all) {
+    square += std::pow(one.squares - one.count * sum.squares / n, 2);
+    log += std::pow(one.log_density - one.count * out.log_density, 2);
+  }
+  const auto r = static_cast<double>(all.size());
+  const double error = std::sqrt(square * r / (r - 1)) / n;
+  out.rmse_se_mm = out.rmse_mm > 0 ? error / (2 * out.rmse_mm) : 0;
+  out.log_density_se = std::sqrt(log * r / (r - 1)) / n;
+  return out;
+}
+
+double constant_of(double count) { return -0.5 * count * std::log(2 * std::numbers::pi); }
+
+void add_errors(const VectorXd& errors_mm, Sums& sums) {
+  sums.squares = errors_mm.squaredNorm();
+  sums.largest = errors_mm.size() > 0 ? errors_mm.cwiseAbs().maxCoeff() : 0;
+  sums.count = static_cast<double>(errors_mm.size());
+}
+
+// As a new insertion: what differs between insertions at its mean. Phases and instants are the recording's own: nobody
+// predicts them.
+VectorXd new_insertion(const Fit& fit, std::size_t r) {
+  VectorXd local = fit.local[r];
+  for (std::size_t i = 0; i < fit.layout.local().size(); ++i)
+    if (!fit.layout.is_scanned(i)) local[static_cast<Index>(i)] = 0;
+  return local;
+}
+
+Sums sums_of(const Fit& fit, const inference::CurveColumns& curve, std::size_t r, const inference::LeftOut& left_out) {
+  Sums out;
+  VectorXd errors_mm = fit.likelihood->errors(fit.layout, r, left_out.shared, new_insertion(fit, r));
+  if (errors_mm.size() == 0) return out;
+  if (curve) errors_mm -= curve.raw[r] * left_out.curve_values;
+  add_errors(errors_mm, out);
+  out.chi2 = left_out.chi2;
+  out.log_density = left_out.log_density + constant_of(out.count);
+  return out;
+}
+
+// By the model file as it is: nothing is refitted, and it knows of no variation.
+Sums as_it_stands(const NeedleSystem& system, const Likelihood& likelihood, std::size_t r) {
+  Sums out;
+  const inference::Layout nothing(system, {});
+  const VectorXd shared = nothing.shared_start(), local = nothing.local_start();
+  inference::Residuals residuals;
+  if (!likelihood.evaluate(nothing, r, shared, local, false, residuals)) {
+    const double none = std::numeric_limits<double>::quiet_NaN();
+    return {.squares = none, .largest = none, .chi2 = none, .log_density = none, .count = 1};
+  }
+  add_errors(likelihood.errors(nothing, r, shared, local), out);
+  out.chi2 = residuals.white.squaredNorm();
+  out.log_density = constant_of(out.count) + likelihood.log_weights(r) - 0.5 * out.chi2;
+  return out;
+}
+
+// Of errors that are the noise and nothing else, in the mean.
+Sums noise_floor(const Likelihood& likelihood, std::size_t r) {
+  Sums out;
+  const auto& series = likelihood.data().recordings[r].series;
+  for (std::size_t c = 0; c < series.size(); ++c)
+    for (const double relative : series[c].relative_sd)
+      out.squares += std::pow(likelihood.noise().sigma[c] * relative, 2), ++out.count;
+  out.chi2 = out.count;
+  out.log_density = constant_of(out.count) + likelihood.log_weights(r) - 0.5 * out.count;
+  return out;
+}
+
+}  // namespace
+
+HeldOut hold_out(const NeedleSystem& system, const inference::Search& search, const ChosenModel& base) {
+  HeldOut out;
+  const Likelihood& likelihood = *base.fit->likelihood;
+  const auto selected = leave_out_selection(search);
+  std::vector<Sums> file, before, after, floor;
+  for (std::size_t r = 0; r < likelihood.recordings(); ++r) {
+    file.push_back(as_it_stands(system, likelihood, r));
+    before.push_back(sums_of(*base.fit, base.curve, r, leave_out(*base.fit, base.blocks, base.curve, r)));
+    const Fit& chosen = *selected[r].fit;
+    after.push_back(sums_of(chosen, curve_of(search, chosen), r, selected[r].of_fit));
+    after.back().log_density = selected[r].log_density + constant_of(after.back().count);
+    floor.push_back(noise_floor(likelihood, r));
+    out.recordings.push_back({.log = system.recorded().recordings[r].name,
+                              .before = figures_of({before.back()}),
+                              .after = figures_of({after.back()})});
+    out.gain += after.back().log_density - before.back().log_density;
+  }
+  out.as_it_stands = figures_of(file);
+  out.before = figures_of(before);
+  out.after = figures_of(after);
+  out.noise_floor = figures_of(floor);
+  return out;
+}
+
+}  // namespace bevel::diagnosis
