@@ -99,7 +99,7 @@ std::vector<FoundEffect> found_effects(const NeedleSystem& system, const Search&
     const inference::Effect& effect = system.effects()[set[m]];
     FoundEffect found{.name = effect.name,
                       .meaning = std::string(system.physics(set[m]).meaning()),
-                      .probability = posterior.inclusion.at(effect.name),
+                      .probability = std::min(1.0, posterior.inclusion.at(effect.name)),
                       .ambiguous_with = rivals_of(search, set, set[m], search.visited().at(set).log_posterior())};
     for (std::size_t p = 0; p < effect.parameters.size(); ++p)
       if (effect.parameters[p].scope == inference::Scope::shared)

@@ -67,8 +67,7 @@ FoundEffect windup() {
   effect.probability = 0.971;
   effect.ambiguous_with = {"rotation_backlash"};
   effect.parameters = {{"lag_at_100mm_rad", 0.8234, 0.031, {0.763, 0.889}, false}};
-  effect.gain = 312;
-  effect.threshold = 14.2;
+  effect.log_bayes_factor = 148;
   effect.visible_sigmas = 17;
   return effect;
 }
@@ -81,29 +80,35 @@ FoundEffect lost_steps() {
   effect.parameters = {{"rotation_rad", 1.394, 0.022, {1.351, 1.437}, false}};
   effect.recordings = {{"rec03.lcm", {{"at_s", 3.309, 0.02, {3.27, 3.35}, false}}},
                        {"rec04.lcm", {{"at_s", 2.411, 0.03, {2.36, 2.47}, false}}}};
-  effect.gain = 2204;
-  effect.threshold = 17;
+  effect.log_bayes_factor = 1080;
   effect.visible_sigmas = 47;
   return effect;
 }
 
+FitFigures figures(double rmse_mm, double max_mm, double chi2_per_dof) {
+  return {.rmse_mm = rmse_mm,
+          .rmse_se_mm = 0.1 * rmse_mm,
+          .max_mm = max_mm,
+          .chi2_per_dof = chi2_per_dof,
+          .log_density = -rmse_mm,
+          .log_density_se = 0.03};
+}
+
 void add_ranking(Findings& findings) {
-  double gain = findings.verdict == Verdict::nothing_missing ? 11.2 : 4312.7;
+  double factor = findings.verdict == Verdict::nothing_missing ? 1.2 : 2112.7;
   for (const model::Effect* effect : model::all_effects()) {
     TriedEffect tried;
     tried.name = effect->name();
-    tried.gain = gain;
-    tried.chance = 1.7;
-    tried.threshold = 14.3;
+    tried.log_bayes_factor = factor;
+    tried.fitted = factor > -0.05;
     for (const auto& p : effect->parameters()) tried.parameters.emplace_back(p.name, 0.5 * (p.lower + p.upper));
-    tried.evidence = gain - tried.chance;
-    tried.passes = gain > 27;
+    tried.likelier = factor > 5;
     findings.tried.push_back(tried);
     tried.beside = "torsional_windup + lost_steps";
-    tried.gain = std::min(gain, 9.0);
-    tried.passes = false;
+    tried.log_bayes_factor = std::min(factor, 2.0);
+    tried.likelier = false;
     if (!findings.effects.empty()) findings.beside.push_back(tried);
-    gain = 0.62 * gain - 0.1;
+    factor = 0.62 * factor - 0.1;
   }
 }
 
@@ -148,7 +153,7 @@ Findings made_up(Verdict verdict) {
     n->lambda2_sd = 0.008;
   }
   f.channels = {"tip.x", "tip.y", "tip.z"};
-  f.noise = {.sigma_mm = {0.151, 0.149, 0.26}, .ar1 = 0.6, .ar2 = -0.1, .outlier_share = 0.0167, .frame_s = 1.0 / 30};
+  f.noise = {.sigma = {0.151, 0.149, 0.26}, .ar1 = 0.6, .ar2 = -0.1, .outlier_share = 0.0167, .frame_s = 1.0 / 30};
   const auto truth = truth_of(verdict);
   const bool explained = verdict == Verdict::effects_found;
   for (int i = 0; i < 8; ++i) {
@@ -156,14 +161,19 @@ Findings made_up(Verdict verdict) {
     f.readings += f.traces.back().time_s.size();
     const double before = verdict == Verdict::nothing_missing ? 0.2 : 0.7 + 0.21 * i;
     const double after = explained ? 0.2 + 0.01 * i : before * 0.8;
-    f.held_out.recordings.push_back(
-        {f.traces.back().log, {before, 3 * before, before * before / 0.04}, {after, 3 * after, after * after / 0.04}});
+    f.held_out.recordings.push_back({f.traces.back().log, figures(before, 3 * before, before * before / 0.04),
+                                     figures(after, 3 * after, after * after / 0.04)});
   }
   f.outliers = 41;
-  f.held_out.before = {1.21, 3.42, 15.2};
-  f.held_out.after = {0.264, 0.91, 1.012};
+  f.held_out.as_it_stands = figures(1.93, 6.1, 44);
+  f.held_out.before = figures(1.21, 3.42, 15.2);
+  f.held_out.after = figures(0.264, 0.91, 1.012);
+  f.held_out.noise_floor = figures(0.201, 0, 1);
+  f.variation = {{"curvature", "relative", 0.05, 0.02, 0.02, 0.12}, {"entry_angle", "rad", 0.003, 0.6, 0, 0.007}};
+  f.explanations = {{{"torsional_windup", "lost_steps (rotation)"}, 0.93, 0.04}, {{"rotation_backlash"}, 0.05, 0.01}};
+  f.nothing_probability = 0.001;
   f.held_out.gain = 5321;
-  f.checks = {1.004, {0.965, 1.036}, 0.41, 0.7, 0.003, true};
+  f.checks = {1.004, {0.965, 1.036}, 0.41, true};
   f.sentence =
       "The tip lags behind the base when it turns, by more the deeper the needle, and rotation steps were lost.";
   f.effects = {windup(), lost_steps()};
@@ -178,39 +188,28 @@ Findings made_up(Verdict verdict) {
     f.effects.clear();
     f.where.clear();
     f.next_experiment.reset();
-    f.held_out.before = f.held_out.after = {0.249, 0.88, 1.008};
+    f.held_out.before = f.held_out.after = figures(0.249, 0.88, 1.008);
   }
   if (verdict == Verdict::unknown_effect) {
     f.sentence = "Something is missing that no listed effect explains: the curvature depends on time.";
     f.effects.pop_back();
-    f.held_out.after = {0.82, 2.71, 9.4};
-    f.checks = {7.4, {0.965, 1.036}, 1e-14, 214, 0.61, false};
-    f.corrections = {{"curvature toward the bevel",
-                      "1/mm",
-                      "time_s",
-                      {0, 2, 4, 6, 8, 10, 12},
-                      {0, 1e-4, 3e-4, 4e-4, 6e-4, 8e-4, 9e-4},
-                      {4e-5, 3e-5, 3e-5, 3e-5, 4e-5, 6e-5, 9e-5},
-                      2310,
-                      31},
-                     {"drift along x",
-                      "mm/s",
-                      "since_stop_s",
-                      {0, 1, 2, 4},
-                      {0.1, 0.05, -0.02, -0.04},
-                      {0.02, 0.02, 0.03, kNone},
-                      96,
-                      31},
-                     {"tip advance", "mm/mm", "depth_mm", {0, 30, 60}, {0.0, 0.01, 0.03}, {0.01, 0.01, 0.01}, 41, 31}};
+    f.held_out.after = figures(0.82, 2.71, 9.4);
+    f.checks = {7.4, {0.965, 1.036}, 1e-14, false};
+    f.discrepancies = {{.component = "curvature toward the bevel",
+                        .unit = "1/mm",
+                        .covariate = "time_s",
+                        .at = {0, 2, 4, 6, 8, 10, 12},
+                        .values = {0, 1e-4, 3e-4, 4e-4, 6e-4, 8e-4, 9e-4},
+                        .std_errors = {4e-5, 3e-5, 3e-5, 3e-5, 4e-5, 6e-5, kNone},
+                        .log_bayes_factor = 1150,
+                        .visible_size = 3.1}};
   }
   add_ranking(f);
   add_reach(f);
   f.remarks = {"rec05.lcm: damaged (log: 1 region, 120 bytes skipped); what is left of it was used.",
                "camera_rotation and entry_angle leave the same mark in these recordings."};
-  f.bootstrap_draws = 400;
-  f.seed = 1;
   f.times = {
-      {"reading the logs", 0.05}, {"noise", 1.31}, {"effects alone", 4.2}, {"bootstrap", 8.7}, {"selection", 12.9}};
+      {"reading the logs", 0.05}, {"noise", 1.31}, {"comparing sets of effects", 4.2}, {"intervals and rivals", 0.7}};
   return f;
 }
 

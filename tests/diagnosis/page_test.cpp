@@ -28,7 +28,7 @@ void expect_sound(const std::string& html) {
   EXPECT_FALSE(std::regex_search(html, std::regex("(src|href)=[\"'](https?:)?//|url\\(http|@import|<script")));
   EXPECT_FALSE(std::regex_search(html, std::regex("[\" >M]-?(nan|inf)[\" <,]")));
   EXPECT_LT(html.size(), 1'500'000U);
-  for (const char* heading : {"What to do", "Parameters", "What is left over", "Paths", "Every effect", "foretold",
+  for (const char* heading : {"What to do", "Parameters", "What is left over", "Paths", "Every effect", "predicted",
                               "could have shown", "next experiment", "Noise and checks", "How this was made"})
     EXPECT_THAT(html, HasSubstr(heading));
 }

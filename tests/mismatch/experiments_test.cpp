@@ -42,54 +42,90 @@ TEST(MotionScripts, KeepToTheDepthAndTheRatesStated) {
   }
 }
 
+// A system with fits of it by the noise of its rig, insertions alike.
+struct Known {
+  NeedleSystem system;
+  std::shared_ptr<const inference::Likelihood> likelihood;
+
+  Known(RecordedCase recorded, const SimulatedRig& rig) : system(std::move(recorded), rig.needle) {
+    inference::Noise noise;
+    noise.sigma = {rig.sigma_mm[0], rig.sigma_mm[1], rig.sigma_mm[2]};
+    noise.frame_s = rig.frame_s;
+    likelihood = std::make_shared<const inference::Likelihood>(
+        system, inference::Readings(system.data().recordings.size()), noise);
+  }
+  std::size_t effect(std::string_view label) const {
+    for (std::size_t e = 0; e < system.effects().size(); ++e)
+      if (system.effects()[e].label == label) return e;
+    throw std::invalid_argument(std::string(label));
+  }
+  inference::Fit fit(const inference::ModelSet& set) const {
+    const inference::Layout layout(system, set);
+    Eigen::VectorXd shared = layout.shared_start();
+    for (std::size_t i = kBaseParameters; i < layout.shared().size(); ++i)
+      shared[static_cast<Eigen::Index>(i)] = layout.shared()[i].parameter->starts.front();
+    const std::vector<Eigen::VectorXd> local(system.data().recordings.size(), layout.local_start());
+    const auto groups = static_cast<Eigen::Index>(system.nuisance_groups().size());
+    auto out = inference::fit(*likelihood, layout, shared, local,
+                              {.nuisance_sd = Eigen::VectorXd::Zero(groups), .curve = {}}, {}, {.tolerance = 1e-9});
+    out.likelihood = likelihood;
+    return out;
+  }
+  Imagined imagine(const inference::Fit& fit) const {
+    const ChosenModel model{.fit = &fit, .curve = {}, .blocks = linearise(*likelihood, fit, {}), .log_posterior = 0};
+    return imagined(fit, model);
+  }
+};
+
 TEST(Separation, OfTwoThatSayTheSameIsNone) {
   const SimulatedRig rig{.effects = {active("drilling", {2.0})}};
-  const auto recorded = record_case(rig, 1);
-  const Evidence evidence = evidence_of(recorded, rig);
-  const Fit drilling = fit_of(evidence, {member("drilling")});
-  for (const auto& script : motion_scripts(60, 0.1))
-    EXPECT_NEAR(separation(evidence, script, drilling, drilling), 0, 1e-9) << script.text;
+  const Known known(record_case(rig, 1), rig);
+  const auto fit = known.fit({known.effect("drilling")});
+  const Imagined drilling = known.imagine(fit);
+  const Experiments experiments(known.system, known.likelihood->noise());
+  for (std::size_t s = 0; s < experiments.scripts().size(); ++s)
+    EXPECT_NEAR(experiments.separation(s, drilling, drilling), 0, 1e-9) << experiments.scripts()[s].text;
 }
 
 TEST(Separation, IsByHowMuchTheRivalRefittedIsWorse) {
   // Recordings without noise, the true effect small. The rival, without it, is fitted to them, and again to them and a
-  // recording of the script: by so much its chi2 rises.
+  // recording of the script: by so much its cost rises.
   SimulatedRig rig{.effects = {active("drilling", {0.3})}, .recordings = 2, .frame_s = 0.1};
   const Eigen::Vector3d sigma_mm = rig.sigma_mm;
   rig.sigma_mm *= 1e-9;
   auto raw = record(rig, 1);
   rig.sigma_mm = sigma_mm;
-  auto recorded = make_case(raw);
-  const Evidence evidence = evidence_of(recorded, rig);
-  const Hypothesis with(rig.needle, {member("drilling")}, recorded);
-  Fit truth(with);
-  truth.values = with.start();
-  truth.values[3] = 0.3;
-  const Hypothesis without(rig.needle, {}, recorded);
-  const Fit rival = fit(evidence, without, without.start(), {.tolerance = 1e-9, .held = {}});
+  const RecordedCase recorded = make_case(raw);
+  const Known known(recorded, rig);
+  const std::size_t effect = known.effect("drilling");
+  inference::Fit truth = known.fit({effect});
+  const inference::Layout nothing(known.system, {});
+  truth.shared.head<kBaseParameters>() = nothing.shared_start();
+  truth.shared[kBaseParameters] = 0.3;
+  const auto rival = known.fit({});
+  const Imagined true_one = known.imagine(truth), rival_one = known.imagine(rival);
+  const Experiments experiments(known.system, known.likelihood->noise());
   int compared = 0;
-  for (const auto& script : motion_scripts(60, 0.1)) {
-    const double expected = separation(evidence, script, truth, rival);
+  for (std::size_t s = 0; s < experiments.scripts().size(); ++s) {
+    const auto& script = experiments.scripts()[s];
+    const double expected = experiments.separation(s, true_one, rival_one);
     RecordedCase longer = recorded;
     Recording more;
     more.motion = script.motion;
-    model::OpenLoop path;
-    ASSERT_TRUE(model::predict(with.make_needle(0, truth.values, false), script.motion, path));
+    std::vector<Eigen::Vector3d> path;
+    ASSERT_TRUE(known.system.tip_path(truth.layout.set(), script.motion, truth.shared, true_one.local, nullptr, path));
     for (const auto& channel : recorded.channels) {
       Series series;
-      for (std::size_t i = 0; i < path.position_mm.size(); ++i) {
-        series.reading.push_back(i);
+      for (std::size_t i = 0; i < path.size(); ++i) {
+        series.message.push_back(i);
         series.time_s.push_back(script.motion.nodes[script.motion.at[i]].time_s);
-        series.measured_mm.push_back(channel.axis.dot(path.position_mm[i]));
+        series.measured.push_back(channel.axis.dot(path[i]));
         series.relative_sd.push_back(1);
       }
       more.series.push_back(series);
     }
     longer.recordings.push_back(more);
-    const Evidence longer_evidence = evidence_of(longer, rig);
-    const Hypothesis again(rig.needle, {}, longer);
-    const Fit refitted = fit(longer_evidence, again, rival.values, {.tolerance = 1e-9, .held = {}});
-    const double rise = refitted.penalised - rival.penalised;
+    const double rise = Known(longer, rig).fit({}).cost - rival.cost;
     EXPECT_NEAR(expected, rise, 0.1 * rise + 0.2) << script.text;
     if (rise > 2) ++compared;
   }
@@ -98,10 +134,10 @@ TEST(Separation, IsByHowMuchTheRivalRefittedIsWorse) {
 
 TEST(BestExperiment, ForDrillingTurnsWhileInserting) {
   const SimulatedRig rig{.effects = {active("drilling", {2.0})}};
-  const auto recorded = record_case(rig, 1);
-  const Evidence evidence = evidence_of(recorded, rig);
-  const NextExperiment best =
-      best_experiment(evidence, fit_of(evidence, {member("drilling")}), fit_of(evidence, {}), 60);
+  const Known known(record_case(rig, 1), rig);
+  const auto with = known.fit({known.effect("drilling")}), without = known.fit({});
+  const Experiments experiments(known.system, known.likelihood->noise());
+  const NextExperiment best = experiments.best(known.imagine(with), known.imagine(without));
   EXPECT_THAT(best.script, ::testing::HasSubstr("spin"));
   EXPECT_EQ(best.separates[0], "drilling");
   EXPECT_EQ(best.separates[1], "nothing");
