@@ -43,7 +43,7 @@ class NeedleSystem final : public inference::System {
   std::vector<inference::Nuisance> nuisances_;
   std::vector<inference::NuisanceGroup> groups_;
   std::vector<inference::Curve> curves_;
-  std::vector<std::unique_ptr<model::Effect>> curve_physics_;  // one per curve
+  std::vector<std::shared_ptr<const model::Effect>> curve_physics_;  // parts of the curves, in their order
 };
 
 }  // namespace bevel::diagnosis

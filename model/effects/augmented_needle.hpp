@@ -3,6 +3,7 @@
 // of its parameters in the same pass. Without effects it is model/kinematics.hpp, bit for bit (tested).
 // Source: shared definitions in effect.hpp; sensitivities by the chain rule through StepJacobian.
 #include <array>
+#include <memory>
 #include <vector>
 
 #include "model/effects/effect.hpp"
@@ -13,6 +14,7 @@ namespace bevel::model {
 struct ActiveEffect {
   const Effect* effect = nullptr;
   std::array<Dual, kMaxEffectParameters> parameters;  // in the order of effect->parameters()
+  std::shared_ptr<const Effect> owned{};              // of an effect that is not in the registry: it lives as long
 };
 
 // In which column of the sensitivities a needle parameter stands; -1: not wanted.

@@ -47,6 +47,7 @@ inline constexpr double kNoNone = std::numeric_limits<double>::quiet_NaN();
 // Against what the effect is to be looked at: where it shows.
 enum class Covariate { time_s, depth_mm, speed_mm_s, turn_rate_rad_s, since_stop_s, since_reversal_mm, roll_rad };
 std::string_view name_of(Covariate covariate);
+std::span<const Covariate> all_covariates();
 
 // What an effect remembers between legs of one insertion. Slopes come with it.
 struct EffectMemory {
