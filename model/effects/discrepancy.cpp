@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <cstdio>
+#include <limits>
 #include <numbers>
 #include <stdexcept>
 
@@ -75,6 +76,7 @@ class Discrepancy final : public Effect {
       for (std::size_t i = 0; i < 2; ++i) memory.slot[i] += world[i];
     } else if (axis() >= 0) {
       memory.slot[0] = value(p, leg, memory);
+      memory.slot[1].value = std_error(place(leg, memory));  // for blur
     }
   }
   void offset(Parameters /*p*/, const EffectMemory& memory, double /*time_s*/, Dual3& position_mm) const override {
@@ -82,6 +84,24 @@ class Discrepancy final : public Effect {
       for (std::size_t i = 0; i < 2; ++i) position_mm[i] += memory.slot[i];
     else if (axis() >= 0)
       position_mm[static_cast<std::size_t>(axis())] += memory.slot[0];
+  }
+  void spread(const LegView& leg, const EffectMemory& memory, Spread& variance) const override {
+    static constexpr std::array<int, 8> kRow = {3, 4, 2, 5, 2, 5, 1, 0};  // of the body's twist, by component
+    if (axis() >= 0) return;
+    const bool by_turning = component_ == Component::advance_turning || component_ == Component::turning_turning;
+    const double entry = by_turning ? leg.entry.rotation_rad : leg.entry.insertion_mm;
+    const double from = by_turning ? leg.from.rotation_rad : leg.from.insertion_mm;
+    const double to = by_turning ? leg.to.rotation_rad : leg.to.insertion_mm;
+    const KnotWeights at = place(leg, memory);
+    const double error = std_error(at), step = std::abs(to - from);
+    // Legs between the same two knots share their error: over a length h of base motion from one knot to the next it
+    // adds up to error^2 h^2, and to no more than error^2 (all the way so far)^2 where the covariate stands still.
+    const double together = std::min(length_of(at, leg, step), std::abs(from + to - 2 * entry));
+    variance[static_cast<std::size_t>(kRow.at(static_cast<std::size_t>(component_)))] +=
+        error * error * together * step;
+  }
+  void blur(const EffectMemory& memory, std::array<double, 3>& variance_mm2) const override {
+    if (axis() >= 0) variance_mm2[static_cast<std::size_t>(axis())] += memory.slot[1].value * memory.slot[1].value;
   }
 
  private:
@@ -95,12 +115,48 @@ class Discrepancy final : public Effect {
     return memory.slot[0];
   }
   // The third slot keeps what the covariate needs to remember, of which no covariate needs both.
-  Dual value(Parameters p, const LegView& leg, EffectMemory& memory) const {
-    double& kept = memory.slot[2].value;
+  CovariateTracker tracked(const LegView& leg, const EffectMemory& memory) const {
+    const double kept = memory.slot[2].value;
     CovariateTracker tracker = memory.phase == 0 ? CovariateTracker(leg.entry) : CovariateTracker(kept, kept);
     tracker.advance(leg.from, leg.to);
+    return tracker;
+  }
+  // Before or after value(): the same leg twice changes nothing.
+  KnotWeights place(const LegView& leg, const EffectMemory& memory) const {
+    return weights_at(curve_.at, curve_.periodic, tracked(leg, memory)[covariate()]);
+  }
+  double std_error(const KnotWeights& at) const {
+    return at.weight[0] * curve_.std_errors[at.knot[0]] + at.weight[1] * curve_.std_errors[at.knot[1]];
+  }
+  // Base motion from one knot to the next, where a leg of so much moves the covariate as this one does.
+  double length_of(const KnotWeights& at, const LegView& leg, double step) const {
+    constexpr double kEndless = std::numeric_limits<double>::infinity();
+    if (at.knot[0] == at.knot[1]) return kEndless;
+    const double spacing = curve_.periodic ? 2 * std::numbers::pi / static_cast<double>(curve_.at.size())
+                                           : curve_.at[at.knot[1]] - curve_.at[at.knot[0]];
+    double moved = 0;
+    switch (covariate()) {
+      case Covariate::time_s:
+      case Covariate::since_stop_s:
+        moved = leg.duration_s();
+        break;
+      case Covariate::depth_mm:
+      case Covariate::since_reversal_mm:
+        moved = std::abs(leg.base_insertion_mm());
+        break;
+      case Covariate::roll_rad:
+        moved = std::abs(leg.base_rotation_rad());
+        break;
+      case Covariate::speed_mm_s:
+      case Covariate::turn_rate_rad_s:
+        break;
+    }
+    return moved > 0 ? spacing * step / moved : kEndless;
+  }
+  Dual value(Parameters p, const LegView& leg, EffectMemory& memory) const {
+    const CovariateTracker tracker = tracked(leg, memory);
     memory.phase = 1;
-    kept = covariate() == Covariate::since_stop_s ? tracker.stopped_s() : tracker.turned_mm();
+    memory.slot[2].value = covariate() == Covariate::since_stop_s ? tracker.stopped_s() : tracker.turned_mm();
     const KnotWeights at = weights_at(curve_.at, curve_.periodic, tracker[covariate()]);
     Dual sum;
     for (std::size_t i = 0; i < 2; ++i) {

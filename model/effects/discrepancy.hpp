@@ -47,10 +47,10 @@ inline constexpr std::size_t kMaxKnots = 64;
 struct DiscrepancyCurve {
   DiscrepancyComponent component = DiscrepancyComponent::curvature_bevel;
   Covariate covariate = Covariate::depth_mm;
-  std::vector<double> at;          // knots, ascending, in the covariate's unit; periodic: 2 pi i / n
-  std::vector<double> values;      // there, in the component's unit
-  std::vector<double> std_errors;  // of the values; what is not known of one knot says nothing about the next
-  bool periodic = false;           // the covariate is an angle
+  std::vector<double> at{};          // knots, ascending, in the covariate's unit; periodic: 2 pi i / n
+  std::vector<double> values{};      // there, in the component's unit
+  std::vector<double> std_errors{};  // of the values; what is not known of one knot says nothing about the next
+  bool periodic = false;             // the covariate is an angle
 
   bool operator==(const DiscrepancyCurve&) const = default;
 };
