@@ -140,10 +140,16 @@ std::vector<model::ActiveEffect> active_effects(const std::vector<EffectEntry>& 
   return active;
 }
 
-std::vector<model::ActiveEffect> active_effects(const ModelFile& model, std::string_view recording_name) {
-  auto active = active_effects(model.effects, recording_name);
-  for (const auto& curve : model.discrepancies) active.push_back(model::active_discrepancy(curve));
+std::vector<model::ActiveEffect> active_effects(const std::vector<EffectEntry>& effects,
+                                                const std::vector<model::DiscrepancyCurve>& discrepancies,
+                                                std::string_view recording_name) {
+  auto active = active_effects(effects, recording_name);
+  for (const auto& curve : discrepancies) active.push_back(model::active_discrepancy(curve));
   return active;
+}
+
+std::vector<model::ActiveEffect> active_effects(const ModelFile& model, std::string_view recording_name) {
+  return active_effects(model.effects, model.discrepancies, recording_name);
 }
 
 ModelFile load_model_file(const std::string& path) { return read_model(ConfigFile::load(path)); }

@@ -65,10 +65,13 @@ ModelFile parse_model_file(std::string_view text, const std::string& name);
 model::NeedleParameters read_needle(Section needle);
 std::vector<EffectEntry> read_effects(Section parent);
 
-// The effects with all their parameters, and of a whole file the discrepancies behind them, as model::AugmentedNeedle
+// The effects with all their parameters, the discrepancies behind them, as model::AugmentedNeedle
 // takes them, for one recording: the path or the name of its log, empty if there is none. Throws std::invalid_argument
 // for an effect or a parameter that does not exist.
 std::vector<model::ActiveEffect> active_effects(const std::vector<EffectEntry>& effects,
+                                                std::string_view recording_name);
+std::vector<model::ActiveEffect> active_effects(const std::vector<EffectEntry>& effects,
+                                                const std::vector<model::DiscrepancyCurve>& discrepancies,
                                                 std::string_view recording_name);
 std::vector<model::ActiveEffect> active_effects(const ModelFile& model, std::string_view recording_name);
 
