@@ -19,6 +19,9 @@ AxisModel::AxisModel(std::vector<model::ActiveEffect> effects) : effects_(std::m
   if (effects_.size() > model::kMaxEffects)
     throw std::invalid_argument("a model has " + std::to_string(effects_.size()) + " effects; at most " +
                                 std::to_string(model::kMaxEffects) + " are supported");
+  // A discrepancy is no dead band: what it adds to a rate, the feedback takes care of, and a turn that comes in short
+  // by a share would be taken for slack.
+  std::erase_if(effects_, [](const model::ActiveEffect& active) { return active.owned != nullptr; });
   // Asked once, deep in the tissue, where a shaft has something to wind up, and with no time passing.
   Tip probe;
   move(probe, {});
@@ -42,8 +45,9 @@ void AxisModel::move(Tip& tip, const model::BaseMotion& to) const {
   leg.tip_rotation_rad.value = tip.rotation_rad;
   model::Dual insertion_mm(to.insertion_mm), rotation_rad(to.rotation_rad);
   for (std::size_t i = 0; i < effects_.size(); ++i) {
-    const auto& [effect, parameters] = effects_[i];
-    effect->axes({parameters.data(), effect->parameters().size()}, leg, tip.memory[i], insertion_mm, rotation_rad);
+    const model::ActiveEffect& active = effects_[i];
+    active.effect->axes({active.parameters.data(), active.effect->parameters().size()}, leg, tip.memory[i],
+                        insertion_mm, rotation_rad);
   }
   tip.rotation_rad = rotation_rad.value;
 }

@@ -1,8 +1,10 @@
 #pragma once
 // What the estimator believes before it has seen anything, and how much it lets the model err.
+#include <cmath>
 #include <vector>
 
 #include "model/effects/augmented_needle.hpp"
+#include "model/effects/variation.hpp"
 
 namespace bevel::estimator {
 
@@ -15,7 +17,14 @@ struct Prior {
   double position_sd_mm = 0.3;  // tip at the entry point
   double tilt_sd_rad = 0.02;    // heading about body x and y
   double roll_sd_rad = 0.05;    // bevel about the heading
+  // Of the model file: by how much insertions differ, beside the widths above, which are for what is not known of all
+  // of them. A filter watches one insertion and starts as wide as both together.
+  model::Variation variation{};
 };
+// Of one insertion's own k.
+inline double insertion_curvature_sd_per_mm(const Prior& prior) {
+  return std::hypot(prior.curvature_sd_per_mm, prior.variation.curvature_relative * prior.needle.curvature_per_mm);
+}
 
 // Random walk per sqrt(mm) of insertion: what tissue does that the model does not. Nothing grows at rest.
 struct ProcessNoise {

@@ -29,12 +29,16 @@ bool NeedleFilter::predict_with_effects(FilterState& state, const model::BaseMot
   const model::BaseMotion& base = state.effects.base;
   model::AugmentedState moved = augmented(state);
   needle_.set_needle(state.curvature_per_mm, state.lambda1_per_rad, state.lambda2, slip_of(state).wheelbase_mm);
-  if (!needle_.advance(moved, {base.time_s + increment.time_s, base.insertion_mm + increment.insertion_mm,
-                               base.rotation_rad + increment.rotation_rad}))
+  model::Spread spread{};
+  if (!needle_.advance(moved,
+                       {base.time_s + increment.time_s, base.insertion_mm + increment.insertion_mm,
+                        base.rotation_rad + increment.rotation_rad},
+                       &spread))
     return false;
   Covariance<kSize> P = covariance_of<kSize>(state);
   propagate<kSize>(P, moved.D.leftCols<6>(), moved.D.middleCols<kSize - 6>(6));
   P.diagonal() += process_variance<kSize>(P, increment.insertion_mm, increment.rotation_rad);
+  for (int i = 0; i < 6; ++i) P(i, i) += spread.at(static_cast<std::size_t>(i));
   set_covariance<kSize>(state, P);
   state.pose = moved.pose;
   EffectState& effects = state.effects;
@@ -50,9 +54,11 @@ bool NeedleFilter::predict_with_effects(FilterState& state, const model::BaseMot
 template bool NeedleFilter::predict_with_effects<9>(FilterState&, const model::BaseMotion&) const;
 template bool NeedleFilter::predict_with_effects<10>(FilterState&, const model::BaseMotion&) const;
 
-model::TipReading NeedleFilter::reading(const FilterState& state) const {
+model::TipReading NeedleFilter::reading(const FilterState& state, Eigen::Vector3d* blur_mm2) const {
   model::TipReading at;
-  needle_.point(augmented(state), at);
+  const model::AugmentedState here = augmented(state);
+  needle_.point(here, at);
+  if (blur_mm2 != nullptr) *blur_mm2 = Eigen::Vector3d::Map(needle_.blur_mm2(here).data());
   needle_.through_cameras(at);
   return at;
 }

@@ -20,6 +20,8 @@ constexpr double kRankTolerance = 1e-9;
 constexpr double kLambda2Max = 0.9;                             // (24) with room: 1 - lambda2 stays away from zero
 constexpr double kWheelbaseMin_mm = 2, kWheelbaseMax_mm = 990;  // of the model's (1, 1000), with room
 constexpr double kVarianceFloor = 1e-14;
+// Readings that share the error of a discrepancy: at 30 Hz and some 10 mm/s those of ten millimetres, about a knot.
+constexpr double kReadingsOfOneError = 30;
 constexpr double kAtEntry_mm = 1.0;  // not inserted yet: within what an entry point is met by
 constexpr std::int32_t kCamerasCounted = 4;
 constexpr double kShort_mm = 0.5, kShort_rad = 0.05;  // see EstimatorConfig::midpoint_derivatives
@@ -30,6 +32,7 @@ double square(double x) { return x * x; }
 struct SeenAxes {
   Eigen::Matrix3d axes;
   Eigen::Vector3d variance = Eigen::Vector3d::Zero();
+  Eigen::Vector3d shared = Eigen::Vector3d::Zero();  // more of it, of an error that neighbouring readings share
   int rank = 0;
 };
 
@@ -61,17 +64,19 @@ SeenAxes seen_axes(const Eigen::Matrix3d& information) {
 
 // `by_state`: derivative of what is seen by the first columns of the error; R of the pose if it is the tip itself.
 template <int kSize, int kRank, int kColumns>
-Update update_rank(FilterState& state, const Eigen::Matrix<double, 3, kColumns>& by_state, const Eigen::Matrix3d& axes,
-                   const Eigen::Vector3d& variance, const Eigen::Vector3d& residual, double gate) {
+Update update_rank(FilterState& state, const Eigen::Matrix<double, 3, kColumns>& by_state, const SeenAxes& seen,
+                   const Eigen::Vector3d& residual, double gate) {
   using Vec = Eigen::Matrix<double, kRank, 1>;
   using Mat = Eigen::Matrix<double, kRank, kRank>;
-  const Eigen::Matrix<double, kRank, kColumns> H = axes.rightCols<kRank>().transpose() * by_state;
+  const auto axes = seen.axes.template rightCols<kRank>();
+  Vec variance = (seen.variance + seen.shared).template tail<kRank>();
+  const Eigen::Matrix<double, kRank, kColumns> H = axes.transpose() * by_state;
   const auto& covariance = covariance_of<kSize>(state);
   const Eigen::Matrix<double, kSize, kRank> PHt = covariance.template leftCols<kColumns>() * H.transpose();
   Mat S = H * PHt.template topRows<kColumns>();
-  S.diagonal() += variance.tail<kRank>();
-  const Eigen::LLT<Mat> llt(S);
-  const Vec y = axes.rightCols<kRank>().transpose() * residual;
+  S.diagonal() += variance;
+  Eigen::LLT<Mat> llt(S);
+  const Vec y = axes.transpose() * residual;
   const Vec whitened = llt.matrixL().solve(y);
 
   Update result;
@@ -83,6 +88,14 @@ Update update_rank(FilterState& state, const Eigen::Matrix<double, 3, kColumns>&
   result.accepted = result.test_ratio <= 1;  // false for a NaN too
   if (!result.accepted) return result;
 
+  if (seen.shared != Eigen::Vector3d::Zero()) {
+    // The gate asks about one reading. The gain must not average away over many what they have in common: each then
+    // counts for its part of one.
+    const Vec more = (kReadingsOfOneError - 1) * seen.shared.template tail<kRank>();
+    variance += more;
+    S.diagonal() += more;
+    llt.compute(S);
+  }
   // By the inverse of a triangle of no more than three rows: Eigen's solver for the nine right sides is a blocked one.
   const Mat inverse_L = llt.matrixL().solve(Mat::Identity());
   const Eigen::Matrix<double, kSize, kRank> whitened_PHt = PHt.lazyProduct(inverse_L.transpose());
@@ -92,7 +105,7 @@ Update update_rank(FilterState& state, const Eigen::Matrix<double, 3, kColumns>&
   Covariance<kSize> P = covariance;
   P.noalias() -= K.lazyProduct(PHt.transpose());
   Eigen::Matrix<double, kSize, kRank> PHt2 = P.template leftCols<kColumns>().lazyProduct(H.transpose());
-  PHt2 -= K * variance.tail<kRank>().asDiagonal();
+  PHt2 -= K * variance.asDiagonal();
   P.noalias() -= PHt2.lazyProduct(K.transpose());
   set_covariance<kSize>(state, 0.5 * (P + P.transpose()));
   move<kSize>(state, correction);
@@ -105,11 +118,11 @@ Update update_seen(FilterState& state, const Eigen::Matrix<double, 3, kColumns>&
                    const Eigen::Vector3d& residual, const std::array<double, 3>& gate) {
   switch (seen.rank) {
     case 1:
-      return update_rank<kSize, 1, kColumns>(state, by_state, seen.axes, seen.variance, residual, gate[0]);
+      return update_rank<kSize, 1, kColumns>(state, by_state, seen, residual, gate[0]);
     case 2:
-      return update_rank<kSize, 2, kColumns>(state, by_state, seen.axes, seen.variance, residual, gate[1]);
+      return update_rank<kSize, 2, kColumns>(state, by_state, seen, residual, gate[1]);
     case 3:
-      return update_rank<kSize, 3, kColumns>(state, by_state, seen.axes, seen.variance, residual, gate[2]);
+      return update_rank<kSize, 3, kColumns>(state, by_state, seen, residual, gate[2]);
     default:
       return {};
   }
@@ -136,8 +149,10 @@ FilterState NeedleFilter::initial(double insertion_mm, double rotation_rad) cons
   state.lambda2 = prior.needle.lambda2;
   state.wheelbase_mm = prior.needle.wheelbase_mm;
   state.wheelbase_variance_mm2 = square(prior.wheelbase_sd_mm);
-  state.covariance.diagonal() << Eigen::Vector3d::Constant(square(prior.position_sd_mm)), square(prior.tilt_sd_rad),
-      square(prior.tilt_sd_rad), square(prior.roll_sd_rad), square(prior.curvature_sd_per_mm),
+  const double aside_mm2 = square(prior.position_sd_mm) + square(prior.variation.entry_point_mm);
+  const double tilt_rad2 = square(prior.tilt_sd_rad) + square(prior.variation.entry_angle_rad);
+  state.covariance.diagonal() << aside_mm2, aside_mm2, square(prior.position_sd_mm), tilt_rad2, tilt_rad2,
+      square(prior.roll_sd_rad) + square(prior.variation.roll_rad), square(insertion_curvature_sd_per_mm(prior)),
       square(prior.lambda1_sd_per_rad), square(prior.lambda2_sd);
   if (config_.effects.empty()) return state;
   const model::AugmentedState entry = needle_.entry({0, insertion_mm, rotation_rad});
@@ -165,7 +180,7 @@ FilterState NeedleFilter::inserted(double insertion_mm, double rotation_rad) con
 // is inclined by k L.
 void NeedleFilter::widen_by_bend(FilterState& state, double inserted_mm) const {
   const double length_mm = std::abs(inserted_mm);
-  const double k = std::abs(config_.prior.needle.curvature_per_mm) + config_.prior.curvature_sd_per_mm;
+  const double k = std::abs(config_.prior.needle.curvature_per_mm) + insertion_curvature_sd_per_mm(config_.prior);
   const double bend_rad = k * length_mm;
   const double aside_mm = 0.5 * bend_rad * length_mm, short_mm = square(bend_rad) * length_mm / 6;
   Eigen::Matrix<double, 6, 1> variance;
@@ -246,12 +261,14 @@ Update NeedleFilter::update(FilterState& state, const model::TipMeasurement& mea
 
 template <int kSize>
 Update NeedleFilter::update_sized(FilterState& state, const model::TipMeasurement& measurement) const {
-  const SeenAxes seen = seen_axes(measurement.information_per_mm2);
+  SeenAxes seen = seen_axes(measurement.information_per_mm2);
   if (seen.rank == 0) return {};  // sees nothing: no rejection either
   const auto apply = [&]() -> Update {
     if (config_.effects.empty())
       return update_seen<kSize, 3>(state, state.pose.R, seen, measurement.position_mm - state.pose.p_mm, gate_);
-    const model::TipReading at = reading(state);
+    Eigen::Vector3d blur_mm2;
+    const model::TipReading at = reading(state, &blur_mm2);
+    seen.shared = seen.axes.cwiseAbs2().transpose() * blur_mm2;
     return update_seen<kSize, kSize>(state, at.D, seen, measurement.position_mm - at.position_mm, gate_);
   };
   Update result = apply();
@@ -318,7 +335,7 @@ void NeedleFilter::declare_reset(FilterState& state, double reach_mm) const {
   state.covariance.diagonal().head<6>() << Eigen::Vector3d::Constant(
       square(std::max(gate.reset_position_sd_mm, reach_mm))),
       square(gate.reset_tilt_sd_rad), square(gate.reset_tilt_sd_rad),
-      square(std::max(gate.reset_tilt_sd_rad, config_.prior.roll_sd_rad));
+      std::max(square(gate.reset_tilt_sd_rad), prior.covariance(5, 5));
   widen_by_bend(state, state.pose.p_mm.z());
   state.rejects_in_row = 0;
   state.camera_rejects_in_row = {};

@@ -141,7 +141,8 @@ class NeedleFilter {
   void keep_in_domain(FilterState& state) const;
   model::SlipParameters slip_of(const FilterState& state) const;
   model::AugmentedState augmented(const FilterState& state) const;
-  model::TipReading reading(const FilterState& state) const;
+  // blur_mm2: what the effects do not know of it, along the axes of {A}.
+  model::TipReading reading(const FilterState& state, Eigen::Vector3d* blur_mm2 = nullptr) const;
   void widen_by_bend(FilterState& state, double inserted_mm) const;
   void declare_reset(FilterState& state, double reach_mm) const;
 

@@ -103,7 +103,7 @@ Ridge<kSize> find_ridge(const FilterState& state, const Prior& prior) {
   constexpr int kParameters = kSize - 6;
   using Vector = Eigen::Matrix<double, kParameters, 1>;
   Vector sd;
-  sd.template head<3>() << prior.curvature_sd_per_mm, prior.lambda1_sd_per_rad, prior.lambda2_sd;
+  sd.template head<3>() << insertion_curvature_sd_per_mm(prior), prior.lambda1_sd_per_rad, prior.lambda2_sd;
   if constexpr (kSize == 10) sd[3] = prior.wheelbase_sd_mm;
   const Vector scale = (sd.array() > 0).select(sd.cwiseInverse(), 0);
   const auto& P = covariance_of<kSize>(state);

@@ -25,4 +25,10 @@ LiveEffects live_effects(const std::vector<EffectEntry>& effects) {
   return live;
 }
 
+LiveEffects live_effects(const ModelFile& model) {
+  LiveEffects live = live_effects(model.effects);
+  for (const auto& curve : model.discrepancies) live.active.push_back(model::active_discrepancy(curve));
+  return live;
+}
+
 }  // namespace bevel::io

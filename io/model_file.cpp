@@ -8,6 +8,8 @@
 #include <fstream>
 #include <limits>
 
+#include "io/toml_text.hpp"
+
 namespace bevel::io {
 namespace {
 
@@ -77,39 +79,16 @@ ModelFile read_model(ConfigFile file) {
   ModelFile model;
   model.needle = read_needle(file.section("needle", required));
   model.effects = read_effects(file.root());
+  model.discrepancies = read_discrepancies(file.root(), model.effects.size());
+  model.variation = read_variation(file.root());
   file.finish();
   return model;
-}
-
-// TOML tells 20 from 20.0, and other readers may insist on the latter.
-std::string toml_number(double value) {
-  const std::string text = format_number(value);
-  return text.find_first_of(".en") == std::string::npos ? text + ".0" : text;
 }
 
 std::string toml_numbers(const std::map<std::string, double>& values) {
   std::string text;
   for (const auto& [key, value] : values) text += key + " = " + toml_number(value) + "\n";
   return text;
-}
-
-std::string toml_text(std::string_view plain) {
-  constexpr std::string_view kHex = "0123456789abcdef";
-  std::string text = "\"";
-  for (const char c : plain) {
-    const auto byte = static_cast<unsigned char>(c);
-    if (c == '"' || c == '\\') {
-      text += '\\';
-      text += c;
-    } else if (byte < 0x20 || byte == 0x7f) {
-      text += "\\u00";
-      text += kHex[byte >> 4U];
-      text += kHex[byte & 15U];
-    } else {
-      text += c;
-    }
-  }
-  return text + '"';
 }
 
 }  // namespace
@@ -161,8 +140,16 @@ std::vector<model::ActiveEffect> active_effects(const std::vector<EffectEntry>& 
   return active;
 }
 
+std::vector<model::ActiveEffect> active_effects(const std::vector<EffectEntry>& effects,
+                                                const std::vector<model::DiscrepancyCurve>& discrepancies,
+                                                std::string_view recording_name) {
+  auto active = active_effects(effects, recording_name);
+  for (const auto& curve : discrepancies) active.push_back(model::active_discrepancy(curve));
+  return active;
+}
+
 std::vector<model::ActiveEffect> active_effects(const ModelFile& model, std::string_view recording_name) {
-  return active_effects(model.effects, recording_name);
+  return active_effects(model.effects, model.discrepancies, recording_name);
 }
 
 ModelFile load_model_file(const std::string& path) { return read_model(ConfigFile::load(path)); }
@@ -186,6 +173,8 @@ std::string to_toml(const ModelFile& model) {
     for (const auto& [recording, values] : effect.recordings)
       text += "[effect.recordings." + toml_text(recording) + "]\n" + toml_numbers(values);
   }
+  for (const auto& curve : model.discrepancies) text += "\n" + to_toml(curve);
+  if (model.variation) text += "\n" + to_toml(*model.variation);
   return text;
 }
 

@@ -30,6 +30,8 @@ class RigNode {
   FaultyBus& faulty_bus(std::size_t axis) { return buses_.at(axis); }
 
   const rig::Plant& plant() const { return *plant_; }
+  // What this insertion has of its own, drawn from the rig's [variation] with its seed.
+  const model::OwnValues& own_values() const { return own_values_; }
   rig::SimulatedDrive& drive(std::size_t axis) { return *drives_[axis]; }
 
  private:
@@ -51,6 +53,7 @@ class RigNode {
   std::optional<std::size_t> blocked_axis_;
   std::int64_t blocked_from_ns_ = 0;
   std::unique_ptr<rig::KinematicPlant> plant_;
+  model::OwnValues own_values_;
   rig::FrameServer* frames_;
   std::vector<Eye> eyes_;
   std::deque<camera::Frame> taken_;  // a late camera's, stamped with the time at which they arrive

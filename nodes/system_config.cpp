@@ -137,27 +137,39 @@ CameraViewConfig read_camera(Section s) {
   return c;
 }
 
-// `needle` and `effects` as the section has them, or from the model file that its key `model` names.
-void read_model(Section& s, const std::filesystem::path& folder, io::Presence needle_presence,
-                model::NeedleParameters& needle, std::vector<io::EffectEntry>& effects) {
+// What a model file holds, as the section has it, or from the model file that its key `model` names. The needle is left
+// as it is where there is none.
+io::ModelFile read_model(Section& s, const std::filesystem::path& folder, io::Presence needle_presence,
+                         const model::NeedleParameters& needle) {
+  io::ModelFile model{needle};
   std::string path;
   s.read("model", path, optional);
   if (Section own = s.section("needle", path.empty() ? needle_presence : optional); own.present())
-    needle = io::read_needle(own);
-  effects = io::read_effects(s);
-  if (path.empty()) return;
-  if (s.has("needle") || s.has("effect")) return s.fail("model", "stands for needle and effect; one or the other");
+    model.needle = io::read_needle(own);
+  model.effects = io::read_effects(s);
+  model.discrepancies = io::read_discrepancies(s, model.effects.size());
+  model.variation = io::read_variation(s);
+  if (path.empty()) return model;
+  for (const char* key : {"needle", "effect", "discrepancy", "variation"})
+    if (s.has(key)) {
+      s.fail("model", std::string("stands for needle, effect, discrepancy and variation, and there is ") + key +
+                          " too; one or the other");
+      return model;
+    }
   try {
-    io::ModelFile model = io::load_model_file((folder / path).string());
-    needle = model.needle;
-    effects = std::move(model.effects);
+    return io::load_model_file((folder / path).string());
   } catch (const io::ConfigError& e) {
     s.fail("model", e.what());
   }
+  return model;
 }
 
 void read_rig(Section s, const std::filesystem::path& folder, RigConfig& c) {
-  read_model(s, folder, optional, c.truth, c.effects);
+  io::ModelFile model = read_model(s, folder, optional, c.truth);
+  c.truth = model.needle;
+  c.effects = std::move(model.effects);
+  c.discrepancies = std::move(model.discrepancies);
+  c.variation = model.variation.value_or(model::Variation{});
   s.read("roll_error_rad", c.roll_error_rad, optional, in_range(-3.2, 3.2));
   s.read("frames_socket", c.frames_socket, optional);
   s.read("frame_rate_hz", c.frame_rate_hz, optional, in_range(1, 120));
@@ -178,8 +190,9 @@ SystemConfig load_system_config(const std::string& path) {
   system.read("realtime", c.realtime, optional);
   const std::filesystem::path folder = std::filesystem::path(path).parent_path();
   Section root = file.root();
-  read_model(root, folder, required, c.needle, c.effects);
-  c.estimator.prior.needle = c.needle;
+  io::ModelFile believed = read_model(root, folder, required, c.needle);
+  c.needle = c.estimator.prior.needle = believed.needle;
+  c.estimator.prior.variation = believed.variation.value_or(model::Variation{});
   io::read_estimator_config(file.section("estimator", optional), c.estimator);
   read_controller(file.section("controller", optional), c.controller);
   read_stepper(file.section("stepper", optional), c.stepper);
@@ -188,7 +201,9 @@ SystemConfig load_system_config(const std::string& path) {
   c.rig.truth = c.needle;
   read_rig(file.section("rig", optional), folder, c.rig);
   file.finish();
-  c.live_effects = io::live_effects(c.effects);
+  c.live_effects = io::live_effects(believed);
+  c.effects = std::move(believed.effects);
+  c.discrepancies = std::move(believed.discrepancies);
   c.estimator.effects = c.live_effects.active;
   return c;
 }

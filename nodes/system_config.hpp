@@ -24,11 +24,14 @@ struct CameraViewConfig {
 };
 
 struct RigConfig {
-  // Of the simulated needle: [rig.needle] and [[rig.effect]]s, or the model file `model`; unlike [needle] and
-  // [[effect]], which are what the software believes. Without [rig.needle] it is [needle], but [[effect]]s are never
-  // taken over. Unknowns of single recordings are as in the effect's own table; time counts from the start.
+  // Of the simulated needle: [rig.needle], [[rig.effect]]s, [[rig.discrepancy]]s and [rig.variation], or the model file
+  // `model`; unlike [needle] and the rest at the top, which are what the software believes. Without [rig.needle] it is
+  // [needle], but nothing else is ever taken over. Unknowns of single recordings are as in the effect's own table; time
+  // counts from the start. What the insertion has of its own is drawn from the variation with `seed`.
   model::NeedleParameters truth;
   std::vector<io::EffectEntry> effects;
+  std::vector<model::DiscrepancyCurve> discrepancies;
+  model::Variation variation;
   double roll_error_rad = 0;  // the bevel's true roll at the start; the software believes zero
   std::string frames_socket = "/tmp/bevel-rig-frames.sock";
   double frame_rate_hz = 30;
@@ -41,10 +44,12 @@ struct SystemConfig {
   std::string lcm_url;  // empty: LCM's default, or LCM_DEFAULT_URL
   std::string can = "unix:/tmp/bevel-rig-can.sock";
   bool realtime = false;  // SCHED_FIFO and locked memory for controller and stepper, where the system permits
-  // What the software believes: [needle] and [[effect]]s, or the model file `model` at the top of the file. Of the
-  // effects, estimator (estimator.effects) and controller have those that are known before an insertion.
+  // What the software believes: [needle], [[effect]]s, [[discrepancy]]s and [variation], or the model file `model` at
+  // the top of the file. Of the effects, estimator (estimator.effects) and controller have those that are known before
+  // an insertion; the variation is in the estimator's prior.
   model::NeedleParameters needle;
   std::vector<io::EffectEntry> effects;
+  std::vector<model::DiscrepancyCurve> discrepancies;
   io::LiveEffects live_effects;
   estimator::EstimatorConfig estimator;
   controller::ControllerConfig controller;

@@ -178,7 +178,7 @@ Findings diagnose(const RecordedCase& recorded, const model::NeedleParameters& m
   const inference::Fit base_fit = refitted_base(search, *decision.model.fit);
   const ChosenModel base = model_of(search, base_fit, 0);
   findings.effects = found_effects(system, search, posterior, unknowns, decision.model);
-  findings.discrepancies = discrepancies_of(search, decision.model);
+  findings.discrepancies = discrepancies_of(system, search, decision.model);
   findings.variation = variation_of(search, unknowns);
   findings.needle = needle_estimate(system, decision.model);
   const inference::Fit& alone = search.visited().at({}).at->fit;

@@ -7,6 +7,7 @@
 
 #include "diagnosis/inference/noise.hpp"
 #include "diagnosis/needle/recorded_case.hpp"
+#include "model/effects/discrepancy.hpp"
 
 namespace bevel::diagnosis {
 
@@ -96,13 +97,9 @@ struct DetectableSize {
 
 // What remains unexplained, described: which quantity of the motion is off by how much, against what.
 struct Discrepancy {
-  std::string component;                       // "curvature toward the bevel", ...
-  std::string unit;                            // of values
-  std::string covariate;                       // "depth_mm", ...
-  bool periodic = false;                       // the covariate is an angle, `at` divides its circle
-  std::vector<double> at, values, std_errors;  // a broken line
-  double log_bayes_factor = 0;                 // natural, against none
-  double visible_size = 0;  // root mean square over the readings, in standard deviations of the noise
+  model::DiscrepancyCurve curve;
+  double log_bayes_factor = 0;  // natural, against none
+  double visible_size = 0;      // root mean square over the readings, in standard deviations of the noise
 };
 
 // How much insertions differ: the standard deviation of one quantity between them.

@@ -189,23 +189,17 @@ std::vector<VariationEstimate> variation_of(const Search& search, const inferenc
   return out;
 }
 
-std::vector<Discrepancy> discrepancies_of(const Search& search, const ChosenModel& model) {
+std::vector<Discrepancy> discrepancies_of(const NeedleSystem& system, const Search& search, const ChosenModel& model) {
   const Fit& fit = *model.fit;
   if (!fit.scales.curve) return {};
-  const inference::Curve& curve = search.system().curves()[fit.scales.curve->curve];
   const MatrixXd covariance = solve_about(fit, model.blocks, model.curve).covariance;
-  Discrepancy out{.component = curve.component,
-                  .unit = curve.unit,
-                  .covariate = curve.covariate,
-                  .periodic = curve.periodic,
-                  .at = curve.at,
-                  .values = {fit.curve_values.begin(), fit.curve_values.end()},
-                  .std_errors = {},
-                  .log_bayes_factor = search.visited().at(fit.layout.set()).at->log_bayes_factor_curve,
-                  .visible_size = search.discrepancy().visible_size(*fit.scales.curve, fit.curve_values)};
+  std::vector<double> std_errors;
   for (Index i = 0; i < fit.curve_values.size(); ++i)
-    out.std_errors.push_back(std::sqrt(std::max(0.0, covariance(fit.shared.size() + i, fit.shared.size() + i))));
-  return {out};
+    std_errors.push_back(std::sqrt(std::max(0.0, covariance(fit.shared.size() + i, fit.shared.size() + i))));
+  return {{.curve = system.model_curve(fit.scales.curve->curve, {fit.curve_values.begin(), fit.curve_values.end()},
+                                       std::move(std_errors)),
+           .log_bayes_factor = search.visited().at(fit.layout.set()).at->log_bayes_factor_curve,
+           .visible_size = search.discrepancy().visible_size(*fit.scales.curve, fit.curve_values)}};
 }
 
 }  // namespace bevel::diagnosis

@@ -23,6 +23,7 @@ std::string sentence_of(const Findings& findings) {
     case Verdict::unknown_effect:
       break;
   }
+  const model::DiscrepancyCurve& curve = findings.discrepancies.front().curve;
   return "Something is missing that no effect of the library explains: the " +
          findings.discrepancies.front().component + " is off with " + findings.discrepancies.front().covariate +
          (findings.effects.empty() ? "." : ", beside " + listed(findings.effects) + ".");

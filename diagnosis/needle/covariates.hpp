@@ -1,24 +1,7 @@
 #pragma once
-// What a discrepancy is looked at against, from the base's motion alone.
-#include "model/effects/open_loop.hpp"
+// The covariates of the needle's discrepancy, which are those of the model's.
+#include "model/effects/covariates.hpp"
 
 namespace bevel::diagnosis {
-
-// Follows the base from leg to leg. depth is the base's insertion; since_stop counts seconds from the moment at which
-// insertion last ended (0 while inserting), since_reversal the insertion since the shaft last turned.
-class CovariateTracker {
- public:
-  explicit CovariateTracker(const model::BaseMotion& entry);
-  // Taken up again: when the insertion last moved, and where the shaft last turned.
-  CovariateTracker(double stopped_s, double turned_mm) : stopped_s_(stopped_s), turned_mm_(turned_mm) {}
-  double stopped_s() const { return stopped_s_; }
-  double turned_mm() const { return turned_mm_; }
-  void advance(const model::BaseMotion& from, const model::BaseMotion& to);
-  double operator[](model::Covariate covariate) const { return value_[static_cast<std::size_t>(covariate)]; }
-
- private:
-  std::array<double, 7> value_{};  // in the order of model::Covariate
-  double stopped_s_, turned_mm_;
-};
-
+using model::CovariateTracker;
 }  // namespace bevel::diagnosis

@@ -1,28 +1,15 @@
 #pragma once
-// Components of the discrepancy of a needle, each as a function of one covariate: the curvature toward the bevel and
-// across it, the advance and the turning of the tip per mm and per rad of the base, a sideways drift, and the reading
-// along each axis of {A}.
+// The discrepancy of a needle (model/effects/discrepancy.hpp) as the engine's curves: every component over every
+// covariate that varies in the recordings.
 #include <memory>
 
 #include "diagnosis/inference/system.hpp"
-#include "model/effects/effect.hpp"
+#include "model/effects/discrepancy.hpp"
 #include "model/effects/open_loop.hpp"
 
 namespace bevel::diagnosis {
 
-enum class Component {
-  curvature_bevel,
-  curvature_across,
-  advance,
-  turning,
-  advance_turning,
-  turning_turning,
-  drift_bevel,
-  drift_across,
-  x,
-  y,
-  z
-};
+using Component = model::DiscrepancyComponent;
 
 struct NeedleCurve {
   Component component;
@@ -36,9 +23,12 @@ std::vector<NeedleCurve> find_curves(const std::vector<const model::Motion*>& mo
 // Weights of a curve's values at a place of its covariate: linear between them, flat outside, round the circle.
 Eigen::VectorXd weights_at(const inference::Curve& curve, double x);
 
+// The curve with these values, as a model file carries it.
+model::DiscrepancyCurve to_model(const NeedleCurve& curve, std::vector<double> values, std::vector<double> std_errors);
+
 // The value itself as an effect with slope in one dual number: part of the curves' values, [first, first + 4), the rest
 // taken as zero.
-inline constexpr std::size_t kValuesOfPart = model::kMaxEffectParameters;
-std::unique_ptr<model::Effect> make_curve_part(const NeedleCurve& curve, std::size_t first);
+inline constexpr std::size_t kValuesOfPart = model::kKnotsOfPart;
+std::shared_ptr<const model::Effect> make_curve_part(const NeedleCurve& curve, std::size_t first);
 
 }  // namespace bevel::diagnosis

@@ -161,7 +161,8 @@ NeedleSystem::NeedleSystem(RecordedCase recorded, const model::NeedleParameters&
     }
   std::vector<const model::Motion*> motions;
   for (const auto& recording : recorded_.recordings) motions.push_back(&recording.motion);
-  for (const NeedleCurve& curve : find_curves(motions)) {
+  needle_curves_ = find_curves(motions);
+  for (const NeedleCurve& curve : needle_curves_) {
     curves_.push_back(curve.curve);
     parts_of_curve_ = (curve.curve.at.size() + kValuesOfPart - 1) / kValuesOfPart;
     for (std::size_t first = 0; first < curve.curve.at.size(); first += kValuesOfPart)

@@ -3,6 +3,7 @@
 // differs between insertions, the effects of the library, and a discrepancy in each component of the tip's twist and
 // of the reading.
 #include "diagnosis/inference/system.hpp"
+#include "diagnosis/needle/curves.hpp"
 #include "diagnosis/needle/recorded_case.hpp"
 
 namespace bevel::diagnosis {
@@ -39,7 +40,11 @@ class NeedleSystem final : public inference::System {
   model::NeedleParameters needle(const Eigen::VectorXd& shared) const;
   // The library's effect behind one of effects().
   const model::Effect& physics(std::size_t effect) const { return *physics_[effect]; }
-  std::uint32_t variant(std::size_t effect) const { return variants_[effect]; }
+  // One of curves(), with values, as a model file carries it.
+  model::DiscrepancyCurve model_curve(std::size_t curve, std::vector<double> values,
+                                      std::vector<double> std_errors) const {
+    return to_model(needle_curves_[curve], std::move(values), std::move(std_errors));
+  }
   // Positions of the tip at the readings of any motion, in {A}, mm; unknowns as for predict. discrepancy may be null.
   bool tip_path(const inference::ModelSet& set, const model::Motion& motion, const Eigen::VectorXd& shared,
                 const Eigen::VectorXd& local, const DiscrepancyValues* discrepancy,
@@ -64,8 +69,9 @@ class NeedleSystem final : public inference::System {
   std::vector<std::uint32_t> variants_;
   std::vector<inference::Nuisance> nuisances_;
   std::vector<inference::NuisanceGroup> groups_;
+  std::vector<NeedleCurve> needle_curves_;
   std::vector<inference::Curve> curves_;
-  std::vector<std::unique_ptr<model::Effect>> curve_physics_;  // parts of each curve
+  std::vector<std::shared_ptr<const model::Effect>> curve_physics_;  // parts of the curves, in their order
   std::size_t parts_of_curve_ = 0;
 };
 

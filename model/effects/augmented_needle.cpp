@@ -61,8 +61,12 @@ AugmentedState AugmentedNeedle::entry(const BaseMotion& base) const {
   state.D.setZero(6, columns_);
   EntryPose pose;
   for (const auto& active : effects_) active.effect->enter(parameters(active), pose);
+  const NeedleColumns& own = needle_columns_;
+  if (own.tilt_x >= 0) pose.tilt_x_rad.slope[own.tilt_x] += 1;
+  if (own.tilt_y >= 0) pose.tilt_y_rad.slope[own.tilt_y] += 1;
+  if (own.roll >= 0) pose.roll_rad.slope[own.roll] += 1;
   const Eigen::Vector3d tilt(pose.tilt_x_rad.value, pose.tilt_y_rad.value, 0);
-  if (!effects_.empty()) {
+  if (!effects_.empty() || own.tilt_x >= 0 || own.tilt_y >= 0 || own.roll >= 0) {
     const Eigen::Matrix3d unroll = exp_so3({0, 0, -pose.roll_rad.value});
     state.pose.R = exp_so3(tilt) * unroll.transpose();
     const Eigen::Matrix<double, 3, 2> by_tilt = (unroll * right_jacobian_so3(tilt)).leftCols<2>();
@@ -70,13 +74,15 @@ AugmentedState AugmentedNeedle::entry(const BaseMotion& base) const {
                               by_tilt.col(1) * pose.tilt_y_rad.slope.head(columns_).matrix().transpose();
     state.D.row(5) += pose.roll_rad.slope.head(columns_).matrix().transpose();
   }
+  if (own.entry_x >= 0) state.D.col(own.entry_x).head<3>() += state.pose.R.row(0).transpose();
+  if (own.entry_y >= 0) state.D.col(own.entry_y).head<3>() += state.pose.R.row(1).transpose();
   state.tip_insertion_mm = base.insertion_mm;
   state.tip_rotation_rad = base.rotation_rad;
   return state;
 }
 
-bool AugmentedNeedle::advance(AugmentedState& state, const BaseMotion& to) const {
-  return effects_.empty() ? advance_plain(state, to) : advance_with_effects(state, to);
+bool AugmentedNeedle::advance(AugmentedState& state, const BaseMotion& to, Spread* spread) const {
+  return effects_.empty() ? advance_plain(state, to) : advance_with_effects(state, to, spread);
 }
 
 bool AugmentedNeedle::integrate(AugmentedState& state, const StepInput& input, StepJacobian& J) const {
@@ -107,7 +113,7 @@ bool AugmentedNeedle::advance_plain(AugmentedState& state, const BaseMotion& to)
   return true;
 }
 
-bool AugmentedNeedle::advance_with_effects(AugmentedState& state, const BaseMotion& to) const {
+bool AugmentedNeedle::advance_with_effects(AugmentedState& state, const BaseMotion& to, Spread* spread) const {
   auto& memory = state.memory;
   LegView leg;
   leg.entry = state.entry;
@@ -149,6 +155,8 @@ bool AugmentedNeedle::advance_with_effects(AugmentedState& state, const BaseMoti
     state.D.noalias() += J.input.lazyProduct(inputs);
   }
   for (std::size_t i = 0; i < effects_.size(); ++i) effects_[i].effect->settle(parameters(effects_[i]), leg, memory[i]);
+  if (spread != nullptr)
+    for (std::size_t i = 0; i < effects_.size(); ++i) effects_[i].effect->spread(leg, memory[i], *spread);
   state.base = to;
   state.tip_insertion_mm = insertion_mm;
   state.tip_rotation_rad = rotation_rad;
@@ -171,6 +179,12 @@ void AugmentedNeedle::through_cameras(TipReading& reading) const {
   Dual3 p = to_dual(reading);
   for (const auto& active : effects_) active.effect->camera(parameters(active), p);
   from_dual(p, reading);
+}
+
+std::array<double, 3> AugmentedNeedle::blur_mm2(const AugmentedState& state) const {
+  std::array<double, 3> variance_mm2{};
+  for (std::size_t i = 0; i < effects_.size(); ++i) effects_[i].effect->blur(state.memory[i], variance_mm2);
+  return variance_mm2;
 }
 
 Dual AugmentedNeedle::latency_s() const {

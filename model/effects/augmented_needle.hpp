@@ -3,6 +3,7 @@
 // of its parameters in the same pass. Without effects it is model/kinematics.hpp, bit for bit (tested).
 // Source: shared definitions in effect.hpp; sensitivities by the chain rule through StepJacobian.
 #include <array>
+#include <memory>
 #include <vector>
 
 #include "model/effects/effect.hpp"
@@ -13,14 +14,17 @@ namespace bevel::model {
 struct ActiveEffect {
   const Effect* effect = nullptr;
   std::array<Dual, kMaxEffectParameters> parameters;  // in the order of effect->parameters()
+  std::shared_ptr<const Effect> owned{};              // of an effect that is not in the registry: it lives as long
 };
 
-// In which column of the sensitivities a needle parameter stands; -1: not wanted.
+// In which column of the sensitivities a parameter of the needle or of its entry stands; -1: not wanted.
 struct NeedleColumns {
   int curvature = -1;
   int lambda1 = -1;
   int lambda2 = -1;
   int wheelbase = -1;
+  int tilt_x = -1, tilt_y = -1, roll = -1;  // of the entry, as EntryPose has them
+  int entry_x = -1, entry_y = -1;           // mm, of the entry point in {A}
 };
 
 // Row by row, as slopes lie in a dual number.
@@ -52,11 +56,14 @@ class AugmentedNeedle {
   // At the entry point, unrolled, along z_A but for what the effects say; the base as it stands then.
   AugmentedState entry(const BaseMotion& base) const;
   // Moves the base. False outside the domain of the slip law; pose and base are then unchanged. Does not allocate.
-  bool advance(AugmentedState& state, const BaseMotion& to) const;
+  // `spread` takes in what the effects do not know of themselves.
+  bool advance(AugmentedState& state, const BaseMotion& to, Spread* spread = nullptr) const;
   // Where the tip is, as a point in {A} before the cameras: effects with an offset included.
   void point(const AugmentedState& state, TipReading& reading) const;
   // What the cameras make of such a point.
   void through_cameras(TipReading& reading) const;
+  // What the effects do not know of a reading, along the axes of {A}.
+  std::array<double, 3> blur_mm2(const AugmentedState& state) const;
   // By how much readings are late; zero without camera_latency.
   Dual latency_s() const;
 
@@ -68,7 +75,7 @@ class AugmentedNeedle {
 
  private:
   bool advance_plain(AugmentedState& state, const BaseMotion& to) const;
-  bool advance_with_effects(AugmentedState& state, const BaseMotion& to) const;
+  bool advance_with_effects(AugmentedState& state, const BaseMotion& to, Spread* spread) const;
   // The pose over a leg, and its derivatives but for those that come in through the leg's own increments and curvature.
   bool integrate(AugmentedState& state, const StepInput& input, StepJacobian& J) const;
   Parameters parameters(const ActiveEffect& active) const {

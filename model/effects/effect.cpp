@@ -1,5 +1,6 @@
 #include "model/effects/effect.hpp"
 
+#include <array>
 #include <cmath>
 
 namespace bevel::model {
@@ -28,6 +29,13 @@ std::string_view name_of(Covariate covariate) {
       return "roll_rad";
   }
   return "time_s";
+}
+
+std::span<const Covariate> all_covariates() {
+  static constexpr std::array kAll = {Covariate::time_s,          Covariate::depth_mm,     Covariate::speed_mm_s,
+                                      Covariate::turn_rate_rad_s, Covariate::since_stop_s, Covariate::since_reversal_mm,
+                                      Covariate::roll_rad};
+  return kAll;
 }
 
 Dual2 LegView::lateral_in_body(const Dual2& world) const {

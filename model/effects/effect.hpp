@@ -47,6 +47,7 @@ inline constexpr double kNoNone = std::numeric_limits<double>::quiet_NaN();
 // Against what the effect is to be looked at: where it shows.
 enum class Covariate { time_s, depth_mm, speed_mm_s, turn_rate_rad_s, since_stop_s, since_reversal_mm, roll_rad };
 std::string_view name_of(Covariate covariate);
+std::span<const Covariate> all_covariates();
 
 // What an effect remembers between legs of one insertion. Slopes come with it.
 struct EffectMemory {
@@ -92,6 +93,9 @@ struct EntryPose {
 
 using Parameters = std::span<const Dual>;
 
+// What an effect does not know of itself, over one leg: variance of the pose as a body perturbation, mm^2 | rad^2.
+using Spread = std::array<double, 6>;
+
 struct EffectDescription {
   std::string_view name;     // a contract: verdict.json, model.toml
   std::string_view meaning;  // one clause for the report: what is going on in the rig
@@ -125,6 +129,11 @@ class Effect {
   virtual void camera(Parameters, Dual3& /*position_mm*/) const {}
   // The reading shows the needle as it was so much earlier.
   virtual Dual latency_s(Parameters) const { return {}; }
+
+  // After settle: adds what is not known of the effect, as independent from leg to leg as makes the sum right.
+  virtual void spread(const LegView&, const EffectMemory&, Spread&) const {}
+  // Adds the variance of the offset in one reading, along the axes of {A}; neighbouring readings share the error.
+  virtual void blur(const EffectMemory&, std::array<double, 3>& /*variance_mm2*/) const {}
 
   // Which parameters are fitted together: bit i for parameter i. More than one where the effect comes in kinds.
   virtual std::span<const std::uint32_t> variants() const;

@@ -8,10 +8,11 @@ constexpr double kShaftSpacing_mm = 1.0;
 }
 
 KinematicPlant::KinematicPlant(const model::NeedleParameters& needle, std::vector<model::ActiveEffect> effects,
-                               double roll_rad)
-    : needle_(needle, std::move(effects)), state_(needle_.entry({})) {
+                               double roll_rad, const model::OwnValues& own)
+    : needle_(model::of_insertion(needle, own), std::move(effects)), state_(needle_.entry({})) {
+  state_.pose = model::of_insertion(state_.pose, own);
   state_.pose.R = state_.pose.R * model::exp_so3({0, 0, roll_rad});
-  path_mm_ = {-state_.pose.R.col(2), state_.pose.p_mm};
+  path_mm_ = {state_.pose.p_mm - state_.pose.R.col(2), state_.pose.p_mm};
   path_depth_mm_ = {-1, 0};
   follow_path();
 }

@@ -3,6 +3,7 @@
 #include <vector>
 
 #include "model/effects/augmented_needle.hpp"
+#include "model/effects/variation.hpp"
 
 namespace bevel::rig {
 
@@ -20,9 +21,10 @@ class Plant {
 // Retraction draws the tip back along that path. What a camera makes of it is not in here.
 class KinematicPlant : public Plant {
  public:
-  // roll_rad: of the bevel at the start. Throws std::invalid_argument for more effects than a model holds.
+  // roll_rad: of the bevel at the start; own: what this insertion has of its own. Throws std::invalid_argument for more
+  // effects than a model holds.
   explicit KinematicPlant(const model::NeedleParameters& needle, std::vector<model::ActiveEffect> effects = {},
-                          double roll_rad = 0);
+                          double roll_rad = 0, const model::OwnValues& own = {});
   void advance(double insertion_mm, double rotation_rad, double dt_s) override;
   model::Pose tip() const override { return tip_; }
   const std::vector<Eigen::Vector3d>& shaft_mm() const override { return shaft_mm_; }

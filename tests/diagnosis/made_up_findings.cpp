@@ -195,12 +195,11 @@ Findings made_up(Verdict verdict) {
     f.effects.pop_back();
     f.held_out.after = figures(0.82, 2.71, 9.4);
     f.checks = {7.4, {0.965, 1.036}, 1e-14, false};
-    f.discrepancies = {{.component = "curvature toward the bevel",
-                        .unit = "1/mm",
-                        .covariate = "time_s",
-                        .at = {0, 2, 4, 6, 8, 10, 12},
-                        .values = {0, 1e-4, 3e-4, 4e-4, 6e-4, 8e-4, 9e-4},
-                        .std_errors = {4e-5, 3e-5, 3e-5, 3e-5, 4e-5, 6e-5, kNone},
+    f.discrepancies = {{.curve = {.component = model::DiscrepancyComponent::curvature_bevel,
+                                  .covariate = model::Covariate::time_s,
+                                  .at = {0, 2, 4, 6, 8, 10, 12},
+                                  .values = {0, 1e-4, 3e-4, 4e-4, 6e-4, 8e-4, 9e-4},
+                                  .std_errors = {4e-5, 3e-5, 3e-5, 3e-5, 4e-5, 6e-5, 9e-5}},
                         .log_bayes_factor = 1150,
                         .visible_size = 3.1}};
   }

@@ -6,6 +6,7 @@
 
 #include <cstdlib>
 #include <filesystem>
+#include <sstream>
 
 #include "io/log_writer.hpp"
 #include "io/messages.hpp"
@@ -118,6 +119,50 @@ depth_mm = 30.0
 curvature_ratio = 0.6
 )",
                      2e-3);
+}
+
+// A curvature that is off by as much everywhere is another needle; the columns of the spread come where the file says
+// what is uncertain, and only there.
+TEST_F(Predict, PredictsWithDiscrepanciesAndSaysHowFarOff) {
+  const std::string log = write_log("rec01.lcm");
+  const auto rows_of = [&](const std::string& model, const std::string& header) {
+    const Said said = run("--model " + folder.write("m.toml", model) + " " + log);
+    EXPECT_EQ(said.status, 0) << said.err;
+    EXPECT_THAT(said.out, StartsWith(header + "\n"));
+    std::vector<std::vector<double>> rows;
+    std::istringstream lines(said.out.substr(said.out.find('\n') + 1));
+    for (std::string line; std::getline(lines, line);) {
+      auto& row = rows.emplace_back();
+      std::istringstream cells(line);
+      for (std::string cell; std::getline(cells, cell, ',');) row.push_back(std::stod(cell));
+    }
+    return rows;
+  };
+  const std::string discrepancy =
+      "[[discrepancy]]\ncomponent = \"curvature_bevel\"\ncovariate = \"depth_mm\"\nknots = [0.0, 30.0]\n"
+      "values = [5e-4, 5e-4]\nstd_errors = [2e-4, 1e-4]\n";
+  const std::string sharper =
+      "[needle]\ncurvature_per_mm = 0.0052\nwheelbase_mm = 20.0\nlambda1_per_rad = 0.49\nlambda2 = 0.22\n";
+  const std::string with_sd = "utime,x_mm,y_mm,z_mm,x_sd_mm,y_sd_mm,z_sd_mm";
+  const auto plain = rows_of(sharper, "utime,x_mm,y_mm,z_mm");
+  const auto by_curve = rows_of(kAgar + discrepancy, with_sd);
+  const auto by_variation = rows_of(sharper + "[variation]\nentry_point_mm = 0.25\nentry_angle_rad = 0.01\n", with_sd);
+  const auto by_both = rows_of(kAgar + discrepancy + "[variation]\nentry_point_mm = 0.25\n", with_sd);
+  ASSERT_EQ(plain.size(), by_curve.size());
+  ASSERT_EQ(plain.size(), by_variation.size());
+  for (std::size_t i = 0; i < plain.size(); ++i) {
+    ASSERT_EQ(plain[i].size(), 4U);
+    ASSERT_EQ(by_curve[i].size(), 7U);
+    for (std::size_t c = 0; c < 4; ++c) {
+      EXPECT_NEAR(by_curve[i][c], plain[i][c], 2e-6);
+      EXPECT_EQ(by_variation[i][c], plain[i][c]);
+    }
+    // A tilt at the entry moves the tip by the depth, or a little less where the slip undoes it.
+    EXPECT_NEAR(by_variation[i][4], std::hypot(0.25, 0.01 * plain[i][3]), 0.05 + 0.1 * 0.01 * plain[i][3]);
+    EXPECT_NEAR(by_both[i][5], std::hypot(0.25, by_curve[i][5]), 1e-3);
+  }
+  EXPECT_GT(by_curve.back()[5], 0.1);
+  EXPECT_EQ(by_curve.front()[5], 0);
 }
 
 TEST_F(Predict, PrintsALineForEachMeasurementInTheOrderOfTheLog) {

@@ -67,6 +67,57 @@ TEST(PlantWithEffects, CameraAlongXSeesItsOwnPicture) {
     EXPECT_LT((seen[i] - plant.shaft_mm()[i].cwiseProduct(Vector3d(1, 1.05, 1.05))).norm(), 1e-12);
 }
 
+TEST(PlantWithADiscrepancy, IsTheModelAlongTheSameMotion) {
+  const Motion motion = rich_script().fine();
+  for (const auto& info : discrepancy_components()) {
+    if (info.component >= DiscrepancyComponent::x) continue;  // the plant shows those too, but has no reading at rest
+    const auto curve =
+        active_discrepancy({info.component, Covariate::depth_mm, {0, 40}, {0, 0.02 * info.largest}, {0, 0}});
+    const auto path = path_of(agar(), {curve}, motion);
+    rig::KinematicPlant plant(agar(), {curve});
+    for (std::size_t i = 1; i < motion.nodes.size(); ++i) {
+      const BaseMotion &a = motion.nodes[i - 1], &b = motion.nodes[i];
+      plant.advance(b.insertion_mm - a.insertion_mm, b.rotation_rad - a.rotation_rad, b.time_s - a.time_s);
+    }
+    EXPECT_LT((plant.tip().p_mm - path.back()).norm(), 0.05) << info.name;  // the last reading is 50 ms or less before
+  }
+}
+
+TEST(PlantOfOneInsertion, EntersWhereAndAsItsOwnValuesSay) {
+  const OwnValues own{.curvature_relative = 0.2,
+                      .tilt_x_rad = 0.02,
+                      .tilt_y_rad = -0.01,
+                      .roll_rad = 0.3,
+                      .entry_x_mm = 0.5,
+                      .entry_y_mm = -0.4};
+  rig::KinematicPlant plant(bicycle(), {}, 0, own);
+  EXPECT_EQ(plant.tip().p_mm, Vector3d(0.5, -0.4, 0));
+  EXPECT_LT((plant.tip().R.col(2) - exp_so3({0.02, -0.01, 0}).col(2)).norm(), 1e-12);
+  plant.advance(60, 0, 6);
+  // An arc of the bicycle's, 1.2 times as sharp, in the plane to which the bevel was turned.
+  const double k = 1.2 * bicycle().curvature_per_mm;
+  const Vector3d arc(0, -(1 - std::cos(60 * k)) / k, std::sin(60 * k) / k);
+  const Vector3d expected = Vector3d(0.5, -0.4, 0) + exp_so3({0.02, -0.01, 0}) * (exp_so3({0, 0, 0.3}) * arc);
+  EXPECT_LT((plant.tip().p_mm - expected).norm(), 1e-9);
+}
+
+TEST(RigWithVariation, DrawsTheInsertionsOwnValuesBySeed) {
+  nodes::SystemConfig config;
+  config.rig.variation = {.curvature_relative = 0.1, .entry_angle_rad = 0.01, .entry_point_mm = 0.3, .roll_rad = 0.1};
+  lcm::LCM lcm("memq://");
+  const auto entry_of = [&](std::int64_t seed) {
+    config.rig.seed = seed;
+    can::MemoryNetwork network;
+    const auto insertion = network.attach(), rotation = network.attach();
+    const nodes::RigNode rig(lcm, *insertion, *rotation, config, nullptr);
+    EXPECT_EQ(rig.own_values().entry_x_mm, draw(config.rig.variation, static_cast<std::uint64_t>(seed)).entry_x_mm);
+    EXPECT_EQ(rig.plant().tip().p_mm.x(), rig.own_values().entry_x_mm);
+    return rig.plant().tip().p_mm;
+  };
+  EXPECT_EQ(entry_of(3), entry_of(3));
+  EXPECT_NE(entry_of(3), entry_of(4));
+}
+
 TEST(RigWithEffects, FramesOfALateCameraComeLateAndAreStampedThen) {
   nodes::SystemConfig config;
   config.cameras.resize(1);
@@ -126,10 +177,27 @@ TEST_F(RigConfigFile, TakesAModelFileBesideIt) {
   EXPECT_EQ(rig.effects, model.effects);
 }
 
+TEST_F(RigConfigFile, TakesDiscrepanciesAndVariationFromEither) {
+  io::ModelFile model;
+  model.discrepancies = {{DiscrepancyComponent::advance, Covariate::depth_mm, {0, 50}, {0, 0.1}, {0.01, 0.02}}};
+  model.variation = Variation{.curvature_relative = 0.1, .roll_rad = 0.05};
+  io::save_model_file(model, (folder / "truth.toml").string());
+  const auto from_file = load("[rig]\nmodel = \"truth.toml\"\n");
+  EXPECT_EQ(from_file.discrepancies, model.discrepancies);
+  EXPECT_EQ(from_file.variation, *model.variation);
+  const auto own = load(
+      "[[rig.discrepancy]]\ncomponent = \"advance\"\ncovariate = \"depth_mm\"\nknots = [0.0, 50.0]\n"
+      "values = [0.0, 0.1]\nstd_errors = [0.01, 0.02]\n[rig.variation]\ncurvature_relative = 0.1\nroll_rad = 0.05\n");
+  EXPECT_EQ(own.discrepancies, model.discrepancies);
+  EXPECT_EQ(own.variation, *model.variation);
+  // What the software believes is never the rig's.
+  EXPECT_EQ(load("[variation]\nroll_rad = 0.1\n").variation, Variation{});
+}
+
 TEST_F(RigConfigFile, MistakesAreNamed) {
   EXPECT_THAT(fault_of("[rig]\nmodel = \"none.toml\"\n"), HasSubstr("none.toml: cannot be read"));
   EXPECT_THAT(fault_of(std::string("[rig]\nmodel = \"m.toml\"\n[[rig.effect]]\n") + kWindup),
-              HasSubstr("rig.model: stands for needle and effect; one or the other"));
+              HasSubstr("rig.model: stands for needle, effect, discrepancy and variation, and there is effect too"));
   EXPECT_THAT(fault_of("[[rig.effect]]\nname = \"layer\"\ncurvature_ratio = 0.5\n"),
               HasSubstr("rig.effect[0].depth_mm is missing"));
 }

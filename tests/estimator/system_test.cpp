@@ -57,6 +57,27 @@ TEST_F(SystemFile, OrTheModelFileBesideIt) {
   ASSERT_EQ(config.estimator.effects.size(), 1U);
 }
 
+constexpr const char* kUncertain =
+    "[[discrepancy]]\ncomponent = \"curvature_bevel\"\ncovariate = \"depth_mm\"\nknots = [0.0, 50.0]\n"
+    "values = [0.0, 6e-4]\nstd_errors = [1e-4, 1e-4]\n[variation]\ncurvature_relative = 0.1\nroll_rad = 0.07\n";
+
+TEST_F(SystemFile, TheEstimatorTakesDiscrepanciesAndVariationLiveAndInAReplay) {
+  const std::string system_path = write(std::string(kNeedle) + kWindup + kUncertain);
+  const auto config = nodes::load_system_config(system_path);
+  ASSERT_EQ(config.estimator.effects.size(), 2U);
+  EXPECT_EQ(config.estimator.effects[1].effect->name(), "discrepancy");
+  EXPECT_EQ(config.estimator.prior.variation, (model::Variation{.curvature_relative = 0.1, .roll_rad = 0.07}));
+  EXPECT_EQ(config.live_effects.active.size(), 2U);
+  EXPECT_TRUE(config.live_effects.left_out.empty());
+  for (const bool by_system : {true, false}) {
+    replay::BatchOptions options;
+    (by_system ? options.system_path : options.model_path) = system_path;
+    const replay::Setup setup = replay::load_setup(options);
+    EXPECT_EQ(setup.discrepancies, config.discrepancies);
+    EXPECT_EQ(setup.config.prior.variation, config.estimator.prior.variation);
+  }
+}
+
 TEST_F(SystemFile, MistakesAreNamed) {
   const auto fault_of = [this](const std::string& text) -> std::string {
     try {
@@ -110,6 +131,24 @@ void write_log(const std::string& path, const estimator::testing::Insertion& dat
       });
   for (const needle_state_t& truth : truths) log.write_message(truth.utime, io::channel::kNeedleTruth, truth);
   log.close();
+}
+
+TEST_F(SystemFile, AReplayIsWithTheDiscrepancyAndTheVariation) {
+  std::mt19937_64 rng(kSeed);
+  const auto data = insertion(rng, estimator::Prior{});
+  const std::string log = (folder / "log.lcm").string();
+  write_log(log, data);
+  const auto last_of = [&](const std::string& text) {
+    replay::BatchOptions options;
+    options.model_path = write(text, "model.toml");
+    const replay::Setup setup = replay::load_setup(options);
+    const auto one =
+        replay::replay_logs({log}, setup.config, {.effects = setup.effects, .discrepancies = setup.discrepancies});
+    return one.front().states.back().state.unpacked();
+  };
+  const auto plain = last_of(kNeedle), uncertain = last_of(std::string(kNeedle) + kUncertain);
+  EXPECT_NE(plain.curvature_per_mm, uncertain.curvature_per_mm);
+  EXPECT_GT(uncertain.covariance(3, 3), plain.covariance(3, 3));
 }
 
 TEST_F(SystemFile, TheLiveNodeAppliesItsEffectsAsAReplayWithTheSameFileDoes) {

@@ -84,5 +84,22 @@ TEST_F(IdentifyTool, AModelWithEffectsIsRefusedByName) {
   }
 }
 
+TEST_F(IdentifyTool, AModelThatSaysWhatIsUncertainIsRefused) {
+  const auto refusal = [&](const io::ModelFile& file) -> std::string {
+    io::save_model_file(file, options.model_path);
+    try {
+      identify(options, std::cerr);
+    } catch (const std::runtime_error& e) {
+      return e.what();
+    }
+    return "";
+  };
+  io::ModelFile file{truth};
+  file.variation = model::Variation{.roll_rad = 0.1};
+  EXPECT_NE(refusal(file).find("has [variation]"), std::string::npos);
+  file.discrepancies = {{model::DiscrepancyComponent::advance, model::Covariate::depth_mm, {0}, {0.1}, {0.1}}};
+  EXPECT_NE(refusal(file).find("has [[discrepancy]] in \"advance\""), std::string::npos);
+}
+
 }  // namespace
 }  // namespace bevel::identify

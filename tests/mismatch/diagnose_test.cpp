@@ -153,12 +153,12 @@ TEST(Diagnose, WhatIsOnNoListIsADiscrepancyWithItsErrors) {
   EXPECT_EQ(found.verdict, Verdict::unknown_effect) << found.sentence;
   ASSERT_EQ(found.discrepancies.size(), 1U);
   const Discrepancy& one = found.discrepancies[0];
-  EXPECT_EQ(one.values.size(), one.at.size());
-  EXPECT_EQ(one.std_errors.size(), one.at.size());
-  for (const double error : one.std_errors) EXPECT_GT(error, 0);
+  EXPECT_EQ(one.curve.values.size(), one.curve.at.size());
+  EXPECT_EQ(one.curve.std_errors.size(), one.curve.at.size());
+  for (const double error : one.curve.std_errors) EXPECT_GT(error, 0);
   EXPECT_GT(one.visible_size, 0.5);
   EXPECT_LT(found.held_out.after.rmse_mm, found.held_out.before.rmse_mm);
-  EXPECT_THAT(found.sentence, HasSubstr(one.component));
+  EXPECT_THAT(found.sentence, HasSubstr(std::string(info_of(one.curve.component).meaning)));
 }
 
 TEST(Diagnose, IsTheSameForOneThreadAndTwo) {

@@ -37,9 +37,11 @@ estimator::EstimatorConfig with_needle_known(estimator::EstimatorConfig config,
 EstimatorFigure replay_case(const std::vector<std::string>& logs, const io::ModelFile& model,
                             const std::vector<replay::NoiseColour>& noise, estimator::EstimatorConfig config) {
   config.prior.needle = model.needle;
+  config.prior.variation = model.variation.value_or(model::Variation{});
   replay::ReplayOptions options;
   options.noise_by_axis = noise;
   options.effects = model.effects;
+  options.discrepancies = model.discrepancies;
   EstimatorFigure figure;
   for (const replay::Replay& one : replay::replay_logs(logs, config, options)) {
     const replay::InnovationFigures innovations = replay::innovation_figures(one);

@@ -21,6 +21,8 @@ struct RigFigure {
   std::vector<RigRecording> recordings;
 };
 
+// Along the needle that all insertions share: what each recording's had of its own nobody knows, and its share of the
+// error stays in the figure.
 RigFigure simulate_rig(const diagnosis::RecordedCase& recorded, const inference::Noise& noise,
                        const io::ModelFile& model);
 

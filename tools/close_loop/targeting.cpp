@@ -86,6 +86,7 @@ controller::NeedleView view_of(const estimator::Estimate& estimate) {
 estimator::EstimatorConfig estimator_config(const SteeredRig& rig, const Believed& believed) {
   estimator::EstimatorConfig config;
   config.prior.needle = believed.needle;
+  config.prior.variation = believed.variation;
   config.effects = believed.effects;
   auto& process = config.process;
   for (double* noise : {&process.position_mm, &process.tilt_rad, &process.roll_rad, &process.roll_per_sqrt_rad,
@@ -99,7 +100,7 @@ estimator::EstimatorConfig estimator_config(const SteeredRig& rig, const Believe
 }  // namespace
 
 Insertion steer(const SteeredRig& rig, const Believed& believed, const Eigen::Vector3d& target_mm, std::uint64_t seed) {
-  rig::KinematicPlant plant(rig.needle, rig.effects);
+  rig::KinematicPlant plant(rig.needle, rig.effects, 0, rig.own);
   Cameras cameras(rig, seed);
   estimator::NeedleEstimator estimator(estimator_config(rig, believed));
   const controller::ControllerConfig config;

@@ -20,6 +20,7 @@ struct SteeredRig {
   std::vector<diagnosis::Channel> channels;  // what its cameras see
   inference::Noise noise;                    // of those; outliers, of which only the share is known, are left out
   double transport_s = 0.05;                 // from the picture to its measurement
+  model::OwnValues own{};                    // of this insertion
 };
 
 // What the software believes.
@@ -28,6 +29,7 @@ struct Believed {
   std::vector<model::ActiveEffect> effects;
   double forgiveness = 1;             // times the filter's process noise as it runs live
   bool controller_knows_axes = true;  // effects of the axes are undone by the controller too, not only followed
+  model::Variation variation{};       // by how much insertions differ
 };
 
 struct Insertion {

@@ -121,7 +121,8 @@ TargetingFigures steer_all(const Models& models, const diagnosis::RecordedCase& 
   std::vector<Believed> beliefs;
   for (const double forgiveness : {1.0, kForgiveness})
     for (const io::ModelFile& model : models)
-      beliefs.push_back({model.needle, io::live_effects(model.effects).active, forgiveness});
+      beliefs.push_back({model.needle, io::live_effects(model).active, forgiveness, true,
+                         model.variation.value_or(model::Variation{})});
   figures.axes_matter = controller::AxisModel(beliefs[kAugmented].effects).turns_late();
   if (figures.axes_matter) {
     beliefs.push_back(beliefs[kAugmented]);
@@ -134,7 +135,11 @@ TargetingFigures steer_all(const Models& models, const diagnosis::RecordedCase& 
   parallel_for(beliefs.size() * count, options.threads, [&](std::size_t job) {
     const std::size_t belief = job / count, i = job % count, target = i / figures.seeds.size();
     const std::uint64_t seed = 1000 * figures.seeds[i % figures.seeds.size()] + target;
-    const SteeredRig rig{truth.needle, for_one_insertion(truth, nominal_s, seed), recorded.channels, noise};
+    const SteeredRig rig{.needle = truth.needle,
+                         .effects = for_one_insertion(truth, nominal_s, seed),
+                         .channels = recorded.channels,
+                         .noise = noise,
+                         .own = model::draw(truth.variation.value_or(model::Variation{}), seed)};
     insertions[belief][i] = steer(rig, beliefs[belief], figures.targets_mm[target], seed);
   });
   double inserted_mm = 0;

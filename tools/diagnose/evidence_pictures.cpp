@@ -214,7 +214,7 @@ std::string discrepancy_picture(const std::vector<Discrepancy>& discrepancies) {
   constexpr double kRow = 220;
   Drawing drawing(832, 8 + kRow * static_cast<double>(rows));
   for (std::size_t i = 0; i < discrepancies.size(); ++i) {
-    const Discrepancy& c = discrepancies[i];
+    const model::DiscrepancyCurve& c = discrepancies[i].curve;
     std::vector<double> low;
     std::vector<double> high;
     std::vector<double> all{0};
@@ -226,7 +226,8 @@ std::string discrepancy_picture(const std::vector<Discrepancy>& discrepancies) {
     }
     const std::size_t row = i / 2;
     const Box box{62 + static_cast<double>(i % 2) * 425, 26 + static_cast<double>(row) * kRow, 335, kRow - 76};
-    Panel panel(drawing, box, axis_around(c.at, in_words(c.covariate)), axis_around(all, c.unit), c.component);
+    Panel panel(drawing, box, axis_around(c.at, in_words(model::name_of(c.covariate))),
+                axis_around(all, std::string(info_of(c.component).unit)), std::string(info_of(c.component).meaning));
     panel.level(0, {.colour = ink::kSoft}).band(c.at, low, high, ink::kAfter);
     panel.curve(c.at, c.values, {.colour = ink::kAfter, .width = 2}).points(c.at, c.values, ink::kAfter, 1, 3);
   }

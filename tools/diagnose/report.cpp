@@ -62,6 +62,8 @@ io::Tone tone_of(Verdict verdict) {
   return io::Tone::plain;
 }
 
+std::string meaning_of(const Discrepancy& d) { return std::string(info_of(d.curve.component).meaning); }
+
 std::string span_of(const Location& w) {
   const std::string from = number(w.range[0]);
   const std::string to = number(w.range[1]);
@@ -222,9 +224,10 @@ void add_unknown_part(io::HtmlReport& page, const Findings& f) {
   std::vector<std::vector<std::string>> rows;
   for (const auto& c : f.discrepancies) {
     double largest = 0;
-    for (const double v : c.values) largest = std::abs(v) > std::abs(largest) ? v : largest;
-    rows.push_back({c.component, in_words(c.covariate), number(largest) + " " + c.unit, log_factor(c.log_bayes_factor),
-                    number(c.visible_size, 2)});
+    for (const double v : c.curve.values) largest = std::abs(v) > std::abs(largest) ? v : largest;
+    rows.push_back({meaning_of(c), in_words(model::name_of(c.curve.covariate)),
+                    number(largest) + " " + std::string(info_of(c.curve.component).unit),
+                    log_factor(c.log_bayes_factor), number(c.visible_size, 2)});
   }
   page.table({"what is off", "against", "largest", "log Bayes factor", "visible size (standard deviations of noise)"},
              rows);

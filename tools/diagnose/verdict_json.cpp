@@ -110,13 +110,14 @@ json absorption_json(const std::vector<DetectableSize>& sizes) {
 json as_json(const std::vector<Discrepancy>& discrepancies) {
   json all = json::array();
   for (const auto& d : discrepancies)
-    all.push_back({{"component", d.component},
-                   {"unit", d.unit},
-                   {"covariate", d.covariate},
-                   {"periodic", d.periodic},
-                   {"at", figures(d.at)},
-                   {"values", figures(d.values)},
-                   {"std_errors", figures(d.std_errors)},
+    all.push_back({{"component", info_of(d.curve.component).name},
+                   {"meaning", info_of(d.curve.component).meaning},
+                   {"unit", info_of(d.curve.component).unit},
+                   {"covariate", model::name_of(d.curve.covariate)},
+                   {"periodic", d.curve.periodic},
+                   {"at", figures(d.curve.at)},
+                   {"values", figures(d.curve.values)},
+                   {"std_errors", figures(d.curve.std_errors)},
                    {"log_bayes_factor", figure(d.log_bayes_factor)},
                    {"visible_size", figure(d.visible_size)}});
   return all;
@@ -205,6 +206,16 @@ io::ModelFile model_of(const Findings& findings) {
       for (const auto& p : r.parameters) entry.recordings[r.log][p.name] = p.value;
     model.effects.push_back(entry);
   }
+  for (const auto& discrepancy : findings.discrepancies) model.discrepancies.push_back(discrepancy.curve);
+  const auto sd_of = [&](std::string_view name) {
+    for (const auto& v : findings.variation)
+      if (v.name == name) return v.sd;
+    return 0.0;
+  };
+  model.variation = {.curvature_relative = sd_of("curvature"),
+                     .entry_angle_rad = sd_of("entry_angle"),
+                     .entry_point_mm = sd_of("entry_point"),
+                     .roll_rad = sd_of("roll")};
   return model;
 }
 

@@ -55,6 +55,14 @@ Identification identify(const Options& options, std::ostream& err) {
   if (!model.effects.empty())
     throw std::runtime_error(options.model_path + ": has [[effect]] \"" + model.effects.front().name +
                              "\"; identification fits [needle] alone, bevel-diagnose fits effects");
+  if (!model.discrepancies.empty())
+    throw std::runtime_error(options.model_path + ": has [[discrepancy]] in \"" +
+                             std::string(model::info_of(model.discrepancies.front().component).name) +
+                             "\"; identification fits [needle] alone, bevel-diagnose fits discrepancies");
+  if (model.variation)
+    throw std::runtime_error(options.model_path +
+                             ": has [variation]; identification takes all insertions for the same needle, "
+                             "bevel-diagnose fits how they differ");
   Identification result;
   result.start = model.needle;
   result.method = options.method;

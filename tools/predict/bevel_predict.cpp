@@ -9,7 +9,8 @@ int main(int argc, char** argv) {
   std::vector<std::string> logs;
   bevel::tools::CommandLine command_line(
       "bevel-predict",
-      "Integrates the model with its effects from ACTUATOR_STATE alone; CSV on stdout, one line per TIP_MEASUREMENT.");
+      "Integrates the model with its effects and discrepancies from ACTUATOR_STATE alone; CSV on stdout, one line per "
+      "TIP_MEASUREMENT, with standard deviations where the model file says what is uncertain.");
   command_line.option("-m,--model", model_path, "model file (TOML)", true)
       .arguments("LOG", logs, "the log, one insertion")
       .reads_recordings()

@@ -10,6 +10,7 @@
 
 #include "io/model_file.hpp"
 #include "io/recording.hpp"
+#include "model/effects/prediction_spread.hpp"
 #include "tools/common/exit_status.hpp"
 
 namespace bevel::predict {
@@ -28,27 +29,51 @@ namespace {
   throw std::domain_error(text.data());
 }
 
-}  // namespace
+// The log in order of time.
+struct Ordered {
+  model::Motion motion;
+  std::vector<std::size_t> order;  // of the measurements
+  std::vector<std::int64_t> utimes;
+};
 
-std::vector<Prediction> predict(const model::AugmentedNeedle& needle, std::span<const model::ActuatorState> actuators,
-                                std::span<const model::TipMeasurement> tips) {
+Ordered in_order(std::span<const model::ActuatorState> actuators, std::span<const model::TipMeasurement> tips) {
   if (actuators.empty()) throw std::invalid_argument("no ACTUATOR_STATE: nothing tells how the base moved");
   if (tips.empty()) throw std::invalid_argument("no TIP_MEASUREMENT: nothing tells for when to predict");
   const auto by_utime = [](const auto& a, const auto& b) { return a.utime < b.utime; };
   std::vector<model::ActuatorState> sorted(actuators.begin(), actuators.end());
   std::stable_sort(sorted.begin(), sorted.end(), by_utime);
-  std::vector<std::size_t> order(tips.size());
-  std::iota(order.begin(), order.end(), 0);
-  std::stable_sort(order.begin(), order.end(), [&](auto a, auto b) { return by_utime(tips[a], tips[b]); });
-  std::vector<std::int64_t> utimes;
-  for (const auto i : order) utimes.push_back(tips[i].utime);
+  Ordered log;
+  log.order.resize(tips.size());
+  std::iota(log.order.begin(), log.order.end(), 0);
+  std::stable_sort(log.order.begin(), log.order.end(), [&](auto a, auto b) { return by_utime(tips[a], tips[b]); });
+  for (const auto i : log.order) log.utimes.push_back(tips[i].utime);
+  log.motion = model::make_motion(sorted, log.utimes);
+  return log;
+}
 
-  const model::Motion motion = model::make_motion(sorted, utimes);
+}  // namespace
+
+std::vector<Prediction> predict(const model::AugmentedNeedle& needle, std::span<const model::ActuatorState> actuators,
+                                std::span<const model::TipMeasurement> tips) {
+  const Ordered log = in_order(actuators, tips);
   model::OpenLoop path;
-  if (!model::predict(needle, motion, path)) fail_in_domain(needle, motion);
+  if (!model::predict(needle, log.motion, path)) fail_in_domain(needle, log.motion);
   std::vector<Prediction> predictions(tips.size());
-  for (std::size_t i = 0; i < order.size(); ++i) predictions[order[i]] = {utimes[i], path.position_mm[i]};
+  for (std::size_t i = 0; i < log.order.size(); ++i) predictions[log.order[i]] = {log.utimes[i], path.position_mm[i]};
   return predictions;
+}
+
+std::vector<Eigen::Vector3d> standard_deviations_mm(const io::ModelFile& model, const std::string& log_path,
+                                                    std::span<const model::ActuatorState> actuators,
+                                                    std::span<const model::TipMeasurement> tips) {
+  const Ordered log = in_order(actuators, tips);
+  const auto covariances =
+      model::reading_covariances(model.needle, io::active_effects(model.effects, log_path), model.discrepancies,
+                                 model.variation.value_or(model::Variation{}), log.motion);
+  std::vector<Eigen::Vector3d> out(tips.size());
+  for (std::size_t i = 0; i < log.order.size(); ++i)
+    out[log.order[i]] = covariances[i].diagonal().cwiseMax(0).cwiseSqrt();
+  return out;
 }
 
 int run(const std::string& model_path, const std::string& log_path, std::ostream& out, std::ostream& err) {
@@ -57,18 +82,27 @@ int run(const std::string& model_path, const std::string& log_path, std::ostream
   err << recording.remarks(log_path);
   io::require_usable(log_path, recording);
   const model::AugmentedNeedle needle(model.needle, io::active_effects(model, log_path));
+  const bool uncertain = model.variation.has_value() || !model.discrepancies.empty();
   std::vector<Prediction> predictions;
+  std::vector<Eigen::Vector3d> sd_mm;
   try {
     predictions = predict(needle, recording.actuators, recording.tips);
+    if (uncertain) sd_mm = standard_deviations_mm(model, log_path, recording.actuators, recording.tips);
   } catch (const std::exception& e) {
     throw std::runtime_error(log_path + ": " + e.what());
   }
-  out << "utime,x_mm,y_mm,z_mm\n";
-  std::array<char, 128> line{};
-  for (const auto& p : predictions) {
-    std::snprintf(line.data(), line.size(), "%lld,%.6f,%.6f,%.6f\n", static_cast<long long>(p.utime), p.position_mm.x(),
+  out << (uncertain ? "utime,x_mm,y_mm,z_mm,x_sd_mm,y_sd_mm,z_sd_mm\n" : "utime,x_mm,y_mm,z_mm\n");
+  std::array<char, 192> line{};
+  for (std::size_t i = 0; i < predictions.size(); ++i) {
+    const Prediction& p = predictions[i];
+    std::snprintf(line.data(), line.size(), "%lld,%.6f,%.6f,%.6f", static_cast<long long>(p.utime), p.position_mm.x(),
                   p.position_mm.y(), p.position_mm.z());
     out << line.data();
+    if (uncertain) {
+      std::snprintf(line.data(), line.size(), ",%.6f,%.6f,%.6f", sd_mm[i].x(), sd_mm[i].y(), sd_mm[i].z());
+      out << line.data();
+    }
+    out << '\n';
   }
   if (!(out << std::flush)) throw std::runtime_error("the output cannot be written");
   return recording.intact() ? tools::kOk : tools::kDamagedInput;

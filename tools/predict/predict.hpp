@@ -1,11 +1,13 @@
 #pragma once
-// bevel-predict without its command line: a model file and a log in, the path as the cameras would report it out.
+// bevel-predict without its command line: a model file and a log in, the path as the cameras would report it out, with
+// how far off it is to be expected where the model file says what is uncertain.
 #include <cstdint>
 #include <iosfwd>
 #include <span>
 #include <string>
 #include <vector>
 
+#include "io/model_file.hpp"
 #include "model/effects/open_loop.hpp"
 
 namespace bevel::predict {
@@ -19,6 +21,12 @@ struct Prediction {
 // Throws std::invalid_argument for too few of either, std::domain_error where the needle leaves the slip law's domain.
 std::vector<Prediction> predict(const model::AugmentedNeedle& needle, std::span<const model::ActuatorState> actuators,
                                 std::span<const model::TipMeasurement> tips);
+
+// Standard deviations (mm, along the axes of {A}) of those predictions, in the same order: by the file's [variation]
+// and by the standard errors of its [[discrepancy]]s, linearised. Throws as predict().
+std::vector<Eigen::Vector3d> standard_deviations_mm(const io::ModelFile& model, const std::string& log_path,
+                                                    std::span<const model::ActuatorState> actuators,
+                                                    std::span<const model::TipMeasurement> tips);
 
 // All of it; returns the exit status: 3 for a damaged log, whose readable part is predicted all the same.
 int run(const std::string& model_path, const std::string& log_path, std::ostream& out, std::ostream& err);

@@ -1,4 +1,5 @@
 // bevel-rig: the simulated rig, two CiA 402 drives, a needle in tissue, and the cameras that look at it.
+#include <cstdio>
 #include <thread>
 
 #include "drivers/can/local_bus.hpp"
@@ -25,6 +26,9 @@ int main(int argc, char** argv) {
     const auto insertion = can::open_bus(config.can), rotation = can::open_bus(config.can);
     rig::FrameServer frames(config.rig.frames_socket);
     nodes::RigNode node(context.lcm, *insertion, *rotation, config, &frames);
+    if (config.rig.variation != model::Variation{})
+      std::fprintf(stderr, "bevel-rig: this insertion differs, drawn with seed %lld: %s\n",
+                   static_cast<long long>(config.rig.seed), model::describe(node.own_values()).c_str());
     if (context.fault) node.break_drive(*context.fault, context.started_ns, tools::kFaultSeed);
     const nodes::Loop loop{0.001, {}, [&](const nodes::Now& now, double) {
                              node.step(now);

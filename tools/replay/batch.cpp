@@ -43,7 +43,7 @@ Setup load_setup(const BatchOptions& options) {
   Setup setup;
   if (!options.system_path.empty()) {
     const nodes::SystemConfig system = nodes::load_system_config(options.system_path);
-    setup = {system.estimator, system.effects};
+    setup = {system.estimator, system.effects, system.discrepancies};
     // As live: what differs from recording to recording was not known then.
     std::erase_if(setup.effects, [](const io::EffectEntry& effect) { return !io::unknown_beforehand(effect).empty(); });
   } else {
@@ -54,7 +54,9 @@ Setup load_setup(const BatchOptions& options) {
     }
     const io::ModelFile model = io::load_model_file(options.model_path);
     setup.config.prior.needle = model.needle;
+    setup.config.prior.variation = model.variation.value_or(model::Variation{});
     setup.effects = model.effects;
+    setup.discrepancies = model.discrepancies;
   }
   if (options.bicycle) {
     estimator::Prior& prior = setup.config.prior;
@@ -82,7 +84,7 @@ std::vector<Replay> replay_logs(const std::vector<std::string>& logs,
       try {
         const io::FileBytes file(logs[i]);
         estimator::EstimatorConfig own = configs.at(i);
-        own.effects = io::active_effects(options.effects, logs[i]);
+        own.effects = io::active_effects(options.effects, options.discrepancies, logs[i]);
         replays[i] = replay_log(file.bytes(), name_of(logs[i]), own, options);
         if (!file.change().empty()) replays[i].remarks += replays[i].name + ": damaged: " + file.change() + "\n";
         if (!(options.ahead_mm > 0)) continue;
@@ -123,6 +125,7 @@ int run(const BatchOptions& options, std::ostream& out, std::ostream& err) {
     throw std::runtime_error("there is one log; to learn on the others takes at least two");
   ReplayOptions replay_options;
   replay_options.effects = setup.effects;
+  replay_options.discrepancies = setup.discrepancies;
   std::vector<estimator::EstimatorConfig> configs(logs.size(), setup.config);
   if (options.held_out) configs = held_out_configs(replay_logs(logs, configs, replay_options), options.width);
   replay_options.ahead_mm = options.ahead_mm;

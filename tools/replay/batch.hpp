@@ -26,8 +26,10 @@ struct BatchOptions {
 std::vector<std::string> find_logs(const std::vector<std::string>& paths);
 
 struct Setup {
-  estimator::EstimatorConfig config;     // its effects are left to replay_logs
-  std::vector<io::EffectEntry> effects;  // of the model file
+  estimator::EstimatorConfig config;  // its effects are left to replay_logs
+  // Of the model file.
+  std::vector<io::EffectEntry> effects{};
+  std::vector<model::DiscrepancyCurve> discrepancies{};
 };
 // From the options' model_path and config_path, or system_path. Throws io::ConfigError.
 Setup load_setup(const BatchOptions& options);

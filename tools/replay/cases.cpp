@@ -30,6 +30,7 @@ CaseFigures figures_of(const std::string& folder, const BatchOptions& options, s
   CaseFigures result;
   ReplayOptions calibrated;
   calibrated.effects = setup.effects;
+  calibrated.discrepancies = setup.discrepancies;
   const auto first = replay_logs(logs, setup.config, calibrated);
   result.status = tell_damage(first, err);
   for (int axis = 0; axis < 3; ++axis) {

@@ -20,7 +20,7 @@ Vector3d parameters_of(const model::NeedleParameters& needle) {
 }
 
 Vector3d widths_of(const estimator::Prior& prior) {
-  return {prior.curvature_sd_per_mm, prior.lambda1_sd_per_rad, prior.lambda2_sd};
+  return {estimator::insertion_curvature_sd_per_mm(prior), prior.lambda1_sd_per_rad, prior.lambda2_sd};
 }
 
 Learned learned_by(const Replay& replay) {

@@ -85,7 +85,9 @@ struct ReplayOptions {
   double ahead_mm = 0;  // for replay_logs: 0, nothing is foretold
   // Replaces each measurement's information by that of this noise, per axis; empty: as the camera says.
   std::vector<NoiseColour> noise_by_axis{};
-  std::vector<io::EffectEntry> effects{};  // of the model file, for replay_logs: some are a recording's own
+  // Of the model file, for replay_logs: some effects are a recording's own.
+  std::vector<io::EffectEntry> effects{};
+  std::vector<model::DiscrepancyCurve> discrepancies{};
 };
 
 // Throws std::runtime_error, with the name, for a log of which nothing can be made: io::Recording::refusal(), or no

@@ -1,19 +1,18 @@
-#include "diagnosis/needle/covariates.hpp"
+#include "model/effects/covariates.hpp"
 
 #include <cmath>
 
-namespace bevel::diagnosis {
+namespace bevel::model {
 namespace {
 constexpr double kMoving_mm_s = 0.05;
 constexpr double kTurning_rad_s = 0.02;
 }  // namespace
 
-CovariateTracker::CovariateTracker(const model::BaseMotion& entry)
-    : stopped_s_(entry.time_s), turned_mm_(entry.insertion_mm) {
+CovariateTracker::CovariateTracker(const BaseMotion& entry) : stopped_s_(entry.time_s), turned_mm_(entry.insertion_mm) {
   advance(entry, entry);
 }
 
-void CovariateTracker::advance(const model::BaseMotion& from, const model::BaseMotion& to) {
+void CovariateTracker::advance(const BaseMotion& from, const BaseMotion& to) {
   const double dt_s = to.time_s - from.time_s;
   const double speed_mm_s = dt_s > 0 ? std::abs(to.insertion_mm - from.insertion_mm) / dt_s : 0;
   const double turn_rate_rad_s = dt_s > 0 ? std::abs(to.rotation_rad - from.rotation_rad) / dt_s : 0;
@@ -24,4 +23,4 @@ void CovariateTracker::advance(const model::BaseMotion& from, const model::BaseM
             to.rotation_rad};
 }
 
-}  // namespace bevel::diagnosis
+}  // namespace bevel::model

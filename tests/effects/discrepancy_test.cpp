@@ -1,0 +1,262 @@
+// Discrepancies against motions that are made by hand, against differences, and what they and the variation between
+// insertions make uncertain against draws.
+#include "model/effects/discrepancy.hpp"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <iostream>
+#include <numbers>
+#include <random>
+
+#include "model/effects/prediction_spread.hpp"
+#include "tests/effects/script.hpp"
+
+namespace bevel::model::testing {
+namespace {
+
+using Component = DiscrepancyComponent;
+
+DiscrepancyCurve constant(Component component, double value, Covariate covariate = Covariate::depth_mm) {
+  const bool periodic = covariate == Covariate::roll_rad;
+  return {component, covariate, {0}, {value}, {0}, periodic};
+}
+
+std::vector<Eigen::Vector3d> path_with(const NeedleParameters& needle, const DiscrepancyCurve& curve,
+                                       const Motion& motion) {
+  return path_of(needle, {active_discrepancy(curve)}, motion);
+}
+
+// As if the base had moved so.
+template <class Change>
+Motion changed(Motion motion, Change change) {
+  double pushed_mm = 0;
+  std::vector<BaseMotion> before = motion.nodes;
+  for (std::size_t i = 0; i < before.size(); ++i) {
+    if (i > 0) pushed_mm += std::abs(before[i].insertion_mm - before[i - 1].insertion_mm);
+    change(motion.nodes[i], pushed_mm);
+  }
+  return motion;
+}
+
+// Over every covariate: a constant does not depend on it.
+TEST(Discrepancy, AConstantIsAnEquivalentMotion) {
+  const Motion motion = rich_script().recorded();
+  NeedleParameters more = agar();
+  more.curvature_per_mm += 8e-4;
+  const auto advanced = changed(motion, [](BaseMotion& b, double) { b.insertion_mm *= 1.04; });
+  const auto twisted = changed(motion, [](BaseMotion& b, double pushed_mm) { b.rotation_rad += 0.02 * pushed_mm; });
+  const auto screwed = changed(motion, [](BaseMotion& b, double) { b.insertion_mm += 0.3 * b.rotation_rad; });
+  const auto geared = changed(motion, [](BaseMotion& b, double) { b.rotation_rad *= 0.9; });
+  // A curvature vector (k, c) is one of its length, of a bevel turned toward it.
+  NeedleParameters turned = agar();
+  turned.curvature_per_mm = std::hypot(agar().curvature_per_mm, 1.5e-3);
+  const auto bevel = active("bevel_offset", {std::atan2(1.5e-3, agar().curvature_per_mm)});
+  for (const Covariate covariate : all_covariates()) {
+    const auto distance = [&](Component component, double value, const std::vector<Eigen::Vector3d>& expected) {
+      return largest_distance_mm(path_with(agar(), constant(component, value, covariate), motion), expected);
+    };
+    EXPECT_LT(distance(Component::curvature_bevel, 8e-4, path_of(more, {}, motion)), 1e-9);
+    EXPECT_LT(distance(Component::curvature_across, 1.5e-3, path_of(turned, {bevel}, motion)), 1e-9);
+    EXPECT_LT(distance(Component::advance, 0.04, path_of(agar(), {}, advanced)), 1e-9);
+    EXPECT_LT(distance(Component::advance, 0.04, path_of(agar(), {active("insertion_scale", {1.04})}, motion)), 1e-9);
+    EXPECT_LT(distance(Component::turning, 0.02, path_of(agar(), {}, twisted)), 1e-9);
+    EXPECT_LT(distance(Component::advance_turning, 0.3, path_of(agar(), {}, screwed)), 1e-9);
+    EXPECT_LT(distance(Component::turning_turning, -0.1, path_of(agar(), {}, geared)), 1e-9);
+  }
+}
+
+TEST(Discrepancy, AConstantDriftCarriesAsideByTheDepth) {
+  NeedleParameters straight = bicycle();
+  straight.curvature_per_mm = 0;
+  const Motion motion = Script{{3, 12, 0}, {0.5, -12, 0}, {2, 10, 0}}.recorded();
+  const auto bevel = path_with(straight, constant(Component::drift_bevel, 0.03), motion);
+  const auto across = path_with(straight, constant(Component::drift_across, 0.03), motion);
+  for (std::size_t i = 0; i < motion.at.size(); ++i) {
+    const double depth_mm = motion.nodes[motion.at[i]].insertion_mm;
+    EXPECT_LT((bevel[i] - Eigen::Vector3d(0, -0.03 * depth_mm, depth_mm)).norm(), 1e-9);
+    EXPECT_LT((across[i] - Eigen::Vector3d(0.03 * depth_mm, 0, depth_mm)).norm(), 1e-9);
+  }
+  // With a turn of the base the drift goes on in its new direction.
+  const Motion quarter = Script{{2, 10, 0}, {1, 0, std::numbers::pi / 2}, {2, 10, 0}}.recorded();
+  const auto end = path_with(straight, constant(Component::drift_bevel, 0.03), quarter).back();
+  EXPECT_LT((end - Eigen::Vector3d(0.6, -0.6, 40)).norm(), 1e-2);  // the last reading is some ms before the end
+}
+
+TEST(Discrepancy, AReadingIsShifted) {
+  const Motion motion = rich_script().recorded();
+  const auto plain = path_of(agar(), {}, motion);
+  for (int axis = 0; axis < 3; ++axis) {
+    const auto component = static_cast<Component>(static_cast<int>(Component::x) + axis);
+    const auto shifted = path_with(agar(), constant(component, 0.7), motion);
+    for (std::size_t i = 0; i < plain.size(); ++i)
+      if (motion.at[i] > 0) EXPECT_LT((shifted[i] - plain[i] - 0.7 * Eigen::Vector3d::Unit(axis)).norm(), 1e-12);
+  }
+}
+
+// Over depth the integral of a line is a parabola; over time at a constant rate the same.
+TEST(Discrepancy, ACurveIsIntegrated) {
+  NeedleParameters straight = bicycle();
+  straight.curvature_per_mm = 0;
+  const Motion motion = Script{{5, 10, 0}}.fine();
+  const DiscrepancyCurve over_depth{Component::advance, Covariate::depth_mm, {0, 50}, {0, 0.1}, {0, 0}};
+  const DiscrepancyCurve over_time{Component::advance, Covariate::time_s, {0, 5}, {0, 0.1}, {0, 0}};
+  const DiscrepancyCurve flat_outside{Component::advance, Covariate::depth_mm, {10, 20}, {0, 0.1}, {0, 0}};
+  EXPECT_NEAR(path_with(straight, over_depth, motion).back().z(), 50 + 2.5, 1e-3);
+  EXPECT_NEAR(path_with(straight, over_time, motion).back().z(), 50 + 2.5, 1e-3);
+  EXPECT_NEAR(path_with(straight, flat_outside, motion).back().z(), 50 + 0.5 + 3, 1e-3);
+  // Round the circle: the value at pi, read after half a turn either way.
+  const DiscrepancyCurve over_roll{Component::x, Covariate::roll_rad, {0, std::numbers::pi}, {0.2, 0.6}, {0, 0}, true};
+  for (const double turns : {-1.5, -0.5, 0.5, 2.5})
+    EXPECT_NEAR(path_with(straight, over_roll, Script{{4, 10, turns * std::numbers::pi / 2}}.fine()).back().x(), 0.6,
+                1e-9);
+}
+
+// By the values of its knots, about a curve that is not zero and beside another effect.
+TEST(Discrepancy, DerivativesByItsKnotsAreThoseOfDifferences) {
+  const Motion motion = rich_script().recorded();
+  for (const auto& info : discrepancy_components())
+    for (const Covariate covariate : all_covariates()) {
+      const bool periodic = covariate == Covariate::roll_rad;
+      DiscrepancyCurve curve{info.component, covariate, {}, {}, {}, periodic};
+      const double last = covariate == Covariate::depth_mm || covariate == Covariate::since_reversal_mm ? 40 : 5;
+      for (int i = 0; i < 6; ++i) {
+        curve.at.push_back(periodic ? 2 * std::numbers::pi * i / 6 : last * i / 5);
+        curve.values.push_back(info.largest * 1e-3 * (i - 2));
+        curve.std_errors.push_back(0);
+      }
+      const auto windup = active("torsional_windup", {0.4});
+      for (std::size_t first = 0; first < 6; first += kKnotsOfPart) {
+        ActiveEffect part;
+        part.owned = make_discrepancy(curve, first);
+        part.effect = part.owned.get();
+        for (std::size_t k = 0; k < kKnotsOfPart; ++k) part.parameters[k] = Dual::unknown(0, static_cast<int>(k));
+        const OpenLoop path = run(AugmentedNeedle(agar(), {windup, part}, kKnotsOfPart), motion);
+        for (std::size_t k = first; k < std::min<std::size_t>(first + kKnotsOfPart, 6); ++k) {
+          const double step = info.largest * 1e-4;
+          DiscrepancyCurve up = curve, down = curve;
+          up.values[k] += step, down.values[k] -= step;
+          const auto above = path_of(agar(), {windup, active_discrepancy(up)}, motion);
+          const auto below = path_of(agar(), {windup, active_discrepancy(down)}, motion);
+          double off = 0, size = 0;
+          for (std::size_t r = 0; r < above.size(); ++r) {
+            const Eigen::Vector3d difference = (above[r] - below[r]) / (2 * step);
+            const Eigen::Vector3d column =
+                path.jacobian.block<3, 1>(static_cast<Eigen::Index>(3 * r), static_cast<Eigen::Index>(k - first));
+            off = std::max(off, (difference - column).norm());
+            size = std::max(size, difference.norm());
+          }
+          EXPECT_LT(off, 2e-3 * size + 1e-6) << info.name << " over " << name_of(covariate) << ", knot " << k;
+        }
+      }
+    }
+}
+
+// A filter keeps the values of an effect's memory and no more; at each leg it takes the insertion up again.
+TEST(Discrepancy, IsTakenUpFromTheValuesOfItsMemory) {
+  const Motion motion = rich_script().recorded();
+  for (const auto& info : discrepancy_components())
+    for (const Covariate covariate : all_covariates()) {
+      const bool periodic = covariate == Covariate::roll_rad;
+      const std::vector<double> at = periodic ? std::vector<double>{0, std::numbers::pi} : std::vector<double>{0, 3};
+      const AugmentedNeedle needle(
+          agar(), {active_discrepancy({info.component, covariate, at, {0, 0.1 * info.largest}, {0, 0}, periodic})});
+      AugmentedState whole = needle.entry(motion.nodes.front()), kept = whole;
+      TipReading a, b;
+      for (std::size_t i = 1; i < motion.nodes.size(); ++i) {
+        ASSERT_TRUE(needle.advance(whole, motion.nodes[i]) && needle.advance(kept, motion.nodes[i]));
+        for (auto& slot : kept.memory[0].slot) slot = Dual(slot.value);
+        needle.point(whole, a);
+        needle.point(kept, b);
+        ASSERT_EQ(a.position_mm, b.position_mm) << info.name << " over " << name_of(covariate);
+      }
+    }
+}
+
+TEST(Discrepancy, FaultsAreNamed) {
+  DiscrepancyCurve curve = constant(Component::x, 0.1);
+  EXPECT_EQ(find_fault(curve), "");
+  curve.values = {std::numeric_limits<double>::quiet_NaN()};
+  EXPECT_THAT(find_fault(curve), ::testing::HasSubstr("values: element 0 = nan is not allowed"));
+  EXPECT_THROW(make_discrepancy(curve), std::invalid_argument);
+  curve = {Component::x, Covariate::depth_mm, {}, {}, {}};
+  EXPECT_THAT(find_fault(curve), ::testing::HasSubstr("knots has 0 elements"));
+}
+
+// Draws of an insertion's own values, each propagated on its own.
+TEST(PredictionSpread, OfTheVariationIsThatOfDraws) {
+  constexpr int kDraws = 3000;
+  const Motion motion = Script{{3, 12, 0.4}, {0.5, 0, 4}, {3, 12, 0}}.recorded();
+  const Variation variation{
+      .curvature_relative = 0.08, .entry_angle_rad = 0.01, .entry_point_mm = 0.3, .roll_rad = 0.06};
+  const std::vector<ActiveEffect> effects = {active("torsional_windup", {0.3}), active("camera_scale", {1.1})};
+  const auto expected = reading_covariances(agar(), effects, {}, variation, motion);
+  const auto centre = path_of(agar(), effects, motion);
+  std::vector<Eigen::Matrix3d> drawn(motion.at.size(), Eigen::Matrix3d::Zero());
+  for (int d = 0; d < kDraws; ++d) {
+    const OwnValues own = draw(variation, 1000 + static_cast<std::uint64_t>(d));
+    const AugmentedNeedle needle(of_insertion(agar(), own), effects);
+    AugmentedState state = needle.entry(motion.nodes.front());
+    state.pose = of_insertion(state.pose, own);
+    TipReading reading;
+    std::size_t node = 0;
+    for (std::size_t r = 0; r < motion.at.size(); ++r) {
+      for (; node < motion.at[r]; ++node) ASSERT_TRUE(needle.advance(state, motion.nodes[node + 1]));
+      needle.point(state, reading);
+      needle.through_cameras(reading);
+      const Eigen::Vector3d off = reading.position_mm - centre[r];
+      drawn[r] += off * off.transpose() / kDraws;
+    }
+  }
+  double least = 10, most = 0;
+  for (std::size_t r = 0; r < drawn.size(); ++r)
+    for (int axis = 0; axis < 2; ++axis) {
+      const double ratio = std::sqrt(drawn[r](axis, axis) / expected[r](axis, axis));
+      least = std::min(least, ratio), most = std::max(most, ratio);
+    }
+  const Eigen::Vector3d end = expected.back().diagonal().cwiseSqrt();
+  std::cout << "sd at 72 mm " << end.transpose() << " mm; drawn over linearised " << least << " to " << most << "\n";
+  // 3000 draws: 1.3 % one standard deviation. Along the needle the spread is of second order.
+  EXPECT_GT(least, 0.94);
+  EXPECT_LT(most, 1.06);
+  EXPECT_LT(std::sqrt(drawn.back()(2, 2)), 2 * std::sqrt(expected.back()(2, 2)) + 0.05);
+}
+
+TEST(PredictionSpread, OfACurvesErrorsIsThatOfDraws) {
+  constexpr int kDraws = 2000;
+  const Motion motion = Script{{3, 12, 0.4}, {0.5, 0, 4}, {3, 12, 0}}.recorded();
+  DiscrepancyCurve bend{Component::curvature_bevel, Covariate::depth_mm, {}, {}, {}};
+  for (int i = 0; i < 8; ++i) {
+    bend.at.push_back(10.0 * i);
+    bend.values.push_back(1e-4 * i);
+    bend.std_errors.push_back(2e-4 + 2e-5 * i);
+  }
+  const DiscrepancyCurve shift{Component::x, Covariate::time_s, {0, 6}, {0, 0.5}, {0.05, 0.2}};
+  const auto expected = reading_covariances(agar(), {}, {bend, shift}, {}, motion);
+  const auto centre = path_of(agar(), {active_discrepancy(bend), active_discrepancy(shift)}, motion);
+  std::vector<Eigen::Vector3d> drawn(motion.at.size(), Eigen::Vector3d::Zero());
+  std::mt19937_64 random(5);
+  std::normal_distribution<double> normal;
+  for (int d = 0; d < kDraws; ++d) {
+    std::vector<ActiveEffect> active;
+    for (DiscrepancyCurve curve : {bend, shift}) {
+      for (std::size_t i = 0; i < curve.at.size(); ++i) curve.values[i] += curve.std_errors[i] * normal(random);
+      active.push_back(active_discrepancy(curve));
+    }
+    const auto path = path_of(agar(), active, motion);
+    for (std::size_t r = 0; r < path.size(); ++r) drawn[r] += (path[r] - centre[r]).cwiseAbs2() / kDraws;
+  }
+  double least = 10, most = 0;
+  for (std::size_t r = 10; r < drawn.size(); ++r)  // from a depth on at which there is something to compare
+    for (int axis = 0; axis < 2; ++axis) {
+      const double ratio = std::sqrt(drawn[r][axis] / expected[r](axis, axis));
+      least = std::min(least, ratio), most = std::max(most, ratio);
+    }
+  std::cout << "sd at 72 mm " << expected.back().diagonal().cwiseSqrt().transpose() << " mm; drawn over linearised "
+            << least << " to " << most << "\n";
+  EXPECT_GT(least, 0.93);
+  EXPECT_LT(most, 1.07);
+}
+
+}  // namespace
+}  // namespace bevel::model::testing
