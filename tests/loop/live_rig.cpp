@@ -6,7 +6,6 @@
 #include <filesystem>
 #include <stdexcept>
 #include <thread>
-#include <tuple>
 
 #include "nodes/needle_pose.hpp"
 
@@ -152,12 +151,15 @@ bool LiveRig::arm(double within_s) {
   std::int64_t next_ns = 0;
   return run(within_s, [&] {
     const std::string& controller = said("bevel-controller").state;
-    const auto& [axes, why] = std::tie(said("bevel-stepper").state, said("bevel-stepper").reason);
+    const std::string& axes = said("bevel-stepper").state;
     if (controller == "armed" && axes == "enabled") return true;
     const std::int64_t now_ns = nodes::now().ns;
     const bool seen = estimate && estimate->health == 0;
-    // A drive that was lost keeps its counter here, and the operator has seen that.
-    const bool asks = why.find("or confirm") != std::string::npos;
+    // Who lost sight of the axes for a while asks; counters and needle are where they were, and the operator knows.
+    const auto asks_to_confirm = [this](const char* process) {
+      return said(process).reason.find("or confirm") != std::string::npos;
+    };
+    const bool asks = asks_to_confirm("bevel-stepper") || asks_to_confirm("bevel-estimator");
     const bool wants = controller != "armed" || latched(axes) || asks;
     if (now_ns >= next_ns && wants && (seen || latched(controller) || latched(axes)) && !controller.empty()) {
       next_ns = now_ns + kWordPeriod_ns;

@@ -37,7 +37,7 @@ constexpr const char* kLoopNice = "19";
 constexpr std::int64_t kTooLate_ns = 40 * kMs;  // of rig or observer: beyond this a time is not measured
 // Switching on is given up after controller.safety.enabling_s; then its word has to come through the load.
 constexpr double kWord_s = 1;
-constexpr double kStatus_s = 0.6;
+constexpr double kStatus_s = 0.6, kToRest_s = 0.5;
 
 struct Load {
   std::string name, kind;
@@ -105,6 +105,7 @@ class Study {
       Stress stress(load);
       rig_.run(kLoaded_s, [this] { return rig_.stop_declared() && rig_.at_rest(); });
       rig_.run(kStatus_s);  // for the rig to say how late it was
+      if (rig_.stop_declared()) rig_.run(kToRest_s, [this] { return rig_.at_rest(); });
       judge_motion(load);
       if (trial_.stopped) {
         rig_.run(kAfterStop_s);
