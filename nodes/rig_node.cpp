@@ -73,9 +73,9 @@ void RigNode::step(const Now& now) {
   if (frames_ && now_ns >= next_frame_ns_) {
     const auto period_ns = std::llround(1e9 / config_.rig.frame_rate_hz);
     next_frame_ns_ = std::max(next_frame_ns_ + period_ns, now_ns + period_ns / 2);
-    take_frames(now_utime);
+    take_frames(now);
   }
-  publish_frames(now_utime);
+  publish_frames(now_ns);
   status_.report("running", "");
 }
 
@@ -100,7 +100,7 @@ void RigNode::publish_truth(std::int64_t now_utime) {
   port_.publish(io::channel::kNeedleTruth, m);
 }
 
-void RigNode::take_frames(std::int64_t now_utime) {
+void RigNode::take_frames(const Now& now) {
   const auto late_us = std::llround(1e6 * plant_->model().latency_s().value);
   const auto to_camera = [](const std::vector<Eigen::Vector3d>& shaft_mm) {
     std::vector<camera::Vector3> path;
@@ -114,18 +114,17 @@ void RigNode::take_frames(std::int64_t now_utime) {
     // Where body x points beside the heading: the roll that shapes the bevel's silhouette.
     const double roll_rad = std::atan2(tip.R(1, 0), tip.R(0, 0));
     camera::Frame frame;
-    frame.capture_utime = now_utime + late_us;
+    frame.capture_utime = now.utime + late_us;
     frame.seq = frame_seq_;
     frame.camera = eye.camera;
     frame.gray = eye.renderer.render(eye.along_x ? path_along_x : path, roll_rad).gray;
-    taken_.push_back(std::move(frame));
+    taken_.push_back({now.ns + 1000 * late_us, std::move(frame)});
   }
   ++frame_seq_;
 }
 
-void RigNode::publish_frames(std::int64_t now_utime) {
-  for (; !taken_.empty() && taken_.front().capture_utime <= now_utime; taken_.pop_front())
-    frames_->publish(taken_.front());
+void RigNode::publish_frames(std::int64_t now_ns) {
+  for (; !taken_.empty() && taken_.front().due_ns <= now_ns; taken_.pop_front()) frames_->publish(taken_.front().frame);
 }
 
 }  // namespace bevel::nodes

@@ -42,8 +42,8 @@ class RigNode {
   };
   void move_plant(std::int64_t now_ns);
   void publish_truth(std::int64_t now_utime);
-  void take_frames(std::int64_t now_utime);
-  void publish_frames(std::int64_t now_utime);
+  void take_frames(const Now& now);
+  void publish_frames(std::int64_t now_ns);
 
   SystemConfig config_;
   LcmPort port_;
@@ -56,8 +56,12 @@ class RigNode {
   model::OwnValues own_values_;
   rig::FrameServer* frames_;
   std::vector<Eye> eyes_;
-  std::deque<camera::Frame> taken_;  // a late camera's, stamped with the time at which they arrive
-  std::array<double, 2> moved_{};    // axis positions that the plant has followed
+  struct Taken {
+    std::int64_t due_ns;  // steady: who sets the wall clock keeps no picture back
+    camera::Frame frame;  // a late camera's is stamped with the time at which it arrives
+  };
+  std::deque<Taken> taken_;
+  std::array<double, 2> moved_{};  // axis positions that the plant has followed
   std::int64_t last_ns_ = 0;
   std::int64_t next_truth_ns_ = 0;
   std::int64_t next_frame_ns_ = 0;

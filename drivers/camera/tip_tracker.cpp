@@ -71,11 +71,9 @@ void TipTracker::set_background(const cv::Mat& gray) {
 std::optional<TipResult> TipTracker::refuse_unseen(const Frame& frame, int64_t now_utime) {
   if (frame.gray.empty() || frame.gray.type() != CV_8UC1) return refused(TipStatus::lost, "not an 8-bit gray picture");
   const bool frozen = same_bytes(frame.gray, last_bytes_);
-  const bool in_order = last_utime_ == 0 || frame.capture_utime > last_utime_;
   if (!frozen) frame.gray.copyTo(last_bytes_);
   if (frozen) return refused(TipStatus::frozen, "the same bytes as the frame before");
-  if (!in_order) return refused(TipStatus::late, "not newer than the frame before");
-  last_utime_ = frame.capture_utime;
+  if (!follows(frame.capture_utime)) return refused(TipStatus::late, "not newer than the frame before");
   if (now_utime != 0 && now_utime - frame.capture_utime > config_.max_age_us)
     return refused(TipStatus::late, "older than max_age_us");
   if (config_.background == Background::first_frame && background_.empty()) {
@@ -85,6 +83,18 @@ std::optional<TipResult> TipTracker::refuse_unseen(const Frame& frame, int64_t n
   if (!background_.empty() && background_.size() != frame.gray.size())
     return refused(TipStatus::lost, "not of the size of the background");
   return std::nullopt;
+}
+
+bool TipTracker::follows(int64_t utime) {
+  if (last_utime_ != 0 && utime <= last_utime_) {
+    behind_ = utime > behind_utime_ ? behind_ + 1 : 1;
+    behind_utime_ = utime;
+    if (behind_ < kSetBack) return false;
+    track_.reset();  // its time is of the other clock
+  }
+  behind_ = 0;
+  last_utime_ = utime;
+  return true;
 }
 
 TipResult TipTracker::track(const Frame& frame, int64_t now_utime, std::optional<cv::Point2d> predicted_tip_px) {

@@ -79,6 +79,10 @@ class TipTracker {
     Centreline line;  // the same
   };
 
+  /// Whether a frame with this stamp goes on from those before. Several that are older than those, but in order among
+  /// themselves, come from a clock that was set back: they are the new time, or nothing would be seen until the old
+  /// time has come again.
+  bool follows(int64_t utime);
   std::optional<TipResult> refuse_unseen(const Frame& frame, int64_t now_utime);
   Search whole(const Canonical& turn) const;
   Search near(const Canonical& turn, const cv::Point2d& predicted) const;
@@ -98,7 +102,10 @@ class TipTracker {
   cv::Mat background_;
   cv::Mat patch_;
   cv::Mat last_bytes_;
-  int64_t last_utime_ = 0;
+  static constexpr int kSetBack = 3;
+  int64_t last_utime_ = 0;    // newest
+  int64_t behind_utime_ = 0;  // of the last frame that was not newer, and how many those were in a row and in order
+  int behind_ = 0;
   std::optional<Track> track_;
 };
 

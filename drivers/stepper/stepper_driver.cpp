@@ -322,7 +322,9 @@ std::array<double, kAxes> StepperDriver::wanted_rates(std::int64_t now_ns,
       ++counters_.setpoints_refused;
     } else {
       fresh_setpoint_ns_ = std::max(fresh_setpoint_ns_, now_ns - std::max<std::int64_t>(setpoint->age_ns, 0));
-      if (setpoint->run) rates = {setpoint->insertion_rate_mm_s, setpoint->rotation_rate_rad_s};
+      // By its own age: one of before a stop must not run in the time that axes just enabled give for the first.
+      if (setpoint->run && setpoint->age_ns <= config_.setpoint_zero_age_ns)
+        rates = {setpoint->insertion_rate_mm_s, setpoint->rotation_rate_rad_s};
       if (!setpoint->run && moving()) latch({StopReason::controller_stop, -1, 0});
     }
   }

@@ -107,6 +107,34 @@ TEST_F(TrackerStatus, LateByOrder) {
   EXPECT_EQ(tracker_.track({utime_, 0, 0, needle(42.0)}).status, TipStatus::late);
 }
 
+TEST_F(TrackerStatus, AClockThatWasSetBackIsFollowedAfterThreeFrames) {
+  ASSERT_EQ(track(needle(40.0)).status, TipStatus::ok);
+  utime_ -= 3'600'000'000;
+  EXPECT_EQ(track(needle(41.0)).status, TipStatus::late);
+  EXPECT_EQ(track(needle(42.0)).status, TipStatus::late);
+  const TipResult followed = track(needle(43.0));
+  EXPECT_EQ(followed.status, TipStatus::ok);
+  EXPECT_TRUE(followed.full_search) << "the tip's speed is not known across the step";
+  EXPECT_EQ(track(needle(44.0)).status, TipStatus::ok);
+}
+
+TEST_F(TrackerStatus, AFrameOfTheOldTimeAfterTheStepKeepsNothingOut) {
+  ASSERT_EQ(track(needle(40.0)).status, TipStatus::ok);
+  utime_ -= 3'600'000'000;
+  for (const double mm : {41.0, 42.0, 43.0}) (void)track(needle(mm));
+  ASSERT_EQ(tracker_.track({utime_ + 3'600'000'000, 0, 0, needle(43.5)}).status, TipStatus::ok);
+  for (const double mm : {44.0, 45.0}) (void)track(needle(mm));
+  EXPECT_EQ(track(needle(46.0)).status, TipStatus::ok);
+}
+
+TEST_F(TrackerStatus, FramesThatComeLateBetweenOthersAreNoNewTime) {
+  ASSERT_EQ(track(needle(40.0)).status, TipStatus::ok);
+  for (int i = 1; i <= 4; ++i) {
+    EXPECT_EQ(track(needle(40.0 + i)).status, TipStatus::ok);
+    EXPECT_EQ(tracker_.track({utime_ - 50'000, 0, 0, needle(40.5 + i)}).status, TipStatus::late);
+  }
+}
+
 TEST(TrackerConfigCheck, NamesTheKey) {
   struct Case {
     const char* key;

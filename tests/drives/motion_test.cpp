@@ -173,6 +173,29 @@ TEST(Setpoints, AgeGivesZeroRateThenALatchedQuickStop) {
   EXPECT_TRUE(bench.at_rest());
 }
 
+TEST(Setpoints, ThatOfBeforeAStopMovesNothingWhenTheAxesAreEnabledAgain) {
+  Bench bench;
+  ASSERT_TRUE(bench.enable());
+  bench.move(10.0, 3.0);
+  bench.run_ms(400);
+  const std::int64_t made_ns = bench.now_ns;  // the last one: who sends them is silent from here on
+  bench.each_ms = [&] { bench.command->age_ns = bench.now_ns - made_ns; };
+  ASSERT_TRUE(bench.ms_to_rest().has_value());
+  bench.run_ms(300);
+  ASSERT_EQ(bench.reason(), StopReason::setpoint_stale);
+  double fastest_unit_s = 0;
+  bench.each_ms = [&] {
+    bench.command->age_ns = bench.now_ns - made_ns;
+    for (const auto* axis : {&bench.insertion, &bench.rotation})
+      fastest_unit_s = std::max(fastest_unit_s, std::abs(axis->velocity_unit_s()));
+  };
+  bench.driver->rearm();
+  ASSERT_TRUE(bench.enable());
+  bench.run_ms(500);
+  EXPECT_LT(fastest_unit_s, 0.01);
+  EXPECT_EQ(bench.reason(), StopReason::setpoint_stale) << "nobody commands: the axes are switched off again";
+}
+
 TEST(Setpoints, NoneAtAllStopsTheAxesToo) {
   Bench bench;
   ASSERT_TRUE(bench.enable());

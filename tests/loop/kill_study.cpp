@@ -9,7 +9,6 @@
 
 #include <algorithm>
 #include <array>
-#include <cmath>
 #include <cstdio>
 #include <cstdlib>
 #include <fstream>
@@ -20,62 +19,16 @@
 #include <thread>
 #include <vector>
 
-#include "drivers/can/open_bus.hpp"
-#include "drivers/stepper/cia301.hpp"
 #include "nodes/runtime.hpp"
 #include "nodes/system_config.hpp"
+#include "tests/loop/bus_listener.hpp"
 
 extern char** environ;
 
 namespace {
 
 using namespace bevel;
-constexpr double kRest_unit_s = 0.05;
-constexpr double kMoving_unit_s = 1.0;
-constexpr std::int64_t kMs = 1'000'000;
-constexpr std::int64_t kAllowed_ns = 200 * kMs;
-
-// What the drives say of their rates (606C), in TPDO1 or when asked.
-class Listener {
- public:
-  Listener(const std::string& bus, const stepper::StepperConfig& config) : config_(config) {
-    std::vector<std::uint32_t> ids;
-    for (const auto& axis : config.axes) {
-      ids.push_back(stepper::cia301::tpdo1_id(axis.node_id));
-      ids.push_back(stepper::cia301::sdo_response_id(axis.node_id));
-    }
-    bus_ = can::open_bus(bus, ids);
-  }
-  void listen() {
-    bus_->maintain(nodes::now().ns);
-    for (can::Reception r = bus_->receive(); r.kind != can::Reception::Kind::nothing; r = bus_->receive()) {
-      if (r.kind != can::Reception::Kind::frame) continue;
-      for (std::size_t axis = 0; axis < 2; ++axis) {
-        const auto node = config_.axes.at(axis).node_id;
-        const bool answer = r.frame.id == stepper::cia301::sdo_response_id(node) && r.frame.data[0] == 0x43 &&
-                            stepper::cia301::get_u16(r.frame, 1) == 0x606C;
-        if (!answer && r.frame.id != stepper::cia301::tpdo1_id(node)) continue;
-        const auto counts_s = static_cast<std::int32_t>(stepper::cia301::get_u32(r.frame, answer ? 4 : 2));
-        rate_.at(axis) = counts_s / config_.axes.at(axis).counts_per_unit;
-        if (!answer) heard_ns_ = nodes::now().ns;
-      }
-    }
-  }
-  // Where no driver asks any more somebody has to: an SDO for 606C, which a drive answers in any state.
-  void ask_if_silent() {
-    if (nodes::now().ns - heard_ns_ < 25 * kMs) return;
-    for (const auto& axis : config_.axes)
-      (void)bus_->send({stepper::cia301::sdo_request_id(axis.node_id), 8, {0x40, 0x6C, 0x60, 0x00}});
-  }
-  double rate(std::size_t axis) const { return std::abs(rate_.at(axis)); }
-  bool at_rest() const { return rate(0) < kRest_unit_s && rate(1) < kRest_unit_s; }
-
- private:
-  stepper::StepperConfig config_;
-  std::unique_ptr<can::Bus> bus_;
-  std::array<double, 2> rate_{};
-  std::int64_t heard_ns_ = 0;
-};
+using test::kMoving_unit_s, test::kMs;
 
 pid_t spawn(std::vector<std::string> words, const std::string& log) {
   std::vector<char*> argv;
@@ -122,11 +75,11 @@ Trial run_trial(const std::string& bin, const std::string& config_path, const st
   const pid_t demo =
       spawn({bin + "/bevel-demo", "--config", config_path, "--out", out, "--target", "4,-6,110"}, out + "-demo.txt");
   const auto sleep_ms = [](int ms) { std::this_thread::sleep_for(std::chrono::milliseconds(ms)); };
-  std::unique_ptr<Listener> listener;
+  std::unique_ptr<test::BusListener> listener;
   for (int i = 0; i < 1500 && (!listener || listener->rate(0) < kMoving_unit_s); ++i) {
     sleep_ms(10);
     try {
-      if (!listener && i > 100) listener = std::make_unique<Listener>(bus, config);
+      if (!listener && i > 100) listener = std::make_unique<test::BusListener>(bus, config);
     } catch (const std::exception&) {  // the rig is not there yet
     }
     if (listener) listener->listen();
@@ -158,7 +111,7 @@ Trial run_trial(const std::string& bin, const std::string& config_path, const st
     trial.ms_to_rest = rest_ns < 0 ? -1 : static_cast<double>(rest_ns - hit_ns) * 1e-6;
     if (rest_ns < 0) {
       trial.problem = "does not rest";
-    } else if (rest_ns - hit_ns > kAllowed_ns) {
+    } else if (rest_ns - hit_ns > test::kToRest_ns) {
       trial.problem = "rests too late";
     }
     if (sent == SIGSTOP) {  // it comes back, and nothing moves again

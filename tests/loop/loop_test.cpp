@@ -64,6 +64,21 @@ TEST_F(Loop, AControllerThatDiesStopsTheNeedleWithin200ms) {
   EXPECT_EQ(stepper->report().stop.reason, stepper::StopReason::setpoint_stale);
 }
 
+TEST_F(Loop, AnArmWhileTheControllerIsSilentDoesNotCarryOutItsLastCommand) {
+  steer({6, -9, 100});
+  run(4);
+  controller.reset();
+  EXPECT_LT(ms_to_rest(), 200);
+  run(0.5);
+  const std::array<double, 2> stopped{rig->drive(0).position_unit(), rig->drive(1).position_unit()};
+  say(Word::arm, {6, -9, 100});
+  ASSERT_TRUE(run(5, [this] { return stepper->report().state == stepper::DriverState::enabled; }));
+  run(1);
+  EXPECT_LT(std::abs(rig->drive(0).position_unit() - stopped[0]), 0.01);
+  EXPECT_LT(std::abs(rig->drive(1).position_unit() - stopped[1]), 0.01);
+  EXPECT_EQ(stepper->report().stop.reason, stepper::StopReason::setpoint_stale);
+}
+
 TEST_F(Loop, ADriverThatDiesLeavesItToTheDrives) {
   steer({6, -9, 100});
   run(4);

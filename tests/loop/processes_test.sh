@@ -1,7 +1,7 @@
 #!/usr/bin/env bash
 # The five processes for real, in a network namespace: an insertion that arrives, and all the ways in which one may end
-# before. Usage: processes_test.sh BIN_DIR SOURCE_DIR CASE [TRIALS SEED]. Exit status 77: no network namespaces here,
-# skipped.
+# before. Usage: processes_test.sh BIN_DIR SOURCE_DIR CASE [ARG...]. Exit status 77: skipped, for want of network
+# namespaces or of what the case needs; it says so.
 set -uo pipefail
 bin=$1 source=$2 case=$3
 if [ -z "${BEVEL_ISOLATED:-}" ]; then
@@ -18,6 +18,26 @@ fail() { echo "FAILED: $*"; cat "$work"/*.txt "$work"/out/*.txt 2>/dev/null; exi
 # Children of ours that still run; nobody else's.
 left_over() { pgrep -f "$work/demo.toml" | grep -v "^$$\$"; }
 wait_for() { for _ in $(seq 100); do grep -q "$1" "$work/demo.txt" && return 0; sleep 0.1; done; fail "never saw '$1'"; }
+skip() { echo "SKIPPED: $*"; exit 77; }
+# A study ends with 0, 1, or 77 where it could not measure; what it prints is the message.
+study() {
+  "$@" >"$work/study.txt" 2>&1; status=$?
+  cat "$work/study.txt"
+  [ $status -eq 77 ] && exit 77
+  [ $status -eq 0 ] || { rm "$work/study.txt"; fail "exit status $status, see above"; }
+}
+# clock_study WHOSE JUMP_S...: each on a rig of its own.
+clock_study() {
+  local library
+  library=$(find /usr/lib /usr/local/lib -name libfaketimeMT.so.1 2>/dev/null | head -n 1)
+  [ -n "$library" ] || skip "no libfaketime here (package faketime): no clock was set under real processes"
+  study "$bin/clock_study" "$bin" "$work/demo.toml" "$work/out" "$library" "$@"
+}
+# load_study SEED LOAD...
+load_study() {
+  command -v stress-ng >/dev/null || skip "no stress-ng here (package stress-ng): nothing was tested under load"
+  study "$bin/load_study" "$bin" "$work/demo.toml" "$work/out" "$@"
+}
 
 case $case in
   arrives)
@@ -97,6 +117,24 @@ case $case in
     ;;
   kills)
     "$bin/kill_study" "$bin" "$work/demo.toml" "$work/out" "unix:$work/s-can.sock" "${4:-3}" "${5:-1}" || fail "see above"
+    ;;
+  clock_set)  # of the machine on which everything runs
+    clock_study all 3600 -3600 -0.2
+    ;;
+  clock_apart)  # of one machine of several
+    clock_study camera -0.2
+    clock_study controller 3600
+    ;;
+  clocks)
+    for whose in all camera estimator controller stepper; do clock_study "$whose" 3600 -3600 -0.2; done
+    ;;
+  load)
+    load_study 1 switch:4:19 mixed:2:19
+    ;;
+  loads)  # ROUNDS SEED
+    for round in $(seq "${4:-1}"); do
+      load_study $((${5:-1} + round)) switch:4:19 matrix:4:19 vm:1:19 mixed:2:19 mixed:4:10
+    done
     ;;
   *) fail "no case '$case'" ;;
 esac
