@@ -30,7 +30,10 @@ MatrixXd correlation_of(const Curve& curve, double length) {
 }
 
 Likelihood::Likelihood(const System& system, const Readings& outliers, Noise noise)
-    : system_(&system), data_(without(system.data(), outliers)), rows_(rows_left(system.data(), outliers)) {
+    : system_(&system),
+      outliers_(outliers),
+      data_(without(system.data(), outliers)),
+      rows_(rows_left(system.data(), outliers)) {
   for (const SeriesSet& recording : data_.recordings) {
     VectorXd measured(recording.rows());
     Index row = 0;

@@ -47,6 +47,7 @@ class Likelihood {
   const System& system() const { return *system_; }
   const Dataset& data() const { return data_; }
   const Noise& noise() const { return noise_; }
+  const Readings& outliers() const { return outliers_; }
   std::size_t recordings() const { return data_.recordings.size(); }
   // Sum of the logarithms of the whitened readings' weights: minus half of log det of the noise's covariance.
   double log_weights() const { return log_weights_.sum(); }
@@ -67,6 +68,7 @@ class Likelihood {
   void whiten_rows(std::size_t recording, Eigen::Ref<Eigen::MatrixXd> rows) const;
 
   const System* system_;
+  Readings outliers_;
   Dataset data_;
   Noise noise_;
   std::vector<std::vector<Eigen::Index>> rows_;    // of the system's, that are left

@@ -203,8 +203,7 @@ std::vector<LeftOutSelection> leave_out_selection(const Search& search) {
       without.push_back(model.log - model.parts[r].log_density);
       if (!likeliest || without.back() > likeliest->log - likeliest->parts[r].log_density) likeliest = &model;
     }
-    out.push_back(
-        {.log_density = log_sum(with) - log_sum(without), .fit = likeliest->fit, .of_fit = likeliest->parts[r]});
+    out.push_back({.log_density = log_sum(with) - log_sum(without), .fit = likeliest->fit});
   }
   return out;
 }

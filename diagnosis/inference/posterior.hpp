@@ -67,12 +67,11 @@ struct LeftOut {
 LeftOut leave_out(const Fit& fit, const std::vector<ArrowBlock>& blocks, const CurveColumns& curve,
                   std::size_t recording);
 
-// Each recording given the others, sets and parameters: sets are weighed, and their parameters fitted, without it.
-// (Which sets were visited was decided with all recordings.)
+// Each recording given the others, sets and parameters: sets are weighed, and their parameters fitted, without it, by
+// the linear models. (Which sets were visited was decided with all recordings.)
 struct LeftOutSelection {
-  double log_density = 0;    // of the mixture
+  double log_density = 0;    // of the mixture; constants of 2 pi left out
   const Fit* fit = nullptr;  // the likeliest without the recording; it lives as long as the search
-  LeftOut of_fit;
 };
 std::vector<LeftOutSelection> leave_out_selection(const Search& search);
 

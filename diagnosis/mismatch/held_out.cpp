@@ -4,6 +4,7 @@
 #include <cmath>
 #include <limits>
 #include <numbers>
+#include <numeric>
 
 namespace bevel::diagnosis {
 
@@ -62,8 +63,34 @@ VectorXd new_insertion(const Fit& fit, std::size_t r) {
   return local;
 }
 
-Sums sums_of(const Fit& fit, const inference::CurveColumns& curve, std::size_t r, const inference::LeftOut& left_out) {
+// Refitted without the recording: where much is missing, the linear model about all of them says little of it.
+struct Refitted {
+  Fit fit;
+  inference::LeftOut left_out;
+};
+Refitted refit_without(const inference::Search& search, const Fit& whole, const inference::CurveColumns& curve,
+                       std::size_t r) {
+  const Likelihood& all = *whole.likelihood;
+  inference::Readings without = all.outliers();
+  without[r].resize(all.system().data().recordings[r].messages);
+  std::iota(without[r].begin(), without[r].end(), std::size_t{0});
+  const Likelihood others(all.system(), without, all.noise());
+  const auto their_curve =
+      whole.scales.curve ? search.discrepancy().columns(others, *whole.scales.curve) : inference::CurveColumns{};
+  Refitted out{.fit = inference::fit(others, whole.layout, whole.shared, whole.local, whole.scales, their_curve),
+               .left_out = {}};
+  if (!out.fit.valid) out.fit = whole;
+  out.fit.likelihood = whole.likelihood;
+  out.fit.local[r] = whole.local[r];
+  const auto blocks = linearise(all, out.fit, curve);
+  if (!blocks.empty()) out.left_out = leave_out(out.fit, blocks, curve, r);
+  return out;
+}
+
+Sums sums_of(const inference::Search& search, const Fit& whole, std::size_t r) {
   Sums out;
+  const auto curve = curve_of(search, whole);
+  const auto [fit, left_out] = refit_without(search, whole, curve, r);
   VectorXd errors_mm = fit.likelihood->errors(fit.layout, r, left_out.shared, new_insertion(fit, r));
   if (errors_mm.size() == 0) return out;
   if (curve) errors_mm -= curve.raw[r] * left_out.curve_values;
@@ -110,9 +137,8 @@ HeldOut hold_out(const NeedleSystem& system, const inference::Search& search, co
   std::vector<Sums> file, before, after, floor;
   for (std::size_t r = 0; r < likelihood.recordings(); ++r) {
     file.push_back(as_it_stands(system, likelihood, r));
-    before.push_back(sums_of(*base.fit, base.curve, r, leave_out(*base.fit, base.blocks, base.curve, r)));
-    const Fit& chosen = *selected[r].fit;
-    after.push_back(sums_of(chosen, curve_of(search, chosen), r, selected[r].of_fit));
+    before.push_back(sums_of(search, *base.fit, r));
+    after.push_back(sums_of(search, *selected[r].fit, r));
     after.back().log_density = selected[r].log_density + constant_of(after.back().count);
     floor.push_back(noise_floor(likelihood, r));
     out.recordings.push_back({.log = system.recorded().recordings[r].name,

@@ -25,7 +25,8 @@ std::string sentence_of(const Findings& findings) {
   }
   const model::DiscrepancyCurve& curve = findings.discrepancies.front().curve;
   return "Something is missing that no effect of the library explains: the " +
-         findings.discrepancies.front().component + " is off with " + findings.discrepancies.front().covariate +
+         std::string(info_of(curve.component).meaning) + " is off with " +
+         std::string(model::name_of(curve.covariate)) +
          (findings.effects.empty() ? "." : ", beside " + listed(findings.effects) + ".");
 }
 

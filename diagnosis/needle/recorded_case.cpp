@@ -9,6 +9,7 @@
 #include <stdexcept>
 
 #include "diagnosis/statistics/median.hpp"
+#include "model/effects/covariates.hpp"
 
 namespace bevel::diagnosis {
 namespace {
@@ -18,8 +19,6 @@ constexpr double kSameAxis = 0.99;       // cosine
 constexpr double kSameDirection = 0.05;  // what information mixes into other directions, as a share
 constexpr double kClocksApart_s = 1.0;
 constexpr double kDifferentRig = 3.0;  // ratio of frame periods or of claimed noise
-constexpr double kMoving_mm_s = 0.05;
-constexpr double kTurning_rad_s = 0.02;
 
 std::string channel_name(int camera, const Eigen::Vector3d& axis) {
   std::ostringstream text;
@@ -207,25 +206,18 @@ double Covariates::operator[](model::Covariate covariate) const {
 }
 
 std::vector<Covariates> find_covariates(const model::Motion& motion) {
-  std::vector<Covariates> all(motion.nodes.size());
-  double stopped_s = 0;
-  double turned_mm = motion.nodes.front().insertion_mm;
-  for (std::size_t i = 0; i < all.size(); ++i) {
-    const auto& node = motion.nodes[i];
-    Covariates& at = all[i];
-    at.time_s = node.time_s;
-    at.depth_mm = node.insertion_mm;
-    at.roll_rad = node.rotation_rad;
-    if (i > 0) {
-      const auto& before = motion.nodes[i - 1];
-      const double dt_s = node.time_s - before.time_s;
-      at.speed_mm_s = dt_s > 0 ? std::abs(node.insertion_mm - before.insertion_mm) / dt_s : 0;
-      at.turn_rate_rad_s = dt_s > 0 ? std::abs(node.rotation_rad - before.rotation_rad) / dt_s : 0;
-      if (at.speed_mm_s > kMoving_mm_s) stopped_s = node.time_s;
-      if (at.turn_rate_rad_s > kTurning_rad_s) turned_mm = node.insertion_mm;
-    }
-    at.since_stop_s = node.time_s - stopped_s;
-    at.since_reversal_mm = node.insertion_mm - turned_mm;
+  std::vector<Covariates> all;
+  model::CovariateTracker tracker(motion.nodes.front());
+  for (std::size_t i = 0; i < motion.nodes.size(); ++i) {
+    if (i > 0) tracker.advance(motion.nodes[i - 1], motion.nodes[i]);
+    Covariates at{.time_s = motion.nodes[i].time_s,
+                  .depth_mm = motion.nodes[i].insertion_mm,
+                  .speed_mm_s = tracker[model::Covariate::speed_mm_s],
+                  .turn_rate_rad_s = tracker[model::Covariate::turn_rate_rad_s],
+                  .since_stop_s = tracker[model::Covariate::since_stop_s],
+                  .since_reversal_mm = tracker[model::Covariate::since_reversal_mm],
+                  .roll_rad = motion.nodes[i].rotation_rad};
+    all.push_back(at);
   }
   return all;
 }

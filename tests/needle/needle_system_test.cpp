@@ -6,7 +6,6 @@
 #include <numbers>
 
 #include "diagnosis/inference/search.hpp"
-#include "diagnosis/needle/covariates.hpp"
 #include "diagnosis/needle/curves.hpp"
 #include "tests/needle/simulated_rig.hpp"
 

@@ -105,8 +105,8 @@ void add_verdict(io::HtmlReport& page, const Findings& f) {
                        measured(last.max_mm) + " mm"});
   facts.push_back({"chi2 per reading", change(&FitFigures::chi2_per_dof), "held out; 1: as sure as it may be"});
   if (!f.discrepancies.empty())
-    facts.push_back(
-        {"unknown part", f.discrepancies.front().component, "against " + in_words(f.discrepancies.front().covariate)});
+    facts.push_back({"unknown part", meaning_of(f.discrepancies.front()),
+                     "against " + in_words(model::name_of(f.discrepancies.front().curve.covariate))});
   facts.push_back(
       {"readings", std::to_string(f.readings),
        "in " + std::to_string(f.traces.size()) + " recordings; " + std::to_string(f.outliers) + " outliers"});
