@@ -21,6 +21,9 @@ namespace {
 constexpr double kFarthest = 4.0;  // sizes promised reach to so many times their start
 constexpr double kNever = -1e3;
 
+// Readings are about as far from those without the effect as the parameter is from where it vanishes.
+bool is_amplitude(const Parameter& p) { return !std::isnan(p.none) && !p.shape; }
+
 // Every combination of starts of the shared parameters.
 std::vector<VectorXd> starts_of(const Effect& effect) {
   std::vector<std::vector<double>> all = {{}};
@@ -104,7 +107,7 @@ Proposals::Candidate Proposals::make_candidate(const Likelihood& likelihood, con
     const Parameter& parameter = effect.parameters[p];
     if (parameter.scope != Scope::shared)
       out.local = static_cast<int>(p), out.instant = parameter.scope == Scope::instant;
-    else if (!std::isnan(parameter.none))
+    else if (is_amplitude(parameter))
       out.amplitudes.push_back(p);
   }
   if (!system_->allows({e})) return out;
@@ -357,7 +360,7 @@ std::vector<std::pair<double, ModelSet>> Proposals::pairs(const Likelihood& like
       Index i = 0;
       for (std::size_t p = 0; p < effect.parameters.size(); ++p)
         if (effect.parameters[p].scope == Scope::shared) {
-          if (!std::isnan(effect.parameters[p].none)) apart[i] = 0;
+          if (is_amplitude(effect.parameters[p])) apart[i] = 0;
           ++i;
         }
       if (apart.norm() < nearest) nearest = apart.norm(), chosen[k] = signature.first;

@@ -143,7 +143,7 @@ Candidate candidate_for(const Member& member) {
     if (!member.fits(p)) continue;
     if (parameters[p].scope == model::Scope::recording)
       candidate.local = static_cast<int>(p);
-    else if (!std::isnan(parameters[p].none))
+    else if (!std::isnan(parameters[p].none) && !parameters[p].shape)
       candidate.amplitudes.push_back(static_cast<int>(p));
   }
   return candidate;

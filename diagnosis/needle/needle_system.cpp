@@ -87,6 +87,7 @@ inference::Parameter parameter_of(const model::EffectParameter& p, const Recorde
                            .prior = {},
                            .scope = Scope::shared,
                            .periodic = p.periodic,
+                           .shape = p.shape,
                            .half_turns = p.half_turns};
   if (p.scope == model::Scope::recording) out.scope = p.periodic ? Scope::phase : Scope::instant;
   if (p.frequency) {
