@@ -21,6 +21,9 @@ namespace {
 constexpr double kFarthest = 4.0;  // sizes promised reach to so many times their start
 constexpr double kNever = -1e3;
 
+// Readings are about as far from those without the effect as the parameter is from where it vanishes.
+bool is_amplitude(const Parameter& p) { return !std::isnan(p.none) && !p.shape; }
+
 // Every combination of starts of the shared parameters.
 std::vector<VectorXd> starts_of(const Effect& effect) {
   std::vector<std::vector<double>> all = {{}};
@@ -93,7 +96,7 @@ Proposals::Candidate Proposals::make_candidate(const Likelihood& likelihood, con
     const Parameter& parameter = effect.parameters[p];
     if (parameter.scope != Scope::shared)
       out.local = static_cast<int>(p), out.instant = parameter.scope == Scope::instant;
-    else if (!std::isnan(parameter.none))
+    else if (is_amplitude(parameter))
       out.amplitudes.push_back(p);
   }
   if (!system_->allows({e})) return out;
@@ -356,7 +359,7 @@ std::size_t Proposals::nearest_signature(const Proposal& proposal) const {
     VectorXd apart = shared_part(effect, signatures[s].values) - proposal.starts.front().shared;
     Index i = 0;
     for (const Parameter& p : effect.parameters)
-      if (p.scope == Scope::shared) apart[i] = std::isnan(p.none) ? apart[i] : 0, ++i;
+      if (p.scope == Scope::shared) apart[i] = is_amplitude(p) ? 0 : apart[i], ++i;
     if (apart.norm() < nearest) nearest = apart.norm(), best = s;
   }
   return best;

@@ -25,6 +25,7 @@ struct Parameter {
   Prior prior;
   Scope scope = Scope::shared;
   bool periodic = false;
+  bool shape = false;   // readings at one start are no multiple of those at another: starts are taken as they stand
   int half_turns = -1;  // periodic: the parameter of this effect that turns by half a period when this one turns by one
 };
 

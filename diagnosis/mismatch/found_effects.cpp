@@ -30,8 +30,8 @@ VectorXd local_variances(const inference::ArrowBlock& block, const inference::Ar
   return (own + through * solution.covariance * through.transpose()).diagonal();
 }
 
-FoundParameter shared_parameter(const inference::Unknowns& unknowns, const ChosenModel& model, std::size_t member,
-                                std::size_t p) {
+FoundParameter shared_parameter(const NeedleSystem& system, const inference::Unknowns& unknowns,
+                                const ChosenModel& model, std::size_t member, std::size_t p) {
   const auto& layout = model.fit->layout;
   const int at = layout.find_shared(member, p);
   const inference::Parameter& parameter = *layout.shared()[static_cast<std::size_t>(at)].parameter;
@@ -42,6 +42,10 @@ FoundParameter shared_parameter(const inference::Unknowns& unknowns, const Chose
   out.ci95 = {std::min(mixture.quantile(0.025), out.value), std::max(mixture.quantile(0.975), out.value)};
   if (!parameter.periodic)
     for (double& end : out.ci95) end = std::clamp(end, parameter.lower, parameter.upper);
+  // The same but for whole turns: the one that is meant.
+  const double turned = model::meant(system.parameter(layout.set()[member], p), out.value) - out.value;
+  out.value += turned;
+  for (double& end : out.ci95) end += turned;
   const auto& held = model.fit->held;
   out.at_bound = std::find(held.begin(), held.end(), at) != held.end();
   return out;
@@ -103,7 +107,7 @@ std::vector<FoundEffect> found_effects(const NeedleSystem& system, const Search&
                       .ambiguous_with = rivals_of(search, set, set[m], search.visited().at(set).log_posterior())};
     for (std::size_t p = 0; p < effect.parameters.size(); ++p)
       if (effect.parameters[p].scope == inference::Scope::shared)
-        found.parameters.push_back(shared_parameter(unknowns, model, m, p));
+        found.parameters.push_back(shared_parameter(system, unknowns, model, m, p));
     for (std::size_t r = 0; r < fit.local.size(); ++r) {
       FoundInRecording one{.log = system.recorded().recordings[r].name, .parameters = {}};
       const VectorXd variances = local_variances(model.blocks[r], solution);

@@ -53,14 +53,13 @@ struct Begin {
 Begin begin_of(const NeedleSystem& system, const Fit& fit, std::size_t r) {
   Begin begin;
   const auto& set = fit.layout.set();
-  for (std::size_t m = 0; m < set.size(); ++m) {
-    const auto& parameters = system.effects()[set[m]].parameters;
-    for (std::size_t p = 0; p < parameters.size(); ++p) {
+  for (std::size_t m = 0; m < set.size(); ++m)
+    for (std::size_t p = 0; p < system.effects()[set[m]].parameters.size(); ++p) {
       const int shared = fit.layout.find_shared(m, p), local = fit.layout.find_local(m, p);
-      if (parameters[p].name == "depth_mm" && shared >= 0) begin.depth_mm = fit.shared[shared];
-      if (parameters[p].name == "at_s" && local >= 0) begin.at_s = fit.local[r][local];
+      const model::Begins begins = system.parameter(set[m], p).begins;
+      if (begins == model::Begins::depth && shared >= 0) begin.depth_mm = fit.shared[shared];
+      if (begins == model::Begins::instant && local >= 0) begin.at_s = fit.local[r][local];
     }
-  }
   return begin;
 }
 

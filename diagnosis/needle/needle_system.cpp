@@ -87,6 +87,7 @@ inference::Parameter parameter_of(const model::EffectParameter& p, const Recorde
                            .prior = {},
                            .scope = Scope::shared,
                            .periodic = p.periodic,
+                           .shape = p.shape,
                            .half_turns = p.half_turns};
   if (p.scope == model::Scope::recording) out.scope = p.periodic ? Scope::phase : Scope::instant;
   if (p.frequency) {
@@ -178,6 +179,15 @@ bool NeedleSystem::allows(const ModelSet& set) const {
       if (physics_[set[i]] == physics_[set[j]]) return false;
   }
   return columns <= static_cast<std::size_t>(model::kMaxColumns);
+}
+
+const model::EffectParameter& NeedleSystem::parameter(std::size_t effect, std::size_t parameter) const {
+  const auto& all = physics_[effect]->parameters();
+  std::size_t p = 0;
+  // Those of this kind alone are fitted.
+  for (std::size_t fitted = 0;; ++p)
+    if ((variants_[effect] >> p & 1U) != 0 && fitted++ == parameter) break;
+  return all[p];
 }
 
 model::NeedleParameters NeedleSystem::needle(const VectorXd& shared) const {

@@ -40,6 +40,8 @@ class NeedleSystem final : public inference::System {
   model::NeedleParameters needle(const Eigen::VectorXd& shared) const;
   // The library's effect behind one of effects().
   const model::Effect& physics(std::size_t effect) const { return *physics_[effect]; }
+  // The library's parameter behind one of an effect's.
+  const model::EffectParameter& parameter(std::size_t effect, std::size_t parameter) const;
   // One of curves(), with values, as a model file carries it.
   model::DiscrepancyCurve model_curve(std::size_t curve, std::vector<double> values,
                                       std::vector<double> std_errors) const {

@@ -11,6 +11,12 @@ std::vector<double> starts_every(double step, double first, double last) {
   return starts;
 }
 
+double meant(const EffectParameter& parameter, double value) {
+  if (parameter.modulo <= 0) return value;
+  const double none = std::isnan(parameter.none) ? 0 : parameter.none;
+  return value - parameter.modulo * std::round((value - none) / parameter.modulo);
+}
+
 std::string_view name_of(Covariate covariate) {
   switch (covariate) {
     case Covariate::time_s:

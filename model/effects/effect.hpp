@@ -25,6 +25,13 @@ enum class Scope {
   recording,  // a phase or an instant of its own in each
 };
 
+// What a parameter says of where its effect begins to act. Before that it changes nothing.
+enum class Begins {
+  unsaid,
+  depth,    // there, in mm of the tip along z
+  instant,  // then, in s from the start of the recording; 0: not in this recording
+};
+
 struct EffectParameter {
   std::string_view name;  // a contract, with the unit: verdict.json, model.toml
   double lower, upper;    // of the model file and of a fit
@@ -36,12 +43,21 @@ struct EffectParameter {
   bool periodic = false;   // an angle: the bounds are one period apart
   int half_turns = -1;     // periodic: the angle that has to turn by half of its own period when this one turns by one
   bool frequency = false;  // in Hz: readings too far apart do not show it
+  // A size on which the form depends as well: readings at one value are no multiple of those at another, and a start
+  // is taken as it stands.
+  bool shape = false;
+  Begins begins = Begins::unsaid;
+  // Values so far apart are the same to all readings but those while it happens; the one nearest to `none` is meant.
+  // 0: none are. A periodic parameter is kept within its bounds and needs none.
+  double modulo = 0;
   double smallest_seen = 0;  // how far from `none` the effect's causes bring it at least
   double largest_seen = std::numeric_limits<double>::infinity();  // the largest value that they bring about
   double usual = std::numeric_limits<double>::quiet_NaN();        // where a model file does not say; NaN: it has to
 };
 // Starts from first to last, evenly: as close as the effect is narrow, or a fit never finds it.
 std::vector<double> starts_every(double step, double first, double last);
+// Of all values that are the same (EffectParameter::modulo) the one that is meant.
+double meant(const EffectParameter& parameter, double value);
 inline constexpr double kNoNone = std::numeric_limits<double>::quiet_NaN();
 
 // Against what the effect is to be looked at: where it shows.

@@ -12,7 +12,12 @@ class Layer final : public Effect {
              .meaning = "a second layer of tissue bends the needle differently",
              .covariate = Covariate::depth_mm,
              .parameters = {
-                 {.name = "depth_mm", .lower = 0, .upper = 300, .none = kNoNone, .starts = starts_every(7.5, 7.5, 120)},
+                 {.name = "depth_mm",
+                  .lower = 0,
+                  .upper = 300,
+                  .none = kNoNone,
+                  .starts = starts_every(7.5, 7.5, 120),
+                  .begins = Begins::depth},
                  {.name = "curvature_ratio", .lower = 0, .upper = 4, .none = 1, .starts = {0.8}, .reported = 0.8}}}) {}
 
   void curvature(Parameters p, const LegView& leg, EffectMemory& /*memory*/, Dual2& kappa_per_mm) const override {

@@ -1,5 +1,7 @@
 #include "model/effects/effect.hpp"
 
+#include <numbers>
+
 namespace bevel::model {
 namespace {
 
@@ -7,6 +9,7 @@ namespace {
 // recording. The jump takes a moment, so that a fit can move its instant: an insertion's shows at once and takes no
 // longer than the drives' messages are apart, a rotation's shows only in where the needle goes from there on. A rotor
 // falls in again a whole electrical cycle on: four steps, 0.126 rad of a motor of 200 that turns the needle directly.
+// A turn more leaves the bevel where it is: readings know the rotation modulo 2 pi.
 class LostSteps final : public Effect {
  public:
   LostSteps()
@@ -21,6 +24,7 @@ class LostSteps final : public Effect {
                   .none = 0,
                   .starts = {-1.6, -0.8, 0.8, 1.6},
                   .reported = 1.5,
+                  .modulo = 2 * std::numbers::pi,
                   .smallest_seen = 0.12},
                  {.name = "insertion_mm", .lower = -30, .upper = 30, .none = 0, .starts = {-3.0, 3.0}, .reported = 3},
                  {.name = "at_s",
@@ -28,7 +32,8 @@ class LostSteps final : public Effect {
                   .upper = 10000.0,
                   .none = 0,
                   .starts = {0.0},
-                  .scope = Scope::recording}}}) {}
+                  .scope = Scope::recording,
+                  .begins = Begins::instant}}}) {}
 
   void axes(Parameters p, const LegView& leg, EffectMemory& /*memory*/, Dual& insertion_mm,
             Dual& rotation_rad) const override {

@@ -13,6 +13,7 @@
   EFFECT(torsional_windup)    \
   EFFECT(insertion_backlash)  \
   EFFECT(insertion_scale)     \
+  EFFECT(stick_slip)          \
   EFFECT(puncture)            \
   EFFECT(rate_dependence)     \
   EFFECT(layer)               \

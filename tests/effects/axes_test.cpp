@@ -206,5 +206,59 @@ TEST(Puncture, ReleasesANeedleThatIsDrawnBackBeforeItBreaks) {
   EXPECT_NEAR(again.pose.p_mm.z(), held.pose.p_mm.z(), 1e-4);
 }
 
+// Stored advance and a threshold, step by step; the product counts jumps over a leg.
+TEST(StickSlip, IsAThresholdOnTheStoredAdvance) {
+  constexpr double kJump_mm = 1.37;
+  const Script script = rich_script();
+  double held_mm = 0;
+  BruteForce brute{.needle = agar(), .axes = [&](const Instant&, double& s_mm, double&) {
+                     if (std::abs(s_mm - held_mm) >= kJump_mm) held_mm = s_mm;
+                     s_mm = held_mm;
+                   }};
+  const auto effect = active("stick_slip", {kJump_mm});
+  for (const Motion& motion : {script.fine(), script.recorded()}) {
+    held_mm = 0;
+    const auto path = path_of(agar(), {effect}, motion);
+    const auto expected = brute.path(script, motion);
+    std::size_t in_a_jump = 0;
+    for (std::size_t i = 0; i < path.size(); ++i) in_a_jump += (path[i] - expected[i]).norm() > 0.05;
+    EXPECT_LE(in_a_jump, path.size() / 50);  // a jump of the product takes 0.02 mm
+  }
+}
+
+TEST(StickSlip, IsASawtoothOfItsJumpOnTheWayIn) {
+  const AugmentedNeedle needle(agar(), {active("stick_slip", {1.5})});
+  for (const double base_mm : {0.7, 1.45, 1.55, 7.4, 7.6, 40.0})
+    EXPECT_NEAR(end_of(needle, Script{{1, base_mm, 0}}.fine()).tip_insertion_mm.value, 1.5 * std::floor(base_mm / 1.5),
+                1e-9)
+        << base_mm;
+  // Half way through a jump, which takes 0.02 mm.
+  EXPECT_NEAR(end_of(needle, Script{{1, 7.5, 0}}.fine()).tip_insertion_mm.value, 6.75, 1e-6);
+}
+
+// Drawn back, it has to store up a jump the other way, from where it is held.
+TEST(StickSlip, HoldsTheOtherWayToo) {
+  const AugmentedNeedle needle(agar(), {active("stick_slip", {2})});
+  const auto tip_at = [&](double back_mm) {
+    return end_of(needle, Script{{1, 11, 0}, {1, -back_mm, 0}}.fine()).tip_insertion_mm.value;
+  };
+  EXPECT_NEAR(tip_at(0.5), 10, 1e-9);
+  EXPECT_NEAR(tip_at(2.9), 10, 1e-9);  // the base at 8.1
+  EXPECT_NEAR(tip_at(3.1), 8, 1e-9);
+  EXPECT_NEAR(tip_at(7.5), 4, 1e-9);
+}
+
+TEST(StickSlip, LegsMayHoldSeveralJumpsOrAPartOfOne) {
+  for (const double jump_mm : {0.013, 0.11, 0.3, 2.4}) {
+    const AugmentedNeedle needle(agar(), {active("stick_slip", {jump_mm})});
+    for (const double insertion_mm : {5.03, 17.77}) {
+      const Script script{{1, insertion_mm, 0}, {1, -0.4 * insertion_mm, 0}};
+      EXPECT_NEAR(end_of(needle, script.fine()).tip_insertion_mm.value,
+                  end_of(needle, script.fine(0.05)).tip_insertion_mm.value, 1e-9)
+          << jump_mm;
+    }
+  }
+}
+
 }  // namespace
 }  // namespace bevel::model::testing

@@ -2,6 +2,7 @@
 #include <gtest/gtest.h>
 
 #include <map>
+#include <numbers>
 #include <set>
 
 #include "tests/effects/script.hpp"
@@ -20,6 +21,7 @@ std::vector<double> shown(const Effect& effect) {
                                                                      {"insertion_backlash", {1.13}},
                                                                      {"insertion_scale", {0.93}},
                                                                      {"puncture", {11.3, 2.3}},
+                                                                     {"stick_slip", {1.37}},
                                                                      {"flip_transient", {6.3}},
                                                                      {"rate_dependence", {0.21}},
                                                                      {"layer", {30.3, 0.7}},
@@ -163,6 +165,96 @@ TEST_P(EveryEffect, SaysWhatAReportNeeds) {
   }
 }
 
+// The readings of rich_script() with an effect at these values, and when each was taken.
+struct Shown {
+  std::vector<Eigen::Vector3d> path, nominal;
+  std::vector<double> time_s;
+};
+Shown shown_at(const Effect& effect, const std::vector<double>& values) {
+  const Motion motion = rich_script().recorded();
+  Shown out{path_of(agar(), {testing::active(effect.name(), values)}, motion), path_of(agar(), {}, motion), {}};
+  for (const std::size_t node : motion.at) out.time_s.push_back(motion.nodes[node].time_s);
+  return out;
+}
+
+// A parameter that says where its effect begins: up to there it changes nothing, and from soon after it does.
+TEST_P(EveryEffect, BeginsWhereItSays) {
+  const Effect& effect = *GetParam();
+  const auto values = shown(effect);
+  for (std::size_t i = 0; i < values.size(); ++i) {
+    const auto begins = effect.parameters()[i].begins;
+    if (begins == Begins::unsaid) continue;
+    // A stall takes a moment about its instant; a tip within a leg of the depth may have reached it.
+    const double early = begins == Begins::instant ? 0.1 : 1.0, late = begins == Begins::instant ? 1.0 : 10.0;
+    const Shown at = shown_at(effect, values);
+    double before_mm = 0, after_mm = 0, deepest_mm = 0;
+    for (std::size_t r = 0; r < at.path.size(); ++r) {
+      deepest_mm = std::max(deepest_mm, at.nominal[r].z());
+      const double place = begins == Begins::instant ? at.time_s[r] : deepest_mm;
+      const double off_mm = (at.path[r] - at.nominal[r]).norm();
+      if (place < values[i] - early) before_mm = std::max(before_mm, off_mm);
+      if (place > values[i] && place < values[i] + late) after_mm = std::max(after_mm, off_mm);
+    }
+    EXPECT_LT(before_mm, 1e-9) << effect.parameters()[i].name;
+    EXPECT_GT(after_mm, 0.02) << effect.parameters()[i].name;
+  }
+}
+
+// Values that are said to be the same are: a period apart, whichever way it is declared.
+TEST_P(EveryEffect, ReadsTheSameAPeriodOn) {
+  const Effect& effect = *GetParam();
+  for (std::size_t i = 0; i < effect.parameters().size(); ++i) {
+    const auto& p = effect.parameters()[i];
+    if (!p.periodic && p.modulo == 0) continue;
+    EXPECT_FALSE(p.periodic && p.modulo != 0) << p.name;
+    auto values = shown(effect);
+    if (effect.name() == "lost_steps") values = {0.8, 0, 2.3};  // while nothing is inserted
+    for (const double turns : {-1.0, 1.0}) {
+      auto moved = values;
+      moved[i] += turns * (p.periodic ? p.upper - p.lower : p.modulo);
+      // Half a turn of an angle of period pi is undone by one that goes with it.
+      if (p.half_turns >= 0) moved[static_cast<std::size_t>(p.half_turns)] += std::numbers::pi;
+      EXPECT_LT(largest_distance_mm(shown_at(effect, values).path, shown_at(effect, moved).path), 1e-9) << p.name;
+    }
+  }
+}
+
+// A shaft that loses a turn takes a moment to do so. What it cuts in that moment goes another way: 2 mm at 20 mm/s,
+// which leave the heading at most 4 mm of curvature apart. Quick insertions tell turns apart, if only by that.
+TEST(LostSteps, ATurnMoreShowsByWhatIsCutMeanwhile) {
+  const Effect& effect = *find_effect("lost_steps");
+  const double turn = effect.parameters()[0].modulo;
+  const Shown one = shown_at(effect, {0.8, 0, 3.317}), other = shown_at(effect, {0.8 - turn, 0, 3.317});
+  const double apart_mm = largest_distance_mm(one.path, other.path);
+  EXPECT_GT(apart_mm, 0.05);
+  EXPECT_LT(apart_mm, 4 * agar().curvature_per_mm * 30);  // and 30 mm of way left
+  EXPECT_GT(largest_distance_mm(one.path, one.nominal), 2 * apart_mm);
+}
+
+TEST(Registry, PlacesWhereAnEffectBeginsAreDeclared) {
+  std::set<std::string> depths, instants;
+  for (const Effect* effect : all_effects())
+    for (const auto& p : effect->parameters()) {
+      const std::string name = std::string(effect->name()) + "." + std::string(p.name);
+      if (p.begins == Begins::depth) depths.insert(name);
+      if (p.begins == Begins::instant) instants.insert(name);
+      // The engine scans an instant over each recording.
+      EXPECT_EQ(p.begins == Begins::instant, p.scope == Scope::recording && !p.periodic) << name;
+    }
+  EXPECT_EQ(depths, (std::set<std::string>{"layer.depth_mm", "puncture.depth_mm"}));
+  EXPECT_EQ(instants, (std::set<std::string>{"lost_steps.at_s"}));
+}
+
+TEST(EffectParameter, OfValuesThatAreTheSameTheNearestToNoneIsMeant) {
+  const EffectParameter& rotation = find_effect("lost_steps")->parameters()[0];
+  EXPECT_NEAR(meant(rotation, -4.943), 1.340, 1e-3);
+  EXPECT_NEAR(meant(rotation, 1.34), 1.34, 1e-12);
+  EXPECT_NEAR(meant(rotation, 6.9), 6.9 - 2 * std::numbers::pi, 1e-12);
+  EXPECT_EQ(meant(find_effect("lost_steps")->parameters()[1], 12.0), 12.0);
+  EffectParameter about_three{.name = "", .lower = 0, .upper = 9, .none = 3, .starts = {1}, .modulo = 2};
+  EXPECT_NEAR(meant(about_three, 8.5), 2.5, 1e-12);
+}
+
 TEST(Registry, NamesAreThoseOfTheContract) {
   std::set<std::string_view> names;
   for (const Effect* effect : all_effects()) names.insert(effect->name());
@@ -179,6 +271,7 @@ TEST(Registry, NamesAreThoseOfTheContract) {
                                                "flip_transient",
                                                "relaxation",
                                                "puncture",
+                                               "stick_slip",
                                                "tissue_motion",
                                                "lateral_bias",
                                                "bevel_offset",
