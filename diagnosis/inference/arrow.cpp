@@ -2,6 +2,7 @@
 
 #include <Eigen/Cholesky>
 #include <algorithm>
+#include <cmath>
 #include <numbers>
 
 namespace bevel::inference {
@@ -12,6 +13,35 @@ using Eigen::VectorXd;
 
 namespace {
 double log_det(const Eigen::LLT<MatrixXd>& factor) { return 2 * factor.matrixLLT().diagonal().array().log().sum(); }
+
+// exp(x^2) erfc(x), x >= 0.
+double scaled_erfc(double x) {
+  constexpr double kFar = 20;  // from where both factors leave the range of a double
+  return x < kFar ? std::exp(x * x) * std::erfc(x) : (1 - 0.5 / (x * x)) / (x * std::sqrt(std::numbers::pi));
+}
+
+// The curvature of the normal density that has the volume of an unknown's tail, from its bound inwards, all but those
+// held eliminated: of exp(-slope x - curvature x^2 / 2) over x > 0.
+std::vector<double> curvatures_of_tails(const MatrixXd& H, const VectorXd& g, const std::vector<Index>& held) {
+  std::vector<Index> others;
+  for (Index i = 0; i < H.rows(); ++i)
+    if (std::find(held.begin(), held.end(), i) == held.end()) others.push_back(i);
+  const VectorXd unit = H.diagonal()(others).cwiseSqrt().cwiseInverse();
+  const Eigen::LLT<MatrixXd> factor(unit.asDiagonal() * H(others, others) * unit.asDiagonal());
+  std::vector<double> out;
+  for (const Index i : held) {
+    double curvature = H(i, i), slope = g[i];
+    if (!others.empty() && factor.info() == Eigen::Success) {
+      const VectorXd across = H(others, i).cwiseProduct(unit);
+      const VectorXd taken = factor.solve(across);
+      curvature -= across.dot(taken);
+      slope -= taken.dot(g(others).cwiseProduct(unit));
+    }
+    const double volume = scaled_erfc(std::abs(slope) / std::sqrt(2 * curvature));
+    out.push_back(4 * curvature / (volume * volume));
+  }
+  return out;
+}
 }  // namespace
 
 ArrowBlock make_block(const MatrixXd& L, const MatrixXd& Z, const VectorXd& w) {
@@ -53,11 +83,15 @@ ArrowSolution solve(const std::vector<ArrowBlock>& blocks, const MatrixXd& preci
     out.least += block.ww + block.centre.dot(block.precision.cwiseProduct(block.centre)) - pulls[r].dot(own);
     out.log_volume_ratio += log_det(factors[r]) - block.precision.array().log().sum();
   }
-  for (const Index i : rules.held) {
-    H.row(i).setZero();
-    H.col(i).setZero();
-    H(i, i) = precision(i, i) + 0.5 * std::numbers::pi * g[i] * g[i];
-    g[i] = 0;
+  if (!rules.held.empty()) {
+    const auto curvatures = curvatures_of_tails(H, g, rules.held);
+    for (std::size_t k = 0; k < rules.held.size(); ++k) {
+      const Index i = rules.held[k];
+      H.row(i).setZero();
+      H.col(i).setZero();
+      H(i, i) = curvatures[k];
+      g[i] = 0;
+    }
   }
   out.information = H;
   H.diagonal() *= 1 + rules.damping;

@@ -32,7 +32,7 @@ ArrowBlock make_block(const Eigen::MatrixXd& L, const Eigen::MatrixXd& Z, const 
 
 // damping: of Levenberg and Marquardt, on the diagonals; `precision` P may be full. used: recordings that take part;
 // empty: all. held: shared unknowns that stay at zero, pressed against a bound: what is left of their posterior is the
-// exponential tail exp(-|gradient| distance), which has a normal one's volume in log_volume_ratio.
+// tail of a normal one beyond its middle, whose volume is the one in log_volume_ratio.
 struct ArrowRules {
   double damping = 0;
   std::vector<bool> used{};

@@ -3,6 +3,8 @@
 
 #include <Eigen/Cholesky>
 #include <Eigen/LU>
+#include <cmath>
+#include <numbers>
 #include <random>
 
 #include "diagnosis/inference/arrow.hpp"
@@ -102,6 +104,46 @@ TEST(Arrow, WhatIsHeldStaysAndHasTheVolumeOfItsTail) {
   const ArrowSolution t = solve(blocks, MatrixXd(precision(rest, rest)), VectorXd::Zero(3));
   EXPECT_NEAR(s.least, t.least, 1e-9);
   EXPECT_GT(s.log_volume_ratio, t.log_volume_ratio);
+}
+
+TEST(Arrow, WhatPressesAgainstABoundHasTheVolumeThatItsCurvatureLeaves) {
+  const Problem p = random_problem(4);
+  const MatrixXd precision = p.precision.topLeftCorner(4, 4).diagonal().asDiagonal();
+  const std::vector<Index> rest = {0, 1, 3};
+  // From hardly pressing, half of a normal density, to an exponential tail.
+  for (const double pull : {0.0, 0.3, 3.0, 1000.0}) {
+    auto blocks = p.blocks;
+    const VectorXd centre = VectorXd::Unit(4, 2) * pull / precision(2, 2);
+    ArrowRules rules;
+    rules.held = {2};
+    const ArrowSolution s = solve(blocks, precision, centre, rules);
+    // The least of the rest, with that unknown at x.
+    double volume_rest = 0;
+    const auto least_at = [&](double x) {
+      auto moved = p.blocks;
+      for (auto& block : moved) {
+        block.ww += x * (x * block.zz(2, 2) - 2 * block.zw[2]);
+        block.lw -= x * block.lz.col(2);
+        block.zw = VectorXd((block.zw - x * block.zz.col(2))(rest));
+        block.lz = MatrixXd(block.lz(Eigen::all, rest));
+        block.zz = MatrixXd(block.zz(rest, rest));
+      }
+      const ArrowSolution t = solve(moved, MatrixXd(precision(rest, rest)), VectorXd::Zero(3));
+      volume_rest = t.log_volume_ratio;
+      return t.least + precision(2, 2) * (x - centre[2]) * (x - centre[2]);
+    };
+    const double here = least_at(0), small = 1e-6;
+    const double inwards = least_at(small) > here ? 1 : -1;
+    // Trapezia over eight widths of the tail.
+    const double slope = (least_at(inwards * small) - here) / (2 * small);
+    const double curvature = (least_at(1) + least_at(-1) - 2 * here) / 2;
+    const double step = 8 / std::max(slope, std::sqrt(curvature)) / 20000;
+    double volume = 0.5 * step;
+    for (int i = 1; i < 20000; ++i) volume += step * std::exp(-0.5 * (least_at(inwards * i * step) - here));
+    EXPECT_NEAR(s.log_volume_ratio,
+                volume_rest + std::log(2 * std::numbers::pi) - 2 * std::log(volume) - std::log(precision(2, 2)), 2e-3)
+        << "pull " << pull;
+  }
 }
 
 }  // namespace
