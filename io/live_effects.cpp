@@ -11,7 +11,8 @@ std::string unknown_beforehand(const EffectEntry& entry) {
   return names;
 }
 
-LiveEffects live_effects(const std::vector<EffectEntry>& effects) {
+LiveEffects live_effects(const std::vector<EffectEntry>& effects,
+                         const std::vector<model::DiscrepancyCurve>& discrepancies) {
   LiveEffects live;
   std::vector<EffectEntry> known;
   for (const auto& entry : effects) {
@@ -21,13 +22,7 @@ LiveEffects live_effects(const std::vector<EffectEntry>& effects) {
       live.left_out.push_back("effect " + entry.name + " is left out: its " + unknown +
                               " differs from recording to recording and is not known before the next insertion");
   }
-  live.active = active_effects(known, "");
-  return live;
-}
-
-LiveEffects live_effects(const ModelFile& model) {
-  LiveEffects live = live_effects(model.effects);
-  for (const auto& curve : model.discrepancies) live.active.push_back(model::active_discrepancy(curve));
+  live.active = active_effects(known, discrepancies, "");
   return live;
 }
 

@@ -18,8 +18,8 @@ struct LiveEffects {
 };
 // For whoever acts on a model while the needle moves: the estimator and the controller have the same effects. Throws
 // std::invalid_argument as active_effects() does.
-LiveEffects live_effects(const std::vector<EffectEntry>& effects);
-// The discrepancies of the file behind them, which are all known beforehand.
-LiveEffects live_effects(const ModelFile& model);
+// The discrepancies, which are all known beforehand, come behind the effects.
+LiveEffects live_effects(const std::vector<EffectEntry>& effects,
+                         const std::vector<model::DiscrepancyCurve>& discrepancies = {});
 
 }  // namespace bevel::io

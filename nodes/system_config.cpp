@@ -201,7 +201,7 @@ SystemConfig load_system_config(const std::string& path) {
   c.rig.truth = c.needle;
   read_rig(file.section("rig", optional), folder, c.rig);
   file.finish();
-  c.live_effects = io::live_effects(believed);
+  c.live_effects = io::live_effects(believed.effects, believed.discrepancies);
   c.effects = std::move(believed.effects);
   c.discrepancies = std::move(believed.discrepancies);
   c.estimator.effects = c.live_effects.active;

@@ -97,8 +97,11 @@ class Discrepancy final : public Effect {
     // Legs between the same two knots share their error: over a length h of base motion from one knot to the next it
     // adds up to error^2 h^2, and to no more than error^2 (all the way so far)^2 where the covariate stands still.
     const double together = std::min(length_of(at, leg, step), std::abs(from + to - 2 * entry));
-    variance[static_cast<std::size_t>(kRow.at(static_cast<std::size_t>(component_)))] +=
-        error * error * together * step;
+    const double added = error * error * together * step;
+    const int row = kRow.at(static_cast<std::size_t>(component_));
+    variance[static_cast<std::size_t>(row)] += added;
+    // Who is further in has bent further too.
+    if (row == 2) variance[3] += added * leg.curvature_per_mm.value * leg.curvature_per_mm.value;
   }
   void blur(const EffectMemory& memory, std::array<double, 3>& variance_mm2) const override {
     if (axis() >= 0) variance_mm2[static_cast<std::size_t>(axis())] += memory.slot[1].value * memory.slot[1].value;

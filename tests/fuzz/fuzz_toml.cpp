@@ -77,7 +77,7 @@ void read_model(std::string_view text) {
   }
   for (const auto& one : io::active_effects(model, "rec.lcm"))
     for (const model::Dual& value : one.parameters) BEVEL_MUST(std::isfinite(value.value));
-  (void)io::live_effects(model.effects);
+  (void)io::live_effects(model.effects, model.discrepancies);
 }
 
 }  // namespace

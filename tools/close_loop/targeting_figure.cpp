@@ -121,7 +121,7 @@ TargetingFigures steer_all(const Models& models, const diagnosis::RecordedCase& 
   std::vector<Believed> beliefs;
   for (const double forgiveness : {1.0, kForgiveness})
     for (const io::ModelFile& model : models)
-      beliefs.push_back({model.needle, io::live_effects(model).active, forgiveness, true,
+      beliefs.push_back({model.needle, io::live_effects(model.effects, model.discrepancies).active, forgiveness, true,
                          model.variation.value_or(model::Variation{})});
   figures.axes_matter = controller::AxisModel(beliefs[kAugmented].effects).turns_late();
   if (figures.axes_matter) {
