@@ -87,7 +87,7 @@ inference::Evaluated best_of(const inference::Likelihood& likelihood, const infe
     sd[g] = values[values.size() / 2];
   }
   const inference::Layout nothing(system, {});
-  inference::Evaluated best = evaluate(likelihood, nullptr, nothing, nothing.shared_start(),
+  inference::Evaluated best = evaluate(likelihood, nothing, nothing.shared_start(),
                                        {likelihood.recordings(), nothing.local_start()}, sd);
   const inference::Proposals proposals(likelihood, best.fit, 1);
   for (const std::size_t effect : set) {
@@ -102,7 +102,7 @@ inference::Evaluated best_of(const inference::Likelihood& likelihood, const infe
         for (const VectorXd& one : from.local) local.push_back(layout.local_from(from.layout, one));
         shared.tail(start.shared.size()) = start.shared;
         for (std::size_t r = 0; r < start.local.size(); ++r) local[r].tail(start.local[r].size()) = start.local[r];
-        auto one = evaluate(likelihood, nullptr, layout, shared, local, from.scales.nuisance_sd);
+        auto one = evaluate(likelihood, layout, shared, local, from.scales.nuisance_sd);
         if (one.valid && (!best.valid || one.log_evidence > best.log_evidence)) best = std::move(one);
       }
     }
