@@ -84,7 +84,7 @@ struct Fit {
   Scales scales;
   Eigen::VectorXd shared;
   std::vector<Eigen::VectorXd> local;
-  Eigen::VectorXd curve_values;                  // in units of `unit` of the curve; empty: no curve
+  Eigen::VectorXd curve_values;                  // in the component's unit; empty: no curve
   std::shared_ptr<const Likelihood> likelihood;  // by whose noise it was fitted
   double cost = 0;                               // squared whitened residuals and priors' pulls
   std::vector<Eigen::Index> held;                // shared unknowns that press against a bound

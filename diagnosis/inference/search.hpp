@@ -13,7 +13,7 @@ namespace bevel::inference {
 
 struct SearchRules {
   std::size_t largest = 3;
-  double window = 3.5;         // in log posterior: sets below are not looked at further (odds of 30)
+  double window = 3.5;         // in log posterior: sets below are not looked at further (odds of 33)
   double curve_window = 15.0;  // without a discrepancy: sets further below are not looked at with one
   double optimism = 2.0;       // by which a refit may exceed what the linear model promised
   double doubt = 12.0;         // below by that after a first fit: noise and variation are not fitted

@@ -1,7 +1,7 @@
 #pragma once
 // What the engine sees of a model: readings with their derivatives by shared parameters and by each recording's own
 // unknowns, a discrepancy's components, and effects with their priors. It knows nothing else of what it judges; a
-// needle is one client (diagnosis/mismatch), a pendulum another (tests/inference).
+// needle is one client (diagnosis/needle), a pendulum another (tests/inference).
 #include <memory>
 #include <string>
 #include <vector>

@@ -1,5 +1,6 @@
 #include "diagnosis/mismatch/decision.hpp"
 
+#include <algorithm>
 #include <set>
 
 namespace bevel::diagnosis {
@@ -37,21 +38,30 @@ Decision decide(const Search& search, const Posterior& posterior) {
       if (probability > 0.5 * something) names.insert(name);
     unknown = posterior.discrepancy > 0.5 * something;
     if (names.empty() && !unknown) {
+      // No name and no discrepancy by itself: the likeliest set, by its share without one.
+      double most = 0;
       for (const auto& share : posterior.sets)
-        if (!share.set.empty() && names.empty()) names = names_of(search, share.set);
+        if (const double plain = share.probability - share.with_discrepancy; !share.set.empty() && plain > most)
+          names = names_of(search, share.set), most = plain;
+      unknown = names.empty() && posterior.discrepancy > 0;
     }
   }
-  out.verdict = unknown ? Verdict::unknown_effect : names.empty() ? Verdict::nothing_missing : Verdict::effects_found;
-  // The likeliest of those sets; of all, should no set that was visited hold just these.
+  // The likeliest set of just these names; if none was visited, of those with as many of them as any.
   const inference::Visited* best = nullptr;
-  for (const bool exactly : {true, false}) {
-    for (const auto& [set, one] : search.visited()) {
-      if ((exactly && names_of(search, set) != names) || (unknown && !one.at->fit_with_curve)) continue;
-      const auto log = [&](const inference::Visited& v) { return unknown ? v.log_with_curve : v.log_without_curve; };
-      if (!best || log(one) > log(*best)) best = &one;
-    }
-    if (best) break;
+  std::size_t best_shared = 0;
+  const auto log = [&](const inference::Visited& v) { return unknown ? v.log_with_curve : v.log_without_curve; };
+  for (const auto& [set, one] : search.visited()) {
+    if (unknown && !one.at->fit_with_curve) continue;
+    const auto held = names_of(search, set);
+    const auto shared = static_cast<std::size_t>(
+        std::count_if(names.begin(), names.end(), [&](const auto& name) { return held.contains(name); }));
+    const std::size_t score = 2 * shared + (held == names ? 1 : 0);
+    if (!best || score > best_shared || (score == best_shared && log(one) > log(*best)))
+      best = &one, best_shared = score;
   }
+  out.verdict = unknown             ? Verdict::unknown_effect
+                : best->set.empty() ? Verdict::nothing_missing
+                                    : Verdict::effects_found;
   out.model = unknown ? model_of(search, *best->at->fit_with_curve, best->log_with_curve)
                       : model_of(search, best->at->fit, best->log_without_curve);
   return out;

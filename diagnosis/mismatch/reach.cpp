@@ -33,8 +33,7 @@ Imagined with_effect(const NeedleSystem& system, const Imagined& base, std::size
 
 void find_reach(const NeedleSystem& system, const inference::Search& search, const ChosenModel& base,
                 const Experiments& experiments, Findings& findings) {
-  const inference::Marginal marginal(*base.fit->likelihood, *base.fit, base.curve);
-  const inference::Reach reach = search.proposals().reach(marginal);
+  const inference::Reach reach = search.proposals().reach(search.base_marginal());
   for (const auto& size : reach.sizes) {
     const auto& effect = system.effects()[size.effect];
     findings.detectable.push_back({.effect = effect.name,

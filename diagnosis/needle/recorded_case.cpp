@@ -164,7 +164,7 @@ RecordedCase make_case(std::vector<RawRecording> raw) {
   if (raw.size() < 2)
     throw std::invalid_argument(
         std::to_string(raw.size()) +
-        " recording given; at least two are needed: what is found in one has to foretell another");
+        " recording given; at least two are needed: what is found in one has to predict another");
   RecordedCase recorded;
   for (auto& one : raw) recorded.recordings.push_back(make_recording(one, recorded.channels));
   for (auto& recording : recorded.recordings) recording.series.resize(recorded.channels.size());

@@ -108,7 +108,9 @@ TEST(PendulumTest, ProbabilitiesAddUpAndHeldOutIsBetterWithWhatWasFound) {
   EXPECT_NEAR(sum, 1, 1e-9);
   EXPECT_GT(posterior.inclusion.at("dry_friction"), 0.5);
   for (const auto& [name, probability] : posterior.inclusion)
-    if (name != "dry_friction") EXPECT_LT(probability, 0.5) << name;
+    if (name != "dry_friction") {
+      EXPECT_LT(probability, 0.5) << name;
+    }
   EXPECT_GT(posterior.inclusion.at("dry_friction"), 0.9);
   EXPECT_LT(posterior.discrepancy, 0.5);
   const auto found = leave_out_selection(search);
@@ -116,7 +118,8 @@ TEST(PendulumTest, ProbabilitiesAddUpAndHeldOutIsBetterWithWhatWasFound) {
   // Each recording is likelier than by the base alone at its likeliest noise.
   const Fit& base = search.visited().at({}).at->fit;
   const auto blocks = linearise(*base.likelihood, base, {});
-  for (std::size_t r = 0; r < 6; ++r) EXPECT_GT(found[r].log_density, leave_out(base, blocks, {}, r).log_density) << "recording " << r;
+  for (std::size_t r = 0; r < 6; ++r)
+    EXPECT_GT(found[r].log_density, leave_out(base, blocks, {}, r).log_density) << "recording " << r;
 }
 
 }  // namespace

@@ -59,7 +59,7 @@ TEST(Diagnose, FindsWindupAndSaysSoInEveryPlace) {
   EXPECT_GT(found.outliers, 0U);
   EXPECT_EQ(found.channels, (std::vector<std::string>{"tip.x", "tip.y", "tip.z"}));
 
-  // What was left out foretells; what is left is noise.
+  // What was left out predicts; what is left is noise.
   EXPECT_NEAR(found.held_out.after.chi2_per_dof, 1, 0.1);
   EXPECT_GT(found.held_out.before.chi2_per_dof, found.held_out.after.chi2_per_dof);
   EXPECT_GT(found.held_out.before.rmse_mm, found.held_out.after.rmse_mm);

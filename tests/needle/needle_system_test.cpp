@@ -7,10 +7,13 @@
 
 #include "diagnosis/inference/search.hpp"
 #include "diagnosis/needle/curves.hpp"
+#include "model/effects/covariates.hpp"
 #include "tests/needle/simulated_rig.hpp"
 
 namespace bevel::diagnosis {
 namespace {
+
+using model::CovariateTracker;
 
 using Eigen::Index;
 using Eigen::MatrixXd;

@@ -12,7 +12,7 @@
 #include "diagnosis/inference/proposals.hpp"
 #include "diagnosis/needle/needle_system.hpp"
 #include "tests/inference/pendulum.hpp"
-#include "tests/mismatch/simulated_rig.hpp"
+#include "tests/needle/simulated_rig.hpp"
 
 namespace {
 

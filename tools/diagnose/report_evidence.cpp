@@ -101,8 +101,10 @@ void add_held_out(io::HtmlReport& page, const Findings& f) {
   if (f.held_out.recordings.empty()) return;
   page.heading("Recordings predicted");
   page.paragraph(
-      "Each recording in turn is put aside, the effects are chosen and fitted by the others, and the one put aside is "
-      "predicted as a new insertion. An effect of the wrong name fits what it has seen and gets the rest wrong.");
+      "Each recording in turn is put aside; by the others the sets that were looked at are weighed and their "
+      "parameters "
+      "fitted, and the one put aside is predicted as a new insertion. An effect of the wrong name fits what it has "
+      "seen and gets the rest wrong.");
   page.figure_svg(
       held_out_picture(f),
       f.verdict == Verdict::nothing_missing
@@ -118,8 +120,9 @@ void add_reach(io::HtmlReport& page, const Findings& f) {
   if (!f.detectable.empty()) {
     page.paragraph(
         "The smallest size of each effect that would have been seen: an absence is ruled out only above it. "
-        "\"Absorbed\" is the share of an effect's mark on the path that a slightly different k, lambda1 and lambda2 "
-        "would leave as well; what they absorb nobody can see.");
+        "\"Absorbed\" is the share of an effect's mark on the path that a slightly different needle, or insertions "
+        "that "
+        "differ, would leave as well; what they absorb nobody can see.");
     std::vector<std::vector<std::string>> rows;
     for (const auto& d : f.detectable)
       rows.push_back({d.effect, words_of(d.parameter), size_of(d, d.size), size_of(d, d.typical), percent(d.absorbed)});
@@ -133,9 +136,10 @@ void add_reach(io::HtmlReport& page, const Findings& f) {
   if (picture.empty()) return;
   page.subheading("Which effects look alike here");
   page.figure_svg(picture,
-                  "How alike two effects look in these recordings once k, lambda1 and lambda2 have absorbed what they "
-                  "can: 0 altogether different, 1 the same. Above 0.95 they cannot be told apart and the verdict names "
-                  "both. The first column is what the needle absorbs.");
+                  "How alike two effects look in these recordings once the needle and the variation between insertions "
+                  "have absorbed what they can: 0 altogether different, 1 the same. Above 0.95 only their forms and "
+                  "their usual sizes tell them apart; a rival at odds of less than 20 to 1 is named beside what was "
+                  "found. The first column is what is absorbed.");
 }
 
 void add_next_experiment(io::HtmlReport& page, const Findings& f) {
