@@ -153,7 +153,7 @@ Findings diagnose(const RecordedCase& recorded, const model::NeedleParameters& m
   Stages stages(options, findings.times);
 
   stages.begin("measuring the cameras' noise");
-  const NeedleSystem system(recorded, model);
+  const NeedleSystem system(recorded, model, options.known);
   const inference::Calibration calibration = calibrate(system);
   for (const auto& recording : recorded.recordings) findings.readings += recording.motion.at.size();
   for (const auto& readings : calibration.outliers) findings.outliers += readings.size();

@@ -4,12 +4,14 @@
 #include <functional>
 
 #include "diagnosis/mismatch/findings.hpp"
+#include "diagnosis/needle/needle_system.hpp"
 
 namespace bevel::diagnosis {
 
 struct DiagnosisOptions {
   int threads = 2;
   std::size_t largest_set = 3;
+  KnownPhysics known{};  // of the model in use, beside its needle
   // Called between stages with a sentence of progress; may throw to stop.
   std::function<void(const std::string&)> progress;
 };

@@ -140,14 +140,15 @@ Experiments::Experiments(const NeedleSystem& system, const inference::Noise& noi
     recording.series.assign(planned.channels.size(), series);
     planned.recordings.push_back(std::move(recording));
   }
-  planned_ = std::make_unique<const NeedleSystem>(std::move(planned), system.model());
+  planned_ = std::make_unique<const NeedleSystem>(std::move(planned), system.model(),
+                                                  KnownPhysics{.in_recording = {}, .elsewhere = system.known(-1)});
   likelihood_ = std::make_unique<const inference::Likelihood>(*planned_, inference::Readings(scripts_.size()), noise);
 }
 
 double Experiments::separation(std::size_t script, const Imagined& truth, const Imagined& rival) const {
   const model::Motion& motion = scripts_[script].motion;
   std::vector<Eigen::Vector3d> path;
-  if (!system_.tip_path(truth.set, motion, truth.shared, truth.local, truth.discrepancy, path)) return 0;
+  if (!system_.tip_path(truth.set, motion, -1, truth.shared, truth.local, truth.discrepancy, path)) return 0;
   inference::Prediction prediction;
   if (!planned_->predict(rival.set, script, rival.shared, rival.local, true, prediction)) return 0;
   VectorXd difference = -prediction.reading;

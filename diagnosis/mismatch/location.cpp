@@ -144,13 +144,13 @@ std::vector<Trace> make_traces(const NeedleSystem& system, const inference::Read
     const std::vector<Eigen::Vector3d> nowhere(trace.time_s.size(), Eigen::Vector3d::Constant(nan));
     trace.model_file_mm = nowhere;
     model::OpenLoop path;
-    if (model::predict(model::AugmentedNeedle(model_file), recording.motion, path))
+    if (model::predict(model::AugmentedNeedle(model_file, system.known(static_cast<int>(r))), recording.motion, path))
       trace.model_file_mm = path.position_mm;
     const auto predicted = [&](const ChosenModel& model) {
       const Fit& fit = *model.fit;
       const auto discrepancy = fit.scales.curve ? model.discrepancy() : DiscrepancyValues{};
       std::vector<Eigen::Vector3d> out;
-      if (!system.tip_path(fit.layout.set(), recording.motion, fit.shared, fit.local[r],
+      if (!system.tip_path(fit.layout.set(), recording.motion, static_cast<int>(r), fit.shared, fit.local[r],
                            fit.scales.curve ? &discrepancy : nullptr, out))
         out = nowhere;
       return out;

@@ -25,6 +25,7 @@ constexpr double kSmallestU = 1e-9;      // (26) is strict
 constexpr double kExpectedShare = 0.75;  // scale of a size's prior, of the largest that is reported
 constexpr double kFewestReadings = 2.5;  // a period
 constexpr double kFewestPeriods = 1.5;   // of the longest recording
+constexpr std::size_t kMostKnown = 2;    // beside the variation, three effects and the parts of a curve: kMaxEffects
 
 // Tilts and rolls the needle at its entry: what an insertion has of its own.
 class EntryVariation final : public model::Effect {
@@ -126,8 +127,16 @@ inference::Dataset data_of(const RecordedCase& recorded) {
 
 }  // namespace
 
-NeedleSystem::NeedleSystem(RecordedCase recorded, const model::NeedleParameters& model)
-    : recorded_(std::move(recorded)), model_(model), data_(data_of(recorded_)), groups_(variation_groups()) {
+NeedleSystem::NeedleSystem(RecordedCase recorded, const model::NeedleParameters& model, KnownPhysics known)
+    : recorded_(std::move(recorded)),
+      model_(model),
+      known_(std::move(known)),
+      data_(data_of(recorded_)),
+      groups_(variation_groups()) {
+  if (known_.elsewhere.size() > kMostKnown)
+    throw std::invalid_argument("the model in use has " + std::to_string(known_.elsewhere.size()) +
+                                " effects and discrepancies; at most " + std::to_string(kMostKnown) +
+                                " can be held while more is looked for");
   const double u = std::max(model.lambda1_per_rad - model.lambda2 * model.lambda2 / (2 * std::numbers::pi), kSmallestU);
   const double width_k = kCurvatureShare * std::max(std::abs(model.curvature_per_mm), 1e-4);
   base_ = {{.name = "curvature_per_mm",
@@ -150,7 +159,10 @@ NeedleSystem::NeedleSystem(RecordedCase recorded, const model::NeedleParameters&
             .prior = inference::normal_prior(model.lambda2, kLambda2Width)}};
   nuisances_ = {{"curvature", 0}, {"tilt_x_rad", 1}, {"tilt_y_rad", 1},
                 {"roll_rad", 3},  {"entry_x_mm", 2}, {"entry_y_mm", 2}};
-  for (const model::Effect* effect : model::all_effects())
+  for (const model::Effect* effect : model::all_effects()) {
+    if (std::any_of(known_.elsewhere.begin(), known_.elsewhere.end(),
+                    [&](const auto& one) { return one.effect == effect; }))
+      continue;
     for (const std::uint32_t variant : effect->variants()) {
       inference::Effect one{.name = std::string(effect->name()), .label = label_of(*effect, variant), .parameters = {}};
       for (std::size_t p = 0; p < effect->parameters().size(); ++p)
@@ -160,6 +172,7 @@ NeedleSystem::NeedleSystem(RecordedCase recorded, const model::NeedleParameters&
       physics_.push_back(effect);
       variants_.push_back(variant);
     }
+  }
   std::vector<const model::Motion*> motions;
   for (const auto& recording : recorded_.recordings) motions.push_back(&recording.motion);
   needle_curves_ = find_curves(motions);
@@ -215,7 +228,12 @@ MatrixXd NeedleSystem::rows_of(std::size_t r, const model::OpenLoop& path, bool 
   return out;
 }
 
-bool NeedleSystem::follow(const ModelSet& set, const model::Motion& motion, const VectorXd& shared,
+const std::vector<model::ActiveEffect>& NeedleSystem::known(int recording) const {
+  const auto r = static_cast<std::size_t>(recording);
+  return recording >= 0 && r < known_.in_recording.size() ? known_.in_recording[r] : known_.elsewhere;
+}
+
+bool NeedleSystem::follow(const ModelSet& set, const model::Motion& motion, int recording, const VectorXd& shared,
                           const VectorXd& local, const DiscrepancyValues* discrepancy, Columns* columns,
                           model::OpenLoop& path) const {
   model::NeedleParameters needle = this->needle(shared);
@@ -243,6 +261,7 @@ bool NeedleSystem::follow(const ModelSet& set, const model::Motion& motion, cons
     }
     effects.push_back(active);
   }
+  effects.insert(effects.end(), known(recording).begin(), known(recording).end());
   if (discrepancy) {
     for (std::size_t part = 0; part < parts_of_curve_; ++part) {
       model::ActiveEffect active;
@@ -260,11 +279,11 @@ bool NeedleSystem::follow(const ModelSet& set, const model::Motion& motion, cons
   return model::predict(augmented, motion, path);
 }
 
-bool NeedleSystem::tip_path(const ModelSet& set, const model::Motion& motion, const VectorXd& shared,
+bool NeedleSystem::tip_path(const ModelSet& set, const model::Motion& motion, int recording, const VectorXd& shared,
                             const VectorXd& local, const DiscrepancyValues* discrepancy,
                             std::vector<Eigen::Vector3d>& out) const {
   model::OpenLoop path;
-  if (!follow(set, motion, shared, local, discrepancy, nullptr, path)) return false;
+  if (!follow(set, motion, recording, shared, local, discrepancy, nullptr, path)) return false;
   out = path.position_mm;
   for (auto& position : out) position.head<2>() += local.segment<2>(kEntryX);
   return true;
@@ -274,7 +293,8 @@ bool NeedleSystem::predict(const ModelSet& set, std::size_t r, const VectorXd& s
                            bool derivatives, inference::Prediction& out) const {
   thread_local model::OpenLoop path;
   Columns columns;
-  if (!follow(set, recorded_.recordings[r].motion, shared, local, nullptr, derivatives ? &columns : nullptr, path))
+  if (!follow(set, recorded_.recordings[r].motion, static_cast<int>(r), shared, local, nullptr,
+              derivatives ? &columns : nullptr, path))
     return false;
   out.reading = rows_of(r, path, false);
   MatrixXd entry(out.reading.size(), 2);
@@ -305,7 +325,7 @@ MatrixXd NeedleSystem::by_curves(std::size_t r, const VectorXd& base) const {
   const model::NeedleParameters needle = this->needle(base);
   constexpr std::size_t kTogether = static_cast<std::size_t>(model::kMaxColumns) / kValuesOfPart;
   for (std::size_t first = 0; first < curve_physics_.size(); first += kTogether) {
-    std::vector<model::ActiveEffect> effects;
+    std::vector<model::ActiveEffect> effects = known(static_cast<int>(r));
     int column = 0;
     for (std::size_t i = first; i < std::min(first + kTogether, curve_physics_.size()); ++i) {
       model::ActiveEffect active;

@@ -14,6 +14,12 @@ enum BaseParameter : int { kCurvature, kU, kLambda2, kBaseParameters };
 // (rad), the bevel's roll there (rad), registration (mm).
 enum Variation : int { kOwnCurvature, kTiltX, kTiltY, kRoll, kEntryX, kEntryY, kVariations };
 
+// Physics that the model in use has already: held as it is in every prediction.
+struct KnownPhysics {
+  std::vector<std::vector<model::ActiveEffect>> in_recording;  // in the order of the recordings
+  std::vector<model::ActiveEffect> elsewhere;                  // in a motion that was not recorded
+};
+
 // Values of one of the system's curves.
 struct DiscrepancyValues {
   std::size_t curve = 0;
@@ -22,10 +28,13 @@ struct DiscrepancyValues {
 
 class NeedleSystem final : public inference::System {
  public:
-  NeedleSystem(RecordedCase recorded, const model::NeedleParameters& model);
+  // Throws std::invalid_argument where `known` is too much to add anything to. An effect that is known is no candidate.
+  NeedleSystem(RecordedCase recorded, const model::NeedleParameters& model, KnownPhysics known = {});
 
   const RecordedCase& recorded() const { return recorded_; }
   const model::NeedleParameters& model() const { return model_; }  // in use
+  // What the model in use says of a recording, as it stands; a recording's index, or -1 for a motion elsewhere.
+  const std::vector<model::ActiveEffect>& known(int recording) const;
   const inference::Dataset& data() const override { return data_; }
   const std::vector<inference::Parameter>& base() const override { return base_; }
   const std::vector<inference::Effect>& effects() const override { return effects_; }
@@ -48,8 +57,9 @@ class NeedleSystem final : public inference::System {
     return to_model(needle_curves_[curve], std::move(values), std::move(std_errors));
   }
   // Positions of the tip at the readings of any motion, in {A}, mm; unknowns as for predict. discrepancy may be null.
-  bool tip_path(const inference::ModelSet& set, const model::Motion& motion, const Eigen::VectorXd& shared,
-                const Eigen::VectorXd& local, const DiscrepancyValues* discrepancy,
+  // recording: whose motion it is, or -1.
+  bool tip_path(const inference::ModelSet& set, const model::Motion& motion, int recording,
+                const Eigen::VectorXd& shared, const Eigen::VectorXd& local, const DiscrepancyValues* discrepancy,
                 std::vector<Eigen::Vector3d>& out) const;
 
  private:
@@ -57,13 +67,14 @@ class NeedleSystem final : public inference::System {
   struct Columns {
     std::vector<Eigen::Index> shared, local;
   };
-  bool follow(const inference::ModelSet& set, const model::Motion& motion, const Eigen::VectorXd& shared,
+  bool follow(const inference::ModelSet& set, const model::Motion& motion, int recording, const Eigen::VectorXd& shared,
               const Eigen::VectorXd& local, const DiscrepancyValues* discrepancy, Columns* columns,
               model::OpenLoop& path) const;
   Eigen::MatrixXd rows_of(std::size_t recording, const model::OpenLoop& path, bool derivatives) const;
 
   RecordedCase recorded_;
   model::NeedleParameters model_;
+  KnownPhysics known_;
   inference::Dataset data_;
   std::vector<inference::Parameter> base_;
   std::vector<inference::Effect> effects_;

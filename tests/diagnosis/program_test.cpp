@@ -141,10 +141,22 @@ TEST_F(Program, BadInputIsOneMessageAndStatusOne) {
                                       << "lambda1_per_rad = 0.01\nlambda2 = 0.9\n";
   expect_refused({"-m", (folder / "wild.toml").string(), "-o", (folder / "out").string(), logs[0], logs[1]},
                  "wild.toml");
-  io::save_model_file({model::testing::agar(), {{"drilling", {{"coefficient_mm_per_rad", 1.5}}, {}}}},
-                      (folder / "with.toml").string());
-  expect_refused({"-m", (folder / "with.toml").string(), "-o", (folder / "out").string(), logs[0], logs[1]},
-                 "has [[effect]] \"drilling\"");
+}
+
+// What the model in use has already is held, and kept in what is written.
+TEST_F(Program, DiagnosesOnTopOfWhatIsKnown) {
+  write_logs({active("drilling", {2.0}), active("insertion_scale", {0.92})});
+  io::save_model_file({model::testing::agar(), {{"drilling", {{"coefficient_mm_per_rad", 2.0}}, {}}}}, model_path);
+  const Said said = run(usual("out"));
+  ASSERT_EQ(said.status, 0) << said.err;
+  const auto verdict = nlohmann::json::parse(text_of(folder / "out/verdict.json"));
+  ASSERT_EQ(verdict["effects"].size(), 1U) << said.out;
+  EXPECT_EQ(verdict["effects"][0]["name"], "insertion_scale");
+  const io::ModelFile model = io::load_model_file((folder / "out/model.toml").string());
+  ASSERT_EQ(model.effects.size(), 2U);
+  EXPECT_EQ(model.effects[0].name, "drilling");
+  EXPECT_EQ(model.effects[1].name, "insertion_scale");
+  ASSERT_TRUE(model.variation.has_value());
 }
 
 TEST_F(Program, UsageErrorsAreStatusTwo) {

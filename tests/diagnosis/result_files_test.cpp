@@ -42,7 +42,7 @@ TEST_F(Results, VerdictsFollowTheSchema) {
   if (std::system(validate.c_str()) != 0) GTEST_SKIP() << "no python3-jsonschema (tools/setup installs it)";
   auto odd = made_up(Verdict::nothing_missing);
   odd.held_out.before.chi2_per_dof = std::numeric_limits<double>::infinity();
-  odd.noise.sigma_mm = {};
+  odd.noise.sigma = {};
   write_together(folder.path(), {{"found.json", verdict_json(made_up(Verdict::effects_found))},
                                  {"nothing.json", verdict_json(made_up(Verdict::nothing_missing))},
                                  {"unknown.json", verdict_json(made_up(Verdict::unknown_effect))},

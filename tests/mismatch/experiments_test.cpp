@@ -113,7 +113,8 @@ TEST(Separation, IsByHowMuchTheRivalRefittedIsWorse) {
     Recording more;
     more.motion = script.motion;
     std::vector<Eigen::Vector3d> path;
-    ASSERT_TRUE(known.system.tip_path(truth.layout.set(), script.motion, truth.shared, true_one.local, nullptr, path));
+    ASSERT_TRUE(
+        known.system.tip_path(truth.layout.set(), script.motion, -1, truth.shared, true_one.local, nullptr, path));
     for (const auto& channel : recorded.channels) {
       Series series;
       for (std::size_t i = 0; i < path.size(); ++i) {

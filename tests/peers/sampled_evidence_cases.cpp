@@ -94,7 +94,7 @@ inference::Evaluated best_of(const inference::Likelihood& likelihood, const infe
     const inference::Fit from = best.fit;
     const inference::Layout layout(system, inference::with(from.layout.set(), effect));
     best.valid = false;
-    for (const auto& proposal : proposals.beside(likelihood, from, {}, kStarts)) {
+    for (const auto& proposal : proposals.beside(inference::Marginal(likelihood, from, {}), kStarts)) {
       if (proposal.effect != effect) continue;
       for (const inference::StartPoint& start : proposal.starts) {
         VectorXd shared = layout.shared_from(from.layout, from.shared);

@@ -42,8 +42,10 @@ ClosedLoop close_the_loop(const Options& options, std::ostream& err) {
   const diagnosis::Findings& findings = loop.findings;
 
   // Through the file and back: what is shown is what the other programs will read.
-  loop.models = {io::load_model_file(files.model_path), io::ModelFile{findings.base.value, {}},
-                 io::parse_model_file(io::to_toml(diagnose::model_of(findings)), "model.toml")};
+  io::ModelFile refitted = found.model;
+  refitted.needle = findings.base.value;
+  loop.models = {found.model, refitted,
+                 io::parse_model_file(io::to_toml(diagnose::model_of(findings, found.model)), "model.toml")};
   const diagnosis::RecordedCase recorded = without_outliers(diagnose::read_case(files.logs).recorded, findings);
   const auto noise = measure_noise(files.logs, loop.models[kAsItCame], estimator);
 

@@ -33,8 +33,10 @@ diagnosis::RecordedCase without_outliers(const diagnosis::RecordedCase& recorded
   }
   diagnosis::RecordedCase out = recorded;
   for (std::size_t r = 0; r < out.recordings.size(); ++r) {
-    inference::SeriesSet set{.series = std::move(out.recordings[r].series)};
-    out.recordings[r].series = inference::without({.recordings = {set}}, {outliers[r]}).recordings[0].series;
+    inference::Dataset one;
+    one.recordings.resize(1);
+    one.recordings[0].series = std::move(out.recordings[r].series);
+    out.recordings[r].series = inference::without(one, {outliers[r]}).recordings[0].series;
   }
   return out;
 }

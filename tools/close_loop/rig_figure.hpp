@@ -5,6 +5,7 @@
 #include <vector>
 
 #include "diagnosis/inference/noise.hpp"
+#include "diagnosis/needle/recorded_case.hpp"
 #include "io/model_file.hpp"
 
 namespace bevel::close_loop {

@@ -21,15 +21,6 @@ using namespace bevel::diagnosis;  // NOLINT(google-build-using-namespace): the 
 
 namespace {
 
-io::ModelFile load_model(const std::string& path) {
-  io::ModelFile model = io::load_model_file(path);
-  if (!model.effects.empty())
-    throw std::runtime_error(path + ": has [[effect]] \"" + model.effects.front().name +
-                             "\"; effects are looked for beside a bare [needle]: give the model file without them, " +
-                             "what is there will be found again");
-  return model;
-}
-
 void print_parameter(std::ostream& out, const FoundParameter& p, const std::string& log) {
   out << "    " << in_words(p.name) << (log.empty() ? "" : " in " + log) << ": " << with_error(p.value, p.std_error)
       << ", 95 % " << interval(p.ci95) << (p.at_bound ? ", at its bound" : "") << '\n';
@@ -45,18 +36,21 @@ std::string listed(const std::vector<std::string>& names) {
 
 Found find(const Options& options, std::ostream& err) {
   Progress progress(options.quiet ? nullptr : stderr);
-  const io::ModelFile model = load_model(options.model_path);
+  io::ModelFile model = io::load_model_file(options.model_path);
   progress.say("reading " + std::to_string(options.logs.size()) + " logs");
   ReadCase input = read_case(options.logs);
   for (const auto& remark : input.remarks) err << remark << std::endl;  // before the minutes of work
   const double reading_s = progress.seconds();
   DiagnosisOptions how;
   how.threads = options.threads;
+  how.known.elsewhere = io::active_effects(model, "");
+  for (const auto& recording : input.recorded.recordings)
+    how.known.in_recording.push_back(io::active_effects(model, recording.name));
   how.progress = [&](const std::string& text) { progress.say(text); };
   Findings findings = diagnosis::diagnose(input.recorded, model.needle, how);
   findings.remarks.insert(findings.remarks.begin(), input.remarks.begin(), input.remarks.end());
   findings.times.insert(findings.times.begin(), {"reading the logs", reading_s});
-  return {std::move(findings), !input.remarks.empty()};
+  return {std::move(findings), std::move(model), !input.remarks.empty()};
 }
 
 void print_verdict(std::ostream& out, const Findings& f) {
@@ -92,7 +86,7 @@ int run(const Options& options, std::ostream& out, std::ostream& err) {
   const Found found = find(options, err);
   const Findings& findings = found.findings;
   write_together(options.out_folder, {{"report.html", report_html(findings, options.model_path)},
-                                      {"model.toml", io::to_toml(model_of(findings))},
+                                      {"model.toml", io::to_toml(model_of(findings, found.model))},
                                       {"verdict.json", verdict_json(findings)}});
   print_verdict(out, findings);
   out << "\nwritten: " << options.out_folder << "/verdict.json, report.html, model.toml\n";

@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "diagnosis/mismatch/findings.hpp"
+#include "io/model_file.hpp"
 
 namespace bevel::diagnose {
 
@@ -18,6 +19,7 @@ struct Options {
 
 struct Found {
   diagnosis::Findings findings;
+  io::ModelFile model;         // in use
   bool input_damaged = false;  // so that it did not stand in the way; the findings' remarks say how
 };
 

@@ -197,8 +197,9 @@ std::string verdict_json(const Findings& f) {
   return j.dump(2, ' ', false, json::error_handler_t::replace) + "\n";
 }
 
-io::ModelFile model_of(const Findings& findings) {
-  io::ModelFile model{findings.needle.value, {}};
+io::ModelFile model_of(const Findings& findings, const io::ModelFile& in_use) {
+  io::ModelFile model = in_use;  // what was known stays
+  model.needle = findings.needle.value;
   for (const auto& effect : findings.effects) {
     io::EffectEntry entry{.name = effect.name};
     for (const auto& p : effect.parameters) entry.parameters[p.name] = p.value;

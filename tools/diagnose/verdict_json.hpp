@@ -10,8 +10,8 @@ namespace bevel::diagnose {
 
 std::string verdict_json(const diagnosis::Findings& findings);
 
-// What was found as a model that the rig, the estimator and bevel-predict accept. Of an unknown effect it carries the
-// known part alone: a name is never invented.
-io::ModelFile model_of(const diagnosis::Findings& findings);
+// What was found, beside what the model in use had already, as a model that the rig, the estimator and bevel-predict
+// accept. Of an unknown effect it carries the discrepancy: a name is never invented.
+io::ModelFile model_of(const diagnosis::Findings& findings, const io::ModelFile& in_use = {});
 
 }  // namespace bevel::diagnose
