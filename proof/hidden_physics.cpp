@@ -78,10 +78,10 @@ std::vector<EffectKind> make_catalogue(int edition) {
   const auto first = std::ranges::find_if(all, [](const EffectKind& kind) { return kind.name == "stick_slip"s; });
   // A jump of less than a third of a millimetre is, in these recordings, a play of that width.
   *first = {"stick_slip", true, {size("jump_mm", &P::stick_slip_mm, 0.6, 2.5)}, 0.5};
-  all.insert(all.end(), {{"winding", false, {size("share_per_rad", &P::winding_per_rad, 0.03, 0.15)}},
+  all.insert(all.end(), {{"winding", false, {size("share_per_rad", &P::winding_per_rad, 0.05, 0.2)}},
                          {"side_gradient",
                           false,
-                          {size("share_per_mm", &P::side_per_mm, 0.02, 0.06),
+                          {size("share_per_mm", &P::side_per_mm, 0.04, 0.12),
                            shape("direction_rad", &P::side_direction_rad, 0, 2 * std::numbers::pi)}},
                          {"axial_creep", false, {size("lag_at_100mm_mm", &P::creep_at_100mm_mm, 1.5, 5)}}});
   return all;
