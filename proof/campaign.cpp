@@ -72,7 +72,7 @@ void in_parallel(int count, int jobs, const std::function<void(int)>& work) {
   if (failure) std::rethrow_exception(failure);
 }
 
-// A folder belongs to one seed and one share of varied trials: trials of two would mix.
+// A folder belongs to one seed, one share of varied trials and one edition: trials of two would mix.
 void claim_folder(const CampaignOptions& options) {
   const fs::path path = options.out / "campaign.json";
   if (fs::exists(path)) {
@@ -85,9 +85,14 @@ void claim_folder(const CampaignOptions& options) {
       throw std::runtime_error(options.out.string() + ": holds trials of which a share of " + json(varied).dump() +
                                " is varied, not " + json(options.varied).dump() +
                                "; take that share or another folder");
+    const int edition = before.value("edition", 1);  // campaigns before there were two
+    if (edition != options.edition)
+      throw std::runtime_error(options.out.string() + ": holds trials of edition " + std::to_string(edition) +
+                               ", not " + std::to_string(options.edition) + "; take that edition or another folder");
     return;
   }
-  write_atomically(path, json{{"seed", options.seed}, {"varied", options.varied}}.dump(1) + "\n");
+  write_atomically(
+      path, json{{"seed", options.seed}, {"varied", options.varied}, {"edition", options.edition}}.dump(1) + "\n");
 }
 
 void write_commitments(const CampaignOptions& options) {
@@ -221,7 +226,8 @@ int run_campaign(const CampaignOptions& options, std::ostream& progress) {
     return interrupted != 0;
   };
   in_parallel(options.trials, options.jobs, [&](int i) {
-    if (prepare_trial(options.out, options.seed, i, options.varied)) say(trial_name(i) + " drawn and sealed");
+    if (prepare_trial(options.out, options.seed, i, options.varied, options.edition))
+      say(trial_name(i) + " drawn and sealed");
   });
   if (stopped()) return 130;
   write_commitments(options);
@@ -245,6 +251,7 @@ int run_campaign(const CampaignOptions& options, std::ostream& progress) {
   const Tally sums = tally(scores);
   json results{{"seed", options.seed},
                {"varied", options.varied},
+               {"edition", options.edition},
                {"sealed", facts.sealed},
                {"tool_sha256", facts.tool_sha256},
                {"commitments_sha256", facts.commitments_sha256},

@@ -20,7 +20,7 @@ struct Remark {
   const char* name;
   const char* text;
 };
-constexpr std::array<Remark, 30> kRemarks{{
+constexpr std::array<Remark, 33> kRemarks{{
     {"rotation_backlash", "teeth give over the last 12 % of the half clearance"},
     {"torsional_windup", "rotary elements of 6 mm in series, each with the friction of its part of the tissue"},
     {"insertion_backlash", "teeth give over the last 12 % of the half clearance"},
@@ -34,6 +34,8 @@ constexpr std::array<Remark, 30> kRemarks{{
     {"drilling", "by the tip's own rates; felt over 0.8 mm of travel"},
     {"flip_transient", "two stages, 85 % and 15 % of the length; none while retracting"},
     {"relaxation", "builds ever more slowly near its end; decays below 0.3 mm/s"},
+    {"stick_slip",
+     "a jump takes 4 ms, and friction of 15 % of a jump goes on meanwhile: a reversal has to overcome both"},
     {"puncture", "the tip creeps by 8 % while it is held, catches up with 40 ms"},
     {"tissue_motion", "3 % of the second harmonic"},
     {"lateral_bias", "grows along the way, by 20 % in 50 mm"},
@@ -49,10 +51,13 @@ constexpr std::array<Remark, 30> kRemarks{{
     {"roll_friction", "the tip's roll is pulled to two preferred directions"},
     {"screw", "turning the shaft also feeds it"},
     {"self_rotation", "the tip's roll drifts with depth"},
-    {"stick_slip", "the tip holds while the shaft is fed, then jumps"},
     {"camera_hysteresis", "y sags with depth and lags behind by a play of 30 mm"},
     {"camera_drift", "y drifts with time"},
     {"fibres", "curvature alternates with depth"},
+    {"winding", "fibres wind onto a shaft that is turned and hold the needle straighter, until it is turned back"},
+    {"side_gradient", "tissue is stiffer to one side, curvature grows that way"},
+    {"axial_creep",
+     "friction on the inserted length presses shaft and tissue together; both give way and recover in 0.4 and 4 s"},
 }};
 
 std::string remark_on(const std::string& name) {
@@ -89,7 +94,9 @@ std::string describe_distribution() {
     shares += "- " + std::string(name_of(share.trial_class)) + ": " + std::to_string(share.count) + " (" +
               percent(static_cast<double>(share.count) / kBlockSize) + ")\n";
   return "# What the blind trial draws from\n\n"
-         "Printed by `bevel-blindtrial --describe`. Units mm, s, rad. Uniform where nothing else is said.\n\n"
+         "Printed by `bevel-blindtrial --describe`: the second edition. In the first, that of the campaigns up to the "
+         "ninth (`--edition 1`), stick_slip was on no list, and winding, side_gradient and axial_creep did not exist. "
+         "Units mm, s, rad. Uniform where nothing else is said.\n\n"
          "## Classes\n\nIn every block of " +
          std::to_string(kBlockSize) + " trials, shuffled by the seed:\n\n" + shares + "\nOf the unlisted ones " +
          percent(kBeamShare) + " are the beam (below), and of the rest " + percent(kUnlistedAndListed) +
@@ -125,7 +132,9 @@ std::string describe_distribution() {
          "Each with the same probability. In " +
          percent(kNaturalShare) +
          " of cases of the size that the field reports (table); else scaled so that about 1.5 to 25 standard "
-         "deviations (log-uniform) can be seen, at most to 1.5 times the drawn size.\n\n" +
+         "deviations (log-uniform) can be seen, at most to 1.5 times the drawn size; a jump of stick_slip at least to "
+         "half of "
+         "it: a smaller one is, in these recordings, a play of its width.\n\n" +
          table(true) +
          "\nThe plain forms are read from the effects' definitions. A physical form departs from its plain one only as "
          "far as that departure, refitted over k, lambda1, lambda2 and the effect's own parameters, stays below " +
@@ -158,7 +167,8 @@ std::string describe_distribution() {
          "from them by what the physical forms, the drives' periodic errors and what is too small to be named make of "
          "it. Intervals are scored against both.\n\n"
          "An unlisted effect alone in its trial is also fitted by every listed one (plain form, its parameters and k, "
-         "lambda1, lambda2 free; not lost_steps and tissue_motion). Those that come closer than the limit are its "
+         "lambda1, lambda2 free; not lost_steps, tissue_motion and stick_slip). Those that come closer than the limit "
+         "are its "
          "rivals: no tool can know better from these recordings, and naming one counts as ambiguous, apart.\n\n"
          "## What binds whom\n\n"
          "A truth is bound by SHA-256 of a random salt and its text before the tool runs on its trial; so are the "

@@ -91,7 +91,11 @@ double DriveTrain::feed(double time_s, double base_mm) {
 double DriveTrain::membrane(double advance_mm, double depth_mm) {
   if (physics_.indentation_mm <= 0.0) return advance_mm;
   const double creep = 0.08 * physics_.departure;
-  if (membrane_ == Membrane::whole && depth_mm >= physics_.puncture_depth_mm) membrane_ = Membrane::loaded;
+  if (membrane_ == Membrane::whole && depth_mm >= physics_.puncture_depth_mm) {
+    membrane_ = Membrane::loaded;
+    // A tip that jumps is stopped by it and does not land beyond.
+    if (physics_.stick_slip_mm > 0.0) membrane_lag_mm_ = depth_mm - physics_.puncture_depth_mm;
+  }
   if (membrane_ == Membrane::loaded) {
     membrane_lag_mm_ += (advance_mm - last_advance_mm_) * (1.0 - creep);
     if (membrane_lag_mm_ < 0.0) membrane_ = Membrane::whole;
@@ -104,12 +108,41 @@ double DriveTrain::membrane(double advance_mm, double depth_mm) {
   return advance_mm - membrane_lag_mm_;
 }
 
+// Friction, so much per inserted length (Okamura, Simone and O'Leary 2004, IEEE Trans. Biomed. Eng. 51), presses the
+// shaft and the tissue about it together while it moves. Both give way and recover as two Kelvin bodies in series, one
+// quick and one slow.
+double DriveTrain::creep(double advance_mm, double inserted_mm) {
+  if (physics_.creep_at_100mm_mm <= 0.0) return advance_mm;
+  constexpr double kQuick_s = 0.4;
+  constexpr double kSlow_s = 4.0;
+  constexpr double kSlides_mm_s = 0.5;  // friction is full from about here on
+  const double speed_mm_s = (advance_mm - last_fed_mm_) / kStep_s;
+  last_fed_mm_ = advance_mm;
+  const double full_mm = physics_.creep_at_100mm_mm * inserted_mm / 100.0 * std::tanh(speed_mm_s / kSlides_mm_s);
+  creep_quick_mm_ += (0.5 * full_mm - creep_quick_mm_) * kStep_s / kQuick_s;
+  creep_slow_mm_ += (0.5 * full_mm - creep_slow_mm_) * kStep_s / kSlow_s;
+  return advance_mm - creep_quick_mm_ - creep_slow_mm_;
+}
+
+// Friction at rest holds the tip until the shaft has taken up a jump's length; then it slides that far, against a
+// friction of its own under which the shaft came in: only a reversal has to overcome that one as well.
 double DriveTrain::friction_hold(double advance_mm) {
-  if (physics_.stick_slip_mm <= 0.0) return advance_mm;
+  const double jump_mm = physics_.stick_slip_mm;
+  if (jump_mm <= 0.0) return advance_mm;
+  const double sliding_mm = 0.15 * physics_.departure * jump_mm;
+  const double pull_mm = advance_mm - slides_to_mm_ + sliding_mm;
+  if (std::abs(pull_mm) > jump_mm + sliding_mm) slides_to_mm_ += pull_mm > 0.0 ? jump_mm : -jump_mm;
+  const double left = physics_.departure > 0.0 ? std::exp(-kStep_s / (0.004 * physics_.departure)) : 0.0;
+  held_mm_ = slides_to_mm_ + (held_mm_ - slides_to_mm_) * left;
+  return held_mm_;
+}
+
+double DriveTrain::first_friction_hold(double advance_mm) {
+  if (physics_.first_stick_slip_mm <= 0.0) return advance_mm;
   const double stretch = advance_mm - held_mm_;
-  if (std::abs(stretch) > physics_.stick_slip_mm) slipping_ = true;
+  if (std::abs(stretch) > physics_.first_stick_slip_mm) slipping_ = true;
   if (slipping_) held_mm_ += stretch * kStep_s / 0.015;
-  if (std::abs(stretch) < 0.15 * physics_.stick_slip_mm) slipping_ = false;
+  if (std::abs(stretch) < 0.15 * physics_.first_stick_slip_mm) slipping_ = false;
   return held_mm_;
 }
 
@@ -122,8 +155,9 @@ DriveTrain::Tip DriveTrain::step(double time_s, double insertion_mm, double rota
   const double base_rad = rotation_rad + lost * physics_.lost_rotation_rad +
                           ripple_.rotation_rad * wave(2.0 * rotation_rad, ripple_.rotation_phase_rad);
 
-  double advance_mm = feed(time_s, insertion_gear_.follow(base_mm));
-  advance_mm = friction_hold(membrane(advance_mm, depth_mm)) + physics_.screw_mm_per_rad * rotation_rad;
+  const double fed_mm = feed(time_s, insertion_gear_.follow(base_mm));
+  double advance_mm = membrane(friction_hold(creep(fed_mm, std::max(fed_mm, 0.0))), depth_mm);
+  advance_mm = first_friction_hold(advance_mm) + physics_.screw_mm_per_rad * rotation_rad;
 
   const double geared_rad = rotation_gear_.follow(base_rad);
   const double inserted_mm = std::max(insertion_mm, 0.0);

@@ -56,7 +56,9 @@ class DriveTrain {
   double lost_share(double time_s) const;
   double feed(double time_s, double base_mm);
   double membrane(double advance_mm, double depth_mm);
+  double creep(double advance_mm, double inserted_mm);
   double friction_hold(double advance_mm);
+  double first_friction_hold(double advance_mm);
 
   HiddenPhysics physics_;
   DriveRipple ripple_;
@@ -72,6 +74,10 @@ class DriveTrain {
   double membrane_lag_mm_ = 0;
   double held_mm_ = 0;
   bool slipping_ = false;
+  double slides_to_mm_ = 0;
+  double creep_quick_mm_ = 0;
+  double creep_slow_mm_ = 0;
+  double last_fed_mm_ = 0;
 };
 
 }  // namespace bevel::proof

@@ -39,6 +39,7 @@ struct HiddenPhysics {
   double relaxation_build_mm = 3;
   double puncture_depth_mm = 0;
   double indentation_mm = 0;
+  double stick_slip_mm = 0;
   double motion_mm = 0;
   double motion_hz = 0.25;
   double motion_direction_rad = 0;
@@ -60,11 +61,15 @@ struct HiddenPhysics {
   double roll_friction_rad = 0;         // roll_friction: the tip's roll is led to preferred directions
   double screw_mm_per_rad = 0;          // screw: turning the shaft also feeds it
   double self_rotation_rad_per_mm = 0;  // self_rotation: the cut turns the tip
-  double stick_slip_mm = 0;             // stick_slip: the tip holds, then jumps
+  double first_stick_slip_mm = 0;       // stick_slip of the first edition: holds, then jumps, but not when fed fast
   double camera_hysteresis_mm = 0;      // camera_hysteresis: the view sags with the tip's depth, and lags
   double camera_drift_mm_per_s = 0;     // camera_drift: the stand moves
   double fibre_share = 0;               // fibres: curvature alternates with depth
   double fibre_period_mm = 20;
+  double winding_per_rad = 0;     // winding: tissue winds onto the shaft
+  double side_per_mm = 0;         // side_gradient: tissue is stiffer to one side
+  double side_direction_rad = 0;  // of that side, from x to y
+  double creep_at_100mm_mm = 0;   // axial_creep: friction presses the shaft together, at rest it recovers
 };
 
 // One thing concealed, as the truth says it.
@@ -89,9 +94,13 @@ struct EffectKind {
   const char* name;
   bool listed;  // false: `name` is the kind of an unknown effect
   std::vector<ParameterRange> parameters;
+  double least_factor = 0.003;  // made smaller than this, of what is drawn, it would no longer be what it is called
 };
 
-const std::vector<EffectKind>& catalogue();
+// Of the distribution: the first is that of the campaigns up to the ninth. With the second stick_slip is on the list,
+// and others take its place off it.
+inline constexpr int kEditions = 2;
+const std::vector<EffectKind>& catalogue(int edition = kEditions);
 const EffectKind& kind_of(const ConcealedEffect& effect);  // throws std::out_of_range for a name it does not hold
 
 // Sizes as the field reports them; instants and phases for recordings of these durations.

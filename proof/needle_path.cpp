@@ -9,6 +9,7 @@
 namespace bevel::proof {
 namespace {
 
+constexpr double kLongest_mm = 0.05;   // in one step of the integration
 constexpr double kSlowest_mm_s = 0.2;  // rate dependence is not continued below
 
 using Eigen::Vector2d;
@@ -46,15 +47,17 @@ class Tissue {
 
   // `speed_mm_s` and `turn_rad_s` are the base's: in the physical forms the tip's own take their place.
   void advance(double time_s, double advance_mm, double roll_before_rad, double roll_after_rad, double speed_mm_s,
-               double turn_rad_s) {
+               double turn_rad_s, double step_s) {
     const double roll_rad = 0.5 * (roll_before_rad + roll_after_rad);
     const double share = physics_.departure;
-    speed_mm_s += share * (std::abs(advance_mm) / kStep_s - speed_mm_s);
-    turn_rad_s += share * (std::abs(roll_after_rad - roll_before_rad) / kStep_s - turn_rad_s);
-    relax(advance_mm, speed_mm_s, roll_rad);
+    speed_mm_s += share * (std::abs(advance_mm) / step_s - speed_mm_s);
+    turn_rad_s += share * (std::abs(roll_after_rad - roll_before_rad) / step_s - turn_rad_s);
+    // A tip that sticks is at rest, whatever its base does.
+    relax(advance_mm, physics_.stick_slip_mm > 0.0 ? std::abs(advance_mm) / step_s : speed_mm_s, roll_rad, step_s);
     if (std::abs(advance_mm) < 1e-12) return;
     advanced_mm_ += advance_mm;
-    const double k = needle_.curvature_per_mm * softening(time_s, speed_mm_s, turn_rad_s, std::abs(advance_mm));
+    const double k = needle_.curvature_per_mm * softening(time_s, speed_mm_s, turn_rad_s, std::abs(advance_mm)) *
+                     surroundings(roll_rad);
     const Vector2d bevel = k * Vector2d(std::cos(roll_rad), std::sin(roll_rad));
     const Vector2d own = needle_.curvature_per_mm * Vector2d(std::cos(roll_rad), std::sin(roll_rad));
     const Vector2d curvature = recover(bevel, own, std::max(advance_mm, 0.0));
@@ -133,6 +136,21 @@ class Tissue {
     return factor;
   }
 
+  // What the tissue about the needle makes of its curvature.
+  double surroundings(double roll_rad) const {
+    double factor = 1.0;
+    // Fibres wind onto a shaft that turns, grasp it, and are unwound when it turns back: Langevin and others 2001,
+    // "Biomechanical response to acupuncture needling in humans", J. Appl. Physiol. 91.
+    if (physics_.winding_per_rad != 0.0)
+      factor /= 1.0 + physics_.winding_per_rad * std::abs(roll_rad - physics_.bevel_offset_rad);
+    // A stiffer side bends the needle more.
+    if (physics_.side_per_mm != 0.0) {
+      const Vector2d side(std::cos(physics_.side_direction_rad), std::sin(physics_.side_direction_rad));
+      factor *= std::max(0.2, 1.0 + physics_.side_per_mm * side.dot(tip_.p.head<2>()));
+    }
+    return factor;
+  }
+
   // Curvature follows the bevel over a length, in two stages of which the second is short.
   Vector2d recover(const Vector2d& bevel, const Vector2d& own, double cut_mm) {
     const double length_mm = physics_.flip_length_mm;
@@ -146,7 +164,7 @@ class Tissue {
   }
 
   // An elastic offset toward the bevel: builds while the tip cuts, goes at rest.
-  void relax(double advance_mm, double speed_mm_s, double roll_rad) {
+  void relax(double advance_mm, double speed_mm_s, double roll_rad, double step_s) {
     if (physics_.relaxation_mm <= 0.0) return;
     const Vector2d full = physics_.relaxation_mm * Vector2d(std::sin(roll_rad), -std::cos(roll_rad));
     if (advance_mm > 0.0) {
@@ -156,7 +174,7 @@ class Tissue {
           1.0 - 0.35 * physics_.departure * std::min(1.0, offset_mm_.norm() / physics_.relaxation_mm);
       offset_mm_ += missing * std::min(1.0, slowing * advance_mm / physics_.relaxation_build_mm);
     }
-    if (speed_mm_s < 0.3) offset_mm_ *= std::exp(-kStep_s / physics_.relaxation_tau_s);
+    if (speed_mm_s < 0.3) offset_mm_ *= std::exp(-step_s / physics_.relaxation_tau_s);
   }
 
   BaseNeedle needle_;
@@ -207,9 +225,15 @@ TipPath travel(const BaseNeedle& needle, const AxisMotion& motion, const HiddenP
   for (std::size_t i = 1; i < motion.size(); ++i) {
     const double time_s = kStep_s * static_cast<double>(i);
     const auto now = drive.step(time_s, motion.insertion_mm[i], motion.rotation_rad[i], tissue.depth_mm());
-    tissue.advance(time_s, now.advance_mm - before.advance_mm, before.roll_rad, now.roll_rad,
-                   std::abs(motion.insertion_mm[i] - motion.insertion_mm[i - 1]) / kStep_s,
-                   std::abs(motion.rotation_rad[i] - motion.rotation_rad[i - 1]) / kStep_s);
+    // A jump goes a long way in a step: bit by bit.
+    const double advance_mm = now.advance_mm - before.advance_mm;
+    const int parts = physics.stick_slip_mm > 0.0 ? 1 + static_cast<int>(std::abs(advance_mm) / kLongest_mm) : 1;
+    const double turn_rad = now.roll_rad - before.roll_rad;
+    for (int part = 0; part < parts; ++part)
+      tissue.advance(time_s, advance_mm / parts, before.roll_rad + turn_rad * part / parts,
+                     part + 1 == parts ? now.roll_rad : before.roll_rad + turn_rad * (part + 1) / parts,
+                     std::abs(motion.insertion_mm[i] - motion.insertion_mm[i - 1]) / kStep_s,
+                     std::abs(motion.rotation_rad[i] - motion.rotation_rad[i - 1]) / kStep_s, kStep_s / parts);
     path.push_back(tissue.tip_mm(time_s, recording));
     before = now;
   }

@@ -55,10 +55,10 @@ bool inseparable(const std::string& a, const std::string& b) {
 }
 
 std::vector<ConcealedEffect> draw_effects(TrialClass trial_class, Random& random,
-                                          const std::vector<AxisMotion>& motions) {
+                                          const std::vector<AxisMotion>& motions, int edition) {
   std::vector<const EffectKind*> listed;
   std::vector<const EffectKind*> unlisted;
-  for (const EffectKind& kind : catalogue()) (kind.listed ? listed : unlisted).push_back(&kind);
+  for (const EffectKind& kind : catalogue(edition)) (kind.listed ? listed : unlisted).push_back(&kind);
   const auto draw = [&](const std::vector<const EffectKind*>& from) {
     return draw_effect(*random.pick(from), random, motions);
   };
@@ -89,7 +89,7 @@ ConcealedEffect scaled_to(const ConcealedEffect& effect, double target, const Se
     const Views seen = views_of(setting, needle, physics_of({scaled(effect, factor)}, 1.0));
     const double sigmas = tangent.norm_beyond(whitened_difference(setting, seen, bare));
     if (sigmas < 1e-6) return effect;  // not excited: no size would show
-    factor = std::clamp(factor * std::clamp(target / sigmas, 0.05, 3.0), 0.003, 1.5);
+    factor = std::clamp(factor * std::clamp(target / sigmas, 0.05, 3.0), kind_of(effect).least_factor, 1.5);
   }
   return scaled(effect, factor);
 }
@@ -140,8 +140,8 @@ void state_nearest(Truth& truth, const Setting& setting, const Views& seen) {
 }
 
 // Kinematic plant: sizes, departure, visibility. Returns what the cameras see.
-Views conceal_in_kinematics(Truth& truth, Setting& setting, Random& random) {
-  auto effects = draw_effects(truth.trial_class, random, setting.motions);
+Views conceal_in_kinematics(Truth& truth, Setting& setting, Random& random, int edition) {
+  auto effects = draw_effects(truth.trial_class, random, setting.motions, edition);
   limit_ripple(truth, setting);
   const bool unlisted = truth.trial_class == TrialClass::unlisted;
   if (!effects.empty()) {
@@ -227,7 +227,7 @@ TrialClass class_of(std::uint64_t seed, int number) {
   return block[static_cast<std::size_t>(number % kBlockSize)];
 }
 
-Trial draw_trial(std::uint64_t seed, int number, double varied) {
+Trial draw_trial(std::uint64_t seed, int number, double varied, int edition) {
   Random random = Random::stream(seed, static_cast<std::uint64_t>(number));
   Trial trial;
   Truth& truth = trial.truth;
@@ -258,7 +258,7 @@ Trial draw_trial(std::uint64_t seed, int number, double varied) {
     setting.absorbers = find_absorbers(setting, truth.needle, truth.spread);
   }
   const Views seen =
-      truth.beam ? conceal_in_beam(truth, setting, random) : conceal_in_kinematics(truth, setting, random);
+      truth.beam ? conceal_in_beam(truth, setting, random) : conceal_in_kinematics(truth, setting, random, edition);
   if (truth.entries.size() == 1 && truth.entries[0].effect.name == "unknown" && truth.visible_sigmas >= kVisible_sigmas)
     truth.rivals = find_rivals(setting, seen, truth.needle, kVisible_sigmas);
   truth.believed = mistaken(truth.needle, random);

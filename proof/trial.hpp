@@ -61,8 +61,9 @@ struct Trial {
 };
 
 // The same trial for the same seed and number, on any machine.
-// varied: the share of trials whose insertions differ; 0 gives the trials of the campaigns up to the ninth.
-Trial draw_trial(std::uint64_t seed, int number, double varied = 0);
+// varied: the share of trials whose insertions differ; 0 and the first edition give the trials of the campaigns up to
+// the ninth.
+Trial draw_trial(std::uint64_t seed, int number, double varied = 0, int edition = kEditions);
 TrialClass class_of(std::uint64_t seed, int number);
 
 // The distribution in words and tables (Markdown).

@@ -130,8 +130,9 @@ std::vector<Rival> find_rivals(const Setting& setting, const Views& seen, const 
   std::vector<Rival> rivals;
   for (const EffectKind& kind : catalogue()) {
     // Instants and phases of single recordings are not searched: neither imitates what lasts through all recordings.
+    // Nor are jumps of one length: small steps do not lead to it.
     const std::string name = kind.name;
-    if (!kind.listed || name == "lost_steps" || name == "tissue_motion") continue;
+    if (!kind.listed || name == "lost_steps" || name == "tissue_motion" || name == "stick_slip") continue;
     const auto& parameters = kind.parameters;
     const auto own = static_cast<Eigen::Index>(name == "slip_direction" ? 0 : parameters.size());
     const auto physics_at = [&](const Eigen::VectorXd& x) {

@@ -172,6 +172,17 @@ LeftOut leave_out(const Fit& fit, const std::vector<ArrowBlock>& blocks, const C
   return out;
 }
 
+Predictive predictive_of(const Fit& fit, const std::vector<ArrowBlock>& blocks, const CurveColumns& curve,
+                         std::size_t recording) {
+  const ArrowSolution rest = solve_without(fit, blocks, curve, recording);
+  const VectorXd here = VectorXd::Zero(rest.shared.size());
+  ArrowRules rules;
+  rules.held = fit.held;
+  const ArrowSolution alone = solve({blocks[recording]}, rest.information, here, rules);
+  return {.log_density = fit.likelihood->log_weights(recording) - 0.5 * (alone.least + alone.log_volume_ratio),
+          .chi2 = alone.least};
+}
+
 std::vector<LeftOutSelection> leave_out_selection(const Search& search) {
   const std::size_t recordings = search.system().data().recordings.size();
   struct Model {

@@ -66,6 +66,13 @@ struct LeftOut {
 };
 LeftOut leave_out(const Fit& fit, const std::vector<ArrowBlock>& blocks, const CurveColumns& curve,
                   std::size_t recording);
+// Its predictive density about the fit's own values, with the covariance that the others give them.
+struct Predictive {
+  double log_density = 0;  // constants of 2 pi left out
+  double chi2 = 0;
+};
+Predictive predictive_of(const Fit& fit, const std::vector<ArrowBlock>& blocks, const CurveColumns& curve,
+                         std::size_t recording);
 
 // Each recording given the others, sets and parameters: sets are weighed, and their parameters fitted, without it, by
 // the linear models. (Which sets were visited was decided with all recordings.)

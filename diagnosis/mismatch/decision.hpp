@@ -32,7 +32,7 @@ Decision decide(const inference::Search& search, const inference::Posterior& pos
 // Any other fit, ready for the same uses.
 ChosenModel model_of(const inference::Search& search, const inference::Fit& fit, double log_posterior);
 
-// The needle alone, refitted with the noise and the variation that go with another model.
-inference::Fit refitted_base(const inference::Search& search, const inference::Fit& like);
+// The needle alone as it was refitted, judged by the noise and the variation of another model.
+inference::Fit base_judged_by(const inference::Search& search, const inference::Fit& judge);
 
 }  // namespace bevel::diagnosis

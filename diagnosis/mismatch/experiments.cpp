@@ -164,7 +164,7 @@ double Experiments::separation(std::size_t script, const Imagined& truth, const 
   A.topLeftCorner(shared, shared) += rival.information.topLeftCorner(shared, shared);
   for (Index i = 0; i < prediction.by_local.cols(); ++i)
     A(shared + i, shared + i) += i < rival.local_precision.size() ? rival.local_precision[i] : 0;
-  A.diagonal().array() += 1e-12 * A.diagonal().maxCoeff();
+  A.diagonal() *= 1 + 1e-12;
   const VectorXd b = J.transpose() * white;
   return std::max(0.0, white.squaredNorm() - b.dot(A.ldlt().solve(b)));
 }

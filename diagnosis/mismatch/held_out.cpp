@@ -64,39 +64,35 @@ VectorXd new_insertion(const Fit& fit, std::size_t r) {
 }
 
 // Refitted without the recording: where much is missing, the linear model about all of them says little of it.
-struct Refitted {
-  Fit fit;
-  inference::LeftOut left_out;
-};
-Refitted refit_without(const inference::Search& search, const Fit& whole, const inference::CurveColumns& curve,
-                       std::size_t r) {
+Fit refit_without(const inference::Search& search, const Fit& whole, std::size_t r) {
   const Likelihood& all = *whole.likelihood;
   inference::Readings without = all.outliers();
   without[r].resize(all.system().data().recordings[r].messages);
   std::iota(without[r].begin(), without[r].end(), std::size_t{0});
   const Likelihood others(all.system(), without, all.noise());
-  const auto their_curve =
+  const auto curve =
       whole.scales.curve ? search.discrepancy().columns(others, *whole.scales.curve) : inference::CurveColumns{};
-  Refitted out{.fit = inference::fit(others, whole.layout, whole.shared, whole.local, whole.scales, their_curve),
-               .left_out = {}};
-  if (!out.fit.valid) out.fit = whole;
-  out.fit.likelihood = whole.likelihood;
-  out.fit.local[r] = whole.local[r];
-  const auto blocks = linearise(all, out.fit, curve);
-  if (!blocks.empty()) out.left_out = leave_out(out.fit, blocks, curve, r);
+  Fit out = inference::fit(others, whole.layout, whole.shared, whole.local, whole.scales, curve);
+  if (!out.valid) out = whole;
+  out.local[r] = whole.local[r];
   return out;
 }
 
-Sums sums_of(const inference::Search& search, const Fit& whole, std::size_t r) {
+// judge: by whose noise and variation chi2 and density are.
+Sums sums_of(const inference::Search& search, const Fit& whole, const Fit& judge, std::size_t r) {
   Sums out;
-  const auto curve = curve_of(search, whole);
-  const auto [fit, left_out] = refit_without(search, whole, curve, r);
-  VectorXd errors_mm = fit.likelihood->errors(fit.layout, r, left_out.shared, new_insertion(fit, r));
-  if (errors_mm.size() == 0) return out;
-  if (curve) errors_mm -= curve.raw[r] * left_out.curve_values;
+  Fit fit = refit_without(search, whole, r);
+  fit.likelihood = judge.likelihood;
+  fit.scales.nuisance_sd = judge.scales.nuisance_sd;
+  const auto curve = curve_of(search, fit);
+  VectorXd errors_mm = fit.likelihood->errors(fit.layout, r, fit.shared, new_insertion(fit, r));
+  const auto blocks = linearise(*fit.likelihood, fit, curve);
+  if (errors_mm.size() == 0 || blocks.empty()) return out;
+  if (curve) errors_mm -= curve.raw[r] * fit.curve_values;
   add_errors(errors_mm, out);
-  out.chi2 = left_out.chi2;
-  out.log_density = left_out.log_density + constant_of(out.count);
+  const auto predictive = predictive_of(fit, blocks, curve, r);
+  out.chi2 = predictive.chi2;
+  out.log_density = predictive.log_density + constant_of(out.count);
   return out;
 }
 
@@ -130,15 +126,16 @@ Sums noise_floor(const Likelihood& likelihood, std::size_t r) {
 
 }  // namespace
 
-HeldOut hold_out(const NeedleSystem& system, const inference::Search& search, const ChosenModel& base) {
+HeldOut hold_out(const NeedleSystem& system, const inference::Search& search, const Fit& judge) {
   HeldOut out;
-  const Likelihood& likelihood = *base.fit->likelihood;
+  const Likelihood& likelihood = *judge.likelihood;
+  const Fit& base = search.visited().at({}).at->fit;
   const auto selected = leave_out_selection(search);
   std::vector<Sums> file, before, after, floor;
   for (std::size_t r = 0; r < likelihood.recordings(); ++r) {
     file.push_back(as_it_stands(system, likelihood, r));
-    before.push_back(sums_of(search, *base.fit, r));
-    after.push_back(sums_of(search, *selected[r].fit, r));
+    before.push_back(sums_of(search, base, judge, r));
+    after.push_back(sums_of(search, *selected[r].fit, *selected[r].fit, r));
     after.back().log_density = selected[r].log_density + constant_of(after.back().count);
     floor.push_back(noise_floor(likelihood, r));
     out.recordings.push_back({.log = system.recorded().recordings[r].name,

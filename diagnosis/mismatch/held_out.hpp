@@ -4,8 +4,8 @@
 
 namespace bevel::diagnosis {
 
-// base: the needle alone, refitted with the noise and the variation of the model that was chosen (refitted_base). The
-// selection is repeated without each recording, among the sets that were visited.
-HeldOut hold_out(const NeedleSystem& system, const inference::Search& search, const ChosenModel& base);
+// judge: the model that was chosen, by whose noise and variation the needle alone is judged too. The selection is
+// repeated without each recording, among the sets that were visited.
+HeldOut hold_out(const NeedleSystem& system, const inference::Search& search, const inference::Fit& judge);
 
 }  // namespace bevel::diagnosis

@@ -137,7 +137,7 @@ TEST(Diagnose, WhereNothingIsMissingSaysHowSmallItWouldHaveSeen) {
 
 TEST(Diagnose, SaysOfAValueAtTheEndOfItsRangeThatItIsNone) {
   const Findings found =
-      findings_of({.effects = {active("rate_dependence", {1.1})}, .recordings = 3, .frame_s = 0.1}, 1);
+      findings_of({.effects = {active("rate_dependence", {1.4})}, .recordings = 3, .frame_s = 0.1}, 1);
   ASSERT_EQ(found.effects.size(), 1U) << found.sentence;
   EXPECT_EQ(found.effects[0].parameters[0].value, 1);  // the largest exponent that is fitted
   EXPECT_THAT(found.remarks, Contains(HasSubstr("rate_dependence: exponent lies at the end")));

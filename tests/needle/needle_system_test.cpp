@@ -79,7 +79,8 @@ INSTANTIATE_TEST_SUITE_P(Sets, Derivatives,
                                            std::vector<std::string>{"layer", "torsional_windup"},
                                            std::vector<std::string>{"lost_steps (rotation)", "camera_scale"},
                                            std::vector<std::string>{"tissue_motion", "entry_angle"},
-                                           std::vector<std::string>{"relaxation", "drilling", "bevel_offset"}));
+                                           std::vector<std::string>{"relaxation", "drilling", "bevel_offset"},
+                                           std::vector<std::string>{"stick_slip", "puncture"}));
 
 TEST(NeedleSystem, WithoutEffectsItIsTheModel) {
   const SimulatedRig rig;
@@ -191,6 +192,19 @@ TEST(Covariates, FollowTheBase) {
   EXPECT_EQ(again[model::Covariate::since_reversal_mm], 5);
 }
 
+// A jump's length is no amplitude: between two of the grid's starts, readings are no multiple of either's.
+TEST(NeedleSystem, StartsOfAJumpAreTakenAsTheyStand) {
+  const SimulatedRig rig;
+  const NeedleSystem system(record_case(rig, 3), rig.needle);
+  const auto& jump = system.effects()[effect_named(system, "stick_slip")].parameters[0];
+  EXPECT_TRUE(jump.shape);
+  EXPECT_EQ(jump.none, 0);
+  // To half a jump at the end of 90 mm, from 0.3 mm on.
+  EXPECT_NEAR(jump.starts.front(), 0.3, 1e-9);
+  for (std::size_t i = 1; i < jump.starts.size(); ++i)
+    EXPECT_LT(90 / jump.starts[i - 1] - 90 / jump.starts[i], 0.51) << jump.starts[i];
+}
+
 // End to end on the simulated rig: nothing, one effect, and one that is on no list.
 struct Said {
   std::string set;
@@ -214,6 +228,9 @@ TEST(NeedleSearch, NothingOneAndUnlisted) {
   const Said named = say(scaled, 12);
   EXPECT_EQ(named.set, "insertion_scale");
   EXPECT_FALSE(named.curve);
+  SimulatedRig sticking;
+  sticking.effects = {active("stick_slip", {1.234})};
+  EXPECT_EQ(say(sticking, 14).set, "stick_slip");
   SimulatedRig drifting;
   drifting.true_motion = [](std::vector<model::ActuatorState>& states) {
     for (auto& s : states) s.insertion_mm += 1.5 * std::sin(0.11 * s.insertion_mm) * std::sin(0.11 * s.insertion_mm);

@@ -77,12 +77,15 @@ TEST_F(Campaign, GoesOnWhereItWas) {
   EXPECT_EQ(calls(), 3);
 }
 
-TEST_F(Campaign, DoesNotMixSeedsOrTools) {
+TEST_F(Campaign, DoesNotMixSeedsEditionsOrTools) {
   CampaignOptions o = options(kSayNothing, 1);
   ASSERT_EQ(run(o), 0);
   CampaignOptions other_seed = o;
   other_seed.seed = 5;
   EXPECT_THAT([&] { run(other_seed); }, ThrowsMessage<std::runtime_error>(HasSubstr("seed 4, not 5")));
+  CampaignOptions other_edition = o;
+  other_edition.edition = 1;
+  EXPECT_THAT([&] { run(other_edition); }, ThrowsMessage<std::runtime_error>(HasSubstr("edition 2, not 1")));
   const CampaignOptions other_tool = options(std::string("true\n") + kSayNothing, 1);
   EXPECT_THAT([&] { run(other_tool); }, ThrowsMessage<std::runtime_error>(HasSubstr("another program")));
 }

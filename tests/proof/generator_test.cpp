@@ -50,14 +50,16 @@ TEST(NeedlePath, AgreesWithTheModelOnSE3WhileTurning) {
 
 TEST(NeedlePath, EffectsOfNoSizeChangeNothing) {
   Random random(3);
-  const AxisMotion motion = motion_of({{3, 12, 0}, {0.5, 0, 3}, {1.5, 9, -2}, {0.5, -8, 0}, {1, 9, 0}, {0.5, 0, 0}});
+  const AxisMotion motion = motion_of({{3, 12, 0}, {0.5, 0, 6}, {1.5, 9, -2}, {0.5, -8, 0}, {1, 9, 0}, {0.5, 0, 0}});
   const std::vector<AxisMotion> motions(kRecordings, motion);
   const BaseNeedle needle;
   const TipPath bare = travel(needle, motion, {}, {}, 0);
   std::vector<double> times_s;
   for (int i = 0; i < 140; ++i) times_s.push_back(0.05 * i);
   const Eigen::Matrix3Xd bare_view = view(bare, times_s, {});
-  for (const EffectKind& kind : catalogue()) {
+  std::vector<EffectKind> kinds = catalogue(1);
+  kinds.insert(kinds.end(), catalogue(2).begin(), catalogue(2).end());
+  for (const EffectKind& kind : kinds) {
     if (std::string(kind.name) == "slip_direction") continue;  // has no size
     const ConcealedEffect effect = draw_effect(kind, random, motions);
     const HiddenPhysics full = physics_of({effect}, 1.0);
@@ -120,6 +122,105 @@ TEST(DriveTrain, MembraneHoldsTheTipByItsIndentationThenLetsGo) {
   EXPECT_NEAR(largest_lag_mm, 3.0, 0.05);
   EXPECT_NEAR(depth_of_lag_mm, 10.0, 0.1);
   EXPECT_NEAR(depth_mm, 30.0, 1e-6);
+}
+
+TEST(DriveTrain, StickSlipHoldsTheTipForAJumpThenLetsItGo) {
+  HiddenPhysics physics;
+  physics.stick_slip_mm = 1.6;
+  for (const double departure : {0.0, 1.0}) {
+    physics.departure = departure;
+    DriveTrain drive(physics, {}, 0);
+    double tip_mm = 0;
+    double largest_lag_mm = 0;
+    int held = 0;
+    for (int i = 0; i <= 4000; ++i) {
+      const double before_mm = tip_mm;
+      tip_mm = drive.step(kStep_s * i, 0.01 * i, 0, 0).advance_mm;
+      largest_lag_mm = std::max(largest_lag_mm, 0.01 * i - tip_mm);
+      held += std::abs(tip_mm - before_mm) < 1e-4;
+    }
+    EXPECT_NEAR(largest_lag_mm, 1.6, 0.02);
+    EXPECT_NEAR(tip_mm, 1.6 * std::floor(40.0 / 1.6 - 1e-9), 0.05)
+        << departure;  // as many jumps, however long they take
+    EXPECT_GT(held, departure > 0 ? 2800 : 3900);
+    // Drawn back it holds for a jump and, with friction while it slides, for twice that much more.
+    const double from_mm = tip_mm;
+    double base_mm = 40.0;
+    for (int i = 4001; std::abs(tip_mm - from_mm) < 0.2; ++i) {
+      base_mm -= 0.01;
+      tip_mm = drive.step(kStep_s * i, base_mm, 0, 0).advance_mm;
+    }
+    EXPECT_NEAR(from_mm - base_mm, 1.6 * (1 + 0.3 * departure), 0.03);
+  }
+}
+
+// Two Kelvin bodies: a shaft at rest has only the slow one left after a while, and e times less of it every 4 s.
+TEST(DriveTrain, AxialCreepRecoversWithTwoTimeConstants) {
+  HiddenPhysics physics;
+  physics.creep_at_100mm_mm = 4;
+  DriveTrain drive(physics, {}, 0);
+  std::vector<double> lag_mm;
+  for (int i = 0; i <= 20000; ++i) {
+    const double base_mm = std::min(0.01 * i, 60.0);
+    lag_mm.push_back(base_mm - drive.step(kStep_s * i, base_mm, 0, 0).advance_mm);
+  }
+  const double moving_mm = lag_mm[6000];
+  EXPECT_GT(moving_mm, 0.5 * 4 * 0.6);  // the quick one is nearly there
+  EXPECT_LT(moving_mm, 4 * 0.6);
+  EXPECT_LT(lag_mm[7000], 0.75 * moving_mm);  // and gone a second after the stop
+  EXPECT_NEAR(lag_mm[14000] / lag_mm[10000], std::exp(-1.0), 0.01);
+}
+
+TEST(NeedlePath, WindingStraightensByTheNetTurn) {
+  const BaseNeedle bicycle{0.005, 22, 0, 0};
+  HiddenPhysics physics;
+  physics.winding_per_rad = 0.1;
+  for (const double back : {0.0, -3.0}) {
+    const AxisMotion motion = motion_of({{1, 0, 5}, {1, 0, back}, {5, 12, 0}, {0.3, 0, 0}});
+    const TipPath path = travel(bicycle, motion, physics, {}, 0);
+    const double turned = motion.rotation_rad.back();
+    EXPECT_NEAR(turned, 5 + back, 0.4);
+    const double k = 0.005 / (1 + 0.1 * turned);
+    const double angle = k * motion.insertion_mm.back();
+    EXPECT_NEAR(path.back().head<2>().norm(), (1 - std::cos(angle)) / k, 1e-3);
+  }
+}
+
+// y'' = -k (1 + g y) for a tip that leans little, toward the stiffer side: y = -(1 - cos(sqrt(k g) s)) / g.
+TEST(NeedlePath, SideGradientChangesCurvatureAcross) {
+  const BaseNeedle bicycle{0.002, 22, 0, 0};
+  HiddenPhysics physics;
+  physics.side_per_mm = 0.06;
+  const AxisMotion motion = motion_of({{5, 10, 0}, {0.3, 0, 0}});
+  const double s = motion.insertion_mm.back();
+  const double straight = -0.5 * 0.002 * s * s;
+  physics.side_direction_rad = std::numbers::pi / 2;
+  const double toward_mm = travel(bicycle, motion, physics, {}, 0).back().y();
+  EXPECT_NEAR(toward_mm, -(1 - std::cos(std::sqrt(0.002 * 0.06) * s)) / 0.06, 0.02);
+  EXPECT_GT(toward_mm, straight);
+  physics.side_direction_rad = 0;  // across the plane in which it bends
+  EXPECT_NEAR(travel(bicycle, motion, physics, {}, 0).back().y(), travel(bicycle, motion, {}, {}, 0).back().y(), 1e-6);
+}
+
+TEST(Catalogue, EditionsDifferInStickSlipAndWhatCameForIt) {
+  const auto names = [](int edition, bool listed) {
+    std::vector<std::string> all;
+    for (const EffectKind& kind : catalogue(edition))
+      if (kind.listed == listed) all.emplace_back(kind.name);
+    return all;
+  };
+  EXPECT_THAT(names(1, false), testing::Contains("stick_slip"));
+  EXPECT_THAT(names(1, true), testing::Not(testing::Contains("stick_slip")));
+  EXPECT_THAT(names(2, true), testing::Contains("stick_slip"));
+  EXPECT_THAT(names(2, false), testing::IsSupersetOf({"winding", "side_gradient", "axial_creep"}));
+  EXPECT_THAT(names(2, false), testing::Not(testing::Contains("stick_slip")));
+  // The same word for two laws, told apart by whether it is on the list.
+  const HiddenPhysics first = physics_of({{"unknown", "stick_slip", {{"jump_mm", 1.5}}, {}}}, 1);
+  const HiddenPhysics second = physics_of({{"stick_slip", "", {{"jump_mm", 1.5}}, {}}}, 1);
+  EXPECT_EQ(first.first_stick_slip_mm, 1.5);
+  EXPECT_EQ(first.stick_slip_mm, 0);
+  EXPECT_EQ(second.stick_slip_mm, 1.5);
+  EXPECT_EQ(second.first_stick_slip_mm, 0);
 }
 
 TEST(Script, MotionStaysWithinTravelAndAcceleration) {
