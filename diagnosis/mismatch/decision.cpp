@@ -67,10 +67,12 @@ Decision decide(const Search& search, const Posterior& posterior) {
   return out;
 }
 
-Fit base_judged_by(const Search& search, const Fit& judge) {
-  Fit out = search.visited().at({}).at->fit;
-  out.scales.nuisance_sd = judge.scales.nuisance_sd;
-  out.likelihood = judge.likelihood;
+Fit refitted_base(const Search& search, const Fit& like) {
+  const inference::Layout nothing(search.system(), {});
+  const Fit& base = search.visited().at({}).at->fit;
+  Fit out =
+      fit(*like.likelihood, nothing, base.shared, base.local, {.nuisance_sd = like.scales.nuisance_sd, .curve = {}});
+  out.likelihood = like.likelihood;
   return out;
 }
 

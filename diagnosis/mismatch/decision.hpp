@@ -32,7 +32,8 @@ Decision decide(const inference::Search& search, const inference::Posterior& pos
 // Any other fit, ready for the same uses.
 ChosenModel model_of(const inference::Search& search, const inference::Fit& fit, double log_posterior);
 
-// The needle alone as it was refitted, judged by the noise and the variation of another model.
-inference::Fit base_judged_by(const inference::Search& search, const inference::Fit& judge);
+// The needle alone, refitted by the noise and the variation that go with another model: what that model explains shows
+// in its residuals, and is neither noise nor variation.
+inference::Fit refitted_base(const inference::Search& search, const inference::Fit& like);
 
 }  // namespace bevel::diagnosis

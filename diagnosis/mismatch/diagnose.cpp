@@ -175,7 +175,7 @@ Findings diagnose(const RecordedCase& recorded, const model::NeedleParameters& m
   const inference::Unknowns unknowns(search);
   findings.noise = decision.model.fit->likelihood->noise();
   findings.noise.outlier_share = calibration.noise.outlier_share;
-  const inference::Fit base_fit = base_judged_by(search, *decision.model.fit);
+  const inference::Fit base_fit = refitted_base(search, *decision.model.fit);
   const ChosenModel base = model_of(search, base_fit, 0);
   findings.effects = found_effects(system, search, posterior, unknowns, decision.model);
   findings.discrepancies = discrepancies_of(system, search, decision.model);

@@ -90,7 +90,7 @@ std::vector<Location> locate(const NeedleSystem& system, const ChosenModel& befo
     for (std::size_t c = 0; c < std::min(white_before.size(), white_after.size()); ++c) {
       const VectorXd fall = (white_before[c].array().square() - white_after[c].array().square()).matrix();
       const double sum = fall.sum();
-      total += sum;
+      total += std::max(sum, 0.0);
       if (!(sum > most)) continue;
       most = sum;
       const Series& series = after.fit->likelihood->data().recordings[r].series[c];

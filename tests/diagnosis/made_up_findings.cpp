@@ -130,9 +130,10 @@ void add_reach(Findings& findings) {
       size.effect = all[i]->name();
       size.parameter = p.name;
       size.typical = p.starts.empty() ? 1 : p.starts.front();
-      size.size = i % 7 == 3 ? std::numeric_limits<double>::infinity() : std::abs(size.typical) * 0.137;
-      size.absorbed = i % 7 == 3 ? 1 : 0.04 * static_cast<double>(i);
-      if (i % 7 == 3) size.experiment = "insert 60 mm at 5 mm/s, hold 20 s, insert 40 mm at 20 mm/s";
+      const bool hidden = all[i]->name() == "layer";
+      size.size = hidden ? std::numeric_limits<double>::infinity() : std::abs(size.typical) * 0.137;
+      size.absorbed = hidden ? 1 : 0.04 * static_cast<double>(i);
+      if (hidden) size.experiment = "insert 60 mm at 5 mm/s, hold 20 s, insert 40 mm at 20 mm/s";
       findings.detectable.push_back(size);
     }
   }

@@ -46,9 +46,9 @@ std::string ranking_picture(const Findings& findings, std::vector<TriedEffect> t
   Drawing drawing(832, 34 + height + 40);
   draw_keys(drawing, {kNames, 14},
             {{ink::kAfter, "found"},
-             {"#8db8dc", findings.verdict == Verdict::unknown_effect ? "likely alone, but does not explain it"
-                                                                     : "likely alone, but another explains more"},
-             {"#c9c9c9", "not likely, or not fitted"},
+             {"#8db8dc",
+              findings.verdict == Verdict::unknown_effect ? "likely, not enough" : "likely, another explains more"},
+             {"#c9c9c9", "not likely"},
              {"#111111", "mark: likelier than not"}});
   const Box box{kNames, 30, 580, height};
   Axis upward{0, 1, ""};

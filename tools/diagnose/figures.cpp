@@ -88,6 +88,7 @@ std::string probability(double p) { return p > 0.999 ? "> 99.9 %" : percent(p); 
 
 std::string log_factor(double log_bayes_factor) {
   if (!std::isfinite(log_bayes_factor)) return "-";
+  if (log_bayes_factor < -99) return "< -99";
   return fixed(log_bayes_factor, std::abs(log_bayes_factor) < 100 ? 1 : 0);
 }
 

@@ -108,10 +108,10 @@ void add_held_out(io::HtmlReport& page, const Findings& f) {
   page.figure_svg(
       held_out_picture(f),
       f.verdict == Verdict::nothing_missing
-          ? "Each recording predicted from the others. On the right they should lie near the line of noise "
-            "alone, none far off."
+          ? "Each recording predicted from the others. On the right they should lie near the line, "
+            "none far off."
           : "Each recording predicted from the others, before and after. Blue should lie left of orange, and "
-            "on the right picture near the line of noise alone.");
+            "on the right picture near the line.");
 }
 
 void add_reach(io::HtmlReport& page, const Findings& f) {
