@@ -157,6 +157,12 @@ TEST(HeldOut, OfALinearModelIsTheConditionalDensity) {
     for (Index i = 0; i < y.size(); ++i)
       if (i / LinearSystem::kCount != static_cast<Index>(r)) others.push_back(i);
     const double without = log_normal(y(others), covariance(others, others));
+    // The same about a fit of the others alone.
+    Fit refitted = at.fit;
+    refitted.shared = leave_out(at.fit, blocks, {}, r).shared;
+    const auto predictive = predictive_of(refitted, linearise(*refitted.likelihood, refitted, {}), {}, r);
+    EXPECT_NEAR(predictive.log_density, log_normal(y, covariance) - without, 1e-6);
+    EXPECT_NEAR(predictive.chi2, leave_out(at.fit, blocks, {}, r).chi2, 1e-6);
     EXPECT_NEAR(leave_out(at.fit, blocks, {}, r).log_density, log_normal(y, covariance) - without, 1e-6);
     // And the parameters: generalised least squares of the others.
     MatrixXd X(y.size(), 3);

@@ -1,0 +1,83 @@
+// The verdict from a posterior, with posteriors made up on the sets that a search of the pendulum visited.
+#include "diagnosis/mismatch/decision.hpp"
+
+#include <gtest/gtest.h>
+
+#include "tests/inference/pendulum.hpp"
+
+namespace bevel::diagnosis {
+namespace {
+
+using inference::ModelSet;
+using inference::Posterior;
+using inference::testing::Pendulum;
+using inference::testing::TruePendulum;
+
+TruePendulum rubbing() {
+  TruePendulum truth;
+  truth.dry_friction = 0.25;
+  return truth;
+}
+
+struct Decide : ::testing::Test {
+  Pendulum system{rubbing(), 4, 21};
+  inference::Search search{system, {.optimism = 50}};  // every effect is fitted, likely or not
+
+  Decide() {
+    inference::Noise noise;
+    noise.sigma = {Pendulum::kSigma_rad};
+    noise.frame_s = Pendulum::kFrame_s;
+    search.run(inference::Readings(4), noise);
+  }
+  ModelSet set_of(const Decision& decision) const { return decision.model.fit->layout.set(); }
+};
+
+TEST_F(Decide, NamesWhatIsThere) {
+  const Decision decision = decide(search, posterior_of(search, kDiscrepancySize));
+  EXPECT_EQ(decision.verdict, Verdict::effects_found);
+  EXPECT_EQ(set_of(decision), ModelSet{Pendulum::kDryFriction});
+}
+
+TEST_F(Decide, NothingWhereNothingIsLikelier) {
+  Posterior posterior;
+  posterior.nothing = 0.51;
+  posterior.inclusion = {{"dry_friction", 0.49}};
+  const Decision decision = decide(search, posterior);
+  EXPECT_EQ(decision.verdict, Verdict::nothing_missing);
+  EXPECT_TRUE(set_of(decision).empty());
+}
+
+TEST_F(Decide, OfRivalsOfWhichNoneIsLikelierThanNotTheLikeliest) {
+  Posterior posterior;
+  posterior.nothing = 0.1;
+  posterior.inclusion = {{"dry_friction", 0.42}, {"sensor_scale", 0.44}};
+  // With a discrepancy the first is likelier; the model that is written has none.
+  posterior.sets = {{{Pendulum::kDryFriction}, 0.42, 0.3}, {{Pendulum::kSensorScale}, 0.41, 0.0}};
+  const Decision decision = decide(search, posterior);
+  EXPECT_EQ(decision.verdict, Verdict::effects_found);
+  EXPECT_EQ(set_of(decision), ModelSet{Pendulum::kSensorScale});
+}
+
+TEST_F(Decide, UnknownCarriesACurveAndTheNamesThatStandBesideIt) {
+  Posterior posterior;
+  posterior.nothing = 0.05;
+  posterior.discrepancy = 0.8;
+  const Decision decision = decide(search, posterior);
+  EXPECT_EQ(decision.verdict, Verdict::unknown_effect);
+  EXPECT_TRUE(decision.model.fit->scales.curve.has_value());
+  EXPECT_TRUE(static_cast<bool>(decision.model.curve));
+  EXPECT_EQ(decision.model.discrepancy().values.size(), decision.model.fit->curve_values.size());
+}
+
+// A pair that was never fitted together: the verdict speaks of a model that there is.
+TEST_F(Decide, NamesThatNoVisitedSetHoldsTogetherAreNotClaimed) {
+  Posterior posterior;
+  posterior.nothing = 0.0;
+  posterior.inclusion = {{"dry_friction", 0.9}, {"an effect of no set", 0.8}};
+  const Decision decision = decide(search, posterior);
+  EXPECT_EQ(decision.verdict, Verdict::effects_found);
+  EXPECT_TRUE(inference::contains(set_of(decision), Pendulum::kDryFriction));
+}
+
+}  // namespace
+}  // namespace bevel::diagnosis
