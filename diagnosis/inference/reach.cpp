@@ -45,7 +45,7 @@ Reach Proposals::reach(const Marginal& base) const {
   const auto root_of = [&](const Side& side) -> MatrixXd {
     const Eigen::SelfAdjointEigenSolver<MatrixXd> eigen(
         all.square.block(side.first, side.first, side.width, side.width));
-    const VectorXd values = eigen.eigenvalues();
+    const VectorXd& values = eigen.eigenvalues();
     const double least = 1e-6 * std::max(values.maxCoeff(), 1e-12);
     return eigen.eigenvectors() *
            values.unaryExpr([&](double v) { return v > least ? 1 / std::sqrt(v) : 0.0; }).asDiagonal();
