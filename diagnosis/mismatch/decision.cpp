@@ -59,6 +59,10 @@ Decision decide(const Search& search, const Posterior& posterior) {
     if (!best || score > best_shared || (score == best_shared && log(one) > log(*best)))
       best = &one, best_shared = score;
   }
+  if (!best) {  // a discrepancy that no mode shows
+    unknown = false;
+    best = &search.visited().at({});
+  }
   out.verdict = unknown             ? Verdict::unknown_effect
                 : best->set.empty() ? Verdict::nothing_missing
                                     : Verdict::effects_found;
