@@ -184,9 +184,9 @@ bool Supervisor::see_enabled(std::int64_t now_utime) {
 
 // Armed a moment ago, drives are being reset, configured and switched on, and what is known of the axes is of before:
 // nothing can move, so there is nothing to judge, but not for ever.
-bool Supervisor::waits_for_axes(std::int64_t now_utime, double dt_s) {
+bool Supervisor::waits_for_axes(std::int64_t now_utime, double elapsed_s) {
   if (status_.state != State::armed || axes_were_enabled_ || see_enabled(now_utime)) return false;
-  enabling_s_ += dt_s;
+  enabling_s_ += elapsed_s;
   if (enabling_s_ <= config_.safety.enabling_s) return true;
   stop(Reason::axes_not_enabled, enabling_s_, "s after arming");
   return true;
@@ -203,7 +203,7 @@ bool Supervisor::check_axes() {
 void Supervisor::remember(const Rates& commanded) { commanded_[commands_++ % kCommands] = commanded; }
 
 // The axes do what they were told within the last axis_delay_s, at any time in it.
-bool Supervisor::check_tracking(double dt_s) {
+bool Supervisor::check_tracking(double elapsed_s) {
   const SafetyLimits& safety = config_.safety;
   if (commands_ == 0) return true;
   const auto window = static_cast<std::size_t>(std::ceil(safety.axis_delay_s / config_.period_s)) + 1;
@@ -217,7 +217,7 @@ bool Supervisor::check_tracking(double dt_s) {
   const double insertion = outside(actuator_->insertion_rate_mm_s, low.insertion_mm_s, high.insertion_mm_s);
   const double rotation = outside(actuator_->rotation_rate_rad_s, low.rotation_rad_s, high.rotation_rad_s);
   const bool bad = !(insertion <= safety.tracking_error_mm_s && rotation <= safety.tracking_error_rad_s);
-  tracking_bad_s_ = bad ? tracking_bad_s_ + dt_s : 0;
+  tracking_bad_s_ = bad ? tracking_bad_s_ + elapsed_s : 0;
   if (tracking_bad_s_ <= safety.tracking_error_s) return true;
   insertion > safety.tracking_error_mm_s ? stop(Reason::insertion_tracking, insertion, "mm/s off")
                                          : stop(Reason::rotation_tracking, rotation, "rad/s off");
@@ -253,7 +253,8 @@ bool Supervisor::watch(std::int64_t now_utime) {
   return !in_motion_states() || enabling || check_inputs(now_utime);
 }
 
-model::MotionCommand Supervisor::step(std::int64_t now_utime, double dt_s) {
+model::MotionCommand Supervisor::step(std::int64_t now_utime, double elapsed_s) {
+  const double dt_s = std::min(elapsed_s, config_.period_s);
   model::MotionCommand command;
   command.utime = now_utime;
   command.seq = seq_++;
@@ -261,8 +262,8 @@ model::MotionCommand Supervisor::step(std::int64_t now_utime, double dt_s) {
     rates_ = {};
     return command;
   }
-  if (waits_for_axes(now_utime, dt_s)) return command;
-  if (!check_inputs(now_utime) || !check_axes() || !check_tracking(dt_s)) return command;
+  if (waits_for_axes(now_utime, elapsed_s)) return command;
+  if (!check_inputs(now_utime) || !check_axes() || !check_tracking(elapsed_s)) return command;
   if (status_.state != State::steering) {
     rates_ = ramp(rates_, {}, dt_s, config_.limits);
     if (!check_rest()) return command;

@@ -92,8 +92,10 @@ class Supervisor {
   // Between periods, when something has come in: whether motion may go on. False once: it was latched just now.
   bool watch(std::int64_t now_utime);
 
-  // One period: rates to command now. mode 1 while steering and holding, else 0: stop. Does not allocate.
-  model::MotionCommand step(std::int64_t now_utime, double dt_s);
+  // One period: rates to command now. mode 1 while steering and holding, else 0: stop. Does not allocate. elapsed_s:
+  // since the last one, more than a period where some were missed; time that counts against a limit is counted by it,
+  // while rates change by no more than one period's worth.
+  model::MotionCommand step(std::int64_t now_utime, double elapsed_s);
 
   const Status& status() const { return status_; }
   const Rates& commanded() const { return rates_; }  // by the last step
@@ -103,9 +105,9 @@ class Supervisor {
   bool check_inputs(std::int64_t now_utime);
   bool all_enabled() const;
   bool see_enabled(std::int64_t now_utime);
-  bool waits_for_axes(std::int64_t now_utime, double dt_s);
+  bool waits_for_axes(std::int64_t now_utime, double elapsed_s);
   bool check_axes();
-  bool check_tracking(double dt_s);
+  bool check_tracking(double elapsed_s);
   bool check_rest();
   Rates steer() const;
   void remember(const Rates& commanded);

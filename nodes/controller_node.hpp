@@ -31,7 +31,7 @@ class ControllerNode {
   void on_word(Word word, const steering_target_t& m);
   void on_trouble(const InputTrouble& trouble);
   void stop(controller::Reason reason, std::string detail = "");
-  void command(double dt_s);
+  void command(double elapsed_s);
   void report();
 
   controller::ControllerConfig config_;
@@ -41,6 +41,7 @@ class ControllerNode {
   OperatorWords words_;
   std::array<double, 3> same_position_mm_{};
   double insertion_mm_ = 0, same_since_insertion_mm_ = 0;
+  std::int64_t stepped_ns_ = 0;  // steady; of the last period
   bool was_latched_ = false;
   std::string detail_;  // of the latched stop
 };

@@ -401,6 +401,26 @@ TEST_F(SupervisorTest, ArmedWithAxesInFaultOrNeverEnabledStops) {
   EXPECT_NEAR(waited_s, config.safety.enabling_s, 0.1);
 }
 
+// A controller that is given a period of five: its limits are of seconds, and its rates do not change five times as
+// fast.
+TEST_F(SupervisorTest, PeriodsThatWereMissedCount) {
+  auto a = axes(now);
+  a.axis_status = {1, 1};
+  supervisor.set_needle(view(now));
+  supervisor.set_actuator(a);
+  supervisor.request(Request::arm, Target{{2, -8, 100}, 0}, now);
+  double waited_s = 0;
+  for (; waited_s < 30 && supervisor.status().state == State::armed; waited_s += 0.1) {
+    now += 100'000;
+    supervisor.set_needle(view(now));
+    a.utime = now;
+    supervisor.set_actuator(a);
+    supervisor.step(now, 0.1);
+  }
+  EXPECT_EQ(supervisor.status().reason, Reason::axes_not_enabled);
+  EXPECT_NEAR(waited_s, config.safety.enabling_s, 0.2);
+}
+
 TEST_F(SupervisorTest, StampsAtTheEndsOfTimeAreNotFresh) {
   for (const std::int64_t stamp : {std::numeric_limits<std::int64_t>::min(), std::numeric_limits<std::int64_t>::max(),
                                    std::int64_t{0}, now + 18'446'744'073'709'552}) {
