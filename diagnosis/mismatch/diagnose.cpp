@@ -86,6 +86,9 @@ void remark_on_short_recordings(const RecordedCase& recorded, Findings& findings
 }
 
 void remark_on_bounds(Findings& findings) {
+  for (const Discrepancy& one : findings.discrepancies)
+    if (const std::string fault = find_fault(one.curve); !fault.empty())
+      findings.remarks.push_back("the discrepancy is beyond what a model file may hold, and is not in it: " + fault);
   for (const FoundEffect& effect : findings.effects)
     for (const FoundParameter& parameter : effect.parameters)
       if (parameter.at_bound)

@@ -1,7 +1,7 @@
 // What comes out does not depend on how many threads it took.
 #include <gtest/gtest.h>
 
-#include "diagnosis/inference/search.hpp"
+#include "diagnosis/inference/posterior.hpp"
 #include "tests/inference/pendulum.hpp"
 
 namespace bevel::inference {
@@ -24,6 +24,8 @@ TEST(ParallelSearch, ManyThreadsSayTheSame) {
     EXPECT_EQ(visited.log_with_curve, same.log_with_curve) << describe(system, set);
     EXPECT_EQ(visited.at->fit.shared, same.at->fit.shared) << describe(system, set);
   }
+  const auto left_out = leave_out_selection(one), the_same = leave_out_selection(four);
+  for (std::size_t r = 0; r < 3; ++r) EXPECT_EQ(left_out[r].log_density, the_same[r].log_density);
 }
 
 }  // namespace

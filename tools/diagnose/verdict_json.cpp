@@ -207,7 +207,8 @@ io::ModelFile model_of(const Findings& findings, const io::ModelFile& in_use) {
       for (const auto& p : r.parameters) entry.recordings[r.log][p.name] = p.value;
     model.effects.push_back(entry);
   }
-  for (const auto& discrepancy : findings.discrepancies) model.discrepancies.push_back(discrepancy.curve);
+  for (const auto& discrepancy : findings.discrepancies)
+    if (find_fault(discrepancy.curve).empty()) model.discrepancies.push_back(discrepancy.curve);
   const auto sd_of = [&](std::string_view name) {
     for (const auto& v : findings.variation)
       if (v.name == name) return v.sd;
