@@ -51,6 +51,7 @@ class Search {
   const Discrepancy& discrepancy() const { return *discrepancy_; }
   const Proposals& proposals() const { return *proposals_; }
   const SearchRules& rules() const { return rules_; }
+  const Likelihood& likelihood() const { return *likelihood_; }  // by whose noise the curves were prepared
   // The base alone, by the noise that promises were made with.
   Marginal base_marginal() const;
   // Log posteriors of sets that the linear model promised, fitted since or not.

@@ -182,6 +182,7 @@ Findings diagnose(const RecordedCase& recorded, const model::NeedleParameters& m
   const ChosenModel base = model_of(search, base_fit, 0);
   findings.effects = found_effects(system, search, posterior, unknowns, decision.model);
   findings.discrepancies = discrepancies_of(system, search, decision.model);
+  findings.proposals = propose_forms(system, search, decision.model);
   findings.variation = variation_of(search, unknowns);
   findings.needle = needle_estimate(system, decision.model);
   const inference::Fit& alone = search.visited().at({}).at->fit;

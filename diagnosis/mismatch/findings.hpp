@@ -102,6 +102,17 @@ struct Discrepancy {
   double visible_size = 0;      // root mean square over the readings, in standard deviations of the noise
 };
 
+// The simplest equation that does for a discrepancy what its curve does: a proposal for an effect, not a cause.
+struct ProposedForm {
+  model::DiscrepancyComponent component = model::DiscrepancyComponent::curvature_bevel;
+  model::Covariate covariate = model::Covariate::depth_mm;
+  std::string form;                                 // "step", "saturation", ...
+  std::string equation;                             // "a (1 - exp(-(x - 0.2) / s))"; x is the covariate
+  double amplitude = 0, amplitude_sd = 0;           // a, in the component's unit
+  double shape = 0, shape_low = 0, shape_high = 0;  // s, with 95 %
+  double log_bayes_factor = 0;                      // natural, of this one against the curves together
+};
+
 // How much insertions differ: the standard deviation of one quantity between them.
 struct VariationEstimate {
   std::string name, unit;
@@ -164,6 +175,7 @@ struct Findings {
   std::vector<TriedEffect> beside;  // beside what was found, best first
   std::vector<DetectableSize> detectable;
   std::vector<Discrepancy> discrepancies;  // unknown-effect only
+  std::vector<ProposedForm> proposals;     // beside it, the likeliest first
   std::optional<NextExperiment> next_experiment;
   std::vector<std::string> confusion_names;
   Eigen::MatrixXd confusion;  // |cosine| between visible parts

@@ -15,4 +15,8 @@ std::vector<VariationEstimate> variation_of(const inference::Search& search, con
 std::vector<Discrepancy> discrepancies_of(const NeedleSystem& system, const inference::Search& search,
                                           const ChosenModel& model);
 
+// Equations for the discrepancy of the model that was chosen, about the mode beside it. Empty where it has none.
+std::vector<ProposedForm> propose_forms(const NeedleSystem& system, const inference::Search& search,
+                                        const ChosenModel& model);
+
 }  // namespace bevel::diagnosis

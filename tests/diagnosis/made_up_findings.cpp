@@ -204,6 +204,17 @@ Findings made_up(Verdict verdict) {
                         .log_bayes_factor = 1150,
                         .visible_size = 3.1}};
   }
+  if (verdict == Verdict::unknown_effect)
+    f.proposals = {{.component = model::DiscrepancyComponent::curvature_bevel,
+                    .covariate = model::Covariate::time_s,
+                    .form = "saturation",
+                    .equation = "a (1 - exp(-(x - 0) / s))",
+                    .amplitude = 0.00113,
+                    .amplitude_sd = 0.00006,
+                    .shape = 7.1,
+                    .shape_low = 6.2,
+                    .shape_high = 8.3,
+                    .log_bayes_factor = 4.2}};
   add_ranking(f);
   add_reach(f);
   f.remarks = {"rec05.lcm: damaged (log: 1 region, 120 bytes skipped); what is left of it was used.",

@@ -56,6 +56,7 @@ TEST(Page, unknown_effect_shows_curves_and_no_name) {
   expect_sound(html);
   EXPECT_THAT(html, HasSubstr("curvature toward the bevel"));
   EXPECT_THAT(html, HasSubstr("The unknown part, described"));
+  EXPECT_THAT(html, HasSubstr("a (1 - exp(-(x - 0) / s))"));
 }
 
 // Figures that the diagnosis may leave empty.

@@ -157,6 +157,11 @@ TEST(Diagnose, WhatIsOnNoListIsADiscrepancyWithItsErrors) {
   EXPECT_EQ(one.curve.std_errors.size(), one.curve.at.size());
   for (const double error : one.curve.std_errors) EXPECT_GT(error, 0);
   EXPECT_GT(one.visible_size, 0.5);
+  // What the tip advances more or less is 1.5 mm x 0.11 / mm x sin(0.22 / mm depth): a wave of 28.6 mm.
+  ASSERT_FALSE(found.proposals.empty());
+  EXPECT_EQ(found.proposals.front().form, "sinusoid");
+  EXPECT_EQ(found.proposals.front().covariate, model::Covariate::depth_mm);
+  EXPECT_NEAR(found.proposals.front().shape, 28.6, 5);
   EXPECT_LT(found.held_out.after.rmse_mm, found.held_out.before.rmse_mm);
   EXPECT_THAT(found.sentence, HasSubstr(std::string(info_of(one.curve.component).meaning)));
 }

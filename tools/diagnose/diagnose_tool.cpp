@@ -62,6 +62,13 @@ void print_verdict(std::ostream& out, const Findings& f) {
     for (const auto& r : effect.recordings)
       for (const auto& p : r.parameters) print_parameter(out, p, r.log);
   }
+  if (!f.proposals.empty()) {
+    const ProposedForm& p = f.proposals.front();
+    out << "  an equation that would do: " << info_of(p.component).meaning << " by " << p.equation << ", x "
+        << in_words(model::name_of(p.covariate)) << "; a " << with_error(p.amplitude, p.amplitude_sd) << ' '
+        << info_of(p.component).unit << ", s " << number(p.shape) << " (95 % " << number(p.shape_low) << " to "
+        << number(p.shape_high) << "), log Bayes factor against all curves " << log_factor(p.log_bayes_factor) << '\n';
+  }
   const auto& n = f.needle;
   out << "  needle: k " << with_error(n.value.curvature_per_mm, n.curvature_sd_per_mm) << " 1/mm, lambda1 "
       << with_error(n.value.lambda1_per_rad, n.lambda1_sd_per_rad) << ", lambda2 "

@@ -231,6 +231,19 @@ void add_unknown_part(io::HtmlReport& page, const Findings& f) {
   }
   page.table({"what is off", "against", "largest", "log Bayes factor", "visible size (standard deviations of noise)"},
              rows);
+  if (f.proposals.empty()) return;
+  std::vector<std::vector<std::string>> forms;
+  for (const auto& p : f.proposals) {
+    const std::string unit(info_of(p.component).unit);
+    forms.push_back({std::string(info_of(p.component).meaning), in_words(model::name_of(p.covariate)), p.equation,
+                     with_error(p.amplitude, p.amplitude_sd) + " " + unit,
+                     number(p.shape) + " (" + number(p.shape_low) + " to " + number(p.shape_high) + ")",
+                     log_factor(p.log_bayes_factor)});
+  }
+  page.subheading("Equations that would do");
+  page.table({"what is off by", "x", "equation", "a", "s (95 %)", "log Bayes factor against all curves"}, forms,
+             "Simple forms of one covariate, each beside the needle and what was named. Above zero, the equation is "
+             "worth more than the freedom of a curve. A proposal to be tried as an effect, not a cause.");
 }
 
 void add_residuals(io::HtmlReport& page, const Findings& f) {

@@ -123,6 +123,20 @@ json as_json(const std::vector<Discrepancy>& discrepancies) {
   return all;
 }
 
+json as_json(const std::vector<ProposedForm>& proposals) {
+  json all = json::array();
+  for (const auto& p : proposals)
+    all.push_back({{"component", info_of(p.component).name},
+                   {"unit", info_of(p.component).unit},
+                   {"covariate", model::name_of(p.covariate)},
+                   {"form", p.form},
+                   {"equation", p.equation},
+                   {"a", {{"value", figure(p.amplitude)}, {"std_error", figure(p.amplitude_sd)}}},
+                   {"s", {{"value", figure(p.shape)}, {"range95", {figure(p.shape_low), figure(p.shape_high)}}}},
+                   {"log_bayes_factor", figure(p.log_bayes_factor)}});
+  return all;
+}
+
 json as_json(const std::vector<Explanation>& explanations) {
   json all = json::array();
   for (const auto& e : explanations)
@@ -186,6 +200,7 @@ std::string verdict_json(const Findings& f) {
                     {"explanations", as_json(f.explanations)}};
   j["variation"] = as_json(f.variation);
   j["discrepancies"] = as_json(f.discrepancies);
+  j["proposals"] = as_json(f.proposals);
   j["checks"] = checks_json(f.checks);
   j["tried"] = as_json(f.tried);
   j["tried_beside"] = as_json(f.beside);

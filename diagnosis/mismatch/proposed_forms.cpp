@@ -1,0 +1,69 @@
+#include <cstdio>
+
+#include "diagnosis/inference/forms.hpp"
+#include "diagnosis/mismatch/found_effects.hpp"
+
+namespace bevel::diagnosis {
+
+using inference::Form;
+
+namespace {
+
+constexpr std::size_t kProposals = 4;
+
+std::string text(const char* format, double value) {
+  char out[96];
+  std::snprintf(out, sizeof out, format, value);
+  return out;
+}
+
+std::string equation_of(const inference::FormFit& fit, const inference::Curve& curve) {
+  const double low = curve.at.front(), range = curve.at.back() - low;
+  const std::string from = text("(x - %.3g)", low);
+  switch (fit.form) {
+    case Form::step:
+      return "a where x >= s, else 0";
+    case Form::ramp:
+      return "a max(0, x - s) / " + text("%.3g", range);
+    case Form::power:
+      return "a (" + from + " / " + text("%.3g", range) + ")^s";
+    case Form::exponential:
+      return "a exp(-" + from + " / s)";
+    case Form::saturation:
+      return "a (1 - exp(-" + from + " / s))";
+    case Form::sinusoid:
+      return "a sin(2 pi x / s + " + text("%.2f", fit.phase_rad) + ")";
+  }
+  return "";
+}
+
+}  // namespace
+
+std::vector<ProposedForm> propose_forms(const NeedleSystem& system, const inference::Search& search,
+                                        const ChosenModel& model) {
+  std::vector<ProposedForm> out;
+  if (!model.fit->scales.curve) return out;
+  // About the needle and the effects as they are beside the curve, the curve itself left to the forms.
+  inference::Fit beside = *model.fit;
+  beside.scales.curve.reset();
+  beside.curve_values.resize(0);
+  const inference::Marginal marginal(search.likelihood(), beside, {});
+  const double curves = log_bayes_factor(search.discrepancy().scan(marginal));
+  for (const auto& fit : fit_forms(system, search.discrepancy(), marginal)) {
+    if (out.size() == kProposals) break;
+    const model::DiscrepancyCurve curve = system.model_curve(fit.curve, {}, {});
+    out.push_back({.component = curve.component,
+                   .covariate = curve.covariate,
+                   .form = std::string(name_of(fit.form)),
+                   .equation = equation_of(fit, system.curves()[fit.curve]),
+                   .amplitude = fit.amplitude,
+                   .amplitude_sd = fit.amplitude_sd,
+                   .shape = fit.shape,
+                   .shape_low = fit.shape_low,
+                   .shape_high = fit.shape_high,
+                   .log_bayes_factor = fit.log_bayes_factor - curves});
+  }
+  return out;
+}
+
+}  // namespace bevel::diagnosis
