@@ -230,7 +230,6 @@ ImportedRecording import_csv(const std::string& csv_path, const ColumnMap& map) 
     row.axes.utime = utime_of(table, map, index);
     if (!rows.empty() && row.axes.utime <= rows.back().axes.utime)
       table.fail(map.seconds, "but time does not grow; allowed: later than the row before");
-    row.axes.seq = static_cast<std::int64_t>(rows.size());
     row.axes.axis_status = {2, 2};
     row.axes.insertion_mm = insertion;
     if (!map.rotation.empty())
@@ -238,7 +237,6 @@ ImportedRecording import_csv(const std::string& csv_path, const ColumnMap& map) 
           table.within(map.rotation[0], -kLargestAngle_rad, kLargestAngle_rad, "rad", map.rotation_scale);
     row.tip = tip_of(table, map, origin);
     row.tip.utime = row.axes.utime;
-    row.tip.seq = row.axes.seq;
     rows.push_back(row);
   }
   if (rows.empty()) throw std::runtime_error(csv_path + ": no row with data by this column map");
@@ -256,6 +254,8 @@ ImportedRecording import_csv(const std::string& csv_path, const ColumnMap& map) 
     model::ActuatorState& a = row.axes;
     a.utime += shift_us;
     row.tip.utime += shift_us;
+    // Counted here: a row that was left out is no message that was lost.
+    a.seq = row.tip.seq = static_cast<std::int64_t>(out.actuators.size());
     if (!out.actuators.empty()) {
       const double dt_s = static_cast<double>(a.utime - out.actuators.back().utime) * 1e-6;
       a.insertion_rate_mm_s = (a.insertion_mm - out.actuators.back().insertion_mm) / dt_s;
