@@ -162,6 +162,18 @@ class SupervisorTest : public ::testing::Test {
     ASSERT_EQ(supervisor.status().state, State::steering);
   }
   // One good period; the command must move.
+  // How long it stays armed with axes that report this, given a period of so much; 10 s at most.
+  double wait_while_armed(model::ActuatorState reported, double period_s) {
+    double waited_s = 0;
+    for (; waited_s < 10 && supervisor.status().state == State::armed; waited_s += period_s) {
+      now += std::llround(1e6 * period_s);
+      supervisor.set_needle(view(now));
+      reported.utime = now;
+      supervisor.set_actuator(reported);
+      supervisor.step(now, period_s);
+    }
+    return waited_s;
+  }
   model::MotionCommand good_step() {
     now += 20'000;
     supervisor.set_needle(view(now));
@@ -389,14 +401,7 @@ TEST_F(SupervisorTest, ArmedWithAxesInFaultOrNeverEnabledStops) {
   EXPECT_EQ(supervisor.status().reason, Reason::axes_not_enabled);
   // Never: after a while.
   supervisor.request(Request::arm, Target{{2, -8, 100}, 0}, now);
-  double waited_s = 0;
-  for (; waited_s < 10 && supervisor.status().state == State::armed; waited_s += 0.02) {
-    now += 20'000;
-    supervisor.set_needle(view(now));
-    a.utime = now;
-    supervisor.set_actuator(a);
-    supervisor.step(now, 0.02);
-  }
+  const double waited_s = wait_while_armed(a, 0.02);
   EXPECT_EQ(supervisor.status().reason, Reason::axes_not_enabled);
   EXPECT_NEAR(waited_s, config.safety.enabling_s, 0.1);
 }
@@ -409,14 +414,7 @@ TEST_F(SupervisorTest, PeriodsThatWereMissedCount) {
   supervisor.set_needle(view(now));
   supervisor.set_actuator(a);
   supervisor.request(Request::arm, Target{{2, -8, 100}, 0}, now);
-  double waited_s = 0;
-  for (; waited_s < 30 && supervisor.status().state == State::armed; waited_s += 0.1) {
-    now += 100'000;
-    supervisor.set_needle(view(now));
-    a.utime = now;
-    supervisor.set_actuator(a);
-    supervisor.step(now, 0.1);
-  }
+  const double waited_s = wait_while_armed(a, 0.1);
   EXPECT_EQ(supervisor.status().reason, Reason::axes_not_enabled);
   EXPECT_NEAR(waited_s, config.safety.enabling_s, 0.2);
 }
