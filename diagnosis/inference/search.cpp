@@ -5,6 +5,7 @@
 #include <limits>
 #include <stdexcept>
 
+#include "diagnosis/inference/calibrate.hpp"
 #include "diagnosis/inference/log_sum.hpp"
 #include "diagnosis/parallel.hpp"
 
@@ -159,12 +160,7 @@ void Search::run(const Readings& outliers, const Noise& noise, const Progress& p
   const Layout nothing(system_, {});
   VectorXd shared = nothing.shared_start();
   std::vector<VectorXd> local(system_.data().recordings.size(), nothing.local_start());
-  // From the middle of each group's.
-  VectorXd nuisance_sd(static_cast<Index>(system_.nuisance_groups().size()));
-  for (Index g = 0; g < nuisance_sd.size(); ++g) {
-    const auto& values = system_.nuisance_groups()[static_cast<std::size_t>(g)].standard_deviations;
-    nuisance_sd[g] = values[values.size() / 2];
-  }
+  VectorXd nuisance_sd = middle_nuisance_sd(system_);
   Noise reference = noise;
   for (std::size_t round = 0; round < rules_.rounds; ++round) {
     likelihood_ = std::make_shared<const Likelihood>(system_, outliers, reference);

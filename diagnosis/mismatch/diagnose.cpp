@@ -6,6 +6,7 @@
 #include <limits>
 #include <stdexcept>
 
+#include "diagnosis/inference/calibrate.hpp"
 #include "diagnosis/mismatch/checks.hpp"
 #include "diagnosis/mismatch/found_effects.hpp"
 #include "diagnosis/mismatch/held_out.hpp"
@@ -14,9 +15,6 @@
 #include "diagnosis/mismatch/sentence.hpp"
 
 namespace bevel::diagnosis {
-
-using Eigen::Index;
-using Eigen::VectorXd;
 
 namespace {
 
@@ -45,35 +43,14 @@ class Stages {
   std::chrono::steady_clock::time_point start_;
 };
 
-// The noise to begin with and the outliers: what a flexible curve leaves beside the needle alone.
 inference::Calibration calibrate(const NeedleSystem& system) {
-  const std::size_t recordings = system.data().recordings.size();
-  inference::Noise claimed;
-  claimed.frame_s = system.data().frame_s;
-  claimed.sigma = system.data().claimed_sd;
-  const inference::Layout nothing(system, {});
-  const std::vector<VectorXd> local(recordings, nothing.local_start());
-  const inference::Likelihood likelihood(system, inference::Readings(recordings), claimed);
-  VectorXd nuisance_sd(static_cast<Index>(system.nuisance_groups().size()));
-  for (Index g = 0; g < nuisance_sd.size(); ++g) {
-    const auto& values = system.nuisance_groups()[static_cast<std::size_t>(g)].standard_deviations;
-    nuisance_sd[g] = values[values.size() / 2];
-  }
-  const auto base = fit(likelihood, nothing, nothing.shared_start(), local, {.nuisance_sd = nuisance_sd, .curve = {}});
-  if (!base.valid)
+  try {
+    return inference::calibrate(system);
+  } catch (const std::domain_error&) {
     throw std::invalid_argument(
         "the model in use cannot follow these recordings: with it the tip leaves the domain of the slip law; check the "
         "model file's curvature_per_mm and lambda, and that insertion and rotation are logged in mm and rad");
-  inference::Errors errors(recordings);
-  for (std::size_t r = 0; r < recordings; ++r) {
-    const VectorXd all = likelihood.errors(nothing, r, base.shared, base.local[r]);
-    Index row = 0;
-    for (const auto& series : system.data().recordings[r].series) {
-      errors[r].push_back(all.segment(row, static_cast<Index>(series.time_s.size())));
-      row += static_cast<Index>(series.time_s.size());
-    }
   }
-  return calibrate_noise(system.data(), errors);
 }
 
 void remark_on_short_recordings(const RecordedCase& recorded, Findings& findings) {

@@ -8,6 +8,7 @@
 #include <iostream>
 #include <nlohmann/json.hpp>
 
+#include "diagnosis/inference/calibrate.hpp"
 #include "diagnosis/inference/evidence.hpp"
 #include "diagnosis/inference/proposals.hpp"
 #include "diagnosis/needle/needle_system.hpp"
@@ -81,14 +82,10 @@ std::vector<Case> all_cases() {
 // Effect by effect, from the starts that are proposed beside what is there, as the search does.
 inference::Evaluated best_of(const inference::Likelihood& likelihood, const inference::ModelSet& set) {
   const inference::System& system = likelihood.system();
-  VectorXd sd(static_cast<Index>(system.nuisance_groups().size()));
-  for (Index g = 0; g < sd.size(); ++g) {
-    const auto& values = system.nuisance_groups()[static_cast<std::size_t>(g)].standard_deviations;
-    sd[g] = values[values.size() / 2];
-  }
   const inference::Layout nothing(system, {});
-  inference::Evaluated best = evaluate(likelihood, nothing, nothing.shared_start(),
-                                       {likelihood.recordings(), nothing.local_start()}, sd);
+  inference::Evaluated best =
+      evaluate(likelihood, nothing, nothing.shared_start(), {likelihood.recordings(), nothing.local_start()},
+               inference::middle_nuisance_sd(system));
   const inference::Proposals proposals(likelihood, best.fit, 1);
   for (const std::size_t effect : set) {
     const inference::Fit from = best.fit;
