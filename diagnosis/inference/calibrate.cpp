@@ -24,8 +24,8 @@ Calibration calibrate(const System& system) {
   const Layout nothing(system, {});
   const std::vector<VectorXd> local(recordings, nothing.local_start());
   const Likelihood likelihood(system, Readings(recordings), claimed);
-  const Fit base = fit(likelihood, nothing, nothing.shared_start(), local,
-                       {.nuisance_sd = middle_nuisance_sd(system), .curve = {}});
+  const Fit base =
+      fit(likelihood, nothing, nothing.shared_start(), local, {.nuisance_sd = middle_nuisance_sd(system), .curve = {}});
   if (!base.valid) throw std::domain_error("the model cannot follow the recordings");
   Errors errors(recordings);
   for (std::size_t r = 0; r < recordings; ++r) {

@@ -5,6 +5,7 @@
 #include <cmath>
 #include <limits>
 
+#include "diagnosis/inference/local_minima.hpp"
 #include "diagnosis/inference/log_sum.hpp"
 
 namespace bevel::inference {
@@ -18,20 +19,13 @@ namespace {
 constexpr double kWorthARefit = 0.2;  // of log evidence
 constexpr int kRefits = 12;           // with the standard deviations and the curve at their likeliest
 constexpr double kLikelyCurve = 3;    // log Bayes factor from which a curve is fitted
-constexpr int kFiner = 5;
-constexpr int kPhases = 12;
-constexpr int kScans = 4;                // by one noise
-constexpr double kInstantWidth_s = 0.1;  // of an instant's posterior, while it is not known yet
-constexpr double kNegligible = 20;       // of chi2: readings beyond it have no part in an integral
+constexpr double kNegligible = 20;    // of chi2: readings beyond it have no part in an integral
 
 double beta_binomial(int happened, int recordings) {
   // Not std::lgamma: it writes its sign into a global of the C library, from every thread.
   return std::log(boost::math::beta(kHappens + happened, kHappensNot + recordings - happened) /
                   boost::math::beta(kHappens, kHappensNot));
 }
-
-// What an instant has to bring in a recording to be taken for one, in chi2: its expected odds.
-double instant_cost(double duration_s) { return 2 * std::log(kHappensNot / kHappens * duration_s / kInstantWidth_s); }
 
 double log_prior_of_instants(const Likelihood& likelihood, const Fit& fit, const CurveColumns& curve) {
   double sum = 0;
@@ -114,34 +108,6 @@ Noise noise_about(const Fit& fit, const CurveColumns& curve) {
   return refine_noise(likelihood.data(), errors, likelihood.noise());
 }
 
-// Each instant in turn taken out, all else fitted anew: kept out where it is not missed. What a scan finds beside
-// parameters that are still off may hold them there.
-void doubt_instants(const Likelihood& likelihood, const CurveColumns& curve, Fit& fitted) {
-  const Layout& layout = fitted.layout;
-  for (std::size_t i = 0; i < layout.local().size(); ++i) {
-    if (!layout.is_instant(i)) continue;
-    for (std::size_t r = 0; r < fitted.local.size(); ++r) {
-      if (!(fitted.local[r][static_cast<Index>(i)] > 0)) continue;
-      auto local = fitted.local;
-      local[r][static_cast<Index>(i)] = 0;
-      Fit without = fit(likelihood, layout, fitted.shared, local, fitted.scales, curve);
-      if (!without.valid) continue;
-      scan_local(likelihood, layout, without.shared, without.local);
-      Fit again = fit(likelihood, layout, without.shared, without.local, fitted.scales, curve);
-      const auto happened = [&](const Fit& f) {
-        return std::count_if(f.local.begin(), f.local.end(),
-                             [&](const VectorXd& l) { return l[static_cast<Index>(i)] > 0; });
-      };
-      const double cost = instant_cost(layout.upper(i, r));
-      if (again.valid && again.cost + cost * static_cast<double>(happened(again)) <
-                             fitted.cost + cost * static_cast<double>(happened(fitted)))
-        fitted = std::move(again);
-    }
-  }
-}
-
-bool has_scanned(const Layout& layout) { return layout.local().size() > layout.system().nuisances().size(); }
-
 struct Settled {
   Fit fit;
   GridEvidence over;
@@ -157,17 +123,12 @@ Settled settle(const Likelihood& likelihood, const Discrepancy* discrepancy, con
     if (scales.curve) curve = discrepancy->columns(*now, *scales.curve);
     Settled one{.fit = fit(*now, layout, shared, local, scales, curve), .over = {}};
     if (!one.fit.valid) break;
-    // Phases and instants have many local minima: they are scanned, with the rest as it now stands.
-    for (int scan = 0; scan < kScans && (pass == 0 || noise_moved) && has_scanned(layout); ++scan) {
-      auto scanned = one.fit.local;
-      scan_local(*now, layout, one.fit.shared, scanned);
-      if (scanned == one.fit.local) break;
-      Fit again = fit(*now, layout, one.fit.shared, scanned, scales, curve);
-      const bool better = again.valid && again.cost < one.fit.cost;
-      if (again.valid) one.fit = std::move(again);
-      if (!better) break;
+    // What has many local minima is scanned, with the rest as it now stands.
+    if (pass == 0 || noise_moved) {
+      scan_locals(*now, curve, one.fit);
+      doubt_instants(*now, curve, one.fit);
+      scan_shapes(*now, curve, one.fit);
     }
-    if (pass == 0 || noise_moved) doubt_instants(*now, curve, one.fit);
     one.fit.likelihood = now;
     one.over = over_nuisances(one.fit, curve, grid);
     const bool better = one.over.log_here > best.over.log_here + kWorthARefit;
@@ -279,44 +240,6 @@ std::pair<Fit, double> moved_to(const std::shared_ptr<const Likelihood>& likelih
   if (!there.valid) return {std::move(there), -std::numeric_limits<double>::infinity()};
   const double change = log_evidence(there, curve) - log_evidence(from, curve_of(*from.likelihood));
   return {std::move(there), change};
-}
-
-void scan_local(const Likelihood& likelihood, const Layout& layout, const VectorXd& shared,
-                std::vector<VectorXd>& local) {
-  Residuals residuals;
-  for (std::size_t i = 0; i < layout.local().size(); ++i) {
-    if (!layout.is_scanned(i)) continue;
-    const bool instant = layout.is_instant(i);
-    const auto at = static_cast<Index>(i);
-    for (std::size_t r = 0; r < local.size(); ++r) {
-      const double lower = layout.local()[i].parameter->lower, upper = layout.upper(i, r);
-      const double cost = instant ? instant_cost(upper) : 0;
-      VectorXd trial = local[r];
-      const auto cost_at = [&](double value) {
-        trial[at] = value;
-        if (!likelihood.evaluate(layout, r, shared, trial, false, residuals))
-          return std::numeric_limits<double>::infinity();
-        return residuals.white.squaredNorm() + (instant && value > 0 ? cost : 0);
-      };
-      double best = local[r][at], least = cost_at(best);
-      const auto try_at = [&](double value) {
-        const double there = cost_at(value);
-        if (there < least) least = there, best = value;
-      };
-      if (instant) try_at(0);
-      const int count =
-          instant ? std::max(4, static_cast<int>(std::lround((upper - lower) / kInstantSpacing_s))) : kPhases;
-      for (int k = 0; k < count; ++k) try_at(lower + (upper - lower) * (k + 0.5) / count);
-      double spacing_s = kInstantSpacing_s;
-      for (int finer = 0; finer < 2 && instant && best > 0; ++finer) {
-        spacing_s /= kFiner;
-        const double middle = best;
-        for (int k = -kFiner; k <= kFiner; ++k)
-          if (const double at_s = middle + k * spacing_s; at_s > lower && at_s < upper) try_at(at_s);
-      }
-      local[r][at] = best;
-    }
-  }
 }
 
 Evaluated evaluate(const Likelihood& likelihood, const Layout& layout, const VectorXd& shared,

@@ -8,12 +8,6 @@
 
 namespace bevel::inference {
 
-// Prior of "it happens at an instant in this recording": Beta(kHappens, kHappensNot), the instant uniform.
-inline constexpr double kHappens = 1, kHappensNot = 3;
-
-// Between instants that are tried.
-inline constexpr double kInstantSpacing_s = 0.3;
-
 // A set at its mode, with its evidence. Logarithms, natural; all of one Likelihood stand on one scale.
 struct Evaluated {
   explicit Evaluated(Fit f) : fit(std::move(f)) {}
@@ -56,9 +50,5 @@ struct InstantPosterior {
 };
 InstantPosterior instant_posterior(const Likelihood& likelihood, const Fit& fit, const CurveColumns& curve,
                                    std::size_t recording, std::size_t local);
-
-// Every phase and instant at the best of a grid, all else as it is.
-void scan_local(const Likelihood& likelihood, const Layout& layout, const Eigen::VectorXd& shared,
-                std::vector<Eigen::VectorXd>& local);
 
 }  // namespace bevel::inference

@@ -32,4 +32,7 @@ double centre_of(const Prior& prior, double value);
 // log_density less that of the normal one.
 double log_density_ratio(const Prior& prior, double value, double known_to);
 
+// Prior of "it happens at an instant in this recording": Beta(kHappens, kHappensNot), the instant uniform.
+inline constexpr double kHappens = 1, kHappensNot = 3;
+
 }  // namespace bevel::inference

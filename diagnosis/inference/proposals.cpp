@@ -5,7 +5,7 @@
 #include <cmath>
 #include <limits>
 
-#include "diagnosis/inference/evidence.hpp"
+#include "diagnosis/inference/local_minima.hpp"
 #include "diagnosis/inference/log_sum.hpp"
 #include "diagnosis/parallel.hpp"
 
@@ -19,12 +19,14 @@ using Eigen::VectorXd;
 namespace {
 
 constexpr double kFarthest = 4.0;  // sizes promised reach to so many times their start
+constexpr double kSmall = 0.1;     // of a start
 constexpr double kNever = -1e3;
 
 // Readings are about as far from those without the effect as the parameter is from where it vanishes.
 bool is_amplitude(const Parameter& p) { return !std::isnan(p.none) && !p.shape; }
 
-// Every combination of starts of the shared parameters.
+// Every combination of starts of the shared parameters; with one shape only, a small size too: what an effect does to
+// the readings is not in proportion to its size beside another that comes in jumps.
 std::vector<VectorXd> starts_of(const Effect& effect) {
   std::vector<std::vector<double>> all = {{}};
   for (const Parameter& p : effect.parameters) {
@@ -39,17 +41,26 @@ std::vector<VectorXd> starts_of(const Effect& effect) {
   }
   std::vector<VectorXd> out;
   for (const auto& one : all) out.push_back(Eigen::Map<const VectorXd>(one.data(), static_cast<Index>(one.size())));
+  if (out.size() == 1) {
+    VectorXd small = out.front();
+    for (std::size_t p = 0; p < effect.parameters.size(); ++p)
+      if (const Parameter& one = effect.parameters[p]; one.scope == Scope::shared && is_amplitude(one))
+        small[static_cast<Index>(p)] = one.none + kSmall * (small[static_cast<Index>(p)] - one.none);
+    out.push_back(small);
+  }
   return out;
 }
 
-// Shared and local unknowns of the base with one effect at these values of its parameters.
-std::pair<VectorXd, VectorXd> unknowns_with(const Layout& layout, const Fit& base, std::size_t r,
+// Shared and local unknowns of a fit with one effect more, at these values of its parameters.
+std::pair<VectorXd, VectorXd> unknowns_with(const Layout& layout, const Fit& about, std::size_t r, std::size_t effect,
                                             const VectorXd& values) {
-  VectorXd shared = layout.shared_from(base.layout, base.shared);
-  VectorXd local = layout.local_from(base.layout, base.local[r]);
+  VectorXd shared = layout.shared_from(about.layout, about.shared);
+  VectorXd local = layout.local_from(about.layout, about.local[r]);
+  const auto member =
+      static_cast<std::size_t>(std::find(layout.set().begin(), layout.set().end(), effect) - layout.set().begin());
   for (Index p = 0; p < values.size(); ++p) {
-    if (const int i = layout.find_shared(0, static_cast<std::size_t>(p)); i >= 0) shared[i] = values[p];
-    if (const int i = layout.find_local(0, static_cast<std::size_t>(p)); i >= 0) local[i] = values[p];
+    if (const int i = layout.find_shared(member, static_cast<std::size_t>(p)); i >= 0) shared[i] = values[p];
+    if (const int i = layout.find_local(member, static_cast<std::size_t>(p)); i >= 0) local[i] = values[p];
   }
   return {shared, local};
 }
@@ -83,13 +94,13 @@ void keep_best(std::vector<StartPoint>& starts, std::size_t count) {
 
 }  // namespace
 
-Proposals::Proposals(const Likelihood& likelihood, const Fit& base, int threads) : system_(&likelihood.system()) {
+Proposals::Proposals(const Likelihood& likelihood, const Fit& about, int threads) : system_(&likelihood.system()) {
   candidates_.resize(system_->effects().size());
   parallel_for(candidates_.size(), threads,
-               [&](std::size_t e) { candidates_[e] = make_candidate(likelihood, base, e); });
+               [&](std::size_t e) { candidates_[e] = make_candidate(likelihood, about, e); });
 }
 
-Proposals::Candidate Proposals::make_candidate(const Likelihood& likelihood, const Fit& base, std::size_t e) const {
+Proposals::Candidate Proposals::make_candidate(const Likelihood& likelihood, const Fit& about, std::size_t e) const {
   const Effect& effect = system_->effects()[e];
   Candidate out;
   for (std::size_t p = 0; p < effect.parameters.size(); ++p) {
@@ -100,11 +111,15 @@ Proposals::Candidate Proposals::make_candidate(const Likelihood& likelihood, con
       out.amplitudes.push_back(p);
   }
   if (!system_->allows({e})) return out;
-  const Layout layout(*system_, {e});
+  ModelSet rest = without(about.layout.set(), e);
+  if (!system_->allows(with(rest, e))) rest.clear();
+  const Layout around(*system_, rest), layout(*system_, with(rest, e));
+  const VectorXd shared_around = around.shared_from(about.layout, about.shared);
   std::vector<VectorXd> path;
   Prediction prediction;
   for (std::size_t r = 0; r < likelihood.recordings(); ++r) {
-    system_->predict({}, r, base.shared, base.local[r], false, prediction);
+    if (!system_->predict(rest, r, shared_around, around.local_from(about.layout, about.local[r]), false, prediction))
+      return out;
     path.push_back(prediction.reading);
     std::vector<double> choices;
     if (out.local >= 0) {
@@ -133,8 +148,9 @@ Proposals::Candidate Proposals::make_candidate(const Likelihood& likelihood, con
           for (std::size_t a = 0; a < out.amplitudes.size(); ++a)
             if (static_cast<Index>(a) != c)
               values[static_cast<Index>(out.amplitudes[a])] = effect.parameters[out.amplitudes[a]].none;
-        const auto [shared, local] = unknowns_with(layout, base, r, values);
-        if (system_->predict({e}, r, shared, local, false, prediction)) raw.col(column) = prediction.reading - path[r];
+        const auto [shared, local] = unknowns_with(layout, about, r, e, values);
+        if (system_->predict(layout.set(), r, shared, local, false, prediction))
+          raw.col(column) = prediction.reading - path[r];
       }
     out.columns.push_back(likelihood.whitened(r, raw).cast<float>());
   }

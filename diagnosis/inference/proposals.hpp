@@ -1,6 +1,6 @@
 #pragma once
-// What each effect would do to the readings, from a grid of starts, once, about the base; and from it, without any fit,
-// what each promises beside a set that was fitted: an estimate of its log Bayes factor, and where to begin.
+// What each effect would do to the readings, from a grid of starts, once, about one fit; and from it, without any new
+// fit, what each promises beside a set that was fitted: an estimate of its log Bayes factor, and where to begin.
 #include "diagnosis/inference/marginal.hpp"
 
 namespace bevel::inference {
@@ -32,8 +32,9 @@ struct Reach {
 
 class Proposals {
  public:
-  // About a fit of the base alone.
-  Proposals(const Likelihood& likelihood, const Fit& base, int threads);
+  // About a fit of any set: what its members do is there when the others are added, as far as they are allowed beside
+  // each other.
+  Proposals(const Likelihood& likelihood, const Fit& about, int threads);
 
   // Every effect that may join the set of a fit, the likeliest first.
   std::vector<Proposal> beside(const Marginal& fit, std::size_t starts) const;
@@ -63,7 +64,7 @@ class Proposals {
     std::size_t effect = 0, signature = 0;
     Eigen::Index first = 0, width = 0;
   };
-  Candidate make_candidate(const Likelihood& likelihood, const Fit& base, std::size_t effect) const;
+  Candidate make_candidate(const Likelihood& likelihood, const Fit& about, std::size_t effect) const;
   Proposal judge(const Candidate& candidate, std::size_t effect, const Marginal& beside, std::size_t starts) const;
   Proposal judge_local(const Candidate& candidate, std::size_t effect, const Marginal& beside,
                        std::size_t starts) const;

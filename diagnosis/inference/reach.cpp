@@ -17,7 +17,7 @@ Reach Proposals::reach(const Marginal& base) const {
   std::vector<Side> sides;
   for (std::size_t e = 0; e < candidates_.size(); ++e)
     if (!candidates_[e].signatures.empty() && !contains(base.set(), e))
-      sides.push_back({.effect = e, .signature = candidates_[e].signatures.size() / 2});
+      sides.push_back({.effect = e, .signature = (candidates_[e].signatures.size() - 1) / 2});
   if (sides.empty() || !base.valid()) return out;
   const auto X = side_by_side(sides);
   const Marginal::Added all = base.added(X);

@@ -115,9 +115,12 @@ void Search::expand(const ModelSet& set) {
         const double promised = from + one.log_bayes_factor + rules_.log_prior_odds_effect;
         auto& known = promised_.try_emplace(larger, -std::numeric_limits<double>::infinity()).first->second;
         known = std::max(known, promised);
-        if (is_visited(larger) ||
-            promised + rules_.optimism + rules_.linear_error * std::max(0.0, one.log_bayes_factor) <
-                best - rules_.window)
+        const double doubtful = rules_.optimism + rules_.linear_error * std::max(0.0, one.log_bayes_factor);
+        if (promised + doubtful < best - rules_.window) continue;
+        // A fit that fell far short of the promise may be in a local minimum: once more, from these starts.
+        const auto visited = visited_.find(larger);
+        if (visited != visited_.end() &&
+            (visited->second.log_posterior() > promised - doubtful || !refitted_.insert(larger).second))
           continue;
         for (const StartPoint& start : one.starts)
           if (start.log_bayes_factor > one.starts.front().log_bayes_factor - rules_.window)
@@ -151,6 +154,11 @@ void Search::expand(const ModelSet& set) {
   evaluate_all(std::move(jobs));
 }
 
+const Fit& Search::likeliest_fit() const {
+  const Visited& best = this->best();
+  return best.log_with_curve > best.log_without_curve ? *best.at->fit_with_curve : best.at->fit;
+}
+
 Marginal Search::base_marginal() const { return {*likelihood_, visited_.at({}).at->fit, {}}; }
 
 double Search::best_log() const { return visited_.empty() ? 0 : best().log_posterior(); }
@@ -178,16 +186,17 @@ void Search::run(const Readings& outliers, const Noise& noise, const Progress& p
       likelihood_ = std::make_shared<const Likelihood>(system_, outliers, reference);
       discrepancy_ = std::make_unique<const Discrepancy>(*likelihood_, base.fit);
     }
-    proposals_ = std::make_unique<const Proposals>(*likelihood_, base.fit, rules_.threads);
+    const Fit about = round == 0 ? base.fit : likeliest_fit();
+    proposals_ = std::make_unique<const Proposals>(*likelihood_, about, rules_.threads);
     keep({}, std::make_shared<const Evaluated>(base));
     expanded_.clear();
     promised_.clear();
+    refitted_.clear();
     fits_ = 0;
     look_around();
-    const Visited& best = this->best();
-    const Fit& fit = best.log_with_curve > best.log_without_curve ? *best.at->fit_with_curve : best.at->fit;
-    if (near(fit.likelihood->noise(), reference)) break;
-    reference = fit.likelihood->noise();
+    const Fit& likeliest = likeliest_fit();
+    if (near(likeliest.likelihood->noise(), reference) && likeliest.layout.set() == about.layout.set()) break;
+    reference = likeliest.likelihood->noise();
   }
 }
 

@@ -42,8 +42,8 @@ class Search {
   // Told what is looked around next; may throw to stop.
   using Progress = std::function<void(const std::string&)>;
   // From readings without those outliers, and a noise to begin with. What the linear model promises depends on the
-  // noise: it is asked again with that of the likeliest set, until that is the same. Throws std::domain_error where
-  // the model without effects cannot follow the recordings.
+  // noise, and on what else the tip does: it is asked again about the likeliest set, until that is the same. Throws
+  // std::domain_error where the model without effects cannot follow the recordings.
   void run(const Readings& outliers, const Noise& noise, const Progress& progress = {});
   const std::map<ModelSet, Visited>& visited() const { return visited_; }
   const Visited& best() const;
@@ -74,6 +74,7 @@ class Search {
   void evaluate_all(std::vector<Job> jobs);
   Job job_from(const Fit& fit, std::size_t effect, const StartPoint& start) const;
   double best_log() const;
+  const Fit& likeliest_fit() const;
   bool is_visited(const ModelSet& set) const { return visited_.contains(set); }
 
   void look_around();
@@ -84,7 +85,7 @@ class Search {
   std::unique_ptr<const Discrepancy> discrepancy_;
   std::unique_ptr<const Proposals> proposals_;
   std::map<ModelSet, Visited> visited_;
-  std::set<ModelSet> expanded_;
+  std::set<ModelSet> expanded_, refitted_;
   Progress progress_;
   std::map<ModelSet, double> promised_;  // log posterior of sets that were not fitted
   std::size_t fits_ = 0;

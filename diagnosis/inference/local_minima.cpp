@@ -1,0 +1,204 @@
+#include "diagnosis/inference/local_minima.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+namespace bevel::inference {
+
+using Eigen::Index;
+using Eigen::MatrixXd;
+using Eigen::VectorXd;
+
+namespace {
+
+constexpr int kFiner = 5;
+constexpr int kPhases = 12;
+constexpr int kScans = 4;
+constexpr double kInstantWidth_s = 0.1;  // of an instant's posterior, while it is not known yet
+constexpr std::size_t kGrid = 3;         // starts from which on a parameter is taken to have many local minima
+constexpr int kSteps = 10;               // of a scan, to each side
+constexpr int kZooms = 2;
+
+// What an instant has to bring in a recording to be taken for one, in chi2: its expected odds.
+double instant_cost(double duration_s) { return 2 * std::log(kHappensNot / kHappens * duration_s / kInstantWidth_s); }
+
+bool has_scanned(const Layout& layout) { return layout.local().size() > layout.system().nuisances().size(); }
+
+bool has_many_minima(const Parameter& p) {
+  return (std::isnan(p.none) || p.shape) && p.starts.size() >= kGrid && !p.periodic;
+}
+
+// Distance to the farther of the neighbours in the grid.
+double grid_spacing(const Parameter& p, double value) {
+  auto starts = p.starts;
+  std::sort(starts.begin(), starts.end());
+  const auto above = std::lower_bound(starts.begin(), starts.end(), value);
+  const auto upper = above == starts.end() ? above - 1 : (above == starts.begin() ? above + 1 : above);
+  return *upper - *(upper - 1);
+}
+
+// A fit's linear model, asked for the cost where one parameter is held at another value.
+class Profile {
+ public:
+  Profile(const Likelihood& likelihood, const CurveColumns& curve, const Fit& fit)
+      : likelihood_(likelihood), curve_(curve), fit_(fit), free_(free_locals(fit.layout)) {
+    Residuals residuals;
+    const VectorXd precision = local_precision_of(fit.layout, fit.scales);
+    for (std::size_t r = 0; r < likelihood.recordings(); ++r) {
+      if (!likelihood.evaluate(fit.layout, r, fit.shared, fit.local[r], true, residuals)) return;
+      MatrixXd Z = residuals.by_shared;
+      if (curve) {
+        Z.conservativeResize(Eigen::NoChange, Z.cols() + curve.columns[r].cols());
+        Z.rightCols(curve.columns[r].cols()) = curve.columns[r];
+        residuals.white -= curve.columns[r] * fit.curve_values;
+      }
+      Z_.push_back(std::move(Z));
+      L_.emplace_back(residuals.by_local(Eigen::all, free_));
+      blocks_.push_back(make_block(L_.back(), Z_.back(), residuals.white));
+      blocks_.back().precision = precision;
+      blocks_.back().centre = nuisance_centre(fit.layout, fit.local[r]);
+    }
+    valid_ = true;
+  }
+  bool valid() const { return valid_; }
+
+  // The unknowns with this one at this value, all else at the least cost by the linear model; its cost.
+  double at(Index which, double value, VectorXd& shared, std::vector<VectorXd>& local) {
+    shared = fit_.shared;
+    shared[which] = value;
+    Residuals residuals;
+    for (std::size_t r = 0; r < blocks_.size(); ++r) {
+      if (!likelihood_.evaluate(fit_.layout, r, shared, fit_.local[r], false, residuals))
+        return std::numeric_limits<double>::infinity();
+      if (curve_) residuals.white -= curve_.columns[r] * fit_.curve_values;
+      blocks_[r].lw = L_[r].transpose() * residuals.white;
+      blocks_[r].zw = Z_[r].transpose() * residuals.white;
+      blocks_[r].ww = residuals.white.squaredNorm();
+    }
+    const Pulls pulls = pulls_of(fit_.layout, shared, fit_.curve_values, curve_.covariance);
+    ArrowRules how{.held = fit_.held};
+    how.held.push_back(which);
+    const ArrowSolution step = solve(blocks_, pulls.precision, pulls.centre, how);
+    if (!step.valid) return std::numeric_limits<double>::infinity();
+    shared += step.shared.head(shared.size());
+    local = fit_.local;
+    for (std::size_t r = 0; r < local.size(); ++r)
+      for (std::size_t i = 0; i < free_.size(); ++i) local[r][free_[i]] += step.local[r][static_cast<Index>(i)];
+    return step.least;
+  }
+
+ private:
+  const Likelihood& likelihood_;
+  const CurveColumns& curve_;
+  const Fit& fit_;
+  std::vector<Index> free_;
+  std::vector<MatrixXd> L_, Z_;
+  std::vector<ArrowBlock> blocks_;
+  bool valid_ = false;
+};
+
+}  // namespace
+
+void scan_local(const Likelihood& likelihood, const Layout& layout, const VectorXd& shared,
+                std::vector<VectorXd>& local) {
+  Residuals residuals;
+  for (std::size_t i = 0; i < layout.local().size(); ++i) {
+    if (!layout.is_scanned(i)) continue;
+    const bool instant = layout.is_instant(i);
+    const auto at = static_cast<Index>(i);
+    for (std::size_t r = 0; r < local.size(); ++r) {
+      const double lower = layout.local()[i].parameter->lower, upper = layout.upper(i, r);
+      const double cost = instant ? instant_cost(upper) : 0;
+      VectorXd trial = local[r];
+      const auto cost_at = [&](double value) {
+        trial[at] = value;
+        if (!likelihood.evaluate(layout, r, shared, trial, false, residuals))
+          return std::numeric_limits<double>::infinity();
+        return residuals.white.squaredNorm() + (instant && value > 0 ? cost : 0);
+      };
+      double best = local[r][at], least = cost_at(best);
+      const auto try_at = [&](double value) {
+        const double there = cost_at(value);
+        if (there < least) least = there, best = value;
+      };
+      if (instant) try_at(0);
+      const int count =
+          instant ? std::max(4, static_cast<int>(std::lround((upper - lower) / kInstantSpacing_s))) : kPhases;
+      for (int k = 0; k < count; ++k) try_at(lower + (upper - lower) * (k + 0.5) / count);
+      double spacing_s = kInstantSpacing_s;
+      for (int finer = 0; finer < 2 && instant && best > 0; ++finer) {
+        spacing_s /= kFiner;
+        const double middle = best;
+        for (int k = -kFiner; k <= kFiner; ++k)
+          if (const double at_s = middle + k * spacing_s; at_s > lower && at_s < upper) try_at(at_s);
+      }
+      local[r][at] = best;
+    }
+  }
+}
+
+void scan_locals(const Likelihood& likelihood, const CurveColumns& curve, Fit& fitted) {
+  for (int scan = 0; scan < kScans && has_scanned(fitted.layout); ++scan) {
+    auto scanned = fitted.local;
+    scan_local(likelihood, fitted.layout, fitted.shared, scanned);
+    if (scanned == fitted.local) return;
+    Fit again = fit(likelihood, fitted.layout, fitted.shared, scanned, fitted.scales, curve);
+    const bool better = again.valid && again.cost < fitted.cost;
+    if (again.valid) fitted = std::move(again);
+    if (!better) return;
+  }
+}
+
+// Each instant in turn taken out, all else fitted anew: kept out where it is not missed. What a scan finds beside
+// parameters that are still off may hold them there.
+void doubt_instants(const Likelihood& likelihood, const CurveColumns& curve, Fit& fitted) {
+  const Layout& layout = fitted.layout;
+  for (std::size_t i = 0; i < layout.local().size(); ++i) {
+    if (!layout.is_instant(i)) continue;
+    for (std::size_t r = 0; r < fitted.local.size(); ++r) {
+      if (!(fitted.local[r][static_cast<Index>(i)] > 0)) continue;
+      auto local = fitted.local;
+      local[r][static_cast<Index>(i)] = 0;
+      Fit without = fit(likelihood, layout, fitted.shared, local, fitted.scales, curve);
+      if (!without.valid) continue;
+      scan_local(likelihood, layout, without.shared, without.local);
+      Fit again = fit(likelihood, layout, without.shared, without.local, fitted.scales, curve);
+      const auto happened = [&](const Fit& f) {
+        return std::count_if(f.local.begin(), f.local.end(),
+                             [&](const VectorXd& l) { return l[static_cast<Index>(i)] > 0; });
+      };
+      const double cost = instant_cost(layout.upper(i, r));
+      if (again.valid && again.cost + cost * static_cast<double>(happened(again)) <
+                             fitted.cost + cost * static_cast<double>(happened(fitted)))
+        fitted = std::move(again);
+    }
+  }
+}
+
+void scan_shapes(const Likelihood& likelihood, const CurveColumns& curve, Fit& fitted) {
+  for (std::size_t i = 0; i < fitted.layout.shared().size(); ++i) {
+    const Parameter& p = *fitted.layout.shared()[i].parameter;
+    if (!has_many_minima(p)) continue;
+    const auto which = static_cast<Index>(i);
+    double step = grid_spacing(p, fitted.shared[which]) / kSteps;
+    for (int zoom = 0; zoom < kZooms; ++zoom, step /= kSteps) {
+      Profile profile(likelihood, curve, fitted);
+      if (!profile.valid()) return;
+      VectorXd shared, best_shared;
+      std::vector<VectorXd> local, best_local;
+      double least = fitted.cost;
+      for (int k = -kSteps; k <= kSteps; ++k) {
+        const double value = fitted.shared[which] + k * step;
+        if (k == 0 || value < p.lower || value > p.upper) continue;
+        const double cost = profile.at(which, value, shared, local);
+        if (cost < least) least = cost, best_shared = shared, best_local = local;
+      }
+      if (best_local.empty()) continue;
+      Fit again = fit(likelihood, fitted.layout, best_shared, best_local, fitted.scales, curve);
+      if (again.valid && again.cost < fitted.cost) fitted = std::move(again);
+    }
+  }
+}
+
+}  // namespace bevel::inference

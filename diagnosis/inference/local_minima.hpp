@@ -1,0 +1,26 @@
+#pragma once
+// Ways out of local minima: phases, instants and shapes of effects at the best of a grid, as derivatives do not see
+// them.
+#include "diagnosis/inference/likelihood.hpp"
+
+namespace bevel::inference {
+
+// Between instants that are tried.
+inline constexpr double kInstantSpacing_s = 0.3;
+
+// Every phase and instant at the best of a grid, all else as it is.
+void scan_local(const Likelihood& likelihood, const Layout& layout, const Eigen::VectorXd& shared,
+                std::vector<Eigen::VectorXd>& local);
+
+// Phases and instants again and again until that helps no more.
+void scan_locals(const Likelihood& likelihood, const CurveColumns& curve, Fit& fitted);
+
+// Each instant in turn taken out, all else fitted anew: kept out where it is not missed. What a scan finds beside
+// parameters that are still off may hold them there.
+void doubt_instants(const Likelihood& likelihood, const CurveColumns& curve, Fit& fitted);
+
+// Each shared parameter that has many local minima (a depth, a jump: Parameter::starts is a grid of them) along a finer
+// grid about where it is, all else following by the linear model.
+void scan_shapes(const Likelihood& likelihood, const CurveColumns& curve, Fit& fitted);
+
+}  // namespace bevel::inference
