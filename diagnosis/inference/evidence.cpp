@@ -16,10 +16,11 @@ using Eigen::VectorXd;
 
 namespace {
 
-constexpr double kWorthARefit = 0.2;  // of log evidence
-constexpr int kRefits = 12;           // with the standard deviations and the curve at their likeliest
-constexpr double kLikelyCurve = 3;    // log Bayes factor from which a curve is fitted
-constexpr double kNegligible = 20;    // of chi2: readings beyond it have no part in an integral
+constexpr double kWorthARefit = 0.2;     // of log evidence
+constexpr double kWhileUnsettled = 0.5;  // of a fit's cost
+constexpr int kRefits = 12;              // with the standard deviations and the curve at their likeliest
+constexpr double kLikelyCurve = 3;       // log Bayes factor from which a curve is fitted
+constexpr double kNegligible = 20;       // of chi2: readings beyond it have no part in an integral
 
 double beta_binomial(int happened, int recordings) {
   // Not std::lgamma: it writes its sign into a global of the C library, from every thread.
@@ -118,24 +119,26 @@ Settled settle(const Likelihood& likelihood, const Discrepancy* discrepancy, con
   auto now = std::make_shared<const Likelihood>(likelihood);
   CurveColumns curve;
   Settled best{.fit = Fit(layout), .over = {}};
-  bool noise_moved = false;
+  bool noise_moved = false, settled = false;
   for (int pass = 0; pass < kRefits; ++pass) {
     if (scales.curve) curve = discrepancy->columns(*now, *scales.curve);
-    Settled one{.fit = fit(*now, layout, shared, local, scales, curve), .over = {}};
+    // What will move with the noise need not be known to the end.
+    const FitRules rules{.tolerance = settled ? FitRules{}.tolerance : kWhileUnsettled};
+    Settled one{.fit = fit(*now, layout, shared, local, scales, curve, rules), .over = {}};
     if (!one.fit.valid) break;
     // What has many local minima is scanned, with the rest as it now stands.
     if (pass == 0 || noise_moved) {
       scan_locals(*now, curve, one.fit);
       doubt_instants(*now, curve, one.fit);
-      scan_shapes(*now, curve, one.fit);
+      if (pass < 2) scan_shapes(*now, curve, one.fit);
     }
     one.fit.likelihood = now;
     one.over = over_nuisances(one.fit, curve, grid);
     const bool better = one.over.log_here > best.over.log_here + kWorthARefit;
     if (one.over.log_here > best.over.log_here) best = one;
-    if (!better && !noise_moved) break;
     // Not before the noise had its turn: what a wrong model leaves passes for noise.
     if (pass > 1 && one.over.log_promised < give_up_below) break;
+    if (!better && !noise_moved && settled) break;
     // The noise first, then what differs between recordings: by a wrong noise they do not differ.
     const Noise noise = noise_about(one.fit, curve);
     noise_moved = !alike(noise, now->noise());
@@ -143,6 +146,8 @@ Settled settle(const Likelihood& likelihood, const Discrepancy* discrepancy, con
       now = std::make_shared<const Likelihood>(likelihood, noise);
     } else if (grid.standard_deviations.col(one.over.best) != scales.nuisance_sd) {
       scales.nuisance_sd = grid.standard_deviations.col(one.over.best);
+    } else if (!settled) {
+      settled = true;
     } else {
       break;
     }

@@ -16,7 +16,7 @@ constexpr int kFiner = 5;
 constexpr int kPhases = 12;
 constexpr int kScans = 4;
 constexpr double kInstantWidth_s = 0.1;  // of an instant's posterior, while it is not known yet
-constexpr std::size_t kGrid = 3;         // starts from which on a parameter is taken to have many local minima
+constexpr std::size_t kGrid = 5;         // starts from which on a parameter is taken to have many local minima
 constexpr int kSteps = 10;               // of a scan, to each side
 constexpr int kZooms = 2;
 

@@ -166,8 +166,9 @@ double Search::best_log() const { return visited_.empty() ? 0 : best().log_poste
 void Search::run(const Readings& outliers, const Noise& noise, const Progress& progress) {
   progress_ = progress;
   const Layout nothing(system_, {});
-  VectorXd shared = nothing.shared_start();
-  std::vector<VectorXd> local(system_.data().recordings.size(), nothing.local_start());
+  const Fit tempered = tempered_base(system_, outliers, noise);
+  VectorXd shared = tempered.shared;
+  std::vector<VectorXd> local = tempered.local;
   VectorXd nuisance_sd = middle_nuisance_sd(system_);
   Noise reference = noise;
   for (std::size_t round = 0; round < rules_.rounds; ++round) {
@@ -192,7 +193,6 @@ void Search::run(const Readings& outliers, const Noise& noise, const Progress& p
     expanded_.clear();
     promised_.clear();
     refitted_.clear();
-    fits_ = 0;
     look_around();
     const Fit& likeliest = likeliest_fit();
     if (near(likeliest.likelihood->noise(), reference) && likeliest.layout.set() == about.layout.set()) break;

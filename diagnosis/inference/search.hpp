@@ -20,7 +20,7 @@ struct SearchRules {
   double linear_error = 0.15;  // of what the linear model promises, as a share of it
   std::size_t starts = 2;      // of an effect, that are fitted
   std::size_t pairs = 8;
-  std::size_t most_fits = 90;
+  std::size_t most_fits = 90;           // in all
   double log_prior_odds_effect = -5.0;  // of one effect being in the model, against not
   double log_prior_odds_curve = -4.0;   // of a discrepancy
   std::size_t rounds = 3;
