@@ -81,18 +81,29 @@ void claim_folder(const CampaignOptions& options) {
       throw std::runtime_error(options.out.string() + ": holds trials of seed " + before.at("seed").dump() + ", not " +
                                std::to_string(options.seed) + "; take that seed or another folder");
     const double varied = before.value("varied", 0.0);  // campaigns before there was any
-    if (varied != options.varied)
+    if (varied != options.population.varied)
       throw std::runtime_error(options.out.string() + ": holds trials of which a share of " + json(varied).dump() +
-                               " is varied, not " + json(options.varied).dump() +
+                               " is varied, not " + json(options.population.varied).dump() +
                                "; take that share or another folder");
     const int edition = before.value("edition", 1);  // campaigns before there were two
-    if (edition != options.edition)
+    if (edition != options.population.edition)
       throw std::runtime_error(options.out.string() + ": holds trials of edition " + std::to_string(edition) +
-                               ", not " + std::to_string(options.edition) + "; take that edition or another folder");
+                               ", not " + std::to_string(options.population.edition) +
+                               "; take that edition or another folder");
+    if (before.value("nulls", false) != options.population.nulls)
+      throw std::runtime_error(
+          options.out.string() +
+          (options.population.nulls ? ": holds trials with physics concealed" : ": holds nulls only") +
+          "; take another folder");
     return;
   }
-  write_atomically(
-      path, json{{"seed", options.seed}, {"varied", options.varied}, {"edition", options.edition}}.dump(1) + "\n");
+  write_atomically(path, json{{"seed", options.seed},
+                              {"varied", options.population.varied},
+                              {"edition", options.population.edition},
+                              {"nulls", options.population.nulls},
+                              {"nulls", options.population.nulls}}
+                                 .dump(1) +
+                             "\n");
 }
 
 void write_commitments(const CampaignOptions& options) {
@@ -226,8 +237,7 @@ int run_campaign(const CampaignOptions& options, std::ostream& progress) {
     return interrupted != 0;
   };
   in_parallel(options.trials, options.jobs, [&](int i) {
-    if (prepare_trial(options.out, options.seed, i, options.varied, options.edition))
-      say(trial_name(i) + " drawn and sealed");
+    if (prepare_trial(options.out, options.seed, i, options.population)) say(trial_name(i) + " drawn and sealed");
   });
   if (stopped()) return 130;
   write_commitments(options);
@@ -250,8 +260,9 @@ int run_campaign(const CampaignOptions& options, std::ostream& progress) {
   for (int i = 0; i < options.trials; ++i) scores.push_back(score_trial(options, i));
   const Tally sums = tally(scores);
   json results{{"seed", options.seed},
-               {"varied", options.varied},
-               {"edition", options.edition},
+               {"varied", options.population.varied},
+               {"edition", options.population.edition},
+               {"nulls", options.population.nulls},
                {"sealed", facts.sealed},
                {"tool_sha256", facts.tool_sha256},
                {"commitments_sha256", facts.commitments_sha256},

@@ -7,15 +7,14 @@
 #include <string>
 #include <vector>
 
-#include "proof/hidden_physics.hpp"
+#include "proof/trial.hpp"
 
 namespace bevel::proof {
 
 struct CampaignOptions {
   int trials = 100;
   std::uint64_t seed = 1;
-  double varied = 0.5;      // share of trials whose insertions differ
-  int edition = kEditions;  // of the distribution
+  Population population{.varied = 0.5};
   std::filesystem::path out;
   std::filesystem::path diagnose;          // the tool under test; not needed for generate_only
   std::vector<std::string> also_readable;  // further folders that the tool may read

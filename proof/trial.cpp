@@ -227,12 +227,12 @@ TrialClass class_of(std::uint64_t seed, int number) {
   return block[static_cast<std::size_t>(number % kBlockSize)];
 }
 
-Trial draw_trial(std::uint64_t seed, int number, double varied, int edition) {
+Trial draw_trial(std::uint64_t seed, int number, const Population& population) {
   Random random = Random::stream(seed, static_cast<std::uint64_t>(number));
   Trial trial;
   Truth& truth = trial.truth;
   truth.trial = number;
-  truth.trial_class = class_of(seed, number);
+  truth.trial_class = population.nulls ? TrialClass::nothing : class_of(seed, number);
   truth.beam = truth.trial_class == TrialClass::unlisted && random.chance(kBeamShare);
   truth.rich = !random.chance(kPoorShare);
   truth.needle = draw_needle(random);
@@ -250,15 +250,15 @@ Trial draw_trial(std::uint64_t seed, int number, double varied, int edition) {
   }
   // A stream of its own: trials without variation stay what they were.
   Random between = Random::stream(seed, kVariationStream + static_cast<std::uint64_t>(number));
-  if (between.chance(varied)) {
+  if (between.chance(population.varied)) {
     truth.spread = draw_spread(between);
     for (std::size_t i = 0; i < setting.motions.size(); ++i)
       truth.variation.push_back(draw_variation(truth.spread, between));
     setting.variation = truth.variation;
     setting.absorbers = find_absorbers(setting, truth.needle, truth.spread);
   }
-  const Views seen =
-      truth.beam ? conceal_in_beam(truth, setting, random) : conceal_in_kinematics(truth, setting, random, edition);
+  const Views seen = truth.beam ? conceal_in_beam(truth, setting, random)
+                                : conceal_in_kinematics(truth, setting, random, population.edition);
   if (truth.entries.size() == 1 && truth.entries[0].effect.name == "unknown" && truth.visible_sigmas >= kVisible_sigmas)
     truth.rivals = find_rivals(setting, seen, truth.needle, kVisible_sigmas);
   truth.believed = mistaken(truth.needle, random);

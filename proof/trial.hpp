@@ -60,10 +60,15 @@ struct Trial {
   std::vector<TrialRecording> recordings;
 };
 
+// What trials are drawn from.
+struct Population {
+  double varied = 0;        // share of trials whose insertions differ
+  int edition = kEditions;  // of the distribution; the first, with none varied: the campaigns up to the ninth
+  bool nulls = false;       // nothing is concealed in any of them: what a tool is calibrated on
+};
+
 // The same trial for the same seed and number, on any machine.
-// varied: the share of trials whose insertions differ; 0 and the first edition give the trials of the campaigns up to
-// the ninth.
-Trial draw_trial(std::uint64_t seed, int number, double varied = 0, int edition = kEditions);
+Trial draw_trial(std::uint64_t seed, int number, const Population& population = {});
 TrialClass class_of(std::uint64_t seed, int number);
 
 // The distribution in words and tables (Markdown).

@@ -240,9 +240,9 @@ void write_trial(const fs::path& out, const Trial& trial) {
                                            "\n");
 }
 
-bool prepare_trial(const fs::path& out, std::uint64_t seed, int number, double varied, int edition) {
+bool prepare_trial(const fs::path& out, std::uint64_t seed, int number, const Population& population) {
   if (fs::exists(TrialFolders(out, number).commitment)) return false;
-  write_trial(out, draw_trial(seed, number, varied, edition));
+  write_trial(out, draw_trial(seed, number, population));
   return true;
 }
 

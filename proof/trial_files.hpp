@@ -28,7 +28,7 @@ std::string model_file_text(const Truth& truth);
 // Writes logs, model file, truth and commitment, the truth's seal last but one, the commitment last.
 void write_trial(const fs::path& out, const Trial& trial);
 // Draws and writes the trial unless it is there already. True if it was written now.
-bool prepare_trial(const fs::path& out, std::uint64_t seed, int number, double varied, int edition);
+bool prepare_trial(const fs::path& out, std::uint64_t seed, int number, const Population& population);
 
 // Checks the seal: throws std::runtime_error if the truth is not the one committed to. Returns the truth's text.
 std::string open_truth(const TrialFolders& folders);

@@ -84,8 +84,11 @@ TEST_F(Campaign, DoesNotMixSeedsEditionsOrTools) {
   other_seed.seed = 5;
   EXPECT_THAT([&] { run(other_seed); }, ThrowsMessage<std::runtime_error>(HasSubstr("seed 4, not 5")));
   CampaignOptions other_edition = o;
-  other_edition.edition = 1;
+  other_edition.population.edition = 1;
   EXPECT_THAT([&] { run(other_edition); }, ThrowsMessage<std::runtime_error>(HasSubstr("edition 2, not 1")));
+  CampaignOptions nulls = o;
+  nulls.population.nulls = true;
+  EXPECT_THAT([&] { run(nulls); }, ThrowsMessage<std::runtime_error>(HasSubstr("holds trials with physics concealed")));
   const CampaignOptions other_tool = options(std::string("true\n") + kSayNothing, 1);
   EXPECT_THAT([&] { run(other_tool); }, ThrowsMessage<std::runtime_error>(HasSubstr("another program")));
 }

@@ -44,6 +44,7 @@ TEST(Trial, IsTheSameForItsSeedAndNumber) {
 
 TEST(Trial, StatesWhatItConceals) {
   const Trial null = draw_trial(4, first_of(TrialClass::nothing));
+  EXPECT_TRUE(draw_trial(4, first_of(TrialClass::two), {.nulls = true}).truth.entries.empty());
   EXPECT_TRUE(null.truth.expected().empty());
   EXPECT_EQ(null.truth.visible_sigmas, 0.0);
   EXPECT_LE(null.truth.ripple_sigmas, 1.0 + 1e-9);
@@ -61,7 +62,7 @@ TEST(Trial, StatesWhatItConceals) {
 
 TEST(Trial, VariationIsDrawnBesideAndLeavesTheRestAsItWas) {
   const int number = first_of(TrialClass::nothing);
-  const Trial plain = draw_trial(4, number), varied = draw_trial(4, number, 1.0);
+  const Trial plain = draw_trial(4, number), varied = draw_trial(4, number, {.varied = 1.0});
   EXPECT_FALSE(plain.truth.spread.any());
   ASSERT_TRUE(varied.truth.spread.any());
   ASSERT_EQ(varied.truth.variation.size(), varied.recordings.size());
@@ -80,7 +81,7 @@ TEST(Trial, VariationIsDrawnBesideAndLeavesTheRestAsItWas) {
 
 TEST(Trial, WhatVariationExplainsIsLessVisible) {
   const int number = first_of(TrialClass::one);
-  const Trial plain = draw_trial(4, number), varied = draw_trial(4, number, 1.0);
+  const Trial plain = draw_trial(4, number), varied = draw_trial(4, number, {.varied = 1.0});
   EXPECT_EQ(plain.truth.entries[0].effect.name, varied.truth.entries[0].effect.name);
   EXPECT_GT(varied.truth.entries[0].visible_sigmas, 0);
 }

@@ -17,9 +17,10 @@ int main(int argc, char** argv) {
       "A blind trial of a mismatch tool: physics concealed and sealed, verdicts hashed, then scored.");
   command_line.option("--trials", o.trials, "number of trials", 1, 10000)
       .option("--seed", seed, "the same seed draws the same trials", 0, 2147483647)
-      .option("--varied", o.varied, "share of trials whose insertions differ", 0.0, 1.0)
-      .option("--edition", o.edition, "of the distribution; 1, with --varied 0: that of the first nine campaigns", 1,
-              bevel::proof::kEditions)
+      .option("--varied", o.population.varied, "share of trials whose insertions differ", 0.0, 1.0)
+      .option("--edition", o.population.edition,
+              "of the distribution; 1, with --varied 0: that of the first nine campaigns", 1, bevel::proof::kEditions)
+      .flag("--nulls", o.population.nulls, "nothing is concealed in any trial: to calibrate a tool")
       .option("--out", out, "folder for trials and results; what is there already is not done again")
       .option("--diagnose", diagnose, "the tool under test: PATH --model M.toml --out DIR LOG...")
       .arguments("--also-readable", o.also_readable, "further folders that the tool may read", false)
