@@ -129,7 +129,7 @@ json as_json(const std::vector<ProposedForm>& proposals) {
     all.push_back({{"component", info_of(p.component).name},
                    {"unit", info_of(p.component).unit},
                    {"covariate", model::name_of(p.covariate)},
-                   {"form", p.form},
+                   {"form", name_of(p.form)},
                    {"equation", p.equation},
                    {"a", {{"value", figure(p.amplitude)}, {"std_error", figure(p.amplitude_sd)}}},
                    {"s", {{"value", figure(p.shape)}, {"range95", {figure(p.shape_low), figure(p.shape_high)}}}},
