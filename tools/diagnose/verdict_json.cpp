@@ -3,6 +3,8 @@
 #include <cmath>
 #include <nlohmann/json.hpp>
 
+#include "diagnosis/mismatch/effect_source.hpp"
+
 namespace bevel::diagnose {
 
 using namespace bevel::diagnosis;  // NOLINT(google-build-using-namespace): the tool speaks of nothing else
@@ -137,6 +139,11 @@ json as_json(const std::vector<ProposedForm>& proposals) {
   return all;
 }
 
+json as_json(const std::optional<EffectSource>& proposed) {
+  if (!proposed) return nullptr;
+  return {{"name", proposed->name}, {"file", kProposedEffectFile}};
+}
+
 json as_json(const std::vector<Explanation>& explanations) {
   json all = json::array();
   for (const auto& e : explanations)
@@ -201,6 +208,7 @@ std::string verdict_json(const Findings& f) {
   j["variation"] = as_json(f.variation);
   j["discrepancies"] = as_json(f.discrepancies);
   j["proposals"] = as_json(f.proposals);
+  j["proposed_effect"] = as_json(proposed_effect(f));
   j["checks"] = checks_json(f.checks);
   j["tried"] = as_json(f.tried);
   j["tried_beside"] = as_json(f.beside);
