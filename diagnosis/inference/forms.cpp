@@ -24,37 +24,12 @@ struct Shape {
 
 double range_of(const Curve& curve) { return curve.at.back() - curve.at.front(); }
 
-// The grid of a form; a sinusoid alone goes round a circle.
+// The grid of a form, with its phases.
 std::vector<Shape> shapes_of(Form form, const Curve& curve) {
   std::vector<Shape> out;
-  const double low = curve.at.front(), range = range_of(curve);
-  const auto shares = [&](std::initializer_list<double> all, double from, double by) {
-    for (const double share : all) out.push_back({from + by * share});
-  };
-  if (curve.periodic && form != Form::sinusoid) return out;
-  switch (form) {
-    case Form::step:  // between the places, and not before the first
-      for (std::size_t i = 1; i < curve.at.size(); ++i) out.push_back({0.5 * (curve.at[i - 1] + curve.at[i])});
-      break;
-    case Form::ramp:
-      shares({0, 0.15, 0.3, 0.45, 0.6, 0.75}, low, range);
-      break;
-    case Form::power:
-      shares({0.5, 1.5, 2, 3}, 0, 1);
-      break;
-    case Form::exponential:
-    case Form::saturation:
-      shares({0.1, 0.14, 0.2, 0.28, 0.4, 0.56, 0.8}, 0, range);
-      break;
-    case Form::sinusoid:
-      for (const double periods : {0.75, 1.0, 1.33, 1.67, 2.0, 2.5}) {
-        const bool whole = periods == 1 || periods == 2;
-        if (curve.periodic && !whole) continue;  // it has to close
-        for (int i = 0; i < kPhases; ++i)
-          out.push_back({(curve.periodic ? 2 * std::numbers::pi : range) / periods, std::numbers::pi * i / kPhases});
-      }
-      break;
-  }
+  for (const double value : shape_grid(form, curve))
+    for (int i = 0; i < (form == Form::sinusoid ? kPhases : 1); ++i)
+      out.push_back({value, std::numbers::pi * i / kPhases});
   return out;
 }
 
@@ -139,15 +114,48 @@ std::string_view name_of(Form form) {
   return "";
 }
 
+// A sinusoid alone goes round a circle.
+std::vector<double> shape_grid(Form form, const Curve& curve) {
+  std::vector<double> out;
+  const double low = curve.at.front(), range = range_of(curve);
+  const auto shares = [&](std::initializer_list<double> all, double from, double by) {
+    for (const double share : all) out.push_back(from + by * share);
+  };
+  if (curve.periodic && form != Form::sinusoid) return out;
+  switch (form) {
+    case Form::step:  // between the places, and not before the first
+      for (std::size_t i = 1; i < curve.at.size(); ++i) out.push_back(0.5 * (curve.at[i - 1] + curve.at[i]));
+      break;
+    case Form::ramp:
+      shares({0, 0.15, 0.3, 0.45, 0.6, 0.75}, low, range);
+      break;
+    case Form::power:
+      out = {0.5, 1.5, 2, 3};
+      break;
+    case Form::exponential:
+    case Form::saturation:
+      shares({0.1, 0.14, 0.2, 0.28, 0.4, 0.56, 0.8}, 0, range);
+      break;
+    case Form::sinusoid:
+      for (const double periods : {0.75, 1.0, 1.33, 1.67, 2.0, 2.5}) {
+        const bool whole = periods == 1 || periods == 2;
+        if (curve.periodic && !whole) continue;  // it has to close
+        out.push_back((curve.periodic ? 2 * std::numbers::pi : range) / periods);
+      }
+      break;
+  }
+  return out;
+}
+
 double value_of(Form form, const Curve& curve, double shape, double phase_rad, double x) {
-  const double along = x - curve.at.front();
+  const double along = std::max(0.0, x - curve.at.front());
   switch (form) {
     case Form::step:
       return x >= shape ? 1 : 0;
     case Form::ramp:
       return std::max(0.0, x - shape) / range_of(curve);
     case Form::power:
-      return std::pow(std::max(0.0, along) / range_of(curve), shape);
+      return std::pow(along / range_of(curve), shape);
     case Form::exponential:
       return std::exp(-along / shape);
     case Form::saturation:

@@ -9,7 +9,7 @@
 
 namespace bevel::inference {
 
-// x in the covariate's unit; low and range of the curve's places.
+// x in the covariate's unit; low and range of the curve's places. Below low all but the sinusoid are as they are there.
 enum class Form {
   step,         // 1 from x = shape on
   ramp,         // max(0, x - shape) / range
@@ -30,6 +30,8 @@ struct FormFit {
 };
 
 double value_of(Form form, const Curve& curve, double shape, double phase_rad, double x);
+// The shapes over which a form is averaged; none where it does not go round the curve's circle.
+std::vector<double> shape_grid(Form form, const Curve& curve);
 
 // Every form over every curve, the likeliest first. `beside`: what the readings leave to a discrepancy.
 std::vector<FormFit> fit_forms(const System& system, const Discrepancy& discrepancy, const Marginal& beside);

@@ -5,6 +5,7 @@
 #include <string>
 #include <vector>
 
+#include "diagnosis/inference/forms.hpp"
 #include "diagnosis/inference/noise.hpp"
 #include "diagnosis/needle/recorded_case.hpp"
 #include "model/effects/discrepancy.hpp"
@@ -106,11 +107,15 @@ struct Discrepancy {
 struct ProposedForm {
   model::DiscrepancyComponent component = model::DiscrepancyComponent::curvature_bevel;
   model::Covariate covariate = model::Covariate::depth_mm;
-  std::string form;                                 // "step", "saturation", ...
+  inference::Form form = inference::Form::step;
   std::string equation;                             // "a (1 - exp(-(x - 0.2) / s))"; x is the covariate
   double amplitude = 0, amplitude_sd = 0;           // a, in the component's unit
   double shape = 0, shape_low = 0, shape_high = 0;  // s, with 95 %
   double log_bayes_factor = 0;                      // natural, of this one against the curves together
+  double phase_rad = 0;                             // of a sinusoid
+  double low = 0, range = 0;                        // of the covariate in the recordings: inference/forms.hpp
+  bool periodic = false;                            // the covariate is an angle, s a share of its circle
+  std::vector<double> shapes{};                     // those that were tried
 };
 
 // How much insertions differ: the standard deviation of one quantity between them.

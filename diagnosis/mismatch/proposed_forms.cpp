@@ -51,17 +51,23 @@ std::vector<ProposedForm> propose_forms(const NeedleSystem& system, const infere
   const double curves = log_bayes_factor(search.discrepancy().scan(marginal));
   for (const auto& fit : fit_forms(system, search.discrepancy(), marginal)) {
     if (out.size() == kProposals) break;
-    const model::DiscrepancyCurve curve = system.model_curve(fit.curve, {}, {});
-    out.push_back({.component = curve.component,
-                   .covariate = curve.covariate,
-                   .form = std::string(name_of(fit.form)),
-                   .equation = equation_of(fit, system.curves()[fit.curve]),
+    const inference::Curve& curve = system.curves()[fit.curve];
+    const model::DiscrepancyCurve model_curve = system.model_curve(fit.curve, {}, {});
+    out.push_back({.component = model_curve.component,
+                   .covariate = model_curve.covariate,
+                   .form = fit.form,
+                   .equation = equation_of(fit, curve),
                    .amplitude = fit.amplitude,
                    .amplitude_sd = fit.amplitude_sd,
                    .shape = fit.shape,
                    .shape_low = fit.shape_low,
                    .shape_high = fit.shape_high,
-                   .log_bayes_factor = fit.log_bayes_factor - curves});
+                   .log_bayes_factor = fit.log_bayes_factor - curves,
+                   .phase_rad = fit.phase_rad,
+                   .low = curve.at.front(),
+                   .range = curve.at.back() - curve.at.front(),
+                   .periodic = curve.periodic,
+                   .shapes = shape_grid(fit.form, curve)});
   }
   return out;
 }

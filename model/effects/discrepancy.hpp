@@ -2,45 +2,13 @@
 // The discrepancy that nobody has a name for: a curve over one covariate, in one component of the tip's motion or of
 // the reading, as an effect beside those of the registry. At the place c of its covariate it has the value
 //   v(c) = sum_i w_i(c) values[i],  w linear between the knots, flat outside, round the circle if periodic.
-// Components, over a leg in which the base moves by ds mm and dR rad (frames: model/kinematics.hpp):
-//   curvature_bevel  kappa_x += v     curvature_across  kappa_y += v
-//   advance          ds_tip += v ds   advance_turning   ds_tip += v dR
-//   turning          dR_tip += v |ds| turning_turning   dR_tip += v dR
-//   drift_bevel, drift_across         the tip is carried aside by v ds_tip, toward body -y, toward body x
-//   x, y, z          the reading is off by v
+// The components are those of component_effect.hpp.
 #include <memory>
-#include <optional>
 
 #include "model/effects/augmented_needle.hpp"
+#include "model/effects/component_effect.hpp"
 
 namespace bevel::model {
-
-enum class DiscrepancyComponent {
-  curvature_bevel,
-  curvature_across,
-  advance,
-  turning,
-  advance_turning,
-  turning_turning,
-  drift_bevel,
-  drift_across,
-  x,
-  y,
-  z
-};
-
-struct DiscrepancyComponentInfo {
-  DiscrepancyComponent component;
-  std::string_view name;     // a contract: model.toml
-  std::string_view meaning;  // for a report
-  std::string_view unit;     // of the values
-  double largest;            // magnitude of a value; beyond it is a mistake
-};
-// In the order of the enumeration.
-std::span<const DiscrepancyComponentInfo> discrepancy_components();
-const DiscrepancyComponentInfo& info_of(DiscrepancyComponent component);
-// Nothing if there is none of that name.
-std::optional<DiscrepancyComponent> find_discrepancy_component(std::string_view name);
 
 inline constexpr std::size_t kMaxKnots = 64;
 

@@ -73,6 +73,12 @@ inline Dual sqrt(const Dual& a) {
 inline Dual sin(const Dual& a) { return {std::sin(a.value), a.slope * std::cos(a.value)}; }
 inline Dual cos(const Dual& a) { return {std::cos(a.value), a.slope * -std::sin(a.value)}; }
 
+// Of a base that is a number and not negative. At zero nothing depends on a positive exponent.
+inline Dual pow(double base, const Dual& exponent) {
+  const double power = std::pow(base, exponent.value);
+  return {power, exponent.slope * (base > 0 ? power * std::log(base) : 0.0)};
+}
+
 // Held between bounds; outside them it no longer moves with its unknowns.
 inline Dual clamp(const Dual& a, double low, double high) {
   if (a.value < low) return {low};

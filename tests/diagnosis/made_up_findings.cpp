@@ -207,14 +207,17 @@ Findings made_up(Verdict verdict) {
   if (verdict == Verdict::unknown_effect)
     f.proposals = {{.component = model::DiscrepancyComponent::curvature_bevel,
                     .covariate = model::Covariate::time_s,
-                    .form = "saturation",
+                    .form = inference::Form::saturation,
                     .equation = "a (1 - exp(-(x - 0) / s))",
                     .amplitude = 0.00113,
                     .amplitude_sd = 0.00006,
                     .shape = 7.1,
                     .shape_low = 6.2,
                     .shape_high = 8.3,
-                    .log_bayes_factor = 4.2}};
+                    .log_bayes_factor = 4.2,
+                    .low = 0,
+                    .range = 12,
+                    .shapes = {1.2, 1.68, 2.4, 3.36, 4.8, 6.72, 9.6}}};
   add_ranking(f);
   add_reach(f);
   f.remarks = {"rec05.lcm: damaged (log: 1 region, 120 bytes skipped); what is left of it was used.",

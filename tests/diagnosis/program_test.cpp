@@ -6,6 +6,7 @@
 #include <unistd.h>
 
 #include <chrono>
+#include <cmath>
 #include <csignal>
 #include <filesystem>
 #include <fstream>
@@ -13,6 +14,7 @@
 #include <thread>
 
 #include "io/model_file.hpp"
+#include "model/effects/discrepancy.hpp"
 #include "tests/diagnosis/recorded_logs.hpp"
 #include "tests/support/temporary_folder.hpp"
 
@@ -78,8 +80,11 @@ struct Program : ::testing::Test {
 
 TEST_F(Program, FindsAConcealedEffectAndWritesAllThreeFiles) {
   write_logs({active("insertion_scale", {0.92})});
+  fs::create_directories(folder / "out");
+  std::ofstream(folder / "out/proposed_effect.cpp") << "of an earlier run";
   const Said said = run(usual("out"));
   ASSERT_EQ(said.status, 0) << said.err;
+  EXPECT_FALSE(fs::exists(folder / "out/proposed_effect.cpp"));
   EXPECT_THAT(said.out,
               AllOf(HasSubstr("insertion_scale"), HasSubstr("ratio"), HasSubstr("predicted from the others")));
   EXPECT_THAT(said.err, HasSubstr(" s  reading 4 logs"));
@@ -95,6 +100,23 @@ TEST_F(Program, FindsAConcealedEffectAndWritesAllThreeFiles) {
   // The same input: the same verdict, whatever the number of threads.
   ASSERT_EQ(run(usual("again", {"--threads", "1", "--quiet"})).status, 0);
   EXPECT_EQ(text_of(folder / "again/verdict.json"), text_of(folder / "out/verdict.json"));
+}
+
+TEST_F(Program, ProposesAnEffectForWhatIsOnNoList) {
+  model::DiscrepancyCurve curve{model::DiscrepancyComponent::advance, model::Covariate::depth_mm, {}, {}, {}};
+  for (int i = 0; i <= 30; ++i) {
+    curve.at.push_back(2.5 * i);
+    curve.values.push_back(0.12 * (1 - std::exp(-curve.at.back() / 14)));
+    curve.std_errors.push_back(0);
+  }
+  write_logs({model::active_discrepancy(curve)});
+  const Said said = run(usual("out"));
+  ASSERT_EQ(said.status, 0) << said.err;
+  EXPECT_THAT(said.out, HasSubstr("as an effect, advance_saturation_by_depth, in proposed_effect.cpp"));
+  const auto verdict = nlohmann::json::parse(text_of(folder / "out/verdict.json"));
+  EXPECT_EQ(verdict["verdict"], "unknown-effect");
+  EXPECT_EQ(verdict["proposed_effect"]["name"], "advance_saturation_by_depth");
+  EXPECT_THAT(text_of(folder / "out/proposed_effect.cpp"), HasSubstr("EFFECT(advance_saturation_by_depth)"));
 }
 
 TEST_F(Program, ALogCutOffIsDiagnosedSaidAndStatusThree) {

@@ -11,10 +11,11 @@
 #include <fstream>
 #include <limits>
 #include <nlohmann/json.hpp>
+#include <sstream>
 
 #include "tests/diagnosis/made_up_findings.hpp"
 #include "tests/support/temporary_folder.hpp"
-#include "tools/diagnose/result_files.hpp"
+#include "tools/diagnose/diagnose_tool.hpp"
 #include "tools/diagnose/verdict_json.hpp"
 
 namespace bevel::diagnose {
@@ -53,6 +54,10 @@ TEST_F(Results, VerdictsFollowTheSchema) {
   // A schema that lets everything pass would prove nothing.
   auto broken = nlohmann::json::parse(text_of(folder / "found.json"));
   broken["effects"][0].erase("probability");
+  std::ofstream(folder / "broken.json") << broken;
+  EXPECT_NE(std::system((check + (folder / "broken.json").string() + " 2>/dev/null").c_str()), 0);
+  broken = nlohmann::json::parse(text_of(folder / "found.json"));
+  broken["proposed_effect"] = {{"name", "of"}, {"file", "another verdict"}};
   std::ofstream(folder / "broken.json") << broken;
   EXPECT_NE(std::system((check + (folder / "broken.json").string() + " 2>/dev/null").c_str()), 0);
 }
@@ -95,6 +100,50 @@ TEST_F(Results, NoneIsTouchedIfOneCannotBe) {
   EXPECT_EQ(text_of(folder / "a"), "old");
   EXPECT_EQ(text_of(folder / "b"), "old");
   EXPECT_THAT(names_in(folder.path()), UnorderedElementsAre("a", "b", "c"));
+}
+
+// A file that these results do not have must not stand there as if it were of them.
+TEST_F(Results, WhatTheyDoNotHaveIsTakenAwayWithTheOlderOnes) {
+  write_together(folder.path(), {{"a", "old"}, {"sometimes", "old"}, {"b", "old"}});
+  fs::create_directories(folder / "c" / "full");
+  EXPECT_THROW(write_together(folder.path(), {{"c", "new"}, {"sometimes", {}}, {"b", "new"}}), std::runtime_error);
+  EXPECT_THAT(names_in(folder.path()), UnorderedElementsAre("a", "b", "c", "sometimes"));
+  EXPECT_THROW(write_together(folder.path(), {{"a", "new"}, {"c", {}}, {"b", "new"}}), std::runtime_error);
+  EXPECT_EQ(text_of(folder / "a"), "old");
+  fs::remove_all(folder / "c");
+  write_together(folder.path(), {{"a", "new"}, {"sometimes", {}}, {"b", "new"}});
+  EXPECT_THAT(names_in(folder.path()), UnorderedElementsAre("a", "b"));
+  write_together(folder.path(), {{"a", "new"}, {"sometimes", {}}, {"b", "new"}});  // where there is none
+  EXPECT_THAT(names_in(folder.path()), UnorderedElementsAre("a", "b"));
+}
+
+TEST_F(Results, AProposedEffectIsThereForAnUnknownOneAlone) {
+  const auto write = [&](const diagnosis::Findings& findings) {
+    write_together(folder.path(), result_files(findings, model_of(findings), "model.toml"));
+    std::ostringstream out;
+    print_verdict(out, findings);
+    return std::pair{nlohmann::json::parse(text_of(folder / "verdict.json")), out.str() + result_names(findings)};
+  };
+  const auto unknown = made_up(Verdict::unknown_effect);
+  const auto [verdict, said] = write(unknown);
+  const std::string name = "curvature_bevel_saturation_by_time";
+  EXPECT_EQ(verdict["proposed_effect"]["name"], name);
+  EXPECT_EQ(verdict["proposed_effect"]["file"], "proposed_effect.cpp");
+  EXPECT_EQ(verdict["proposals"][0]["form"], "saturation");
+  EXPECT_THAT(said, HasSubstr("as an effect, " + name + ", in proposed_effect.cpp"));
+  EXPECT_THAT(said, ::testing::EndsWith("model.toml, proposed_effect.cpp"));
+  EXPECT_THAT(text_of(folder / "proposed_effect.cpp"), HasSubstr("const Effect& " + name + "() {"));
+  EXPECT_THAT(text_of(folder / "report.html"), HasSubstr("proposed_effect.cpp beside this page"));
+
+  auto without = unknown;
+  without.proposals.clear();
+  for (const auto& findings : {made_up(Verdict::effects_found), made_up(Verdict::nothing_missing), without}) {
+    write(unknown);
+    const auto [other_verdict, other_said] = write(findings);
+    EXPECT_THAT(names_in(folder.path()), UnorderedElementsAre("report.html", "model.toml", "verdict.json"));
+    EXPECT_TRUE(other_verdict["proposed_effect"].is_null());
+    EXPECT_THAT(other_said + text_of(folder / "report.html"), ::testing::Not(HasSubstr("proposed_effect")));
+  }
 }
 
 TEST_F(Results, AFullDiskLeavesTheOldOnes) {

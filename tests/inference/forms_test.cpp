@@ -113,6 +113,9 @@ TEST(Forms, TakeTheirValues) {
   EXPECT_EQ(value_of(Form::exponential, curve, 5, 0, 10), 1);
   EXPECT_NEAR(value_of(Form::saturation, curve, 5, 0, 15), 1 - std::exp(-1), 1e-15);
   EXPECT_NEAR(value_of(Form::sinusoid, curve, 4, 0.3, 1), std::cos(0.3), 1e-15);
+  // Before the first place as there.
+  EXPECT_EQ(value_of(Form::exponential, curve, 5, 0, -40), 1);
+  EXPECT_EQ(value_of(Form::saturation, curve, 5, 0, -40), 0);
 }
 
 }  // namespace

@@ -6,6 +6,7 @@
 #include <set>
 
 #include "diagnosis/mismatch/diagnose.hpp"
+#include "diagnosis/mismatch/effect_source.hpp"
 #include "tests/needle/simulated_rig.hpp"
 
 namespace bevel::diagnosis::testing {
@@ -159,9 +160,11 @@ TEST(Diagnose, WhatIsOnNoListIsADiscrepancyWithItsErrors) {
   EXPECT_GT(one.visible_size, 0.5);
   // What the tip advances more or less is 1.5 mm x 0.11 / mm x sin(0.22 / mm depth): a wave of 28.6 mm.
   ASSERT_FALSE(found.proposals.empty());
-  EXPECT_EQ(found.proposals.front().form, "sinusoid");
+  EXPECT_EQ(found.proposals.front().form, inference::Form::sinusoid);
   EXPECT_EQ(found.proposals.front().covariate, model::Covariate::depth_mm);
   EXPECT_NEAR(found.proposals.front().shape, 28.6, 5);
+  ASSERT_TRUE(proposed_effect(found).has_value());
+  EXPECT_EQ(proposed_effect(found)->name, "advance_sinusoid_by_depth");
   EXPECT_LT(found.held_out.after.rmse_mm, found.held_out.before.rmse_mm);
   EXPECT_THAT(found.sentence, HasSubstr(std::string(info_of(one.curve.component).meaning)));
 }

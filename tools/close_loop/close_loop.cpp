@@ -67,11 +67,10 @@ ClosedLoop close_the_loop(const Options& options, std::ostream& err) {
 }
 
 void write_results(const ClosedLoop& loop, const std::string& model_path, const std::string& out_folder) {
-  diagnose::write_together(out_folder, {{"report.html", diagnose::report_html(loop.findings, model_path)},
-                                        {"model.toml", io::to_toml(loop.models[kAugmented])},
-                                        {"verdict.json", diagnose::verdict_json(loop.findings)},
-                                        {"close-the-loop.html", page_html(loop)},
-                                        {"close-the-loop.json", to_json(loop)}});
+  auto files = diagnose::result_files(loop.findings, loop.models[kAugmented], model_path);
+  files.push_back({"close-the-loop.html", page_html(loop)});
+  files.push_back({"close-the-loop.json", to_json(loop)});
+  diagnose::write_together(out_folder, files);
 }
 
 int run(const Options& options, std::ostream& out, std::ostream& err) {
@@ -79,7 +78,8 @@ int run(const Options& options, std::ostream& out, std::ostream& err) {
   const ClosedLoop loop = close_the_loop(options, err);
   write_results(loop, find_case(options.folder).model_path, options.out_folder);
   out << table_text(loop) << "\nwritten: " << options.out_folder
-      << "/close-the-loop.html, close-the-loop.json, and the diagnosis: verdict.json, report.html, model.toml\n";
+      << "/close-the-loop.html, close-the-loop.json, and the diagnosis: " << diagnose::result_names(loop.findings)
+      << '\n';
   return loop.input_damaged ? tools::kDamagedInput : tools::kOk;
 }
 

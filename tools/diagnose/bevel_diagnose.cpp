@@ -15,7 +15,7 @@ int main(int argc, char** argv) {
   command_line.arguments("LOG", o.logs, "logs of one rig, at least two")
       .reads_recordings()
       .option("-m,--model", o.model_path, "the model in use (TOML)", true)
-      .option("-o,--out", o.out_folder, "folder for verdict.json, report.html and model.toml", true)
+      .option("-o,--out", o.out_folder, "folder for verdict.json, report.html, model.toml and a proposed effect", true)
       .option("--threads", o.threads, "at work at once; the verdict does not depend on it", 1, 64)
       .flag("-q,--quiet", o.quiet, "no progress on stderr");
   bevel::diagnose::end_on_signals("bevel-diagnose");

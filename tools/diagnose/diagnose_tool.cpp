@@ -6,6 +6,7 @@
 #include <stdexcept>
 
 #include "diagnosis/mismatch/diagnose.hpp"
+#include "diagnosis/mismatch/effect_source.hpp"
 #include "io/model_file.hpp"
 #include "tools/common/exit_status.hpp"
 #include "tools/diagnose/figures.hpp"
@@ -62,12 +63,13 @@ void print_verdict(std::ostream& out, const Findings& f) {
     for (const auto& r : effect.recordings)
       for (const auto& p : r.parameters) print_parameter(out, p, r.log);
   }
-  if (!f.proposals.empty()) {
+  if (const auto proposed = proposed_effect(f)) {
     const ProposedForm& p = f.proposals.front();
     out << "  an equation that would do: " << info_of(p.component).meaning << " by " << p.equation << ", x "
         << in_words(model::name_of(p.covariate)) << "; a " << with_error(p.amplitude, p.amplitude_sd) << ' '
         << info_of(p.component).unit << ", s " << number(p.shape) << " (95 % " << number(p.shape_low) << " to "
-        << number(p.shape_high) << "), log Bayes factor against all curves " << log_factor(p.log_bayes_factor) << '\n';
+        << number(p.shape_high) << "), log Bayes factor against all curves " << log_factor(p.log_bayes_factor)
+        << "; as an effect, " << proposed->name << ", in " << kProposedEffectFile << '\n';
   }
   const auto& n = f.needle;
   out << "  needle: k " << with_error(n.value.curvature_per_mm, n.curvature_sd_per_mm) << " 1/mm, lambda1 "
@@ -88,15 +90,28 @@ void print_verdict(std::ostream& out, const Findings& f) {
   for (const auto& remark : f.remarks) out << "  - " << remark << '\n';
 }
 
+std::vector<ResultFile> result_files(const Findings& findings, const io::ModelFile& augmented,
+                                     const std::string& model_path) {
+  ResultFile effect{kProposedEffectFile, {}};
+  if (auto proposed = proposed_effect(findings)) effect.text = std::move(proposed->text);
+  return {{"report.html", report_html(findings, model_path)},
+          {"model.toml", io::to_toml(augmented)},
+          std::move(effect),
+          {"verdict.json", verdict_json(findings)}};
+}
+
+std::string result_names(const Findings& findings) {
+  const std::string always = "verdict.json, report.html, model.toml";
+  return proposed_effect(findings) ? always + ", " + kProposedEffectFile : always;
+}
+
 int run(const Options& options, std::ostream& out, std::ostream& err) {
   check_writable(options.out_folder);
   const Found found = find(options, err);
   const Findings& findings = found.findings;
-  write_together(options.out_folder, {{"report.html", report_html(findings, options.model_path)},
-                                      {"model.toml", io::to_toml(model_of(findings, found.model))},
-                                      {"verdict.json", verdict_json(findings)}});
+  write_together(options.out_folder, result_files(findings, model_of(findings, found.model), options.model_path));
   print_verdict(out, findings);
-  out << "\nwritten: " << options.out_folder << "/verdict.json, report.html, model.toml\n";
+  out << "\nwritten: " << options.out_folder << "/" << result_names(findings) << '\n';
   return found.input_damaged ? tools::kDamagedInput : tools::kOk;
 }
 

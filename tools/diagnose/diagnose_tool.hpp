@@ -1,4 +1,5 @@
-// bevel-diagnose: from logs and the model in use to verdict.json, report.html and model.toml.
+// bevel-diagnose: from logs and the model in use to verdict.json, report.html and model.toml, and for an unknown effect
+// to the source of the one that is proposed.
 #pragma once
 
 #include <iosfwd>
@@ -7,6 +8,7 @@
 
 #include "diagnosis/mismatch/findings.hpp"
 #include "io/model_file.hpp"
+#include "tools/diagnose/result_files.hpp"
 
 namespace bevel::diagnose {
 
@@ -28,6 +30,12 @@ struct Found {
 Found find(const Options& options, std::ostream& err);
 
 void print_verdict(std::ostream& out, const diagnosis::Findings& findings);
+
+// For write_together(): the page, the augmented model, the proposed effect where there is one, and last the verdict.
+std::vector<ResultFile> result_files(const diagnosis::Findings& findings, const io::ModelFile& augmented,
+                                     const std::string& model_path);
+// Of those files, for a message.
+std::string result_names(const diagnosis::Findings& findings);
 
 // All of it; returns the exit status.
 int run(const Options& options, std::ostream& out, std::ostream& err);

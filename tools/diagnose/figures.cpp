@@ -25,6 +25,9 @@ int decimals_for(double size, int digits) {
 }
 
 constexpr std::pair<std::string_view, std::string_view> kUnits[] = {{"_mm_per_rad", "mm/rad"},
+                                                                    {"_mm_per_mm", "mm/mm"},
+                                                                    {"_rad_per_mm", "rad/mm"},
+                                                                    {"_rad_per_rad", "rad/rad"},
                                                                     {"_per_100mm", "per 100 mm"},
                                                                     {"_per_mm", "1/mm"},
                                                                     {"_per_rad", "1/rad"},

@@ -4,8 +4,10 @@
 #include <array>
 #include <cmath>
 
+#include "diagnosis/mismatch/effect_source.hpp"
 #include "tools/diagnose/figures.hpp"
 #include "tools/diagnose/pictures.hpp"
+#include "tools/diagnose/verdict_json.hpp"
 
 namespace bevel::diagnose {
 
@@ -244,6 +246,9 @@ void add_unknown_part(io::HtmlReport& page, const Findings& f) {
   page.table({"what is off by", "x", "equation", "a", "s (95 %)", "log Bayes factor against all curves"}, forms,
              "Simple forms of one covariate, each beside the needle and what was named. Above zero, the equation is "
              "worth more than the freedom of a curve. A proposal to be tried as an effect, not a cause.");
+  if (const auto proposed = proposed_effect(f))
+    page.paragraph(std::string(kProposedEffectFile) + " beside this page is the first of them as an effect, " +
+                   proposed->name + ", ready to be added to the library (docs/adding-an-effect.md).");
 }
 
 void add_residuals(io::HtmlReport& page, const Findings& f) {

@@ -55,20 +55,20 @@ class SignalsWait {
 // A file beside its place; gone with its owner unless it took the place.
 class Pending {
  public:
-  Pending(const fs::path& folder, const ResultFile& file) : place_(folder / file.name) {
-    std::string pattern = (folder / ("." + file.name + ".XXXXXX")).string();
+  Pending(const fs::path& folder, const std::string& name, const std::string& text) : place_(folder / name) {
+    std::string pattern = (folder / ("." + name + ".XXXXXX")).string();
     const int descriptor = ::mkstemp(pattern.data());
     if (descriptor < 0) fail(folder, "no file can be made in it");
     path_ = pattern;
     const mode_t mask = ::umask(0);  // mkstemp gives a file to its owner alone
     ::umask(mask);
     std::size_t done = 0;
-    while (done < file.text.size()) {
-      const ssize_t size = ::write(descriptor, file.text.data() + done, file.text.size() - done);
+    while (done < text.size()) {
+      const ssize_t size = ::write(descriptor, text.data() + done, text.size() - done);
       if (size < 0 && errno != EINTR) break;
       if (size > 0) done += static_cast<std::size_t>(size);
     }
-    const bool whole = done == file.text.size() && ::fchmod(descriptor, 0666 & ~mask) == 0 && ::fsync(descriptor) == 0;
+    const bool whole = done == text.size() && ::fchmod(descriptor, 0666 & ~mask) == 0 && ::fsync(descriptor) == 0;
     const int reason = errno;
     ::close(descriptor);
     if (whole) return;
@@ -119,9 +119,11 @@ void write_together(const fs::path& folder, const std::vector<ResultFile>& files
       errno = EISDIR;
       fail(folder / file.name, "cannot be replaced");
     }
-    pending.emplace_back(folder, file);
+    if (file.text) pending.emplace_back(folder, file.name, *file.text);
   }
   if (!files.empty()) fs::remove(folder / files.back().name);
+  for (const auto& file : files)
+    if (!file.text) fs::remove(folder / file.name);
   for (auto& one : pending) one.take_place();
   say_on_signal("the results had been written");
 }

@@ -3,6 +3,8 @@
 #include <cmath>
 #include <nlohmann/json.hpp>
 
+#include "diagnosis/mismatch/effect_source.hpp"
+
 namespace bevel::diagnose {
 
 using namespace bevel::diagnosis;  // NOLINT(google-build-using-namespace): the tool speaks of nothing else
@@ -129,12 +131,17 @@ json as_json(const std::vector<ProposedForm>& proposals) {
     all.push_back({{"component", info_of(p.component).name},
                    {"unit", info_of(p.component).unit},
                    {"covariate", model::name_of(p.covariate)},
-                   {"form", p.form},
+                   {"form", name_of(p.form)},
                    {"equation", p.equation},
                    {"a", {{"value", figure(p.amplitude)}, {"std_error", figure(p.amplitude_sd)}}},
                    {"s", {{"value", figure(p.shape)}, {"range95", {figure(p.shape_low), figure(p.shape_high)}}}},
                    {"log_bayes_factor", figure(p.log_bayes_factor)}});
   return all;
+}
+
+json as_json(const std::optional<EffectSource>& proposed) {
+  if (!proposed) return nullptr;
+  return {{"name", proposed->name}, {"file", kProposedEffectFile}};
 }
 
 json as_json(const std::vector<Explanation>& explanations) {
@@ -201,6 +208,7 @@ std::string verdict_json(const Findings& f) {
   j["variation"] = as_json(f.variation);
   j["discrepancies"] = as_json(f.discrepancies);
   j["proposals"] = as_json(f.proposals);
+  j["proposed_effect"] = as_json(proposed_effect(f));
   j["checks"] = checks_json(f.checks);
   j["tried"] = as_json(f.tried);
   j["tried_beside"] = as_json(f.beside);

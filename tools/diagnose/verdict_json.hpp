@@ -8,6 +8,9 @@
 
 namespace bevel::diagnose {
 
+// Where the source of the proposed effect stands, if there is one.
+inline constexpr const char* kProposedEffectFile = "proposed_effect.cpp";
+
 std::string verdict_json(const diagnosis::Findings& findings);
 
 // What was found, beside what the model in use had already, as a model that the rig, the estimator and bevel-predict

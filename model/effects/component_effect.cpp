@@ -1,0 +1,103 @@
+#include "model/effects/component_effect.hpp"
+
+#include <cmath>
+
+namespace bevel::model {
+namespace {
+
+using Component = DiscrepancyComponent;
+
+constexpr std::array<DiscrepancyComponentInfo, 11> kComponents = {
+    {{Component::curvature_bevel, "curvature_bevel", "curvature toward the bevel", "1/mm", 0.05},
+     {Component::curvature_across, "curvature_across", "curvature across the bevel", "1/mm", 0.05},
+     {Component::advance, "advance", "advance of the tip", "mm per mm", 5},
+     {Component::turning, "turning", "turning of the tip", "rad per mm", 5},
+     {Component::advance_turning, "advance_turning", "advance of the tip with turning", "mm per rad", 50},
+     {Component::turning_turning, "turning_turning", "turning of the tip with turning", "rad per rad", 5},
+     {Component::drift_bevel, "drift_bevel", "sideways drift toward the bevel", "mm per mm", 5},
+     {Component::drift_across, "drift_across", "sideways drift across the bevel", "mm per mm", 5},
+     {Component::x, "x", "reading along x", "mm", 100},
+     {Component::y, "y", "reading along y", "mm", 100},
+     {Component::z, "z", "reading along z", "mm", 100}}};
+
+}  // namespace
+
+std::span<const DiscrepancyComponentInfo> discrepancy_components() { return kComponents; }
+
+const DiscrepancyComponentInfo& info_of(DiscrepancyComponent component) {
+  return kComponents.at(static_cast<std::size_t>(component));
+}
+
+std::optional<DiscrepancyComponent> find_discrepancy_component(std::string_view name) {
+  for (const auto& info : kComponents)
+    if (info.name == name) return info.component;
+  return std::nullopt;
+}
+
+void ComponentEffect::axes(Parameters p, const LegView& leg, EffectMemory& memory, Dual& insertion_mm,
+                           Dual& rotation_rad) const {
+  switch (component_) {
+    case Component::advance:
+      insertion_mm += summed(p, leg, memory, leg.base_insertion_mm());
+      break;
+    case Component::turning:
+      rotation_rad += summed(p, leg, memory, std::abs(leg.base_insertion_mm()));
+      break;
+    case Component::advance_turning:
+      insertion_mm += summed(p, leg, memory, leg.base_rotation_rad());
+      break;
+    case Component::turning_turning:
+      rotation_rad += summed(p, leg, memory, leg.base_rotation_rad());
+      break;
+    default:
+      break;
+  }
+}
+
+void ComponentEffect::curvature(Parameters p, const LegView& leg, EffectMemory& memory, Dual2& kappa_per_mm) const {
+  if (component_ == Component::curvature_bevel) kappa_per_mm[0] += value(p, leg, memory);
+  if (component_ == Component::curvature_across) kappa_per_mm[1] += value(p, leg, memory);
+}
+
+void ComponentEffect::settle(Parameters p, const LegView& leg, EffectMemory& memory) const {
+  if (drifts()) {
+    const Dual drift = value(p, leg, memory) * leg.insertion_mm;
+    // Toward the bevel is body -y for k > 0.
+    const Dual2 world = component_ == Component::drift_bevel ? leg.lateral_in_world({Dual(), -drift})
+                                                             : leg.lateral_in_world({drift, Dual()});
+    for (std::size_t i = 0; i < 2; ++i) memory.slot[i] += world[i];
+  } else if (axis() >= 0) {
+    memory.slot[0] = value(p, leg, memory);
+  }
+}
+
+void ComponentEffect::offset(Parameters /*p*/, const EffectMemory& memory, double /*time_s*/,
+                             Dual3& position_mm) const {
+  if (drifts())
+    for (std::size_t i = 0; i < 2; ++i) position_mm[i] += memory.slot[i];
+  else if (axis() >= 0)
+    position_mm[static_cast<std::size_t>(axis())] += memory.slot[0];
+}
+
+// The third slot keeps what the covariate needs to remember, of which no covariate needs both.
+CovariateTracker ComponentEffect::tracked(const LegView& leg, const EffectMemory& memory) const {
+  const double kept = memory.slot[2].value;
+  CovariateTracker tracker = memory.phase == 0 ? CovariateTracker(leg.entry) : CovariateTracker(kept, kept);
+  tracker.advance(leg.from, leg.to);
+  return tracker;
+}
+
+Dual ComponentEffect::value(Parameters p, const LegView& leg, EffectMemory& memory) const {
+  const CovariateTracker tracker = tracked(leg, memory);
+  memory.phase = 1;
+  memory.slot[2].value = covariate() == Covariate::since_stop_s ? tracker.stopped_s() : tracker.turned_mm();
+  return value_at(p, tracker[covariate()]);
+}
+
+// So much per mm or rad of the base, over all legs so far.
+const Dual& ComponentEffect::summed(Parameters p, const LegView& leg, EffectMemory& memory, double base) const {
+  memory.slot[0] += value(p, leg, memory) * base;
+  return memory.slot[0];
+}
+
+}  // namespace bevel::model
