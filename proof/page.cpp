@@ -86,6 +86,26 @@ void shares(io::HtmlReport& page, const Tally& t) {
                  std::to_string(t.unknown_alarms.hits) + " of " + std::to_string(t.unknown_alarms.of) + ".");
 }
 
+// Is a verdict right as often as the tool says that it is?
+void reliability(io::HtmlReport& page, const Tally& t) {
+  std::vector<std::vector<std::string>> rows;
+  for (std::size_t i = 0; i < t.reliability.size(); ++i) {
+    const ReliabilityBin& bin = t.reliability[i];
+    if (bin.right.of == 0) continue;
+    const Interval w = wilson95(bin.right);
+    const double high = i + 1 < t.reliability.size() ? t.reliability[i + 1].low : 1.0;
+    rows.push_back({digits(bin.low, 2) + " to " + digits(high, 2), digits(bin.mean), std::to_string(bin.right.hits),
+                    std::to_string(bin.right.of), percent(bin.right.value()),
+                    percent(w.low) + " to " + percent(w.high)});
+  }
+  if (rows.empty()) return;
+  page.heading("Probabilities");
+  page.table({"probability of what was said", "mean", "right", "of", "share", "95 %"}, rows,
+             "Expected calibration error " + digits(t.expected_calibration_error, 2) +
+                 ". The truth had a probability below 0.01 in " + std::to_string(t.truth_improbable.hits) + " of " +
+                 std::to_string(t.truth_improbable.of) + ".");
+}
+
 void sensitivity(io::HtmlReport& page, const Tally& t) {
   io::Plot plot;
   plot.x_label = "visible size (standard deviations of the coloured noise)";
@@ -232,6 +252,7 @@ std::string results_page(const CampaignFacts& facts, const Tally& t, const std::
   io::HtmlReport page("Blind trial of the mismatch tool");
   headline(page, t, facts);
   shares(page, t);
+  reliability(page, t);
   sensitivity(page, t);
   confusion(page, t);
   parameters(page, t);

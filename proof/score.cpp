@@ -35,7 +35,24 @@ bool matches_leniently(const Names& expected, const Verdict& verdict) {
   return false;
 }
 
+// Of a set, "unknown" in it or not, by the sets that the tool lists. A discrepancy too small to count is said in none
+// of the verdicts: of what lies beside one, the share that counts is that over all sets.
+double probability_by(const PosteriorGiven& posterior, Names expected) {
+  if (expected.empty()) return posterior.nothing_missing;
+  const bool unknown = std::erase(expected, "unknown") > 0;
+  std::ranges::sort(expected);
+  double beside = 0;
+  for (const Explanation& one : posterior.explanations) beside += one.with_discrepancy;
+  const double counts = beside > 0 ? std::min(1.0, posterior.discrepancy / beside) : 0;
+  double p = 0;
+  for (const Explanation& one : posterior.explanations)
+    if (one.effects == expected)
+      p += unknown ? counts * one.with_discrepancy : one.probability - counts * one.with_discrepancy;
+  return std::clamp(p, 0.0, 1.0);
+}
+
 double probability_of(const Names& expected, const Verdict& verdict) {
+  if (verdict.posterior) return probability_by(*verdict.posterior, expected);
   if (holds(expected, "unknown") != (verdict.kind == "unknown-effect")) return 0.0;
   double p = 1.0;
   for (const std::string& name : expected)
@@ -177,6 +194,7 @@ TrialScore score_verdict(const OpenedTruth& truth, const Verdict& verdict) {
   const bool imitated = score.named.size() == 1 && holds(truth.rivals, score.named[0]);
   score.lenient = score.strict || imitated || matches_leniently(truth.expected, verdict);
   score.probability_of_truth = probability_of(truth.expected, verdict);
+  score.probability_of_said = probability_of(score.named, verdict);
   for (FoundEffect& found : score.found) found.named = holds(score.named, found.name);
   for (const OpenedEffect& effect : truth.effects) {
     if (!holds(truth.expected, effect.name)) continue;

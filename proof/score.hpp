@@ -76,7 +76,7 @@ struct TrialScore {
   std::string abstention;  // why there is no verdict
   bool strict = false;     // named is exactly what was expected
   bool lenient = false;    // so it is, with names out of ambiguous_with, or of a rival
-  double probability_of_truth = 0;
+  double probability_of_truth = 0, probability_of_said = 0;
   std::vector<FoundEffect> found;
   std::vector<ParameterScore> parameters;
   std::vector<LocationScore> locations;

@@ -62,6 +62,7 @@ json as_json(const TrialScore& s) {
          {"strict", s.strict},
          {"lenient", s.lenient},
          {"probability_of_truth", s.probability_of_truth},
+         {"probability_of_said", s.probability_of_said},
          {"chi2_before", optional_json(s.chi2_before)},
          {"chi2_after", optional_json(s.chi2_after)},
          {"rmse_before_mm", optional_json(s.rmse_before_mm)},
@@ -102,6 +103,7 @@ TrialScore trial_score_of(const json& j) {
   s.strict = j.at("strict");
   s.lenient = j.at("lenient");
   s.probability_of_truth = j.at("probability_of_truth");
+  s.probability_of_said = j.value("probability_of_said", 0.0);
   s.chi2_before = optional_number(j, "chi2_before");
   s.chi2_after = optional_number(j, "chi2_after");
   s.rmse_before_mm = optional_number(j, "rmse_before_mm");
@@ -120,6 +122,9 @@ TrialScore trial_score_of(const json& j) {
 }
 
 json as_json(const Tally& t) {
+  json reliability = json::array();
+  for (const ReliabilityBin& bin : t.reliability)
+    reliability.push_back({{"from", bin.low}, {"mean", bin.mean}, {"right", share_json(bin.right)}});
   json sensitivity = json::array();
   for (const SensitivityBin& bin : t.sensitivity)
     sensitivity.push_back({{"from_sigmas", bin.low_sigmas},
@@ -140,6 +145,9 @@ json as_json(const Tally& t) {
           {"unknown_called_unknown_without_rival", share_json(t.unknown_distinct)},
           {"unknown_called_without_cause", share_json(t.unknown_alarms)},
           {"mean_probability_of_truth", t.mean_probability_of_truth},
+          {"truth_below_one_percent", share_json(t.truth_improbable)},
+          {"reliability", reliability},
+          {"expected_calibration_error", t.expected_calibration_error},
           {"sensitivity", sensitivity},
           {"confusion", t.confusion},
           {"z_scores", {{"count", t.z.size()}, {"mean", t.z_mean}, {"spread", t.z_spread}, {"values", t.z}}},

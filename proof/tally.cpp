@@ -76,6 +76,26 @@ void note_parameters(const TrialScore& score, Tally& tally) {
   }
 }
 
+void note_reliability(const TrialScore& score, Tally& tally) {
+  tally.truth_improbable.add(score.probability_of_truth < 0.01);
+  auto bin = tally.reliability.end();
+  do --bin;
+  while (bin != tally.reliability.begin() && score.probability_of_said < bin->low);
+  bin->mean += score.probability_of_said;  // a sum until all are in
+  bin->right.add(score.strict);
+}
+
+void finish_reliability(Tally& tally) {
+  int all = 0;
+  for (ReliabilityBin& bin : tally.reliability) {
+    if (bin.right.of == 0) continue;
+    bin.mean /= bin.right.of;
+    all += bin.right.of;
+    tally.expected_calibration_error += bin.right.of * std::abs(bin.mean - bin.right.value());
+  }
+  if (all > 0) tally.expected_calibration_error /= all;
+}
+
 std::pair<double, double> mean_and_spread(const std::vector<double>& values) {
   double mean = 0, squares = 0;
   for (const double value : values) mean += value / static_cast<double>(values.size());
@@ -89,6 +109,7 @@ Tally tally(const std::vector<TrialScore>& scores) {
   Tally t;
   const std::vector<double> edges{0, 2, 5, 8, 15, 30, 100, std::numeric_limits<double>::infinity()};
   for (std::size_t i = 0; i + 1 < edges.size(); ++i) t.sensitivity.push_back({edges[i], edges[i + 1], {}, {}});
+  for (const double low : {0.0, 0.5, 0.7, 0.9, 0.97}) t.reliability.push_back({.low = low, .right = {}});
   for (const TrialScore& score : scores) {
     ++t.trials;
     note_shares(score, t);
@@ -99,11 +120,13 @@ Tally tally(const std::vector<TrialScore>& scores) {
       continue;
     }
     t.mean_probability_of_truth += score.probability_of_truth;
+    note_reliability(score, t);
     confuse(score, t);
     note_fit(score, t);
     note_parameters(score, t);
   }
   if (t.trials > 0) t.mean_probability_of_truth /= t.trials;
+  finish_reliability(t);
   std::tie(t.z_mean, t.z_spread) = mean_and_spread(t.z);
   std::tie(t.z_nearest_mean, t.z_nearest_spread) = mean_and_spread(t.z_nearest);
   std::ranges::sort(t.seconds);

@@ -16,6 +16,13 @@ struct SensitivityBin {
   Share alarmed;       // trials of this visible size in which anything was named
 };
 
+// Verdicts by the probability that the tool gave to exactly what it said.
+struct ReliabilityBin {
+  double low = 0;
+  double mean = 0;  // of those probabilities
+  Share right;
+};
+
 struct Tally {
   int trials = 0;
   int abstentions = 0;
@@ -27,6 +34,9 @@ struct Tally {
   Share unknown_distinct;                        // of those that no listed effect imitates
   Share unknown_alarms;                          // "unknown" called where nothing unlisted was concealed
   double mean_probability_of_truth = 0;
+  Share truth_improbable;  // the truth had a probability below 0.01
+  std::vector<ReliabilityBin> reliability;
+  double expected_calibration_error = 0;  // mean distance of the bins' shares from their probabilities, by trials
   std::vector<SensitivityBin> sensitivity;
   std::map<std::string, std::map<std::string, int>> confusion;  // [truth][named]; "none" on either side
   std::vector<double> z;

@@ -1,5 +1,6 @@
 #include "proof/verdict.hpp"
 
+#include <algorithm>
 #include <cmath>
 #include <filesystem>
 #include <nlohmann/json.hpp>
@@ -95,6 +96,27 @@ Location read_location(const json& j) {
   return location;
 }
 
+PosteriorGiven read_posterior(const json& j) {
+  if (!j.is_object()) fail("posterior is not an object");
+  PosteriorGiven posterior{.nothing_missing = number(j, "nothing_missing").value_or(0),
+                           .discrepancy = number(j, "discrepancy").value_or(0),
+                           .explanations = {}};
+  for (const json& one : list(j, "explanations")) {
+    if (!one.is_object()) fail("an explanation is not an object");
+    Explanation explanation{.effects = {},
+                            .probability = number(one, "probability").value_or(0),
+                            .with_discrepancy = number(one, "with_discrepancy").value_or(0)};
+    for (const json& effect : list(one, "effects")) {
+      if (!effect.is_string()) fail("an explanation holds " + effect.dump());
+      const auto label = effect.get<std::string>();
+      explanation.effects.push_back(label.substr(0, label.find(" (")));  // of an effect in kinds, its name
+    }
+    std::ranges::sort(explanation.effects);
+    posterior.explanations.push_back(std::move(explanation));
+  }
+  return posterior;
+}
+
 }  // namespace
 
 std::vector<std::string> Verdict::named() const {
@@ -115,6 +137,7 @@ Verdict parse_verdict(std::string_view text_of_file) {
   if (verdict.kind == "nothing-missing" && !verdict.effects.empty()) fail("nothing-missing, yet effects are named");
   if (verdict.kind == "effects-found" && verdict.effects.empty()) fail("effects-found, yet none is named");
   for (const json& location : list(j, "where")) verdict.where.push_back(read_location(location));
+  if (j.contains("posterior")) verdict.posterior = read_posterior(j.at("posterior"));
   if (j.contains("fit") && j.at("fit").is_object()) {
     const json& fit = j.at("fit");
     const json none = json::object();

@@ -29,10 +29,23 @@ struct Location {
   std::optional<double> range_low, range_high;
 };
 
+// One set of the tool's posterior.
+struct Explanation {
+  std::vector<std::string> effects;  // names, sorted
+  double probability = 0;
+  double with_discrepancy = 0;  // of it, beside something that has no name, of any size
+};
+struct PosteriorGiven {
+  double nothing_missing = 0;
+  double discrepancy = 0;  // of a size that counts
+  std::vector<Explanation> explanations;
+};
+
 struct Verdict {
   std::string kind;  // nothing-missing, effects-found, unknown-effect
   std::vector<NamedEffect> effects;
   std::vector<Location> where;
+  std::optional<PosteriorGiven> posterior;
   std::optional<double> chi2_before, chi2_after;  // held-out, per degree of freedom
   std::optional<double> rmse_before_mm, rmse_after_mm;
 

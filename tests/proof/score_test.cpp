@@ -116,6 +116,25 @@ TEST(Score, ProbabilityOfTheTruth) {
   EXPECT_EQ(score(truth_of({}), "nothing-missing", {}).probability_of_truth, 1.0);
 }
 
+// By the sets that a verdict lists: what was not named has its probability too.
+TEST(Score, ProbabilityByTheSetsOfThePosterior) {
+  const json posterior{{"posterior",
+                        {{"nothing_missing", 0.1},
+                         {"discrepancy", 0.15},
+                         {"explanations",
+                          {{{"effects", {"lost_steps (rotation)"}}, {"probability", 0.6}, {"with_discrepancy", 0.2}},
+                           {{"effects", {"torsional_windup"}}, {"probability", 0.25}, {"with_discrepancy", 0.1}},
+                           {{"effects", json::array()}, {"probability", 0.15}, {"with_discrepancy", 0.0}}}}}}};
+  const TrialScore s = score(truth_of({windup()}), "effects-found", {effect("lost_steps", 0.6)}, posterior);
+  // Half of what lies beside a discrepancy is beside one that counts.
+  EXPECT_NEAR(s.probability_of_truth, 0.25 - 0.5 * 0.1, 1e-12);
+  EXPECT_NEAR(s.probability_of_said, 0.6 - 0.5 * 0.2, 1e-12);
+  EXPECT_NEAR(score(truth_of({}), "effects-found", {effect("lost_steps")}, posterior).probability_of_truth, 0.1, 1e-12);
+  EXPECT_NEAR(score(truth_of({windup(), screw()}), "unknown-effect", {effect("torsional_windup")}, posterior)
+                  .probability_of_truth,
+              0.5 * 0.1, 1e-12);
+}
+
 json estimate(double value, double std_error) {
   return {{"value", value}, {"std_error", std_error}, {"ci95", {value - 2 * std_error, value + 2 * std_error}}};
 }

@@ -61,6 +61,19 @@ TEST(Tally, ConfusionCountsEachExpectedEffectOnce) {
   EXPECT_EQ(t.confusion.at("unknown").at("insertion_scale"), 1);
 }
 
+// Four verdicts that claim 0.95, of which three are right, and one of 0.6 that is: 0.8 |0.95 - 0.75| + 0.2 |0.6 - 1|.
+TEST(Tally, ReliabilityComparesProbabilitiesWithShares) {
+  std::vector<TrialScore> scores(5, trial({"layer"}, {"layer"}));
+  scores[0] = trial({"layer"}, {"drilling"});
+  for (auto& one : scores) one.probability_of_said = 0.95;
+  scores[4].probability_of_said = 0.6;
+  const Tally t = tally(scores);
+  EXPECT_NEAR(t.expected_calibration_error, 0.8 * 0.2 + 0.2 * 0.4, 1e-12);
+  EXPECT_EQ(t.truth_improbable.hits, 1);
+  EXPECT_EQ(t.reliability.at(3).right.of, 4);
+  EXPECT_NEAR(t.reliability.at(3).mean, 0.95, 1e-12);
+}
+
 TEST(Tally, SharesByVisibility) {
   TrialScore silent = trial({"layer"}, {});
   silent.abstained = true;
