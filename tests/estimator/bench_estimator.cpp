@@ -111,7 +111,7 @@ void BM_whole_insertion_per_message(benchmark::State& bench) {
         estimator.add(data.measurements[next++]);
       estimator.add(actuator);
     }
-    benchmark::DoNotOptimize(estimator.counters().late);
+    benchmark::DoNotOptimize(estimator.counters().positions.late);
   }
   bench.SetItemsProcessed(bench.iterations() *
                           static_cast<std::int64_t>(data.actuators.size() + data.measurements.size()));
