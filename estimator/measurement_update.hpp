@@ -1,6 +1,7 @@
 #pragma once
 // The Kalman update that every kind of reading ends in: a residual of three numbers, of which some axes are seen.
 #include <Eigen/Cholesky>
+#include <Eigen/LU>
 #include <array>
 
 #include "estimator/error_state.hpp"
@@ -84,6 +85,15 @@ Update update_seen(FilterState& state, const Eigen::Matrix<double, 3, kColumns>&
     default:
       return {};
   }
+}
+
+// The x across `along` with information x = left, where that is singular along it: nothing along it, nor along an axis
+// that is not seen.
+inline Eigen::Vector3d solve_across(const Eigen::Matrix3d& information, const Eigen::Vector3d& along,
+                                    const Eigen::Vector3d& left) {
+  const Eigen::Matrix3d bounded =
+      information + information.trace() * (along * along.transpose() + kRankTolerance * Eigen::Matrix3d::Identity());
+  return bounded.inverse() * left;
 }
 
 }  // namespace bevel::estimator

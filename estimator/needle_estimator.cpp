@@ -79,10 +79,9 @@ void NeedleEstimator::remember(const Node& before, const Node& node) {
     step.information_per_mm2 = node.measurement.information_per_mm2;
   }
   if (step.heading_measured) {
-    const Eigen::Vector3d ahead = node.state.pose.R.col(2);
-    const Eigen::Matrix3d across = Eigen::Matrix3d::Identity() - ahead * ahead.transpose();
-    step.heading = node.heading.heading.normalized();
-    step.information_per_rad2 = across * node.heading.information_per_rad2 * across;
+    const model::TipHeading linear = filter_.made_linear(node.heading, node.state);
+    step.heading = linear.heading;
+    step.information_per_rad2 = linear.information_per_rad2;
   }
   past_mm_ += std::abs(step.insertion_mm);
   past_.add(before.state, step, node.state, node.moved, filter_);

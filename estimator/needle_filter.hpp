@@ -118,13 +118,16 @@ class NeedleFilter {
   SeenHeading seen_heading(const FilterState& state) const;
   std::int64_t latency_us() const;
 
+  // A heading about a state, without effects, as a point of which all that is known is linear: information times
+  // (heading - R e3) is what it says of R e3, and the information is singular along that.
+  model::TipHeading made_linear(const model::TipHeading& measurement, const FilterState& state) const;
+
   // Applies one measurement; its status must be 0 and its values finite (the checked decode sees to that).
   Update update(FilterState& state, const model::TipMeasurement& measurement) const;
 
-  // The same for a heading. The residual is the angle between the heading seen and the predicted one, as a vector
-  // across the predicted one that points from it to the other: two degrees of freedom. It has the gate of its rank and
-  // a count of rejects of its own, and brings no reset: a sensor that is turned about must not throw away what the
-  // cameras know. One that points backwards is refused whatever its information says.
+  // The same for a heading: of what it knows across itself, one angle or two (filter_heading.cpp). It has the gate of
+  // its rank and a count of rejects of its own, and brings no reset: a sensor that is turned about must not throw away
+  // what the cameras know. One that points backwards is refused whatever its information says.
   Update update(FilterState& state, const model::TipHeading& measurement) const;
 
   // An extended filter keeps the derivatives that it took while it knew little of k and lambda, and is too sure for

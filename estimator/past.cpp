@@ -1,14 +1,14 @@
 #include "estimator/past.hpp"
 
-#include <Eigen/LU>
 #include <cmath>
+
+#include "estimator/measurement_update.hpp"
 
 namespace bevel::estimator {
 namespace {
 
 constexpr double kLongest_mm = 2.5;
 constexpr double kLongest_rad = 0.25;
-constexpr double kUnseen = 1e-9;
 constexpr double kSkew_mm_rad = 0.01;  // turns the heading by k times half of this
 
 bool in_proportion(double insertion_mm, double rotation_rad, const PastStep& step) {
@@ -80,17 +80,14 @@ void Past::add(const FilterState& before, const PastStep& step, const FilterStat
 // same heading: two that each know nothing along their own would together know where along it they cross, at length
 // zero.
 void Past::join_heading(const PastStep& step, const Eigen::Vector3d& ahead, Eigen::Vector3d& offset) {
-  const Eigen::Matrix3d along = ahead * ahead.transpose();
-  const Eigen::Matrix3d across = Eigen::Matrix3d::Identity() - along;
+  const Eigen::Matrix3d across = Eigen::Matrix3d::Identity() - ahead * ahead.transpose();
   const Eigen::Matrix3d had = across * open_.information_per_rad2 * across;
   const Eigen::Matrix3d& comes = step.information_per_rad2;
   const Eigen::Matrix3d sum = had + comes;
   const double share = had.trace() / sum.trace();
   const Eigen::Vector3d left = had * (open_.heading - ahead - offset) + comes * (step.heading - ahead);
-  // Nothing is left along the heading, nor along an axis that neither sees: there the inverse may be anything.
-  const Eigen::Matrix3d bounded = sum + sum.trace() * (along + kUnseen * Eigen::Matrix3d::Identity());
   offset *= share;
-  open_.heading = ahead + offset + bounded.inverse() * left;
+  open_.heading = ahead + offset + solve_across(sum, ahead, left);
   open_.information_per_rad2 = sum;
   if (!open_.measured) measured_at_ += (progress_ - measured_at_) * (1 - share);
   open_.heading_measured = true;

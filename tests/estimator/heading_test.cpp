@@ -86,44 +86,70 @@ TEST(Heading, DerivativesAreThoseOfPerturbation) {
   }
 }
 
-// Information form: P^-1 + H^T W H, and the error that the innovation brings.
-TEST(Heading, TheUpdateIsTheClosedForm) {
+// Information form, P^-1 + H^T R^-1 H, with H by central differences of the innovation where it is, not at zero.
+TEST(Heading, TheUpdateIsTheClosedFormWithDerivativesByPerturbation) {
   const NeedleFilter filter(agar_config());
   std::mt19937_64 rng(32);
-  for (int trial = 0; trial < 50; ++trial) {
+  double largest = 0;
+  for (int trial = 0; trial < 100; ++trial) {
     const FilterState before = random_state(filter, rng);
-    const SeenHeading seen = filter.seen_heading(before);
-    const Eigen::Vector3d about = before.pose.R * Eigen::Vector3d(0.01, -0.007, 0);  // of the rotation to the reading
-    model::TipHeading m = heading_of(model::exp_so3(about) * seen.along);
+    const Eigen::Vector3d ahead = before.pose.R.col(2);
+    constexpr double kSd_rad = 0.02;
     const bool one_camera = trial % 2 == 1;
-    if (one_camera) {
-      const Eigen::Vector3d across = m.heading.cross(Eigen::Vector3d::UnitX()).normalized();
-      m.information_per_rad2 = 2500 * across * across.transpose();
-    }
+    // One camera: the angle in its picture, which may be far from the heading itself.
+    model::TipHeading m =
+        one_camera ? testing::picture_heading(ahead, 1, 1, 0, {1, 0, 0}, kSd_rad, rng)
+                   : heading_of(model::exp_so3(before.pose.R * Eigen::Vector3d(0.01, -0.02, 0)) * ahead, kSd_rad);
     FilterState after = before;
     const Update update = filter.update(after, m);
     ASSERT_TRUE(update.accepted);
-    EXPECT_EQ(update.rank, one_camera ? 1 : 2);
+    ASSERT_EQ(update.rank, one_camera ? 1 : 2);
     if (!one_camera) {
-      EXPECT_NEAR(update.innovation.head<2>().norm(), about.norm(), 1e-12);
+      EXPECT_NEAR(update.innovation.head<2>().norm(), std::hypot(0.01, 0.02), 1e-5);
     }
-
     Eigen::Matrix<double, 3, 9> H = Eigen::Matrix<double, 3, 9>::Zero();
-    H.leftCols<6>() = seen.by_error;
-    const Eigen::Matrix3d across = Eigen::Matrix3d::Identity() - seen.along * seen.along.transpose();
-    const Eigen::Matrix3d W = across * m.information_per_rad2 * across;
-    const Matrix9d P = (before.covariance.inverse() + H.transpose() * W * H).inverse();
-    const Eigen::Vector3d residual = about.cross(seen.along);
-    const Vector9d correction = P * H.transpose() * W * residual;
+    for (int i = 0; i < 9; ++i) {
+      constexpr double kStep = 1e-6;
+      FilterState up = before, down = before;
+      move<9>(up, kStep * Vector9d::Unit(i));
+      move<9>(down, -kStep * Vector9d::Unit(i));
+      H.col(i) = (filter.update(down, m).innovation - filter.update(up, m).innovation) / (2 * kStep);
+    }
+    EXPECT_LT((H.leftCols<3>().norm() + H.rightCols<4>().norm()), 1e-9) << "neither place nor roll nor parameters";
+    const Matrix9d P = (before.covariance.inverse() + H.transpose() * H / (kSd_rad * kSd_rad)).inverse();
+    const Vector9d correction = P * H.transpose() * update.innovation / (kSd_rad * kSd_rad);
     const Vector9d sd = P.diagonal().cwiseSqrt();
-    const auto in_sd = [&sd](const Matrix9d& M) {
-      return sd.cwiseInverse().asDiagonal() * M * sd.cwiseInverse().asDiagonal();
-    };
-    EXPECT_LT((in_sd(after.covariance) - in_sd(P)).norm(), 1e-7);
-    EXPECT_LT((difference<9>(before, after) - correction).cwiseQuotient(sd).norm(), 1e-5);
-    const Eigen::Matrix3d S = H * before.covariance * H.transpose();
-    const double d2 = residual.dot((Eigen::Matrix3d::Identity() + W * S).inverse() * W * residual);
-    EXPECT_NEAR(update.mahalanobis2, d2, 1e-4 * d2);
+    const Matrix9d off = after.covariance - P;
+    largest = std::max(largest, (sd.cwiseInverse().asDiagonal() * off * sd.cwiseInverse().asDiagonal()).norm());
+    EXPECT_LT((difference<9>(before, after) - correction).cwiseQuotient(sd).norm(), 1e-6);
+    const Eigen::Matrix3d S = H * before.covariance * H.transpose() + kSd_rad * kSd_rad * Eigen::Matrix3d::Identity();
+    const double d2 = update.innovation.dot(S.inverse() * update.innovation);
+    EXPECT_NEAR(update.mahalanobis2, d2, 1e-6 * d2 + 1e-12);
+  }
+  std::printf("covariance off by at most %.1e of it\n", largest);
+  EXPECT_LT(largest, 1e-6);
+}
+
+// What the past is run again with says of a heading what the update does, near the state about which it was made.
+TEST(Heading, MadeLinearItSaysTheSame) {
+  const NeedleFilter filter(agar_config());
+  std::mt19937_64 rng(39);
+  for (int trial = 0; trial < 50; ++trial) {
+    const FilterState before = random_state(filter, rng);
+    const Eigen::Vector3d ahead = before.pose.R.col(2);
+    const model::TipHeading m = trial % 2 == 1 ? testing::picture_heading(ahead, 1, 1, 0, {0, 1, 0}, 0.02, rng)
+                                               : testing::measure_heading(ahead, 1, 1, 0, 0.02, rng);
+    FilterState after = before;
+    ASSERT_TRUE(filter.update(after, m).accepted);
+    const model::TipHeading linear = filter.made_linear(m, before);
+    const Eigen::Matrix3d& W = linear.information_per_rad2;
+    EXPECT_LT((W * ahead).norm(), 1e-9 * W.trace());
+    Eigen::Matrix<double, 3, 9> H = Eigen::Matrix<double, 3, 9>::Zero();
+    H.leftCols<6>() = filter.seen_heading(before).by_error;
+    const Matrix9d P = (before.covariance.inverse() + H.transpose() * W * H).inverse();
+    const Vector9d sd = P.diagonal().cwiseSqrt();
+    const Vector9d correction = P * H.transpose() * W * (linear.heading - ahead);
+    EXPECT_LT((difference<9>(before, after) - correction).cwiseQuotient(sd).norm(), 1e-6);
   }
 }
 
