@@ -19,17 +19,13 @@ NeedleEstimator::NeedleEstimator(const EstimatorConfig& config, std::size_t hist
   for (std::size_t i = pool_.size(); i-- > 0;) free_.push_back(static_cast<std::uint32_t>(i));
 }
 
-// Finds the place of a new node and opens it; nullptr when it is a duplicate. An actuator state comes before a
-// measurement of the same instant, measurements of one instant are ordered by camera and number: the order of arrival
-// plays no part.
+// Finds the place of a new node and opens it; nullptr when it is a duplicate. An actuator state comes before the
+// readings of the same instant, positions before headings, and those are ordered by camera and number: the order of
+// arrival plays no part.
 NeedleEstimator::Node* NeedleEstimator::insert(std::int64_t utime, Kind kind, std::int32_t camera, std::int64_t seq,
                                                std::size_t& index) {
-  const auto key = [](const Node& n) {
-    return n.kind == Kind::actuator ? std::tuple(n.utime, 0, std::int32_t{0}, std::int64_t{0})
-                                    : std::tuple(n.utime, 1, n.measurement.camera, n.measurement.seq);
-  };
-  const auto wanted = kind == Kind::actuator ? std::tuple(utime, 0, std::int32_t{0}, std::int64_t{0})
-                                             : std::tuple(utime, 1, camera, seq);
+  const auto key = [](const Node& n) { return std::tuple(n.utime, n.kind, n.camera, n.seq); };
+  const auto wanted = std::tuple(utime, kind, camera, seq);
   index = order_.size();
   while (index > 0 && key(node(index - 1)) > wanted) --index;
   if (index > 0 && key(node(index - 1)) == wanted) return nullptr;
@@ -43,6 +39,8 @@ NeedleEstimator::Node* NeedleEstimator::insert(std::int64_t utime, Kind kind, st
   Node& made = pool_[slot];
   made.utime = utime;
   made.kind = kind;
+  made.camera = camera;
+  made.seq = seq;
   made.applied_before = false;
   return &made;
 }
@@ -52,7 +50,7 @@ NeedleEstimator::Node* NeedleEstimator::insert(std::int64_t utime, Kind kind, st
 void NeedleEstimator::drop_oldest() {
   const std::ptrdiff_t which = processed_ < 2 ? 1 : 0;
   if (which == 1) {
-    ++counters_.too_old;
+    ++counters_of(node(1).kind).too_old;
   } else {
     remember(node(0), node(1));
     --processed_;
@@ -74,13 +72,19 @@ void NeedleEstimator::remember(const Node& before, const Node& node) {
   PastStep step;
   step.insertion_mm = node.insertion_mm - before.insertion_mm;
   step.rotation_rad = node.rotation_rad - before.rotation_rad;
-  step.measured = node.kind == Kind::measurement && node.update.accepted;
+  step.measured = node.kind == Kind::position && node.update.accepted;
+  step.heading_measured = node.kind == Kind::heading && node.update.accepted;
   if (step.measured) {
     step.position_mm = node.measurement.position_mm;
     step.information_per_mm2 = node.measurement.information_per_mm2;
   }
+  if (step.heading_measured) {
+    const model::TipHeading linear = filter_.made_linear(node.heading, node.state);
+    step.heading = linear.heading;
+    step.information_per_rad2 = linear.information_per_rad2;
+  }
   past_mm_ += std::abs(step.insertion_mm);
-  past_.add(before.state, step, node.state, node.moved_mm, filter_);
+  past_.add(before.state, step, node.state, node.moved, filter_);
 }
 
 void NeedleEstimator::relinearise_if_due() {
@@ -116,32 +120,42 @@ void NeedleEstimator::add(const model::ActuatorState& actuator) {
   }
   // Measurements since the previous actuator state are interpolated anew.
   std::size_t from = index;
-  while (from > 1 && node(from - 1).kind == Kind::measurement) --from;
+  while (from > 1 && node(from - 1).kind != Kind::actuator) --from;
   process_from(from);
   relinearise_if_due();
 }
 
-void NeedleEstimator::add(const model::TipMeasurement& stamped) {
-  ++counters_.measurements;
-  model::TipMeasurement measurement = stamped;
-  measurement.utime -= filter_.latency_us();  // a camera known to stamp late saw the tip so much earlier
-  if (measurement.status != 0 || !(measurement.information_per_mm2.trace() > 0)) {
-    ++counters_.not_usable;
+void NeedleEstimator::add(const model::TipMeasurement& measurement) {
+  add_reading(Kind::position, measurement, measurement.information_per_mm2, &Node::measurement);
+}
+
+void NeedleEstimator::add(const model::TipHeading& heading) {
+  add_reading(Kind::heading, heading, heading.information_per_rad2, &Node::heading);
+}
+
+template <class Reading>
+void NeedleEstimator::add_reading(Kind kind, Reading reading, const Eigen::Matrix3d& information,
+                                  Reading Node::*member) {
+  ReadingCounters& counters = counters_of(kind);
+  ++counters.offered;
+  reading.utime -= filter_.latency_us();  // a camera known to stamp late saw the tip so much earlier
+  if (reading.status != 0 || !(information.trace() > 0)) {
+    ++counters.not_usable;
     return;
   }
-  // A full history drops its oldest node, or of measurements that wait for the axes the oldest: not the new one.
-  if (order_.empty() || measurement.utime < node(0).utime || (free_.empty() && measurement.utime < node(1).utime)) {
-    ++counters_.too_old;
+  // A full history drops its oldest node, or of readings that wait for the axes the oldest: not the new one.
+  if (order_.empty() || reading.utime < node(0).utime || (free_.empty() && reading.utime < node(1).utime)) {
+    ++counters.too_old;
     return;
   }
   std::size_t index = 0;
-  Node* made = insert(measurement.utime, Kind::measurement, measurement.camera, measurement.seq, index);
+  Node* made = insert(reading.utime, kind, reading.camera, reading.seq, index);
   if (!made) {
-    ++counters_.duplicate;
+    ++counters.duplicate;
     return;
   }
-  made->measurement = measurement;
-  if (index < processed_) ++counters_.late;
+  made->*member = reading;
+  if (index < processed_) ++counters.late;
   process_from(index);
   relinearise_if_due();
 }
@@ -161,6 +175,7 @@ void NeedleEstimator::shift_time(std::int64_t by_us) {
     Node& n = pool_[slot];
     n.utime += by_us;
     n.measurement.utime += by_us;
+    n.heading.utime += by_us;
     if (n.state.measurement_utime != 0) n.state.measurement_utime += by_us;
     ++n.state.reset_count;
   }
@@ -193,22 +208,27 @@ void NeedleEstimator::process_from(std::size_t index) {
   for (std::size_t i = std::max<std::size_t>(index, 1); i < end; ++i) {
     Node& n = node(i);
     const Node& previous = node(i - 1);
-    if (n.kind == Kind::measurement) interpolate(i);
+    if (n.kind != Kind::actuator) interpolate(i);
     n.state = previous.state;
     filter_.predict(n.state, n.insertion_mm - previous.insertion_mm, n.rotation_rad - previous.rotation_rad,
                     static_cast<double>(n.utime - previous.utime) * 1e-6);
-    n.moved_mm = n.state.pose.p_mm - previous.state.pose.p_mm;
-    if (n.kind != Kind::measurement) continue;
+    n.moved = {n.state.pose.p_mm - previous.state.pose.p_mm, n.state.pose.R.col(2) - previous.state.pose.R.col(2)};
+    if (n.kind == Kind::actuator) continue;
+    const bool position = n.kind == Kind::position;
+    const auto apply = [&] {
+      n.update = position ? filter_.update(n.state, n.measurement) : filter_.update(n.state, n.heading);
+    };
     if (observer_ && !n.applied_before) {
-      Applied applied{n.utime, n.measurement.camera, n.state, {}, &n.measurement};
-      n.update = filter_.update(n.state, n.measurement);
+      Applied applied{
+          n.utime, n.camera, n.state, {}, position ? &n.measurement : nullptr, position ? nullptr : &n.heading};
+      apply();
       applied.update = n.update;
       observer_(observer_context_, applied);
     } else {
-      n.update = filter_.update(n.state, n.measurement);
+      apply();
     }
     n.applied_before = true;
-    if (n.utime >= newest_update_utime_) newest_update_ = n.update, newest_update_utime_ = n.utime;
+    if (position && n.utime >= newest_update_utime_) newest_update_ = n.update, newest_update_utime_ = n.utime;
   }
   processed_ = std::max<std::size_t>(end, order_.empty() ? 0 : 1);
 }
@@ -236,7 +256,7 @@ Estimate NeedleEstimator::estimate(std::int64_t now_utime) const {
   const double largest_variance = state.covariance.diagonal().head<3>().maxCoeff();
   if (!(largest_variance < limits.position_sd_mm * limits.position_sd_mm)) result.health |= kUncertain;
   const Gate& gate = filter_.config().gate;
-  if (state.rejects_in_row >= gate.rejects_before_unhealthy ||
+  if (std::max(state.rejects_in_row, state.heading_rejects_in_row) >= gate.rejects_before_unhealthy ||
       std::ranges::any_of(state.camera_rejects_in_row,
                           [&gate](int rejects) { return rejects >= gate.camera_rejects_before_unhealthy; }))
     result.health |= kRejecting;

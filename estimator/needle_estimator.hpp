@@ -12,18 +12,23 @@
 
 namespace bevel::estimator {
 
-struct Counters {
-  std::int64_t measurements = 0;  // offered
-  std::int64_t not_usable = 0;    // status other than 0, or no axis seen
-  std::int64_t too_old = 0;       // older than the history
+// Of one kind of reading.
+struct ReadingCounters {
+  std::int64_t offered = 0;
+  std::int64_t not_usable = 0;  // status other than 0, or no axis seen
+  std::int64_t too_old = 0;     // older than the history
   std::int64_t duplicate = 0;
+  std::int64_t late = 0;  // arrived behind a newer node: the history was rolled back
+};
+
+struct Counters {
+  ReadingCounters positions, headings;
   std::int64_t relinearised = 0;
-  std::int64_t late = 0;       // arrived behind a newer node: the history was rolled back
   std::int64_t actuators = 0;  // offered
   std::int64_t actuators_refused = 0;
 };
 
-// The estimate at the newest actuator state, and what the newest measurement said.
+// The estimate at the newest actuator state, and what the newest position said.
 struct Estimate {
   std::int64_t utime = 0;  // 0: nothing yet
   FilterState state;
@@ -33,11 +38,13 @@ struct Estimate {
 
 class NeedleEstimator {
  public:
-  // history: number of nodes kept; at 100 Hz of actuators and 2 x 30 Hz of cameras 64 nodes are 0.4 s.
+  // history: number of nodes kept; at 100 Hz of actuators and 2 x 30 Hz of cameras 64 nodes are 0.4 s, and 0.3 s if
+  // each camera gives headings too.
   explicit NeedleEstimator(const EstimatorConfig& config, std::size_t history = 64);
 
   void add(const model::ActuatorState& actuator);
   void add(const model::TipMeasurement& measurement);
+  void add(const model::TipHeading& heading);
 
   // Begins anew, a declared reset, with the next actuator state.
   void restart();
@@ -54,7 +61,8 @@ class NeedleEstimator {
     std::int32_t camera;
     FilterState state_before;
     Update update;
-    const model::TipMeasurement* measurement;  // valid during the call
+    const model::TipMeasurement* measurement;  // one of the two, valid during the call
+    const model::TipHeading* heading;
   };
   using Observer = void (*)(void* context, const Applied&);
   void observe(Observer observer, void* context) { observer_ = observer, observer_context_ = context; }
@@ -66,15 +74,18 @@ class NeedleEstimator {
   // Insertion after which the past is run again; what has come since is linear.
   static constexpr double kFirstRelinearisation_mm = 30;
   static constexpr double kRelinearisedEvery_mm = 15;
-  enum class Kind : std::uint8_t { actuator, measurement };
+  enum class Kind : std::uint8_t { actuator, position, heading };
   struct Node {
     std::int64_t utime = 0;
     Kind kind = Kind::actuator;
+    std::int32_t camera = 0;
+    std::int64_t seq = 0;
     bool applied_before = false;
     double insertion_mm = 0;
     double rotation_rad = 0;
-    Eigen::Vector3d moved_mm = Eigen::Vector3d::Zero();  // of the tip since the node before, by the model
-    model::TipMeasurement measurement;
+    Moved moved;                        // since the node before, by the model
+    model::TipMeasurement measurement;  // of a position
+    model::TipHeading heading;          // of a heading
     FilterState state;
     Update update;
   };
@@ -82,6 +93,9 @@ class NeedleEstimator {
   Node& node(std::size_t i) { return pool_[order_[i]]; }
   const Node& node(std::size_t i) const { return pool_[order_[i]]; }
   Node* insert(std::int64_t utime, Kind kind, std::int32_t camera, std::int64_t seq, std::size_t& index);
+  template <class Reading>
+  void add_reading(Kind kind, Reading reading, const Eigen::Matrix3d& information, Reading Node::*member);
+  ReadingCounters& counters_of(Kind kind) { return kind == Kind::heading ? counters_.headings : counters_.positions; }
   void process_from(std::size_t index);
   void drop_oldest();
   void remember(const Node& before, const Node& node);

@@ -3,8 +3,9 @@
 //
 // State: pose of {B} in {A} (error in the body frame, mm | rad), k, lambda1, lambda2. Nine error states, in this order;
 // ell is a tenth where the prior gives it a width (Prior::wheelbase_sd_mm).
-// Model: model/kinematics.hpp, (10) with the slip of (25); measurement: tip position in {A}, information of any rank.
-// Pure: no clock, no allocation, fixed-size Eigen. Covariance by the Joseph form, symmetric and floored.
+// Model: model/kinematics.hpp, (10) with the slip of (25); measurements: tip position in {A}, heading in {A}, each with
+// information of any rank. Pure: no clock, no allocation, fixed-size Eigen. Covariance by the Joseph form, symmetric
+// and floored.
 #include <Eigen/Core>
 #include <array>
 #include <cstdint>
@@ -38,9 +39,10 @@ struct FilterState {
   // Of ell with the nine, and its own; zero where ell is held.
   Vector9d wheelbase_covariance = Vector9d::Zero();
   double wheelbase_variance_mm2 = 0;
-  std::int64_t measurement_utime = 0;  // newest accepted; 0 before the first
+  std::int64_t measurement_utime = 0;  // newest position accepted; 0 before the first
   std::int32_t rejects_in_row = 0;
   std::array<std::uint8_t, 4> camera_rejects_in_row{};  // cameras 0 to 3; higher numbers share the last
+  std::int32_t heading_rejects_in_row = 0;              // of any camera; they bring no reset
   std::int32_t reset_count = 0;
   bool outside_model = false;
   EffectState effects;
@@ -48,17 +50,18 @@ struct FilterState {
 
 struct Update {
   bool accepted = false;
-  bool reset = false;                                    // this measurement brought a declared reset
-  int rank = 0;                                          // axes that it saw
-  double mahalanobis2 = 0;                               // d^2 = innovation^T S^-1 innovation
-  double test_ratio = 0;                                 // d^2 over the gate of its rank
-  Eigen::Vector3d innovation = Eigen::Vector3d::Zero();  // first `rank` entries, along the seen axes, mm
+  bool reset = false;       // this measurement brought a declared reset
+  int rank = 0;             // axes that it saw
+  double mahalanobis2 = 0;  // d^2 = innovation^T S^-1 innovation
+  double test_ratio = 0;    // d^2 over the gate of its rank
+  Eigen::Vector3d innovation =
+      Eigen::Vector3d::Zero();  // first `rank` entries, along the seen axes, mm; of a heading rad
   Eigen::Vector3d innovation_whitened =
       Eigen::Vector3d::Zero();  // L^-1 innovation, S = L L^T: unit variance if all is right
 };
 
 // One step of the past, as relinearise() needs it: increments since the step before it, then perhaps what was measured
-// on the way, as one reading of a point that stands still in the body.
+// on the way, as one reading of a point that stands still in the body and one of a direction that does.
 struct PastStep {
   double insertion_mm = 0;
   double rotation_rad = 0;
@@ -66,6 +69,12 @@ struct PastStep {
   Eigen::Vector3d position_mm = Eigen::Vector3d::Zero();
   Eigen::Vector3d point_mm = Eigen::Vector3d::Zero();  // in {B} at the end of the step: where the tip was when measured
   Eigen::Matrix3d information_per_mm2 = Eigen::Matrix3d::Zero();
+  bool heading_measured = false;  // and accepted
+  Eigen::Vector3d heading = Eigen::Vector3d::Zero();
+  Eigen::Vector3d direction = Eigen::Vector3d::UnitZ();  // in {B} at the end of the step: the heading when measured
+  Eigen::Matrix3d information_per_rad2 = Eigen::Matrix3d::Zero();
+
+  bool has_reading() const { return measured || heading_measured; }
 };
 
 // What relinearise() writes down of a step of a path when it walks back over it.
@@ -73,6 +82,13 @@ struct WalkedStep {
   model::NeedleJacobian backwards;  // of the step that undoes it
   Eigen::Matrix3d R;                // of the pose after it
   Eigen::Vector3d residual_mm;      // measured, less where the path has the point
+  Eigen::Vector3d residual_rad;     // the same of the direction
+};
+
+// A state's heading as the cameras see it, a unit vector in {A}, and its derivative by the error of the pose.
+struct SeenHeading {
+  Eigen::Vector3d along;
+  Eigen::Matrix<double, 3, 6> by_error;
 };
 
 template <int kSize>
@@ -99,10 +115,20 @@ class NeedleFilter {
 
   // Where the cameras see the tip of a state, and by how much they are late.
   Eigen::Vector3d seen_position_mm(const FilterState& state) const;
+  SeenHeading seen_heading(const FilterState& state) const;
   std::int64_t latency_us() const;
+
+  // A heading about a state, without effects, as a point of which all that is known is linear: information times
+  // (heading - R e3) is what it says of R e3, and the information is singular along that.
+  model::TipHeading made_linear(const model::TipHeading& measurement, const FilterState& state) const;
 
   // Applies one measurement; its status must be 0 and its values finite (the checked decode sees to that).
   Update update(FilterState& state, const model::TipMeasurement& measurement) const;
+
+  // The same for a heading: of what it knows across itself, one angle or two (filter_heading.cpp). It has the gate of
+  // its rank and a count of rejects of its own, and brings no reset: a sensor that is turned about must not throw away
+  // what the cameras know. One that points backwards is refused whatever its information says.
+  Update update(FilterState& state, const model::TipHeading& measurement) const;
 
   // An extended filter keeps the derivatives that it took while it knew little of k and lambda, and is too sure for
   // it. This runs the steps since `start` (the state before the first of them) again; `state` is the estimate after the
@@ -126,6 +152,8 @@ class NeedleFilter {
   bool predict_with_effects(FilterState& state, const model::BaseMotion& increment) const;
   template <int kSize>
   Update update_sized(FilterState& state, const model::TipMeasurement& measurement) const;
+  template <int kSize>
+  Update update_heading(FilterState& state, const model::TipHeading& measurement) const;
   template <int kSize>
   bool relinearise_sized(FilterState& state, const FilterState& start, std::span<const PastStep> steps,
                          std::span<WalkedStep> walked) const;

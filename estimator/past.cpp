@@ -2,6 +2,8 @@
 
 #include <cmath>
 
+#include "estimator/measurement_update.hpp"
+
 namespace bevel::estimator {
 namespace {
 
@@ -34,8 +36,8 @@ bool Past::joins(const PastStep& step) const {
          diagonal(step.information_per_mm2);
 }
 
-void Past::add(const FilterState& before, const PastStep& step, const FilterState& after,
-               const Eigen::Vector3d& moved_mm, const NeedleFilter& filter) {
+void Past::add(const FilterState& before, const PastStep& step, const FilterState& after, const Moved& moved,
+               const NeedleFilter& filter) {
   if (has_open_ && !joins(step)) close(before, filter);
   if (!has_open_) {
     open_ = step;
@@ -48,7 +50,7 @@ void Past::add(const FilterState& before, const PastStep& step, const FilterStat
   open_.rotation_rad += step.rotation_rad;
   // From the new end to where the tip was, in {A}; then the mean with the new reading, whose tip is the end itself.
   Eigen::Vector3d offset_mm = Eigen::Vector3d::Zero();
-  if (open_.measured) offset_mm = before.pose.R * open_.point_mm - moved_mm;
+  if (open_.measured) offset_mm = before.pose.R * open_.point_mm - moved.tip_mm;
   if (step.measured) {
     const Eigen::Vector3d had = open_.information_per_mm2.diagonal();
     const Eigen::Vector3d comes = step.information_per_mm2.diagonal();
@@ -63,11 +65,37 @@ void Past::add(const FilterState& before, const PastStep& step, const FilterStat
     open_.measured = true;
   }
   open_.point_mm = after.pose.R.transpose() * offset_mm;
+
+  // The same for the heading, as a point at unit distance ahead.
+  if (!open_.heading_measured && !step.heading_measured) return;
+  const Eigen::Vector3d ahead = after.pose.R.col(2);
+  Eigen::Vector3d heading_offset = Eigen::Vector3d::Zero();
+  if (open_.heading_measured)
+    heading_offset = before.pose.R * (open_.direction - Eigen::Vector3d::UnitZ()) - moved.heading;
+  if (step.heading_measured) join_heading(step, ahead, heading_offset);
+  open_.direction = Eigen::Vector3d::UnitZ() + after.pose.R.transpose() * heading_offset;
+}
+
+// The mean reading leaves of the heading what the two leave, each by its information. That is taken across one and the
+// same heading: two that each know nothing along their own would together know where along it they cross, at length
+// zero.
+void Past::join_heading(const PastStep& step, const Eigen::Vector3d& ahead, Eigen::Vector3d& offset) {
+  const Eigen::Matrix3d across = Eigen::Matrix3d::Identity() - ahead * ahead.transpose();
+  const Eigen::Matrix3d had = across * open_.information_per_rad2 * across;
+  const Eigen::Matrix3d& comes = step.information_per_rad2;
+  const Eigen::Matrix3d sum = had + comes;
+  const double share = had.trace() / sum.trace();
+  const Eigen::Vector3d left = had * (open_.heading - ahead - offset) + comes * (step.heading - ahead);
+  offset *= share;
+  open_.heading = ahead + offset + solve_across(sum, ahead, left);
+  open_.information_per_rad2 = sum;
+  if (!open_.measured) measured_at_ += (progress_ - measured_at_) * (1 - share);
+  open_.heading_measured = true;
 }
 
 void Past::append(double insertion_mm, double rotation_rad) {
   if (insertion_mm == 0 && rotation_rad == 0) return;
-  if (!steps_.empty() && !steps_.back().measured && in_proportion(insertion_mm, rotation_rad, steps_.back())) {
+  if (!steps_.empty() && !steps_.back().has_reading() && in_proportion(insertion_mm, rotation_rad, steps_.back())) {
     steps_.back().insertion_mm += insertion_mm;
     steps_.back().rotation_rad += rotation_rad;
   } else {
@@ -83,17 +111,21 @@ void Past::close(const FilterState& end, const NeedleFilter& filter) {
     complete_ = false;
     return;
   }
-  if (!open_.measured) return append(open_.insertion_mm, open_.rotation_rad);
+  if (!open_.has_reading()) return append(open_.insertion_mm, open_.rotation_rad);
   const double share = progress_ > 0 ? measured_at_ / progress_ : 1;
   append(share * open_.insertion_mm, share * open_.rotation_rad);
-  if (steps_.empty() || steps_.back().measured) steps_.emplace_back();
+  if (steps_.empty() || steps_.back().has_reading()) steps_.emplace_back();
   FilterState there = end;
   filter.predict(there, (share - 1) * open_.insertion_mm, (share - 1) * open_.rotation_rad);
   PastStep& step = steps_.back();
-  step.measured = true;
+  step.measured = open_.measured;
   step.position_mm = open_.position_mm;
   step.information_per_mm2 = open_.information_per_mm2;
   step.point_mm = there.pose.R.transpose() * (end.pose.p_mm + end.pose.R * open_.point_mm - there.pose.p_mm);
+  step.heading_measured = open_.heading_measured;
+  step.heading = open_.heading;
+  step.direction = there.pose.R.transpose() * (end.pose.R * open_.direction);
+  step.information_per_rad2 = open_.information_per_rad2;
   append((1 - share) * open_.insertion_mm, (1 - share) * open_.rotation_rad);
 }
 

@@ -9,15 +9,20 @@
 
 namespace bevel::estimator {
 
+// By how much a step of the model moved the tip and the heading, in {A}.
+struct Moved {
+  Eigen::Vector3d tip_mm = Eigen::Vector3d::Zero();
+  Eigen::Vector3d heading = Eigen::Vector3d::Zero();
+};
+
 class Past {
  public:
   explicit Past(std::size_t room);  // sized here, nothing is allocated later
 
   // Forgets everything; what comes next starts at `start`.
   void restart(const FilterState& start);
-  // The history's step from `before`, by the increments of `step` and its measurement, to `after`; `moved_mm` is how
-  // far the model moved the tip, in {A}.
-  void add(const FilterState& before, const PastStep& step, const FilterState& after, const Eigen::Vector3d& moved_mm,
+  // The history's step from `before`, by the increments of `step` and its measurement, to `after`.
+  void add(const FilterState& before, const PastStep& step, const FilterState& after, const Moved& moved,
            const NeedleFilter& filter);
   // Ends the stretch which still grows; `end` is the state after the newest step.
   void close(const FilterState& end, const NeedleFilter& filter);
@@ -29,14 +34,16 @@ class Past {
 
  private:
   bool joins(const PastStep& step) const;
+  void join_heading(const PastStep& step, const Eigen::Vector3d& ahead, Eigen::Vector3d& offset);
   void append(double insertion_mm, double rotation_rad);
 
   FilterState start_;
   std::vector<PastStep> steps_;
-  PastStep open_;  // the stretch that still grows; point_mm at its end
+  PastStep open_;  // the stretch that still grows; point_mm and direction at its end
   bool has_open_ = false;
-  double progress_ = 0;     // of the stretch, |mm| + |rad|
-  double measured_at_ = 0;  // progress at which its readings were taken, on the average
+  double progress_ = 0;  // of the stretch, |mm| + |rad|
+  // Progress at which its readings of the position were taken, on the average; without any, those of the heading.
+  double measured_at_ = 0;
   bool complete_ = true;
 };
 

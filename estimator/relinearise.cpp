@@ -26,18 +26,32 @@ struct LinearFilter {
     covariance.diagonal() += added;
   }
 
+  void update(const PastStep& step, const WalkedStep& walked) {
+    if (step.measured) update<true>(walked.R, step.point_mm, step.information_per_mm2, walked.residual_mm);
+    if (step.heading_measured) update<false>(walked.R, step.direction, step.information_per_rad2, walked.residual_rad);
+  }
+
+  // A point of the body moves by R (v + omega x arm) under a body perturbation, a direction without the v.
   // In information form on the seen axes, whatever the rank: S^-1 = (I + W H P H^T)^-1 W with W the information.
-  void update(const Eigen::Matrix3d& R, const PastStep& step, const Eigen::Vector3d& residual) {
+  template <bool kPoint>
+  void update(const Eigen::Matrix3d& R, const Eigen::Vector3d& arm, const Eigen::Matrix3d& information,
+              const Eigen::Vector3d& residual) {
     using Columns = Eigen::Matrix<double, kSize, 3>;
-    // The point moves by R (v + omega x point) under a body perturbation.
-    const Eigen::Matrix3d lever = model::hat(step.point_mm);
-    Columns by_body = covariance.template leftCols<3>();
+    const Eigen::Matrix3d lever = model::hat(arm);
+    Columns by_body = Columns::Zero();
+    if constexpr (kPoint) by_body = covariance.template leftCols<3>();
     by_body.noalias() += covariance.template middleCols<3>(3).lazyProduct(lever);
     const Columns PHt = by_body.lazyProduct(R.transpose());
-    const Eigen::Matrix3d HPHt = R * (PHt.template topRows<3>() - lever * PHt.template middleRows<3>(3));
-    const Eigen::Matrix3d spread = Eigen::Matrix3d::Identity() + step.information_per_mm2 * HPHt;
-    const Eigen::Matrix3d weight = spread.inverse() * step.information_per_mm2;
-    const Eigen::Vector3d innovation = residual - R * (error.template head<3>() - lever * error.template segment<3>(3));
+    Eigen::Matrix3d HPHt = -lever * PHt.template middleRows<3>(3);
+    Eigen::Vector3d moved = -lever * error.template segment<3>(3);
+    if constexpr (kPoint) {
+      HPHt += PHt.template topRows<3>();
+      moved += error.template head<3>();
+    }
+    HPHt = R * HPHt;
+    const Eigen::Matrix3d spread = Eigen::Matrix3d::Identity() + information * HPHt;
+    const Eigen::Matrix3d weight = spread.inverse() * information;
+    const Eigen::Vector3d innovation = residual - R * moved;
     log_evidence -= 0.5 * (innovation.dot(weight * innovation) + std::log(spread.determinant()));
     const Columns gain = PHt.lazyProduct(weight);
     error += gain * innovation;
@@ -139,6 +153,10 @@ double NeedleFilter::path_cost(const FilterState& state, const FilterState& star
       const Eigen::Vector3d residual = step.position_mm - entry.pose.p_mm - entry.pose.R * step.point_mm;
       squares += residual.dot(step.information_per_mm2 * residual);
     }
+    if (step.heading_measured) {
+      const Eigen::Vector3d residual = step.heading - entry.pose.R * step.direction;
+      squares += residual.dot(step.information_per_rad2 * residual);
+    }
     if (!model::advance(entry.pose, {-step.insertion_mm, -step.rotation_rad, {state.curvature_per_mm, 0}}, slip))
       return kNone;
   }
@@ -159,10 +177,14 @@ bool NeedleFilter::run_again(const FilterState& about, const FilterState& start,
   for (std::size_t i = steps.size(); i-- > 0;) {
     const PastStep& step = steps[i];
     WalkedStep& back = walked[i];
+    if (step.has_reading()) back.R = pose.R;
     if (step.measured) {
-      back.R = pose.R;
       back.residual_mm = step.position_mm - pose.p_mm - pose.R * step.point_mm;
       squares += back.residual_mm.dot(step.information_per_mm2 * back.residual_mm);
+    }
+    if (step.heading_measured) {
+      back.residual_rad = step.heading - pose.R * step.direction;
+      squares += back.residual_rad.dot(step.information_per_rad2 * back.residual_rad);
     }
     if (moves(step) &&
         !model::advance_by_midpoint(pose, {-step.insertion_mm, -step.rotation_rad, curvature}, slip, back.backwards))
@@ -180,7 +202,7 @@ bool NeedleFilter::run_again(const FilterState& about, const FilterState& start,
     if (moves(step))
       linear.predict(inverse(walked[i].backwards),
                      process_variance<kSize>(linear.covariance, step.insertion_mm, step.rotation_rad));
-    if (step.measured) linear.update(walked[i].R, step, walked[i].residual_mm);
+    linear.update(step, walked[i]);
   }
   return linear.error.allFinite() && linear.covariance.allFinite() && std::isfinite(linear.log_evidence);
 }

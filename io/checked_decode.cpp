@@ -9,6 +9,9 @@ namespace {
 
 constexpr std::size_t kFingerprintSize = 8;
 constexpr std::size_t kLongestText = 4096;
+// Of a heading's length, and of what its information matrix leaves along it, against its trace: a sender that computes
+// in single precision, or rounds for a file, is well within.
+constexpr double kHeadingTolerance = 1e-3;
 
 std::uint64_t read_big_endian(const std::uint8_t* bytes, std::size_t count) {
   std::uint64_t value = 0;
@@ -107,6 +110,8 @@ bool could_be_covariance(const double* matrix, std::size_t rows) {
   return true;
 }
 
+double dot(const double* a, const double* b) { return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]; }
+
 // What a field alone cannot tell.
 template <class Message>
 const char* find_inconsistency(const Message&) {
@@ -115,6 +120,20 @@ const char* find_inconsistency(const Message&) {
 template <>
 const char* find_inconsistency(const tip_measurement_t& m) {
   return could_be_covariance(m.information_per_mm2, 3) ? nullptr : "information_per_mm2";
+}
+// A camera that says it sees nothing has no heading to give, and may leave it zero.
+template <>
+const char* find_inconsistency(const tip_heading_t& m) {
+  const double length = std::sqrt(dot(m.heading, m.heading));
+  if (std::abs(length - 1.0) > kHeadingTolerance && !(m.status != 0 && length == 0.0)) return "heading";
+  if (!could_be_covariance(m.information_per_rad2, 3)) return "information_per_rad2";
+  // With no variance negative, no correlation beyond one and nothing along the heading, no other eigenvalue is
+  // negative: neither the sum of the two that are left nor their product is.
+  const double* W = m.information_per_rad2;
+  const double largest = W[0] + W[4] + W[8];
+  for (std::size_t row = 0; row < 3; ++row)
+    if (std::abs(dot(W + 3 * row, m.heading)) > kHeadingTolerance * largest) return "information_per_rad2";
+  return nullptr;
 }
 template <>
 const char* find_inconsistency(const needle_state_t& m) {
@@ -194,12 +213,14 @@ Decoded<Message> checked_decode(const void* data, std::size_t size) noexcept {
 }
 
 template Decoded<tip_measurement_t> checked_decode(const void*, std::size_t) noexcept;
+template Decoded<tip_heading_t> checked_decode(const void*, std::size_t) noexcept;
 template Decoded<actuator_state_t> checked_decode(const void*, std::size_t) noexcept;
 template Decoded<motion_command_t> checked_decode(const void*, std::size_t) noexcept;
 template Decoded<needle_state_t> checked_decode(const void*, std::size_t) noexcept;
 template Decoded<steering_target_t> checked_decode(const void*, std::size_t) noexcept;
 template Decoded<process_status_t> checked_decode(const void*, std::size_t) noexcept;
 template std::optional<DecodeError> check_fields(const tip_measurement_t&) noexcept;
+template std::optional<DecodeError> check_fields(const tip_heading_t&) noexcept;
 template std::optional<DecodeError> check_fields(const actuator_state_t&) noexcept;
 template std::optional<DecodeError> check_fields(const motion_command_t&) noexcept;
 template std::optional<DecodeError> check_fields(const needle_state_t&) noexcept;

@@ -18,7 +18,7 @@ enum class DecodeFault {
   text,          // a string's length is outside the message, or it does not end at its first zero
   not_finite,    // NaN or infinity
   out_of_range,  // a code without meaning, a negative counter, a magnitude that no bench has
-  inconsistent,  // a quaternion without unit length, a covariance that is none
+  inconsistent,  // a quaternion or heading without unit length, a covariance that is none
   time,          // not positive
 };
 inline constexpr int kDecodeFaultCount = 7;

@@ -44,15 +44,25 @@ std::string needle_header() {
 std::vector<std::pair<std::string, std::int64_t>> export_csv(const Recording& recording, const std::string& folder) {
   std::filesystem::create_directories(folder);
   std::vector<std::pair<std::string, std::int64_t>> done;
+  const auto write_reading = [](std::ofstream& file, const auto& m, const Eigen::Vector3d& value,
+                                const Eigen::Matrix3d& information) {
+    file << m.utime << ',' << m.seq << ',' << m.camera << ',' << m.status;
+    for (const double v : value) file << ',' << v;
+    for (int r = 0; r < 3; ++r)
+      for (int c = 0; c < 3; ++c) file << ',' << information(r, c);
+    file << '\n';
+  };
   write_file(done, folder + "/tip_measurement.csv",
              "utime,seq,camera,status,x_mm,y_mm,z_mm,ixx_per_mm2,ixy_per_mm2,ixz_per_mm2,iyx_per_mm2,iyy_per_mm2,"
              "iyz_per_mm2,izx_per_mm2,izy_per_mm2,izz_per_mm2",
-             recording.tips, [](std::ofstream& file, const model::TipMeasurement& m) {
-               file << m.utime << ',' << m.seq << ',' << m.camera << ',' << m.status;
-               for (const double v : m.position_mm) file << ',' << v;
-               for (int r = 0; r < 3; ++r)
-                 for (int c = 0; c < 3; ++c) file << ',' << m.information_per_mm2(r, c);
-               file << '\n';
+             recording.tips, [&](std::ofstream& file, const model::TipMeasurement& m) {
+               write_reading(file, m, m.position_mm, m.information_per_mm2);
+             });
+  write_file(done, folder + "/tip_heading.csv",
+             "utime,seq,camera,status,heading_x,heading_y,heading_z,ixx_per_rad2,ixy_per_rad2,ixz_per_rad2,"
+             "iyx_per_rad2,iyy_per_rad2,iyz_per_rad2,izx_per_rad2,izy_per_rad2,izz_per_rad2",
+             recording.headings, [&](std::ofstream& file, const model::TipHeading& m) {
+               write_reading(file, m, m.heading, m.information_per_rad2);
              });
   write_file(done, folder + "/actuator_state.csv",
              "utime,seq,insertion_status,rotation_status,insertion_mm,insertion_rate_mm_s,rotation_rad,"

@@ -1,5 +1,6 @@
-// A recording as CSV files for spreadsheets and scripts: tip_measurement.csv, actuator_state.csv, motion_command.csv,
-// needle_state.csv, needle_truth.csv; only those the recording has. First line: the fields' names, units in them.
+// A recording as CSV files for spreadsheets and scripts: tip_measurement.csv, tip_heading.csv, actuator_state.csv,
+// motion_command.csv, needle_state.csv, needle_truth.csv; only those the recording has. First line: the fields' names,
+// units in them.
 #pragma once
 
 #include <string>

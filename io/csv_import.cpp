@@ -21,6 +21,7 @@ constexpr double kLatest_s = 1e10;
 // Where a recording begins whose clock began at 0 or later: messages have a positive utime.
 constexpr std::int64_t kOwnEpoch_us = 1'000'000;
 constexpr double kMostRowsLeftOut = 0.2;
+constexpr double kUnitWithin = 0.01;  // files round
 constexpr std::size_t kRemarks = 10;
 
 SignedColumn signed_column(const std::string& text) {
@@ -116,6 +117,7 @@ class Table {
 struct Row {
   model::ActuatorState axes;
   model::TipMeasurement tip;
+  model::TipHeading heading;
   int line = 0;
 };
 
@@ -138,6 +140,20 @@ model::TipMeasurement tip_of(const Table& row, const ColumnMap& map, const Eigen
       row.fail(map.tip[i].name, format_number(m.position_mm[axis]) + " mm from the origin; allowed " +
                                     format_number(kLargestLength_mm) + " mm either way");
   }
+  return m;
+}
+
+model::TipHeading heading_of(const Table& row, const ColumnMap& map) {
+  Eigen::Vector3d along;
+  for (std::size_t i = 0; i < 3; ++i)
+    along[static_cast<Eigen::Index>(i)] = row.within(map.heading[i], -1 - kUnitWithin, 1 + kUnitWithin, "");
+  if (!(std::abs(along.norm() - 1) <= kUnitWithin))
+    row.fail(map.heading[0].name, "and the heading's length is " + format_number(along.norm()) + "; allowed " +
+                                      format_number(1 - kUnitWithin) + " to " + format_number(1 + kUnitWithin));
+  model::TipHeading m;
+  m.heading = along.normalized();
+  m.information_per_rad2 =
+      (Eigen::Matrix3d::Identity() - m.heading * m.heading.transpose()) / (map.heading_sd_rad * map.heading_sd_rad);
   return m;
 }
 
@@ -188,6 +204,10 @@ ColumnMap load_column_map(const std::string& path) {
       tip.fail("sigma_mm", "is " + format_number(sigma_mm) + " for an axis; allowed are 0, or 1e-06 to 1e+06");
   for (std::size_t i = 0; i < axes.size() && i < 3; ++i) map.tip[i] = signed_column(axes[i]);
   for (const std::string& column : origin) map.origin.push_back(signed_column(column));
+  std::vector<std::string> heading;
+  read_columns(tip, "heading", heading, optional);
+  tip.read("heading_sd_rad", map.heading_sd_rad, heading.empty() ? optional : required, in_range(1e-5, 1));
+  for (const std::string& column : heading) map.heading.push_back(signed_column(column));
   Section insertion = file.section("insertion", required);
   std::string column;
   insertion.read("column", column, required);
@@ -237,6 +257,7 @@ ImportedRecording import_csv(const std::string& csv_path, const ColumnMap& map) 
           table.within(map.rotation[0], -kLargestAngle_rad, kLargestAngle_rad, "rad", map.rotation_scale);
     row.tip = tip_of(table, map, origin);
     row.tip.utime = row.axes.utime;
+    if (!map.heading.empty()) row.heading = heading_of(table, map);
     rows.push_back(row);
   }
   if (rows.empty()) throw std::runtime_error(csv_path + ": no row with data by this column map");
@@ -255,7 +276,8 @@ ImportedRecording import_csv(const std::string& csv_path, const ColumnMap& map) 
     a.utime += shift_us;
     row.tip.utime += shift_us;
     // Counted here: a row that was left out is no message that was lost.
-    a.seq = row.tip.seq = static_cast<std::int64_t>(out.actuators.size());
+    a.seq = row.tip.seq = row.heading.seq = static_cast<std::int64_t>(out.actuators.size());
+    row.heading.utime = row.tip.utime;
     if (!out.actuators.empty()) {
       const double dt_s = static_cast<double>(a.utime - out.actuators.back().utime) * 1e-6;
       a.insertion_rate_mm_s = (a.insertion_mm - out.actuators.back().insertion_mm) / dt_s;
@@ -270,6 +292,9 @@ ImportedRecording import_csv(const std::string& csv_path, const ColumnMap& map) 
     require_readable(to_message(row.tip));
     out.actuators.push_back(a);
     out.tips.push_back(row.tip);
+    if (map.heading.empty()) continue;
+    require_readable(to_message(row.heading));
+    out.headings.push_back(row.heading);
   }
   return out;
 }
@@ -292,6 +317,8 @@ void write_log(const ImportedRecording& recording, const std::string& log_path) 
     for (std::size_t i = 0; i < recording.actuators.size(); ++i) {
       log.write_message(recording.actuators[i].utime, channel::kActuatorState, to_message(recording.actuators[i]));
       log.write_message(recording.tips[i].utime, channel::kTipMeasurement, to_message(recording.tips[i]));
+      if (!recording.headings.empty())
+        log.write_message(recording.headings[i].utime, channel::kTipHeading, to_message(recording.headings[i]));
     }
     log.close();
     std::filesystem::rename(unfinished, log_path);

@@ -15,6 +15,7 @@
 #include <bevel/needle_state_t.hpp>
 #include <bevel/process_status_t.hpp>
 #include <bevel/steering_target_t.hpp>
+#include <bevel/tip_heading_t.hpp>
 #include <bevel/tip_measurement_t.hpp>
 #include <cstdint>
 #include <limits>
@@ -26,7 +27,8 @@ inline constexpr double kLargestLength_mm = 1e5;
 inline constexpr double kLargestRate_mm_s = 1e5;
 inline constexpr double kLargestAngle_rad = 1e7;  // a shaft turned at 10 rev/s for a day is 5e6 rad
 inline constexpr double kLargestRate_rad_s = 1e5;
-inline constexpr double kLargestInformation_per_mm2 = 1e12;  // a standard deviation of 1 nm
+inline constexpr double kLargestInformation_per_mm2 = 1e12;   // a standard deviation of 1 nm
+inline constexpr double kLargestInformation_per_rad2 = 1e12;  // a standard deviation of 1 urad
 inline constexpr double kLargestPlainNumber = 1e12;
 inline constexpr std::int32_t kAnyCode = std::numeric_limits<std::int32_t>::max();
 
@@ -41,6 +43,16 @@ void visit_fields(Message& m, Visitor&& v) {
   v.code("status", m.status, 0, kAnyCode);
   v.number("position_mm", m.position_mm, 3, kLargestLength_mm);
   v.number("information_per_mm2", m.information_per_mm2, 9, kLargestInformation_per_mm2);
+}
+
+template <MessageOf<tip_heading_t> Message, class Visitor>
+void visit_fields(Message& m, Visitor&& v) {
+  v.time("utime", m.utime);
+  v.count("seq", m.seq);
+  v.code("camera", m.camera, 0, kAnyCode);
+  v.code("status", m.status, 0, kAnyCode);
+  v.number("heading", m.heading, 3, 1.01);
+  v.number("information_per_rad2", m.information_per_rad2, 9, kLargestInformation_per_rad2);
 }
 
 template <MessageOf<actuator_state_t> Message, class Visitor>

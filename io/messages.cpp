@@ -15,6 +15,17 @@ model::TipMeasurement to_sample(const tip_measurement_t& message) {
   return sample;
 }
 
+model::TipHeading to_sample(const tip_heading_t& message) {
+  model::TipHeading sample;
+  sample.utime = message.utime;
+  sample.seq = message.seq;
+  sample.camera = message.camera;
+  sample.status = message.status;
+  sample.heading = Eigen::Map<const Eigen::Vector3d>(message.heading);
+  sample.information_per_rad2 = Eigen::Map<const RowMajor3>(message.information_per_rad2);
+  return sample;
+}
+
 model::ActuatorState to_sample(const actuator_state_t& message) {
   model::ActuatorState sample;
   sample.utime = message.utime;
@@ -45,6 +56,17 @@ tip_measurement_t to_message(const model::TipMeasurement& sample) {
   message.status = sample.status;
   Eigen::Map<Eigen::Vector3d>(message.position_mm) = sample.position_mm;
   Eigen::Map<RowMajor3>(message.information_per_mm2) = sample.information_per_mm2;
+  return message;
+}
+
+tip_heading_t to_message(const model::TipHeading& sample) {
+  tip_heading_t message{};
+  message.utime = sample.utime;
+  message.seq = sample.seq;
+  message.camera = sample.camera;
+  message.status = sample.status;
+  Eigen::Map<Eigen::Vector3d>(message.heading) = sample.heading;
+  Eigen::Map<RowMajor3>(message.information_per_rad2) = sample.information_per_rad2;
   return message;
 }
 

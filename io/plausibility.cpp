@@ -179,14 +179,16 @@ Agreement compare_readings(const model::TipMeasurement& a, const model::TipMeasu
                                           " s; allowed " + number(allowed_mm) + " mm"};
 }
 
-Agreement find_false_claim(const model::TipMeasurement& a, const model::TipMeasurement& b,
-                           const model::TipMeasurement& c) {
-  const double around = std::max(a.information_per_mm2.trace(), c.information_per_mm2.trace());
-  const double claimed = b.information_per_mm2.trace();
+double information(const model::TipMeasurement& m) { return m.information_per_mm2.trace(); }
+double information(const model::TipHeading& m) { return m.information_per_rad2.trace(); }
+
+template <class Sample>
+Agreement find_false_claim(const Sample& a, const Sample& b, const Sample& c, const std::string& unit) {
+  const double around = std::max(information(a), information(c));
+  const double claimed = information(b);
   if (!(around > 0) || claimed <= kSurerByRatio * around) return {};
-  return Fault{Oddity::Kind::reading, "information is " + number(claimed) + " /mm2 between frames of at most " +
-                                          number(around) + " /mm2; allowed " + number(kSurerByRatio * around) +
-                                          " /mm2"};
+  return Fault{Oddity::Kind::reading, "information is " + number(claimed) + unit + " between frames of at most " +
+                                          number(around) + unit + "; allowed " + number(kSurerByRatio * around) + unit};
 }
 
 // Leaves out the samples within `kept` that find(n) tells of.
@@ -199,6 +201,35 @@ void leave_out_between(std::span<const Sample> samples, const Indices& kept, Jud
     judgement.oddities.push_back({fault->kind, samples[kept[n]].utime, true, std::move(fault->what)});
     ++n;  // its successor is a neighbour that was relied on
   }
+}
+
+// compare_values(a, b): what, beside the stamps, stands against b's following a.
+template <class Sample, class Compare>
+Judgement judge_cameras(std::span<const Sample> samples, const std::string& unit, Compare&& compare_values) {
+  Judgement judgement;
+  judgement.left_out.resize(samples.size());
+  std::map<std::int32_t, Indices> cameras;  // each counts for itself
+  for (const std::size_t i : by_time(samples)) cameras[samples[i].camera].push_back(i);
+  for (const auto& [camera, order] : cameras) {
+    if (order.size() == 1 && samples.size() > 20) {
+      judgement.left_out[order.front()] = true;
+      judgement.oddities.push_back({Oddity::Kind::reading, samples[order.front()].utime, true,
+                                    "camera " + std::to_string(camera) + " occurs once among " +
+                                        std::to_string(samples.size()) + "; allowed: cameras that go on"});
+      continue;
+    }
+    const bool counted = counts(samples, order);
+    const Indices kept = follow(samples, order, judgement, [&](const auto& a, const auto& b) {
+      Agreement fault = compare_stamps(a, b, counted);
+      return fault ? fault : compare_values(a, b);
+    });
+    leave_out_between(samples, kept, judgement, [&](std::size_t n) {
+      return find_false_claim(samples[kept[n - 1]], samples[kept[n]], samples[kept[n + 1]], unit);
+    });
+  }
+  // A camera that takes something else for the tip for a while is no damage: the estimator has its gate for it.
+  std::erase_if(judgement.oddities, [](const Oddity& o) { return o.kind == Oddity::Kind::reading && !o.left_out; });
+  return judgement;
 }
 
 }  // namespace
@@ -223,31 +254,12 @@ Judgement judge(std::span<const model::ActuatorState> actuators) {
 }
 
 Judgement judge(std::span<const model::TipMeasurement> tips, std::span<const model::ActuatorState> actuators) {
-  Judgement judgement;
-  judgement.left_out.resize(tips.size());
   const Travel travel(actuators);
-  std::map<std::int32_t, Indices> cameras;  // each counts for itself
-  for (const std::size_t i : by_time(tips)) cameras[tips[i].camera].push_back(i);
-  for (const auto& [camera, order] : cameras) {
-    if (order.size() == 1 && tips.size() > 20) {
-      judgement.left_out[order.front()] = true;
-      judgement.oddities.push_back({Oddity::Kind::reading, tips[order.front()].utime, true,
-                                    "camera " + std::to_string(camera) + " occurs once among " +
-                                        std::to_string(tips.size()) + "; allowed: cameras that go on"});
-      continue;
-    }
-    const bool counted = counts(tips, order);
-    const Indices kept = follow(tips, order, judgement, [&](const auto& a, const auto& b) {
-      Agreement fault = compare_stamps(a, b, counted);
-      return fault ? fault : compare_readings(a, b, travel);
-    });
-    leave_out_between(tips, kept, judgement, [&](std::size_t n) {
-      return find_false_claim(tips[kept[n - 1]], tips[kept[n]], tips[kept[n + 1]]);
-    });
-  }
-  // A camera that takes something else for the tip for a while is no damage: the estimator has its gate for it.
-  std::erase_if(judgement.oddities, [](const Oddity& o) { return o.kind == Oddity::Kind::reading && !o.left_out; });
-  return judgement;
+  return judge_cameras(tips, " /mm2", [&](const auto& a, const auto& b) { return compare_readings(a, b, travel); });
+}
+
+Judgement judge(std::span<const model::TipHeading> headings) {
+  return judge_cameras(headings, " /rad2", [](const auto&, const auto&) { return Agreement(); });
 }
 
 std::string describe(const std::vector<Oddity>& oddities, const std::string& channel, std::int64_t start_utime) {

@@ -53,6 +53,9 @@ struct Judgement {
 Judgement judge(std::span<const model::ActuatorState> actuators);
 // `actuators`: those not left out, in the order of utime.
 Judgement judge(std::span<const model::TipMeasurement> tips, std::span<const model::ActuatorState> actuators);
+// By stamps, cameras and claims of precision alone: a heading that is turned about for a frame is a tracker's mistake,
+// and the estimator has its gate for it.
+Judgement judge(std::span<const model::TipHeading> headings);
 
 // A line for each kind, with the first of its kind: "1 ACTUATOR_STATE at 3.21 s: ...; left out". Times count from
 // start_utime.

@@ -38,6 +38,9 @@ void add_event(Recording& recording, const LogEvent& event) {
   if (event.channel == channel::kTipMeasurement) {
     const bool taken = decode_into<tip_measurement_t>(recording, event, to_sample_in(recording.tips));
     note(taken, Arrival::Channel::tip, recording.tips.size());
+  } else if (event.channel == channel::kTipHeading) {
+    const bool taken = decode_into<tip_heading_t>(recording, event, to_sample_in(recording.headings));
+    note(taken, Arrival::Channel::heading, recording.headings.size());
   } else if (event.channel == channel::kActuatorState) {
     const bool taken = decode_into<actuator_state_t>(recording, event, to_sample_in(recording.actuators));
     note(taken, Arrival::Channel::actuator, recording.actuators.size());
@@ -82,6 +85,9 @@ void leave_out_the_implausible(Recording& recording) {
   Judgement tips = judge(recording.tips, sorted);
   drop(recording, Arrival::Channel::tip, recording.tips, tips.left_out);
   recording.tip_oddities = std::move(tips.oddities);
+  Judgement headings = judge(recording.headings);
+  drop(recording, Arrival::Channel::heading, recording.headings, headings.left_out);
+  recording.heading_oddities = std::move(headings.oddities);
 }
 
 std::string one_line(std::string text) {
@@ -119,10 +125,13 @@ std::string Recording::describe_faults() const {
   }
   std::int64_t start_utime = std::numeric_limits<std::int64_t>::max();
   for (const auto& a : actuators) start_utime = std::min(start_utime, a.utime);
-  if (actuators.empty())
+  if (actuators.empty()) {
     for (const auto& t : tips) start_utime = std::min(start_utime, t.utime);
+    for (const auto& h : headings) start_utime = std::min(start_utime, h.utime);
+  }
   return text + describe(actuator_oddities, channel::kActuatorState, start_utime) +
-         describe(tip_oddities, channel::kTipMeasurement, start_utime);
+         describe(tip_oddities, channel::kTipMeasurement, start_utime) +
+         describe(heading_oddities, channel::kTipHeading, start_utime);
 }
 
 std::string Recording::remarks(const std::string& name) const {
@@ -136,7 +145,8 @@ std::string Recording::refusal() const {
   if (events == 0)
     return "no LCM event in its " + std::to_string(bytes) + " bytes; " +
            (bytes == 0 ? "the file is empty" : "not a log, or damaged throughout");
-  if (tips.empty() && actuators.empty() && commands.empty() && targets.empty() && estimates.empty() && truths.empty())
+  if (tips.empty() && headings.empty() && actuators.empty() && commands.empty() && targets.empty() &&
+      estimates.empty() && truths.empty())
     return "no usable message in its " + std::to_string(events) + " events; " + std::to_string(rejected()) +
            " were refused, the others are on channels that are not read here";
   for (const Oddity& oddity : actuator_oddities)
@@ -144,7 +154,9 @@ std::string Recording::refusal() const {
       return "damaged beyond use: " + one_line(describe({oddity}, channel::kActuatorState, actuators.front().utime)) +
              ", so that where the base was is not known";
   const std::string axes = too_much_left_out(actuator_oddities, actuators.size(), channel::kActuatorState);
-  return axes.empty() ? too_much_left_out(tip_oddities, tips.size(), channel::kTipMeasurement) : axes;
+  if (!axes.empty()) return axes;
+  const std::string positions = too_much_left_out(tip_oddities, tips.size(), channel::kTipMeasurement);
+  return positions.empty() ? too_much_left_out(heading_oddities, headings.size(), channel::kTipHeading) : positions;
 }
 
 Recording read_recording(std::span<const std::uint8_t> log) {

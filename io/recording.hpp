@@ -20,14 +20,15 @@ using RejectCounts = std::array<std::int64_t, kDecodeFaultCount>;
 
 // Where a message of the log went: for what depends on the order of arrival across channels.
 struct Arrival {
-  enum class Channel : std::uint8_t { tip, actuator };
+  enum class Channel : std::uint8_t { tip, heading, actuator };
   Channel channel;
-  std::size_t index;  // into tips or actuators
+  std::size_t index;  // into tips, headings or actuators
 };
 
 struct Recording {
   // Each in the order of the log, which is the order of arrival and need not be that of utime.
   std::vector<model::TipMeasurement> tips;
+  std::vector<model::TipHeading> headings;
   std::vector<model::ActuatorState> actuators;
   std::vector<model::MotionCommand> commands;
   std::vector<steering_target_t> targets;
@@ -35,20 +36,20 @@ struct Recording {
   std::vector<needle_state_t> truths;     // NEEDLE_TRUTH
   std::string config;                     // text of CONFIG; "" if the log has none
 
-  std::vector<Arrival> arrivals;  // of tips and actuators together
+  std::vector<Arrival> arrivals;  // of tips, headings and actuators together
 
   std::map<std::string, RejectCounts> rejects;           // channel -> counts; only channels with rejects
   std::map<std::string, std::int64_t> skipped_channels;  // channels that this reader does not decode -> messages
-  std::vector<Oddity> tip_oddities, actuator_oddities;   // what was left out of `tips` and `actuators`, and what lasts
-  std::string file_change;                               // how the file changed while it was read; "" if it did not
+  std::vector<Oddity> tip_oddities, heading_oddities, actuator_oddities;  // what was left out of each, and what lasts
+  std::string file_change;  // how the file changed while it was read; "" if it did not
   LogDamage damage;
   std::int64_t events = 0;
   std::int64_t bytes = 0;
 
   std::int64_t rejected() const;
   bool intact() const {
-    return damage.intact() && rejected() == 0 && tip_oddities.empty() && actuator_oddities.empty() &&
-           file_change.empty();
+    return damage.intact() && rejected() == 0 && tip_oddities.empty() && heading_oddities.empty() &&
+           actuator_oddities.empty() && file_change.empty();
   }
   std::string describe_faults() const;  // one line per kind of fault; "" if intact
   // The same for stderr: each line opens with the log's name.

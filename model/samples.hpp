@@ -18,6 +18,15 @@ struct TipMeasurement {
   Eigen::Matrix3d information_per_mm2 = Eigen::Matrix3d::Zero();  // inverse covariance, any rank
 };
 
+struct TipHeading {
+  std::int64_t utime = 0;  // us since the epoch, time of capture
+  std::int64_t seq = 0;
+  std::int32_t camera = 0;
+  std::int32_t status = 0;                                         // 0 ok, else why not usable
+  Eigen::Vector3d heading = Eigen::Vector3d::Zero();               // unit vector in {A}
+  Eigen::Matrix3d information_per_rad2 = Eigen::Matrix3d::Zero();  // inverse covariance of its error, zero along it
+};
+
 struct ActuatorState {
   std::int64_t utime = 0;  // us since the epoch, time for which the positions hold
   std::int64_t seq = 0;

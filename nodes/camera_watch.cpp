@@ -1,6 +1,5 @@
 #include "nodes/camera_watch.hpp"
 
-#include <algorithm>
 #include <cmath>
 
 #include "estimator/health.hpp"
@@ -15,12 +14,20 @@ constexpr double kMoved_mm = 0.05;
 }  // namespace
 
 void CameraWatch::hear(const tip_measurement_t& m, double insertion_mm, std::int64_t now_ns) {
-  Camera& camera = cameras_[m.camera];
+  hear(m.camera, m.status, std::to_array(m.position_mm), insertion_mm, now_ns);
+}
+
+void CameraWatch::hear(const tip_heading_t& m, double insertion_mm, std::int64_t now_ns) {
+  hear(m.camera, m.status, std::to_array(m.heading), insertion_mm, now_ns);
+}
+
+void CameraWatch::hear(std::int32_t number, std::int32_t status, const Says& says, double insertion_mm,
+                       std::int64_t now_ns) {
+  Camera& camera = cameras_[number];
   camera.heard_ns = now_ns;
-  if (m.status != 0) return;  // it says itself that it sees nothing
-  const bool same = std::equal(camera.position_mm.begin(), camera.position_mm.end(), m.position_mm);
-  if (!same) {
-    std::copy_n(m.position_mm, 3, camera.position_mm.begin());
+  if (status != 0) return;  // it says itself that it sees nothing
+  if (says != camera.says) {
+    camera.says = says;
     camera.insertion_mm = insertion_mm;
     camera.repeats = 0;
     camera.frozen = false;

@@ -2,6 +2,7 @@
 // What the arrival of a camera's messages tells, beside what they say: whether it still sends, and whether what it
 // sends still changes. By the steady clock, so that a wall clock that is set cannot keep a dead camera alive.
 #include <array>
+#include <bevel/tip_heading_t.hpp>
 #include <bevel/tip_measurement_t.hpp>
 #include <cstdint>
 #include <map>
@@ -14,15 +15,19 @@ class CameraWatch {
 
   // insertion_mm: of the axes now.
   void hear(const tip_measurement_t& m, double insertion_mm, std::int64_t now_ns);
+  void hear(const tip_heading_t& m, double insertion_mm, std::int64_t now_ns);
   // Bits of estimator/health.hpp.
   std::int32_t health(std::int64_t now_ns) const;
   // Cameras may be others from here on.
   void restart() { cameras_.clear(); }
 
  private:
+  using Says = std::array<double, 3>;
+  void hear(std::int32_t number, std::int32_t status, const Says& says, double insertion_mm, std::int64_t now_ns);
+
   struct Camera {
     std::int64_t heard_ns = 0;
-    std::array<double, 3> position_mm{};
+    Says says{};
     double insertion_mm = 0;  // when it began to say the same
     int repeats = 0;
     bool frozen = false;

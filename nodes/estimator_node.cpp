@@ -57,10 +57,13 @@ EstimatorNode::EstimatorNode(lcm::LCM& lcm, const estimator::EstimatorConfig& co
       estimator_(live(config)),
       status_(port_, "bevel-estimator", kPeriod_s),
       words_(port_, status_, Receiver::estimator, [this](Word word, const steering_target_t&) { on_word(word); }),
-      cameras_(config.limits.measurement_silence_s) {
+      cameras_(config.limits.measurement_silence_s),
+      headings_(config.limits.measurement_silence_s) {
   port_.on_trouble = [this](const InputTrouble& trouble) { on_trouble(trouble); };
   port_.subscribe<tip_measurement_t>(io::channel::kTipMeasurement, tip_limits(config.limits),
                                      [this](const tip_measurement_t& m) { on_tip(m); });
+  port_.subscribe<tip_heading_t>(io::channel::kTipHeading, tip_limits(config.limits),
+                                 [this](const tip_heading_t& m) { on_heading(m); });
   port_.subscribe<actuator_state_t>(
       io::channel::kActuatorState, axes_limits(config.limits), [this](const actuator_state_t& m) { on_axes(m); },
       io::axes_check(bounds));
@@ -83,6 +86,11 @@ void EstimatorNode::on_tip(const tip_measurement_t& m) {
   estimator_.add(io::to_sample(m));
 }
 
+void EstimatorNode::on_heading(const tip_heading_t& m) {
+  headings_.hear(m, axes_ ? axes_->insertion_mm : 0, port_.now().ns);
+  estimator_.add(io::to_sample(m));
+}
+
 void EstimatorNode::on_word(Word word) {
   switch (word) {
     case Word::arm:
@@ -101,6 +109,7 @@ void EstimatorNode::on_word(Word word) {
   }
   port_.forget_senders();
   cameras_.restart();
+  headings_.restart();
   input_refused_ = false;
   remark_.clear();
 }
@@ -120,6 +129,8 @@ void EstimatorNode::on_trouble(const InputTrouble& trouble) {
 
 std::int32_t EstimatorNode::health() const {
   std::int32_t health = estimator_.estimate(port_.now().utime).health | cameras_.health(port_.now().ns);
+  // The estimate stands without headings: that they fall silent is no reason to stop, that they are false is.
+  health |= headings_.health(port_.now().ns) & estimator::kCameraFrozen;
   if (axes_ && !entry_.from_entry()) health |= estimator::kNotFromEntry;
   if (input_refused_) health |= estimator::kInputRefused;
   return health;

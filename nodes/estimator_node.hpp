@@ -1,5 +1,5 @@
 #pragma once
-// bevel-estimator: TIP_MEASUREMENT and ACTUATOR_STATE in, NEEDLE_STATE out, one for each actuator state.
+// bevel-estimator: TIP_MEASUREMENT, TIP_HEADING and ACTUATOR_STATE in, NEEDLE_STATE out, one for each actuator state.
 //
 // Of the operator's words (nodes/operator_words.hpp) it obeys `entry` (the tip is at the entry point: begin there),
 // `confirm` (go on from where the axes say the needle is, although nobody watched it go there) and `arm` (inputs that
@@ -32,6 +32,7 @@ class EstimatorNode {
  private:
   void on_axes(const actuator_state_t& m);
   void on_tip(const tip_measurement_t& m);
+  void on_heading(const tip_heading_t& m);
   void on_word(Word word);
   void on_trouble(const InputTrouble& trouble);
   void publish();
@@ -41,7 +42,7 @@ class EstimatorNode {
   estimator::NeedleEstimator estimator_;
   StatusReporter status_;
   OperatorWords words_;
-  CameraWatch cameras_;
+  CameraWatch cameras_, headings_;
   EntryWatch entry_;
   std::optional<actuator_state_t> axes_;
   std::int64_t published_utime_ = 0;

@@ -9,6 +9,7 @@
 #include <bevel/needle_state_t.hpp>
 #include <bevel/process_status_t.hpp>
 #include <bevel/steering_target_t.hpp>
+#include <bevel/tip_heading_t.hpp>
 #include <bevel/tip_measurement_t.hpp>
 #include <cstdint>
 #include <exception>
@@ -178,6 +179,10 @@ std::int32_t sender_key(const Message&) {
 }
 template <>
 inline std::int32_t sender_key(const tip_measurement_t& message) {
+  return message.camera;
+}
+template <>
+inline std::int32_t sender_key(const tip_heading_t& message) {
   return message.camera;
 }
 

@@ -1,5 +1,6 @@
 #include "nodes/rig_node.hpp"
 
+#include <Eigen/Geometry>
 #include <cmath>
 #include <stdexcept>
 
@@ -26,7 +27,8 @@ RigNode::RigNode(lcm::LCM& lcm, can::Bus& insertion_bus, can::Bus& rotation_bus,
       status_(port_, "bevel-rig", 0.001),
       buses_{FaultyBus(insertion_bus, config.stepper.axes[0].node_id),
              FaultyBus(rotation_bus, config.stepper.axes[1].node_id)},
-      frames_(frames) {
+      frames_(frames),
+      heading_noise_(static_cast<std::uint64_t>(config.rig.seed)) {
   drives_[0] = std::make_unique<rig::SimulatedDrive>(buses_[0], drive_config(config.stepper.axes[0]));
   drives_[1] = std::make_unique<rig::SimulatedDrive>(buses_[1], drive_config(config.stepper.axes[1]));
   own_values_ = model::draw(config.rig.variation, static_cast<std::uint64_t>(config.rig.seed));
@@ -76,6 +78,12 @@ void RigNode::step(const Now& now) {
     take_frames(now);
   }
   publish_frames(now_ns);
+  if (config_.rig.heading.sd_rad > 0 && now_ns >= next_heading_ns_) {
+    const auto period_ns = std::llround(1e9 / config_.rig.heading.rate_hz);
+    next_heading_ns_ = std::max(next_heading_ns_ + period_ns, now_ns + period_ns / 2);
+    take_heading(now);
+  }
+  publish_headings(now_ns);
   status_.report("running", "");
 }
 
@@ -98,6 +106,34 @@ void RigNode::publish_truth(std::int64_t now_utime) {
   m.lambda1_per_rad = needle.lambda1_per_rad;
   m.lambda2 = needle.lambda2;
   port_.publish(io::channel::kNeedleTruth, m);
+}
+
+// Through the cameras' effects and with their delay, as the estimator takes what a model file says of them.
+void RigNode::take_heading(const Now& now) {
+  const model::Pose tip = plant_->tip();
+  const auto seen_mm = [&](double ahead_mm) {
+    model::TipReading reading{tip.p_mm + ahead_mm * tip.R.col(2), model::PointColumns(3, 0)};
+    plant_->model().through_cameras(reading);
+    return reading.position_mm;
+  };
+  const Eigen::Vector3d ahead = (seen_mm(0.5) - seen_mm(-0.5)).normalized();
+  const double sd_rad = config_.rig.heading.sd_rad;
+  std::normal_distribution<double> noise(0, sd_rad);
+  const Eigen::Vector3d aside = ahead.unitOrthogonal();
+  const double right_rad = noise(heading_noise_), up_rad = noise(heading_noise_);
+  const auto late_us = std::llround(1e6 * plant_->model().latency_s().value);
+  model::TipHeading m;
+  m.utime = now.utime + late_us;
+  m.seq = heading_seq_++;
+  m.camera = config_.rig.heading.camera;
+  m.heading = (ahead + right_rad * aside + up_rad * ahead.cross(aside)).normalized();
+  m.information_per_rad2 = (Eigen::Matrix3d::Identity() - m.heading * m.heading.transpose()) / (sd_rad * sd_rad);
+  felt_.push_back({now.ns + 1000 * late_us, io::to_message(m)});
+}
+
+void RigNode::publish_headings(std::int64_t now_ns) {
+  for (; !felt_.empty() && felt_.front().due_ns <= now_ns; felt_.pop_front())
+    port_.publish(io::channel::kTipHeading, felt_.front().heading);
 }
 
 void RigNode::take_frames(const Now& now) {

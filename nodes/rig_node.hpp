@@ -1,9 +1,11 @@
 #pragma once
 // bevel-rig: a needle, two cameras and two drives that exist only as programs. Drives on a CAN bus, frames on a Unix
-// socket, the true tip on NEEDLE_TRUTH. The rest of the software cannot tell it from a bench.
+// socket, the true tip on NEEDLE_TRUTH, and its heading on TIP_HEADING if the needle has a sensor for it. The rest of
+// the software cannot tell it from a bench.
 #include <deque>
 #include <memory>
 #include <optional>
+#include <random>
 #include <vector>
 
 #include "drivers/can/bus.hpp"
@@ -42,6 +44,8 @@ class RigNode {
   };
   void move_plant(std::int64_t now_ns);
   void publish_truth(std::int64_t now_utime);
+  void take_heading(const Now& now);
+  void publish_headings(std::int64_t now_ns);
   void take_frames(const Now& now);
   void publish_frames(std::int64_t now_ns);
 
@@ -61,12 +65,20 @@ class RigNode {
     camera::Frame frame;  // a late camera's is stamped with the time at which it arrives
   };
   std::deque<Taken> taken_;
+  struct Felt {
+    std::int64_t due_ns;
+    tip_heading_t heading;
+  };
+  std::deque<Felt> felt_;
+  std::mt19937_64 heading_noise_;
   std::array<double, 2> moved_{};  // axis positions that the plant has followed
   std::int64_t last_ns_ = 0;
   std::int64_t next_truth_ns_ = 0;
   std::int64_t next_frame_ns_ = 0;
+  std::int64_t next_heading_ns_ = 0;
   std::int64_t truth_seq_ = 0;
   std::int64_t frame_seq_ = 0;
+  std::int64_t heading_seq_ = 0;
 };
 
 }  // namespace bevel::nodes

@@ -176,6 +176,10 @@ void read_rig(Section s, const std::filesystem::path& folder, RigConfig& c) {
   s.read("noise_gray", c.noise_gray, optional, in_range(0, 50));
   s.read("blur_px", c.blur_px, optional, in_range(0, 10));
   s.read("seed", c.seed, optional, in_range(0, 1e15));
+  Section h = s.section("heading", optional);
+  h.read("sd_rad", c.heading.sd_rad, h.present() ? required : optional, in_range(1e-4, 1));
+  h.read("rate_hz", c.heading.rate_hz, optional, in_range(0.1, 500));
+  h.read("camera", c.heading.camera, optional, in_range(0, 15));
 }
 
 }  // namespace

@@ -23,6 +23,13 @@ struct CameraViewConfig {
   int height_px = 480;
 };
 
+// A sensor in the simulated needle that tells the tip's heading, [rig.heading].
+struct HeadingSensorConfig {
+  double sd_rad = 0;  // to either side; 0: there is none
+  double rate_hz = 30;
+  int camera = 15;  // the number that it goes by in TIP_HEADING
+};
+
 struct RigConfig {
   // Of the simulated needle: [rig.needle], [[rig.effect]]s, [[rig.discrepancy]]s and [rig.variation], or the model file
   // `model`; unlike [needle] and the rest at the top, which are what the software believes. Without [rig.needle] it is
@@ -35,6 +42,7 @@ struct RigConfig {
   double roll_error_rad = 0;  // the bevel's true roll at the start; the software believes zero
   std::string frames_socket = "/tmp/bevel-rig-frames.sock";
   double frame_rate_hz = 30;
+  HeadingSensorConfig heading;
   double noise_gray = 2;
   double blur_px = 0.8;
   std::int64_t seed = 1;

@@ -2,13 +2,13 @@
 #include <gtest/gtest.h>
 
 #include "estimator/needle_estimator.hpp"
-#include "tests/estimator/insertion.hpp"
+#include "tests/estimator/play.hpp"
 #include "tests/support/count_allocations.hpp"
 
 namespace bevel::estimator {
 namespace {
 
-void expect_no_allocation(double wheelbase_sd_mm) {
+void expect_no_allocation(double wheelbase_sd_mm, double heading_sd_rad = 0) {
   std::mt19937_64 rng(21);
   EstimatorConfig config;
   config.prior.needle.lambda1_per_rad = 0.49;
@@ -16,27 +16,37 @@ void expect_no_allocation(double wheelbase_sd_mm) {
   config.prior.wheelbase_sd_mm = wheelbase_sd_mm;
   testing::InsertionPlan plan;
   plan.cameras = 2;
+  plan.heading_sd_rad = heading_sd_rad;
   testing::Insertion data = testing::insert(config.prior.needle, {}, plan, rng);
   for (std::size_t i = 300; i < 340; ++i)
     data.measurements[i].position_mm += Eigen::Vector3d(10, 10, 0);  // brings a reset
   NeedleEstimator estimator(config);
-  std::size_t next = 0;
+  for (std::size_t i = 500; i < data.headings.size() && i < 510; ++i) data.headings[i].heading *= -1;  // refused
+  std::size_t next = 0, next_heading = 0;
   const long before = bevel::testing::allocations;
   for (const auto& actuator : data.actuators) {
     estimator.add(actuator);
     while (next < data.measurements.size() && data.measurements[next].utime + 60'000 < actuator.utime)
       estimator.add(data.measurements[next++]);
+    while (next_heading < data.headings.size() && data.headings[next_heading].utime + 40'000 < actuator.utime)
+      estimator.add(data.headings[next_heading++]);
     (void)estimator.estimate(actuator.utime);
   }
   EXPECT_EQ(bevel::testing::allocations - before, 0);
-  EXPECT_GT(estimator.counters().late, 100);
+  EXPECT_GT(estimator.counters().positions.late, 100);
   EXPECT_GT(estimator.counters().relinearised, 0);
+  EXPECT_EQ(estimator.counters().headings.late > 100, heading_sd_rad > 0);
   EXPECT_GT(estimator.estimate(data.actuators.back().utime).state.reset_count, 0);
 }
 
 TEST(NeedleEstimator, AllocatesNothingInAStep) { expect_no_allocation(0); }
 
 TEST(NeedleEstimator, AllocatesNothingInAStepWithEllAsAState) { expect_no_allocation(5); }
+
+TEST(NeedleEstimator, AllocatesNothingInAStepWithHeadings) {
+  expect_no_allocation(0, 0.02);
+  expect_no_allocation(5, 0.02);
+}
 
 TEST(NeedleEstimator, AllocatesNothingInAStepWithEffects) {
   std::mt19937_64 rng(22);
@@ -49,17 +59,14 @@ TEST(NeedleEstimator, AllocatesNothingInAStepWithEffects) {
       active.parameters[i] = active.effect->parameters()[i].starts.front();
     config.effects.push_back(active);
   }
-  testing::Insertion data = testing::insert(config.prior.needle, {}, {}, rng);
+  testing::InsertionPlan plan;
+  plan.heading_sd_rad = 0.02;
+  const testing::Insertion data = testing::insert(config.prior.needle, {}, plan, rng);
   NeedleEstimator estimator(config);
-  std::size_t next = 0;
   const long before = bevel::testing::allocations;
-  for (const auto& actuator : data.actuators) {
-    estimator.add(actuator);
-    while (next < data.measurements.size() && data.measurements[next].utime + 60'000 < actuator.utime)
-      estimator.add(data.measurements[next++]);
-  }
+  testing::play(estimator, data, 60'000);
   EXPECT_EQ(bevel::testing::allocations - before, 0);
-  EXPECT_GT(estimator.counters().late, 100);
+  EXPECT_GT(estimator.counters().positions.late, 100);
 }
 
 }  // namespace

@@ -28,6 +28,20 @@ void BM_predict_update(benchmark::State& bench) {
 }
 BENCHMARK(BM_predict_update);
 
+void BM_predict_heading(benchmark::State& bench) {
+  const NeedleFilter filter(agar());
+  FilterState state = filter.initial();
+  model::TipHeading m;
+  long i = 0;
+  for (auto _ : bench) {
+    filter.predict(state, (i++ / 500) % 2 ? -0.1 : 0.1, 0.006);
+    m.heading = state.pose.R.col(2);
+    m.information_per_rad2 = 2500 * (Eigen::Matrix3d::Identity() - m.heading * m.heading.transpose());
+    benchmark::DoNotOptimize(filter.update(state, m));
+  }
+}
+BENCHMARK(BM_predict_heading);
+
 void BM_predict(benchmark::State& bench) {
   const NeedleFilter filter(agar());
   FilterState state = filter.initial();
@@ -111,7 +125,7 @@ void BM_whole_insertion_per_message(benchmark::State& bench) {
         estimator.add(data.measurements[next++]);
       estimator.add(actuator);
     }
-    benchmark::DoNotOptimize(estimator.counters().late);
+    benchmark::DoNotOptimize(estimator.counters().positions.late);
   }
   bench.SetItemsProcessed(bench.iterations() *
                           static_cast<std::int64_t>(data.actuators.size() + data.measurements.size()));

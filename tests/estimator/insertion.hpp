@@ -1,5 +1,7 @@
 #pragma once
-// A simulated insertion for the estimator's tests: true path, actuator states at 100 Hz, tip measurements at 30 Hz.
+// A simulated insertion for the estimator's tests: true path, actuator states at 100 Hz, tip measurements at 30 Hz, and
+// headings with them if asked for.
+#include <Eigen/Geometry>
 #include <random>
 #include <vector>
 
@@ -13,8 +15,9 @@ namespace bevel::estimator::testing {
 struct Insertion {
   std::vector<model::ActuatorState> actuators;
   std::vector<model::TipMeasurement> measurements;
-  std::vector<model::Pose> poses;  // true, at each actuator state
-  model::Pose final_pose;          // at the newest actuator state
+  std::vector<model::TipHeading> headings;  // in the order of utime, as all of these
+  std::vector<model::Pose> poses;           // true, at each actuator state
+  model::Pose final_pose;                   // at the newest actuator state
   // The direction of motion stayed within the range for which the parameters were found valid. Where it does not, the
   // model says nothing, and a truth made of it is none: near 90 degrees the simulated tip would stand still.
   bool in_domain = true;
@@ -27,6 +30,7 @@ struct InsertionPlan {
   double sigma_mm = 0.15;
   int cameras = 1;  // 1: one camera that sees all three axes; 2: (y, z) and (x, z), taken at different times
   double lost_share = 0;
+  double heading_sd_rad = 0;  // 0: no headings; else one with each measurement, of two cameras the angle in its picture
 };
 
 inline constexpr std::int64_t kStart_utime = 1'700'000'000'000'000;
@@ -40,6 +44,35 @@ inline model::TipMeasurement measure(const Eigen::Vector3d& tip_mm, std::int64_t
   m.camera = camera;
   m.information_per_mm2 = (sees / (sigma_mm * sigma_mm)).asDiagonal();
   for (int i = 0; i < 3; ++i) m.position_mm[i] = sees[i] > 0 ? tip_mm[i] + noise(rng) : 0;
+  return m;
+}
+
+// By a sensor that is equally sure to all sides.
+inline model::TipHeading measure_heading(const Eigen::Vector3d& ahead, std::int64_t utime, std::int64_t seq, int camera,
+                                         double sd_rad, std::mt19937_64& rng) {
+  std::normal_distribution<double> noise(0, sd_rad);
+  const Eigen::Vector3d aside = ahead.unitOrthogonal();
+  model::TipHeading m;
+  m.utime = utime;
+  m.seq = seq;
+  m.camera = camera;
+  m.heading = (ahead + noise(rng) * aside + noise(rng) * ahead.cross(aside)).normalized();
+  m.information_per_rad2 = (Eigen::Matrix3d::Identity() - m.heading * m.heading.transpose()) / (sd_rad * sd_rad);
+  return m;
+}
+
+// By one camera that looks along an axis of {A}: the heading's angle in its picture, and nothing out of it.
+inline model::TipHeading picture_heading(const Eigen::Vector3d& ahead, std::int64_t utime, std::int64_t seq, int camera,
+                                         const Eigen::Vector3d& looks_along, double sd_rad, std::mt19937_64& rng) {
+  std::normal_distribution<double> noise(0, sd_rad);
+  const Eigen::Vector3d in_picture = (ahead - looks_along.dot(ahead) * looks_along).normalized();
+  model::TipHeading m;
+  m.utime = utime;
+  m.seq = seq;
+  m.camera = camera;
+  m.heading = Eigen::AngleAxisd(noise(rng), looks_along) * in_picture;
+  const Eigen::Vector3d across = looks_along.cross(m.heading);
+  m.information_per_rad2 = across * across.transpose() / (sd_rad * sd_rad);
   return m;
 }
 
@@ -74,13 +107,20 @@ inline Insertion insert(const model::NeedleParameters& truth, const model::Pose&
     }
     if (ms % 33 == 7 && unit(rng) >= plan.lost_share) {
       if (plan.cameras == 1) {
+        if (plan.heading_sd_rad > 0)
+          out.headings.push_back(measure_heading(pose.R.col(2), utime, seq, 0, plan.heading_sd_rad, rng));
         out.measurements.push_back(measure(pose.p_mm, utime, seq++, 0, {1, 1, 1}, plan.sigma_mm, rng));
       } else {
+        if (plan.heading_sd_rad > 0)
+          out.headings.push_back(picture_heading(pose.R.col(2), utime, seq, 0, {1, 0, 0}, plan.heading_sd_rad, rng));
         out.measurements.push_back(measure(pose.p_mm, utime, seq++, 0, {0, 1, 1}, plan.sigma_mm, rng));
       }
     }
-    if (plan.cameras == 2 && ms % 33 == 19 && unit(rng) >= plan.lost_share)
+    if (plan.cameras == 2 && ms % 33 == 19 && unit(rng) >= plan.lost_share) {
+      if (plan.heading_sd_rad > 0)
+        out.headings.push_back(picture_heading(pose.R.col(2), utime, seq, 1, {0, 1, 0}, plan.heading_sd_rad, rng));
       out.measurements.push_back(measure(pose.p_mm, utime, seq++, 1, {1, 0, 1}, plan.sigma_mm, rng));
+    }
     if (!model::step(pose, {plan.rate_mm_s * 1e-3, rate * 1e-3, {truth.curvature_per_mm, 0}}, slip) ||
         model::evaluate_slip(model::tilt_rad(pose), slip.lambda1_per_rad, slip.lambda2).gamma_rad >
             model::kDefaultGammaMax_rad)

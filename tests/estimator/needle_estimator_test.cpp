@@ -136,8 +136,8 @@ TEST(NeedleEstimator, ShuffledInputGivesTheSameStateBitForBit) {
 
   const auto now = data.actuators.back().utime;
   const FilterState a = sorted.estimate(now).state, b = shuffled.estimate(now).state;
-  EXPECT_GT(shuffled.counters().late, 50);
-  EXPECT_EQ(shuffled.counters().too_old, 0);
+  EXPECT_GT(shuffled.counters().positions.late, 50);
+  EXPECT_EQ(shuffled.counters().positions.too_old, 0);
   EXPECT_EQ(a.pose.p_mm, b.pose.p_mm);
   EXPECT_EQ(a.pose.R, b.pose.R);
   EXPECT_EQ(a.covariance, b.covariance);
@@ -152,14 +152,14 @@ TEST(NeedleEstimator, OlderThanTheHistoryIsRefusedAndCounted) {
   play(estimator, data);
   const FilterState before = estimator.estimate(data.actuators.back().utime).state;
   estimator.add(data.measurements[3]);
-  EXPECT_EQ(estimator.counters().too_old, 1);
+  EXPECT_EQ(estimator.counters().positions.too_old, 1);
   EXPECT_EQ(estimator.estimate(data.actuators.back().utime).state.pose.p_mm, before.pose.p_mm);
   model::TipMeasurement unusable = data.measurements.back();
   unusable.status = 1;
   estimator.add(unusable);
-  EXPECT_EQ(estimator.counters().not_usable, 1);
+  EXPECT_EQ(estimator.counters().positions.not_usable, 1);
   estimator.add(data.measurements.back());
-  EXPECT_EQ(estimator.counters().duplicate, 1);
+  EXPECT_EQ(estimator.counters().positions.duplicate, 1);
 }
 
 TEST(NeedleEstimator, MeasurementsWithoutActuatorsKeepTheAnchor) {
@@ -171,7 +171,7 @@ TEST(NeedleEstimator, MeasurementsWithoutActuatorsKeepTheAnchor) {
   estimator.add(a);
   for (int i = 1; i < 100; ++i)
     estimator.add(testing::measure({0, 0, 0}, a.utime + std::int64_t{1000} * i, i, 0, {1, 1, 1}, 0.1, rng));
-  EXPECT_GT(estimator.counters().too_old, 0);
+  EXPECT_GT(estimator.counters().positions.too_old, 0);
   EXPECT_TRUE(estimator.estimate(a.utime).state.pose.p_mm.allFinite());
   EXPECT_GT(estimator.estimate(a.utime).state.covariance(0, 0), 0);
 }
@@ -242,7 +242,7 @@ TEST(NeedleEstimator, AnActuatorStateThatFindsTheHistoryFullOfWaitingMeasurement
   EXPECT_EQ(estimate.state.measurement_utime, a.utime);
   EXPECT_NEAR(estimate.state.pose.p_mm.z(), 4, 0.1);
   EXPECT_EQ(estimator.counters().actuators_refused, 0);
-  EXPECT_GT(estimator.counters().too_old, 20);
+  EXPECT_GT(estimator.counters().positions.too_old, 20);
 }
 
 TEST(NeedleEstimator, ZeroWidthPriorsKeepTheBicycle) {

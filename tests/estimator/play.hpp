@@ -8,12 +8,14 @@
 
 namespace bevel::estimator::testing {
 
-// Sends everything in order of arrival: each measurement `latency_us` after its capture.
+// Sends everything in order of arrival: each measurement and heading `latency_us` after its capture.
 inline void play(NeedleEstimator& estimator, const Insertion& data, std::int64_t latency_us = 0) {
-  std::size_t next = 0;
+  std::size_t next = 0, next_heading = 0;
   for (const auto& actuator : data.actuators) {
     while (next < data.measurements.size() && data.measurements[next].utime + latency_us < actuator.utime)
       estimator.add(data.measurements[next++]);
+    while (next_heading < data.headings.size() && data.headings[next_heading].utime + latency_us < actuator.utime)
+      estimator.add(data.headings[next_heading++]);
     estimator.add(actuator);
   }
 }

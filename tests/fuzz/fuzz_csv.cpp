@@ -31,6 +31,7 @@ io::ColumnMap fixed_map() {
 void check(const io::ImportedRecording& recording) {
   const auto samples = static_cast<int>(recording.actuators.size());
   BEVEL_MUST(samples > 0 && recording.tips.size() == recording.actuators.size());
+  BEVEL_MUST(recording.headings.empty() || recording.headings.size() == recording.tips.size());
   BEVEL_MUST(samples + recording.rows_without_data + recording.rows_unsettled + recording.rows_implausible ==
              recording.rows);
   for (std::size_t i = 0; i < recording.actuators.size(); ++i) {
@@ -41,6 +42,10 @@ void check(const io::ImportedRecording& recording) {
     // What is written to a log has to be read from it.
     BEVEL_MUST(!io::check_fields(io::to_message(actuator)));
     BEVEL_MUST(!io::check_fields(io::to_message(tip)));
+    if (recording.headings.empty()) continue;
+    const auto& heading = recording.headings[i];
+    BEVEL_MUST(heading.seq == tip.seq && heading.utime == tip.utime);
+    BEVEL_MUST(!io::check_fields(io::to_message(heading)));
   }
 }
 

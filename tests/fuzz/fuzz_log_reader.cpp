@@ -28,8 +28,9 @@ struct Walk {
 };
 
 bool is_decoded(std::string_view channel) {
-  for (const char* known : {io::channel::kTipMeasurement, io::channel::kActuatorState, io::channel::kMotionCommand,
-                            io::channel::kSteeringTarget, io::channel::kNeedleState, io::channel::kNeedleTruth})
+  for (const char* known : {io::channel::kTipMeasurement, io::channel::kTipHeading, io::channel::kActuatorState,
+                            io::channel::kMotionCommand, io::channel::kSteeringTarget, io::channel::kNeedleState,
+                            io::channel::kNeedleTruth})
     if (channel == known) return true;
   return false;
 }
@@ -87,11 +88,12 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
   std::int64_t skipped = 0;
   for (const auto& [channel, messages] : recording.skipped_channels) skipped += messages;
   BEVEL_MUST(skipped == whole.others);
-  const std::int64_t held = fuzz::count_good(recording.tips) + fuzz::count_good(recording.actuators) +
-                            fuzz::count_good(recording.commands) + fuzz::count_good(recording.targets) +
-                            fuzz::count_good(recording.estimates) + fuzz::count_good(recording.truths);
+  const std::int64_t held = fuzz::count_good(recording.tips) + fuzz::count_good(recording.headings) +
+                            fuzz::count_good(recording.actuators) + fuzz::count_good(recording.commands) +
+                            fuzz::count_good(recording.targets) + fuzz::count_good(recording.estimates) +
+                            fuzz::count_good(recording.truths);
   std::int64_t left_out = 0;  // decoded and good, but no motion of a rig
-  for (const auto* oddities : {&recording.tip_oddities, &recording.actuator_oddities})
+  for (const auto* oddities : {&recording.tip_oddities, &recording.heading_oddities, &recording.actuator_oddities})
     for (const io::Oddity& oddity : *oddities) left_out += oddity.left_out ? 1 : 0;
   BEVEL_MUST(held + left_out + recording.rejected() + whole.configs + skipped == whole.count);
   BEVEL_MUST(recording.intact() == recording.describe_faults().empty());

@@ -28,6 +28,8 @@ def message(kind, **fields):
 
 
 TIP = message("tip_measurement_t", position_mm=[0.5, -1, 30], information_per_mm2=[100, 0, 0, 0, 100, 0, 0, 0, 4])
+HEADING = message("tip_heading_t", heading=[0, 0.6, 0.8],
+                  information_per_rad2=[2500, 0, 0, 0, 1600, -1200, 0, -1200, 900])
 ACTUATOR = message("actuator_state_t", axis_status=[2, 2], insertion_mm=31.0, rotation_rad=-2.5)
 COMMAND = message("motion_command_t", mode=1, insertion_rate_mm_s=5.0, rotation_rate_rad_s=-3.0)
 NEEDLE = message("needle_state_t", measurement_utime=UTIME - 9, orientation_wxyz=[1, 0, 0, 0], curvature_per_mm=0.0047,
@@ -37,7 +39,7 @@ STATUS = message("process_status_t", process="bevel-estimator", state="running",
 
 
 def decode():
-    for name, data in [("tip", TIP), ("actuator", ACTUATOR), ("command", COMMAND), ("needle", NEEDLE),
+    for name, data in [("tip", TIP), ("heading", HEADING), ("actuator", ACTUATOR), ("command", COMMAND), ("needle", NEEDLE),
                        ("target", TARGET), ("status", STATUS)]:
         keep("checked_decode", name, data)
     keep("checked_decode", "empty", b"")
@@ -48,6 +50,10 @@ def decode():
     keep("checked_decode", "infinite_rate", message("motion_command_t", insertion_rate_mm_s=float("-inf")))
     keep("checked_decode", "no_quaternion", message("needle_state_t", orientation_wxyz=[1, 1, 0, 0]))
     keep("checked_decode", "negative_variance", message("tip_measurement_t", information_per_mm2=[-1] + [0] * 8))
+    keep("checked_decode", "heading_of_no_length", message("tip_heading_t"))
+    keep("checked_decode", "heading_not_seen", message("tip_heading_t", status=1))
+    keep("checked_decode", "heading_known_along_itself", message(
+        "tip_heading_t", heading=[0, 0, 1], information_per_rad2=[100, 0, 0, 0, 100, 0, 0, 0, 100]))
     keep("checked_decode", "utime_largest", message("motion_command_t", utime=2**63 - 1))
     keep("checked_decode", "utime_one", message("motion_command_t", utime=1))
     keep("checked_decode", "seq_negative", message("motion_command_t", seq=-1))
@@ -55,7 +61,7 @@ def decode():
     # Lengths of the first string that LCM's own decoder takes at its word.
     for name, length in [("zero", 0), ("minus_one", 2**32 - 1), ("2_28", 2**28), ("2_31_less_one", 2**31 - 1),
                          ("one_less", 15), ("one_more", 17)]:
-        keep("checked_decode", "text_length_" + name, STATUS[:24] + struct.pack(">I", length) + STATUS[28:])
+        keep("checked_decode", "text_length_" + name, STATUS[:32] + struct.pack(">I", length) + STATUS[36:])
     keep("checked_decode", "text_with_zero_inside", STATUS.replace(b"running", b"run\0ing"))
 
 
@@ -71,7 +77,7 @@ def logs():
     actuator = event(2, b"ACTUATOR_STATE", ACTUATOR)
     whole = (first + tip + actuator + event(3, b"MOTION_COMMAND", COMMAND) + event(4, b"NEEDLE_STATE", NEEDLE)
              + event(5, b"NEEDLE_TRUTH", NEEDLE) + event(6, b"STEERING_TARGET", TARGET)
-             + event(7, b"PROCESS_STATUS", STATUS))
+             + event(7, b"PROCESS_STATUS", STATUS) + event(8, b"TIP_HEADING", HEADING))
     keep("log_reader", "whole", whole)
     keep("log_reader", "empty", b"")
     keep("log_reader", "torn_tail", first + tip + actuator[:-3])

@@ -1,6 +1,7 @@
 // The checked decode against every way in which bytes can be wrong; each test runs over all message types and fields.
 #include <gtest/gtest.h>
 
+#include <Eigen/Geometry>
 #include <cmath>
 #include <cstring>
 #include <limits>
@@ -20,6 +21,9 @@ Message valid_message() {
   if constexpr (std::is_same_v<Message, tip_measurement_t>) {
     for (int i = 0; i < 3; ++i) m.information_per_mm2[4 * i] = 100.0;
     m.position_mm[2] = 35.5;
+  } else if constexpr (std::is_same_v<Message, tip_heading_t>) {
+    m.heading[2] = 1;
+    m.information_per_rad2[0] = m.information_per_rad2[4] = 2500;
   } else if constexpr (std::is_same_v<Message, actuator_state_t>) {
     m.axis_status[0] = m.axis_status[1] = 2;
     m.insertion_mm = 35.5;
@@ -48,8 +52,8 @@ Decoded<Message> decode_bytes(const std::vector<std::uint8_t>& bytes) {
 
 template <class Message>
 class CheckedDecode : public ::testing::Test {};
-using MessageTypes = ::testing::Types<tip_measurement_t, actuator_state_t, motion_command_t, needle_state_t,
-                                      steering_target_t, process_status_t>;
+using MessageTypes = ::testing::Types<tip_measurement_t, tip_heading_t, actuator_state_t, motion_command_t,
+                                      needle_state_t, steering_target_t, process_status_t>;
 TYPED_TEST_SUITE(CheckedDecode, MessageTypes);
 
 // Calls `action` for each field value in turn; base for the property tests below.
@@ -211,6 +215,52 @@ TEST(CheckedDecodeMatrix, an_information_matrix_must_be_one) {
   EXPECT_EQ(check_fields(message)->fault, DecodeFault::inconsistent);
 }
 
+TEST(CheckedDecodeHeading, it_must_have_unit_length_unless_the_sender_says_that_it_saw_nothing) {
+  for (const double length : {0.0, 0.998, 1.002}) {
+    auto message = valid_message<tip_heading_t>();
+    message.heading[2] = length;
+    ASSERT_TRUE(check_fields(message)) << length;
+    EXPECT_EQ(check_fields(message)->fault, DecodeFault::inconsistent);
+    EXPECT_STREQ(check_fields(message)->field, "heading");
+  }
+  auto message = valid_message<tip_heading_t>();
+  message.heading[2] = 0.9995;
+  EXPECT_FALSE(check_fields(message));
+  message = {};
+  message.utime = 1;
+  message.status = 2;
+  EXPECT_FALSE(check_fields(message)) << "nothing seen, nothing known";
+  message.heading[0] = 0.5;
+  EXPECT_TRUE(check_fields(message));
+}
+
+TEST(CheckedDecodeHeading, its_information_is_across_it_alone_and_positive_semidefinite) {
+  const Eigen::Vector3d along = Eigen::Vector3d(0.2, -0.4, 1).normalized();
+  const Eigen::Vector3d a = along.unitOrthogonal(), b = along.cross(a);
+  const auto with = [&along](const Eigen::Matrix3d& information) {
+    model::TipHeading heading;
+    heading.utime = 1;
+    heading.heading = along;
+    heading.information_per_rad2 = information;
+    return check_fields(to_message(heading));
+  };
+  const Eigen::Matrix3d across = 900 * a * a.transpose() + 2500 * b * b.transpose();
+  EXPECT_FALSE(with(across));
+  EXPECT_FALSE(with(2500 * b * b.transpose())) << "one camera";
+  EXPECT_FALSE(with(Eigen::Matrix3d::Zero()));
+  EXPECT_FALSE(with(across.cast<float>().cast<double>())) << "of a sender in single precision";
+  const std::pair<const char*, Eigen::Matrix3d> wrong[] = {
+      {"the same to all sides", 2500 * Eigen::Matrix3d::Identity()},
+      {"along the heading", across + 100 * along * along.transpose()},
+      {"one negative", 900 * a * a.transpose() - 100 * b * b.transpose()},
+      {"not symmetric", across + 100 * a * b.transpose()}};
+  for (const auto& [name, information] : wrong) {
+    ASSERT_TRUE(with(information)) << name;
+    EXPECT_EQ(with(information)->fault, DecodeFault::inconsistent) << name;
+    EXPECT_STREQ(with(information)->field, "information_per_rad2") << name;
+  }
+}
+
 TEST(CheckedDecodeMatrix, an_orientation_must_have_unit_length) {
   auto message = valid_message<needle_state_t>();
   message.orientation_wxyz[0] = 0.9;
@@ -224,6 +274,13 @@ TEST(Samples, conversion_there_and_back_loses_nothing) {
   tip.status = 3;
   EXPECT_EQ(encode(to_message(to_sample(tip))), encode(tip));
   EXPECT_DOUBLE_EQ(to_sample(tip).information_per_mm2(0, 2), 2.0);
+  auto heading = valid_message<tip_heading_t>();
+  for (int i = 0; i < 9; ++i) heading.information_per_rad2[i] = i;
+  heading.camera = 1;
+  heading.status = 4;
+  heading.heading[0] = -0.25;
+  EXPECT_EQ(encode(to_message(to_sample(heading))), encode(heading));
+  EXPECT_DOUBLE_EQ(to_sample(heading).information_per_rad2(0, 2), 2.0);
   auto actuator = valid_message<actuator_state_t>();
   actuator.axis_status[1] = 4;
   actuator.rotation_rate_rad_s = -1.5;

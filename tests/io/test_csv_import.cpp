@@ -115,6 +115,52 @@ TEST_F(PlainCsv, ReadsBackIntact) {
   EXPECT_EQ(back.actuators.front().utime, 1'700'000'000'000'000);
 }
 
+TEST_F(PlainCsv, AHeadingsColumnsBecomeATipHeadingEachAndComeBackInTheExport) {
+  const std::string with_heading =
+      file("heading.toml",
+           "[time]\nseconds = \"t\"\n[tip]\naxes = [\"x\", \"y\", \"z\"]\nsigma_mm = [0.1, 0.1, 0.2]\n"
+           "heading = [\"heading_x\", \"-heading_y\", \"heading_z\"]\nheading_sd_rad = 0.02\n"
+           "[insertion]\ncolumn = \"depth\"\n");
+  const std::string table = file("heading.csv",
+                                 "t,depth,x,y,z,heading_x,heading_y,heading_z\n"
+                                 "1,0,0,0,0,0,0,1\n2,5,0,0,5,0,0.6,0.8\n3,10,0,0,10,0.707,0.0,0.707\n");
+  const ImportedRecording r = import_csv(table, load_column_map(with_heading));
+  ASSERT_EQ(r.headings.size(), 3U);
+  EXPECT_LT((r.headings[1].heading - Eigen::Vector3d(0, -0.6, 0.8)).norm(), 1e-12);
+  EXPECT_NEAR(r.headings[2].heading.norm(), 1, 1e-12) << "three digits of a file are no damage";
+  EXPECT_NEAR(r.headings[1].information_per_rad2(0, 0), 2500, 1e-9);
+  EXPECT_NEAR(r.headings[1].information_per_rad2.trace(), 5000, 1e-9);
+
+  write_log(r, (folder / "heading.lcm").string());
+  const Recording back = read_recording((folder / "heading.lcm").string());
+  EXPECT_TRUE(back.intact()) << back.describe_faults();
+  ASSERT_EQ(back.headings.size(), 3U);
+  EXPECT_EQ(back.headings[2].heading, r.headings[2].heading);
+  EXPECT_EQ(back.arrivals.size(), 9U);
+  export_csv(back, (folder / "out").string());
+  const std::string exported = test::text_of(folder / "out/tip_heading.csv");
+  EXPECT_THAT(exported, HasSubstr("utime,seq,camera,status,heading_x,heading_y,heading_z,ixx_per_rad2,"));
+  EXPECT_THAT(exported, HasSubstr("\n1000000,0,0,0,0,-0,1,2500,"));
+
+  const std::string bad = file("bad.csv", "t,depth,x,y,z,heading_x,heading_y,heading_z\n1,0,0,0,0,0,0.6,0.6\n");
+  try {
+    import_csv(bad, load_column_map(with_heading));
+    FAIL() << "taken";
+  } catch (const std::runtime_error& e) {
+    EXPECT_THAT(e.what(), HasSubstr("bad.csv:2: column 'heading_x' is '0', and the heading's length is 0.8485"));
+  }
+  const std::string unsure = file("unsure.toml",
+                                  "[time]\nrate_hz = 30.0\n[tip]\naxes = [\"x\", \"y\", \"z\"]\n"
+                                  "sigma_mm = [0.1, 0.1, 0]\nheading = [\"a\", \"b\", \"c\"]\n"
+                                  "[insertion]\ncolumn = \"depth\"\n");
+  try {
+    load_column_map(unsure);
+    FAIL() << "taken";
+  } catch (const ConfigError& e) {
+    EXPECT_THAT(e.what(), HasSubstr("heading_sd_rad"));
+  }
+}
+
 TEST_F(PlainCsv, ATimeThatStartsAtZeroOrBelowIsShiftedAndThatIsSaid) {
   for (const int start : {0, -7, -100}) {
     const test::Said said = import(csv([start](int i, auto& cells) { cells[0] = std::to_string(start + i); }));

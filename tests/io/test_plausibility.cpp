@@ -137,6 +137,29 @@ TEST(Plausibility, AReadingBeyondAnyOutlierThatComesBackIsLeftOut) {
   EXPECT_THAT(left_out(judge(tips, steady())), testing::ElementsAre(60U));
 }
 
+TEST(Plausibility, AHeadingIsJudgedByItsStampItsCameraAndWhatItClaimsToKnow) {
+  std::vector<model::TipHeading> headings(120);
+  for (std::size_t i = 0; i < headings.size(); ++i) {
+    headings[i].utime = kStart + 33'333 * static_cast<std::int64_t>(i);
+    headings[i].seq = static_cast<std::int64_t>(i);
+    headings[i].heading = Eigen::Vector3d::UnitZ();
+    headings[i].information_per_rad2.diagonal() << 2500, 2500, 0;
+  }
+  headings[20].heading *= -1;  // a tracker's mistake, no damage
+  headings[30].status = 1;
+  EXPECT_THAT(left_out(judge(headings)), IsEmpty());
+  EXPECT_TRUE(judge(headings).oddities.empty());
+  auto damaged = headings;
+  damaged[60].information_per_rad2(0, 0) = 1e9;
+  EXPECT_THAT(left_out(judge(damaged)), testing::ElementsAre(60U));
+  damaged = headings;
+  damaged[60].camera = 7;
+  EXPECT_THAT(left_out(judge(damaged)), testing::ElementsAre(60U));
+  damaged = headings;
+  damaged[60].utime += std::int64_t{1} << 40U;
+  EXPECT_THAT(left_out(judge(damaged)), testing::ElementsAre(60U));
+}
+
 TEST(Plausibility, OrdinaryFaultsOfCamerasAndBenchesAreNoDamage) {
   auto tips = readings();
   tips[20].position_mm.x() = 25;                                              // an outlier,

@@ -1,4 +1,4 @@
-// bevel-estimator: TIP_MEASUREMENT and ACTUATOR_STATE in, NEEDLE_STATE out.
+// bevel-estimator: TIP_MEASUREMENT, TIP_HEADING and ACTUATOR_STATE in, NEEDLE_STATE out.
 #include "nodes/controller_node.hpp"
 #include "nodes/estimator_node.hpp"
 #include "tools/processes/process_main.hpp"
@@ -6,7 +6,8 @@
 int main(int argc, char** argv) {
   using namespace bevel;
   tools::CommandLine command_line(
-      "bevel-estimator", "Estimates the needle's pose, curvature and lambda from tip measurements and axis positions.");
+      "bevel-estimator",
+      "Estimates the needle's pose, curvature and lambda from tip measurements, headings and axis positions.");
   const auto name = [](const nodes::SystemConfig&) { return "bevel-estimator"; };
   return tools::process_main(command_line, argc, argv, name, [](tools::ProcessContext& context) {
     tools::warn_of_effects_left_out(context.config, "bevel-estimator");

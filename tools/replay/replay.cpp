@@ -23,9 +23,18 @@ double processor_s() {
 
 struct Sink {
   std::vector<InnovationRow>* rows;
+  std::vector<HeadingRow>* headings;
   const estimator::NeedleFilter* filter;
 
   static void take(void* context, const estimator::NeedleEstimator::Applied& applied) {
+    const Sink& sink = *static_cast<Sink*>(context);
+    if (applied.heading != nullptr) {
+      const model::TipHeading& h = *applied.heading;
+      const estimator::Update& update = applied.update;
+      sink.headings->push_back(
+          {h.utime, h.seq, h.camera, update.accepted, update.rank, update.mahalanobis2, update.innovation.head<2>()});
+      return;
+    }
     const model::TipMeasurement& m = *applied.measurement;
     InnovationRow row;
     row.utime = m.utime;
@@ -35,7 +44,6 @@ struct Sink {
     row.rank = applied.update.rank;
     row.mahalanobis2 = applied.update.mahalanobis2;
     row.position_mm = m.position_mm;
-    const Sink& sink = *static_cast<Sink*>(context);
     row.innovation_mm = m.position_mm - sink.filter->seen_position_mm(applied.state_before);
     const Eigen::Matrix3d& R = applied.state_before.pose.R;
     row.state_variance_mm2 = (R * applied.state_before.covariance.topLeftCorner<3, 3>() * R.transpose()).diagonal();
@@ -133,7 +141,7 @@ Replay replay_log(std::span<const std::uint8_t> log, const std::string& name, co
   result.states.reserve(log.size() / 150 + 16);
   result.innovations.reserve(log.size() / 250 + 16);
   estimator::NeedleEstimator estimator(config, options.history);
-  Sink sink{&result.innovations, &estimator.filter()};
+  Sink sink{&result.innovations, &result.headings, &estimator.filter()};
   estimator.observe(&Sink::take, &sink);
 
   const auto start = std::chrono::steady_clock::now();
@@ -144,6 +152,8 @@ Replay replay_log(std::span<const std::uint8_t> log, const std::string& name, co
   for (const io::Arrival& arrival : recording.arrivals) {
     if (arrival.channel == io::Arrival::Channel::tip)
       estimator.add(with_noise(recording.tips[arrival.index], options.noise_by_axis));
+    if (arrival.channel == io::Arrival::Channel::heading && options.use_headings)
+      estimator.add(recording.headings[arrival.index]);
     if (arrival.channel != io::Arrival::Channel::actuator) continue;
     const model::ActuatorState& actuator = recording.actuators[arrival.index];
     estimator.add(actuator);
@@ -168,6 +178,12 @@ Replay replay_log(std::span<const std::uint8_t> log, const std::string& name, co
                              " ACTUATOR_STATE messages; at least one is needed");
   result.log_s = static_cast<double>(result.states.back().utime - result.states.front().utime) * 1e-6;
   compare(result, recording.truths, estimator.filter());
+  if (result.headings.empty()) return result;
+  ReplayOptions without = options;
+  without.use_headings = false;
+  const Replay alone = replay_log(log, name, config, without);
+  result.without_headings = alone.states.back();
+  result.truth_without_headings = alone.truth;
   return result;
 }
 
@@ -234,6 +250,10 @@ InnovationFigures innovation_figures(const Replay& replay) {
       series[i].push_back(standard);
       figures.axis[i].add(standard * standard, 1);
     }
+  }
+  for (const HeadingRow& row : replay.headings) {
+    ++figures.headings;
+    row.accepted ? figures.heading_nis.add(row.mahalanobis2, row.rank) : void(++figures.headings_rejected);
   }
   for (std::size_t i = 0; i < 3; ++i) figures.whiteness[i] = ljung_box(series[i]);
   if (!replay.states.empty()) figures.resets = replay.states.back().state.reset_count;

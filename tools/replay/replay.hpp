@@ -2,6 +2,7 @@
 // One log through the estimator: the same NeedleEstimator that runs live, fed in the log's order of arrival.
 #include <array>
 #include <cstdint>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -38,6 +39,17 @@ struct InnovationRow {
   Eigen::Vector3d noise_variance_mm2;  // of the measurement, by its information matrix
 };
 
+// One heading when it was first applied.
+struct HeadingRow {
+  std::int64_t utime = 0;
+  std::int64_t seq = 0;
+  std::int32_t camera = 0;
+  bool accepted = false;
+  int rank = 0;
+  double mahalanobis2 = 0;
+  Eigen::Vector2d innovation_rad;  // along the axes seen, the best seen last
+};
+
 struct TruthFigures {
   std::int64_t count = 0;
   double position_rmse_mm = 0;
@@ -64,6 +76,10 @@ struct Replay {
   std::vector<StateRow> states;
   std::vector<estimator::EffectState> effects;  // one for each of `states` where the model has effects, else empty
   std::vector<InnovationRow> innovations;
+  std::vector<HeadingRow> headings;
+  // The same log without its headings, at its newest actuator state; empty where there are none.
+  std::optional<StateRow> without_headings;
+  TruthFigures truth_without_headings;
   estimator::Counters counters;
   std::int64_t refused_messages = 0;  // by the checked decode
   io::LogDamage damage;
@@ -82,7 +98,8 @@ estimator::FilterState filter_state(const Replay& replay, std::size_t row);
 
 struct ReplayOptions {
   std::size_t history = 64;
-  double ahead_mm = 0;  // for replay_logs: 0, nothing is foretold
+  bool use_headings = true;  // false: as if the log had none
+  double ahead_mm = 0;       // for replay_logs: 0, nothing is foretold
   // Replaces each measurement's information by that of this noise, per axis; empty: as the camera says.
   std::vector<NoiseColour> noise_by_axis{};
   // Of the model file, for replay_logs: some effects are a recording's own.
@@ -104,6 +121,8 @@ struct InnovationFigures {
   std::array<ChiSquareMean, 3> axis;  // x, y, z on their own, standardised
   std::array<LjungBox, 3> whiteness;  // of one replay (the first)
   std::int64_t measurements = 0, rejected = 0, resets = 0;
+  ChiSquareMean heading_nis;  // d^2 per axis seen, accepted headings
+  std::int64_t headings = 0, headings_rejected = 0;
 };
 InnovationFigures innovation_figures(const Replay& replay);
 

@@ -86,6 +86,14 @@ void write_csv(const Replay& replay, const std::string& stem) {
         row.position_mm.x(), row.position_mm.y(), row.position_mm.z(), row.innovation_mm.x(), row.innovation_mm.y(),
         row.innovation_mm.z(), row.state_variance_mm2.x(), row.state_variance_mm2.y(), row.state_variance_mm2.z());
   innovations.close();
+  if (replay.headings.empty()) return;
+  CsvFile headings(stem + ".headings.csv",
+                   "utime,seq,camera,accepted,rank,mahalanobis2,innovation_a_rad,innovation_b_rad");
+  for (const HeadingRow& row : replay.headings)
+    headings.row("%lld,%lld,%d,%d,%d,%.6g,%.6f,%.6f\n", static_cast<long long>(row.utime),
+                 static_cast<long long>(row.seq), row.camera, static_cast<int>(row.accepted), row.rank,
+                 row.mahalanobis2, row.innovation_rad[0], row.innovation_rad[1]);
+  headings.close();
 }
 
 // A state over insertion with its 2-sigma band; `thin` keeps the page small.
@@ -141,7 +149,35 @@ void add_state_plots(io::HtmlReport& page, const Replay& replay) {
   page.figure(band_plot(
                   replay, "roll sd (rad)", [](const estimator::FilterState& s) { return sd(s, 5); },
                   [](const estimator::FilterState&) { return 0.0; }),
-              "Roll is never measured: this is what the filter admits not to know of it.");
+              "Roll is never measured itself: this is what the filter admits not to know of it.");
+}
+
+// What headings bring: the newest state with them and without, and whether they are what the filter takes them for.
+void print_headings(std::ostream& out, const Replay& replay, const InnovationFigures& figures) {
+  const estimator::ReadingCounters& c = replay.counters.headings;
+  if (c.offered == 0) return;
+  out << text_of(
+      "  headings     %lld: %lld not usable, %lld too old, %lld duplicate, %lld late, %lld of %lld rejected\n",
+      static_cast<long long>(c.offered), static_cast<long long>(c.not_usable), static_cast<long long>(c.too_old),
+      static_cast<long long>(c.duplicate), static_cast<long long>(c.late),
+      static_cast<long long>(figures.headings_rejected), static_cast<long long>(figures.headings));
+  if (figures.heading_nis.degrees > 0)
+    out << "  heading NIS  " << with_band(figures.heading_nis)
+        << text_of("; %lld headings, %lld axes\n", static_cast<long long>(figures.headings - figures.headings_rejected),
+                   static_cast<long long>(figures.heading_nis.degrees));
+  if (!replay.without_headings) return;
+  const auto print_spread = [&out](const char* name, const estimator::FilterState& s) {
+    const Eigen::Vector3d spread = position_sd_mm(s);
+    out << text_of(
+        "  %s k +- %.6f /mm, lambda2 +- %.4f, tip +- %.3f %.3f %.3f mm, tilt +- %.4f %.4f, roll +- %.4f rad\n", name,
+        sd(s, 6), sd(s, 8), spread.x(), spread.y(), spread.z(), sd(s, 3), sd(s, 4), sd(s, 5));
+  };
+  print_spread("with them   ", replay.states.back().state.unpacked());
+  print_spread("without     ", replay.without_headings->state.unpacked());
+  if (replay.truth_without_headings.count == 0) return;
+  const TruthFigures& truth = replay.truth_without_headings;
+  out << text_of("  truth        without headings RMSE position %.3f mm, tilt %.4f rad, roll %.4f rad\n",
+                 truth.position_rmse_mm, truth.tilt_rmse_rad, truth.roll_rmse_rad);
 }
 
 void print_foretold(std::ostream& out, const Foretold& next, const Foretold& ahead, double ahead_mm) {
@@ -154,13 +190,13 @@ void print_foretold(std::ostream& out, const Foretold& next, const Foretold& ahe
 
 void print(std::ostream& out, const Replay& replay, double ahead_mm) {
   const InnovationFigures figures = innovation_figures(replay);
-  const estimator::Counters& c = replay.counters;
+  const estimator::ReadingCounters& c = replay.counters.positions;
   out << replay.name << "\n";
   out << text_of(
       "  messages     %lld actuator states (%lld refused), %lld measurements:\n"
       "               %lld not usable, %lld too old, %lld duplicate, %lld late\n",
-      static_cast<long long>(c.actuators), static_cast<long long>(c.actuators_refused),
-      static_cast<long long>(c.measurements), static_cast<long long>(c.not_usable), static_cast<long long>(c.too_old),
+      static_cast<long long>(replay.counters.actuators), static_cast<long long>(replay.counters.actuators_refused),
+      static_cast<long long>(c.offered), static_cast<long long>(c.not_usable), static_cast<long long>(c.too_old),
       static_cast<long long>(c.duplicate), static_cast<long long>(c.late));
   if (replay.refused_messages > 0)
     out << "  REFUSED      " << replay.refused_messages << " messages that do not decode\n";
@@ -205,23 +241,28 @@ void print(std::ostream& out, const Replay& replay, double ahead_mm) {
     out << text_of("  by itself    x %.2f, y %.2f, along the needle %.2f, tilts %.2f and %.2f, roll %.2f\n",
                    nees[0].mean(), nees[1].mean(), nees[2].mean(), nees[3].mean(), nees[4].mean(), nees[5].mean());
   }
+  print_headings(out, replay, figures);
   print_foretold(out, replay.next, replay.ahead, ahead_mm);
 }
 
 void print_together(std::ostream& out, const std::vector<Replay>& replays, double ahead_mm) {
-  ChiSquareMean nis;
+  ChiSquareMean nis, heading_nis;
   std::int64_t rejected = 0;
   std::int64_t measurements = 0;
   Foretold next, ahead;
   for (const Replay& replay : replays) {
     const InnovationFigures figures = innovation_figures(replay);
     nis.add(figures.nis.sum, figures.nis.degrees);
+    heading_nis.add(figures.heading_nis.sum, figures.heading_nis.degrees);
     rejected += figures.rejected, measurements += figures.measurements;
     next.add(replay.next), ahead.add(replay.ahead);
   }
   out << text_of("%zu logs together\n  gate         %lld of %lld rejected\n", replays.size(),
                  static_cast<long long>(rejected), static_cast<long long>(measurements));
   if (nis.degrees > 0) out << "  NIS / axis   " << with_band(nis) << "\n";
+  if (heading_nis.degrees > 0)
+    out << "  heading NIS  " << with_band(heading_nis)
+        << text_of("; %lld axes\n", static_cast<long long>(heading_nis.degrees));
   print_foretold(out, next, ahead, ahead_mm);
 }
 

@@ -14,8 +14,8 @@ void print(std::ostream& out, const Replay& replay, double ahead_mm);
 void print_together(std::ostream& out, const std::vector<Replay>& replays, double ahead_mm);
 void print_speed(std::ostream& out, const std::vector<Replay>& replays);
 
-// DIR/<name>.states.csv, DIR/<name>.innovations.csv and one page DIR/<name>.html. Throws std::runtime_error naming the
-// file.
+// DIR/<name>.states.csv, DIR/<name>.innovations.csv, DIR/<name>.headings.csv where there are any, and one page
+// DIR/<name>.html. Throws std::runtime_error naming the file.
 void write_files(const Replay& replay, const std::string& folder, double ahead_mm);
 
 }  // namespace bevel::replay

@@ -1,0 +1,321 @@
+// The heading as a measurement: derivatives, the update against its closed form, the gate, order, and what is counted.
+#include <gtest/gtest.h>
+
+#include <Eigen/Eigenvalues>
+#include <Eigen/LU>
+#include <algorithm>
+#include <numbers>
+
+#include "estimator/health.hpp"
+#include "tests/estimator/play.hpp"
+
+namespace bevel::estimator {
+namespace {
+
+using testing::Insertion;
+using testing::InsertionPlan;
+
+EstimatorConfig agar_config() {
+  EstimatorConfig config;
+  config.prior.needle.lambda1_per_rad = 0.49;
+  config.prior.needle.lambda2 = 0.22;
+  return config;
+}
+
+Eigen::Vector3d random_vector(std::mt19937_64& rng, double size) {
+  std::uniform_real_distribution<double> unit(-1, 1);
+  return size * Eigen::Vector3d(unit(rng), unit(rng), unit(rng));
+}
+
+// Anywhere in the workspace, with a covariance that correlates everything.
+FilterState random_state(const NeedleFilter& filter, std::mt19937_64& rng) {
+  FilterState state = filter.initial();
+  state.pose.R = model::exp_so3(random_vector(rng, 0.5));
+  state.pose.p_mm = Eigen::Vector3d(0, 0, 50) + random_vector(rng, 30);
+  std::normal_distribution<double> normal(0, 1);
+  const Matrix9d mixed = Matrix9d::NullaryExpr([&] { return 0.3 * normal(rng); }) + Matrix9d::Identity();
+  const Vector9d sd = state.covariance.diagonal().cwiseSqrt();
+  const Matrix9d P = sd.asDiagonal() * (mixed * mixed.transpose()) * sd.asDiagonal();
+  state.covariance = 0.5 * (P + P.transpose());
+  return state;
+}
+
+model::TipHeading heading_of(const Eigen::Vector3d& along, double sd_rad = 0.02) {
+  model::TipHeading m;
+  m.utime = testing::kStart_utime;
+  m.heading = along.normalized();
+  m.information_per_rad2 = (Eigen::Matrix3d::Identity() - m.heading * m.heading.transpose()) / (sd_rad * sd_rad);
+  return m;
+}
+
+TEST(Heading, DerivativesAreThoseOfPerturbation) {
+  for (const bool effects : {false, true}) {
+    EstimatorConfig config = agar_config();
+    if (effects)
+      for (const auto& [name, value] :
+           {std::pair("camera_scale", 1.04), {"camera_rotation", 0.05}, {"refraction", 0.03}}) {
+        model::ActiveEffect active;
+        active.effect = model::find_effect(name);
+        ASSERT_NE(active.effect, nullptr) << name;
+        active.parameters[0] = value;
+        config.effects.push_back(active);
+      }
+    const NeedleFilter filter(config);
+    std::mt19937_64 rng(31);
+    double largest = 0;
+    for (int trial = 0; trial < 50; ++trial) {
+      const FilterState state = random_state(filter, rng);
+      const SeenHeading seen = filter.seen_heading(state);
+      EXPECT_NEAR(seen.along.norm(), 1, 1e-12);
+      if (!effects) {
+        EXPECT_LT((seen.along - state.pose.R.col(2)).norm(), 1e-12);
+      }
+      // Of refraction the direction changes with the place too, by some 1e-4 rad over a standard deviation of it: left
+      // out.
+      for (int i = effects ? 3 : 0; i < 6; ++i) {
+        constexpr double kStep = 1e-5;
+        FilterState up = state, down = state;
+        move<9>(up, kStep * Vector9d::Unit(i));
+        move<9>(down, -kStep * Vector9d::Unit(i));
+        const Eigen::Vector3d numeric = (filter.seen_heading(up).along - filter.seen_heading(down).along) / (2 * kStep);
+        largest = std::max(largest, (numeric - seen.by_error.col(i)).norm());
+      }
+    }
+    std::printf("largest difference, %s effects: %.1e\n", effects ? "with" : "without", largest);
+    EXPECT_LT(largest, 1e-8);
+  }
+}
+
+// Information form, P^-1 + H^T R^-1 H, with H by central differences of the innovation where it is, not at zero.
+TEST(Heading, TheUpdateIsTheClosedFormWithDerivativesByPerturbation) {
+  const NeedleFilter filter(agar_config());
+  std::mt19937_64 rng(32);
+  double largest = 0;
+  for (int trial = 0; trial < 100; ++trial) {
+    const FilterState before = random_state(filter, rng);
+    const Eigen::Vector3d ahead = before.pose.R.col(2);
+    constexpr double kSd_rad = 0.02;
+    const bool one_camera = trial % 2 == 1;
+    // One camera: the angle in its picture, which may be far from the heading itself.
+    model::TipHeading m =
+        one_camera ? testing::picture_heading(ahead, 1, 1, 0, {1, 0, 0}, kSd_rad, rng)
+                   : heading_of(model::exp_so3(before.pose.R * Eigen::Vector3d(0.01, -0.02, 0)) * ahead, kSd_rad);
+    FilterState after = before;
+    const Update update = filter.update(after, m);
+    ASSERT_TRUE(update.accepted);
+    ASSERT_EQ(update.rank, one_camera ? 1 : 2);
+    if (!one_camera) {
+      EXPECT_NEAR(update.innovation.head<2>().norm(), std::hypot(0.01, 0.02), 1e-5);
+    }
+    Eigen::Matrix<double, 3, 9> H = Eigen::Matrix<double, 3, 9>::Zero();
+    for (int i = 0; i < 9; ++i) {
+      constexpr double kStep = 1e-6;
+      FilterState up = before, down = before;
+      move<9>(up, kStep * Vector9d::Unit(i));
+      move<9>(down, -kStep * Vector9d::Unit(i));
+      H.col(i) = (filter.update(down, m).innovation - filter.update(up, m).innovation) / (2 * kStep);
+    }
+    EXPECT_LT((H.leftCols<3>().norm() + H.rightCols<4>().norm()), 1e-9) << "neither place nor roll nor parameters";
+    const Matrix9d P = (before.covariance.inverse() + H.transpose() * H / (kSd_rad * kSd_rad)).inverse();
+    const Vector9d correction = P * H.transpose() * update.innovation / (kSd_rad * kSd_rad);
+    const Vector9d sd = P.diagonal().cwiseSqrt();
+    const Matrix9d off = after.covariance - P;
+    largest = std::max(largest, (sd.cwiseInverse().asDiagonal() * off * sd.cwiseInverse().asDiagonal()).norm());
+    EXPECT_LT((difference<9>(before, after) - correction).cwiseQuotient(sd).norm(), 1e-6);
+    const Eigen::Matrix3d S = H * before.covariance * H.transpose() + kSd_rad * kSd_rad * Eigen::Matrix3d::Identity();
+    const double d2 = update.innovation.dot(S.inverse() * update.innovation);
+    EXPECT_NEAR(update.mahalanobis2, d2, 1e-6 * d2 + 1e-12);
+  }
+  std::printf("covariance off by at most %.1e of it\n", largest);
+  EXPECT_LT(largest, 1e-6);
+}
+
+// What the past is run again with says of a heading what the update does, near the state about which it was made.
+TEST(Heading, MadeLinearItSaysTheSame) {
+  const NeedleFilter filter(agar_config());
+  std::mt19937_64 rng(39);
+  for (int trial = 0; trial < 50; ++trial) {
+    const FilterState before = random_state(filter, rng);
+    const Eigen::Vector3d ahead = before.pose.R.col(2);
+    const model::TipHeading m = trial % 2 == 1 ? testing::picture_heading(ahead, 1, 1, 0, {0, 1, 0}, 0.02, rng)
+                                               : testing::measure_heading(ahead, 1, 1, 0, 0.02, rng);
+    FilterState after = before;
+    ASSERT_TRUE(filter.update(after, m).accepted);
+    const model::TipHeading linear = filter.made_linear(m, before);
+    const Eigen::Matrix3d& W = linear.information_per_rad2;
+    EXPECT_LT((W * ahead).norm(), 1e-9 * W.trace());
+    Eigen::Matrix<double, 3, 9> H = Eigen::Matrix<double, 3, 9>::Zero();
+    H.leftCols<6>() = filter.seen_heading(before).by_error;
+    const Matrix9d P = (before.covariance.inverse() + H.transpose() * W * H).inverse();
+    const Vector9d sd = P.diagonal().cwiseSqrt();
+    const Vector9d correction = P * H.transpose() * W * (linear.heading - ahead);
+    EXPECT_LT((difference<9>(before, after) - correction).cwiseQuotient(sd).norm(), 1e-6);
+  }
+}
+
+TEST(Heading, OneThatPointsBackwardsIsRefusedWhateverItClaims) {
+  const NeedleFilter filter(agar_config());
+  std::mt19937_64 rng(33);
+  for (int trial = 0; trial < 20; ++trial)
+    for (const double sd_rad : {1e-3, 0.02, 0.5, 3.0})
+      for (const double off_rad : {0.0, 1e-9, 0.3, 1.5}) {
+        const FilterState before = random_state(filter, rng);
+        const Eigen::Matrix3d off = model::exp_so3(before.pose.R * Eigen::Vector3d(off_rad, 0, 0));
+        for (const bool one_camera : {false, true}) {
+          model::TipHeading m = heading_of(-(off * before.pose.R.col(2)), sd_rad);
+          if (one_camera) {
+            const Eigen::Vector3d across = m.heading.cross(Eigen::Vector3d::UnitX()).normalized();
+            m.information_per_rad2 = across * across.transpose() / (sd_rad * sd_rad);
+          }
+          FilterState after = before;
+          const Update update = filter.update(after, m);
+          EXPECT_FALSE(update.accepted) << sd_rad << " " << off_rad;
+          EXPECT_GT(update.test_ratio, 1);
+          EXPECT_TRUE(std::isfinite(update.test_ratio));
+          EXPECT_EQ(after.pose.R, before.pose.R);
+          EXPECT_EQ(after.covariance, before.covariance);
+          EXPECT_EQ(after.heading_rejects_in_row, 1);
+          EXPECT_EQ(after.rejects_in_row, 0);
+        }
+      }
+}
+
+TEST(Heading, ASensorThatIsTurnedAboutIsSaidAndThrowsNothingAway) {
+  std::mt19937_64 rng(34);
+  const EstimatorConfig config = agar_config();
+  InsertionPlan plan;
+  plan.heading_sd_rad = 0.02;
+  Insertion data = testing::insert(config.prior.needle, {}, plan, rng);
+  Insertion without = data;
+  without.headings.clear();
+  for (auto& m : data.headings) m.heading *= -1;
+  NeedleEstimator estimator(config), alone(config);
+  testing::play(estimator, data);
+  testing::play(alone, without);
+  const auto now = data.actuators.back().utime;
+  const Estimate estimate = estimator.estimate(now);
+  EXPECT_EQ(estimate.health, kRejecting) << describe_health(estimate.health);
+  EXPECT_EQ(estimate.state.reset_count, 0);
+  EXPECT_EQ(estimate.state.rejects_in_row, 0);
+  EXPECT_LT((estimate.state.pose.p_mm - alone.estimate(now).state.pose.p_mm).norm(), 1e-3);
+  for (auto& m : data.headings) m.heading *= -1;
+  NeedleEstimator right(config);
+  testing::play(right, data);
+  EXPECT_EQ(right.estimate(now).health, kHealthy) << describe_health(right.estimate(now).health);
+}
+
+TEST(Heading, NotUsableOldAndTwiceAreCountedApartFromPositions) {
+  std::mt19937_64 rng(35);
+  const EstimatorConfig config = agar_config();
+  InsertionPlan plan;
+  plan.heading_sd_rad = 0.02;
+  const Insertion data = testing::insert(config.prior.needle, {}, plan, rng);
+  NeedleEstimator estimator(config);
+  testing::play(estimator, data);
+  const auto now = data.actuators.back().utime;
+  const FilterState before = estimator.estimate(now).state;
+  model::TipHeading unusable = data.headings.back();
+  unusable.seq += 1;
+  unusable.status = 1;
+  estimator.add(unusable);
+  unusable.status = 0;
+  unusable.information_per_rad2.setZero();
+  estimator.add(unusable);
+  estimator.add(data.headings.back());
+  estimator.add(data.headings.front());
+  const Counters& counters = estimator.counters();
+  EXPECT_EQ(counters.headings.offered, static_cast<std::int64_t>(data.headings.size()) + 4);
+  EXPECT_EQ(counters.headings.not_usable, 2);
+  EXPECT_EQ(counters.headings.duplicate, 1);
+  EXPECT_EQ(counters.headings.too_old, 1);
+  EXPECT_EQ(counters.positions.offered, static_cast<std::int64_t>(data.measurements.size()));
+  EXPECT_EQ(counters.positions.not_usable + counters.positions.duplicate + counters.positions.too_old, 0);
+  EXPECT_EQ(estimator.estimate(now).state.covariance, before.covariance);
+  EXPECT_EQ(estimator.estimate(now).state.pose.R, before.pose.R);
+}
+
+TEST(Heading, ShuffledInputGivesTheSameStateBitForBit) {
+  std::mt19937_64 rng(36);
+  const EstimatorConfig config = agar_config();
+  InsertionPlan plan;
+  plan.cameras = 2;
+  plan.length_mm = 20;
+  plan.heading_sd_rad = 0.02;
+  const Insertion data = testing::insert(config.prior.needle, {}, plan, rng);
+  NeedleEstimator sorted(config, 4096), shuffled(config, 4096);
+  testing::play(sorted, data);
+  struct Event {
+    std::int64_t arrival;
+    int kind;
+    std::size_t index;
+  };
+  std::vector<Event> events;
+  std::uniform_int_distribution<std::int64_t> delay(0, 400'000);
+  for (std::size_t i = 0; i < data.actuators.size(); ++i)
+    events.push_back({data.actuators[i].utime + (i ? delay(rng) : 0), 0, i});
+  for (std::size_t i = 0; i < data.measurements.size(); ++i)
+    events.push_back({data.measurements[i].utime + 1000 + delay(rng), 1, i});
+  for (std::size_t i = 0; i < data.headings.size(); ++i)
+    events.push_back({data.headings[i].utime + 1000 + delay(rng), 2, i});
+  std::ranges::stable_sort(events, {}, &Event::arrival);
+  for (const Event& e : events) {
+    if (e.kind == 0) shuffled.add(data.actuators[e.index]);
+    if (e.kind == 1) shuffled.add(data.measurements[e.index]);
+    if (e.kind == 2) shuffled.add(data.headings[e.index]);
+  }
+  const auto now = data.actuators.back().utime;
+  const FilterState a = sorted.estimate(now).state, b = shuffled.estimate(now).state;
+  EXPECT_GT(shuffled.counters().headings.late, 50);
+  EXPECT_EQ(shuffled.counters().headings.too_old, 0);
+  EXPECT_EQ(a.pose.p_mm, b.pose.p_mm);
+  EXPECT_EQ(a.pose.R, b.pose.R);
+  EXPECT_EQ(a.covariance, b.covariance);
+  EXPECT_EQ(a.lambda2, b.lambda2);
+}
+
+// Headings at the rate of the axes: what leaves the history is still joined to few steps, and nothing of it is lost.
+TEST(Heading, ThePastIsRunAgainWithItsHeadingsHoweverMany) {
+  std::mt19937_64 rng(37);
+  EstimatorConfig config = agar_config();
+  config.process = {1e-6, 1e-8, 1e-8, 1e-8, 1e-9, 1e-9, 1e-9};
+  const model::NeedleParameters truth = config.prior.needle;
+  Insertion data = testing::insert(truth, {}, {}, rng);
+  for (std::size_t i = 0; i < data.actuators.size(); ++i)
+    data.headings.push_back(testing::measure_heading(data.poses[i].R.col(2), data.actuators[i].utime,
+                                                     static_cast<std::int64_t>(i), 7, 0.05, rng));
+  EstimatorConfig once = config;
+  once.relinearised_steps = 0;
+  NeedleEstimator estimator(config), linear(once);
+  testing::play(estimator, data);
+  testing::play(linear, data);
+  const auto now = data.actuators.back().utime;
+  const FilterState a = estimator.estimate(now).state, b = linear.estimate(now).state;
+  EXPECT_GT(estimator.counters().relinearised, 2);
+  // The needle is the prior's mean: derivatives taken once are near those of the path, and both see the same.
+  const Vector9d ratio = (a.covariance.diagonal().array() / b.covariance.diagonal().array()).sqrt();
+  std::cout << "standard deviations, past run again over once: " << ratio.transpose() << "\n";
+  EXPECT_GT(ratio.minCoeff(), 0.9);
+  EXPECT_LT(ratio.maxCoeff(), 1.1);
+  EXPECT_LT(testing::nees_of(a, data.final_pose, truth), 25);
+}
+
+TEST(Heading, AHundredThousandStepsStayPositiveDefiniteAndSymmetric) {
+  const NeedleFilter filter(agar_config());
+  FilterState state = filter.initial();
+  std::mt19937_64 rng(38);
+  for (int i = 0; i < 100'000; ++i) {
+    filter.predict(state, (i / 400) % 2 ? -0.1 : 0.1, 0.01);
+    if (i % 3 == 0) filter.update(state, testing::measure(state.pose.p_mm, i, i, 0, {1, 1, 1}, 0.1, rng));
+    if (i % 3 == 1)
+      filter.update(state, i % 2 ? testing::measure_heading(state.pose.R.col(2), i, i, 0, 0.01, rng)
+                                 : testing::picture_heading(state.pose.R.col(2), i, i, 0, {1, 0, 0}, 0.01, rng));
+    if (i % 10'000 == 0) {
+      ASSERT_TRUE(state.covariance.allFinite());
+      ASSERT_EQ(state.covariance, state.covariance.transpose());
+      ASSERT_GT(Eigen::SelfAdjointEigenSolver<Matrix9d>(state.covariance).eigenvalues()[0], 0) << i;
+    }
+  }
+}
+
+}  // namespace
+}  // namespace bevel::estimator
