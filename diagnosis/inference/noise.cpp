@@ -17,7 +17,8 @@ constexpr double kSecondOrder = 10.8;  // fall of the deviance that chance bring
 constexpr double kOutlier = 28.0;
 constexpr double kGrossOutlier = 200.0;  // beside whatever
 constexpr int kOutlierPasses = 12;
-constexpr double kClipped = 3.0;  // deviations, by the median of their size, while outliers are still in
+constexpr double kLeastLeft = 0.02;  // of a reading's precision: where a curve takes more, nothing is known of it
+constexpr double kClipped = 3.0;     // deviations, by the median of their size, while outliers are still in
 
 struct Whitened {
   double rss = 0;
@@ -122,7 +123,23 @@ Eigen::VectorXd surprise(const Series& series, Eigen::VectorXd error, const Nois
   Eigen::VectorXd e = error;
   whiten(whitening, X);
   whiten(whitening, e);
-  error -= curve * X.householderQr().solve(e).eval();
+  const Eigen::HouseholderQR<Eigen::MatrixXd> qr(X);
+  error -= curve * qr.solve(e).eval();
+  // What the curve takes of each reading: with a precision P = W'W the conditional precision of a reading, the curve
+  // unknown, is that of P - PX (X'PX)^-1 X'P. At the ends of a series the curve follows a single one.
+  const Eigen::MatrixXd basis = qr.householderQ() * Eigen::MatrixXd::Identity(X.rows(), X.cols());
+  const auto left_by_curve = [&](Eigen::Index i) {
+    const auto at = static_cast<std::size_t>(i);
+    const double own = whitening.weight[at];
+    double precision = own * own;
+    Eigen::RowVectorXd taken = own * basis.row(i);
+    if (i + 1 < n) {
+      const double next = whitening.carry[at + 1] * whitening.weight[at + 1];
+      precision += next * next;
+      taken -= next * basis.row(i + 1);
+    }
+    return std::max(1 - taken.squaredNorm() / precision, kLeastLeft);
+  };
   for (Eigen::Index i = 0; i < n; ++i) error[i] /= series.relative_sd[static_cast<std::size_t>(i)];
   Eigen::VectorXd squared(n);
   for (Eigen::Index i = 0; i < n; ++i) {
@@ -139,7 +156,7 @@ Eigen::VectorXd surprise(const Series& series, Eigen::VectorXd error, const Nois
       join(i + 1, whitening.carry[static_cast<std::size_t>(i + 1)] * series.relative_sd[static_cast<std::size_t>(i)] /
                       series.relative_sd[static_cast<std::size_t>(i + 1)]);
     const double residual = error[i] - pull / precision;
-    squared[i] = residual * residual * precision / (sigma * sigma);
+    squared[i] = residual * residual * precision / (sigma * sigma * left_by_curve(i));
   }
   return squared;
 }

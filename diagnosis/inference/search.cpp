@@ -110,13 +110,16 @@ void Search::expand(const ModelSet& set) {
     const auto [plain, change] = moved_to(likelihood_, here.at->fit, *discrepancy_);
     const double best = best_log();
     const auto add = [&](const Fit& fit, const std::vector<Proposal>& list, double from, bool beside_curve) {
+      std::size_t rank = 0;
       for (const Proposal& one : list) {
+        // Far from its start an effect may bring much more than in proportion: the foremost are fitted in any case.
+        const bool foremost = rank++ < rules_.foremost && one.log_bayes_factor > -rules_.log_prior_odds_effect;
         const ModelSet larger = with(set, one.effect);
         const double promised = from + one.log_bayes_factor + rules_.log_prior_odds_effect;
         auto& known = promised_.try_emplace(larger, -std::numeric_limits<double>::infinity()).first->second;
         known = std::max(known, promised);
         const double doubtful = rules_.optimism + rules_.linear_error * std::max(0.0, one.log_bayes_factor);
-        if (promised + doubtful < best - rules_.window) continue;
+        if (!foremost && promised + doubtful < best - rules_.window) continue;
         // A fit that fell far short of the promise may be in a local minimum: once more, from these starts.
         const auto visited = visited_.find(larger);
         if (visited != visited_.end() &&

@@ -19,6 +19,7 @@ struct SearchRules {
   double doubt = 12.0;         // below by that after a first fit: noise and variation are not fitted
   double linear_error = 0.15;  // of what the linear model promises, as a share of it
   std::size_t starts = 2;      // of an effect, that are fitted
+  std::size_t foremost = 2;    // proposals beside a set that are fitted though they do not come near
   std::size_t pairs = 8;
   std::size_t most_fits = 90;           // in all
   double log_prior_odds_effect = -5.0;  // of one effect being in the model, against not

@@ -80,6 +80,20 @@ TEST_P(NoiseBesideACurve, IsFoundWithItsOutliers) {
 
 INSTANTIATE_TEST_SUITE_P(Autocorrelations, NoiseBesideACurve, ::testing::Values(0.0, 0.6, 0.85));
 
+// The curve follows the last readings of a series most. Two outliers of the last three, 15 to 35 deviations, are two
+// all the same, and the good one between them is none.
+TEST(Noise, OutliersAtTheEndOfASeriesAreFound) {
+  Made made = make(0.85, 0, 0, 21);
+  const std::vector<std::size_t> planted{397, 399};
+  for (std::size_t r = 0; r < 6; r += 2) {
+    made.errors[r][0](397) -= 3.5, made.errors[r][0](399) -= 2.3;
+    made.errors[r][1](397) += 5.2, made.errors[r][1](399) += 4.1;
+  }
+  const Calibration found = calibrate_noise(made.data, made.errors);
+  for (std::size_t r = 0; r < 6; ++r)
+    EXPECT_EQ(found.outliers[r], r % 2 == 0 ? planted : std::vector<std::size_t>()) << "recording " << r;
+}
+
 TEST(Noise, WithoutItsOutliersTheRestIsLeft) {
   const Made made = make(0.3, 0.02, 0, 5);
   const Dataset rest = without(made.data, made.outliers);
