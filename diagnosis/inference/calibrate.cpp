@@ -20,12 +20,13 @@ VectorXd middle_nuisance_sd(const System& system) {
 
 namespace {
 
-// Of each recording, a series per channel.
+// Of each recording, a series per channel; none outside the model's domain.
 Errors errors_by_series(const Likelihood& likelihood, const Layout& layout, const VectorXd& shared,
                         const std::vector<VectorXd>& local) {
   Errors out(likelihood.recordings());
   for (std::size_t r = 0; r < out.size(); ++r) {
     const VectorXd all = likelihood.errors(layout, r, shared, local[r]);
+    if (all.size() != likelihood.data().recordings[r].rows()) return {};
     Index row = 0;
     for (const Series& series : likelihood.data().recordings[r].series) {
       out[r].push_back(all.segment(row, static_cast<Index>(series.time_s.size())));
@@ -62,7 +63,9 @@ Fit tempered_base(const System& system, const Readings& outliers, const Noise& n
   Noise before = noise;
   for (int step = 0; step < kSteps; ++step) {
     const Likelihood by(system, outliers, before);
-    const Noise sigma = noise_of(errors_by_series(by, nothing, now.shared, now.local), noise);
+    const Errors errors = errors_by_series(by, nothing, now.shared, now.local);
+    if (errors.empty()) break;
+    const Noise sigma = noise_of(errors, noise);
     double change = 0;
     for (std::size_t c = 0; c < sigma.sigma.size(); ++c)
       change = std::max(change, std::abs(std::log(sigma.sigma[c] / before.sigma[c])));
