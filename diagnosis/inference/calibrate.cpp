@@ -23,15 +23,11 @@ namespace {
 // Of each recording, a series per channel; none outside the model's domain.
 Errors errors_by_series(const Likelihood& likelihood, const Layout& layout, const VectorXd& shared,
                         const std::vector<VectorXd>& local) {
-  Errors out(likelihood.recordings());
-  for (std::size_t r = 0; r < out.size(); ++r) {
+  Errors out;
+  for (std::size_t r = 0; r < likelihood.recordings(); ++r) {
     const VectorXd all = likelihood.errors(layout, r, shared, local[r]);
     if (all.size() != likelihood.data().recordings[r].rows()) return {};
-    Index row = 0;
-    for (const Series& series : likelihood.data().recordings[r].series) {
-      out[r].push_back(all.segment(row, static_cast<Index>(series.time_s.size())));
-      row += static_cast<Index>(series.time_s.size());
-    }
+    out.push_back(by_channel(likelihood.data().recordings[r], all));
   }
   return out;
 }

@@ -26,6 +26,17 @@ Dataset without(const Dataset& data, const Readings& readings) {
   return out;
 }
 
+std::vector<Eigen::VectorXd> by_channel(const SeriesSet& set, const Eigen::VectorXd& rows) {
+  std::vector<Eigen::VectorXd> out;
+  Eigen::Index row = 0;
+  for (const Series& series : set.series) {
+    const auto count = static_cast<Eigen::Index>(series.time_s.size());
+    out.emplace_back(rows.segment(row, count));
+    row += count;
+  }
+  return out;
+}
+
 std::vector<std::vector<Eigen::Index>> rows_left(const Dataset& data, const Readings& readings) {
   std::vector<std::vector<Eigen::Index>> out(data.recordings.size());
   for (std::size_t r = 0; r < out.size(); ++r) {

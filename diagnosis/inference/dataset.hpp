@@ -40,6 +40,9 @@ struct Dataset {
 // Readings by their message, per recording.
 using Readings = std::vector<std::vector<std::size_t>>;
 
+// Values of all of a recording's rows, a vector per channel.
+std::vector<Eigen::VectorXd> by_channel(const SeriesSet& set, const Eigen::VectorXd& rows);
+
 // The dataset without those readings (ascending), and which of the old rows are left, per recording.
 Dataset without(const Dataset& data, const Readings& readings);
 std::vector<std::vector<Eigen::Index>> rows_left(const Dataset& data, const Readings& readings);

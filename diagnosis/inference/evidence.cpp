@@ -96,15 +96,11 @@ GridEvidence over_nuisances(const Fit& fit, const CurveColumns& curve, const Nui
 // The likeliest noise for what a fit leaves.
 Noise noise_about(const Fit& fit, const CurveColumns& curve) {
   const Likelihood& likelihood = *fit.likelihood;
-  Errors errors(likelihood.recordings());
-  for (std::size_t r = 0; r < errors.size(); ++r) {
+  Errors errors;
+  for (std::size_t r = 0; r < likelihood.recordings(); ++r) {
     VectorXd all = likelihood.errors(fit.layout, r, fit.shared, fit.local[r]);
     if (curve) all -= curve.raw[r] * fit.curve_values;
-    Index row = 0;
-    for (const Series& series : likelihood.data().recordings[r].series) {
-      errors[r].push_back(all.segment(row, static_cast<Index>(series.time_s.size())));
-      row += static_cast<Index>(series.time_s.size());
-    }
+    errors.push_back(by_channel(likelihood.data().recordings[r], all));
   }
   return refine_noise(likelihood.data(), errors, likelihood.noise());
 }

@@ -147,25 +147,32 @@ VectorXd local_precision_of(const Layout& layout, const Scales& scales) {
   return out;
 }
 
+bool linearise(const Likelihood& likelihood, const Fit& fit, const CurveColumns& curve, std::size_t r,
+               LinearRecording& out) {
+  Residuals& residuals = out.residuals;
+  if (!likelihood.evaluate(fit.layout, r, fit.shared, fit.local[r], true, residuals)) return false;
+  out.Z = residuals.by_shared;
+  if (curve) {
+    residuals.white -= curve.columns[r] * fit.curve_values;
+    out.Z.conservativeResize(Eigen::NoChange, out.Z.cols() + curve.columns[r].cols());
+    out.Z.rightCols(curve.columns[r].cols()) = curve.columns[r];
+  }
+  out.L = residuals.by_local(Eigen::all, free_locals(fit.layout));
+  out.block = make_block(out.L, out.Z, residuals.white);
+  out.block.precision = local_precision_of(fit.layout, fit.scales);
+  out.block.centre = nuisance_centre(fit.layout, fit.local[r]);
+  return true;
+}
+
 namespace {
 
 bool make_blocks(const Likelihood& likelihood, const Fit& fit, const CurveColumns& curve,
                  std::vector<ArrowBlock>& blocks) {
-  Residuals residuals;
+  LinearRecording recording;
   blocks.resize(likelihood.recordings());
-  const auto free = free_locals(fit.layout);
-  const VectorXd precision = local_precision_of(fit.layout, fit.scales);
   for (std::size_t r = 0; r < likelihood.recordings(); ++r) {
-    if (!likelihood.evaluate(fit.layout, r, fit.shared, fit.local[r], true, residuals)) return false;
-    if (curve) residuals.white -= curve.columns[r] * fit.curve_values;
-    MatrixXd Z = residuals.by_shared;
-    if (curve) {
-      Z.conservativeResize(Eigen::NoChange, Z.cols() + curve.columns[r].cols());
-      Z.rightCols(curve.columns[r].cols()) = curve.columns[r];
-    }
-    blocks[r] = make_block(residuals.by_local(Eigen::all, free), Z, residuals.white);
-    blocks[r].precision = precision;
-    blocks[r].centre = nuisance_centre(fit.layout, fit.local[r]);
+    if (!linearise(likelihood, fit, curve, r, recording)) return false;
+    blocks[r] = std::move(recording.block);
   }
   return true;
 }

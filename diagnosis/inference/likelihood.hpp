@@ -123,6 +123,15 @@ Pulls pulls_of(const Layout& layout, const Eigen::VectorXd& shared, const Eigen:
 std::vector<Eigen::Index> free_locals(const Layout& layout);
 Eigen::VectorXd local_precision_of(const Layout& layout, const Scales& scales);
 Eigen::VectorXd nuisance_centre(const Layout& layout, const Eigen::VectorXd& local);
+// One recording of them, with the columns that it is made of: local unknowns, then shared ones and the curve's values.
+struct LinearRecording {
+  Residuals residuals;  // the curve's part taken out
+  Eigen::MatrixXd L, Z;
+  ArrowBlock block;
+};
+// False outside the model's domain.
+bool linearise(const Likelihood& likelihood, const Fit& fit, const CurveColumns& curve, std::size_t recording,
+               LinearRecording& out);
 // The linear model about a fit, what presses against a bound held.
 ArrowSolution solve_about(const Fit& fit, const std::vector<ArrowBlock>& blocks, const CurveColumns& curve);
 

@@ -23,6 +23,45 @@ constexpr int kZooms = 2;
 // What an instant has to bring in a recording to be taken for one, in chi2: its expected odds.
 double instant_cost(double duration_s) { return 2 * std::log(kHappensNot / kHappens * duration_s / kInstantWidth_s); }
 
+// Every phase and instant at the best of a grid, all else as it is.
+void scan_local(const Likelihood& likelihood, const Layout& layout, const VectorXd& shared,
+                std::vector<VectorXd>& local) {
+  Residuals residuals;
+  for (std::size_t i = 0; i < layout.local().size(); ++i) {
+    if (!layout.is_scanned(i)) continue;
+    const bool instant = layout.is_instant(i);
+    const auto at = static_cast<Index>(i);
+    for (std::size_t r = 0; r < local.size(); ++r) {
+      const double lower = layout.local()[i].parameter->lower, upper = layout.upper(i, r);
+      const double cost = instant ? instant_cost(upper) : 0;
+      VectorXd trial = local[r];
+      const auto cost_at = [&](double value) {
+        trial[at] = value;
+        if (!likelihood.evaluate(layout, r, shared, trial, false, residuals))
+          return std::numeric_limits<double>::infinity();
+        return residuals.white.squaredNorm() + (instant && value > 0 ? cost : 0);
+      };
+      double best = local[r][at], least = cost_at(best);
+      const auto try_at = [&](double value) {
+        const double there = cost_at(value);
+        if (there < least) least = there, best = value;
+      };
+      if (instant) try_at(0);
+      const int count =
+          instant ? std::max(4, static_cast<int>(std::lround((upper - lower) / kInstantSpacing_s))) : kPhases;
+      for (int k = 0; k < count; ++k) try_at(lower + (upper - lower) * (k + 0.5) / count);
+      double spacing_s = kInstantSpacing_s;
+      for (int finer = 0; finer < 2 && instant && best > 0; ++finer) {
+        spacing_s /= kFiner;
+        const double middle = best;
+        for (int k = -kFiner; k <= kFiner; ++k)
+          if (const double at_s = middle + k * spacing_s; at_s > lower && at_s < upper) try_at(at_s);
+      }
+      local[r][at] = best;
+    }
+  }
+}
+
 bool has_scanned(const Layout& layout) { return layout.local().size() > layout.system().nuisances().size(); }
 
 bool has_many_minima(const Parameter& p) {
@@ -43,21 +82,12 @@ class Profile {
  public:
   Profile(const Likelihood& likelihood, const CurveColumns& curve, const Fit& fit)
       : likelihood_(likelihood), curve_(curve), fit_(fit), free_(free_locals(fit.layout)) {
-    Residuals residuals;
-    const VectorXd precision = local_precision_of(fit.layout, fit.scales);
+    LinearRecording recording;
     for (std::size_t r = 0; r < likelihood.recordings(); ++r) {
-      if (!likelihood.evaluate(fit.layout, r, fit.shared, fit.local[r], true, residuals)) return;
-      MatrixXd Z = residuals.by_shared;
-      if (curve) {
-        Z.conservativeResize(Eigen::NoChange, Z.cols() + curve.columns[r].cols());
-        Z.rightCols(curve.columns[r].cols()) = curve.columns[r];
-        residuals.white -= curve.columns[r] * fit.curve_values;
-      }
-      Z_.push_back(std::move(Z));
-      L_.emplace_back(residuals.by_local(Eigen::all, free_));
-      blocks_.push_back(make_block(L_.back(), Z_.back(), residuals.white));
-      blocks_.back().precision = precision;
-      blocks_.back().centre = nuisance_centre(fit.layout, fit.local[r]);
+      if (!linearise(likelihood, fit, curve, r, recording)) return;
+      Z_.push_back(std::move(recording.Z));
+      L_.push_back(std::move(recording.L));
+      blocks_.push_back(std::move(recording.block));
     }
     valid_ = true;
   }
@@ -99,44 +129,6 @@ class Profile {
 };
 
 }  // namespace
-
-void scan_local(const Likelihood& likelihood, const Layout& layout, const VectorXd& shared,
-                std::vector<VectorXd>& local) {
-  Residuals residuals;
-  for (std::size_t i = 0; i < layout.local().size(); ++i) {
-    if (!layout.is_scanned(i)) continue;
-    const bool instant = layout.is_instant(i);
-    const auto at = static_cast<Index>(i);
-    for (std::size_t r = 0; r < local.size(); ++r) {
-      const double lower = layout.local()[i].parameter->lower, upper = layout.upper(i, r);
-      const double cost = instant ? instant_cost(upper) : 0;
-      VectorXd trial = local[r];
-      const auto cost_at = [&](double value) {
-        trial[at] = value;
-        if (!likelihood.evaluate(layout, r, shared, trial, false, residuals))
-          return std::numeric_limits<double>::infinity();
-        return residuals.white.squaredNorm() + (instant && value > 0 ? cost : 0);
-      };
-      double best = local[r][at], least = cost_at(best);
-      const auto try_at = [&](double value) {
-        const double there = cost_at(value);
-        if (there < least) least = there, best = value;
-      };
-      if (instant) try_at(0);
-      const int count =
-          instant ? std::max(4, static_cast<int>(std::lround((upper - lower) / kInstantSpacing_s))) : kPhases;
-      for (int k = 0; k < count; ++k) try_at(lower + (upper - lower) * (k + 0.5) / count);
-      double spacing_s = kInstantSpacing_s;
-      for (int finer = 0; finer < 2 && instant && best > 0; ++finer) {
-        spacing_s /= kFiner;
-        const double middle = best;
-        for (int k = -kFiner; k <= kFiner; ++k)
-          if (const double at_s = middle + k * spacing_s; at_s > lower && at_s < upper) try_at(at_s);
-      }
-      local[r][at] = best;
-    }
-  }
-}
 
 void scan_locals(const Likelihood& likelihood, const CurveColumns& curve, Fit& fitted) {
   for (int scan = 0; scan < kScans && has_scanned(fitted.layout); ++scan) {

@@ -8,11 +8,7 @@ namespace bevel::inference {
 // Between instants that are tried.
 inline constexpr double kInstantSpacing_s = 0.3;
 
-// Every phase and instant at the best of a grid, all else as it is.
-void scan_local(const Likelihood& likelihood, const Layout& layout, const Eigen::VectorXd& shared,
-                std::vector<Eigen::VectorXd>& local);
-
-// Phases and instants again and again until that helps no more.
+// Every phase and instant at the best of a grid, all else as it is, again and again until that helps no more.
 void scan_locals(const Likelihood& likelihood, const CurveColumns& curve, Fit& fitted);
 
 // Each instant in turn taken out, all else fitted anew: kept out where it is not missed. What a scan finds beside

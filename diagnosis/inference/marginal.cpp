@@ -10,31 +10,21 @@ using Eigen::MatrixXf;
 using Eigen::VectorXd;
 
 Marginal::Marginal(const Likelihood& likelihood, const Fit& fit, const CurveColumns& curve) : set_(fit.layout.set()) {
-  const auto free = free_locals(fit.layout);
-  const VectorXd precision = local_precision_of(fit.layout, fit.scales);
-  const auto own = static_cast<Index>(free.size());
-  Residuals residuals;
+  LinearRecording recording;
   for (std::size_t r = 0; r < likelihood.recordings(); ++r) {
-    if (!likelihood.evaluate(fit.layout, r, fit.shared, fit.local[r], true, residuals)) return;
-    if (curve) residuals.white -= curve.columns[r] * fit.curve_values;
-    const Index values = curve ? curve.columns[r].cols() : 0;
-    MatrixXd Z(residuals.white.size(), fit.shared.size() + values);
-    Z.leftCols(fit.shared.size()) = residuals.by_shared;
-    if (curve) Z.rightCols(values) = curve.columns[r];
-    const MatrixXd L = residuals.by_local(Eigen::all, free);
-    ArrowBlock block = make_block(L, Z, residuals.white);
-    block.precision = precision;
-    block.centre = nuisance_centre(fit.layout, fit.local[r]);
+    if (!linearise(likelihood, fit, curve, r, recording)) return;
+    const MatrixXd &L = recording.L, &Z = recording.Z;
+    const ArrowBlock& block = recording.block;
     MatrixXd inner = block.ll;
-    inner.diagonal() += precision;
-    inner_.emplace_back(inner.llt().solve(MatrixXd::Identity(own, own)));
-    pull_.emplace_back(block.lw + precision.cwiseProduct(block.centre));
-    MatrixXf LZ(Z.rows(), own + Z.cols());
-    LZ.leftCols(own) = L.cast<float>();
+    inner.diagonal() += block.precision;
+    inner_.emplace_back(inner.llt().solve(MatrixXd::Identity(L.cols(), L.cols())));
+    pull_.emplace_back(block.lw + block.precision.cwiseProduct(block.centre));
+    MatrixXf LZ(Z.rows(), L.cols() + Z.cols());
+    LZ.leftCols(L.cols()) = L.cast<float>();
     LZ.rightCols(Z.cols()) = Z.cast<float>();
     LZ_.push_back(std::move(LZ));
-    w_.emplace_back(residuals.white.cast<float>());
-    blocks_.push_back(std::move(block));
+    w_.emplace_back(recording.residuals.white.cast<float>());
+    blocks_.push_back(block);
   }
   solution_ = solve_about(fit, blocks_, curve);
 }

@@ -71,13 +71,18 @@ Search::Job Search::job_from(const Fit& fit, std::size_t effect, const StartPoin
   return job;
 }
 
-void Search::keep(const ModelSet& set, const std::shared_ptr<const Evaluated>& at) {
+Visited Search::weighed(const ModelSet& set, const std::shared_ptr<const Evaluated>& at) const {
   Visited one{.set = set, .at = at};
   const double curve = std::exp(rules_.log_prior_odds_curve);
   one.log_without_curve = log_prior(set) + at->log_evidence - std::log1p(curve);
   one.log_with_curve = at->with_discrepancy
                            ? one.log_without_curve + rules_.log_prior_odds_curve + at->log_bayes_factor_curve
                            : -std::numeric_limits<double>::infinity();
+  return one;
+}
+
+void Search::keep(const ModelSet& set, const std::shared_ptr<const Evaluated>& at) {
+  Visited one = weighed(set, at);
   const auto known = visited_.find(set);
   // Another local minimum of the same set: the likelier counts.
   if (known == visited_.end() || known->second.log_posterior() <= one.log_posterior())

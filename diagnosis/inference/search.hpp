@@ -60,6 +60,8 @@ class Search {
   // Log of the share of sets that were judged by the linear model alone, by its estimate.
   double log_not_visited() const;
   double log_prior(const ModelSet& set) const;
+  // A set that was evaluated, with its share in the posterior.
+  Visited weighed(const ModelSet& set, const std::shared_ptr<const Evaluated>& at) const;
 
  private:
   struct Job {

@@ -30,17 +30,13 @@ Checks check_model(const inference::Search& search, const ChosenModel& model, co
     count += static_cast<double>(residuals.white.size());
     if (!fit.likelihood->evaluate(fit.layout, r, fit.shared, fit.local[r], false, residuals)) continue;
     if (model.curve) residuals.white -= model.curve.columns[r] * fit.curve_values;
-    Index row = 0;
-    for (const auto& series : fit.likelihood->data().recordings[r].series) {
-      const auto readings = static_cast<Index>(series.time_s.size());
-      if (readings >= kFewest) {
-        const auto& noise = fit.likelihood->noise();
-        const int lags = std::min(kLags, static_cast<int>(readings) / 3);
-        const int fitted = (noise.ar1 > 0 ? 1 : 0) + (noise.ar2 != 0 ? 1 : 0);
-        smallest_p = std::min(smallest_p, ljung_box(residuals.white.segment(row, readings), lags, fitted).p_value);
-        ++series_count;
-      }
-      row += readings;
+    for (const auto& white : by_channel(fit.likelihood->data().recordings[r], residuals.white)) {
+      if (white.size() < kFewest) continue;
+      const auto& noise = fit.likelihood->noise();
+      const int lags = std::min(kLags, static_cast<int>(white.size()) / 3);
+      const int fitted = (noise.ar1 > 0 ? 1 : 0) + (noise.ar2 != 0 ? 1 : 0);
+      smallest_p = std::min(smallest_p, ljung_box(white, lags, fitted).p_value);
+      ++series_count;
     }
   }
   out.chi2_per_dof = chi2 / std::max(count, 1.0);

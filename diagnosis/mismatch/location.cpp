@@ -17,17 +17,10 @@ constexpr double kSpanShare = 0.8;  // of a series' fall of chi2 that a located 
 // White residuals of one recording by channel, in the order of its series.
 std::vector<VectorXd> white_of(const ChosenModel& model, std::size_t r) {
   const Fit& fit = *model.fit;
-  std::vector<VectorXd> out;
   inference::Residuals residuals;
-  if (!fit.likelihood->evaluate(fit.layout, r, fit.shared, fit.local[r], false, residuals)) return out;
+  if (!fit.likelihood->evaluate(fit.layout, r, fit.shared, fit.local[r], false, residuals)) return {};
   if (model.curve) residuals.white -= model.curve.columns[r] * fit.curve_values;
-  Index row = 0;
-  for (const auto& series : fit.likelihood->data().recordings[r].series) {
-    const auto count = static_cast<Index>(series.time_s.size());
-    out.emplace_back(residuals.white.segment(row, count));
-    row += count;
-  }
-  return out;
+  return by_channel(fit.likelihood->data().recordings[r], residuals.white);
 }
 
 // Shortest run of readings that holds the share of the positive fall.

@@ -15,13 +15,7 @@ using Eigen::MatrixXd;
 using Eigen::VectorXd;
 using testing::LinearSystem;
 using testing::log_normal;
-
-Noise white(const LinearSystem& system) {
-  Noise noise;
-  noise.sigma = {system.sigma};
-  noise.frame_s = 0.1;
-  return noise;
-}
+using testing::white;
 
 VectorXd all_readings(const LinearSystem& system) {
   VectorXd out(system.data().rows());

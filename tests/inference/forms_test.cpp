@@ -14,6 +14,7 @@ using Eigen::MatrixXd;
 using Eigen::VectorXd;
 using testing::LinearSystem;
 using testing::log_normal;
+using testing::white;
 
 struct Made {
   double nuisance_sd;
@@ -23,12 +24,6 @@ struct Made {
   Discrepancy discrepancy;
   Marginal marginal;
 
-  static Noise white(const LinearSystem& system) {
-    Noise noise;
-    noise.sigma = {system.sigma};
-    noise.frame_s = 0.1;
-    return noise;
-  }
   Made(double parabola, double bump, double nuisance)
       : nuisance_sd(nuisance),
         system(4, 3, parabola, nuisance, bump),

@@ -5,6 +5,7 @@
 #include <cmath>
 #include <random>
 
+#include "diagnosis/inference/noise.hpp"
 #include "diagnosis/inference/system.hpp"
 
 namespace bevel::inference::testing {
@@ -111,6 +112,14 @@ class LinearSystem final : public System {
 inline double log_normal(const Eigen::VectorXd& y, const Eigen::MatrixXd& covariance) {
   const Eigen::PartialPivLU<Eigen::MatrixXd> lu(covariance);
   return -0.5 * (y.dot(lu.solve(y)) + lu.matrixLU().diagonal().array().abs().log().sum());
+}
+
+// The noise that its readings have.
+inline Noise white(const LinearSystem& system) {
+  Noise noise;
+  noise.sigma = {system.sigma};
+  noise.frame_s = 0.1;
+  return noise;
 }
 
 }  // namespace bevel::inference::testing
