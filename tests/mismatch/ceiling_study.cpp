@@ -13,6 +13,7 @@
 #include "diagnosis/inference/calibrate.hpp"
 #include "diagnosis/inference/search.hpp"
 #include "diagnosis/needle/needle_system.hpp"
+#include "io/find_logs.hpp"
 #include "io/model_file.hpp"
 #include "tools/diagnose/read_case.hpp"
 
@@ -51,12 +52,8 @@ struct Compared {
 
 // nullopt: the truth is not among the library's sets.
 std::optional<Compared> compare(const fs::path& folder, const json& truth) {
-  std::vector<std::string> logs;
-  for (const auto& entry : fs::directory_iterator(folder))
-    if (entry.path().extension() == ".lcm") logs.push_back(entry.path().string());
-  std::ranges::sort(logs);
   const auto model = io::load_model_file((folder / "model.toml").string());
-  const diagnosis::NeedleSystem system(diagnose::read_case(logs).recorded, model.needle);
+  const diagnosis::NeedleSystem system(diagnose::read_case(io::find_logs({folder.string()})).recorded, model.needle);
   inference::ModelSet set;
   std::vector<const json*> by_effect(system.effects().size(), nullptr);
   for (const json& effect : truth.at("effects")) {
@@ -91,11 +88,8 @@ std::optional<Compared> compare(const fs::path& folder, const json& truth) {
   Compared out{.truth = describe(system, set), .found = describe(system, search.best().set)};
   out.found_log = search.best().log_posterior();
   inference::add_discrepancy(search.likelihood(), search.discrepancy(), at);
-  const inference::SearchRules rules;
-  const double odds = std::exp(rules.log_prior_odds_curve);
-  out.truth_log = search.log_prior(set) + at.log_evidence - std::log1p(odds) +
-                  std::log1p(odds * std::exp(std::min(at.log_bayes_factor_curve, 600.0)));
-  if (!at.valid) out.truth_log = -std::numeric_limits<double>::infinity();
+  out.truth_log = at.valid ? search.weighed(set, std::make_shared<const inference::Evaluated>(at)).log_posterior()
+                           : -std::numeric_limits<double>::infinity();
   return out;
 }
 

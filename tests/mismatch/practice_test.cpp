@@ -4,6 +4,7 @@
 #include <filesystem>
 
 #include "diagnosis/mismatch/diagnose.hpp"
+#include "io/find_logs.hpp"
 #include "io/model_file.hpp"
 #include "tests/support/shared_recordings.hpp"
 #include "tools/diagnose/read_case.hpp"
@@ -16,11 +17,8 @@ namespace fs = std::filesystem;
 fs::path practice() { return test::shared_recordings() / "recordings" / "practice"; }
 
 Findings findings_of(const fs::path& folder) {
-  std::vector<std::string> logs;
-  for (const auto& entry : fs::directory_iterator(folder))
-    if (entry.path().extension() == ".lcm") logs.push_back(entry.path().string());
-  std::sort(logs.begin(), logs.end());
-  return diagnose(diagnose::read_case(logs).recorded, io::load_model_file((folder / "model.toml").string()).needle, {});
+  return diagnose(diagnose::read_case(io::find_logs({folder.string()})).recorded,
+                  io::load_model_file((folder / "model.toml").string()).needle, {});
 }
 
 TEST(Practice, WhereNothingIsMissing) {

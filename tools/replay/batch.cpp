@@ -11,6 +11,7 @@
 
 #include "io/estimator_config.hpp"
 #include "io/file_bytes.hpp"
+#include "io/find_logs.hpp"
 #include "io/model_file.hpp"
 #include "nodes/system_config.hpp"
 #include "tools/common/exit_status.hpp"
@@ -20,24 +21,6 @@
 namespace bevel::replay {
 
 namespace fs = std::filesystem;
-
-std::vector<std::string> find_logs(const std::vector<std::string>& paths) {
-  std::vector<std::string> logs;
-  for (const std::string& path : paths) {
-    if (!fs::is_directory(path)) {
-      if (!fs::exists(path)) throw std::runtime_error(path + ": no such log");
-      logs.push_back(path);
-      continue;
-    }
-    std::vector<std::string> inside;
-    for (const auto& entry : fs::directory_iterator(path))
-      if (entry.path().extension() == ".lcm") inside.push_back(entry.path().string());
-    if (inside.empty()) throw std::runtime_error(path + ": holds no file that ends in .lcm");
-    std::sort(inside.begin(), inside.end());
-    logs.insert(logs.end(), inside.begin(), inside.end());
-  }
-  return logs;
-}
 
 Setup load_setup(const BatchOptions& options) {
   Setup setup;
@@ -120,7 +103,7 @@ int tell_damage(const std::vector<Replay>& replays, std::ostream& err) {
 
 int run(const BatchOptions& options, std::ostream& out, std::ostream& err) {
   const Setup setup = load_setup(options);
-  const auto logs = find_logs(options.paths);
+  const auto logs = io::find_logs(options.paths);
   if (options.held_out && logs.size() < 2)
     throw std::runtime_error("there is one log; to learn on the others takes at least two");
   ReplayOptions replay_options;

@@ -21,10 +21,6 @@ struct BatchOptions {
   std::vector<std::string> paths;
 };
 
-// Files as they are, folders by the .lcm files in them, in the order of their names. Throws std::runtime_error naming
-// what is not there.
-std::vector<std::string> find_logs(const std::vector<std::string>& paths);
-
 struct Setup {
   estimator::EstimatorConfig config;  // its effects are left to replay_logs
   // Of the model file.

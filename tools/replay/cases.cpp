@@ -6,6 +6,7 @@
 #include <ostream>
 #include <stdexcept>
 
+#include "io/find_logs.hpp"
 #include "tools/replay/batch.hpp"
 
 namespace bevel::replay {
@@ -23,7 +24,7 @@ struct CaseFigures {
 };
 
 CaseFigures figures_of(const std::string& folder, const BatchOptions& options, std::ostream& err) {
-  const auto logs = find_logs({folder});
+  const auto logs = io::find_logs({folder});
   BatchOptions own = options;
   own.model_path = (fs::path(folder) / "model.toml").string();
   const Setup setup = load_setup(own);
