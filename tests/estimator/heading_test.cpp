@@ -244,25 +244,7 @@ TEST(Heading, ShuffledInputGivesTheSameStateBitForBit) {
   const Insertion data = testing::insert(config.prior.needle, {}, plan, rng);
   NeedleEstimator sorted(config, 4096), shuffled(config, 4096);
   testing::play(sorted, data);
-  struct Event {
-    std::int64_t arrival;
-    int kind;
-    std::size_t index;
-  };
-  std::vector<Event> events;
-  std::uniform_int_distribution<std::int64_t> delay(0, 400'000);
-  for (std::size_t i = 0; i < data.actuators.size(); ++i)
-    events.push_back({data.actuators[i].utime + (i ? delay(rng) : 0), 0, i});
-  for (std::size_t i = 0; i < data.measurements.size(); ++i)
-    events.push_back({data.measurements[i].utime + 1000 + delay(rng), 1, i});
-  for (std::size_t i = 0; i < data.headings.size(); ++i)
-    events.push_back({data.headings[i].utime + 1000 + delay(rng), 2, i});
-  std::ranges::stable_sort(events, {}, &Event::arrival);
-  for (const Event& e : events) {
-    if (e.kind == 0) shuffled.add(data.actuators[e.index]);
-    if (e.kind == 1) shuffled.add(data.measurements[e.index]);
-    if (e.kind == 2) shuffled.add(data.headings[e.index]);
-  }
+  testing::play_shuffled(shuffled, data, rng);
   const auto now = data.actuators.back().utime;
   const FilterState a = sorted.estimate(now).state, b = shuffled.estimate(now).state;
   EXPECT_GT(shuffled.counters().headings.late, 50);

@@ -118,21 +118,7 @@ TEST(NeedleEstimator, ShuffledInputGivesTheSameStateBitForBit) {
   const Insertion data = testing::insert(config.prior.needle, {}, plan, rng);
   NeedleEstimator sorted(config, 1024), shuffled(config, 1024);
   play(sorted, data);
-
-  struct Event {
-    std::int64_t arrival;
-    bool actuator;
-    std::size_t index;
-  };
-  std::vector<Event> events;
-  std::uniform_int_distribution<std::int64_t> delay(0, 400'000);
-  for (std::size_t i = 0; i < data.actuators.size(); ++i)
-    events.push_back({data.actuators[i].utime + (i ? delay(rng) : 0), true, i});
-  for (std::size_t i = 0; i < data.measurements.size(); ++i)
-    events.push_back({data.measurements[i].utime + 1000 + delay(rng), false, i});
-  std::stable_sort(events.begin(), events.end(), [](const Event& a, const Event& b) { return a.arrival < b.arrival; });
-  for (const Event& e : events)
-    e.actuator ? shuffled.add(data.actuators[e.index]) : shuffled.add(data.measurements[e.index]);
+  play_shuffled(shuffled, data, rng);
 
   const auto now = data.actuators.back().utime;
   const FilterState a = sorted.estimate(now).state, b = shuffled.estimate(now).state;

@@ -1,6 +1,9 @@
 #pragma once
 // A simulated insertion through the estimator, and how far the result is from the truth.
 #include <Eigen/Cholesky>
+#include <algorithm>
+#include <random>
+#include <vector>
 
 #include "estimator/error_state.hpp"
 #include "estimator/needle_estimator.hpp"
@@ -17,6 +20,29 @@ inline void play(NeedleEstimator& estimator, const Insertion& data, std::int64_t
     while (next_heading < data.headings.size() && data.headings[next_heading].utime + latency_us < actuator.utime)
       estimator.add(data.headings[next_heading++]);
     estimator.add(actuator);
+  }
+}
+
+// Sends everything up to 0.4 s late, each message on its own; the first actuator state at once, where all begins.
+inline void play_shuffled(NeedleEstimator& estimator, const Insertion& data, std::mt19937_64& rng) {
+  struct Event {
+    std::int64_t arrival;
+    enum { actuator, measurement, heading } kind;
+    std::size_t index;
+  };
+  std::vector<Event> events;
+  std::uniform_int_distribution<std::int64_t> delay(0, 400'000);
+  for (std::size_t i = 0; i < data.actuators.size(); ++i)
+    events.push_back({data.actuators[i].utime + (i ? delay(rng) : 0), Event::actuator, i});
+  for (std::size_t i = 0; i < data.measurements.size(); ++i)
+    events.push_back({data.measurements[i].utime + 1000 + delay(rng), Event::measurement, i});
+  for (std::size_t i = 0; i < data.headings.size(); ++i)
+    events.push_back({data.headings[i].utime + 1000 + delay(rng), Event::heading, i});
+  std::ranges::stable_sort(events, {}, &Event::arrival);
+  for (const Event& e : events) {
+    if (e.kind == Event::actuator) estimator.add(data.actuators[e.index]);
+    if (e.kind == Event::measurement) estimator.add(data.measurements[e.index]);
+    if (e.kind == Event::heading) estimator.add(data.headings[e.index]);
   }
 }
 

@@ -21,6 +21,11 @@ double processor_s() {
   return static_cast<double>(now.tv_sec) + 1e-9 * static_cast<double>(now.tv_nsec);
 }
 
+template <class Reading>
+AppliedRow applied_row(const Reading& reading, const estimator::Update& update) {
+  return {reading.utime, reading.seq, reading.camera, update.accepted, update.rank, update.mahalanobis2};
+}
+
 struct Sink {
   std::vector<InnovationRow>* rows;
   std::vector<HeadingRow>* headings;
@@ -29,20 +34,12 @@ struct Sink {
   static void take(void* context, const estimator::NeedleEstimator::Applied& applied) {
     const Sink& sink = *static_cast<Sink*>(context);
     if (applied.heading != nullptr) {
-      const model::TipHeading& h = *applied.heading;
-      const estimator::Update& update = applied.update;
-      sink.headings->push_back(
-          {h.utime, h.seq, h.camera, update.accepted, update.rank, update.mahalanobis2, update.innovation.head<2>()});
+      sink.headings->push_back({applied_row(*applied.heading, applied.update), applied.update.innovation.head<2>()});
       return;
     }
     const model::TipMeasurement& m = *applied.measurement;
     InnovationRow row;
-    row.utime = m.utime;
-    row.seq = m.seq;
-    row.camera = m.camera;
-    row.accepted = applied.update.accepted;
-    row.rank = applied.update.rank;
-    row.mahalanobis2 = applied.update.mahalanobis2;
+    static_cast<AppliedRow&>(row) = applied_row(m, applied.update);
     row.position_mm = m.position_mm;
     row.innovation_mm = m.position_mm - sink.filter->seen_position_mm(applied.state_before);
     const Eigen::Matrix3d& R = applied.state_before.pose.R;

@@ -24,14 +24,18 @@ struct StateRow {
   std::int32_t health = 0;
 };
 
-// One measurement when it was first applied. Axes are those of {A}.
-struct InnovationRow {
+// One reading when it was first applied.
+struct AppliedRow {
   std::int64_t utime = 0;
   std::int64_t seq = 0;
   std::int32_t camera = 0;
   bool accepted = false;
   int rank = 0;
   double mahalanobis2 = 0;
+};
+
+// A position. Axes are those of {A}.
+struct InnovationRow : AppliedRow {
   Eigen::Vector3d position_mm;         // as measured
   std::array<bool, 3> sees{};          // the camera has information along this axis
   Eigen::Vector3d innovation_mm;       // measured - predicted
@@ -39,14 +43,7 @@ struct InnovationRow {
   Eigen::Vector3d noise_variance_mm2;  // of the measurement, by its information matrix
 };
 
-// One heading when it was first applied.
-struct HeadingRow {
-  std::int64_t utime = 0;
-  std::int64_t seq = 0;
-  std::int32_t camera = 0;
-  bool accepted = false;
-  int rank = 0;
-  double mahalanobis2 = 0;
+struct HeadingRow : AppliedRow {
   Eigen::Vector2d innovation_rad;  // along the axes seen, the best seen last
 };
 
