@@ -7,27 +7,41 @@
 namespace bevel::model {
 namespace {
 
+constexpr double kSmallTilt2 = 1e-12;  // rad^2: below, two terms of the series are exact
+
 std::size_t registry_index(const Effect* effect) {
   const auto all = all_effects();
   return static_cast<std::size_t>(std::find(all.begin(), all.end(), effect) - all.begin());
 }
 
-Dual3 to_dual(const TipReading& reading) {
-  Dual3 point;
+Dual3 to_dual(const Eigen::Vector3d& vector, const PointColumns& D) {
+  Dual3 out;
   for (int i = 0; i < 3; ++i) {
-    auto& x = point[static_cast<std::size_t>(i)];
-    x.value = reading.position_mm[i];
-    x.slope.head(reading.D.cols()) = reading.D.row(i).transpose().array();
+    auto& x = out[static_cast<std::size_t>(i)];
+    x.value = vector[i];
+    x.slope.head(D.cols()) = D.row(i).transpose().array();
   }
-  return point;
+  return out;
 }
 
-void from_dual(const Dual3& point, TipReading& reading) {
+void from_dual(const Dual3& dual, Eigen::Vector3d& vector, PointColumns& D) {
   for (int i = 0; i < 3; ++i) {
-    const auto& x = point[static_cast<std::size_t>(i)];
-    reading.position_mm[i] = x.value;
-    reading.D.row(i) = x.slope.head(reading.D.cols()).matrix().transpose();
+    const auto& x = dual[static_cast<std::size_t>(i)];
+    vector[i] = x.value;
+    D.row(i) = x.slope.head(D.cols()).matrix().transpose();
   }
+}
+
+// e3 turned by the rotation vector (x, y, 0).
+Dual3 tilted(const Dual2& tilt_rad) {
+  const Dual square = tilt_rad[0] * tilt_rad[0] + tilt_rad[1] * tilt_rad[1];
+  if (square.value < kSmallTilt2) {
+    const Dual sinc = 1.0 - square / 6.0;
+    return {sinc * tilt_rad[1], -(sinc * tilt_rad[0]), 1.0 - 0.5 * square};
+  }
+  const Dual angle = sqrt(square);
+  const Dual sinc = sin(angle) / angle;
+  return {sinc * tilt_rad[1], -(sinc * tilt_rad[0]), cos(angle)};
 }
 
 }  // namespace
@@ -168,17 +182,39 @@ void AugmentedNeedle::point(const AugmentedState& state, TipReading& reading) co
   reading.D.resize(3, columns_);
   reading.D.noalias() = state.pose.R.lazyProduct(state.D.topRows<3>());
   if (effects_.empty()) return;
-  Dual3 p = to_dual(reading);
+  Dual3 p = to_dual(reading.position_mm, reading.D);
   for (std::size_t i = 0; i < effects_.size(); ++i)
     effects_[i].effect->offset(parameters(effects_[i]), state.memory[i], state.base.time_s, p);
-  from_dual(p, reading);
+  from_dual(p, reading.position_mm, reading.D);
 }
 
 void AugmentedNeedle::through_cameras(TipReading& reading) const {
   if (effects_.empty()) return;
-  Dual3 p = to_dual(reading);
+  Dual3 p = to_dual(reading.position_mm, reading.D);
   for (const auto& active : effects_) active.effect->camera(parameters(active), p);
-  from_dual(p, reading);
+  from_dual(p, reading.position_mm, reading.D);
+}
+
+void AugmentedNeedle::heading(const AugmentedState& state, HeadingReading& reading) const {
+  Dual2 tilt_rad;
+  for (const auto& active : effects_) active.effect->sensor(parameters(active), tilt_rad);
+  const Dual3 in_body = tilted(tilt_rad);
+  const Eigen::Vector3d body(in_body[0].value, in_body[1].value, in_body[2].value);
+  reading.direction = state.pose.R * body;
+  reading.D.resize(3, columns_);
+  if (columns_ == 0) return;
+  PointColumns moved(3, columns_);
+  for (int i = 0; i < 3; ++i)
+    moved.row(i) = in_body[static_cast<std::size_t>(i)].slope.head(columns_).matrix().transpose();
+  moved.noalias() -= hat(body).lazyProduct(state.D.bottomRows<3>());
+  reading.D.noalias() = state.pose.R.lazyProduct(moved);
+}
+
+void AugmentedNeedle::through_frame(HeadingReading& reading) const {
+  if (effects_.empty()) return;
+  Dual3 direction = to_dual(reading.direction, reading.D);
+  for (const auto& active : effects_) active.effect->frame(parameters(active), direction);
+  from_dual(direction, reading.direction, reading.D);
 }
 
 std::array<double, 3> AugmentedNeedle::blur_mm2(const AugmentedState& state) const {

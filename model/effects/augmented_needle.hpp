@@ -46,6 +46,12 @@ struct TipReading {
   PointColumns D;  // 3 x columns
 };
 
+// A measured heading: unit vector in {A}, and its derivatives.
+struct HeadingReading {
+  Eigen::Vector3d direction;
+  PointColumns D;  // 3 x columns
+};
+
 class AugmentedNeedle {
  public:
   // columns: how many sensitivities are carried (0 to kMaxColumns). Effects are put into the order of the registry.
@@ -62,6 +68,9 @@ class AugmentedNeedle {
   void point(const AugmentedState& state, TipReading& reading) const;
   // What the cameras make of such a point.
   void through_cameras(TipReading& reading) const;
+  // What a sensor in the needle's tip reports of its heading, before and after the frame in which it does.
+  void heading(const AugmentedState& state, HeadingReading& reading) const;
+  void through_frame(HeadingReading& reading) const;
   // What the effects do not know of a reading, along the axes of {A}.
   std::array<double, 3> blur_mm2(const AugmentedState& state) const;
   // By how much readings are late; zero without camera_latency.

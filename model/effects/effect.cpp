@@ -37,6 +37,11 @@ std::string_view name_of(Covariate covariate) {
   return "time_s";
 }
 
+bool needs_clock(Covariate covariate) {
+  return covariate == Covariate::time_s || covariate == Covariate::speed_mm_s ||
+         covariate == Covariate::turn_rate_rad_s || covariate == Covariate::since_stop_s;
+}
+
 std::span<const Covariate> all_covariates() {
   static constexpr std::array kAll = {Covariate::time_s,          Covariate::depth_mm,     Covariate::speed_mm_s,
                                       Covariate::turn_rate_rad_s, Covariate::since_stop_s, Covariate::since_reversal_mm,
@@ -59,14 +64,25 @@ Dual2 LegView::lateral_in_body(const Dual2& world) const {
 }
 
 Dual2 LegView::lateral_in_world(const Dual2& body) const {
+  const Dual3 world = in_world(body);
+  return {world[0], world[1]};
+}
+
+Dual2 LegView::toward_bevel() const {
+  const Dual half = 0.5 * rotation_rad;
+  const double away = curvature_per_mm.value < 0 ? -1 : 1;
+  return {away * sin(half), -away * cos(half)};
+}
+
+Dual3 LegView::in_world(const Dual2& body) const {
   // R u moves by R (delta x u).
   const Eigen::Vector3d u(body[0].value, body[1].value, 0);
-  Dual2 world;
+  Dual3 world;
   const Eigen::Matrix<double, 3, kMaxColumns> du =
       (Eigen::Matrix<double, 3, kMaxColumns>() << -R_body.row(2) * u.y(), R_body.row(2) * u.x(),
        R_body.row(0) * u.y() - R_body.row(1) * u.x())
           .finished();
-  for (int i = 0; i < 2; ++i) {
+  for (int i = 0; i < 3; ++i) {
     auto& out = world[static_cast<std::size_t>(i)];
     out.value = R.row(i).dot(u);
     out.slope = R(i, 0) * body[0].slope + R(i, 1) * body[1].slope + (R.row(i) * du).array().transpose();

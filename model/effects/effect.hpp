@@ -4,7 +4,8 @@
 // sensitivities; and one line in registry.cpp. docs/adding-an-effect.md walks through it.
 //
 // Order within a leg (augmented_needle.hpp): axes -> curvature -> the integrator -> settle; then, for a measurement:
-// offset -> camera. Several effects act in the order of the registry, motor first, camera last.
+// offset -> camera; for a measured heading: sensor -> frame. Several effects act in the order of the registry, motor
+// first, camera last.
 #include <cstdint>
 #include <limits>
 #include <span>
@@ -63,6 +64,7 @@ inline constexpr double kNoNone = std::numeric_limits<double>::quiet_NaN();
 // Against what the effect is to be looked at: where it shows.
 enum class Covariate { time_s, depth_mm, speed_mm_s, turn_rate_rad_s, since_stop_s, since_reversal_mm, roll_rad };
 std::string_view name_of(Covariate covariate);
+bool needs_clock(Covariate covariate);  // time, speed, rate, rest: unknown where only the order of readings is
 std::span<const Covariate> all_covariates();
 
 // What an effect remembers between legs of one insertion. Slopes come with it.
@@ -98,8 +100,12 @@ struct LegView {
   double turn_rate_rad_s() const { return duration_s() > 0 ? std::abs(base_rotation_rad()) / duration_s() : 0; }
   // A vector of {A} seen in {B} halfway through the leg's own rotation.
   Dual2 lateral_in_body(const Dual2& world) const;
-  // A lateral vector of {B} at the start of the leg, as its x and y in {A}.
+  // A lateral vector of {B} at the start of the leg, as its x and y in {A}; all of it.
   Dual2 lateral_in_world(const Dual2& body) const;
+  Dual3 in_world(const Dual2& body) const;
+  // Unit vector in {B} at the start of the leg toward the bevel's side, halfway through the leg's own rotation: the
+  // heading turns toward body -y for k > 0.
+  Dual2 toward_bevel() const;
 };
 
 struct EntryPose {
@@ -117,6 +123,7 @@ struct EffectDescription {
   std::string_view meaning;  // one clause for the report: what is going on in the rig
   Covariate covariate;
   std::vector<EffectParameter> parameters;
+  bool of_headings = false;  // no position shows it, only a measured heading
 };
 
 class Effect {
@@ -130,6 +137,7 @@ class Effect {
   std::string_view meaning() const { return description_.meaning; }
   Covariate covariate() const { return description_.covariate; }
   const std::vector<EffectParameter>& parameters() const { return description_.parameters; }
+  bool of_headings() const { return description_.of_headings; }
 
   virtual void change_needle(NeedleParameters&) const {}
   virtual void enter(Parameters, EntryPose&) const {}
@@ -143,6 +151,10 @@ class Effect {
   virtual void offset(Parameters, const EffectMemory&, double /*time_s*/, Dual3& /*position_mm*/) const {}
   // What the cameras make of the point.
   virtual void camera(Parameters, Dual3& /*position_mm*/) const {}
+  // Rotation vector about x and y of {B} by which the sensor of the heading sits askew in the needle.
+  virtual void sensor(Parameters, Dual2& /*tilt_rad*/) const {}
+  // What a turned frame makes of a direction.
+  virtual void frame(Parameters, Dual3& /*direction*/) const {}
   // The reading shows the needle as it was so much earlier.
   virtual Dual latency_s(Parameters) const { return {}; }
 

@@ -73,45 +73,87 @@ Motion make_motion(std::span<const ActuatorState> actuators, std::span<const std
   return motion;
 }
 
-bool predict(const AugmentedNeedle& needle, const Motion& motion, OpenLoop& out) {
+namespace {
+
+// Where a reading that is late comes from: between two nodes, and how far.
+struct Place {
+  std::size_t from = 0, to = 0;
+  double share = 1;
+  double span_s = 0;   // between the nodes
+  bool moves = false;  // with the latency
+};
+
+Place place_of(const Motion& motion, std::size_t node, const Dual& latency_s) {
+  std::size_t i = node;
+  const double time_s = motion.nodes[i].time_s - latency_s.value;
+  while (i > 1 && motion.nodes[i - 1].time_s > time_s) --i;
+  const double span_s = motion.nodes[i].time_s - motion.nodes[i - 1].time_s;
+  return {.from = i - 1,
+          .to = i,
+          .share = std::max(0.0, (time_s - motion.nodes[i - 1].time_s) / span_s),
+          .span_s = span_s,
+          .moves = time_s > motion.nodes.front().time_s};
+}
+
+// A vector of the nodes as a reading shows it.
+void look(const Place& place, const std::vector<Eigen::Vector3d>& nodes, const Eigen::MatrixXd& jacobian,
+          const Dual& latency_s, Eigen::Vector3d& value, PointColumns& D) {
+  const auto D_of = [&](std::size_t i) { return jacobian.middleRows<3>(static_cast<Eigen::Index>(3 * i)); };
+  D.resize(3, jacobian.cols());
+  if (place.from == place.to) {
+    value = nodes[place.to];
+    if (D.cols() > 0) D = D_of(place.to);
+    return;
+  }
+  const Eigen::Vector3d step = nodes[place.to] - nodes[place.from];
+  value = nodes[place.from] + place.share * step;
+  if (D.cols() == 0) return;
+  D = (1 - place.share) * D_of(place.from) + place.share * D_of(place.to);
+  if (place.moves) D -= step / place.span_s * latency_s.slope.head(D.cols()).matrix().transpose();
+}
+
+}  // namespace
+
+bool predict(const AugmentedNeedle& needle, const Motion& motion, OpenLoop& out, bool headings) {
   const Eigen::Index columns = needle.columns();
   const std::size_t count = motion.nodes.size();
   out.node_position_mm.resize(count);
   out.node_jacobian.resize(static_cast<Eigen::Index>(3 * count), columns);
+  out.node_heading.resize(headings ? count : 0);
+  out.node_heading_jacobian.resize(headings ? static_cast<Eigen::Index>(3 * count) : 0, columns);
   AugmentedState state = needle.entry(motion.nodes.front());
   TipReading reading;
+  HeadingReading heading;
   for (std::size_t i = 0; i < count; ++i) {
     if (i > 0 && !needle.advance(state, motion.nodes[i])) return false;
     needle.point(state, reading);
     out.node_position_mm[i] = reading.position_mm;
     if (columns > 0) out.node_jacobian.middleRows<3>(static_cast<Eigen::Index>(3 * i)) = reading.D;
+    if (!headings) continue;
+    needle.heading(state, heading);
+    out.node_heading[i] = heading.direction;
+    if (columns > 0) out.node_heading_jacobian.middleRows<3>(static_cast<Eigen::Index>(3 * i)) = heading.D;
   }
 
   const Dual latency_s = needle.latency_s();
   const bool late = latency_s.value != 0 || (latency_s.slope != 0).any();
-  out.position_mm.resize(motion.at.size());
-  out.jacobian.resize(static_cast<Eigen::Index>(3 * motion.at.size()), columns);
-  const auto node_D = [&](std::size_t i) { return out.node_jacobian.middleRows<3>(static_cast<Eigen::Index>(3 * i)); };
-  for (std::size_t r = 0; r < motion.at.size(); ++r) {
-    std::size_t i = motion.at[r];
-    reading.position_mm = out.node_position_mm[i];
-    if (columns > 0) reading.D = node_D(i);
-    if (late && i > 0) {
-      const double time_s = motion.nodes[i].time_s - latency_s.value;
-      while (i > 1 && motion.nodes[i - 1].time_s > time_s) --i;
-      const double span_s = motion.nodes[i].time_s - motion.nodes[i - 1].time_s;
-      const double share = std::max(0.0, (time_s - motion.nodes[i - 1].time_s) / span_s);
-      const Eigen::Vector3d step = out.node_position_mm[i] - out.node_position_mm[i - 1];
-      reading.position_mm = out.node_position_mm[i - 1] + share * step;
-      if (columns > 0) {
-        reading.D = (1 - share) * node_D(i - 1) + share * node_D(i);
-        if (time_s > motion.nodes.front().time_s)
-          reading.D -= step / span_s * latency_s.slope.head(columns).matrix().transpose();
-      }
-    }
+  const std::size_t readings = motion.at.size();
+  out.position_mm.resize(readings);
+  out.jacobian.resize(static_cast<Eigen::Index>(3 * readings), columns);
+  out.heading.resize(headings ? readings : 0);
+  out.heading_jacobian.resize(headings ? static_cast<Eigen::Index>(3 * readings) : 0, columns);
+  for (std::size_t r = 0; r < readings; ++r) {
+    const std::size_t node = motion.at[r];
+    const Place place = late && node > 0 ? place_of(motion, node, latency_s) : Place{.from = node, .to = node};
+    look(place, out.node_position_mm, out.node_jacobian, latency_s, reading.position_mm, reading.D);
     needle.through_cameras(reading);
     out.position_mm[r] = reading.position_mm;
     if (columns > 0) out.jacobian.middleRows<3>(static_cast<Eigen::Index>(3 * r)) = reading.D;
+    if (!headings) continue;
+    look(place, out.node_heading, out.node_heading_jacobian, latency_s, heading.direction, heading.D);
+    needle.through_frame(heading);
+    out.heading[r] = heading.direction;
+    if (columns > 0) out.heading_jacobian.middleRows<3>(static_cast<Eigen::Index>(3 * r)) = heading.D;
   }
   return true;
 }

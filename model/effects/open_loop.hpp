@@ -24,13 +24,16 @@ Motion make_motion(std::span<const ActuatorState> actuators, std::span<const std
 struct OpenLoop {
   std::vector<Eigen::Vector3d> position_mm;  // one per reading
   Eigen::MatrixXd jacobian;                  // 3 rows per reading, by the needle's columns
+  // Unit vectors; where headings are asked for, one per reading.
+  std::vector<Eigen::Vector3d> heading;
+  Eigen::MatrixXd heading_jacobian;
 
   // Room for predict(), kept from one call to the next.
-  std::vector<Eigen::Vector3d> node_position_mm;
-  Eigen::MatrixXd node_jacobian;
+  std::vector<Eigen::Vector3d> node_position_mm, node_heading;
+  Eigen::MatrixXd node_jacobian, node_heading_jacobian;
 };
 
 // False where the tip leaves the domain of the slip law. A late camera sees the path between two nodes as straight.
-bool predict(const AugmentedNeedle& needle, const Motion& motion, OpenLoop& out);
+bool predict(const AugmentedNeedle& needle, const Motion& motion, OpenLoop& out, bool headings = false);
 
 }  // namespace bevel::model

@@ -8,6 +8,7 @@
   EFFECT(slip_direction)      \
   EFFECT(entry_angle)         \
   EFFECT(bevel_offset)        \
+  EFFECT(entry_point)         \
   EFFECT(lost_steps)          \
   EFFECT(rotation_backlash)   \
   EFFECT(torsional_windup)    \
@@ -21,8 +22,10 @@
   EFFECT(drilling)            \
   EFFECT(flip_transient)      \
   EFFECT(lateral_bias)        \
+  EFFECT(cutting_angle)       \
   EFFECT(relaxation)          \
   EFFECT(tissue_motion)       \
+  EFFECT(sensor_tilt)         \
   EFFECT(refraction)          \
   EFFECT(camera_rotation)     \
   EFFECT(camera_scale)        \

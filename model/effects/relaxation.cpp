@@ -30,11 +30,9 @@ class Relaxation final : public Effect {
   void settle(Parameters p, const LegView& leg, EffectMemory& memory) const override {
     memory.phase = 1;
     if (leg.insertion_mm.value > kRest_mm_s * leg.duration_s()) {
-      // The bevel's side halfway through the leg's own rotation, whichever way the path bends: after a turn the bevel
-      // pushes the new way at once, however long the tissue holds the needle to its old curve.
-      const Dual half = 0.5 * leg.rotation_rad;
-      const double away = leg.curvature_per_mm.value < 0 ? -1 : 1;  // the heading turns toward body -y for k > 0
-      const Dual2 side = leg.lateral_in_world({away * sin(half), -away * cos(half)});
+      // The bevel's side, whichever way the path bends: after a turn the bevel pushes the new way at once, however
+      // long the tissue holds the needle to its old curve.
+      const Dual2 side = leg.lateral_in_world(leg.toward_bevel());
       const Dual built = 1.0 - exp(-leg.insertion_mm / p[2]);
       for (std::size_t i = 0; i < 2; ++i) memory.slot[i] += (p[0] * side[i] - memory.slot[i]) * built;
     } else if (leg.insertion_mm.value > -kRest_mm_s * leg.duration_s()) {

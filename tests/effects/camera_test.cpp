@@ -23,7 +23,7 @@ TEST(CameraScale, StretchesTheImagePlane) {
 
 TEST(CameraRotation, TurnsTheImageTheOtherWay) {
   // A camera turned by +a about x sees the world turned by -a: z_A leans toward +y in its picture.
-  const Vector3d p = seen(active("camera_rotation", {0.03}), {7, 0, 60});
+  const Vector3d p = seen(active("camera_rotation", {0.03, 0}), {7, 0, 60});
   EXPECT_LT((p - Vector3d(7, 60 * std::sin(0.03), 60 * std::cos(0.03))).norm(), 1e-12);
 }
 
@@ -38,11 +38,11 @@ TEST(Refraction, IsCubicAboutItsCentre) {
 
 TEST(Cameras, ActInTheOrderOfTheRegistry) {  // the window bends the light, then the camera is turned, then its scale
   const AugmentedNeedle needle(
-      agar(), {active("refraction", {0.03, 40}), active("camera_scale", {1.04}), active("camera_rotation", {0.03})});
+      agar(), {active("refraction", {0.03, 40}), active("camera_scale", {1.04}), active("camera_rotation", {0.03, 0})});
   TipReading reading{Vector3d(7, -5, 60), PointColumns(3, 0)};
   needle.through_cameras(reading);
   Vector3d by_hand = seen(active("refraction", {0.03, 40}), {7, -5, 60});
-  by_hand = seen(active("camera_scale", {1.04}), seen(active("camera_rotation", {0.03}), by_hand));
+  by_hand = seen(active("camera_scale", {1.04}), seen(active("camera_rotation", {0.03, 0}), by_hand));
   EXPECT_EQ(reading.position_mm, by_hand);
 }
 

@@ -30,11 +30,26 @@ std::vector<double> shown(const Effect& effect) {
                                                                      {"lateral_bias", {0.0007, -0.0011}},
                                                                      {"relaxation", {1.1, 2.2, 4.3}},
                                                                      {"tissue_motion", {1.2, 0.27, 0.9, 2.0}},
-                                                                     {"camera_rotation", {0.03}},
+                                                                     {"camera_rotation", {0.03, -0.02}},
+                                                                     {"entry_point", {0.7, -0.4}},
+                                                                     {"cutting_angle", {0.04}},
+                                                                     {"sensor_tilt", {0.03, -0.05}},
                                                                      {"camera_scale", {1.03}},
                                                                      {"refraction", {0.03, 25}},
                                                                      {"camera_latency", {0.1117}}};
   return sizes.at(effect.name());
+}
+
+// What is measured along a path: positions, and headings by a lever of 30 mm, so that all are in mm.
+constexpr double kLever_mm = 30;
+std::vector<Eigen::Vector3d> measured(const AugmentedNeedle& needle, const Motion& motion) {
+  const OpenLoop path = run(needle, motion, true);
+  std::vector<Eigen::Vector3d> all = path.position_mm;
+  for (const Eigen::Vector3d& heading : path.heading) all.emplace_back(kLever_mm * heading);
+  return all;
+}
+std::vector<Eigen::Vector3d> measured(const std::vector<ActiveEffect>& effects, const Motion& motion) {
+  return measured(AugmentedNeedle(agar(), effects), motion);
 }
 
 std::vector<double> at_none(const Effect& effect) {
@@ -57,8 +72,8 @@ INSTANTIATE_TEST_SUITE_P(Effects, EveryEffect, ::testing::ValuesIn(all_effects()
 TEST_P(EveryEffect, ShowsAtItsSizes) {
   const Motion motion = rich_script().recorded();
   EXPECT_EQ(find_parameter_violation(*GetParam(), shown(*GetParam())), -1);
-  EXPECT_GT(largest_distance_mm(path_of(agar(), {testing::active(GetParam()->name(), shown(*GetParam()))}, motion),
-                                path_of(agar(), {}, motion)),
+  EXPECT_GT(largest_distance_mm(measured({testing::active(GetParam()->name(), shown(*GetParam()))}, motion),
+                                measured({}, motion)),
             0.05);
 }
 
@@ -69,8 +84,8 @@ TEST_P(EveryEffect, ChangesNothingAtItsNone) {
   const Effect& effect = *GetParam();
   if (effect.parameters().empty()) GTEST_SKIP() << effect.name() << " has no parameter";
   const Motion motion = rich_script().recorded();
-  const auto path = path_of(agar(), {testing::active(effect.name(), at_none(effect))}, motion);
-  const auto nominal = path_of(agar(), {}, motion);
+  const auto path = measured({testing::active(effect.name(), at_none(effect))}, motion);
+  const auto nominal = measured({}, motion);
   static const std::set<std::string_view> to_rounding{"flip_transient", "puncture"};
   if (to_rounding.contains(effect.name())) {
     EXPECT_LT(largest_distance_mm(path, nominal), 1e-12 * 62);
@@ -104,18 +119,20 @@ void expect_sensitivities(const std::vector<const Effect*>& effects, double tole
         for (auto& p : one.parameters) p = Dual(p.value);
     return AugmentedNeedle(needle, all, columns, {0, 1, 2, 3});
   };
-  const OpenLoop path = run(needle_at(values, static_cast<int>(values.size())), motion);
+  const OpenLoop path = run(needle_at(values, static_cast<int>(values.size())), motion, true);
+  Eigen::MatrixXd jacobian(path.jacobian.rows() + path.heading_jacobian.rows(), path.jacobian.cols());
+  jacobian << path.jacobian, kLever_mm * path.heading_jacobian;
   for (std::size_t c = 0; c < values.size(); ++c) {
     const double h = 1e-6 * std::max(std::abs(values[c]), 1e-2);
     std::vector<double> up = values, down = values;
     up[c] += h;
     down[c] -= h;
-    const auto a = run(needle_at(up, 0), motion).position_mm;
-    const auto b = run(needle_at(down, 0), motion).position_mm;
+    const auto a = measured(needle_at(up, 0), motion);
+    const auto b = measured(needle_at(down, 0), motion);
     Eigen::VectorXd differences(3 * a.size());
     for (std::size_t i = 0; i < a.size(); ++i)
       differences.segment<3>(static_cast<Eigen::Index>(3 * i)) = (a[i] - b[i]) / (2 * h);
-    const auto column = path.jacobian.col(static_cast<Eigen::Index>(c));
+    const auto column = jacobian.col(static_cast<Eigen::Index>(c));
     std::string who;
     for (const Effect* effect : effects) who += std::string(effect->name()) + " ";
     EXPECT_LT((column - differences).cwiseAbs().maxCoeff(), tolerance * differences.cwiseAbs().maxCoeff())
@@ -137,7 +154,7 @@ TEST_P(EveryEffect, DoesNotMindWhereItIsListed) {
   const auto one = testing::active(GetParam()->name(), shown(*GetParam()));
   for (const Effect* other : all_effects()) {
     const auto two = testing::active(other->name(), shown(*other));
-    EXPECT_EQ(path_of(agar(), {one, two}, motion), path_of(agar(), {two, one}, motion)) << other->name();
+    EXPECT_EQ(measured({one, two}, motion), measured({two, one}, motion)) << other->name();
   }
 }
 
@@ -147,8 +164,7 @@ TEST_P(EveryEffect, HasTheSamePathWithAndWithoutColumns) {
   int column = 0;
   const auto with = active(*GetParam(), shown(*GetParam()), column);
   const auto without = testing::active(GetParam()->name(), shown(*GetParam()));
-  EXPECT_LT(largest_distance_mm(run(AugmentedNeedle(agar(), {with}, column), motion).position_mm,
-                                path_of(agar(), {without}, motion)),
+  EXPECT_LT(largest_distance_mm(measured(AugmentedNeedle(agar(), {with}, column), motion), measured({without}, motion)),
             1e-9);
 }
 
@@ -277,6 +293,9 @@ TEST(Registry, NamesAreThoseOfTheContract) {
                                                "bevel_offset",
                                                "entry_angle",
                                                "camera_latency",
+                                               "cutting_angle",
+                                               "entry_point",
+                                               "sensor_tilt",
                                                "camera_scale",
                                                "camera_rotation",
                                                "refraction",

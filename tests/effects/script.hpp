@@ -100,9 +100,9 @@ inline ActiveEffect active(std::string_view name, const std::vector<double>& val
 }
 
 // Throws where the needle leaves the domain.
-inline OpenLoop run(const AugmentedNeedle& needle, const Motion& motion) {
+inline OpenLoop run(const AugmentedNeedle& needle, const Motion& motion, bool headings = false) {
   OpenLoop path;
-  if (!predict(needle, motion, path)) throw std::domain_error("the needle leaves the domain of (25)");
+  if (!predict(needle, motion, path, headings)) throw std::domain_error("the needle leaves the domain of (25)");
   return path;
 }
 inline std::vector<Eigen::Vector3d> path_of(const NeedleParameters& needle, const std::vector<ActiveEffect>& effects,
