@@ -8,10 +8,12 @@
 #include <sstream>
 #include <stdexcept>
 
+#include "io/csv_stops.hpp"
 #include "io/file_bytes.hpp"
 #include "io/log_writer.hpp"
 #include "io/messages.hpp"
 #include "io/plausibility.hpp"
+#include "io/recording_clock.hpp"
 
 namespace bevel::io {
 namespace {
@@ -143,6 +145,13 @@ model::TipMeasurement tip_of(const Table& row, const ColumnMap& map, const Eigen
   return m;
 }
 
+model::TipHeading heading_along(const Eigen::Vector3d& along, double information_per_rad2) {
+  model::TipHeading m;
+  m.heading = along.normalized();
+  m.information_per_rad2 = information_per_rad2 * (Eigen::Matrix3d::Identity() - m.heading * m.heading.transpose());
+  return m;
+}
+
 model::TipHeading heading_of(const Table& row, const ColumnMap& map) {
   Eigen::Vector3d along;
   for (std::size_t i = 0; i < 3; ++i)
@@ -150,11 +159,30 @@ model::TipHeading heading_of(const Table& row, const ColumnMap& map) {
   if (!(std::abs(along.norm() - 1) <= kUnitWithin))
     row.fail(map.heading[0].name, "and the heading's length is " + format_number(along.norm()) + "; allowed " +
                                       format_number(1 - kUnitWithin) + " to " + format_number(1 + kUnitWithin));
-  model::TipHeading m;
-  m.heading = along.normalized();
-  m.information_per_rad2 =
-      (Eigen::Matrix3d::Identity() - m.heading * m.heading.transpose()) / (map.heading_sd_rad * map.heading_sd_rad);
-  return m;
+  return heading_along(along, 1 / (map.heading_sd_rad * map.heading_sd_rad));
+}
+
+// Rows of one stop into one.
+std::vector<Row> stops_of(const std::vector<Row>& rows, const ColumnMap& map, int& between) {
+  constexpr Eigen::Index kPosition = 3;
+  std::vector<StopRow> readings;
+  for (std::size_t i = 0; i < rows.size(); ++i) {
+    StopRow one{.depth_mm = rows[i].axes.insertion_mm, .reading = Eigen::VectorXd(2 * kPosition), .row = i};
+    one.reading << rows[i].tip.position_mm, rows[i].heading.heading;
+    readings.push_back(std::move(one));
+  }
+  std::vector<Row> out;
+  for (const Stop& stop : find_stops(readings, kPosition, between)) {
+    Row row = rows[stop.first_row];
+    row.axes.utime = row.tip.utime = kOwnEpoch_us * (1 + std::ssize(out));
+    row.tip.position_mm = stop.reading.head<3>();
+    row.tip.information_per_mm2 *= stop.information_share();
+    if (!map.heading.empty())
+      row.heading =
+          heading_along(stop.reading.tail<3>(), stop.information_share() / (map.heading_sd_rad * map.heading_sd_rad));
+    out.push_back(row);
+  }
+  return out;
 }
 
 // Each row's lines of what is implausible in it, and the rows without it.
@@ -188,11 +216,15 @@ ColumnMap load_column_map(const std::string& path) {
   const auto read_columns = [](Section s, const char* key, std::vector<std::string>& names, Presence presence) {
     s.read(key, names, presence, in_range(3, 3));
   };
-  Section time = file.section("time", required);
+  Section insertion = file.section("insertion", required);
+  insertion.read("stops", map.stops, optional);
+  Section time = file.section("time", map.stops ? optional : required);
   time.read("seconds", map.seconds, optional);
   time.read("nanoseconds", map.nanoseconds, optional);
   time.read("rate_hz", map.rate_hz, optional, in_range(1e-3, 1e6));
-  if (time.present() && map.seconds.empty() == (map.rate_hz == 0))
+  if (map.stops && time.present())
+    time.fail("", "is given, but insertion.stops = true makes a log without a clock; leave one out");
+  else if (time.present() && map.seconds.empty() == (map.rate_hz == 0))
     time.fail("", "either seconds (a column) or rate_hz must be given, and not both");
   Section tip = file.section("tip", required);
   std::vector<std::string> axes, origin;
@@ -208,11 +240,11 @@ ColumnMap load_column_map(const std::string& path) {
   read_columns(tip, "heading", heading, optional);
   tip.read("heading_sd_rad", map.heading_sd_rad, heading.empty() ? optional : required, in_range(1e-5, 1));
   for (const std::string& column : heading) map.heading.push_back(signed_column(column));
-  Section insertion = file.section("insertion", required);
   std::string column;
   insertion.read("column", column, required);
   map.insertion = signed_column(column);
   insertion.read("settled", map.settled, optional);
+  if (map.settled && map.stops) insertion.fail("settled", "is given beside stops; one of them");
   Section rotation = file.section("rotation", optional);
   std::string rotation_column;
   rotation.read("column", rotation_column, rotation.present() ? required : optional);
@@ -247,7 +279,7 @@ ImportedRecording import_csv(const std::string& csv_path, const ColumnMap& map) 
     last_insertion = insertion;
     Row row;
     row.line = table.line();
-    row.axes.utime = utime_of(table, map, index);
+    row.axes.utime = map.stops ? kOwnEpoch_us + index : utime_of(table, map, index);
     if (!rows.empty() && row.axes.utime <= rows.back().axes.utime)
       table.fail(map.seconds, "but time does not grow; allowed: later than the row before");
     row.axes.axis_status = {2, 2};
@@ -261,6 +293,8 @@ ImportedRecording import_csv(const std::string& csv_path, const ColumnMap& map) 
     rows.push_back(row);
   }
   if (rows.empty()) throw std::runtime_error(csv_path + ": no row with data by this column map");
+  out.has_clock = map.has_clock();
+  if (map.stops) rows = stops_of(rows, map, out.rows_unsettled);
 
   const std::size_t found = rows.size();
   leave_out_the_implausible(table, rows, out);
@@ -278,7 +312,7 @@ ImportedRecording import_csv(const std::string& csv_path, const ColumnMap& map) 
     // Counted here: a row that was left out is no message that was lost.
     a.seq = row.tip.seq = row.heading.seq = static_cast<std::int64_t>(out.actuators.size());
     row.heading.utime = row.tip.utime;
-    if (!out.actuators.empty()) {
+    if (!out.actuators.empty() && !map.stops) {
       const double dt_s = static_cast<double>(a.utime - out.actuators.back().utime) * 1e-6;
       a.insertion_rate_mm_s = (a.insertion_mm - out.actuators.back().insertion_mm) / dt_s;
       a.rotation_rate_rad_s = (a.rotation_rad - out.actuators.back().rotation_rad) / dt_s;
@@ -314,6 +348,8 @@ void write_log(const ImportedRecording& recording, const std::string& log_path) 
   const std::string unfinished = log_path + ".unfinished";
   try {
     LogWriter log(unfinished);
+    if (!recording.has_clock && !recording.actuators.empty())
+      log.write_text(recording.actuators.front().utime, channel::kConfig, kNoClockConfig);
     for (std::size_t i = 0; i < recording.actuators.size(); ++i) {
       log.write_message(recording.actuators[i].utime, channel::kActuatorState, to_message(recording.actuators[i]));
       log.write_message(recording.tips[i].utime, channel::kTipMeasurement, to_message(recording.tips[i]));

@@ -1,13 +1,14 @@
 // CSV recordings made elsewhere, by a column map, into the messages of the contract.
 //
 // The map (TOML; docs/import/bwh.toml is one):
-//   [time]       seconds = "..."  nanoseconds = "..." (optional), or rate_hz = 30.0 (rows are that far apart)
-//   [tip]        axes = ["Tip z", "-Tip x", "-Tip y"]: the column, with its sign, that each axis of {A} is
+//   [time]       not with stops = true; seconds = "..."  nanoseconds = "..." (optional), or rate_hz = 30.0 (rows are
+//   that far apart) [tip]        axes = ["Tip z", "-Tip x", "-Tip y"]: the column, with its sign, that each axis of {A}
+//   is
 //                origin = the same for the entry point (optional): its first row without a zero; default 0
 //                sigma_mm = [x, y, z]: standard deviations; 0 for an axis that was not measured
 //                heading = [x, y, z] (optional): columns, with signs as axes, of the unit vector along the needle's tip
 //                heading_sd_rad: its standard deviation to any side; required with heading
-//   [insertion]  column = "-Base y", settled = true: rows count only where this column has just changed (see below)
+//   [insertion]  column = "-Base y"; settled = true or stops = true (see below)
 //   [rotation]   column (optional), in rad unless scale says otherwise; default: no rotation
 //   [rows]       nonzero = ["Tip x", ...]: rows in which one of these is zero hold no data
 //
@@ -15,6 +16,9 @@
 // is done. In between nobody knows how deep the base was, so with settled = true only the first row of each new value
 // is used: one ACTUATOR_STATE and one TIP_MEASUREMENT each, and one TIP_HEADING where it has columns. A row with depth
 // 0 at the entry point begins the log.
+// With stops = true the column is the depth commanded, and all rows of one depth are one stop: its reading is their
+// median, without the rows in which the needle was moving (csv_stops.hpp), and with the information of a median.
+// sigma_mm and heading_sd_rad are of one row. Either way the log says that it has no clock (recording_clock.hpp).
 #pragma once
 
 #include <string>
@@ -39,7 +43,8 @@ struct ColumnMap {
   std::vector<SignedColumn> heading;  // empty, or three
   double heading_sd_rad = 0;
   SignedColumn insertion;
-  bool settled = false;
+  bool settled = false, stops = false;
+  bool has_clock() const { return !settled && !stops; }
   std::vector<SignedColumn> rotation;  // empty, or one
   double rotation_scale = 1;
   std::vector<std::string> nonzero;
@@ -56,7 +61,8 @@ struct ImportedRecording {
   int rows_unsettled = 0;
   int rows_implausible = 0;           // left out, each with a remark
   std::vector<std::string> left_out;  // a line for each row that is implausible beside its neighbours
-  double time_shift_s = 0;            // added where the file's clock begins at 0 or below; a log's times are positive
+  bool has_clock = true;
+  double time_shift_s = 0;  // added where the file's clock begins at 0 or below; a log's times are positive
 
   std::string remarks(const std::string& name) const;  // the last two in lines for stderr; "" if there is nothing
 };

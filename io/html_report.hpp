@@ -27,7 +27,7 @@ class HtmlReport {
   HtmlReport& list(const std::vector<std::string>& items);
   HtmlReport& code(std::string_view text);                                           // kept as it is, line by line
   HtmlReport& callout(Tone tone, std::string_view headline, std::string_view text);  // the verdict, at a glance
-  HtmlReport& facts(const std::vector<Fact>& facts);  // side by side
+  HtmlReport& facts(const std::vector<Fact>& facts);                                 // side by side
   // What `fill` adds stands behind a line that unfolds it.
   HtmlReport& folded(std::string_view line, const std::function<void(HtmlReport&)>& fill);
   // A column whose cells are all numbers is set flush right. Throws std::invalid_argument on a row of another length.

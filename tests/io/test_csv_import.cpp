@@ -6,6 +6,7 @@
 
 #include "io/csv_export.hpp"
 #include "io/csv_import.hpp"
+#include "io/recording_clock.hpp"
 #include "tests/support/run_program.hpp"
 #include "tests/support/shared_recordings.hpp"
 #include "tests/support/temporary_folder.hpp"
@@ -57,6 +58,56 @@ TEST_F(CsvImport, MapsAxesDropsEmptyRowsAndKeepsOnlySettledSteps) {
   const auto files = export_csv(back, (folder / "out").string());
   ASSERT_EQ(files.size(), 2u);
   EXPECT_EQ(files[0].second, 2);
+}
+
+// Several rows a stop; a depth is noted when it is reached, and its last rows are of the way to the next.
+TEST_F(CsvImport, RowsOfOneStopAreOneReadingWithoutAClock) {
+  const std::string stops =
+      file("stops.toml",
+           "[tip]\naxes = [\"x\", \"y\", \"z\"]\nsigma_mm = [0.1, 0.1, 0.1]\nheading = [\"hx\", \"hy\", \"hz\"]\n"
+           "heading_sd_rad = 0.01\n[insertion]\ncolumn = \"depth\"\nstops = true\n");
+  const std::string csv = file("stops.csv",
+                               "depth,x,y,z,hx,hy,hz\n"
+                               "0,0.1,0,0.1,0,0,1\n0,0.0,0,0.0,0,0,1\n0,0.2,0,0.2,0,0,1\n"
+                               "0,0.0,0,2.9,0,0.1,0.99498744\n0,0.1,0,4.9,0,0,1\n"  // on the way
+                               "5,0.3,0,5.0,0,0,1\n5,0.3,0.2,5.1,0,0,1\n5,0.2,0,8.0,0,0,1\n"
+                               "10,0.5,-0.1,10.0,0,-0.02,0.9998\n");
+  const ImportedRecording r = import_csv(csv, load_column_map(stops));
+  EXPECT_FALSE(r.has_clock);
+  ASSERT_EQ(r.tips.size(), 3u);
+  EXPECT_EQ(r.rows_unsettled, 3);
+  EXPECT_NEAR((r.tips[0].position_mm - Eigen::Vector3d(0.1, 0, 0.1)).norm(), 0, 1e-12) << "median of three";
+  EXPECT_NEAR((r.tips[1].position_mm - Eigen::Vector3d(0.3, 0.1, 5.05)).norm(), 0, 1e-12) << "mean of two";
+  EXPECT_NEAR(r.tips[1].information_per_mm2(0, 0), 200, 1e-9);
+  EXPECT_NEAR(r.tips[2].information_per_mm2(0, 0), 100, 1e-9);
+  EXPECT_EQ(r.actuators[2].insertion_mm, 10);
+  EXPECT_EQ(r.actuators[2].insertion_rate_mm_s, 0) << "nobody knows it";
+  EXPECT_NEAR(r.headings[2].heading.y(), -0.02, 1e-5);
+
+  write_log(r, (folder / "stops.lcm").string());
+  const Recording back = read_recording((folder / "stops.lcm").string());
+  EXPECT_TRUE(back.intact());
+  EXPECT_FALSE(has_clock(back));
+  EXPECT_EQ(back.headings.size(), 3u);
+}
+
+TEST_F(CsvImport, ALogHasAClockUnlessItsConfigSaysNo) {
+  Recording recording;
+  EXPECT_TRUE(has_clock(recording));
+  recording.config = "[recording]\nclock = \"none\"\n";
+  EXPECT_FALSE(has_clock(recording));
+  for (const char* other : {"[recording]\nclock = \"ptp\"\n", "[needle]\n", "[[[a]]]", "clock = none", "\xff"}) {
+    recording.config = other;
+    EXPECT_TRUE(has_clock(recording)) << other;
+  }
+}
+
+TEST_F(CsvImport, ATimeBesideStopsIsRefused) {
+  const std::string both = file("both.toml",
+                                "[time]\nrate_hz = 10.0\n[tip]\naxes = [\"x\", \"y\", \"z\"]\n"
+                                "sigma_mm = [0.1, 0.1, 0.1]\n[insertion]\ncolumn = \"depth\"\nstops = true\n");
+  EXPECT_THAT([&] { load_column_map(both); },
+              ::testing::ThrowsMessage<ConfigError>(::testing::AllOf(HasSubstr("stops"), HasSubstr("clock"))));
 }
 
 TEST_F(CsvImport, FaultsNameFileLineColumnAndTheNearestName) {
