@@ -155,6 +155,34 @@ Settled settle(const Likelihood& likelihood, const Discrepancy* discrepancy, con
 
 }  // namespace
 
+std::vector<LessSpread> with_less_spread(const Likelihood& likelihood, const Fit& fit) {
+  std::vector<LessSpread> out;
+  auto blocks = linearise(likelihood, fit, {});
+  if (blocks.empty()) return out;
+  const auto log_of = [&](const Fit& about) {
+    const VectorXd precision = local_precision_of(about.layout, about.scales);
+    for (auto& block : blocks) block.precision = precision;
+    const ArrowSolution solution = solve_about(about, blocks, {});
+    return -0.5 * (solution.least + solution.log_volume_ratio);
+  };
+  const double here = log_of(fit);
+  const auto& groups = likelihood.system().nuisance_groups();
+  for (std::size_t g = 0; g < groups.size(); ++g) {
+    const auto& values = groups[g].standard_deviations;
+    double& now = out.emplace_back(LessSpread{.fit = fit}).fit.scales.nuisance_sd[static_cast<Index>(g)];
+    const auto at = std::find(values.begin(), values.end(), now);
+    if (at == values.end() || at == values.begin()) {
+      out.pop_back();
+      continue;
+    }
+    now = *std::prev(at);
+    // Of the grid's prior: none as likely as all others together.
+    const double to_none = now == values.front() ? std::log(static_cast<double>(values.size() - 1)) : 0.0;
+    out.back().log_change = log_of(out.back().fit) - here + to_none;
+  }
+  return out;
+}
+
 NuisanceGrid nuisance_grid(const System& system) {
   const auto& groups = system.nuisance_groups();
   Index count = 1;

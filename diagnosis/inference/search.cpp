@@ -114,15 +114,19 @@ void Search::expand(const ModelSet& set) {
     // What is promised is relative to this set by the reference's noise.
     const auto [plain, change] = moved_to(likelihood_, here.at->fit, *discrepancy_);
     const double best = best_log();
-    const auto add = [&](const Fit& fit, const std::vector<Proposal>& list, double from, bool beside_curve) {
+    enum class Beside { as_it_is, curve, less_spread };
+    const auto add = [&](const Fit& about, const std::vector<Proposal>& list, double from, Beside beside) {
       std::size_t rank = 0;
       for (const Proposal& one : list) {
         // Far from its start an effect may bring much more than in proportion: the foremost are fitted in any case.
-        const bool foremost = rank++ < rules_.foremost && one.log_bayes_factor > -rules_.log_prior_odds_effect;
+        const bool foremost = beside != Beside::less_spread && rank++ < rules_.foremost &&
+                              one.log_bayes_factor > -rules_.log_prior_odds_effect;
         const ModelSet larger = with(set, one.effect);
         const double promised = from + one.log_bayes_factor + rules_.log_prior_odds_effect;
         auto& known = promised_.try_emplace(larger, -std::numeric_limits<double>::infinity()).first->second;
+        const bool nothing_new = beside == Beside::less_spread && promised < known + rules_.optimism;
         known = std::max(known, promised);
+        if (nothing_new) continue;
         const double doubtful = rules_.optimism + rules_.linear_error * std::max(0.0, one.log_bayes_factor);
         if (!foremost && promised + doubtful < best - rules_.window) continue;
         // A fit that fell far short of the promise may be in a local minimum: once more, from these starts.
@@ -132,18 +136,21 @@ void Search::expand(const ModelSet& set) {
           continue;
         for (const StartPoint& start : one.starts)
           if (start.log_bayes_factor > one.starts.front().log_bayes_factor - rules_.window)
-            jobs.push_back(job_from(fit, one.effect, start)), jobs.back().beside_curve = beside_curve;
+            jobs.push_back(job_from(about, one.effect, start)), jobs.back().beside_curve = beside == Beside::curve;
       }
     };
     if (here.at->fit_with_curve && here.log_with_curve > here.log_without_curve) {
       const auto [beside_curve, more] = moved_to(likelihood_, *here.at->fit_with_curve, *discrepancy_);
       const CurveColumns curve = discrepancy_->columns(*likelihood_, *beside_curve.scales.curve);
       add(beside_curve, proposals_->beside(Marginal(*likelihood_, beside_curve, curve), rules_.starts),
-          here.log_with_curve + more, true);
+          here.log_with_curve + more, Beside::curve);
     }
     // Without the curve too: an effect may take its place.
     add(plain, proposals_->beside(Marginal(*likelihood_, plain, {}), rules_.starts), here.log_without_curve + change,
-        false);
+        Beside::as_it_is);
+    for (const LessSpread& less : with_less_spread(*likelihood_, plain))
+      add(less.fit, proposals_->beside(Marginal(*likelihood_, less.fit, {}), rules_.starts),
+          here.log_without_curve + change + less.log_change, Beside::less_spread);
   }
   // Smaller sets, from which swaps come.
   for (const std::size_t effect : set) {

@@ -56,10 +56,32 @@ inference::Calibration calibrate(const NeedleSystem& system) {
 void remark_on_short_recordings(const RecordedCase& recorded, Findings& findings) {
   std::size_t fewest = std::numeric_limits<std::size_t>::max();
   for (const auto& recording : recorded.recordings) fewest = std::min(fewest, recording.motion.at.size());
-  if (fewest < kFewReadings)
+  if (recorded.has_clock && fewest < kFewReadings)
     findings.remarks.push_back(
         "a recording has only " + std::to_string(fewest) +
         " readings: the cameras' noise is hardly known, and what is quicker than a few readings cannot be seen");
+}
+
+void remark_on_clock(const NeedleSystem& system, Findings& findings) {
+  if (system.recorded().has_clock) return;
+  std::string left_out;
+  for (const model::Effect* effect : model::all_effects())
+    if (model::needs_clock(effect->covariate()))
+      left_out += (left_out.empty() ? "" : ", ") + std::string(effect->name());
+  findings.remarks.push_back("these recordings have no clock: effects of time, speed and rest were not looked for (" +
+                             left_out + ")");
+}
+
+void remark_on_groups(const RecordedCase& recorded, Findings& findings) {
+  constexpr std::ptrdiff_t kComfortable = 4;
+  if (!recorded.two_groups()) return;
+  const auto changed = std::ranges::count_if(recorded.recordings, &Recording::changed);
+  const auto fewest = std::min(changed, std::ssize(recorded.recordings) - changed);
+  if (fewest < kComfortable)
+    findings.remarks.push_back(
+        "a group of " + std::to_string(fewest) +
+        ": how much insertions differ by themselves is known from the two groups together, and a change has to stand "
+        "out of that; what would have been seen is listed, more insertions would show less");
 }
 
 void remark_on_bounds(Findings& findings) {
@@ -114,22 +136,26 @@ std::optional<NextExperiment> next_experiment(const inference::Search& search, c
 
 }  // namespace
 
-std::string_view name_of(Verdict verdict) {
+std::string_view name_of(Verdict verdict, bool two_groups) {
   switch (verdict) {
     case Verdict::nothing_missing:
-      return "nothing-missing";
+      return two_groups ? "unchanged" : "nothing-missing";
     case Verdict::effects_found:
-      return "effects-found";
+      return two_groups ? "changed" : "effects-found";
     case Verdict::unknown_effect:
-      return "unknown-effect";
+      break;
   }
-  return "unknown-effect";
+  return two_groups ? "changed-unknown" : "unknown-effect";
 }
 
 Findings diagnose(const RecordedCase& recorded, const model::NeedleParameters& model, const DiagnosisOptions& options) {
   Findings findings;
   findings.model_file = model;
-  for (const auto& channel : recorded.channels) findings.channels.push_back(channel.name);
+  findings.two_groups = recorded.two_groups();
+  for (const auto& channel : recorded.channels) {
+    findings.channels.push_back(channel.name);
+    findings.units.emplace_back(channel.unit());
+  }
   Stages stages(options, findings.times);
 
   stages.begin("measuring the cameras' noise");
@@ -180,6 +206,8 @@ Findings diagnose(const RecordedCase& recorded, const model::NeedleParameters& m
   if (findings.verdict != Verdict::nothing_missing) findings.where = locate(system, base, decision.model, 3);
   findings.traces = make_traces(system, calibration.outliers, base, decision.model, model);
   remark_on_short_recordings(recorded, findings);
+  remark_on_clock(system, findings);
+  remark_on_groups(recorded, findings);
   remark_on_bounds(findings);
   findings.sentence = sentence_of(findings);
   stages.end();

@@ -126,9 +126,11 @@ Experiments::Experiments(const NeedleSystem& system, const inference::Noise& noi
   RecordedCase planned;
   planned.channels = system.recorded().channels;
   planned.frame_s = system.recorded().frame_s;
+  planned.has_clock = system.recorded().has_clock;
   for (const MotionScript& script : scripts_) {
     Recording recording;
     recording.name = script.text;
+    recording.changed = system.recorded().two_groups();
     recording.motion = script.motion;
     inference::Series series;
     for (std::size_t i = 0; i < script.motion.at.size(); ++i) {
@@ -147,14 +149,15 @@ Experiments::Experiments(const NeedleSystem& system, const inference::Noise& noi
 
 double Experiments::separation(std::size_t script, const Imagined& truth, const Imagined& rival) const {
   const model::Motion& motion = scripts_[script].motion;
-  std::vector<Eigen::Vector3d> path;
+  model::OpenLoop path;
   if (!system_.tip_path(truth.set, motion, -1, truth.shared, truth.local, truth.discrepancy, path)) return 0;
   inference::Prediction prediction;
   if (!planned_->predict(rival.set, script, rival.shared, rival.local, true, prediction)) return 0;
   VectorXd difference = -prediction.reading;
   Index row = 0;
   for (const Channel& channel : system_.recorded().channels)
-    for (const auto& position : path) difference[row++] += channel.axis.dot(position);
+    for (const auto& vector : channel.heading ? path.heading : path.position_mm)
+      difference[row++] += channel.axis.dot(vector);
   const MatrixXd white = likelihood_->whitened(script, difference);
   // The rival may move its parameters, as far as what is recorded already lets it, and call it another insertion.
   MatrixXd J(difference.size(), prediction.by_shared.cols() + prediction.by_local.cols());

@@ -13,7 +13,9 @@
 namespace bevel::diagnosis {
 
 enum class Verdict { nothing_missing, effects_found, unknown_effect };
-std::string_view name_of(Verdict verdict);  // "nothing-missing", ...
+// "nothing-missing", "effects-found", "unknown-effect"; of two groups of recordings "unchanged", "changed",
+// "changed-unknown".
+std::string_view name_of(Verdict verdict, bool two_groups = false);
 
 struct FoundParameter {
   std::string name;
@@ -50,8 +52,8 @@ struct Location {
   double share = 0;  // of the whole mismatch, in chi2
 };
 
-// Of scalar readings. chi2 counts what was not known beforehand too (parameters, variation between insertions): 1 is a
-// prediction that knows how sure it is.
+// Of scalar readings; errors in mm of positions alone, headings count in chi2 and density. chi2 counts what was not
+// known beforehand too (parameters, variation between insertions): 1 is a prediction that knows how sure it is.
 struct FitFigures {
   double rmse_mm = 0, rmse_se_mm = 0;  // its standard error: from recording to recording
   double max_mm = 0, chi2_per_dof = 0;
@@ -61,7 +63,7 @@ struct HeldOutRecording {
   std::string log;
   FitFigures before, after;
 };
-// Each recording predicted as a new insertion.
+// Each recording (of two groups: of the second) predicted as a new insertion.
 struct HeldOut {
   FitFigures as_it_stands;   // by the model file; noise alone is known
   FitFigures before, after;  // refitted to the others: the needle alone, and what the others select
@@ -163,7 +165,8 @@ struct StageTime {
 
 struct Findings {
   Verdict verdict = Verdict::nothing_missing;
-  std::string sentence;  // what was found, in one
+  bool two_groups = false;  // what is said is of what the second has and the first has not
+  std::string sentence;     // what was found, in one
   std::vector<FoundEffect> effects;
   std::vector<Explanation> explanations;  // the likeliest first
   double nothing_probability = 0;         // of no effect, and no discrepancy of any consequence
@@ -171,7 +174,7 @@ struct Findings {
   double not_visited = 0;                 // share of sets that were judged by the linear model alone
   std::vector<Location> where;
   inference::Noise noise;
-  std::vector<std::string> channels;  // names, in the order of noise.sigma
+  std::vector<std::string> channels, units;  // in the order of noise.sigma
   std::vector<VariationEstimate> variation;
   HeldOut held_out;
   NeedleEstimate base, needle;  // refitted without, and with what was found

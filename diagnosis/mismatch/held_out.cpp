@@ -17,30 +17,31 @@ namespace {
 
 // Sums over readings of one recording.
 struct Sums {
-  double squares = 0, largest = 0, chi2 = 0, log_density = 0;
-  double count = 0;
+  double squares = 0, largest = 0, positions = 0;  // of positions, mm
+  double chi2 = 0, log_density = 0, count = 0;
 };
 
 FitFigures figures_of(const std::vector<Sums>& all) {
   FitFigures out;
   Sums sum;
   for (const Sums& one : all) {
-    sum.squares += one.squares, sum.chi2 += one.chi2, sum.log_density += one.log_density, sum.count += one.count;
+    sum.squares += one.squares, sum.positions += one.positions;
+    sum.chi2 += one.chi2, sum.log_density += one.log_density, sum.count += one.count;
     out.max_mm = std::max(out.max_mm, one.largest);
   }
-  const double n = std::max(sum.count, 1.0);
-  out.rmse_mm = std::sqrt(sum.squares / n);
+  const double n = std::max(sum.count, 1.0), positions = std::max(sum.positions, 1.0);
+  out.rmse_mm = std::sqrt(sum.squares / positions);
   out.chi2_per_dof = sum.chi2 / n;
   out.log_density = sum.log_density / n;
   if (all.size() < 2) return out;
   // From recording to recording, weighed by their readings: of the mean square, and of the mean logarithm.
   double square = 0, log = 0;
   for (const Sums& one : all) {
-    square += std::pow(one.squares - one.count * sum.squares / n, 2);
+    square += std::pow(one.squares - one.positions * sum.squares / positions, 2);
     log += std::pow(one.log_density - one.count * out.log_density, 2);
   }
   const auto r = static_cast<double>(all.size());
-  const double error = std::sqrt(square * r / (r - 1)) / n;
+  const double error = std::sqrt(square * r / (r - 1)) / positions;
   out.rmse_se_mm = out.rmse_mm > 0 ? error / (2 * out.rmse_mm) : 0;
   out.log_density_se = std::sqrt(log * r / (r - 1)) / n;
   return out;
@@ -48,10 +49,16 @@ FitFigures figures_of(const std::vector<Sums>& all) {
 
 double constant_of(double count) { return -0.5 * count * std::log(2 * std::numbers::pi); }
 
-void add_errors(const VectorXd& errors_mm, Sums& sums) {
-  sums.squares = errors_mm.squaredNorm();
-  sums.largest = errors_mm.size() > 0 ? errors_mm.cwiseAbs().maxCoeff() : 0;
-  sums.count = static_cast<double>(errors_mm.size());
+void add_errors(const NeedleSystem& system, const Likelihood& likelihood, std::size_t r, const VectorXd& errors,
+                Sums& sums) {
+  sums.count = static_cast<double>(errors.size());
+  const auto by_channel = inference::by_channel(likelihood.data().recordings[r], errors);
+  for (std::size_t c = 0; c < by_channel.size(); ++c) {
+    if (system.recorded().channels[c].heading || by_channel[c].size() == 0) continue;
+    sums.squares += by_channel[c].squaredNorm();
+    sums.largest = std::max(sums.largest, by_channel[c].cwiseAbs().maxCoeff());
+    sums.positions += static_cast<double>(by_channel[c].size());
+  }
 }
 
 // As a new insertion: what differs between insertions at its mean. Phases and instants are the recording's own: nobody
@@ -79,17 +86,18 @@ Fit refit_without(const inference::Search& search, const Fit& whole, std::size_t
 }
 
 // judge: by whose noise and variation chi2 and density are.
-Sums sums_of(const inference::Search& search, const Fit& whole, const Fit& judge, std::size_t r) {
+Sums sums_of(const NeedleSystem& system, const inference::Search& search, const Fit& whole, const Fit& judge,
+             std::size_t r) {
   Sums out;
   Fit fit = refit_without(search, whole, r);
   fit.likelihood = judge.likelihood;
   fit.scales.nuisance_sd = judge.scales.nuisance_sd;
   const auto curve = curve_of(search, fit);
-  VectorXd errors_mm = fit.likelihood->errors(fit.layout, r, fit.shared, new_insertion(fit, r));
+  VectorXd errors = fit.likelihood->errors(fit.layout, r, fit.shared, new_insertion(fit, r));
   const auto blocks = linearise(*fit.likelihood, fit, curve);
-  if (errors_mm.size() == 0 || blocks.empty()) return out;
-  if (curve) errors_mm -= curve.raw[r] * fit.curve_values;
-  add_errors(errors_mm, out);
+  if (errors.size() == 0 || blocks.empty()) return out;
+  if (curve) errors -= curve.raw[r] * fit.curve_values;
+  add_errors(system, *fit.likelihood, r, errors, out);
   const auto predictive = predictive_of(fit, blocks, curve, r);
   out.chi2 = predictive.chi2;
   out.log_density = predictive.log_density + constant_of(out.count);
@@ -104,21 +112,25 @@ Sums as_it_stands(const NeedleSystem& system, const Likelihood& likelihood, std:
   inference::Residuals residuals;
   if (!likelihood.evaluate(nothing, r, shared, local, false, residuals)) {
     const double none = std::numeric_limits<double>::quiet_NaN();
-    return {.squares = none, .largest = none, .chi2 = none, .log_density = none, .count = 1};
+    return {.squares = none, .largest = none, .positions = 1, .chi2 = none, .log_density = none, .count = 1};
   }
-  add_errors(likelihood.errors(nothing, r, shared, local), out);
+  add_errors(system, likelihood, r, likelihood.errors(nothing, r, shared, local), out);
   out.chi2 = residuals.white.squaredNorm();
   out.log_density = constant_of(out.count) + likelihood.log_weights(r) - 0.5 * out.chi2;
   return out;
 }
 
 // Of errors that are the noise and nothing else, in the mean.
-Sums noise_floor(const Likelihood& likelihood, std::size_t r) {
+Sums noise_floor(const NeedleSystem& system, const Likelihood& likelihood, std::size_t r) {
   Sums out;
   const auto& series = likelihood.data().recordings[r].series;
   for (std::size_t c = 0; c < series.size(); ++c)
-    for (const double relative : series[c].relative_sd)
-      out.squares += std::pow(likelihood.noise().sigma[c] * relative, 2), ++out.count;
+    for (const double relative : series[c].relative_sd) {
+      ++out.count;
+      if (system.recorded().channels[c].heading) continue;
+      out.squares += std::pow(likelihood.noise().sigma[c] * relative, 2);
+      ++out.positions;
+    }
   out.chi2 = out.count;
   out.log_density = constant_of(out.count) + likelihood.log_weights(r) - 0.5 * out.count;
   return out;
@@ -133,14 +145,15 @@ HeldOut hold_out(const NeedleSystem& system, const inference::Search& search, co
   const auto selected = leave_out_selection(search);
   std::vector<Sums> file, before, after, floor;
   for (std::size_t r = 0; r < likelihood.recordings(); ++r) {
+    const Recording& recording = system.recorded().recordings[r];
+    if (system.recorded().two_groups() && !recording.changed) continue;
     file.push_back(as_it_stands(system, likelihood, r));
-    before.push_back(sums_of(search, base, judge, r));
-    after.push_back(sums_of(search, *selected[r].fit, *selected[r].fit, r));
+    before.push_back(sums_of(system, search, base, judge, r));
+    after.push_back(sums_of(system, search, *selected[r].fit, *selected[r].fit, r));
     after.back().log_density = selected[r].log_density + constant_of(after.back().count);
-    floor.push_back(noise_floor(likelihood, r));
-    out.recordings.push_back({.log = system.recorded().recordings[r].name,
-                              .before = figures_of({before.back()}),
-                              .after = figures_of({after.back()})});
+    floor.push_back(noise_floor(system, likelihood, r));
+    out.recordings.push_back(
+        {.log = recording.name, .before = figures_of({before.back()}), .after = figures_of({after.back()})});
     out.gain += after.back().log_density - before.back().log_density;
   }
   out.as_it_stands = figures_of(file);

@@ -142,11 +142,11 @@ std::vector<Trace> make_traces(const NeedleSystem& system, const inference::Read
     const auto predicted = [&](const ChosenModel& model) {
       const Fit& fit = *model.fit;
       const auto discrepancy = fit.scales.curve ? model.discrepancy() : DiscrepancyValues{};
-      std::vector<Eigen::Vector3d> out;
+      model::OpenLoop out;
       if (!system.tip_path(fit.layout.set(), recording.motion, static_cast<int>(r), fit.shared, fit.local[r],
                            fit.scales.curve ? &discrepancy : nullptr, out))
-        out = nowhere;
-      return out;
+        return nowhere;
+      return out.position_mm;
     };
     trace.before_mm = predicted(before);
     trace.after_mm = predicted(after);

@@ -12,9 +12,29 @@ std::string listed(const std::vector<FoundEffect>& effects) {
   return text;
 }
 
+std::string off_with(const Discrepancy& discrepancy) {
+  return "the " + std::string(info_of(discrepancy.curve.component).meaning) + " is off with " +
+         std::string(model::name_of(discrepancy.curve.covariate));
+}
+
+std::string sentence_on_change(const Findings& findings) {
+  switch (findings.verdict) {
+    case Verdict::nothing_missing:
+      return "Nothing changed between the two groups that these recordings could show.";
+    case Verdict::effects_found:
+      return "What changed: " + listed(findings.effects) + ".";
+    case Verdict::unknown_effect:
+      break;
+  }
+  return "Something changed that no effect of the library explains: in the second group " +
+         off_with(findings.discrepancies.front()) +
+         (findings.effects.empty() ? "." : ", beside " + listed(findings.effects) + ".");
+}
+
 }  // namespace
 
 std::string sentence_of(const Findings& findings) {
+  if (findings.two_groups) return sentence_on_change(findings);
   switch (findings.verdict) {
     case Verdict::nothing_missing:
       return "Nothing is missing from the model that these recordings could show.";
@@ -23,10 +43,7 @@ std::string sentence_of(const Findings& findings) {
     case Verdict::unknown_effect:
       break;
   }
-  const model::DiscrepancyCurve& curve = findings.discrepancies.front().curve;
-  return "Something is missing that no effect of the library explains: the " +
-         std::string(info_of(curve.component).meaning) + " is off with " +
-         std::string(model::name_of(curve.covariate)) +
+  return "Something is missing that no effect of the library explains: " + off_with(findings.discrepancies.front()) +
          (findings.effects.empty() ? "." : ", beside " + listed(findings.effects) + ".");
 }
 

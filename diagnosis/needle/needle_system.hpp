@@ -2,13 +2,18 @@
 // The needle as the engine's client (diagnosis/inference): readings of the cameras from the base's motion, with what
 // differs between insertions, the effects of the library, and a discrepancy in each component of the tip's twist and
 // of the reading.
+//
+// Where the recordings are of two groups, the question is what changed: effects, discrepancy and changes of the
+// needle's own parameters act in the second group alone, and what the model gets wrong in both groups alike is no
+// matter: each channel's error against depth, common to all recordings, is among the shared parameters.
 #include "diagnosis/inference/system.hpp"
 #include "diagnosis/needle/curves.hpp"
 #include "diagnosis/needle/recorded_case.hpp"
 
 namespace bevel::diagnosis {
 
-// Shared parameters, in this order; u = lambda1 - lambda2^2/(2 pi) >= 0 is the domain (26) as a bound.
+// Shared parameters, in this order, then common errors; u = lambda1 - lambda2^2/(2 pi) >= 0 is the domain (26) as a
+// bound.
 enum BaseParameter : int { kCurvature, kU, kLambda2, kBaseParameters };
 // What insertions have of their own: curvature as a share of the needle's, the heading's rotation vector at the entry
 // (rad), the bevel's roll there (rad), registration (mm).
@@ -47,6 +52,8 @@ class NeedleSystem final : public inference::System {
   Eigen::MatrixXd by_curves(std::size_t recording, const Eigen::VectorXd& base) const override;
 
   model::NeedleParameters needle(const Eigen::VectorXd& shared) const;
+  // Of these recordings' effects that no library holds: by how much a parameter of the needle changed; -1: none.
+  int changed_parameter(std::size_t effect) const;
   // The library's effect behind one of effects().
   const model::Effect& physics(std::size_t effect) const { return *physics_[effect]; }
   // The library's parameter behind one of an effect's.
@@ -56,21 +63,31 @@ class NeedleSystem final : public inference::System {
                                       std::vector<double> std_errors) const {
     return to_model(needle_curves_[curve], std::move(values), std::move(std_errors));
   }
-  // Positions of the tip at the readings of any motion, in {A}, mm; unknowns as for predict. discrepancy may be null.
-  // recording: whose motion it is, or -1.
+  // Positions of the tip at the readings of any motion, in {A}, mm, and headings where some are measured; unknowns as
+  // for predict. discrepancy may be null. recording: whose motion it is, or -1: of the second group, if there are two.
   bool tip_path(const inference::ModelSet& set, const model::Motion& motion, int recording,
                 const Eigen::VectorXd& shared, const Eigen::VectorXd& local, const DiscrepancyValues* discrepancy,
-                std::vector<Eigen::Vector3d>& out) const;
+                model::OpenLoop& out) const;
 
  private:
-  // Which columns of a path's Jacobian are shared unknowns, and which a recording's own beside the variation.
+  // Which columns of a path's Jacobian are the members' shared unknowns, and which their own in the recording. kNone:
+  // not in this recording.
   struct Columns {
+    static constexpr Eigen::Index kNone = -1;
     std::vector<Eigen::Index> shared, local;
   };
   bool follow(const inference::ModelSet& set, const model::Motion& motion, int recording, const Eigen::VectorXd& shared,
               const Eigen::VectorXd& local, const DiscrepancyValues* discrepancy, Columns* columns,
               model::OpenLoop& path) const;
   Eigen::MatrixXd rows_of(std::size_t recording, const model::OpenLoop& path, bool derivatives) const;
+  // Whether effects and discrepancy act in it.
+  bool acts_in(int recording) const;
+  void add_effects_of_library();
+  void add_common_errors();
+  // The needle of a recording: its own curvature, and what changed.
+  model::NeedleParameters needle_in(const inference::ModelSet& set, int recording, const Eigen::VectorXd& shared,
+                                    const Eigen::VectorXd& local) const;
+  Eigen::Index base_size() const { return static_cast<Eigen::Index>(base_.size()); }
 
   RecordedCase recorded_;
   model::NeedleParameters model_;
@@ -86,6 +103,9 @@ class NeedleSystem final : public inference::System {
   std::vector<inference::Curve> curves_;
   std::vector<std::shared_ptr<const model::Effect>> curve_physics_;  // parts of the curves, in their order
   std::size_t parts_of_curve_ = 0;
+  bool two_groups_, headings_;
+  std::vector<double> common_at_mm_;             // depths at which each channel has a common error; none: no groups
+  std::vector<Eigen::MatrixXd> common_columns_;  // of each recording
 };
 
 }  // namespace bevel::diagnosis

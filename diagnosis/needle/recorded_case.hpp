@@ -9,24 +9,27 @@
 
 namespace bevel::diagnosis {
 
-// One direction in which one camera sees. A camera's information matrix gives them: its eigenvectors of nonzero
-// information.
+// One direction in which one camera (or sensor) sees the tip's position, or the heading's unit vector. The information
+// matrix gives them: its eigenvectors of nonzero information; of a heading, of its x and y components.
 struct Channel {
   int camera = 0;
-  Eigen::Vector3d axis;         // unit vector in {A}
-  std::string name;             // "tip.y"; "tip[2].(0.71 0 0.71)" for a second camera or an oblique axis
-  double claimed_sigma_mm = 0;  // median of what the messages say
+  Eigen::Vector3d axis;   // unit vector in {A}
+  std::string name;       // "tip.y"; "tip[2].(0.71 0 0.71)" for a second camera or an oblique axis; "heading.x"
+  double claimed_sd = 0;  // median of what the messages say, in the channel's unit
+  bool heading = false;
+  const char* unit() const { return heading ? "rad" : "mm"; }  // a small component of a unit vector is an angle
 };
 
-// One channel in one recording: message is an index into the recording's motion.at, measured is in mm along the axis.
+// One channel in one recording: message is an index into the recording's motion.at, measured is along the axis.
 using inference::Series;
 
 struct Recording {
   std::string name;
   model::Motion motion;
   std::vector<Series> series;                // one per channel of the case; may be empty
-  std::vector<Eigen::Vector3d> position_mm;  // raw readings, one per motion.at, for pictures
+  std::vector<Eigen::Vector3d> position_mm;  // raw readings, one per motion.at, for pictures; NaN where it has none
   std::size_t skipped = 0;                   // measurements not used: status not 0, or no axis seen
+  bool changed = false;                      // of the second group, where there are two
   double duration_s() const { return motion.nodes.back().time_s; }
 };
 
@@ -34,6 +37,9 @@ struct RecordedCase {
   std::vector<Channel> channels;
   std::vector<Recording> recordings;
   double frame_s = 0;                // median time between readings of a channel
+  bool has_clock = true;             // false: times are an order, and mean nothing else
+  bool has_headings() const;         // of some channel
+  bool two_groups() const;           // some recordings are of the second group
   std::size_t measurements() const;  // scalar readings in use
 };
 
@@ -41,8 +47,12 @@ struct RawRecording {
   std::string name;
   std::vector<model::ActuatorState> actuators;
   std::vector<model::TipMeasurement> tips;
+  std::vector<model::TipHeading> headings{};
+  bool has_clock = true;
+  bool changed = false;
 };
 
+// Where one recording has no clock, none has: each different time of its readings is one stop, evenly apart.
 // Throws std::invalid_argument, naming the recording and what is wrong: no usable tip measurement, no motion, clocks of
 // camera and axes apart, fewer than two recordings, recordings of different rigs (cameras that see other axes, or frame
 // periods or claimed noise that differ more than threefold).

@@ -89,10 +89,10 @@ class SimulatedLoop {
   bool real_can = false;
   std::map<std::string, process_status_t> statuses;
   std::optional<needle_state_t> needle_state;
-  motion_command_t sent{};              // newest of the controller
-  std::deque<controller::Rates> meant;  // by the controller, each millisecond within the delay of the axes
+  motion_command_t sent{};                 // newest of the controller
+  std::deque<controller::Rates> meant;     // by the controller, each millisecond within the delay of the axes
   std::deque<std::array<double, 2>> told;  // integral of what was sent, mm and rad, within what an axis may lag
-  std::function<void()> each_ms;        // called at the end of each, if set
+  std::function<void()> each_ms;           // called at the end of each, if set
 
  private:
   void install_injector(nodes::Component component, nodes::LcmPort& port);

@@ -112,15 +112,15 @@ TEST(Separation, IsByHowMuchTheRivalRefittedIsWorse) {
     RecordedCase longer = recorded;
     Recording more;
     more.motion = script.motion;
-    std::vector<Eigen::Vector3d> path;
+    model::OpenLoop path;
     ASSERT_TRUE(
         known.system.tip_path(truth.layout.set(), script.motion, -1, truth.shared, true_one.local, nullptr, path));
     for (const auto& channel : recorded.channels) {
       Series series;
-      for (std::size_t i = 0; i < path.size(); ++i) {
+      for (std::size_t i = 0; i < path.position_mm.size(); ++i) {
         series.message.push_back(i);
         series.time_s.push_back(script.motion.nodes[script.motion.at[i]].time_s);
-        series.measured.push_back(channel.axis.dot(path[i]));
+        series.measured.push_back(channel.axis.dot(path.position_mm[i]));
         series.relative_sd.push_back(1);
       }
       more.series.push_back(series);

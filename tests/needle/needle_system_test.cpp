@@ -1,6 +1,7 @@
 // The needle behind the engine's interface, against differences and against the model itself.
 #include "diagnosis/needle/needle_system.hpp"
 
+#include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
 #include <numbers>
@@ -39,7 +40,7 @@ Setting setting_of(const NeedleSystem& system, const std::vector<std::string>& l
   for (const auto& label : labels) out.set = inference::with(out.set, effect_named(system, label));
   const inference::Layout layout(system, out.set);
   out.shared = layout.shared_start();
-  for (Index i = kBaseParameters; i < out.shared.size(); ++i) {
+  for (auto i = static_cast<Index>(system.base().size()); i < out.shared.size(); ++i) {
     const auto& p = *layout.shared()[static_cast<std::size_t>(i)].parameter;
     out.shared[i] = p.starts[p.starts.size() / 2];
   }
@@ -51,10 +52,9 @@ Setting setting_of(const NeedleSystem& system, const std::vector<std::string>& l
 
 class Derivatives : public ::testing::TestWithParam<std::vector<std::string>> {};
 
-TEST_P(Derivatives, AreThoseOfDifferences) {
-  const SimulatedRig rig;
+void expect_derivatives(const SimulatedRig& rig, const std::vector<std::string>& labels) {
   const NeedleSystem system(record_case(rig, 1), rig.needle);
-  const Setting at = setting_of(system, GetParam());
+  const Setting at = setting_of(system, labels);
   inference::Prediction here, up, down;
   ASSERT_TRUE(system.predict(at.set, 1, at.shared, at.local, true, here));
   ASSERT_EQ(here.by_shared.cols(), at.shared.size());
@@ -74,6 +74,12 @@ TEST_P(Derivatives, AreThoseOfDifferences) {
   for (Index i = 0; i < at.local.size(); ++i) check(false, i, here.by_local.col(i));
 }
 
+TEST_P(Derivatives, AreThoseOfDifferences) { expect_derivatives({}, GetParam()); }
+TEST_P(Derivatives, AreThoseOfDifferencesWithHeadings) { expect_derivatives({.heading_sd_rad = 0.004}, GetParam()); }
+TEST_P(Derivatives, AreThoseOfDifferencesInTheChangedGroup) {
+  expect_derivatives({.heading_sd_rad = 0.004, .changed_from = 1}, GetParam());
+}
+
 INSTANTIATE_TEST_SUITE_P(Sets, Derivatives,
                          ::testing::Values(std::vector<std::string>{},
                                            std::vector<std::string>{"layer", "torsional_windup"},
@@ -81,6 +87,74 @@ INSTANTIATE_TEST_SUITE_P(Sets, Derivatives,
                                            std::vector<std::string>{"tissue_motion", "entry_angle"},
                                            std::vector<std::string>{"relaxation", "drilling", "bevel_offset"},
                                            std::vector<std::string>{"stick_slip", "puncture"}));
+
+TEST(NeedleDerivatives, OfWhatHeadingsShowAndOfWhatChanged) {
+  expect_derivatives({.heading_sd_rad = 0.004}, {"sensor_tilt", "cutting_angle"});
+  expect_derivatives({.changed_from = 1}, {"curvature_per_mm", "layer"});
+  expect_derivatives({.changed_from = 1}, {"lambda1_per_rad", "lambda2"});
+}
+
+// In the first group nothing acts, and a needle's change is what it says in the second.
+TEST(TwoGroups, EffectsActInTheSecondAlone) {
+  const SimulatedRig rig{.changed_from = 2};
+  const NeedleSystem system(record_case(rig, 6), rig.needle);
+  Setting at = setting_of(system, {"curvature_per_mm", "camera_scale"});
+  const inference::Layout nothing(system, {});
+  const auto none = nothing.shared_start();
+  inference::Prediction plain, changed;
+  ASSERT_TRUE(system.predict({}, 1, none, at.local, true, plain));
+  ASSERT_TRUE(system.predict(at.set, 1, at.shared, at.local, true, changed));
+  EXPECT_EQ(plain.reading, changed.reading);
+  EXPECT_EQ(changed.by_shared.rightCols(2).norm(), 0);
+  EXPECT_EQ(system.by_curves(1, none).norm(), 0);
+  EXPECT_GT(system.by_curves(2, none).norm(), 0);
+
+  at = setting_of(system, {"curvature_per_mm"});
+  at.shared[at.shared.size() - 1] = 0.2;
+  model::NeedleParameters bent = rig.needle;
+  bent.curvature_per_mm *= 1.2;
+  const NeedleSystem by_hand(record_case(rig, 6), bent);
+  ASSERT_TRUE(system.predict(at.set, 2, at.shared, at.local, false, changed));
+  VectorXd straight = none;
+  straight[kCurvature] = bent.curvature_per_mm;
+  ASSERT_TRUE(by_hand.predict({}, 2, straight, at.local, false, plain));
+  EXPECT_LT((changed.reading - plain.reading).norm(), 1e-9);
+}
+
+// What all recordings share against depth is nobody's change.
+TEST(TwoGroups, ACommonErrorIsTakenUpByTheReadings) {
+  const SimulatedRig rig{.changed_from = 2};
+  const NeedleSystem system(record_case(rig, 6), rig.needle);
+  const inference::Layout nothing(system, {});
+  VectorXd shared = nothing.shared_start();
+  ASSERT_EQ(shared.size(), kBaseParameters + 3 * 8);
+  inference::Prediction plain, shifted;
+  ASSERT_TRUE(system.predict({}, 0, shared, nothing.local_start(), false, plain));
+  shared.segment(kBaseParameters, 8).setConstant(0.7);  // of the first channel, at all depths
+  ASSERT_TRUE(system.predict({}, 0, shared, nothing.local_start(), false, shifted));
+  const auto by_channel = inference::by_channel(system.data().recordings[0], shifted.reading - plain.reading);
+  EXPECT_LT((by_channel[0].array() - 0.7).abs().maxCoeff(), 1e-12);
+  EXPECT_EQ(by_channel[1].norm() + by_channel[2].norm(), 0);
+}
+
+// Where nobody measures a heading, or nobody knows the time, what needs them is no candidate.
+TEST(NeedleSystem, LooksOnlyForWhatTheRecordingsCanShow) {
+  const auto has = [](const NeedleSystem& system, std::string_view name) {
+    return std::ranges::any_of(system.effects(), [&](const auto& effect) { return effect.name == name; });
+  };
+  SimulatedRig rig;
+  EXPECT_FALSE(has(NeedleSystem(record_case(rig, 7), rig.needle), "sensor_tilt"));
+  EXPECT_FALSE(has(NeedleSystem(record_case(rig, 7), rig.needle), "curvature_per_mm"));
+  rig.heading_sd_rad = 0.004;
+  EXPECT_TRUE(has(NeedleSystem(record_case(rig, 7), rig.needle), "sensor_tilt"));
+  auto raw = testing::record(rig, 7);
+  for (auto& one : raw) one.has_clock = false;
+  const NeedleSystem stops(make_case(std::move(raw)), rig.needle);
+  for (const char* name : {"camera_latency", "tissue_motion", "relaxation", "rate_dependence", "lost_steps"})
+    EXPECT_FALSE(has(stops, name)) << name;
+  EXPECT_TRUE(has(stops, "layer"));
+  for (const auto& curve : stops.curves()) EXPECT_THAT(curve.covariate, ::testing::Not(::testing::HasSubstr("_s")));
+}
 
 TEST(NeedleSystem, WithoutEffectsItIsTheModel) {
   const SimulatedRig rig;

@@ -43,8 +43,8 @@ std::vector<std::string> names_of(const RecordedCase& recorded) {
 TEST(Channels, ADiagonalInformationSeesTheAxesItHasInformationAlong) {
   const auto recorded = make_case(with_information([](auto) { return diagonal(0, 25, 16); }));
   EXPECT_THAT(names_of(recorded), ::testing::ElementsAre("tip.y", "tip.z"));
-  EXPECT_NEAR(recorded.channels[0].claimed_sigma_mm, 0.2, 1e-12);
-  EXPECT_NEAR(recorded.channels[1].claimed_sigma_mm, 0.25, 1e-12);
+  EXPECT_NEAR(recorded.channels[0].claimed_sd, 0.2, 1e-12);
+  EXPECT_NEAR(recorded.channels[1].claimed_sd, 0.25, 1e-12);
   const auto& recording = recorded.recordings[0];
   ASSERT_EQ(recording.series[0].measured.size(), recording.position_mm.size());
   for (std::size_t i = 0; i < recording.position_mm.size(); ++i) {
@@ -55,6 +55,51 @@ TEST(Channels, ADiagonalInformationSeesTheAxesItHasInformationAlong) {
             2 * (recorded.recordings[0].position_mm.size() + recorded.recordings[1].position_mm.size()));
 }
 
+// A sensor that sees a heading to all sides gives two channels, by x and y, in the message of its position.
+TEST(Channels, AHeadingIsReadByItsComponents) {
+  const auto recorded = make_case(record({.recordings = 2, .heading_sd_rad = 0.004}, 1));
+  EXPECT_THAT(names_of(recorded), ::testing::ElementsAre("tip.x", "tip.y", "tip.z", "heading.x", "heading.y"));
+  EXPECT_NEAR(recorded.channels[3].claimed_sd, 0.004, 1e-4);
+  EXPECT_STREQ(recorded.channels[3].unit(), "rad");
+  EXPECT_STREQ(recorded.channels[0].unit(), "mm");
+  const auto raw = record({.recordings = 2, .heading_sd_rad = 0.004}, 1);
+  const auto& recording = recorded.recordings[1];
+  ASSERT_EQ(recording.motion.at.size(), raw[1].tips.size()) << "one message each";
+  ASSERT_EQ(recording.series[4].message, recording.series[0].message);
+  for (std::size_t i = 0; i < raw[1].headings.size(); ++i)
+    EXPECT_EQ(recording.series[4].measured[i], raw[1].headings[i].heading.y());
+}
+
+// One camera sees a heading turn in its picture alone: from along x, about x.
+TEST(Channels, AHeadingThatOneCameraSeesHasOneChannel) {
+  auto raw = record({.recordings = 2, .heading_sd_rad = 0.004}, 1);
+  for (auto& recording : raw)
+    for (auto& heading : recording.headings) {
+      const Eigen::Vector3d across = Eigen::Vector3d::UnitX().cross(heading.heading).normalized();
+      heading.information_per_rad2 = across * across.transpose() / (0.01 * 0.01);
+    }
+  const auto recorded = make_case(std::move(raw));
+  EXPECT_THAT(names_of(recorded), ::testing::ElementsAre("tip.x", "tip.y", "tip.z", "heading.y"));
+  EXPECT_NEAR(recorded.channels[3].claimed_sd, 0.01, 1e-3);
+}
+
+// Without a clock the n-th time is the n-th stop, however long it took.
+TEST(Channels, WithoutAClockTimesAreAnOrder) {
+  auto raw = record({.recordings = 2}, 1);
+  for (auto& recording : raw) {
+    recording.has_clock = false;
+    recording.actuators.resize(30);
+    recording.tips.resize(30);
+    for (std::size_t i = 0; i < 30; ++i)
+      recording.tips[i].utime = recording.actuators[i].utime = 1'000'000 + static_cast<std::int64_t>(i * i) * 777'000;
+  }
+  const auto recorded = make_case(std::move(raw));
+  EXPECT_FALSE(recorded.has_clock);
+  const auto& time_s = recorded.recordings[0].series[0].time_s;
+  ASSERT_EQ(time_s.size(), 30U);
+  for (std::size_t i = 2; i < 30; ++i) EXPECT_NEAR(time_s[i] - time_s[i - 1], time_s[1] - time_s[0], 1e-9);
+}
+
 TEST(Channels, AnObliqueInformationSeesAlongItsEigenvectors) {
   // One camera turned about z by 30 degrees, with unequal deviations across.
   const Eigen::Matrix3d turn = Eigen::AngleAxisd(std::numbers::pi / 6, Eigen::Vector3d::UnitZ()).toRotationMatrix();
@@ -63,7 +108,7 @@ TEST(Channels, AnObliqueInformationSeesAlongItsEigenvectors) {
   ASSERT_EQ(recorded.channels.size(), 3U);
   for (const auto& channel : recorded.channels) {
     const double sigma_mm = std::abs(channel.axis.z()) > 0.99 ? 0.5 : channel.axis.x() > channel.axis.y() ? 0.1 : 0.2;
-    EXPECT_NEAR(channel.claimed_sigma_mm, sigma_mm, 1e-9) << channel.name;
+    EXPECT_NEAR(channel.claimed_sd, sigma_mm, 1e-9) << channel.name;
     EXPECT_NEAR((information * channel.axis - channel.axis / (sigma_mm * sigma_mm)).norm(), 0, 1e-9) << channel.name;
   }
 }
@@ -76,7 +121,7 @@ TEST(Channels, ACameraThatSeesNoDepthHasTwo) {
   ASSERT_EQ(recorded.channels.size(), 2U);
   for (const auto& channel : recorded.channels) {
     EXPECT_NEAR(channel.axis.dot(depth), 0, 1e-9);
-    EXPECT_NEAR(channel.claimed_sigma_mm, 0.2, 1e-9);
+    EXPECT_NEAR(channel.claimed_sd, 0.2, 1e-9);
   }
   EXPECT_NEAR(recorded.channels[0].axis.dot(recorded.channels[1].axis), 0, 1e-9);
 }
@@ -94,7 +139,7 @@ TEST(Channels, AnObliqueCamerasOwnRoundingMakesNoNewOnes) {
     return Eigen::Matrix3d((25 + 5 * uniform(random)) * (seen + other));
   }));
   ASSERT_EQ(recorded.channels.size(), 2U);
-  for (const auto& channel : recorded.channels) EXPECT_NEAR(channel.claimed_sigma_mm, 0.2, 0.02);
+  for (const auto& channel : recorded.channels) EXPECT_NEAR(channel.claimed_sd, 0.2, 0.02);
   for (const auto& recording : recorded.recordings)
     for (const auto& series : recording.series) EXPECT_EQ(series.time_s.size(), recording.position_mm.size());
 }

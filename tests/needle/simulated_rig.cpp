@@ -48,7 +48,10 @@ std::vector<RawRecording> record(const SimulatedRig& rig, std::uint64_t seed) {
     auto effects = rig.effects;
     if (rig.effects_in)
       for (const auto& effect : rig.effects_in(r)) effects.push_back(effect);
-    const auto path = model::testing::path_of(rig.needle, effects, model::make_motion(base, utimes));
+    const auto run = model::testing::run(model::AugmentedNeedle(rig.needle, effects), model::make_motion(base, utimes),
+                                         rig.heading_sd_rad > 0);
+    const auto& path = run.position_mm;
+    raw.changed = rig.changed_from >= 0 && r >= rig.changed_from;
     Eigen::MatrixXd noise(static_cast<Eigen::Index>(path.size()), 3);
     for (Eigen::Index i = 0; i < 3; ++i)
       noise.col(i) = coloured_noise(time_s, rig.sigma_mm[i], rig.ar1, rig.frame_s, random);
@@ -62,6 +65,17 @@ std::vector<RawRecording> record(const SimulatedRig& rig, std::uint64_t seed) {
             20 * rig.sigma_mm.mean() * Eigen::Vector3d(normal(random), normal(random), normal(random)).normalized();
       tip.information_per_mm2 = rig.sigma_mm.cwiseAbs2().cwiseInverse().asDiagonal();
       raw.tips.push_back(tip);
+    }
+    for (std::size_t i = 0; i < run.heading.size(); ++i) {
+      model::TipHeading heading;
+      heading.utime = utimes[i];
+      heading.seq = static_cast<std::int64_t>(i);
+      const double sd = rig.heading_sd_rad;
+      const Eigen::Vector3d error(sd * normal(random), sd * normal(random), sd * normal(random));
+      heading.heading = (run.heading[i] + error).normalized();
+      heading.information_per_rad2 =
+          (Eigen::Matrix3d::Identity() - heading.heading * heading.heading.transpose()) / (sd * sd);
+      raw.headings.push_back(heading);
     }
     all.push_back(std::move(raw));
   }

@@ -26,6 +26,8 @@ struct SimulatedRig {
   double ar1 = 0;
   double outlier_share = 0;  // thrown off by 20 sigma along a random direction
   double dropped_share = 0;
+  double heading_sd_rad = 0;  // of the heading's two components across the needle; 0: none is measured
+  int changed_from = -1;      // the first recording of the second group; -1: there is one group
 };
 
 // 7 to 9 s, 60 to 75 mm: turns both ways at several depths, two speeds, a rest, steady turning, retraction.

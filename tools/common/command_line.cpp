@@ -60,6 +60,11 @@ CommandLine& CommandLine::choice(const std::string& names, std::string& value, c
   return *this;
 }
 
+CommandLine& CommandLine::paths(const std::string& names, std::vector<std::string>& values, const std::string& help) {
+  impl_->app.add_option(names, values, help)->expected(1, CLI::detail::expected_max_vector_size)->type_name("PATH");
+  return *this;
+}
+
 CommandLine& CommandLine::check(std::function<std::string()> problem) {
   impl_->checks.push_back(std::move(problem));
   return *this;

@@ -25,6 +25,8 @@ class CommandLine {
   CommandLine& numbers(const std::string& names, std::vector<double>& value, const std::string& help, int count);
   CommandLine& choice(const std::string& names, std::string& value, const std::string& help,
                       const std::vector<std::string>& allowed);
+  // Any number of files or folders after the option.
+  CommandLine& paths(const std::string& names, std::vector<std::string>& values, const std::string& help);
   CommandLine& flag(const std::string& names, bool& value, const std::string& help);
   // Arguments without a name, at least one of them if required.
   CommandLine& arguments(const std::string& name, std::vector<std::string>& values, const std::string& help,

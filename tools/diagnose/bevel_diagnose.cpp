@@ -12,7 +12,10 @@ int main(int argc, char** argv) {
   o.threads = std::clamp(static_cast<int>(std::thread::hardware_concurrency()), 1, 64);
   bevel::tools::CommandLine command_line(
       "bevel-diagnose", "Where the model in use goes wrong, what physics it leaves out, and the model with it.");
-  command_line.arguments("LOG", o.logs, "logs of one rig, at least two")
+  command_line.arguments("LOG", o.logs, "logs of one rig, at least two", false)
+      .paths("--baseline", o.baseline, "with --changed, in place of LOG: logs, or folders of them, as it was")
+      .paths("--changed", o.changed, "the same, as it is now: what changed?")
+      .check([&] { return bevel::diagnose::usage_fault(o); })
       .reads_recordings()
       .option("-m,--model", o.model_path, "the model in use (TOML)", true)
       .option("-o,--out", o.out_folder, "folder for verdict.json, report.html, model.toml and a proposed effect", true)

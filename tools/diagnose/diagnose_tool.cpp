@@ -35,11 +35,18 @@ std::string listed(const std::vector<std::string>& names) {
 
 }  // namespace
 
+std::string usage_fault(const Options& options) {
+  if (options.baseline.empty() != options.changed.empty()) return "--baseline and --changed: one needs the other";
+  if (options.changed.empty() == options.logs.empty())
+    return "recordings are given either as LOG..., or in two groups by --baseline and --changed";
+  return "";
+}
+
 Found find(const Options& options, std::ostream& err) {
   Progress progress(options.quiet ? nullptr : stderr);
   io::ModelFile model = io::load_model_file(options.model_path);
-  progress.say("reading " + std::to_string(options.logs.size()) + " logs");
-  ReadCase input = read_case(options.logs);
+  progress.say("reading logs");
+  ReadCase input = options.changed.empty() ? read_case(options.logs) : read_groups(options.baseline, options.changed);
   for (const auto& remark : input.remarks) err << remark << std::endl;  // before the minutes of work
   const double reading_s = progress.seconds();
   DiagnosisOptions how;
@@ -55,7 +62,7 @@ Found find(const Options& options, std::ostream& err) {
 }
 
 void print_verdict(std::ostream& out, const Findings& f) {
-  out << headline_of(f.verdict) << ": " << f.sentence << "\n\n";
+  out << headline_of(f.verdict, f.two_groups) << ": " << f.sentence << "\n\n";
   for (const auto& effect : f.effects) {
     out << "  " << effect.name << "  probability " << probability(effect.probability)
         << (effect.ambiguous_with.empty() ? "" : ", or " + listed(effect.ambiguous_with)) << '\n';
@@ -72,10 +79,12 @@ void print_verdict(std::ostream& out, const Findings& f) {
         << "; as an effect, " << proposed->name << ", in " << kProposedEffectFile << '\n';
   }
   const auto& n = f.needle;
-  out << "  needle: k " << with_error(n.value.curvature_per_mm, n.curvature_sd_per_mm) << " 1/mm, lambda1 "
-      << with_error(n.value.lambda1_per_rad, n.lambda1_sd_per_rad) << ", lambda2 "
-      << with_error(n.value.lambda2, n.lambda2_sd) << '\n';
+  if (!f.two_groups)
+    out << "  needle: k " << with_error(n.value.curvature_per_mm, n.curvature_sd_per_mm) << " 1/mm, lambda1 "
+        << with_error(n.value.lambda1_per_rad, n.lambda1_sd_per_rad) << ", lambda2 "
+        << with_error(n.value.lambda2, n.lambda2_sd) << '\n';
   const HeldOut& h = f.held_out;
+  if (f.two_groups) out << "  of the second group, each predicted as a new insertion:\n";
   out << "  rms error per axis of recordings predicted from the others: as it stands "
       << measured(h.as_it_stands.rmse_mm) << ", needle refitted " << measured(h.before.rmse_mm)
       << ", with what was found " << measured(h.after.rmse_mm) << ", noise alone " << measured(h.noise_floor.rmse_mm)

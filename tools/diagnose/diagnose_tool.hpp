@@ -14,10 +14,14 @@ namespace bevel::diagnose {
 
 struct Options {
   std::string model_path, out_folder;
-  std::vector<std::string> logs;
+  std::vector<std::string> logs;               // or
+  std::vector<std::string> baseline, changed;  // two groups, files and folders: what changed?
   int threads = 2;
   bool quiet = false;  // no progress on stderr
 };
+
+// What is wrong with which recordings are given; "" if nothing.
+std::string usage_fault(const Options& options);
 
 struct Found {
   diagnosis::Findings findings;

@@ -128,14 +128,14 @@ std::string in_words(std::string_view name) {
   return unit.empty() ? words : words + " (" + std::string(unit) + ")";
 }
 
-std::string headline_of(diagnosis::Verdict verdict) {
+std::string headline_of(diagnosis::Verdict verdict, bool two_groups) {
   switch (verdict) {
     case diagnosis::Verdict::nothing_missing:
-      return "Nothing missing";
+      return two_groups ? "Unchanged" : "Nothing missing";
     case diagnosis::Verdict::effects_found:
-      return "Effects found";
+      return two_groups ? "Changed" : "Effects found";
     case diagnosis::Verdict::unknown_effect:
-      return "Unknown effect";
+      return two_groups ? "Changed, in a way on no list" : "Unknown effect";
   }
   return "";
 }

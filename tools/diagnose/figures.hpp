@@ -32,6 +32,6 @@ bool is_kind_of(std::string_view tried, const diagnosis::FoundEffect& found);
 // The same for a parameter of an effect.
 bool is_kind_of(std::string_view tried, std::string_view effect, std::string_view parameter);
 
-std::string headline_of(diagnosis::Verdict verdict);  // "Effects found", ...
+std::string headline_of(diagnosis::Verdict verdict, bool two_groups = false);  // "Effects found", ...
 
 }  // namespace bevel::diagnose

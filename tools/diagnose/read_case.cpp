@@ -7,6 +7,8 @@
 #include <stdexcept>
 
 #include "io/file_bytes.hpp"
+#include "io/find_logs.hpp"
+#include "io/recording_clock.hpp"
 #include "tools/diagnose/figures.hpp"
 
 namespace bevel::diagnose {
@@ -78,32 +80,72 @@ std::string judge_damage(const std::string& name, const io::Recording& recording
       lost_much(refused_on(recording, "ACTUATOR_STATE"), recording.actuators.size()))
     throw std::runtime_error(name + ": damaged beyond use (" + faults + "); at most " + percent(kLargestLoss) +
                              " of a log, and of the messages of a channel, may be lost");
-  check_motion_known(name, recording.actuators);
+  if (io::has_clock(recording)) check_motion_known(name, recording.actuators);
   if (recording.intact()) return "";
   return name + ": damaged (" + faults + "); what is left of it was used.";
 }
 
-ReadCase read_case(const std::vector<std::string>& logs) {
-  check_each_once(logs);
-  ReadCase result;
-  std::vector<diagnosis::RawRecording> raw;
-  std::vector<io::FileBytes> files;
-  for (std::size_t i = 0; i < logs.size(); ++i) {
-    files.emplace_back(logs[i]);
-    const auto bytes = files.back().bytes();
-    for (std::size_t k = 0; k < i; ++k)
-      if (!bytes.empty() && std::ranges::equal(bytes, files[k].bytes()))
-        throw std::runtime_error(logs[i] + ": the same recording as " + logs[k] +
+namespace {
+
+// Reads logs one after the other; the same recording twice is refused.
+class Reader {
+ public:
+  void add(const std::string& log, const std::string& group, bool changed) {
+    files_.emplace_back(log);
+    paths_.push_back(log);
+    const auto bytes = files_.back().bytes();
+    for (std::size_t k = 0; k + 1 < files_.size(); ++k)
+      if (!bytes.empty() && std::ranges::equal(bytes, files_[k].bytes()))
+        throw std::runtime_error(log + ": the same recording as " + paths_[k] +
                                  "; counted twice it would make everything look surer than it is");
     io::Recording recording = io::read_recording(bytes);
-    recording.file_change = files.back().change();
-    const std::string name = fs::path(logs[i]).filename().string();
+    recording.file_change = files_.back().change();
+    const std::string name = group + fs::path(log).filename().string();
+    const bool has_clock = io::has_clock(recording);
     const std::string remark = judge_damage(name, recording);
-    if (!remark.empty()) result.remarks.push_back(remark);
-    raw.push_back({name, std::move(recording.actuators), std::move(recording.tips)});
+    if (!remark.empty()) result_.remarks.push_back(remark);
+    raw_.push_back({.name = name,
+                    .actuators = std::move(recording.actuators),
+                    .tips = std::move(recording.tips),
+                    .headings = std::move(recording.headings),
+                    .has_clock = has_clock,
+                    .changed = changed});
   }
-  result.recorded = diagnosis::make_case(std::move(raw));
-  return result;
+  ReadCase take() {
+    result_.recorded = diagnosis::make_case(std::move(raw_));
+    return std::move(result_);
+  }
+
+ private:
+  ReadCase result_;
+  std::vector<diagnosis::RawRecording> raw_;
+  std::vector<io::FileBytes> files_;
+  std::vector<std::string> paths_;
+};
+
+}  // namespace
+
+ReadCase read_case(const std::vector<std::string>& logs) {
+  check_each_once(logs);
+  Reader reader;
+  for (const std::string& log : logs) reader.add(log, "", false);
+  return reader.take();
+}
+
+ReadCase read_groups(const std::vector<std::string>& baseline, const std::vector<std::string>& changed) {
+  constexpr std::size_t kFewest = 2;
+  Reader reader;
+  for (const bool second : {false, true}) {
+    const auto logs = io::find_logs(second ? changed : baseline);
+    check_each_once(logs);
+    if (logs.size() < kFewest)
+      throw std::runtime_error(std::string(second ? "--changed" : "--baseline") + ": " + std::to_string(logs.size()) +
+                               " recording; at least " + std::to_string(kFewest) +
+                               " are needed to know how much insertions differ by themselves, and three or more are "
+                               "better");
+    for (const std::string& log : logs) reader.add(log, second ? "changed/" : "baseline/", second);
+  }
+  return reader.take();
 }
 
 }  // namespace bevel::diagnose

@@ -18,6 +18,10 @@ struct ReadCase {
 // much, for a log given twice, for two of one name, and with what diagnosis::make_case says of the rest.
 ReadCase read_case(const std::vector<std::string>& logs);
 
+// Two groups, of logs and of folders that hold them; a recording's name begins with its group's. As above, and a group
+// with fewer than two recordings.
+ReadCase read_groups(const std::vector<std::string>& baseline, const std::vector<std::string>& changed);
+
 // What of a log is missing: "" if nothing, a remark if it does not matter; throws if it does, a motion unknown for a
 // while above all: physics would be blamed for it.
 std::string judge_damage(const std::string& name, const io::Recording& recording);

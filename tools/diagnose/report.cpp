@@ -90,7 +90,7 @@ void add_verdict(io::HtmlReport& page, const Findings& f) {
                     "recordings could have shown\".";
   else
     consequences += held_out_sentence(f);
-  page.callout(tone_of(f.verdict), headline_of(f.verdict) + ". " + f.sentence, consequences);
+  page.callout(tone_of(f.verdict), headline_of(f.verdict, f.two_groups) + ". " + f.sentence, consequences);
 
   std::vector<io::Fact> facts;
   for (const auto& effect : f.effects)

@@ -4,6 +4,7 @@
 #include <nlohmann/json.hpp>
 
 #include "diagnosis/mismatch/effect_source.hpp"
+#include "model/effects/effect.hpp"
 
 namespace bevel::diagnose {
 
@@ -187,20 +188,23 @@ json checks_json(const Checks& c) {
 }  // namespace
 
 std::string verdict_json(const Findings& f) {
-  json j = {
-      {"verdict", name_of(f.verdict)}, {"sentence", f.sentence}, {"effects", json::array()}, {"where", json::array()}};
-  for (const auto& effect : f.effects) j["effects"].push_back(as_json(effect));
+  json j = {{"verdict", name_of(f.verdict, f.two_groups)}, {"sentence", f.sentence}, {"effects", json::array()}};
+  if (f.two_groups) j["changes"] = json::array();
+  for (const auto& effect : f.effects) j[f.two_groups ? "changes" : "effects"].push_back(as_json(effect));
+  j["where"] = json::array();
   for (const auto& location : f.where) j["where"].push_back(as_json(location));
   j["noise"] = {{"sigma_mm", figures(f.noise.sigma)},
                 {"ar1", figure(f.noise.ar1)},
                 {"ar2", figure(f.noise.ar2)},
                 {"outlier_share", figure(f.noise.outlier_share)},
                 {"channels", f.channels},
+                {"units", f.units},
                 {"frame_s", figure(f.noise.frame_s)}};
   j["fit"] = as_json(f.held_out);
   j["detectable"] = detectable_json(f.detectable);
   j["next_experiment"] = experiment_json(f.next_experiment);
-  j["needle"] = {{"before", as_json(f.base)}, {"after", as_json(f.needle)}};
+  if (!f.two_groups)  // else it is held by the common errors, not measured
+    j["needle"] = {{"before", as_json(f.base)}, {"after", as_json(f.needle)}};
   j["posterior"] = {{"nothing_missing", figure(f.nothing_probability)},
                     {"discrepancy", figure(f.discrepancy_probability)},
                     {"not_fitted", figure(f.not_visited)},
@@ -220,10 +224,26 @@ std::string verdict_json(const Findings& f) {
   return j.dump(2, ' ', false, json::error_handler_t::replace) + "\n";
 }
 
+namespace {
+
+// A parameter of the needle, as it is in the second group of recordings.
+void change(model::NeedleParameters& needle, const FoundEffect& changed) {
+  const double by = changed.parameters.front().value;
+  if (changed.name == "curvature_per_mm") needle.curvature_per_mm *= 1 + by;
+  if (changed.name == "lambda1_per_rad") needle.lambda1_per_rad += by;
+  if (changed.name == "lambda2") needle.lambda2 += by;
+}
+
+}  // namespace
+
 io::ModelFile model_of(const Findings& findings, const io::ModelFile& in_use) {
   io::ModelFile model = in_use;  // what was known stays
-  model.needle = findings.needle.value;
+  if (!findings.two_groups) model.needle = findings.needle.value;
   for (const auto& effect : findings.effects) {
+    if (model::find_effect(effect.name) == nullptr) {
+      change(model.needle, effect);
+      continue;
+    }
     io::EffectEntry entry{.name = effect.name};
     for (const auto& p : effect.parameters) entry.parameters[p.name] = p.value;
     for (const auto& r : effect.recordings)

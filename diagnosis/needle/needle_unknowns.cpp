@@ -1,0 +1,266 @@
+// What is unknown of a needle: its parameters, the variation between insertions, the library's effects, what changed,
+// and errors that all recordings share; each with its prior.
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <numbers>
+
+#include "diagnosis/needle/needle_system.hpp"
+
+namespace bevel::diagnosis {
+
+using Eigen::Index;
+using Eigen::MatrixXd;
+using inference::ModelSet;
+using inference::Scope;
+
+namespace {
+
+// The lab's own belief in its model file: half of k, and all of Table I and beyond for lambda.
+constexpr double kCurvatureShare = 0.5;
+constexpr double kUWidth_per_rad = 0.5;
+constexpr double kLambda2Width = 0.3;
+constexpr double kCurvatureMax_per_mm = 0.05;
+constexpr double kSmallestU = 1e-9;      // (26) is strict
+constexpr double kExpectedShare = 0.75;  // scale of a size's prior, of the largest that is reported
+constexpr double kFewestReadings = 2.5;  // a period
+constexpr double kFewestPeriods = 1.5;   // of the longest recording
+constexpr std::size_t kMostKnown = 2;    // beside the variation, three effects and the parts of a curve: kMaxEffects
+
+// By how much a parameter of the needle changed from one group of recordings to the other; NeedleSystem::needle_in
+// knows what it does.
+class NeedleChange final : public model::Effect {
+ public:
+  NeedleChange(std::string_view name, std::string_view meaning, model::EffectParameter parameter)
+      : Effect({.name = name,
+                .meaning = meaning,
+                .covariate = model::Covariate::depth_mm,
+                .parameters = {std::move(parameter)}}) {}
+};
+// In the order of BaseParameter. Reported: phantoms and tissues of one lab, as far as Table I is apart.
+const std::array<const model::Effect*, kBaseParameters>& needle_changes() {
+  static const NeedleChange curvature(
+      "curvature_per_mm", "the needle's curvature changed",
+      {.name = "change_relative", .lower = -0.95, .upper = 3, .none = 0, .starts = {0.05}, .reported = 0.5});
+  static const NeedleChange lambda1(
+      "lambda1_per_rad", "the needle's slip changed",
+      {.name = "change_per_rad", .lower = -3, .upper = 3, .none = 0, .starts = {0.05}, .reported = 0.5});
+  static const NeedleChange lambda2(
+      "lambda2", "the needle's slip while turning changed",
+      {.name = "change", .lower = -1.5, .upper = 1.5, .none = 0, .starts = {0.05}, .reported = 0.3});
+  static const std::array<const model::Effect*, kBaseParameters> all{&curvature, &lambda1, &lambda2};
+  return all;
+}
+
+// What the field reports of repeated insertions: curvature 10 to 40 % in tissue, a few in gelatin; entry angles of
+// 0.2 to 0.7 degrees; registration of some tenths of a millimetre; a bevel set by hand to a few degrees.
+std::vector<inference::NuisanceGroup> variation_groups() {
+  return {{"curvature", "relative", {0, 0.02, 0.05, 0.12, 0.3}},
+          {"entry_angle", "rad", {0, 0.003, 0.007, 0.015, 0.03}},
+          {"entry_point", "mm", {0, 0.05, 0.12, 0.3, 0.8}},
+          {"roll", "rad", {0, 0.015, 0.04, 0.1}}};
+}
+
+double reach_of(const model::EffectParameter& p) {
+  if (p.reported > 0) return p.reported;
+  double reach = 0;
+  for (const double start : p.starts) reach = std::max(reach, 2 * std::abs(start - p.none));
+  return reach;
+}
+
+inference::Prior prior_of(const model::EffectParameter& p, double lower, double upper) {
+  if (p.periodic && std::isnan(p.none)) return inference::flat_prior(lower, upper);
+  if (std::isnan(p.none)) {
+    const double low = *std::min_element(p.starts.begin(), p.starts.end());
+    const double high = std::max(*std::max_element(p.starts.begin(), p.starts.end()), p.reported);
+    return inference::flat_prior(low < high ? low : 0.5 * low, low < high ? high : 2 * high);
+  }
+  auto prior = inference::size_prior(p.none, kExpectedShare * reach_of(p), lower, upper);
+  prior.least_distance = p.smallest_seen;
+  prior.largest = p.largest_seen;
+  return prior;
+}
+
+inference::Parameter parameter_of(const model::EffectParameter& p, const RecordedCase& recorded) {
+  double longest_s = 0;
+  for (const auto& recording : recorded.recordings) longest_s = std::max(longest_s, recording.duration_s());
+  inference::Parameter out{.name = std::string(p.name),
+                           .lower = p.lower,
+                           .upper = p.upper,
+                           .none = p.none,
+                           .starts = p.starts,
+                           .prior = {},
+                           .scope = Scope::shared,
+                           .periodic = p.periodic,
+                           .shape = p.shape,
+                           .half_turns = p.half_turns};
+  if (p.scope == model::Scope::recording) out.scope = p.periodic ? Scope::phase : Scope::instant;
+  if (p.frequency) {
+    // Hardly more than a period in the longest recording is a drift, and readings too far apart show another frequency.
+    out.lower = std::max(out.lower, kFewestPeriods / std::max(longest_s, 1e-3));
+    out.upper = std::max(out.lower, std::min(out.upper, 1 / (kFewestReadings * recorded.frame_s)));
+    std::erase_if(out.starts, [&](double start) { return start < out.lower || start > out.upper; });
+    if (out.starts.empty()) out.starts = {out.lower};
+  }
+  out.prior = out.scope == Scope::instant ? inference::flat_prior(0, longest_s) : prior_of(p, out.lower, out.upper);
+  return out;
+}
+
+std::string label_of(const model::Effect& effect, std::uint32_t variant) {
+  std::string label(effect.name());
+  if (effect.variants().size() < 2) return label;
+  for (std::size_t p = 0; p < effect.parameters().size(); ++p)
+    if ((variant >> p & 1U) != 0 && effect.parameters()[p].scope == model::Scope::rig)
+      label += " (" + std::string(effect.parameters()[p].name.substr(0, effect.parameters()[p].name.find('_'))) + ")";
+  return label;
+}
+
+inference::Dataset data_of(const RecordedCase& recorded) {
+  inference::Dataset out;
+  for (const auto& channel : recorded.channels) out.claimed_sd.push_back(channel.claimed_sd);
+  out.frame_s = recorded.frame_s;
+  for (const auto& recording : recorded.recordings) {
+    inference::SeriesSet set;
+    set.messages = recording.motion.at.size();
+    set.duration_s = recording.duration_s();
+    set.series = recording.series;
+    out.recordings.push_back(std::move(set));
+  }
+  return out;
+}
+
+}  // namespace
+
+NeedleSystem::NeedleSystem(RecordedCase recorded, const model::NeedleParameters& model, KnownPhysics known)
+    : recorded_(std::move(recorded)),
+      model_(model),
+      known_(std::move(known)),
+      data_(data_of(recorded_)),
+      groups_(variation_groups()),
+      two_groups_(recorded_.two_groups()),
+      headings_(recorded_.has_headings()) {
+  if (known_.elsewhere.size() > kMostKnown)
+    throw std::invalid_argument("the model in use has " + std::to_string(known_.elsewhere.size()) +
+                                " effects and discrepancies; at most " + std::to_string(kMostKnown) +
+                                " can be held while more is looked for");
+  const double u = std::max(model.lambda1_per_rad - model.lambda2 * model.lambda2 / (2 * std::numbers::pi), kSmallestU);
+  const double width_k = kCurvatureShare * std::max(std::abs(model.curvature_per_mm), 1e-4);
+  base_ = {{.name = "curvature_per_mm",
+            .lower = -kCurvatureMax_per_mm,
+            .upper = kCurvatureMax_per_mm,
+            .none = 0,
+            .starts = {},
+            .prior = inference::normal_prior(model.curvature_per_mm, width_k)},
+           {.name = "u_per_rad",
+            .lower = kSmallestU,
+            .upper = 5,
+            .none = 0,
+            .starts = {},
+            .prior = inference::normal_prior(u, kUWidth_per_rad)},
+           {.name = "lambda2",
+            .lower = -2,
+            .upper = 0.9,
+            .none = 0,
+            .starts = {},
+            .prior = inference::normal_prior(model.lambda2, kLambda2Width)}};
+  nuisances_ = {{"curvature", 0}, {"tilt_x_rad", 1}, {"tilt_y_rad", 1},
+                {"roll_rad", 3},  {"entry_x_mm", 2}, {"entry_y_mm", 2}};
+  add_effects_of_library();
+  if (two_groups_) add_common_errors();
+  std::vector<const model::Motion*> motions;
+  for (const auto& recording : recorded_.recordings) motions.push_back(&recording.motion);
+  needle_curves_ = find_curves(motions);
+  if (!recorded_.has_clock)
+    std::erase_if(needle_curves_, [](const NeedleCurve& curve) { return model::needs_clock(curve.covariate); });
+  for (const NeedleCurve& curve : needle_curves_) {
+    curves_.push_back(curve.curve);
+    parts_of_curve_ = (curve.curve.at.size() + kValuesOfPart - 1) / kValuesOfPart;
+    for (std::size_t first = 0; first < curve.curve.at.size(); first += kValuesOfPart)
+      curve_physics_.push_back(make_curve_part(curve, first));
+  }
+}
+
+void NeedleSystem::add_effects_of_library() {
+  const auto add = [&](const model::Effect& effect) {
+    for (const std::uint32_t variant : effect.variants()) {
+      inference::Effect one{.name = std::string(effect.name()), .label = label_of(effect, variant), .parameters = {}};
+      for (std::size_t p = 0; p < effect.parameters().size(); ++p)
+        if ((variant >> p & 1U) != 0) one.parameters.push_back(parameter_of(effect.parameters()[p], recorded_));
+      // Where only some parameters are fitted, a partner's place moves with them; none of those has one.
+      effects_.push_back(std::move(one));
+      physics_.push_back(&effect);
+      variants_.push_back(variant);
+    }
+  };
+  for (const model::Effect* effect : model::all_effects()) {
+    const bool known = std::any_of(known_.elsewhere.begin(), known_.elsewhere.end(),
+                                   [&](const auto& one) { return one.effect == effect; });
+    const bool shown =
+        (recorded_.has_clock || !model::needs_clock(effect->covariate())) && (headings_ || !effect->of_headings());
+    // Without a parameter it is a convention of the model file, and no convention changes between two groups.
+    const bool may_change = !two_groups_ || !effect->parameters().empty();
+    if (!known && shown && may_change) add(*effect);
+  }
+  if (two_groups_)
+    for (const model::Effect* change : needle_changes()) add(*change);
+}
+
+void NeedleSystem::add_common_errors() {
+  constexpr int kDepths = 8;
+  constexpr double kWide_mm = 10, kWide_rad = 0.3;  // so much that they cost the same in every set
+  double deepest_mm = 0;
+  for (const auto& recording : recorded_.recordings)
+    for (const auto& node : recording.motion.nodes) deepest_mm = std::max(deepest_mm, node.insertion_mm);
+  for (int i = 0; i < kDepths; ++i) common_at_mm_.push_back(deepest_mm * i / (kDepths - 1));
+  for (const Channel& channel : recorded_.channels)
+    for (const double at_mm : common_at_mm_) {
+      const double wide = channel.heading ? kWide_rad : kWide_mm;
+      base_.push_back({.name = "error_of_" + channel.name + "_at_" + std::to_string(std::lround(at_mm)) + "_mm",
+                       .lower = -1e3 * wide,
+                       .upper = 1e3 * wide,
+                       .none = 0,
+                       .starts = {},
+                       .prior = inference::normal_prior(0, wide)});
+    }
+  for (std::size_t r = 0; r < recorded_.recordings.size(); ++r) {
+    const auto& recording = recorded_.recordings[r];
+    MatrixXd columns = MatrixXd::Zero(data_.recordings[r].rows(), base_size() - kBaseParameters);
+    Index row = 0;
+    for (std::size_t c = 0; c < recording.series.size(); ++c)
+      for (const std::size_t reading : recording.series[c].message) {
+        const double depth_mm = recording.motion.nodes[recording.motion.at[reading]].insertion_mm;
+        const auto weights = model::weights_at(common_at_mm_, false, depth_mm);
+        for (std::size_t i = 0; i < 2; ++i)
+          columns(row, static_cast<Index>(c * common_at_mm_.size() + weights.knot[i])) += weights.weight[i];
+        ++row;
+      }
+    common_columns_.push_back(std::move(columns));
+  }
+}
+
+int NeedleSystem::changed_parameter(std::size_t effect) const {
+  const auto& changes = needle_changes();
+  const auto at = std::find(changes.begin(), changes.end(), physics_[effect]);
+  return at == changes.end() ? -1 : static_cast<int>(at - changes.begin());
+}
+
+bool NeedleSystem::allows(const ModelSet& set) const {
+  std::size_t columns = kBaseParameters + 3;  // and tilt and roll of each insertion
+  for (std::size_t i = 0; i < set.size(); ++i) {
+    columns += effects_[set[i]].parameters.size();
+    for (std::size_t j = 0; j < i; ++j)
+      if (physics_[set[i]] == physics_[set[j]]) return false;
+  }
+  return columns <= static_cast<std::size_t>(model::kMaxColumns);
+}
+
+const model::EffectParameter& NeedleSystem::parameter(std::size_t effect, std::size_t parameter) const {
+  const auto& all = physics_[effect]->parameters();
+  std::size_t p = 0;
+  // Those of this kind alone are fitted.
+  for (std::size_t fitted = 0;; ++p)
+    if ((variants_[effect] >> p & 1U) != 0 && fitted++ == parameter) break;
+  return all[p];
+}
+
+}  // namespace bevel::diagnosis
