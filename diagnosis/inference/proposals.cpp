@@ -188,6 +188,8 @@ Proposal Proposals::judge(const Candidate& candidate, std::size_t e, const Margi
   Xw -= XZ * beside.step();
   Proposal out{.effect = e, .starts = {}};
   std::vector<double> logs;
+  const bool sizes_have_grid =
+      std::ranges::any_of(candidate.amplitudes, [&](std::size_t a) { return effect.parameters[a].starts.size() > 1; });
   for (const Signature& signature : candidate.signatures) {
     const auto across = XZ.middleRows(signature.first, width);
     MatrixXd square = XX.middleCols(signature.first, width) - across * beside.covariance() * across.transpose();
@@ -217,7 +219,10 @@ Proposal Proposals::judge(const Candidate& candidate, std::size_t e, const Margi
       }
     }
     logs.push_back(start.log_bayes_factor);
-    out.starts.push_back(std::move(start));
+    out.starts.push_back(start);
+    // Where sizes have a grid, the form depends on the size, and the one of the grid is the form that was looked at.
+    start.shared = shared_part(effect, signature.values);
+    if (sizes_have_grid) out.starts.push_back(std::move(start));
   }
   out.log_bayes_factor = log_sum(logs) - std::log(static_cast<double>(logs.size()));
   keep_best(out.starts, starts);

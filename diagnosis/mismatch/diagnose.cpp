@@ -72,6 +72,32 @@ void remark_on_clock(const NeedleSystem& system, Findings& findings) {
                              left_out + ")");
 }
 
+// Where the posterior is as wide as the belief that the model file is.
+void remark_on_beliefs(const NeedleSystem& system, const NeedleEstimate& needle, Findings& findings) {
+  constexpr double kAsWide = 0.8;
+  if (findings.two_groups) return;
+  const auto belief_sd = [&](BaseParameter p) {
+    return 1 / std::sqrt(inference::precision_of(system.base()[p].prior));
+  };
+  std::string held;
+  const auto look = [&](const char* name, double sd, BaseParameter p) {
+    if (sd > kAsWide * belief_sd(p)) held += (held.empty() ? "" : ", ") + std::string(name);
+  };
+  look("curvature_per_mm", needle.curvature_sd_per_mm, kCurvature);
+  look("lambda1_per_rad", needle.lambda1_sd_per_rad, kU);
+  look("lambda2", needle.lambda2_sd, kLambda2);
+  if (!held.empty())
+    findings.remarks.push_back(
+        held +
+        ": held by the model file, of which these recordings say next to nothing; insertions that turn, at two "
+        "speeds and both ways, and paths that bend would measure it");
+  const double k = needle.value.curvature_per_mm, believed = system.model().curvature_per_mm;
+  if (k * believed < 0 || std::abs(k) < 2 * needle.curvature_sd_per_mm)
+    findings.remarks.push_back(
+        "the needle's curvature cannot be told from none, or is on the other side than the model file's: check the "
+        "frame and the bevel's side, and record insertions that bend, at two roll angles, before this model is used");
+}
+
 void remark_on_groups(const RecordedCase& recorded, Findings& findings) {
   constexpr std::ptrdiff_t kComfortable = 4;
   if (!recorded.two_groups()) return;
@@ -208,6 +234,7 @@ Findings diagnose(const RecordedCase& recorded, const model::NeedleParameters& m
   remark_on_short_recordings(recorded, findings);
   remark_on_clock(system, findings);
   remark_on_groups(recorded, findings);
+  remark_on_beliefs(system, findings.needle, findings);
   remark_on_bounds(findings);
   findings.sentence = sentence_of(findings);
   stages.end();

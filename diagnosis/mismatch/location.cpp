@@ -74,6 +74,7 @@ std::vector<Location> locate(const NeedleSystem& system, const ChosenModel& befo
   double total = 0;
   for (std::size_t r = 0; r < system.recorded().recordings.size(); ++r) {
     const Recording& recording = system.recorded().recordings[r];
+    if (system.recorded().two_groups() && !recording.changed) continue;
     const auto white_before = white_of(before, r);
     const auto white_after = white_of(after, r);
     const auto covariates = find_covariates(recording.motion);

@@ -68,11 +68,12 @@ double reach_of(const model::EffectParameter& p) {
   return reach;
 }
 
-inference::Prior prior_of(const model::EffectParameter& p, double lower, double upper) {
+inference::Prior prior_of(const model::EffectParameter& p, const std::vector<double>& starts, double lower,
+                          double upper) {
   if (p.periodic && std::isnan(p.none)) return inference::flat_prior(lower, upper);
   if (std::isnan(p.none)) {
-    const double low = *std::min_element(p.starts.begin(), p.starts.end());
-    const double high = std::max(*std::max_element(p.starts.begin(), p.starts.end()), p.reported);
+    const double low = *std::min_element(starts.begin(), starts.end());
+    const double high = std::max(*std::max_element(starts.begin(), starts.end()), p.reported);
     return inference::flat_prior(low < high ? low : 0.5 * low, low < high ? high : 2 * high);
   }
   auto prior = inference::size_prior(p.none, kExpectedShare * reach_of(p), lower, upper);
@@ -81,9 +82,17 @@ inference::Prior prior_of(const model::EffectParameter& p, double lower, double 
   return prior;
 }
 
+double deepest_of(const RecordedCase& recorded) {
+  double deepest_mm = 0;
+  for (const auto& recording : recorded.recordings)
+    for (const auto& node : recording.motion.nodes) deepest_mm = std::max(deepest_mm, node.insertion_mm);
+  return deepest_mm;
+}
+
 inference::Parameter parameter_of(const model::EffectParameter& p, const RecordedCase& recorded) {
   double longest_s = 0;
   for (const auto& recording : recorded.recordings) longest_s = std::max(longest_s, recording.duration_s());
+  const double deepest_mm = deepest_of(recorded);
   inference::Parameter out{.name = std::string(p.name),
                            .lower = p.lower,
                            .upper = p.upper,
@@ -102,7 +111,11 @@ inference::Parameter parameter_of(const model::EffectParameter& p, const Recorde
     std::erase_if(out.starts, [&](double start) { return start < out.lower || start > out.upper; });
     if (out.starts.empty()) out.starts = {out.lower};
   }
-  out.prior = out.scope == Scope::instant ? inference::flat_prior(0, longest_s) : prior_of(p, out.lower, out.upper);
+  // Nobody sees what begins deeper than anybody went.
+  if (p.begins == model::Begins::depth)
+    std::erase_if(out.starts, [&](double start) { return start > deepest_mm && start > p.starts.front(); });
+  out.prior =
+      out.scope == Scope::instant ? inference::flat_prior(0, longest_s) : prior_of(p, out.starts, out.lower, out.upper);
   return out;
 }
 
@@ -208,9 +221,7 @@ void NeedleSystem::add_effects_of_library() {
 void NeedleSystem::add_common_errors() {
   constexpr int kDepths = 8;
   constexpr double kWide_mm = 10, kWide_rad = 0.3;  // so much that they cost the same in every set
-  double deepest_mm = 0;
-  for (const auto& recording : recorded_.recordings)
-    for (const auto& node : recording.motion.nodes) deepest_mm = std::max(deepest_mm, node.insertion_mm);
+  const double deepest_mm = deepest_of(recorded_);
   for (int i = 0; i < kDepths; ++i) common_at_mm_.push_back(deepest_mm * i / (kDepths - 1));
   for (const Channel& channel : recorded_.channels)
     for (const double at_mm : common_at_mm_) {

@@ -23,7 +23,7 @@ class Puncture final : public Effect {
                                 .lower = 0,
                                 .upper = 15,
                                 .none = 0,
-                                .starts = {0.3, 1.0},
+                                .starts = {0.4, 1.2, 3.5},
                                 .reported = 5}}}) {}
 
   void axes(Parameters p, const LegView& leg, EffectMemory& memory, Dual& insertion_mm,

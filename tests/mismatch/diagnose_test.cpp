@@ -113,6 +113,22 @@ TEST(Diagnose, FindsWindupAndSaysSoInEveryPlace) {
               4 * found.needle.curvature_sd_per_mm);
 }
 
+// Its readings are no multiple of a small membrane's: where it breaks moves with how far it gives way.
+TEST(Diagnose, FindsAMembraneThatGivesWayFarAndOneThatHardlyDoes) {
+  for (const double indentation_mm : {4.5, 0.8}) {
+    const Findings found = findings_of({.effects = {active("puncture", {21.3, indentation_mm})},
+                                        .recordings = 6,
+                                        .sigma_mm = {0.1, 0.1, 0.13},
+                                        .ar1 = 0.6},
+                                       5);
+    ASSERT_EQ(found.effects.size(), 1U) << found.sentence << ' ' << indentation_mm;
+    EXPECT_EQ(found.effects[0].name, "puncture");
+    EXPECT_NEAR(found.effects[0].parameters[0].value, 21.3, 0.2);
+    // Some of its few readings may pass for outliers: how far it gave way is then not known well, and that is said.
+    EXPECT_NEAR(found.effects[0].parameters[1].value, indentation_mm, 3 * found.effects[0].parameters[1].std_error);
+  }
+}
+
 TEST(Diagnose, WhereNothingIsMissingSaysHowSmallItWouldHaveSeen) {
   const Findings found = findings_of({.recordings = 4, .ar1 = 0.8}, 2);
   EXPECT_EQ(found.verdict, Verdict::nothing_missing) << found.sentence;

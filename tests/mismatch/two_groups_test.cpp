@@ -47,6 +47,8 @@ TEST(TwoGroups, AnEffectThatCameIsNamedBesideWhatWasThere) {
   ASSERT_EQ(found.effects.size(), 1U) << found.sentence;
   EXPECT_EQ(found.effects[0].name, "torsional_windup");
   EXPECT_NEAR(found.effects[0].parameters[0].value, 0.6, 4 * found.effects[0].parameters[0].std_error);
+  for (const Location& where : found.where)
+    EXPECT_THAT(where.log, ::testing::AnyOf("rec5", "rec6", "rec7", "rec8")) << "of the second group";
   EXPECT_GT(found.held_out.gain, 12);
 }
 
@@ -59,6 +61,34 @@ TEST(TwoGroups, ANeedleThatBendsMoreIsNamedByItsParameter) {
   EXPECT_EQ(found.effects[0].name, "curvature_per_mm");
   EXPECT_EQ(found.effects[0].parameters[0].name, "change_relative");
   EXPECT_NEAR(found.effects[0].parameters[0].value, 0.25, 4 * found.effects[0].parameters[0].std_error);
+}
+
+// Registration: a shift of the second group alone looks like insertions that differ more, until it has a name.
+TEST(TwoGroups, AShiftIsNotTakenForInsertionsThatDiffer) {
+  SimulatedRig after{.effects = kCommon};
+  after.effects.push_back(active("entry_point", {1.2, -0.6}));
+  const Findings found = what_changed({.effects = kCommon}, after);
+  ASSERT_EQ(found.effects.size(), 1U) << found.sentence;
+  EXPECT_EQ(found.effects[0].name, "entry_point");
+}
+
+// What the recordings say nothing of is said to be held by the model file.
+TEST(Beliefs, ANeedleThatNeverTurnsSaysNothingOfItsSlip) {
+  auto raw = record({.recordings = 4}, kSeed);
+  for (auto& one : raw) {
+    model::testing::Script straight{{8, 2.5, 0}};
+    one.actuators = straight.actuators(0.02);
+    std::vector<std::int64_t> utimes;
+    for (auto& tip : one.tips) utimes.push_back(tip.utime);
+    const auto path = model::testing::path_of(model::testing::agar(), {}, model::make_motion(one.actuators, utimes));
+    for (std::size_t i = 0; i < path.size(); ++i) {
+      const double noise_mm = 0.3 * std::sin(37.0 * static_cast<double>(i) + static_cast<double>(&one - raw.data()));
+      one.tips[i].position_mm = path[i] + Eigen::Vector3d::Constant(noise_mm);
+    }
+  }
+  const Findings found = diagnose(make_case(std::move(raw)), model::testing::agar(), {});
+  EXPECT_THAT(found.remarks,
+              ::testing::Contains(::testing::AllOf(HasSubstr("held by the model file"), HasSubstr("lambda1_per_rad"))));
 }
 
 // A sensor askew leaves the path alone: only its headings show it.

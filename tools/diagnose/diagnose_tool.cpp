@@ -84,12 +84,14 @@ void print_verdict(std::ostream& out, const Findings& f) {
         << with_error(n.value.lambda1_per_rad, n.lambda1_sd_per_rad) << ", lambda2 "
         << with_error(n.value.lambda2, n.lambda2_sd) << '\n';
   const HeldOut& h = f.held_out;
-  if (f.two_groups) out << "  of the second group, each predicted as a new insertion:\n";
-  out << "  rms error per axis of recordings predicted from the others: as it stands "
-      << measured(h.as_it_stands.rmse_mm) << ", needle refitted " << measured(h.before.rmse_mm)
-      << ", with what was found " << measured(h.after.rmse_mm) << ", noise alone " << measured(h.noise_floor.rmse_mm)
-      << " mm; chi2 per reading, refitted " << measured(h.before.chi2_per_dof) << ", with what was found "
-      << measured(h.after.chi2_per_dof) << '\n';
+  const std::string refitted = f.two_groups ? "by what both share " : "needle refitted ";
+  const std::string found = f.two_groups ? "with the change " : "with what was found ";
+  out << (f.two_groups ? "  rms error per axis of the second group's recordings, predicted from all others: "
+                       : "  rms error per axis of recordings predicted from the others: as it stands " +
+                             measured(h.as_it_stands.rmse_mm) + ", ")
+      << refitted << measured(h.before.rmse_mm) << ", " << found << measured(h.after.rmse_mm) << ", noise alone "
+      << measured(h.noise_floor.rmse_mm) << " mm; chi2 per reading, " << refitted << measured(h.before.chi2_per_dof)
+      << ", " << found << measured(h.after.chi2_per_dof) << '\n';
   out << "  insertions differ by (standard deviation):";
   for (const auto& v : f.variation) out << (&v == f.variation.data() ? " " : ", ") << variation_in_words(v);
   out << '\n';

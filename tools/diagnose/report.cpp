@@ -43,6 +43,12 @@ std::string sizes_of(const FoundEffect& effect) {
 
 std::string held_out_sentence(const Findings& f) {
   const HeldOut& h = f.held_out;
+  if (f.two_groups)
+    return "The second group's recordings, each predicted as a new insertion, are off by " +
+           measured(h.before.rmse_mm) + " mm (rms per axis) by what both groups share, and with the change by " +
+           measured(h.after.rmse_mm) + " mm; noise alone would be " + measured(h.noise_floor.rmse_mm) +
+           " mm. chi2 per reading goes from " + measured(h.before.chi2_per_dof) + " to " +
+           measured(h.after.chi2_per_dof) + " (1: as far off as the model says it may be).";
   const std::string with =
       f.discrepancies.empty() ? "with what was found" : "with the discrepancy below that describes the rest";
   return "On recordings that it was not fitted to, the model file as it stands is off by " +
@@ -81,7 +87,12 @@ bool has_rivals(const Findings& f) {
 void add_verdict(io::HtmlReport& page, const Findings& f) {
   std::string consequences;
   for (const auto& effect : f.effects) consequences += sizes_of(effect) + ". ";
-  if (f.verdict == Verdict::nothing_missing)
+  if (f.verdict == Verdict::nothing_missing && f.two_groups)
+    consequences += "The second group's recordings are predicted by what both share to " +
+                    measured(f.held_out.before.rmse_mm) + " mm (rms per axis), of which noise alone is " +
+                    measured(f.held_out.noise_floor.rmse_mm) +
+                    " mm. Nothing above the sizes listed under \"What these recordings could have shown\".";
+  else if (f.verdict == Verdict::nothing_missing)
     consequences += "With its needle refitted, the model is off by " + measured(f.held_out.before.rmse_mm) +
                     " mm (rms per axis) on recordings that it was not fitted to, of which noise alone is " +
                     measured(f.held_out.noise_floor.rmse_mm) + " mm; chi2 per reading " +
@@ -119,6 +130,14 @@ void add_what_to_do(io::HtmlReport& page, const Findings& f) {
   std::vector<std::string> todo;
   for (const auto& effect : f.effects)
     if (!effect.meaning.empty()) todo.push_back(effect.name + " means: " + effect.meaning + ".");
+  if (f.two_groups) {
+    todo.emplace_back(
+        f.verdict == Verdict::nothing_missing
+            ? "Read the table of detectable sizes before you rule a change out: a smaller one may well be there."
+            : "model.toml is the model in use with what changed; the rest of it is as it was.");
+    page.heading("What to do").list(todo);
+    return;
+  }
   switch (f.verdict) {
     case Verdict::nothing_missing:
       todo.emplace_back("Keep the physics of the model. Its needle refitted to these recordings is in model.toml.");
@@ -159,6 +178,12 @@ void add_parameters(io::HtmlReport& page, const Findings& f) {
         picture,
         "What was found, with 95 % intervals over all explanations that hold the effect, with and without a "
         "discrepancy beside it. An interval that reaches the diamond would be no evidence of an effect.");
+  if (f.two_groups) {
+    page.paragraph(
+        "The needle itself is not measured between two groups: what all recordings get wrong alike, against depth, is "
+        "fitted along with it and takes its place.");
+    return;
+  }
   const auto fitted = [](const NeedleEstimate& n) {
     return std::array{with_error(n.value.curvature_per_mm, n.curvature_sd_per_mm),
                       with_error(n.value.lambda1_per_rad, n.lambda1_sd_per_rad),
@@ -303,7 +328,7 @@ void add_paths(io::HtmlReport& page, const Findings& f) {
 }
 
 std::string report_html(const Findings& findings, const std::string& model_path) {
-  io::HtmlReport page("What the model leaves out");
+  io::HtmlReport page(findings.two_groups ? "What changed" : "What the model leaves out");
   add_verdict(page, findings);
   add_what_to_do(page, findings);
   add_parameters(page, findings);

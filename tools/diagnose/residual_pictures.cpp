@@ -20,6 +20,7 @@ constexpr std::size_t kMostPoints = 1200;  // in one panel, of each model
 // Index of the coordinate that a channel sees, or -1.
 int coordinate_of(const std::string& channel) {
   const auto dot = channel.rfind('.');
+  if (channel.starts_with("heading")) return -1;
   if (dot == std::string::npos || dot + 2 != channel.size()) return -1;
   const char axis = channel.back();
   return axis >= 'x' && axis <= 'z' ? axis - 'x' : -1;
