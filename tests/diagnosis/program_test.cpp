@@ -102,6 +102,53 @@ TEST_F(Program, FindsAConcealedEffectAndWritesAllThreeFiles) {
   EXPECT_EQ(text_of(folder / "again/verdict.json"), text_of(folder / "out/verdict.json"));
 }
 
+// Two groups, one of them a folder; a log's name is told from the same name in the other group.
+TEST_F(Program, SaysWhatChangedBetweenTwoGroups) {
+  std::vector<std::string> words{
+      "--quiet",  "--model", model_path, "--out", (folder / "out").string(), "--baseline", (folder / "before").string(),
+      "--changed"};
+  for (const char* group : {"before", "after"}) {
+    fs::create_directories(folder / group);
+    const bool changed = std::string(group) == "after";
+    for (int i = 0; i < 2; ++i) {
+      const fs::path path = folder / group / ("rec0" + std::to_string(i + 1) + ".lcm");
+      diagnosis::testing::write_log(path, {.script = i + (changed ? 2 : 0)});
+      if (changed) words.push_back(path.string());
+    }
+  }
+  const Said said = run(words);
+  ASSERT_EQ(said.status, 0) << said.err;
+  EXPECT_THAT(said.out, AllOf(HasSubstr("Unchanged"), HasSubstr("by what both share")));
+  const auto verdict = nlohmann::json::parse(text_of(folder / "out/verdict.json"));
+  EXPECT_EQ(verdict["verdict"], "unchanged");
+  EXPECT_TRUE(verdict["effects"].empty());
+  EXPECT_TRUE(verdict["changes"].empty());
+  EXPECT_FALSE(verdict["detectable"].empty());
+  EXPECT_FALSE(verdict.contains("needle"));
+  EXPECT_TRUE(verdict["fit"]["recordings"].contains("changed/rec01.lcm"));
+  EXPECT_FALSE(verdict["fit"]["recordings"].contains("baseline/rec01.lcm"));
+  const auto model = io::load_model_file((folder / "out/model.toml").string());
+  EXPECT_DOUBLE_EQ(model.needle.curvature_per_mm, model::testing::agar().curvature_per_mm);
+  EXPECT_TRUE(model.effects.empty());
+}
+
+TEST_F(Program, GroupsAreGivenWholeOrNotAtAll) {
+  const std::string model = model_path, out = (folder / "out").string();
+  const Said one = run({"--model", model, "--out", out, "--baseline", folder.path().string()});
+  EXPECT_EQ(one.status, 2);
+  EXPECT_THAT(one.err, HasSubstr("--changed"));
+  const Said both = run({"a.lcm", "--model", model, "--out", out, "--baseline", "b", "--changed", "c"});
+  EXPECT_EQ(both.status, 2);
+  const Said none = run({"--model", model, "--out", out});
+  EXPECT_EQ(none.status, 2);
+  EXPECT_THAT(none.err, HasSubstr("LOG"));
+  fs::create_directories(folder / "empty");
+  const std::string empty = (folder / "empty").string();
+  const Said nothing = run({"--model", model, "--out", out, "--baseline", empty, "--changed", empty});
+  EXPECT_EQ(nothing.status, 1);
+  EXPECT_THAT(nothing.err, HasSubstr("empty"));
+}
+
 TEST_F(Program, ProposesAnEffectForWhatIsOnNoList) {
   model::DiscrepancyCurve curve{model::DiscrepancyComponent::advance, model::Covariate::depth_mm, {}, {}, {}};
   for (int i = 0; i <= 30; ++i) {
