@@ -1,9 +1,9 @@
 // CSV recordings made elsewhere, by a column map, into the messages of the contract.
 //
 // The map (TOML; docs/import/bwh.toml is one):
-//   [time]       not with stops = true; seconds = "..."  nanoseconds = "..." (optional), or rate_hz = 30.0 (rows are
-//   that far apart) [tip]        axes = ["Tip z", "-Tip x", "-Tip y"]: the column, with its sign, that each axis of {A}
-//   is
+//   [time]       seconds = "..."  nanoseconds = "..." (optional), or rate_hz = 30.0 (rows are that far apart);
+//                left out with stops = true
+//   [tip]        axes = ["Tip z", "-Tip x", "-Tip y"]: the column, with its sign, that each axis of {A} is
 //                origin = the same for the entry point (optional): its first row without a zero; default 0
 //                sigma_mm = [x, y, z]: standard deviations; 0 for an axis that was not measured
 //                heading = [x, y, z] (optional): columns, with signs as axes, of the unit vector along the needle's tip

@@ -7,7 +7,7 @@
 namespace bevel::io {
 namespace {
 
-constexpr double kShareOfStep = 0.2;
+constexpr double kShareOfStep = 0.2;  // a row so far on the way to the next stop is moving; noise is a few times less
 
 Eigen::VectorXd median_of(const std::vector<const StopRow*>& rows) {
   Eigen::VectorXd out(rows.front()->reading.size());

@@ -53,13 +53,6 @@ class Script {
   std::vector<model::ActuatorState> actuators_;
 };
 
-double deepest_mm(const RecordedCase& recorded) {
-  double depth = 0;
-  for (const auto& recording : recorded.recordings)
-    for (const auto& node : recording.motion.nodes) depth = std::max(depth, node.insertion_mm);
-  return depth;
-}
-
 }  // namespace
 
 std::vector<MotionScript> motion_scripts(double depth_mm, double frame_s) {
@@ -122,7 +115,7 @@ std::vector<MotionScript> motion_scripts(double depth_mm, double frame_s) {
 }
 
 Experiments::Experiments(const NeedleSystem& system, const inference::Noise& noise)
-    : system_(system), scripts_(motion_scripts(deepest_mm(system.recorded()), system.data().frame_s)) {
+    : system_(system), scripts_(motion_scripts(system.recorded().deepest_mm(), system.data().frame_s)) {
   RecordedCase planned;
   planned.channels = system.recorded().channels;
   planned.frame_s = system.recorded().frame_s;

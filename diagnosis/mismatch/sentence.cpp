@@ -12,9 +12,12 @@ std::string listed(const std::vector<FoundEffect>& effects) {
   return text;
 }
 
-std::string off_with(const Discrepancy& discrepancy) {
-  return "the " + std::string(info_of(discrepancy.curve.component).meaning) + " is off with " +
-         std::string(model::name_of(discrepancy.curve.covariate));
+// What is on no list, and what was named beside it.
+std::string off_with(const Findings& findings) {
+  const model::DiscrepancyCurve& curve = findings.discrepancies.front().curve;
+  return "the " + std::string(info_of(curve.component).meaning) + " is off with " +
+         std::string(model::name_of(curve.covariate)) +
+         (findings.effects.empty() ? "." : ", beside " + listed(findings.effects) + ".");
 }
 
 std::string sentence_on_change(const Findings& findings) {
@@ -26,9 +29,7 @@ std::string sentence_on_change(const Findings& findings) {
     case Verdict::unknown_effect:
       break;
   }
-  return "Something changed that no effect of the library explains: in the second group " +
-         off_with(findings.discrepancies.front()) +
-         (findings.effects.empty() ? "." : ", beside " + listed(findings.effects) + ".");
+  return "Something changed that no effect of the library explains: in the second group " + off_with(findings);
 }
 
 }  // namespace
@@ -43,8 +44,7 @@ std::string sentence_of(const Findings& findings) {
     case Verdict::unknown_effect:
       break;
   }
-  return "Something is missing that no effect of the library explains: " + off_with(findings.discrepancies.front()) +
-         (findings.effects.empty() ? "." : ", beside " + listed(findings.effects) + ".");
+  return "Something is missing that no effect of the library explains: " + off_with(findings);
 }
 
 }  // namespace bevel::diagnosis

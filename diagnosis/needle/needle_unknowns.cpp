@@ -82,17 +82,9 @@ inference::Prior prior_of(const model::EffectParameter& p, const std::vector<dou
   return prior;
 }
 
-double deepest_of(const RecordedCase& recorded) {
-  double deepest_mm = 0;
-  for (const auto& recording : recorded.recordings)
-    for (const auto& node : recording.motion.nodes) deepest_mm = std::max(deepest_mm, node.insertion_mm);
-  return deepest_mm;
-}
-
 inference::Parameter parameter_of(const model::EffectParameter& p, const RecordedCase& recorded) {
   double longest_s = 0;
   for (const auto& recording : recorded.recordings) longest_s = std::max(longest_s, recording.duration_s());
-  const double deepest_mm = deepest_of(recorded);
   inference::Parameter out{.name = std::string(p.name),
                            .lower = p.lower,
                            .upper = p.upper,
@@ -113,7 +105,9 @@ inference::Parameter parameter_of(const model::EffectParameter& p, const Recorde
   }
   // Nobody sees what begins deeper than anybody went.
   if (p.begins == model::Begins::depth)
-    std::erase_if(out.starts, [&](double start) { return start > deepest_mm && start > p.starts.front(); });
+    std::erase_if(out.starts, [&, deepest_mm = recorded.deepest_mm()](double start) {
+      return start > deepest_mm && start > p.starts.front();
+    });
   out.prior =
       out.scope == Scope::instant ? inference::flat_prior(0, longest_s) : prior_of(p, out.starts, out.lower, out.upper);
   return out;
@@ -221,7 +215,7 @@ void NeedleSystem::add_effects_of_library() {
 void NeedleSystem::add_common_errors() {
   constexpr int kDepths = 8;
   constexpr double kWide_mm = 10, kWide_rad = 0.3;  // so much that they cost the same in every set
-  const double deepest_mm = deepest_of(recorded_);
+  const double deepest_mm = recorded_.deepest_mm();
   for (int i = 0; i < kDepths; ++i) common_at_mm_.push_back(deepest_mm * i / (kDepths - 1));
   for (const Channel& channel : recorded_.channels)
     for (const double at_mm : common_at_mm_) {

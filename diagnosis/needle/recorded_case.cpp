@@ -236,6 +236,13 @@ void check_same_rig(const RecordedCase& recorded) {
 bool RecordedCase::has_headings() const { return std::ranges::any_of(channels, &Channel::heading); }
 bool RecordedCase::two_groups() const { return std::ranges::any_of(recordings, &Recording::changed); }
 
+double RecordedCase::deepest_mm() const {
+  double deepest_mm = 0;
+  for (const auto& recording : recordings)
+    for (const auto& node : recording.motion.nodes) deepest_mm = std::max(deepest_mm, node.insertion_mm);
+  return deepest_mm;
+}
+
 std::size_t RecordedCase::measurements() const {
   std::size_t count = 0;
   for (const auto& recording : recordings)

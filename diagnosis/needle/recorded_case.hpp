@@ -40,6 +40,7 @@ struct RecordedCase {
   bool has_clock = true;             // false: times are an order, and mean nothing else
   bool has_headings() const;         // of some channel
   bool two_groups() const;           // some recordings are of the second group
+  double deepest_mm() const;         // of the base, in any recording
   std::size_t measurements() const;  // scalar readings in use
 };
 
