@@ -101,13 +101,22 @@ ArrowSolution solve(const std::vector<ArrowBlock>& blocks, const MatrixXd& preci
   const MatrixXd scaled = unit.asDiagonal() * H * unit.asDiagonal();
   const Eigen::LLT<MatrixXd> factor(scaled);
   if (factor.info() != Eigen::Success) return out;
-  out.covariance = unit.asDiagonal() * factor.solve(MatrixXd::Identity(n, n)) * unit.asDiagonal();
-  out.shared = out.covariance * g;
+  if (rules.covariance_of) {
+    out.covariance = MatrixXd::Zero(n, n);
+    for (const Index i : *rules.covariance_of)
+      out.covariance.col(i) = unit.cwiseProduct(factor.solve(VectorXd(unit[i] * VectorXd::Unit(n, i))));
+  } else {
+    out.covariance = unit.asDiagonal() * factor.solve(MatrixXd::Identity(n, n)) * unit.asDiagonal();
+  }
+  out.shared = unit.cwiseProduct(factor.solve(unit.cwiseProduct(g)));
   out.least -= g.dot(out.shared);
   out.log_volume_ratio += log_det(factor) - 2 * unit.array().log().sum();
   for (const Index i : rules.held) out.covariance(i, i) = 0;
-  const Eigen::LLT<MatrixXd> prior(precision);
-  if (n > 0) {
+  if (precision.isDiagonal(0)) {
+    if (!(precision.diagonal().array() > 0).all()) return out;
+    out.log_volume_ratio -= precision.diagonal().array().log().sum();
+  } else {
+    const Eigen::LLT<MatrixXd> prior(precision);
     if (prior.info() != Eigen::Success) return out;
     out.log_volume_ratio -= log_det(prior);
   }

@@ -4,6 +4,7 @@
 //
 //   minimise  sum_r |w_r - L_r l_r - Z_r z|^2 + (l_r - l0_r)' T_r (l_r - l0_r) + (z - z0)' P (z - z0)
 #include <Eigen/Core>
+#include <optional>
 #include <vector>
 
 namespace bevel::inference {
@@ -21,7 +22,7 @@ struct ArrowSolution {
   Eigen::VectorXd shared;  // z
   std::vector<Eigen::VectorXd> local;
   Eigen::MatrixXd information;  // of z, all else eliminated: the Schur complement plus P
-  Eigen::MatrixXd covariance;   // its inverse
+  Eigen::MatrixXd covariance;   // its inverse, or those columns of it that were asked for, the others zero
   // log det of the whole Hessian less that of the priors' precisions: what the posterior's volume lost.
   double log_volume_ratio = 0;
   bool valid = false;
@@ -32,11 +33,13 @@ ArrowBlock make_block(const Eigen::MatrixXd& L, const Eigen::MatrixXd& Z, const 
 
 // damping: of Levenberg and Marquardt, on the diagonals; `precision` P may be full. used: recordings that take part;
 // empty: all. held: shared unknowns that stay at zero, pressed against a bound: what is left of their posterior is the
-// tail of a normal one beyond its middle, whose volume is the one in log_volume_ratio.
+// tail of a normal one beyond its middle, whose volume is the one in log_volume_ratio. covariance_of: columns of the
+// covariance that are wanted; without it all: they cost as much as the rest.
 struct ArrowRules {
   double damping = 0;
   std::vector<bool> used{};
   std::vector<Eigen::Index> held{};
+  std::optional<std::vector<Eigen::Index>> covariance_of{};
 };
 ArrowSolution solve(const std::vector<ArrowBlock>& blocks, const Eigen::MatrixXd& precision,
                     const Eigen::VectorXd& centre, const ArrowRules& rules = {});

@@ -67,14 +67,19 @@ GridEvidence over_nuisances(const Fit& fit, const CurveColumns& curve, const Nui
   const Likelihood& likelihood = *fit.likelihood;
   auto blocks = linearise(likelihood, fit, curve);
   if (blocks.empty()) return out;
-  const double here = solve_about(fit, blocks, curve).least;
+  // Of the shared unknowns' errors only those whose prior is not normal matter.
+  std::vector<Index> not_normal;
+  for (Index i = 0; i < fit.shared.size(); ++i)
+    if (fit.layout.shared()[static_cast<std::size_t>(i)].parameter->prior.form != Prior::Form::normal)
+      not_normal.push_back(i);
+  const double here = solve_about(fit, blocks, curve, not_normal).least;
   std::vector<double> logs;
   Fit about = fit;
   for (Index k = 0; k < grid.log_prior.size(); ++k) {
     about.scales.nuisance_sd = grid.standard_deviations.col(k);
     const VectorXd precision = local_precision_of(fit.layout, about.scales);
     for (auto& block : blocks) block.precision = precision;
-    const ArrowSolution solution = solve_about(about, blocks, curve);
+    const ArrowSolution solution = solve_about(about, blocks, curve, not_normal);
     logs.push_back(solution.valid ? -0.5 * (fit.cost + solution.least - here + solution.log_volume_ratio) +
                                         log_density_ratios(fit, solution.covariance) + grid.log_prior[k]
                                   : -std::numeric_limits<double>::infinity());
@@ -162,7 +167,7 @@ std::vector<LessSpread> with_less_spread(const Likelihood& likelihood, const Fit
   const auto log_of = [&](const Fit& about) {
     const VectorXd precision = local_precision_of(about.layout, about.scales);
     for (auto& block : blocks) block.precision = precision;
-    const ArrowSolution solution = solve_about(about, blocks, {});
+    const ArrowSolution solution = solve_about(about, blocks, {}, std::vector<Index>{});
     return -0.5 * (solution.least + solution.log_volume_ratio);
   };
   const double here = log_of(fit);

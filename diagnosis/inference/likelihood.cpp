@@ -205,9 +205,10 @@ ArrowSolution solve_within(const Fit& now, const std::vector<ArrowBlock>& blocks
 
 }  // namespace
 
-ArrowSolution solve_about(const Fit& fit, const std::vector<ArrowBlock>& blocks, const CurveColumns& curve) {
+ArrowSolution solve_about(const Fit& fit, const std::vector<ArrowBlock>& blocks, const CurveColumns& curve,
+                          std::optional<std::vector<Index>> covariance_of) {
   const Pulls pulls = pulls_of(fit.layout, fit.shared, fit.curve_values, curve.covariance);
-  ArrowRules how;
+  ArrowRules how{.covariance_of = std::move(covariance_of)};
   return solve_within(fit, blocks, pulls, how);
 }
 
@@ -243,7 +244,7 @@ Fit fit(const Likelihood& likelihood, const Layout& layout, const VectorXd& shar
   double damping = 1e-4;
   for (int iteration = 0; now.valid && iteration < rules.max_iterations; ++iteration) {
     now.iterations = iteration + 1;
-    ArrowRules how{.damping = damping};
+    ArrowRules how{.damping = damping, .covariance_of = std::vector<Index>{}};
     bool moved = false, small = false;
     while (how.damping < 1e8) {
       const ArrowSolution step = solve_within(now, here.blocks, here.pulls, how);

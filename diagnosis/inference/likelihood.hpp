@@ -133,6 +133,7 @@ struct LinearRecording {
 bool linearise(const Likelihood& likelihood, const Fit& fit, const CurveColumns& curve, std::size_t recording,
                LinearRecording& out);
 // The linear model about a fit, what presses against a bound held.
-ArrowSolution solve_about(const Fit& fit, const std::vector<ArrowBlock>& blocks, const CurveColumns& curve);
+ArrowSolution solve_about(const Fit& fit, const std::vector<ArrowBlock>& blocks, const CurveColumns& curve,
+                          std::optional<std::vector<Eigen::Index>> covariance_of = {});
 
 }  // namespace bevel::inference
