@@ -20,6 +20,7 @@ Dataset without(const Dataset& data, const Readings& readings) {
         kept.time_s.push_back(series.time_s[i]);
         kept.measured.push_back(series.measured[i]);
         kept.relative_sd.push_back(series.relative_sd[i]);
+        if (!series.input_sd.empty()) kept.input_sd.push_back(series.input_sd[i]);
       }
       series = std::move(kept);
     }

@@ -12,6 +12,9 @@ struct Series {
   std::vector<double> time_s;        // from the recording's start
   std::vector<double> measured;      // in the channel's unit
   std::vector<double> relative_sd;   // claimed standard deviation over the channel's median
+  // Standard deviation by what the model's inputs are not known to, of each reading by itself, in standard deviations
+  // of the channel's noise. Empty: none.
+  std::vector<double> input_sd;
 };
 
 struct SeriesSet {

@@ -110,16 +110,38 @@ Noise noise_about(const Fit& fit, const CurveColumns& curve) {
   return refine_noise(likelihood.data(), errors, likelihood.noise());
 }
 
+// What of the readings is not known since the inputs are not, by this fit; empty: nothing. In the channels' units.
+std::vector<VectorXd> inputs_about(const Fit& fit) {
+  std::vector<VectorXd> out;
+  const Likelihood& likelihood = *fit.likelihood;
+  for (std::size_t r = 0; r < likelihood.recordings(); ++r) {
+    out.push_back(likelihood.system().by_inputs(fit.layout.set(), r, fit.shared, fit.local[r]));
+    if (out.back().size() == 0) return {};
+  }
+  return out;
+}
+
+bool alike(const std::vector<VectorXd>& a, const std::vector<VectorXd>& b, const Likelihood& likelihood) {
+  constexpr double kShare = 0.2;  // of the noise
+  if (a.size() != b.size()) return false;
+  const auto& sigma = likelihood.noise().sigma;
+  const double least = *std::min_element(sigma.begin(), sigma.end());
+  for (std::size_t r = 0; r < a.size(); ++r)
+    if ((a[r] - b[r]).cwiseAbs().maxCoeff() > kShare * least) return false;
+  return true;
+}
+
 struct Settled {
   Fit fit;
   GridEvidence over;
 };
-// Fit, noise and the nuisances' standard deviations in turn, until none changes.
+// Fit, noise (with what the inputs leave open) and the nuisances' standard deviations in turn, until none changes.
 Settled settle(const Likelihood& likelihood, const Discrepancy* discrepancy, const Layout& layout, VectorXd shared,
                std::vector<VectorXd> local, Scales scales, const NuisanceGrid& grid, double give_up_below) {
   auto now = std::make_shared<const Likelihood>(likelihood);
   CurveColumns curve;
   Settled best{.fit = Fit(layout), .over = {}};
+  std::vector<VectorXd> inputs;
   bool noise_moved = false, settled = false;
   for (int pass = 0; pass < kRefits; ++pass) {
     if (scales.curve) curve = discrepancy->columns(*now, *scales.curve);
@@ -142,9 +164,11 @@ Settled settle(const Likelihood& likelihood, const Discrepancy* discrepancy, con
     if (!better && !noise_moved && settled) break;
     // The noise first, then what differs between recordings: by a wrong noise they do not differ.
     const Noise noise = noise_about(one.fit, curve);
-    noise_moved = !alike(noise, now->noise());
+    auto open = inputs_about(one.fit);
+    noise_moved = !alike(noise, now->noise()) || !alike(open, inputs, *now);
     if (noise_moved) {
-      now = std::make_shared<const Likelihood>(likelihood, noise);
+      inputs = std::move(open);
+      now = std::make_shared<const Likelihood>(likelihood, noise, inputs);
     } else if (grid.standard_deviations.col(one.over.best) != scales.nuisance_sd) {
       scales.nuisance_sd = grid.standard_deviations.col(one.over.best);
     } else if (!settled) {

@@ -44,7 +44,19 @@ Likelihood::Likelihood(const System& system, const Readings& outliers, Noise noi
   set_noise(std::move(noise));
 }
 
-Likelihood::Likelihood(const Likelihood& other, Noise noise) : Likelihood(other) { set_noise(std::move(noise)); }
+Likelihood::Likelihood(const Likelihood& other, Noise noise, const std::vector<VectorXd>& inputs) : Likelihood(other) {
+  for (std::size_t r = 0; r < data_.recordings.size(); ++r) {
+    const bool known = r >= inputs.size() || inputs[r].size() == 0;
+    const auto own = known ? std::vector<VectorXd>() : by_channel(data_.recordings[r], kept(r, inputs[r]));
+    for (std::size_t c = 0; c < data_.recordings[r].series.size(); ++c) {
+      auto& input_sd = data_.recordings[r].series[c].input_sd;
+      input_sd.clear();
+      if (!known)
+        for (const double sd : own[c]) input_sd.push_back(sd / noise.sigma[c]);
+    }
+  }
+  set_noise(std::move(noise));
+}
 
 void Likelihood::set_noise(Noise noise) {
   noise_ = std::move(noise);

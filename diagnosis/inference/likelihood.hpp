@@ -41,8 +41,9 @@ struct Residuals {
 class Likelihood {
  public:
   Likelihood(const System& system, const Readings& outliers, Noise noise);
-  // The same readings with another noise.
-  Likelihood(const Likelihood& other, Noise noise);
+  // The same readings with another noise; inputs: by_inputs() of the model that they are to be judged by, per
+  // recording.
+  Likelihood(const Likelihood& other, Noise noise, const std::vector<Eigen::VectorXd>& inputs = {});
 
   const System& system() const { return *system_; }
   const Dataset& data() const { return data_; }

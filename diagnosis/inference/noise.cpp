@@ -193,6 +193,9 @@ Whitening make_whitening(const Series& series, const Noise& noise, double sigma)
   out.carry2.assign(n, 0);
   out.weight.resize(n);
   const Correlations correlation(noise);
+  const bool own = !series.input_sd.empty();
+  if (own) out.gain.resize(n);
+  std::vector<double> unknown(own ? n : 0);  // variance of the noise in each reading, that and all before it read
   for (std::size_t i = 0; i < n; ++i) {
     double left = 1;
     if (i > 0 && noise.ar1 > 0) {
@@ -209,10 +212,18 @@ Whitening make_whitening(const Series& series, const Noise& noise, double sigma)
       }
       left -= first * near;
       // The process is of errors in units of their claimed standard deviations.
+      if (own) left += first * first * unknown[i - 1] + (second != 0 ? second * second * unknown[i - 2] : 0);
       out.carry[i] = first * series.relative_sd[i] / series.relative_sd[i - 1];
       if (second != 0) out.carry2[i] = second * series.relative_sd[i] / series.relative_sd[i - 2];
     }
-    out.weight[i] = 1 / (sigma * series.relative_sd[i] * std::sqrt(left));
+    double variance = series.relative_sd[i] * series.relative_sd[i] * left;
+    if (own) {
+      const double noise_part = variance;
+      variance += series.input_sd[i] * series.input_sd[i];
+      out.gain[i] = noise_part / variance;
+      unknown[i] = left * (1 - out.gain[i]);
+    }
+    out.weight[i] = 1 / (sigma * std::sqrt(variance));
   }
   return out;
 }

@@ -22,14 +22,30 @@ struct Noise {
 // Coefficients that turn a series of errors into independent ones of unit variance:
 // white_i = (e_i - carry_i e_(i-1) - carry2_i e_(i-2)) * weight_i.
 // Of second order it is the best that two readings predict: exact where no frame is missing.
+// Where a reading also has an error of its own (Series::input_sd), what is carried on is not e but the noise in it, as
+// a Kalman filter takes it: the error predicted and `gain` of what was not (Anderson and Moore 1979, Optimal Filtering,
+// 5.3; of second order but for the covariance of neighbouring estimates).
 struct Whitening {
   std::vector<double> carry, carry2, weight;
+  std::vector<double> gain;  // empty: one
 };
 Whitening make_whitening(const Series& series, const Noise& noise, double sigma);
 
 // In place, on each column; rows are the series in time.
 template <class Matrix>
 void whiten(const Whitening& whitening, Matrix&& rows) {
+  if (!whitening.gain.empty()) {
+    Eigen::RowVectorXd before = Eigen::RowVectorXd::Zero(rows.cols()), last = before, predicted;
+    for (Eigen::Index i = 0; i < rows.rows(); ++i) {
+      const auto at = static_cast<std::size_t>(i);
+      predicted = whitening.carry[at] * last + whitening.carry2[at] * before;
+      rows.row(i) -= predicted;
+      before = last;
+      last = predicted + whitening.gain[at] * rows.row(i);
+      rows.row(i) *= whitening.weight[at];
+    }
+    return;
+  }
   for (Eigen::Index i = rows.rows() - 1; i > 0; --i) {
     const auto at = static_cast<std::size_t>(i);
     rows.row(i) -= whitening.carry[at] * rows.row(i - 1);

@@ -81,6 +81,12 @@ class System {
   // the model's domain. Thread-safe.
   virtual bool predict(const ModelSet& set, std::size_t recording, const Eigen::VectorXd& shared,
                        const Eigen::VectorXd& local, bool derivatives, Prediction& out) const = 0;
+  // Standard deviations of the rows by what the model's inputs are not known to, where that matters to this set;
+  // unknowns as for predict. Empty: nowhere. Thread-safe.
+  virtual Eigen::VectorXd by_inputs(const ModelSet& /*set*/, std::size_t /*recording*/,
+                                    const Eigen::VectorXd& /*shared*/, const Eigen::VectorXd& /*local*/) const {
+    return {};
+  }
   // Derivatives of the readings by the values of all curves, one after the other, without effects. Thread-safe.
   virtual Eigen::MatrixXd by_curves(std::size_t recording, const Eigen::VectorXd& base) const = 0;
 };

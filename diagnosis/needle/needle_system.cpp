@@ -209,6 +209,23 @@ bool NeedleSystem::predict(const ModelSet& set, std::size_t r, const VectorXd& s
   return true;
 }
 
+VectorXd NeedleSystem::by_inputs(const ModelSet& set, std::size_t r, const VectorXd& shared,
+                                 const VectorXd& local) const {
+  // Lead screws of 2 mm turned by 200 full steps; what a microstep is off by, and a screw within a turn, is about that.
+  constexpr double kBase_mm = 0.01;
+  if (std::ranges::none_of(set, [&](std::size_t e) { return physics_[e]->sudden(); })) return {};
+  model::Motion motion = recorded_.recordings[r].motion;
+  model::OpenLoop ahead, behind;
+  const auto shift = [&](double by_mm) {  // where it entered is where it entered
+    for (std::size_t i = 1; i < motion.nodes.size(); ++i) motion.nodes[i].insertion_mm += by_mm;
+  };
+  shift(kBase_mm);
+  const bool one = follow(set, motion, static_cast<int>(r), shared, local, nullptr, nullptr, ahead);
+  shift(-2 * kBase_mm);
+  if (!one || !follow(set, motion, static_cast<int>(r), shared, local, nullptr, nullptr, behind)) return {};
+  return 0.5 * (rows_of(r, ahead, false) - rows_of(r, behind, false)).cwiseAbs();
+}
+
 MatrixXd NeedleSystem::by_curves(std::size_t r, const VectorXd& base) const {
   Index columns = 0;
   for (const auto& curve : curves_) columns += static_cast<Index>(curve.at.size());

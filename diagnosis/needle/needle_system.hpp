@@ -49,6 +49,9 @@ class NeedleSystem final : public inference::System {
   bool allows(const inference::ModelSet& set) const override;
   bool predict(const inference::ModelSet& set, std::size_t recording, const Eigen::VectorXd& shared,
                const Eigen::VectorXd& local, bool derivatives, inference::Prediction& out) const override;
+  // Of effects that are sudden, by where the base is: to a hundredth of a millimetre.
+  Eigen::VectorXd by_inputs(const inference::ModelSet& set, std::size_t recording, const Eigen::VectorXd& shared,
+                            const Eigen::VectorXd& local) const override;
   Eigen::MatrixXd by_curves(std::size_t recording, const Eigen::VectorXd& base) const override;
 
   model::NeedleParameters needle(const Eigen::VectorXd& shared) const;

@@ -124,6 +124,8 @@ struct EffectDescription {
   Covariate covariate;
   std::vector<EffectParameter> parameters;
   bool of_headings = false;  // no position shows it, only a measured heading
+  // Within hundredths of a millimetre of the base: its own error decides which reading still is before, which after.
+  bool sudden = false;
 };
 
 class Effect {
@@ -138,6 +140,7 @@ class Effect {
   Covariate covariate() const { return description_.covariate; }
   const std::vector<EffectParameter>& parameters() const { return description_.parameters; }
   bool of_headings() const { return description_.of_headings; }
+  bool sudden() const { return description_.sudden; }
 
   virtual void change_needle(NeedleParameters&) const {}
   virtual void enter(Parameters, EntryPose&) const {}

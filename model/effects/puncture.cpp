@@ -24,7 +24,8 @@ class Puncture final : public Effect {
                                 .upper = 15,
                                 .none = 0,
                                 .starts = {0.4, 1.2, 3.5},
-                                .reported = 5}}}) {}
+                                .reported = 5}},
+                .sudden = true}) {}
 
   void axes(Parameters p, const LegView& leg, EffectMemory& memory, Dual& insertion_mm,
             Dual& /*rotation_rad*/) const override {

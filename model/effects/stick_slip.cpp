@@ -22,7 +22,8 @@ class StickSlip final : public Effect {
                                 .none = 0,
                                 .starts = starts(),
                                 .reported = 3,
-                                .shape = true}}}) {}
+                                .shape = true}},
+                .sudden = true}) {}
 
   void axes(Parameters p, const LegView& leg, EffectMemory& memory, Dual& insertion_mm,
             Dual& /*rotation_rad*/) const override {

@@ -94,6 +94,30 @@ TEST(Noise, OutliersAtTheEndOfASeriesAreFound) {
     EXPECT_EQ(found.outliers[r], r % 2 == 0 ? planted : std::vector<std::size_t>()) << "recording " << r;
 }
 
+// Readings with an error of their own beside autocorrelated noise, frames missing: against the dense covariance.
+TEST(Noise, AReadingsOwnErrorIsWhitenedExactly) {
+  Noise noise{.sigma = {0.3}, .ar1 = 0.7};
+  Series series;
+  for (const int frame : {0, 1, 2, 4, 5, 6, 9, 10, 11, 12}) {
+    series.time_s.push_back(frame * noise.frame_s);
+    series.relative_sd.push_back(frame % 3 == 0 ? 1.5 : 1);
+    series.input_sd.push_back(frame == 2 || frame == 5 || frame == 6 ? 3 : frame == 12 ? 0.5 : 0);
+  }
+  const auto n = static_cast<Eigen::Index>(series.time_s.size());
+  Eigen::MatrixXd covariance(n, n), white = Eigen::MatrixXd::Identity(n, n);
+  for (Eigen::Index i = 0; i < n; ++i)
+    for (Eigen::Index j = 0; j < n; ++j) {
+      const auto a = static_cast<std::size_t>(i), b = static_cast<std::size_t>(j);
+      const double frames = std::abs(series.time_s[a] - series.time_s[b]) / noise.frame_s;
+      covariance(i, j) = series.relative_sd[a] * series.relative_sd[b] * std::pow(noise.ar1, frames);
+      if (i == j) covariance(i, j) += series.input_sd[a] * series.input_sd[a];
+      covariance(i, j) *= 0.3 * 0.3;
+    }
+  const Whitening whitening = make_whitening(series, noise, 0.3);
+  whiten(whitening, white);  // now the whitening matrix
+  EXPECT_LT((white * covariance * white.transpose() - Eigen::MatrixXd::Identity(n, n)).cwiseAbs().maxCoeff(), 1e-12);
+}
+
 TEST(Noise, WithoutItsOutliersTheRestIsLeft) {
   const Made made = make(0.3, 0.02, 0, 5);
   const Dataset rest = without(made.data, made.outliers);

@@ -279,6 +279,40 @@ TEST(NeedleSystem, StartsOfAJumpAreTakenAsTheyStand) {
     EXPECT_LT(90 / jump.starts[i - 1] - 90 / jump.starts[i], 0.51) << jump.starts[i];
 }
 
+// Only a jump makes much of where the base is, and then as much as half of itself.
+TEST(NeedleSystem, AJumpIsAsUncertainAsTheBase) {
+  const double jump_mm = 2.345;
+  SimulatedRig rig;
+  const NeedleSystem system(record_case(rig, 3), rig.needle);
+  const Setting smooth = setting_of(system, {"insertion_scale"});
+  EXPECT_EQ(system.by_inputs(smooth.set, 0, smooth.shared, smooth.local).size(), 0);
+  Setting at = setting_of(system, {"stick_slip"});
+  at.shared[at.shared.size() - 1] = jump_mm;
+  int doubtful = 0, readings = 0;
+  for (std::size_t r = 0; r < 4; ++r) {
+    const VectorXd sd = system.by_inputs(at.set, r, at.shared, at.local);
+    const auto& nodes = system.recorded().recordings[r].motion;
+    ASSERT_EQ(sd.size(), system.data().recordings[r].rows());
+    const auto& series = system.data().recordings[r].series[2];  // along z
+    for (std::size_t i = 0; i < series.message.size(); ++i) {
+      const double here = sd[sd.size() - static_cast<Index>(series.message.size() - i)];
+      const double gone_mm = nodes.nodes[nodes.at[series.message[i]]].insertion_mm;
+      const double to_jump_mm = std::abs(std::remainder(gone_mm, jump_mm));
+      ++readings;
+      if (here > 0.1) ++doubtful;
+      if (here > 0.1 && gone_mm > 1) {
+        EXPECT_LT(here, 0.51 * jump_mm);
+      }
+      // On the way in for the first time, where jumps are due at whole multiples.
+      if (i < 10 && r % 3 == 0) {
+        EXPECT_EQ(here > 0.1, to_jump_mm < 0.02 && gone_mm > 1) << gone_mm;
+      }
+    }
+  }
+  EXPECT_GT(doubtful, 0);
+  EXPECT_LT(doubtful, readings / 10);
+}
+
 // End to end on the simulated rig: nothing, one effect, and one that is on no list.
 struct Said {
   std::string set;
@@ -305,6 +339,19 @@ TEST(NeedleSearch, NothingOneAndUnlisted) {
   SimulatedRig sticking;
   sticking.effects = {active("stick_slip", {1.234})};
   EXPECT_EQ(say(sticking, 14).set, "stick_slip");
+  // A lead screw that is off by a hundredth of a millimetre: not so much as a frame is sure of its jump.
+  for (const std::uint64_t seed : {15U, 16U, 17U}) {
+    SimulatedRig uneven = sticking;
+    uneven.recordings = 6;
+    uneven.frame_s = 1.0 / 30;
+    uneven.effects = {active("stick_slip", {2.345})};
+    uneven.true_motion = [](std::vector<model::ActuatorState>& states) {
+      for (auto& s : states) s.insertion_mm += 0.01 * std::sin(std::numbers::pi * s.insertion_mm);
+    };
+    const Said said = say(uneven, seed);
+    EXPECT_EQ(said.set, "stick_slip") << seed;
+    EXPECT_FALSE(said.curve) << seed;
+  }
   SimulatedRig drifting;
   drifting.true_motion = [](std::vector<model::ActuatorState>& states) {
     for (auto& s : states) s.insertion_mm += 1.5 * std::sin(0.11 * s.insertion_mm) * std::sin(0.11 * s.insertion_mm);
