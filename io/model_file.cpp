@@ -126,9 +126,7 @@ std::vector<model::ActiveEffect> active_effects(const std::vector<EffectEntry>& 
     values.insert(entry.parameters.begin(), entry.parameters.end());  // the recording's own come first
     for (std::size_t i = 0; const auto& parameter : one.effect->parameters()) {
       const auto given = values.extract(std::string(parameter.name));
-      const double otherwise = parameter.scope == model::Scope::recording ? 0
-                               : std::isnan(parameter.usual)              ? parameter.none
-                                                                          : parameter.usual;
+      const double otherwise = model::value_if_unsaid(parameter);
       one.parameters[i++] = given.empty() ? otherwise : given.mapped();
       if (given.empty() && std::isnan(otherwise))
         throw std::invalid_argument(entry.name + "." + std::string(parameter.name) + " is missing and is required");

@@ -119,7 +119,7 @@ bool NeedleSystem::follow(const ModelSet& set, const model::Motion& motion, int 
     const auto& parameters = physics_[e]->parameters();
     for (std::size_t p = 0; p < parameters.size(); ++p) {
       if ((variants_[e] >> p & 1U) == 0) {
-        active.parameters[p] = std::isnan(parameters[p].none) ? parameters[p].starts.front() : parameters[p].none;
+        active.parameters[p] = model::value_if_unsaid(parameters[p]);
         continue;
       }
       const bool own = parameters[p].scope == model::Scope::recording;

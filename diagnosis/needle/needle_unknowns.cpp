@@ -115,9 +115,10 @@ inference::Parameter parameter_of(const model::EffectParameter& p, const Recorde
 
 std::string label_of(const model::Effect& effect, std::uint32_t variant) {
   std::string label(effect.name());
-  if (effect.variants().size() < 2) return label;
+  std::uint32_t common = ~0U;  // what all kinds have
+  for (const std::uint32_t one : effect.variants()) common &= one;
   for (std::size_t p = 0; p < effect.parameters().size(); ++p)
-    if ((variant >> p & 1U) != 0 && effect.parameters()[p].scope == model::Scope::rig)
+    if ((variant & ~common) >> p & 1U && effect.parameters()[p].scope == model::Scope::rig)
       label += " (" + std::string(effect.parameters()[p].name.substr(0, effect.parameters()[p].name.find('_'))) + ")";
   return label;
 }

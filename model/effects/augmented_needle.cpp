@@ -197,7 +197,8 @@ void AugmentedNeedle::through_cameras(TipReading& reading) const {
 
 void AugmentedNeedle::heading(const AugmentedState& state, HeadingReading& reading) const {
   Dual2 tilt_rad;
-  for (const auto& active : effects_) active.effect->sensor(parameters(active), tilt_rad);
+  for (std::size_t i = 0; i < effects_.size(); ++i)
+    effects_[i].effect->sensor(parameters(effects_[i]), state.memory[i], tilt_rad);
   const Dual3 in_body = tilted(tilt_rad);
   const Eigen::Vector3d body(in_body[0].value, in_body[1].value, in_body[2].value);
   reading.direction = state.pose.R * body;

@@ -11,6 +11,11 @@ std::vector<double> starts_every(double step, double first, double last) {
   return starts;
 }
 
+double value_if_unsaid(const EffectParameter& parameter) {
+  if (parameter.scope == Scope::recording) return 0;
+  return std::isnan(parameter.usual) ? parameter.none : parameter.usual;
+}
+
 double meant(const EffectParameter& parameter, double value) {
   if (parameter.modulo <= 0) return value;
   const double none = std::isnan(parameter.none) ? 0 : parameter.none;

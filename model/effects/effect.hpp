@@ -57,6 +57,8 @@ struct EffectParameter {
 };
 // Starts from first to last, evenly: as close as the effect is narrow, or a fit never finds it.
 std::vector<double> starts_every(double step, double first, double last);
+// Where a model file does not say, or another kind of the effect is meant; NaN: it has to be said.
+double value_if_unsaid(const EffectParameter& parameter);
 // Of all values that are the same (EffectParameter::modulo) the one that is meant.
 double meant(const EffectParameter& parameter, double value);
 inline constexpr double kNoNone = std::numeric_limits<double>::quiet_NaN();
@@ -69,7 +71,8 @@ std::span<const Covariate> all_covariates();
 
 // What an effect remembers between legs of one insertion. Slopes come with it.
 struct EffectMemory {
-  std::array<Dual, 3> slot;
+  static constexpr std::size_t kSlots = 4;
+  std::array<Dual, kSlots> slot;
   int phase = 0;  // 0 until it has seen a leg
 };
 
@@ -154,8 +157,8 @@ class Effect {
   virtual void offset(Parameters, const EffectMemory&, double /*time_s*/, Dual3& /*position_mm*/) const {}
   // What the cameras make of the point.
   virtual void camera(Parameters, Dual3& /*position_mm*/) const {}
-  // Rotation vector about x and y of {B} by which the sensor of the heading sits askew in the needle.
-  virtual void sensor(Parameters, Dual2& /*tilt_rad*/) const {}
+  // Rotation vector about x and y of {B} by which the sensor of the heading, or what it sits in, is askew.
+  virtual void sensor(Parameters, const EffectMemory&, Dual2& /*tilt_rad*/) const {}
   // What a turned frame makes of a direction.
   virtual void frame(Parameters, Dual3& /*direction*/) const {}
   // The reading shows the needle as it was so much earlier.

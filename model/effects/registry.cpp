@@ -20,6 +20,7 @@
   EFFECT(layer)               \
   EFFECT(depth_dependence)    \
   EFFECT(drilling)            \
+  EFFECT(tip_swing)           \
   EFFECT(flip_transient)      \
   EFFECT(lateral_bias)        \
   EFFECT(cutting_angle)       \

@@ -17,7 +17,7 @@ class SensorTilt final : public Effect {
                   {.name = "about_y_rad", .lower = -0.5, .upper = 0.5, .none = 0, .starts = {0.01}, .reported = 0.07}},
              .of_headings = true}) {}
 
-  void sensor(Parameters p, Dual2& tilt_rad) const override {
+  void sensor(Parameters p, const EffectMemory& /*memory*/, Dual2& tilt_rad) const override {
     for (std::size_t i = 0; i < 2; ++i) tilt_rad[i] += p[i];
   }
 };

@@ -15,7 +15,7 @@ std::vector<double> shown(const Effect& effect) {
   static const std::map<std::string_view, std::vector<double>> sizes{{"slip_direction", {}},
                                                                      {"entry_angle", {0.05, -0.03}},
                                                                      {"bevel_offset", {0.35}},
-                                                                     {"lost_steps", {0.8, -1.3, 3.317}},
+                                                                     {"lost_steps", {0.8, -1.3, 3.327}},
                                                                      {"rotation_backlash", {0.37}},
                                                                      {"torsional_windup", {0.83}},
                                                                      {"insertion_backlash", {1.13}},
@@ -33,6 +33,7 @@ std::vector<double> shown(const Effect& effect) {
                                                                      {"camera_rotation", {0.03, -0.02}},
                                                                      {"entry_point", {0.7, -0.4}},
                                                                      {"cutting_angle", {0.04}},
+                                                                     {"tip_swing", {0.7, 4.3, 17, 3}},
                                                                      {"sensor_tilt", {0.03, -0.05}},
                                                                      {"camera_scale", {1.03}},
                                                                      {"refraction", {0.03, 25}},
@@ -94,13 +95,33 @@ TEST_P(EveryEffect, ChangesNothingAtItsNone) {
   }
 }
 
-// The Jacobian of model::predict against central differences of it, for k, lambda1, lambda2, ell and all parameters.
-void expect_sensitivities(const std::vector<const Effect*>& effects, double tolerance) {
+// An effect with those of its parameters that one of its kinds has; the others are as if unsaid.
+struct Kind {
+  const Effect* effect;
+  std::uint32_t parameters;
+  std::vector<double> values() const {
+    std::vector<double> out = shown(*effect);
+    for (std::size_t i = 0; i < out.size(); ++i)
+      if (!has(i)) out[i] = value_if_unsaid(effect->parameters()[i]);
+    return out;
+  }
+  bool has(std::size_t parameter) const { return (parameters >> parameter & 1U) != 0; }
+};
+std::vector<Kind> kinds_of(const Effect& effect) {
+  std::vector<Kind> out;
+  for (const std::uint32_t variant : effect.variants()) out.push_back({&effect, variant});
+  return out;
+}
+
+// The Jacobian of model::predict against central differences of it, for k, lambda1, lambda2, ell and all parameters of
+// the kinds.
+void expect_sensitivities(const std::vector<Kind>& kinds, double tolerance) {
   const Motion motion = rich_script().recorded();
   constexpr int kNeedleColumns = 4;
   std::vector<double> values{agar().curvature_per_mm, agar().lambda1_per_rad, agar().lambda2, agar().wheelbase_mm};
-  for (const Effect* effect : effects)
-    for (const double v : shown(*effect)) values.push_back(v);
+  std::vector<bool> shows(kNeedleColumns, true);
+  for (const Kind& kind : kinds)
+    for (std::size_t i = 0; const double v : kind.values()) values.push_back(v), shows.push_back(kind.has(i++));
   const auto needle_at = [&](const std::vector<double>& at, int columns) {
     NeedleParameters needle = agar();
     needle.curvature_per_mm = at[0];
@@ -109,10 +130,10 @@ void expect_sensitivities(const std::vector<const Effect*>& effects, double tole
     needle.wheelbase_mm = at[3];
     std::vector<ActiveEffect> all;
     int column = kNeedleColumns;
-    for (const Effect* effect : effects) {
+    for (const Kind& kind : kinds) {
       const auto first = at.begin() + column;
-      const std::vector<double> own(first, first + static_cast<std::ptrdiff_t>(effect->parameters().size()));
-      all.push_back(active(*effect, own, column));
+      const std::vector<double> own(first, first + static_cast<std::ptrdiff_t>(kind.effect->parameters().size()));
+      all.push_back(active(*kind.effect, own, column));
     }
     if (columns == 0)
       for (auto& one : all)
@@ -123,6 +144,7 @@ void expect_sensitivities(const std::vector<const Effect*>& effects, double tole
   Eigen::MatrixXd jacobian(path.jacobian.rows() + path.heading_jacobian.rows(), path.jacobian.cols());
   jacobian << path.jacobian, kLever_mm * path.heading_jacobian;
   for (std::size_t c = 0; c < values.size(); ++c) {
+    if (!shows[c]) continue;
     const double h = 1e-6 * std::max(std::abs(values[c]), 1e-2);
     std::vector<double> up = values, down = values;
     up[c] += h;
@@ -134,19 +156,21 @@ void expect_sensitivities(const std::vector<const Effect*>& effects, double tole
       differences.segment<3>(static_cast<Eigen::Index>(3 * i)) = (a[i] - b[i]) / (2 * h);
     const auto column = jacobian.col(static_cast<Eigen::Index>(c));
     std::string who;
-    for (const Effect* effect : effects) who += std::string(effect->name()) + " ";
+    for (const Kind& kind : kinds) who += std::string(kind.effect->name()) + " ";
     EXPECT_LT((column - differences).cwiseAbs().maxCoeff(), tolerance * differences.cwiseAbs().maxCoeff())
         << who << "column " << c;
     EXPECT_GT(differences.cwiseAbs().maxCoeff(), 0) << who << "column " << c;
   }
 }
 
-TEST_P(EveryEffect, HasTheSensitivitiesOfFiniteDifferences) { expect_sensitivities({GetParam()}, 2e-6); }
+TEST_P(EveryEffect, HasTheSensitivitiesOfFiniteDifferences) {
+  for (const Kind& kind : kinds_of(*GetParam())) expect_sensitivities({kind}, 2e-6);
+}
 
 TEST_P(EveryEffect, HasThemBesideEveryOther) {
   for (const Effect* other : all_effects())
     if (other != GetParam() && other->parameters().size() + GetParam()->parameters().size() + 4 <= kMaxColumns)
-      expect_sensitivities({GetParam(), other}, 2e-5);
+      expect_sensitivities({kinds_of(*GetParam()).front(), kinds_of(*other).front()}, 2e-5);
 }
 
 TEST_P(EveryEffect, DoesNotMindWhereItIsListed) {
@@ -296,6 +320,7 @@ TEST(Registry, NamesAreThoseOfTheContract) {
                                                "cutting_angle",
                                                "entry_point",
                                                "sensor_tilt",
+                                               "tip_swing",
                                                "camera_scale",
                                                "camera_rotation",
                                                "refraction",
