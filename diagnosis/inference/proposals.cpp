@@ -21,6 +21,7 @@ namespace {
 constexpr double kFarthest = 4.0;  // sizes promised reach to so many times their start
 constexpr double kSmall = 0.1;     // of a start
 constexpr double kNever = -1e3;
+constexpr std::size_t kGrid = 5;  // starts of one parameter
 
 // Readings are about as far from those without the effect as the parameter is from where it vanishes.
 bool is_amplitude(const Parameter& p) { return !std::isnan(p.none) && !p.shape; }
@@ -92,6 +93,26 @@ void keep_best(std::vector<StartPoint>& starts, std::size_t count) {
   if (starts.size() > count) starts.resize(count);
 }
 
+// The fits from which an effect is looked at: this one, and, where what is missing drove the base a standard deviation
+// from its prior, the same with the base where the prior has it. What an effect does may be in proportion to the base's
+// own parameters, and these may have been fitted away.
+std::vector<Fit> views_of(const Fit& about, const Effect& effect) {
+  std::vector<Fit> out{about};
+  const auto& unknowns = about.layout.shared();
+  const bool grid = std::ranges::any_of(effect.parameters, [](const Parameter& p) { return p.starts.size() >= kGrid; });
+  bool far = false;
+  Fit at_prior = about;
+  for (std::size_t i = 0; i < unknowns.size(); ++i) {
+    const Prior& prior = unknowns[i].parameter->prior;
+    if (unknowns[i].member >= 0 || prior.form != Prior::Form::normal) continue;
+    double& value = at_prior.shared[static_cast<Index>(i)];
+    far = far || std::abs(value - prior.middle) * std::sqrt(precision_of(prior)) > 1;
+    value = prior.middle;
+  }
+  if (far && !grid) out.push_back(std::move(at_prior));
+  return out;
+}
+
 }  // namespace
 
 Proposals::Proposals(const Likelihood& likelihood, const Fit& about, int threads) : system_(&likelihood.system()) {
@@ -114,13 +135,8 @@ Proposals::Candidate Proposals::make_candidate(const Likelihood& likelihood, con
   ModelSet rest = without(about.layout.set(), e);
   if (!system_->allows(with(rest, e))) rest.clear();
   const Layout around(*system_, rest), layout(*system_, with(rest, e));
-  const VectorXd shared_around = around.shared_from(about.layout, about.shared);
-  std::vector<VectorXd> path;
-  Prediction prediction;
+  const auto views = views_of(about, effect);
   for (std::size_t r = 0; r < likelihood.recordings(); ++r) {
-    if (!system_->predict(rest, r, shared_around, around.local_from(about.layout, about.local[r]), false, prediction))
-      return out;
-    path.push_back(prediction.reading);
     std::vector<double> choices;
     if (out.local >= 0) {
       const Parameter& parameter = effect.parameters[static_cast<std::size_t>(out.local)];
@@ -135,27 +151,37 @@ Proposals::Candidate Proposals::make_candidate(const Likelihood& likelihood, con
     out.choices.push_back(std::move(choices));
   }
   const auto starts = starts_of(effect);
+  const auto seen = static_cast<Index>(starts.size() * views.size());
+  Prediction prediction;
   for (std::size_t r = 0; r < likelihood.recordings(); ++r) {
     const auto per_start = out.local >= 0 ? static_cast<Index>(out.choices[r].size()) : out.width();
-    MatrixXd raw = MatrixXd::Zero(path[r].size(), per_start * static_cast<Index>(starts.size()));
+    MatrixXd raw;
     Index column = 0;
-    for (const VectorXd& start : starts)
-      for (Index c = 0; c < per_start; ++c, ++column) {
-        VectorXd values = start;
-        if (out.local >= 0)
-          values[out.local] = out.choices[r][static_cast<std::size_t>(c)];
-        else
-          for (std::size_t a = 0; a < out.amplitudes.size(); ++a)
-            if (static_cast<Index>(a) != c)
-              values[static_cast<Index>(out.amplitudes[a])] = effect.parameters[out.amplitudes[a]].none;
-        const auto [shared, local] = unknowns_with(layout, about, r, e, values);
-        if (system_->predict(layout.set(), r, shared, local, false, prediction))
-          raw.col(column) = prediction.reading - path[r];
-      }
+    for (const Fit& view : views) {
+      if (!system_->predict(rest, r, around.shared_from(view.layout, view.shared),
+                            around.local_from(view.layout, view.local[r]), false, prediction))
+        return Candidate{};
+      const VectorXd path = prediction.reading;
+      if (raw.size() == 0) raw = MatrixXd::Zero(path.size(), per_start * seen);
+      for (const VectorXd& start : starts)
+        for (Index c = 0; c < per_start; ++c, ++column) {
+          VectorXd values = start;
+          if (out.local >= 0)
+            values[out.local] = out.choices[r][static_cast<std::size_t>(c)];
+          else
+            for (std::size_t a = 0; a < out.amplitudes.size(); ++a)
+              if (static_cast<Index>(a) != c)
+                values[static_cast<Index>(out.amplitudes[a])] = effect.parameters[out.amplitudes[a]].none;
+          const auto [shared, local] = unknowns_with(layout, view, r, e, values);
+          if (system_->predict(layout.set(), r, shared, local, false, prediction))
+            raw.col(column) = prediction.reading - path;
+        }
+    }
     out.columns.push_back(likelihood.whitened(r, raw).cast<float>());
   }
-  for (std::size_t s = 0; s < starts.size(); ++s)
-    out.signatures.push_back({starts[s], out.local >= 0 ? static_cast<Index>(s) : static_cast<Index>(s) * out.width()});
+  for (Index s = 0; s < seen; ++s)
+    out.signatures.push_back(
+        {starts[static_cast<std::size_t>(s) % starts.size()], out.local >= 0 ? s : s * out.width()});
   return out;
 }
 

@@ -71,8 +71,7 @@ std::span<const Covariate> all_covariates();
 
 // What an effect remembers between legs of one insertion. Slopes come with it.
 struct EffectMemory {
-  static constexpr std::size_t kSlots = 4;
-  std::array<Dual, kSlots> slot;
+  std::array<Dual, 3> slot;
   int phase = 0;  // 0 until it has seen a leg
 };
 

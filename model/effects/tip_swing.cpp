@@ -21,7 +21,8 @@ namespace {
 //     g = (sinh x cosh x - sin x cos x) / (cosh^2 x + cos^2 x),  h = (sinh^2 x + sin^2 x) / (cosh^2 x + cos^2 x).
 //   That is the beam for small slopes; between guide and tissue the shaft bends as if it were held there too, which is
 //   the same to the fifth power of guide / bending. The other two parameters have no part.
-// Memory: the offset in {A}, and the heading's own tilt toward the bevel.
+// Only across {A}: what is fed is the length of the shaft. Memory: the offset, and the heading's own tilt toward the
+// bevel.
 class TipSwing final : public Effect {
  public:
   TipSwing()
@@ -70,11 +71,11 @@ class TipSwing final : public Effect {
     // By which the direction toward the bevel turned: from (0, -1).
     const Dual2 turned_by = {sin(leg.rotation_rad), 1.0 - cos(leg.rotation_rad)};
     for (std::size_t i = 0; i < 2; ++i) body[i] += side * of_turn_mm * turned_by[i];
-    const Dual3 world = leg.in_world(body);
-    for (std::size_t i = 0; i < 3; ++i) memory.slot[i] = memory.slot[i] * kept + world[i];
+    const Dual2 world = leg.lateral_in_world(body);
+    for (std::size_t i = 0; i < 2; ++i) memory.slot[i] = memory.slot[i] * kept + world[i];
   }
   void offset(Parameters /*p*/, const EffectMemory& memory, double /*time_s*/, Dual3& position_mm) const override {
-    for (std::size_t i = 0; i < 3; ++i) position_mm[i] += memory.slot[i];
+    for (std::size_t i = 0; i < 2; ++i) position_mm[i] += memory.slot[i];
   }
   void sensor(Parameters /*p*/, const EffectMemory& memory, Dual2& tilt_rad) const override {
     tilt_rad[0] += memory.slot[kTilt];
@@ -87,7 +88,7 @@ class TipSwing final : public Effect {
  private:
   static constexpr double kShortest_mm = 1e-6;
   static constexpr double kDeep = 15;  // bending lengths, from where on nothing changes
-  static constexpr std::size_t kTilt = 3;
+  static constexpr std::size_t kTilt = 2;
 
   static Dual depth_halfway(const LegView& leg) { return leg.tip_depth_mm + 0.5 * leg.insertion_mm * leg.heading_z; }
   struct End {

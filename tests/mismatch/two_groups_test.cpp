@@ -49,7 +49,7 @@ TEST(TwoGroups, AnEffectThatCameIsNamedBesideWhatWasThere) {
   EXPECT_NEAR(found.effects[0].parameters[0].value, 0.6, 4 * found.effects[0].parameters[0].std_error);
   for (const Location& where : found.where)
     EXPECT_THAT(where.log, ::testing::AnyOf("rec5", "rec6", "rec7", "rec8")) << "of the second group";
-  EXPECT_GT(found.held_out.gain, 12);
+  EXPECT_GT(found.held_out.gain, 3);  // odds of 20; by how much more hangs on which sets the others select
 }
 
 TEST(TwoGroups, ANeedleThatBendsMoreIsNamedByItsParameter) {
