@@ -37,7 +37,7 @@ TEST(RealFrames, TheTipAdvancesByTheCommandedStep) {
     if (entry.is_directory()) folders.push_back(entry.path());
   std::sort(folders.begin(), folders.end());
   ASSERT_FALSE(folders.empty());
-  std::array<int, 8> by_status{};
+  std::array<int, kTipStatuses> by_status{};
   int frames = 0;
   int not_ok_after_second = 0;
   std::vector<double> advance_mm;
