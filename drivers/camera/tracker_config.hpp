@@ -32,7 +32,7 @@ struct TrackerConfig {
   double curvature_sigma_per_mm = 0.01;  ///< curvatures expected; twice the 0.0047 / mm of the model's needle
   /// Change of curvature along that piece, as where the bevel was turned. A parabola cannot follow it, and the
   /// heading's information says so. With 0.003, needles of 0.005 / mm that are turned by up to 0.3 rad / mm have errors
-  /// of 1.1 times what is claimed, needles that are not, of 0.9 times.
+  /// of 1.1 times what is claimed, needles that are not, of 0.83 times.
   double curvature_change_per_mm = 0.003;
   // Region of interest
   double roi_ahead_mm = 10.0;  ///< how far beyond the prediction the tip may be
