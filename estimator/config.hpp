@@ -72,6 +72,10 @@ struct EstimatorConfig {
   // the midpoint rule, off by less than a thousandth of what the step does. False: by those of the step itself, as
   // longer ones, at 1.2 times the time. The path is the same.
   bool midpoint_derivatives = true;
+  // Cameras (tip_heading_t.camera) whose headings are the tangent of the shaft's end. The shaft lies where the tip has
+  // passed, so that is the way the tip moves, gamma; the others' are of what the needle's tip points along, e3 of {B}.
+  // Taken for one another they are wrong by alpha, more than hundreds of headings are uncertain by.
+  std::vector<int> shaft_cameras;
   // Live: the axes count from the entry point, so the first actuator state says how deep the needle is and how it is
   // turned. False: wherever the axes stand at first is the entry, as in recordings made elsewhere.
   bool start_at_axes = false;

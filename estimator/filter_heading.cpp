@@ -1,7 +1,11 @@
 // The filter's measurement of the heading.
 //
+// A heading is of a sensor in the needle, which points along R e3, or of a camera that sees the shaft, which ends in
+// the direction in which the tip moves (model/motion_direction.hpp): h below is either.
+//
 // A heading R e3 moves with the error (v | omega) of the pose, in the body, by R (omega x e3): along R e1 by omega_y,
-// along R e2 by -omega_x. Neither roll nor position moves it.
+// along R e2 by -omega_x. Neither roll nor position moves it. The direction of motion depends on
+// lambda1 and lambda2 besides.
 //
 // What is measured, z, is known along one or two axes n across it, and so taken as angles: the angle from the predicted
 // heading h to z in the plane of z and n is -atan2(n.h, z.h). For small ones these are the parts of the rotation vector
@@ -13,6 +17,7 @@
 #include <cmath>
 
 #include "estimator/measurement_update.hpp"
+#include "model/motion_direction.hpp"
 
 namespace bevel::estimator {
 namespace {
@@ -57,11 +62,15 @@ Angles angles_of(const model::TipHeading& measurement, const Eigen::Vector3d& h)
 
 }  // namespace
 
+// Directions are seen as the cameras see small shifts of the tip. How a shift of the tip along the axes of the body is
+// seen stands in the first columns of what a position's reading has.
+Eigen::Matrix3d NeedleFilter::seen_shift(const FilterState& state) const {
+  if (config_.effects.empty()) return state.pose.R;
+  return reading(state).D.leftCols<3>();
+}
+
 SeenHeading NeedleFilter::seen_heading(const FilterState& state) const {
-  // Directions are seen as the cameras see small shifts of the tip. How a shift of the tip along the axes of the body
-  // is seen stands in the first columns of what a position's reading has.
-  Eigen::Matrix3d shift = state.pose.R;
-  if (!config_.effects.empty()) shift = reading(state).D.leftCols<3>();
+  const Eigen::Matrix3d shift = seen_shift(state);
   const double length = shift.col(2).norm();
   SeenHeading seen;
   seen.along = shift.col(2) / length;
@@ -72,20 +81,56 @@ SeenHeading NeedleFilter::seen_heading(const FilterState& state) const {
   return seen;
 }
 
+std::optional<SeenHeading> NeedleFilter::seen_motion(const FilterState& state) const {
+  model::MotionDirection motion;
+  if (!model::motion_direction(state.pose.R, slip_of(state), motion)) return std::nullopt;
+  const Eigen::Matrix3d shift = seen_shift(state);
+  const Eigen::Vector3d moves = shift * motion.along;
+  const double length = moves.norm();
+  SeenHeading seen;
+  seen.along = moves / length;
+  const Eigen::Matrix3d across = (Eigen::Matrix3d::Identity() - seen.along * seen.along.transpose()) / length * shift;
+  seen.by_error.leftCols<3>().setZero();
+  seen.by_error.rightCols<3>() = across * motion.by_turn;
+  seen.by_slip = across * motion.by_slip;
+  return seen;
+}
+
+bool NeedleFilter::is_of_shaft(std::int32_t camera) const {
+  return std::ranges::find(config_.shaft_cameras, camera) != config_.shaft_cameras.end();
+}
+
+Eigen::Vector3d NeedleFilter::motion_of(const FilterState& state) const {
+  model::MotionDirection motion;
+  if (config_.shaft_cameras.empty() || !model::motion_direction(state.pose.R, slip_of(state), motion))
+    return Eigen::Vector3d::Zero();
+  return state.pose.R * motion.along;
+}
+
 Update NeedleFilter::update(FilterState& state, const model::TipHeading& measurement) const {
   return wheelbase_estimated_ ? update_heading<10>(state, measurement) : update_heading<9>(state, measurement);
 }
 
 template <int kSize>
 Update NeedleFilter::update_heading(FilterState& state, const model::TipHeading& measurement) const {
-  const SeenHeading predicted = seen_heading(state);
+  const bool of_shaft = is_of_shaft(measurement.camera);
+  const std::optional<SeenHeading> of_motion = of_shaft ? seen_motion(state) : std::nullopt;
+  if (of_shaft && !of_motion) return {};  // no model of what it sees
+  const SeenHeading predicted = of_motion ? *of_motion : seen_heading(state);
   const Angles angles = angles_of(measurement, predicted.along);
   const int rank = angles.seen.rank;
   if (rank == 0) return {};  // sees nothing: no rejection either
   Update result;
   if (angles.cosine > 0) {
-    const Eigen::Matrix<double, 3, 6> by_error = angles.by_heading * predicted.by_error;
-    result = update_seen<kSize, 6>(state, by_error, angles.seen, angles.residual_rad, gate_);
+    if (of_shaft) {
+      Eigen::Matrix<double, 3, 9> by_state = Eigen::Matrix<double, 3, 9>::Zero();
+      by_state.leftCols<6>() = angles.by_heading * predicted.by_error;
+      by_state.rightCols<2>() = angles.by_heading * predicted.by_slip;
+      result = update_seen<kSize, 9>(state, by_state, angles.seen, angles.residual_rad, gate_);
+    } else {
+      const Eigen::Matrix<double, 3, 6> by_error = angles.by_heading * predicted.by_error;
+      result = update_seen<kSize, 6>(state, by_error, angles.seen, angles.residual_rad, gate_);
+    }
   } else {
     // Half way round, the angle in a camera's picture may be nothing, or anything.
     const double angle_rad = std::acos(std::max(angles.cosine, -1.0));
@@ -102,20 +147,21 @@ Update NeedleFilter::update_heading(FilterState& state, const model::TipHeading&
   return result;
 }
 
-model::TipHeading NeedleFilter::made_linear(const model::TipHeading& measurement, const FilterState& state) const {
-  const Eigen::Vector3d h = state.pose.R.col(2);
+DirectionReading NeedleFilter::made_linear(const model::TipHeading& measurement, const FilterState& state) const {
+  const bool of_shaft = is_of_shaft(measurement.camera);
+  const Eigen::Vector3d h = of_shaft ? motion_of(state) : state.pose.R.col(2);
+  DirectionReading made;
+  if (h.isZero()) return made;
   const Angles angles = angles_of(measurement, h);
-  Eigen::Matrix3d information = Eigen::Matrix3d::Zero();
   Eigen::Vector3d left = Eigen::Vector3d::Zero();
   for (const int i : {1, 2}) {
     if (!(angles.seen.variance[i] > 0)) continue;
     const Eigen::Vector3d by_heading = angles.by_heading.row(i);
-    information += by_heading * by_heading.transpose() / angles.seen.variance[i];
+    made.information_per_rad2 += by_heading * by_heading.transpose() / angles.seen.variance[i];
     left += by_heading * (angles.residual_rad[i] / angles.seen.variance[i]);
   }
-  model::TipHeading made = measurement;
-  made.heading = h + solve_across(information, h, left);
-  made.information_per_rad2 = information;
+  made.measured = true;
+  made.seen = h + solve_across(made.information_per_rad2, h, left);
   return made;
 }
 

@@ -73,16 +73,13 @@ void NeedleEstimator::remember(const Node& before, const Node& node) {
   step.insertion_mm = node.insertion_mm - before.insertion_mm;
   step.rotation_rad = node.rotation_rad - before.rotation_rad;
   step.measured = node.kind == Kind::position && node.update.accepted;
-  step.heading_measured = node.kind == Kind::heading && node.update.accepted;
   if (step.measured) {
     step.position_mm = node.measurement.position_mm;
     step.information_per_mm2 = node.measurement.information_per_mm2;
   }
-  if (step.heading_measured) {
-    const model::TipHeading linear = filter_.made_linear(node.heading, node.state);
-    step.heading = linear.heading;
-    step.information_per_rad2 = linear.information_per_rad2;
-  }
+  if (node.kind == Kind::heading && node.update.accepted)
+    (filter_.is_of_shaft(node.heading.camera) ? step.motion : step.heading) =
+        filter_.made_linear(node.heading, node.state);
   past_mm_ += std::abs(step.insertion_mm);
   past_.add(before.state, step, node.state, node.moved, filter_);
 }
@@ -212,7 +209,8 @@ void NeedleEstimator::process_from(std::size_t index) {
     n.state = previous.state;
     filter_.predict(n.state, n.insertion_mm - previous.insertion_mm, n.rotation_rad - previous.rotation_rad,
                     static_cast<double>(n.utime - previous.utime) * 1e-6);
-    n.moved = {n.state.pose.p_mm - previous.state.pose.p_mm, n.state.pose.R.col(2) - previous.state.pose.R.col(2)};
+    n.moved = {n.state.pose.p_mm - previous.state.pose.p_mm, n.state.pose.R.col(2) - previous.state.pose.R.col(2),
+               filter_.motion_of(n.state) - filter_.motion_of(previous.state)};
     if (n.kind == Kind::actuator) continue;
     const bool position = n.kind == Kind::position;
     const auto apply = [&] {

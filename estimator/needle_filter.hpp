@@ -9,6 +9,7 @@
 #include <Eigen/Core>
 #include <array>
 #include <cstdint>
+#include <optional>
 #include <span>
 
 #include "estimator/config.hpp"
@@ -60,8 +61,18 @@ struct Update {
       Eigen::Vector3d::Zero();  // L^-1 innovation, S = L L^T: unit variance if all is right
 };
 
+// What was measured of a direction on a stretch of the past, as one linear reading: information times (seen -
+// direction).
+struct DirectionReading {
+  bool measured = false;  // and accepted
+  Eigen::Vector3d seen = Eigen::Vector3d::Zero();
+  Eigen::Vector3d offset =
+      Eigen::Vector3d::Zero();  // in {B} at the end of the step: of when it was measured, from then
+  Eigen::Matrix3d information_per_rad2 = Eigen::Matrix3d::Zero();
+};
+
 // One step of the past, as relinearise() needs it: increments since the step before it, then perhaps what was measured
-// on the way, as one reading of a point that stands still in the body and one of a direction that does.
+// on the way, as one reading of a point that stands still in the body and one each of its heading and of its motion.
 struct PastStep {
   double insertion_mm = 0;
   double rotation_rad = 0;
@@ -69,12 +80,10 @@ struct PastStep {
   Eigen::Vector3d position_mm = Eigen::Vector3d::Zero();
   Eigen::Vector3d point_mm = Eigen::Vector3d::Zero();  // in {B} at the end of the step: where the tip was when measured
   Eigen::Matrix3d information_per_mm2 = Eigen::Matrix3d::Zero();
-  bool heading_measured = false;  // and accepted
-  Eigen::Vector3d heading = Eigen::Vector3d::Zero();
-  Eigen::Vector3d direction = Eigen::Vector3d::UnitZ();  // in {B} at the end of the step: the heading when measured
-  Eigen::Matrix3d information_per_rad2 = Eigen::Matrix3d::Zero();
+  DirectionReading heading{};  // of e3
+  DirectionReading motion{};   // of the way the tip moves
 
-  bool has_reading() const { return measured || heading_measured; }
+  bool has_reading() const { return measured || heading.measured || motion.measured; }
 };
 
 // What relinearise() writes down of a step of a path when it walks back over it.
@@ -82,13 +91,16 @@ struct WalkedStep {
   model::NeedleJacobian backwards;  // of the step that undoes it
   Eigen::Matrix3d R;                // of the pose after it
   Eigen::Vector3d residual_mm;      // measured, less where the path has the point
-  Eigen::Vector3d residual_rad;     // the same of the direction
+  Eigen::Vector3d residual_rad;     // the same of the heading
+  Eigen::Vector3d motion_residual_rad;
 };
 
-// A state's heading as the cameras see it, a unit vector in {A}, and its derivative by the error of the pose.
+// A state's heading as the cameras see it, or the way its tip moves: a unit vector in {A}, and its derivatives by the
+// error of the pose and by lambda1, lambda2.
 struct SeenHeading {
   Eigen::Vector3d along;
   Eigen::Matrix<double, 3, 6> by_error;
+  Eigen::Matrix<double, 3, 2> by_slip = Eigen::Matrix<double, 3, 2>::Zero();
 };
 
 template <int kSize>
@@ -116,11 +128,17 @@ class NeedleFilter {
   // Where the cameras see the tip of a state, and by how much they are late.
   Eigen::Vector3d seen_position_mm(const FilterState& state) const;
   SeenHeading seen_heading(const FilterState& state) const;
+  // Nothing outside the domain of the slip law.
+  std::optional<SeenHeading> seen_motion(const FilterState& state) const;
+  // Whether this camera's headings are of the shaft, and so of the way the tip moves (EstimatorConfig::shaft_cameras).
+  bool is_of_shaft(std::int32_t camera) const;
+  // Which way the tip of a state moves, in {A}; zero where no camera gives it, and outside the slip law's domain.
+  Eigen::Vector3d motion_of(const FilterState& state) const;
   std::int64_t latency_us() const;
 
   // A heading about a state, without effects, as a point of which all that is known is linear: information times
-  // (heading - R e3) is what it says of R e3, and the information is singular along that.
-  model::TipHeading made_linear(const model::TipHeading& measurement, const FilterState& state) const;
+  // (seen - h) is what it says of h, R e3 or the way the tip moves, and the information is singular along that.
+  DirectionReading made_linear(const model::TipHeading& measurement, const FilterState& state) const;
 
   // Applies one measurement; its status must be 0 and its values finite (the checked decode sees to that).
   Update update(FilterState& state, const model::TipMeasurement& measurement) const;
@@ -154,6 +172,7 @@ class NeedleFilter {
   Update update_sized(FilterState& state, const model::TipMeasurement& measurement) const;
   template <int kSize>
   Update update_heading(FilterState& state, const model::TipHeading& measurement) const;
+  Eigen::Matrix3d seen_shift(const FilterState& state) const;
   template <int kSize>
   bool relinearise_sized(FilterState& state, const FilterState& start, std::span<const PastStep> steps,
                          std::span<WalkedStep> walked) const;

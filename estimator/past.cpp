@@ -66,31 +66,35 @@ void Past::add(const FilterState& before, const PastStep& step, const FilterStat
   }
   open_.point_mm = after.pose.R.transpose() * offset_mm;
 
-  // The same for the heading, as a point at unit distance ahead.
-  if (!open_.heading_measured && !step.heading_measured) return;
-  const Eigen::Vector3d ahead = after.pose.R.col(2);
-  Eigen::Vector3d heading_offset = Eigen::Vector3d::Zero();
-  if (open_.heading_measured)
-    heading_offset = before.pose.R * (open_.direction - Eigen::Vector3d::UnitZ()) - moved.heading;
-  if (step.heading_measured) join_heading(step, ahead, heading_offset);
-  open_.direction = Eigen::Vector3d::UnitZ() + after.pose.R.transpose() * heading_offset;
+  // The same for the directions, as points at unit distance ahead.
+  const auto take = [&](const DirectionReading& comes, const Eigen::Vector3d& ahead, const Eigen::Vector3d& by_model,
+                        DirectionReading& open) {
+    if (!open.measured && !comes.measured) return;
+    Eigen::Vector3d offset = Eigen::Vector3d::Zero();
+    if (open.measured) offset = before.pose.R * open.offset - by_model;
+    if (comes.measured) join(comes, ahead, open, offset);
+    open.offset = after.pose.R.transpose() * offset;
+  };
+  take(step.heading, after.pose.R.col(2), moved.heading, open_.heading);
+  if (open_.motion.measured || step.motion.measured)
+    take(step.motion, filter.motion_of(after), moved.motion, open_.motion);
 }
 
-// The mean reading leaves of the heading what the two leave, each by its information. That is taken across one and the
-// same heading: two that each know nothing along their own would together know where along it they cross, at length
-// zero.
-void Past::join_heading(const PastStep& step, const Eigen::Vector3d& ahead, Eigen::Vector3d& offset) {
+// The mean reading leaves of the direction what the two leave, each by its information. That is taken across one and
+// the same direction: two that each know nothing along their own would together know where along it they cross, at
+// length zero.
+void Past::join(const DirectionReading& comes, const Eigen::Vector3d& ahead, DirectionReading& open,
+                Eigen::Vector3d& offset) {
   const Eigen::Matrix3d across = Eigen::Matrix3d::Identity() - ahead * ahead.transpose();
-  const Eigen::Matrix3d had = across * open_.information_per_rad2 * across;
-  const Eigen::Matrix3d& comes = step.information_per_rad2;
-  const Eigen::Matrix3d sum = had + comes;
+  const Eigen::Matrix3d had = across * open.information_per_rad2 * across;
+  const Eigen::Matrix3d sum = had + comes.information_per_rad2;
   const double share = had.trace() / sum.trace();
-  const Eigen::Vector3d left = had * (open_.heading - ahead - offset) + comes * (step.heading - ahead);
+  const Eigen::Vector3d left = had * (open.seen - ahead - offset) + comes.information_per_rad2 * (comes.seen - ahead);
   offset *= share;
-  open_.heading = ahead + offset + solve_across(sum, ahead, left);
-  open_.information_per_rad2 = sum;
+  open.seen = ahead + offset + solve_across(sum, ahead, left);
+  open.information_per_rad2 = sum;
   if (!open_.measured) measured_at_ += (progress_ - measured_at_) * (1 - share);
-  open_.heading_measured = true;
+  open.measured = true;
 }
 
 void Past::append(double insertion_mm, double rotation_rad) {
@@ -122,10 +126,12 @@ void Past::close(const FilterState& end, const NeedleFilter& filter) {
   step.position_mm = open_.position_mm;
   step.information_per_mm2 = open_.information_per_mm2;
   step.point_mm = there.pose.R.transpose() * (end.pose.p_mm + end.pose.R * open_.point_mm - there.pose.p_mm);
-  step.heading_measured = open_.heading_measured;
+  const Eigen::Matrix3d back = there.pose.R.transpose();
   step.heading = open_.heading;
-  step.direction = there.pose.R.transpose() * (end.pose.R * open_.direction);
-  step.information_per_rad2 = open_.information_per_rad2;
+  step.heading.offset = back * (end.pose.R * open_.heading.offset + end.pose.R.col(2) - there.pose.R.col(2));
+  step.motion = open_.motion;
+  if (step.motion.measured)
+    step.motion.offset = back * (end.pose.R * open_.motion.offset + filter.motion_of(end) - filter.motion_of(there));
   append((1 - share) * open_.insertion_mm, (1 - share) * open_.rotation_rad);
 }
 

@@ -9,10 +9,11 @@
 
 namespace bevel::estimator {
 
-// By how much a step of the model moved the tip and the heading, in {A}.
+// By how much a step of the model moved the tip, the heading and the way the tip moves, in {A}.
 struct Moved {
   Eigen::Vector3d tip_mm = Eigen::Vector3d::Zero();
   Eigen::Vector3d heading = Eigen::Vector3d::Zero();
+  Eigen::Vector3d motion = Eigen::Vector3d::Zero();
 };
 
 class Past {
@@ -34,7 +35,8 @@ class Past {
 
  private:
   bool joins(const PastStep& step) const;
-  void join_heading(const PastStep& step, const Eigen::Vector3d& ahead, Eigen::Vector3d& offset);
+  void join(const DirectionReading& comes, const Eigen::Vector3d& ahead, DirectionReading& open,
+            Eigen::Vector3d& offset);
   void append(double insertion_mm, double rotation_rad);
 
   FilterState start_;

@@ -8,6 +8,7 @@
 
 #include "estimator/error_state.hpp"
 #include "estimator/propagate.hpp"
+#include "model/motion_direction.hpp"
 
 namespace bevel::estimator {
 
@@ -26,9 +27,25 @@ struct LinearFilter {
     covariance.diagonal() += added;
   }
 
-  void update(const PastStep& step, const WalkedStep& walked) {
+  void update(const PastStep& step, const WalkedStep& walked, const model::SlipParameters& slip) {
     if (step.measured) update<true>(walked.R, step.point_mm, step.information_per_mm2, walked.residual_mm);
-    if (step.heading_measured) update<false>(walked.R, step.direction, step.information_per_rad2, walked.residual_rad);
+    if (step.heading.measured)
+      update<false>(walked.R, Eigen::Vector3d::UnitZ() + step.heading.offset, step.heading.information_per_rad2,
+                    walked.residual_rad);
+    if (step.motion.measured) update_motion(step.motion, walked, slip);
+  }
+
+  // Of the way the tip moves, which depends on lambda too.
+  void update_motion(const DirectionReading& reading, const WalkedStep& walked, const model::SlipParameters& slip) {
+    model::MotionDirection motion;
+    if (!model::motion_direction(walked.R, slip, motion)) return;
+    const Eigen::Matrix3d by_turn = walked.R * (motion.by_turn - model::hat(reading.offset));
+    const Eigen::Matrix<double, 3, 2> by_slip = walked.R * motion.by_slip;
+    Eigen::Matrix<double, kSize, 3> PHt = covariance.template middleCols<3>(3).lazyProduct(by_turn.transpose());
+    PHt.noalias() += covariance.template middleCols<2>(7).lazyProduct(by_slip.transpose());
+    const Eigen::Matrix3d HPHt = by_turn * PHt.template middleRows<3>(3) + by_slip * PHt.template middleRows<2>(7);
+    const Eigen::Vector3d moved = by_turn * error.template segment<3>(3) + by_slip * error.template segment<2>(7);
+    take(PHt, HPHt, reading.information_per_rad2, walked.motion_residual_rad - moved);
   }
 
   // A point of the body moves by R (v + omega x arm) under a body perturbation, a direction without the v.
@@ -48,12 +65,15 @@ struct LinearFilter {
       HPHt += PHt.template topRows<3>();
       moved += error.template head<3>();
     }
-    HPHt = R * HPHt;
+    take(PHt, R * HPHt, information, residual - R * moved);
+  }
+
+  void take(const Eigen::Matrix<double, kSize, 3>& PHt, const Eigen::Matrix3d& HPHt, const Eigen::Matrix3d& information,
+            const Eigen::Vector3d& innovation) {
     const Eigen::Matrix3d spread = Eigen::Matrix3d::Identity() + information * HPHt;
     const Eigen::Matrix3d weight = spread.inverse() * information;
-    const Eigen::Vector3d innovation = residual - R * moved;
     log_evidence -= 0.5 * (innovation.dot(weight * innovation) + std::log(spread.determinant()));
-    const Columns gain = PHt.lazyProduct(weight);
+    const Eigen::Matrix<double, kSize, 3> gain = PHt.lazyProduct(weight);
     error += gain * innovation;
     Covariance<kSize> P = covariance;
     P.noalias() -= gain.lazyProduct(PHt.transpose());
@@ -81,6 +101,19 @@ struct LinearFilter {
 namespace {
 
 constexpr double kKnown = 1e-12;  // variance against the prior's
+
+Eigen::Vector3d heading_residual(const DirectionReading& reading, const Eigen::Matrix3d& R) {
+  return reading.seen - R * (Eigen::Vector3d::UnitZ() + reading.offset);
+}
+
+// Outside the slip law's domain there is no answer, and the cost of such a path is none either.
+Eigen::Vector3d motion_residual(const DirectionReading& reading, const Eigen::Matrix3d& R,
+                                const model::SlipParameters& slip) {
+  model::MotionDirection motion;
+  if (!model::motion_direction(R, slip, motion))
+    return Eigen::Vector3d::Constant(std::numeric_limits<double>::quiet_NaN());
+  return reading.seen - R * (motion.along + reading.offset);
+}
 
 bool moves(const PastStep& step) { return step.insertion_mm != 0 || step.rotation_rad != 0; }
 
@@ -153,9 +186,13 @@ double NeedleFilter::path_cost(const FilterState& state, const FilterState& star
       const Eigen::Vector3d residual = step.position_mm - entry.pose.p_mm - entry.pose.R * step.point_mm;
       squares += residual.dot(step.information_per_mm2 * residual);
     }
-    if (step.heading_measured) {
-      const Eigen::Vector3d residual = step.heading - entry.pose.R * step.direction;
-      squares += residual.dot(step.information_per_rad2 * residual);
+    if (step.heading.measured) {
+      const Eigen::Vector3d residual = heading_residual(step.heading, entry.pose.R);
+      squares += residual.dot(step.heading.information_per_rad2 * residual);
+    }
+    if (step.motion.measured) {
+      const Eigen::Vector3d residual = motion_residual(step.motion, entry.pose.R, slip);
+      squares += residual.dot(step.motion.information_per_rad2 * residual);
     }
     if (!model::advance(entry.pose, {-step.insertion_mm, -step.rotation_rad, {state.curvature_per_mm, 0}}, slip))
       return kNone;
@@ -182,9 +219,13 @@ bool NeedleFilter::run_again(const FilterState& about, const FilterState& start,
       back.residual_mm = step.position_mm - pose.p_mm - pose.R * step.point_mm;
       squares += back.residual_mm.dot(step.information_per_mm2 * back.residual_mm);
     }
-    if (step.heading_measured) {
-      back.residual_rad = step.heading - pose.R * step.direction;
-      squares += back.residual_rad.dot(step.information_per_rad2 * back.residual_rad);
+    if (step.heading.measured) {
+      back.residual_rad = heading_residual(step.heading, pose.R);
+      squares += back.residual_rad.dot(step.heading.information_per_rad2 * back.residual_rad);
+    }
+    if (step.motion.measured) {
+      back.motion_residual_rad = motion_residual(step.motion, pose.R, slip);
+      squares += back.motion_residual_rad.dot(step.motion.information_per_rad2 * back.motion_residual_rad);
     }
     if (moves(step) &&
         !model::advance_by_midpoint(pose, {-step.insertion_mm, -step.rotation_rad, curvature}, slip, back.backwards))
@@ -202,7 +243,7 @@ bool NeedleFilter::run_again(const FilterState& about, const FilterState& start,
     if (moves(step))
       linear.predict(inverse(walked[i].backwards),
                      process_variance<kSize>(linear.covariance, step.insertion_mm, step.rotation_rad));
-    linear.update(step, walked[i]);
+    linear.update(step, walked[i], slip);
   }
   return linear.error.allFinite() && linear.covariance.allFinite() && std::isfinite(linear.log_evidence);
 }

@@ -1,5 +1,9 @@
 #include "io/estimator_config.hpp"
 
+#include <cmath>
+#include <string>
+#include <vector>
+
 namespace bevel::io {
 
 void read_estimator_config(Section section, estimator::EstimatorConfig& config) {
@@ -28,6 +32,15 @@ void read_estimator_config(Section section, estimator::EstimatorConfig& config) 
   gate.read("rejects_before_reset", config.gate.rejects_before_reset, optional, in_range(1, 10000));
   gate.read("reset_position_sd_mm", config.gate.reset_position_sd_mm, optional, in_range(0.01, 1000));
   gate.read("reset_tilt_sd_rad", config.gate.reset_tilt_sd_rad, optional, in_range(1e-4, 3));
+
+  std::vector<double> shaft_cameras(config.shaft_cameras.begin(), config.shaft_cameras.end());
+  section.read("shaft_cameras", shaft_cameras, optional, in_range(0, 15));
+  config.shaft_cameras.clear();
+  for (const double camera : shaft_cameras) {
+    if (camera != std::floor(camera))
+      section.fail("shaft_cameras", "has " + std::to_string(camera) + "; allowed: whole numbers, as in TIP_HEADING");
+    config.shaft_cameras.push_back(static_cast<int>(camera));
+  }
 
   section.read("relinearised_steps", config.relinearised_steps, optional, in_range(0, 100000));
 

@@ -1,5 +1,6 @@
 #include "nodes/camera_node.hpp"
 
+#include <algorithm>
 #include <stdexcept>
 
 namespace bevel::nodes {
@@ -9,12 +10,36 @@ std::string camera_process_name(const SystemConfig& config) {
   return all ? "bevel-camera" : "bevel-camera-" + std::to_string(config.source.camera);
 }
 
+tip_measurement_t to_tip(const camera::TipObservation& seen, std::int64_t seq) {
+  tip_measurement_t m{};
+  m.utime = seen.capture_utime;
+  m.seq = seq;
+  m.camera = seen.camera;
+  m.status = static_cast<std::int32_t>(seen.status);
+  std::ranges::copy(seen.position_mm, m.position_mm);
+  std::ranges::copy(seen.information_per_mm2, m.information_per_mm2);
+  return m;
+}
+
+tip_heading_t to_heading(const camera::TipObservation& seen, std::int64_t seq) {
+  tip_heading_t m{};
+  m.utime = seen.capture_utime;
+  m.seq = seq;
+  m.camera = seen.camera;
+  m.status = static_cast<std::int32_t>(seen.heading_status);
+  std::ranges::copy(seen.heading.direction, m.heading);
+  std::ranges::copy(seen.heading.information_per_rad2, m.information_per_rad2);
+  return m;
+}
+
 CameraNode::CameraNode(lcm::LCM& lcm, const SystemConfig& config)
     : port_(lcm), status_(port_, camera_process_name(config), 0) {
   if (config.cameras.empty()) throw std::invalid_argument("no [[camera]] in the configuration: at least one is needed");
   std::vector<camera::CameraSetup> setups;
-  for (const CameraViewConfig& c : config.cameras)
+  for (const CameraViewConfig& c : config.cameras) {
+    if (c.headings) with_headings_.insert(c.camera);
     setups.push_back({c.camera, std::make_shared<camera::PlanarView>(c.view), c.tracker, {}});
+  }
   pipeline_ = std::make_unique<camera::CameraPipeline>(camera::make_frame_source(config.source), setups);
   port_.subscribe<needle_state_t>(
       io::channel::kNeedleState,
@@ -41,14 +66,9 @@ CameraNode::Outcome CameraNode::step(const Now& now, int timeout_ms) {
   }
   const auto& seen = std::get<camera::TipObservation>(result);
   status_.note_run(seen.run_s);
-  tip_measurement_t m{};
-  m.utime = seen.capture_utime;
-  m.seq = seq_[seen.camera]++;
-  m.camera = seen.camera;
-  m.status = static_cast<std::int32_t>(seen.status);
-  for (std::size_t i = 0; i < 3; ++i) m.position_mm[i] = seen.position_mm[i];
-  for (std::size_t i = 0; i < 9; ++i) m.information_per_mm2[i] = seen.information_per_mm2[i];
-  port_.publish(io::channel::kTipMeasurement, m);
+  const std::int64_t seq = seq_[seen.camera]++;
+  port_.publish(io::channel::kTipMeasurement, to_tip(seen, seq));
+  if (with_headings_.contains(seen.camera)) port_.publish(io::channel::kTipHeading, to_heading(seen, seq));
   if (on_observation) on_observation(seen);
   return Outcome::frame;
 }

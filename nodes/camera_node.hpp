@@ -1,6 +1,8 @@
 #pragma once
-// bevel-camera: frames in, TIP_MEASUREMENT out. The estimate, if there is one, says where to look.
+// bevel-camera: frames in, TIP_MEASUREMENT out, and TIP_HEADING of the same frame, stamp and number for cameras that
+// are told to give it. The estimate, if there is one, says where to look.
 #include <map>
+#include <set>
 
 #include "drivers/camera/pipeline.hpp"
 #include "nodes/status_reporter.hpp"
@@ -10,6 +12,10 @@ namespace bevel::nodes {
 
 // bevel-camera, or bevel-camera-N for one that serves camera N of several.
 std::string camera_process_name(const SystemConfig& config);
+
+// What is published of an observation.
+tip_measurement_t to_tip(const camera::TipObservation& seen, std::int64_t seq);
+tip_heading_t to_heading(const camera::TipObservation& seen, std::int64_t seq);
 
 class CameraNode {
  public:
@@ -31,6 +37,7 @@ class CameraNode {
   StatusReporter status_;
   std::string failure_;
   std::map<int, std::int64_t> seq_;  // each camera counts for itself
+  std::set<int> with_headings_;
 };
 
 }  // namespace bevel::nodes

@@ -14,12 +14,12 @@
 namespace bevel::nodes {
 
 enum class FaultKind {
-  off,            // sends nothing any more
-  stuck,          // the newest message for ever: byte for byte, or with new stamps and numbers
-  garbage,        // bytes that mean nothing, of the right type or not
-  wrong,          // well-formed and false: a tip 10 mm aside, axes that jump, a command nobody computed
-  slow,           // one message in a quarter of a second
-  delayed,        // each message late by 0.15 to 0.5 s
+  off,      // sends nothing any more
+  stuck,    // the newest message for ever: byte for byte, or with new stamps and numbers
+  garbage,  // bytes that mean nothing, of the right type or not
+  wrong,    // well-formed and false: a tip 10 mm aside, a heading turned, axes that jump, a command nobody computed
+  slow,     // one message in a quarter of a second
+  delayed,  // each message late by 0.15 to 0.5 s
   intermittent,   // gaps of 0.15 to 0.4 s
   replayed,       // beside its own messages those of a second before
   second_sender,  // beside its own messages those of another, false and in good form
@@ -32,6 +32,8 @@ inline constexpr int kComponents = 6;
 const char* name_of(Component component);
 // The channel on which a process speaks to the others; "" for drives, which are on the bus.
 const char* channel_of(Component component);
+// All of them: a camera's headings fail with its positions.
+std::vector<std::string> channels_of(Component component);
 
 struct Fault {
   Component component = Component::camera;
@@ -46,13 +48,15 @@ class FaultInjector {
   using Emit = std::function<void(const char* channel, std::span<const std::uint8_t> bytes)>;
 
   // Lets everything pass until begin().
-  explicit FaultInjector(const char* channel) : channel_(channel) {}
+  explicit FaultInjector(Component component) : channels_(channels_of(component)) {}
   // Acts from start_ns (steady clock) on. The seed draws the variant, lengths and bytes.
   void begin(FaultKind kind, std::int64_t start_ns, std::uint64_t seed);
 
-  bool concerns(const char* channel) const { return channel_ == channel; }
-  // Takes a message that its component sends; what comes out of it is emitted by flush().
-  void pass(const std::vector<std::uint8_t>& bytes, std::int64_t now_ns, std::int64_t now_utime);
+  bool concerns(std::string_view channel) const;
+  // Takes a message that its component sends; what comes out of it is emitted by flush(), on the same channel. A
+  // channel that it does not concern throws std::invalid_argument.
+  void pass(std::string_view channel, const std::vector<std::uint8_t>& bytes, std::int64_t now_ns,
+            std::int64_t now_utime);
   // Emits what is due.
   void flush(std::int64_t now_ns, const Emit& emit);
 
@@ -60,13 +64,18 @@ class FaultInjector {
   using Bytes = std::vector<std::uint8_t>;
   struct Due {
     std::int64_t at_ns;
+    std::size_t channel;  // of channels_
     Bytes bytes;
   };
-  void emit_at(std::int64_t at_ns, Bytes bytes) { due_.push_back({at_ns, std::move(bytes)}); }  // at_ns never falls
+  // at_ns never falls
+  void emit_at(std::int64_t at_ns, std::size_t channel, Bytes bytes) {
+    due_.push_back({at_ns, channel, std::move(bytes)});
+  }
+  const Due* newest_of(std::size_t channel) const;  // of before the fault; nullptr: none
   double uniform(double low, double high) { return std::uniform_real_distribution<double>(low, high)(rng_); }
   Bytes garbage(const Bytes& like);
 
-  std::string channel_;
+  std::vector<std::string> channels_;
   FaultKind kind_ = FaultKind::off;
   std::int64_t start_ns_ = std::numeric_limits<std::int64_t>::max();
   std::mt19937_64 rng_;
@@ -74,8 +83,10 @@ class FaultInjector {
   std::int64_t shift_ns_ = 0;        // of delays
   std::int64_t pass_until_ns_ = 0;   // intermittent
   std::int64_t block_until_ns_ = 0;  // intermittent, slow
-  std::int64_t own_seq_ = 0;         // of the second sender
-  std::deque<Due> past_;             // of the last second
+  std::int64_t slow_sent_ns_ = 0;    // when the newest was let through, and its channel
+  std::size_t slow_channel_ = 0;
+  std::vector<std::int64_t> own_seq_;  // of the second sender, on each channel
+  std::deque<Due> past_;               // of the last second
   std::deque<Due> due_;
 };
 

@@ -66,7 +66,7 @@ void LcmPort::flush_injector() {
 
 bool LcmPort::send(const char* channel, const std::vector<std::uint8_t>& bytes) {
   if (injector_ && injector_->concerns(channel)) {
-    injector_->pass(bytes, now_.ns, now_.utime);
+    injector_->pass(channel, bytes, now_.ns, now_.utime);
     flush_injector();
     return true;
   }

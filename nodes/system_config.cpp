@@ -1,5 +1,6 @@
 #include "nodes/system_config.hpp"
 
+#include <algorithm>
 #include <cmath>
 #include <filesystem>
 #include <utility>
@@ -134,6 +135,9 @@ CameraViewConfig read_camera(Section s) {
   s.read("min_length_mm", t.min_length_mm, optional, in_range(0.5, 1000));
   s.read("floor_across_mm", t.floor_across_mm, optional, in_range(1e-4, 100));
   s.read("floor_along_mm", t.floor_along_mm, optional, in_range(1e-4, 100));
+  s.read("headings", c.headings, optional);
+  s.read("floor_heading_rad", t.floor_heading_rad, optional, in_range(1e-5, 1));
+  s.read("max_heading_sd_rad", t.max_heading_sd_rad, optional, in_range(1e-3, 1));
   return c;
 }
 
@@ -202,8 +206,15 @@ SystemConfig load_system_config(const std::string& path) {
   read_stepper(file.section("stepper", optional), c.stepper);
   read_source(file.section("source", optional), c.source);
   for (const Section& s : file.sections("camera", optional)) c.cameras.push_back(read_camera(s));
+  // Whoever of them gives headings gives the shaft's.
+  for (const CameraViewConfig& camera : c.cameras) c.estimator.shaft_cameras.push_back(camera.camera);
   c.rig.truth = c.needle;
   read_rig(file.section("rig", optional), folder, c.rig);
+  if (c.rig.heading.sd_rad > 0 && std::ranges::count(c.cameras, c.rig.heading.camera, &CameraViewConfig::camera) > 0)
+    file.section("rig", optional)
+        .section("heading", optional)
+        .fail("camera", "is " + std::to_string(c.rig.heading.camera) +
+                            ", which a [[camera]] has; allowed: a number of its own, 0 to 15");
   file.finish();
   c.live_effects = io::live_effects(believed.effects, believed.discrepancies);
   c.effects = std::move(believed.effects);

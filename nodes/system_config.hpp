@@ -19,6 +19,10 @@ struct CameraViewConfig {
   int camera = 0;
   camera::PlanarViewConfig view;
   camera::TrackerConfig tracker;
+  // Whether the tangent of the shaft's end goes out on TIP_HEADING. Off by default: beside the positions of the same
+  // frames it brings the estimate next to nothing (docs/estimator.md), and to who does not know that it is the shaft's
+  // it is a wrong heading, by the slip angle. On where the estimate may have to start deep in the tissue.
+  bool headings = false;
   int width_px = 640;  // of the rig's rendered picture
   int height_px = 480;
 };

@@ -8,6 +8,7 @@ namespace bevel::camera {
 namespace {
 
 constexpr int kMinRows = 8;
+constexpr double kLeastVariance_px2 = 1e-6;
 constexpr double kTukey = 4.685;  // 95 % efficient for Gaussian residuals
 
 double bilinear(const cv::Mat& m, double x, double y) {
@@ -72,6 +73,24 @@ double Centreline::variance_px2(double row) const {
   return g.dot(covariance * g);
 }
 
+double TangentFit::slope(double row) const {
+  const double t = (row - last_row) / scale_px;
+  return (coefficient[1] + 2.0 * t * coefficient[2]) / scale_px;
+}
+
+double TangentFit::angle_variance_rad2(double row) const {
+  const double t = (row - last_row) / scale_px;
+  const cv::Vec3d g(0.0, 1.0 / scale_px, 2.0 * t / scale_px);
+  double variance = g.dot(covariance * g);
+  for (int i = 0; i < kBends; ++i) {
+    const double true_slope = std::max(0.0, row - last_row + (i + 0.5) * bend_spacing_px);
+    const double off = g.dot(by_bend[static_cast<size_t>(i)]) - true_slope;
+    variance += off * off * curvature_change_per_px * curvature_change_per_px / kBends;
+  }
+  const double s = slope(row);
+  return variance / ((1.0 + s * s) * (1.0 + s * s));
+}
+
 cv::Point2d Centreline::along(double row, double arc_px) const {
   // Midpoint steps of at most two pixels; the curve turns by far less than a degree in one.
   const int steps = std::max(1, static_cast<int>(std::ceil(std::abs(arc_px) / 2.0)));
@@ -83,16 +102,51 @@ cv::Point2d Centreline::along(double row, double arc_px) const {
   return {col(row), row};
 }
 
-Centreline fit_centreline(const std::vector<cv::Point2d>& centres, double correlation_px,
-                          double curvature_sigma_per_px) {
+namespace {
+
+TangentFit fit_tangent(const Centreline& line, const std::vector<cv::Point2d>& centres,
+                       const std::vector<double>& weight, const CentrelinePriors& priors) {
+  TangentFit fit;
+  fit.last_row = line.last_row;
+  fit.scale_px = line.scale_px;
+  fit.bend_spacing_px = line.scale_px / TangentFit::kBends;
+  fit.curvature_change_per_px = priors.curvature_change_per_px;
+  cv::Matx33d normal = cv::Matx33d::zeros();
+  cv::Vec3d right(0.0, 0.0, 0.0);
+  std::array<cv::Vec3d, TangentFit::kBends> drawn;
+  for (size_t i = 0; i < centres.size(); ++i) {
+    const double off_px = centres[i].y - fit.last_row;
+    const double t = off_px / fit.scale_px;
+    const cv::Vec3d g(1.0, t, t * t);
+    normal += weight[i] * (g * g.t());
+    right += weight[i] * centres[i].x * g;
+    for (int k = 0; k < TangentFit::kBends; ++k) {
+      const double beyond_px = std::max(0.0, off_px + (k + 0.5) * fit.bend_spacing_px);
+      drawn[static_cast<size_t>(k)] += 0.5 * weight[i] * beyond_px * beyond_px * g;
+    }
+  }
+  const double variance_px2 = line.residual_px * line.residual_px * priors.tangent_correlation_px;
+  const double bend_sigma_px = 0.5 * priors.curvature_sigma_per_px * fit.scale_px * fit.scale_px;
+  // Residuals of exactly nothing, of a drawing, would leave no prior at all and its covariance undefined.
+  normal(2, 2) += std::max(variance_px2, kLeastVariance_px2) / (bend_sigma_px * bend_sigma_px);
+  const cv::Matx33d inverse = normal.inv(cv::DECOMP_CHOLESKY);
+  fit.coefficient = inverse * right;
+  fit.covariance = inverse * std::max(variance_px2, kLeastVariance_px2);
+  for (size_t k = 0; k < drawn.size(); ++k) fit.by_bend[k] = inverse * drawn[k];
+  return fit;
+}
+
+}  // namespace
+
+Centreline fit_centreline(const std::vector<cv::Point2d>& centres, const CentrelinePriors& priors) {
   Centreline fit;
   if (centres.size() < kMinRows) return fit;
   fit.last_row = centres.back().y;
   fit.scale_px = std::max(1.0, fit.last_row - centres.front().y);
   constexpr double typical_residual_px = 0.3;
-  const double bend_sigma_px = 0.5 * curvature_sigma_per_px * fit.scale_px * fit.scale_px;
+  const double bend_sigma_px = 0.5 * priors.curvature_sigma_per_px * fit.scale_px * fit.scale_px;
   const double prior_weight =
-      typical_residual_px * typical_residual_px * correlation_px / (bend_sigma_px * bend_sigma_px);
+      typical_residual_px * typical_residual_px * priors.correlation_px / (bend_sigma_px * bend_sigma_px);
   std::vector<double> weight(centres.size(), 1.0);
   std::vector<double> residual(centres.size());
   cv::Matx33d inverse = cv::Matx33d::eye();
@@ -127,8 +181,9 @@ Centreline fit_centreline(const std::vector<cv::Point2d>& centres, double correl
   for (size_t i = 0; i < centres.size(); ++i) squares += weight[i] * residual[i] * residual[i];
   const double variance = squares / std::max(1.0, weight_sum - 3.0);
   fit.residual_px = std::sqrt(variance);
-  fit.covariance = inverse * (variance * correlation_px);
+  fit.covariance = inverse * (variance * priors.correlation_px);
   fit.rows_used = static_cast<int>(weight_sum);
+  fit.tangent = fit_tangent(fit, centres, weight, priors);
   return fit;
 }
 

@@ -62,12 +62,16 @@ TipObservation CameraPipeline::observe(Eye& eye, const Frame& frame) {
   seen.seq = frame.seq;
   seen.camera = frame.camera;
   seen.status = tip.status;
+  seen.heading_status = tip.heading_status;
   seen.reason = tip.reason;
   if (tip.status != TipStatus::ok) return seen;
   seen.position_mm = eye.view->position_mm(tip.tip_px);
   seen.information_per_mm2 = eye.view->information_per_mm2(tip.tip_px, tip.covariance_px2);
   seen.tip_px = tip.tip_px;
   seen.direction_px = tip.direction_px;
+  if (tip.heading_status != TipStatus::ok) return seen;
+  ++counters_.headings;
+  seen.heading = eye.view->direction(tip.tip_px, tip.direction_px, tip.direction_variance_rad2);
   return seen;
 }
 

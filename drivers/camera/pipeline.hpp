@@ -16,8 +16,8 @@
 
 namespace bevel::camera {
 
-/// One camera's answer to one frame; field for field what tip_measurement_t carries, and what a display wants beside
-/// it.
+/// One camera's answer to one frame; field for field what tip_measurement_t and tip_heading_t carry, and what a display
+/// wants beside it.
 struct TipObservation {
   int64_t capture_utime = 0;
   int64_t seq = 0;
@@ -25,7 +25,11 @@ struct TipObservation {
   TipStatus status = TipStatus::lost;
   Vector3 position_mm{};          ///< in {A}; zero unless ok
   Matrix3 information_per_mm2{};  ///< zero unless ok, and along the optical axis
-  cv::Point2d tip_px;             ///< and the rest: only if ok
+  /// The tangent of the shaft's centreline at the tip, as this picture shows it (view.hpp); zero unless heading_status
+  /// is ok.
+  SeenDirection heading;
+  TipStatus heading_status = TipStatus::lost;
+  cv::Point2d tip_px;  ///< and the rest: only if ok
   cv::Vec2d direction_px;
   std::string_view reason;  ///< why not ok; static storage
   double run_s = 0;         ///< from the frame to this, without waiting for it
@@ -42,7 +46,8 @@ struct CameraCounters {
   int64_t frames = 0;
   int64_t lost_frames = 0;     ///< gaps in seq
   int64_t unknown_camera = 0;  ///< frames of cameras that are not set up; dropped
-  std::array<int64_t, 8> by_status{};
+  std::array<int64_t, kTipStatuses> by_status{};
+  int64_t headings = 0;  ///< frames with a usable one
 };
 
 class CameraPipeline {

@@ -57,4 +57,19 @@ Matrix3 PlanarView::information_per_mm2(const cv::Point2d& /*pixel*/, const cv::
   return out;
 }
 
+// All pixels are the same number of mm to both sides, so that angles in the picture are angles in its plane of {A}.
+SeenDirection PlanarView::direction(const cv::Point2d& /*pixel*/, const cv::Vec2d& direction_px,
+                                    double variance_rad2) const {
+  const cv::Vec2d along = cv::normalize(direction_px);
+  SeenDirection seen;
+  Vector3 across{};
+  seen.direction[index(config_.u_axis)] = config_.u_axis.sign * along[0];
+  seen.direction[index(config_.v_axis)] = config_.v_axis.sign * along[1];
+  across[index(config_.u_axis)] = -config_.u_axis.sign * along[1];
+  across[index(config_.v_axis)] = config_.v_axis.sign * along[0];
+  for (size_t r = 0; r < 3; ++r)
+    for (size_t c = 0; c < 3; ++c) seen.information_per_rad2[3 * r + c] = across[r] * across[c] / variance_rad2;
+  return seen;
+}
+
 }  // namespace bevel::camera

@@ -29,6 +29,7 @@ class PlanarView : public View {
   Vector3 position_mm(const cv::Point2d& pixel) const override;
   cv::Point2d pixel(const Vector3& position_mm) const override;
   Matrix3 information_per_mm2(const cv::Point2d& pixel, const cv::Matx22d& covariance_px2) const override;
+  SeenDirection direction(const cv::Point2d& pixel, const cv::Vec2d& direction_px, double variance_rad2) const override;
   double px_per_mm() const override { return config_.px_per_mm; }
   const PlanarViewConfig& config() const { return config_; }
 

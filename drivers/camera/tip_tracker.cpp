@@ -13,6 +13,7 @@ namespace {
 
 Centreline moved(Centreline line, const cv::Point& by) {
   line.last_row += by.y;
+  line.tangent.last_row += by.y;
   line.coefficient[0] += by.x;
   return line;
 }
@@ -26,7 +27,7 @@ bool same_bytes(const cv::Mat& a, const cv::Mat& b) {
 
 TipResult refused(TipStatus status, std::string_view reason) {
   TipResult result;
-  result.status = status;
+  result.status = result.heading_status = status;
   result.reason = reason;
   return result;
 }
@@ -51,6 +52,8 @@ std::string_view name_of(TipStatus status) {
       return "frozen";
     case TipStatus::late:
       return "late";
+    case TipStatus::unsure:
+      return "unsure";
   }
   return "unknown";
 }
@@ -198,7 +201,7 @@ TipTracker::Found TipTracker::look(const cv::Mat& gray, const Canonical& turn, c
   result = refused(TipStatus::lost, "no dark line from the entry side");
   result.full_search = search.full;
   const auto finish = [&](TipStatus status, std::string_view reason) {
-    result.status = status;
+    result.status = result.heading_status = status;
     result.reason = reason;
     return found;
   };
@@ -241,7 +244,7 @@ TipTracker::Found TipTracker::look(const cv::Mat& gray, const Canonical& turn, c
   found.tip += cv::Point2d(search.region.tl());
   found.line = moved(found.line, search.region.tl());
   result.tip_px = turn.to_picture(found.tip);
-  const double slope = found.line.slope(found.tip.y);
+  const double slope = found.line.tangent.slope(found.tip.y);
   const cv::Vec2d forward = cv::normalize(cv::Vec2d(slope, 1.0));
   result.direction_px = turn.direction_to_picture(forward);
   // Turning is a permutation with signs: the covariance turns with its two axes.
@@ -254,7 +257,7 @@ TipTracker::Found TipTracker::look(const cv::Mat& gray, const Canonical& turn, c
 
 void TipTracker::measure(const cv::Mat& patch, const RidgePath& path, int end_row, Found& found) const {
   TipResult& result = found.result;
-  result.status = TipStatus::lost;
+  result.status = result.heading_status = TipStatus::lost;
   result.reason = "no steady centreline";
   const double taper_px = config_.bevel_length_mm * px_per_mm_;
   const int last_shaft_row = end_row - cvRound(0.5 * taper_px) - scale_.core_px;
@@ -265,7 +268,9 @@ void TipTracker::measure(const cv::Mat& patch, const RidgePath& path, int end_ro
     const double col = centre_in_row(patch, r, path.cols[static_cast<size_t>(r)], scale_);
     if (std::isfinite(col)) centres.emplace_back(col, r);
   }
-  found.line = fit_centreline(centres, config_.correlation_px, config_.curvature_sigma_per_mm / px_per_mm_);
+  found.line = fit_centreline(
+      centres, {config_.correlation_px, config_.heading_correlation_px, config_.curvature_sigma_per_mm / px_per_mm_,
+                config_.curvature_change_per_mm / px_per_mm_});
   if (found.line.rows_used == 0) return;
 
   result.reason = "the end of the needle is not seen";
@@ -307,6 +312,10 @@ void TipTracker::measure(const cv::Mat& patch, const RidgePath& path, int end_ro
   result.contrast_gray = edge.height;
   result.status = TipStatus::ok;
   result.reason = {};
+  result.direction_variance_rad2 =
+      found.line.tangent.angle_variance_rad2(found.tip.y) + config_.floor_heading_rad * config_.floor_heading_rad;
+  const bool sure = result.direction_variance_rad2 <= config_.max_heading_sd_rad * config_.max_heading_sd_rad;
+  result.heading_status = sure ? TipStatus::ok : TipStatus::unsure;
 }
 
 }  // namespace bevel::camera

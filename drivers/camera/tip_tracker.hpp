@@ -2,7 +2,8 @@
 // The tip of a dark needle in the frames of one camera. Steps: region of interest from the last tips (whole picture
 // when lost), background and illumination gain, ridge response and best path (ridge_path.hpp), sub-pixel centreline and
 // robust arc (centreline.hpp), blurred edge of a bevelled end along the tangent (edge_fit.hpp), covariance from the
-// residuals of both fits. A frame in which any of this is in doubt gets a status instead of a position.
+// residuals of both fits; the direction of the arc at the tip, with what noise and a change of
+// curvature along the piece do to it. A frame in which any of this is in doubt gets a status instead of a position.
 //
 // The tip is the point of the shaft's AXIS at the depth of the foremost point of the bevel: it does not move when the
 // needle is rotated in place, whereas the foremost point itself circles the axis at half the diameter.
@@ -20,7 +21,7 @@
 
 namespace bevel::camera {
 
-/// Values are those of tip_measurement_t.status.
+/// Values are those of tip_measurement_t.status and tip_heading_t.status.
 enum class TipStatus : int32_t {
   ok = 0,
   lost = 1,            ///< no needle found, or its end not seen
@@ -30,15 +31,19 @@ enum class TipStatus : int32_t {
   blurred = 5,         ///< the end is smeared over more than max_blur_mm
   frozen = 6,          ///< the same bytes as the frame before
   late = 7,            ///< older than max_age_us, or not newer than the frame before
+  unsure = 8,          ///< of a heading alone: its standard deviation is above max_heading_sd_rad
 };
+inline constexpr size_t kTipStatuses = 9;
 std::string_view name_of(TipStatus status);
 
 struct TipResult {
   TipStatus status = TipStatus::lost;
-  std::string_view reason;     ///< one phrase, static storage; empty when ok
-  cv::Point2d tip_px;          ///< (u, v) and the rest: meaningful only when ok
-  cv::Vec2d direction_px;      ///< unit vector of the shaft at the tip, pointing forward
-  cv::Matx22d covariance_px2;  ///< of tip_px
+  std::string_view reason;                     ///< one phrase, static storage; empty when ok
+  cv::Point2d tip_px;                          ///< (u, v) and the rest: meaningful only when ok
+  cv::Vec2d direction_px;                      ///< unit vector of the shaft at the tip, pointing forward
+  cv::Matx22d covariance_px2;                  ///< of tip_px
+  double direction_variance_rad2 = 0.0;        ///< of the angle of direction_px in the picture
+  TipStatus heading_status = TipStatus::lost;  ///< whether direction_px is worth to be measured by; `status` unless ok
   double blur_px = 0.0;
   double taper_px = 0.0;  ///< over which the bevel fades, as fitted
   double contrast_gray = 0.0;

@@ -27,6 +27,7 @@ void check(const TrackerConfig& c) {
       {"min_length_mm", c.min_length_mm, 1.0, 200.0},
       {"fit_length_mm", c.fit_length_mm, 3.0, 200.0},
       {"curvature_sigma_per_mm", c.curvature_sigma_per_mm, 1e-6, 1.0},
+      {"curvature_change_per_mm", c.curvature_change_per_mm, 0.0, 1.0},
       {"roi_ahead_mm", c.roi_ahead_mm, 1.0, 200.0},
       {"roi_side_mm", c.roi_side_mm, 1.0, 200.0},
       {"max_blur_mm", c.max_blur_mm, 0.01, 50.0},
@@ -34,8 +35,11 @@ void check(const TrackerConfig& c) {
       {"second_score_ratio", c.second_score_ratio, 0.0, 1.0},
       {"max_age_us", static_cast<double>(c.max_age_us), 1.0, 60e6},
       {"correlation_px", c.correlation_px, 1.0, 100.0},
+      {"heading_correlation_px", c.heading_correlation_px, 1.0, 100.0},
       {"floor_across_mm", c.floor_across_mm, 1e-4, 10.0},
       {"floor_along_mm", c.floor_along_mm, 1e-4, 10.0},
+      {"floor_heading_rad", c.floor_heading_rad, 1e-5, 1.0},
+      {"max_heading_sd_rad", c.max_heading_sd_rad, 1e-3, 1.0},
   };
   for (const Range& r : ranges)
     if (!std::isfinite(r.value) || r.value < r.low || r.value > r.high)

@@ -30,6 +30,10 @@ struct TrackerConfig {
   /// a controller in the loop answers with a weave. 25 mm gave errors of 0.15 mm; noise is no problem at 10 mm.
   double fit_length_mm = 10.0;
   double curvature_sigma_per_mm = 0.01;  ///< curvatures expected; twice the 0.0047 / mm of the model's needle
+  /// Change of curvature along that piece, as where the bevel was turned. A parabola cannot follow it, and the
+  /// heading's information says so. With 0.003, needles of 0.005 / mm that are turned by up to 0.3 rad / mm have errors
+  /// of 1.1 times what is claimed, needles that are not, of 0.83 times.
+  double curvature_change_per_mm = 0.003;
   // Region of interest
   double roi_ahead_mm = 10.0;  ///< how far beyond the prediction the tip may be
   double roi_side_mm = 8.0;    ///< how far beside it
@@ -39,9 +43,12 @@ struct TrackerConfig {
   double second_score_ratio = 0.6;  ///< a second needle with this share of the first one's evidence is an ambiguity
   int64_t max_age_us = 500'000;     ///< older frames are `late`
   // Honesty of the covariance. Neighbouring rows share blur and texture, so they are not independent samples.
-  double correlation_px = 4.0;    ///< length over which residuals are correlated
-  double floor_across_mm = 0.03;  ///< standard deviation below which no measurement is trusted
+  double correlation_px = 4.0;          ///< length over which residuals are correlated
+  double heading_correlation_px = 2.0;  ///< the same for the heading, of which rendered needles show how large it is
+  double floor_across_mm = 0.03;        ///< standard deviation below which no measurement is trusted
   double floor_along_mm = 0.10;
+  double floor_heading_rad = 0.003;
+  double max_heading_sd_rad = 0.15;  ///< no heading that is known less well is `ok`: it would bring nothing
   Background background = Background::local;
 };
 

@@ -63,12 +63,20 @@ TEST(CameraPipeline, TwoCamerasGiveThreeAxes) {
     EXPECT_NEAR(seen.position_mm[2], path.back()[2], 0.5);
     EXPECT_EQ(seen.information_per_mm2[4 * (1 - sideways)], 0.0);
     for (size_t i = 0; i < 9; ++i) sum[i] += seen.information_per_mm2[i];
+    ASSERT_EQ(seen.heading_status, TipStatus::ok);
+    const Vector3& end = path.back();
+    const Vector3& before = path[path.size() - 2];
+    const Vector3& h = seen.heading.direction;
+    EXPECT_EQ(h[1 - sideways], 0.0);
+    EXPECT_NEAR(std::atan2(h[sideways], h[2]), std::atan2(end[sideways] - before[sideways], end[2] - before[2]), 0.06);
+    EXPECT_GT(seen.heading.information_per_rad2[4 * sideways], 100.0);
   }
   EXPECT_TRUE(std::holds_alternative<EndOfFrames>(pipeline.next(milliseconds(100))));
   for (const size_t axis : {0U, 1U, 2U}) EXPECT_GT(sum[4 * axis], 1.0);
   EXPECT_GT(sum[0], sum[8]) << "across is better known than along";
   EXPECT_EQ(pipeline.counters().frames, 2);
   EXPECT_EQ(pipeline.counters().unknown_camera, 1);
+  EXPECT_EQ(pipeline.counters().headings, 2);
 }
 
 TEST(CameraPipeline, NoPositionWithoutOkAndGapsAreCounted) {
@@ -85,6 +93,9 @@ TEST(CameraPipeline, NoPositionWithoutOkAndGapsAreCounted) {
   EXPECT_FALSE(first.reason.empty());
   for (const double p : first.position_mm) EXPECT_EQ(p, 0.0);
   for (const double i : first.information_per_mm2) EXPECT_EQ(i, 0.0);
+  EXPECT_EQ(first.heading_status, first.status);
+  for (const double h : first.heading.direction) EXPECT_EQ(h, 0.0);
+  for (const double i : first.heading.information_per_rad2) EXPECT_EQ(i, 0.0);
   EXPECT_TRUE(std::holds_alternative<FrameTimeout>(pipeline.next(milliseconds(1))));
   EXPECT_EQ(std::get<TipObservation>(pipeline.next(milliseconds(1))).status, TipStatus::late);
   EXPECT_EQ(std::get<SourceFailure>(pipeline.next(milliseconds(1))).text, "unplugged");

@@ -38,6 +38,28 @@ TEST(PlanarView, InformationFollowsTheAxesAndIsZeroAlongTheOpticalAxis) {
   EXPECT_EQ(info[5], info[7]);
 }
 
+TEST(PlanarView, ADirectionIsOneAngleInItsPlane) {
+  PlanarViewConfig config;
+  config.u_axis = {WorldAxis::y, -1};
+  const PlanarView view(config);
+  const SeenDirection seen = view.direction({0, 0}, {0.6, 0.8}, 0.04);
+  for (const auto& [axis, value] : {std::pair(0U, 0.0), {1U, -0.6}, {2U, 0.8}})
+    EXPECT_NEAR(seen.direction.at(axis), value, 1e-15);
+  const Matrix3& W = seen.information_per_rad2;
+  for (const size_t i : {0U, 1U, 2U, 3U, 6U}) EXPECT_EQ(W[i], 0.0) << "nothing out of the picture: " << i;
+  for (const size_t r : {1U, 2U}) EXPECT_NEAR(W[3 * r + 1] * -0.6 + W[3 * r + 2] * 0.8, 0.0, 1e-12) << "nor along it";
+  EXPECT_NEAR(W[4] + W[8], 1.0 / 0.04, 1e-9);
+  EXPECT_NEAR(W[4] * W[8] - W[5] * W[7], 0.0, 1e-9) << "rank 1";
+  // Turned by a small angle in the picture, it says that angle: the root of d^T W d, times its standard deviation.
+  const double angle_rad = 1e-4, at_rad = std::atan2(0.6, 0.8) + angle_rad;
+  const SeenDirection turned = view.direction({0, 0}, {std::sin(at_rad), std::cos(at_rad)}, 0.04);
+  double squares = 0.0;
+  for (size_t r = 0; r < 3; ++r)
+    for (size_t c = 0; c < 3; ++c)
+      squares += (turned.direction[r] - seen.direction[r]) * W[3 * r + c] * (turned.direction[c] - seen.direction[c]);
+  EXPECT_NEAR(std::sqrt(squares) * 0.2, angle_rad, 1e-10);
+}
+
 TEST(PlanarView, BadConfigurationsNameTheKey) {
   struct Case {
     const char* key;

@@ -33,7 +33,7 @@ TEST(TrackerAccuracy, RandomRenderedNeedles) {
   std::vector<double> across_px;
   std::vector<double> direction_deg;
   std::vector<double> nees;
-  std::array<int, 8> by_status{};
+  std::array<int, kTipStatuses> by_status{};
   for (int i = 0; i < frames; ++i) {
     const test::Needle needle = test::random_needle(random, seed + static_cast<uint64_t>(i));
     const rig::NeedlePicture picture = rig::NeedleRenderer(needle.scene, view).render(needle.path, needle.roll_rad);

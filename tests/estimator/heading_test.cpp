@@ -130,6 +130,78 @@ TEST(Heading, TheUpdateIsTheClosedFormWithDerivativesByPerturbation) {
   EXPECT_LT(largest, 1e-6);
 }
 
+// The same for cameras that see the shaft, which ends in the direction of motion: lambda takes part.
+TEST(Heading, OfTheShaftTheUpdateIsTheClosedFormToo) {
+  EstimatorConfig config = agar_config();
+  config.shaft_cameras = {0, 3};
+  const NeedleFilter filter(config);
+  std::mt19937_64 rng(42);
+  double largest = 0, by_slip = 0;
+  for (int trial = 0; trial < 100; ++trial) {
+    const FilterState before = random_state(filter, rng);
+    const SeenHeading motion = filter.seen_motion(before).value();
+    constexpr double kSd_rad = 0.02;
+    model::TipHeading m = trial % 2 == 1 ? testing::picture_heading(motion.along, 1, 1, 0, {1, 0, 0}, kSd_rad, rng)
+                                         : heading_of(motion.along, kSd_rad);
+    FilterState after = before;
+    const Update update = filter.update(after, m);
+    ASSERT_TRUE(update.accepted);
+    Eigen::Matrix<double, 3, 9> H = Eigen::Matrix<double, 3, 9>::Zero();
+    for (int i = 0; i < 9; ++i) {
+      constexpr double kStep = 1e-6;
+      FilterState up = before, down = before;
+      move<9>(up, kStep * Vector9d::Unit(i));
+      move<9>(down, -kStep * Vector9d::Unit(i));
+      H.col(i) = (filter.update(down, m).innovation - filter.update(up, m).innovation) / (2 * kStep);
+    }
+    EXPECT_LT(H.leftCols<3>().norm() + H.col(6).norm(), 1e-9) << "neither place nor k";
+    by_slip = std::max(by_slip, H.rightCols<2>().norm());
+    const Matrix9d P = (before.covariance.inverse() + H.transpose() * H / (kSd_rad * kSd_rad)).inverse();
+    const Vector9d sd = P.diagonal().cwiseSqrt();
+    const auto off_by = [&](const Matrix9d& other) {
+      const Matrix9d off = other - P;
+      return (sd.cwiseInverse().asDiagonal() * off * sd.cwiseInverse().asDiagonal()).norm();
+    };
+    largest = std::max(largest, off_by(after.covariance));
+    const DirectionReading linear = filter.made_linear(m, before);
+    Eigen::Matrix<double, 3, 9> L = Eigen::Matrix<double, 3, 9>::Zero();
+    L.leftCols<6>() = motion.by_error;
+    L.rightCols<2>() = motion.by_slip;
+    EXPECT_LT(off_by((before.covariance.inverse() + L.transpose() * linear.information_per_rad2 * L).inverse()), 1e-5);
+    m.camera = 1;  // not of the shaft
+    FilterState other = before;
+    EXPECT_TRUE(filter.update(other, m).accepted);
+    EXPECT_NE(other.pose.R, after.pose.R);
+  }
+  std::printf("covariance off by at most %.1e of it\n", largest);
+  EXPECT_LT(largest, 1e-6);
+  EXPECT_GT(by_slip, 0.1);
+}
+
+// A picture's angle as the tracker gives it, vector and information: nothing of the slope out of the picture enters.
+TEST(Heading, APicturesAngleIsExactHoweverFarTheNeedlePointsOutOfIt) {
+  EstimatorConfig config = agar_config();
+  std::mt19937_64 rng(43);
+  std::uniform_real_distribution<double> unit(-1, 1);
+  for (const bool of_shaft : {false, true}) {
+    config.shaft_cameras = of_shaft ? std::vector<int>{0} : std::vector<int>{};
+    const NeedleFilter filter(config);
+    for (int trial = 0; trial < 100; ++trial) {
+      FilterState state = random_state(filter, rng);
+      state.pose.R = model::exp_so3({0.5 * unit(rng), 0.5 * unit(rng), 0});  // x out of the picture y-z
+      const Eigen::Vector3d h = of_shaft ? filter.seen_motion(state).value().along : state.pose.R.col(2).eval();
+      const double in_picture = std::atan2(h.y(), h.z()), measured = in_picture + 0.05 * unit(rng);
+      model::TipHeading m;
+      m.heading = {0, std::sin(measured), std::cos(measured)};
+      const Eigen::Vector3d across(0, m.heading.z(), -m.heading.y());
+      m.information_per_rad2 = across * across.transpose() / (0.02 * 0.02);
+      const Update update = filter.update(state, m);
+      ASSERT_EQ(update.rank, 1);
+      EXPECT_NEAR(std::abs(update.innovation[0]), std::abs(measured - in_picture), 1e-12);
+    }
+  }
+}
+
 // What the past is run again with says of a heading what the update does, near the state about which it was made.
 TEST(Heading, MadeLinearItSaysTheSame) {
   const NeedleFilter filter(agar_config());
@@ -141,14 +213,14 @@ TEST(Heading, MadeLinearItSaysTheSame) {
                                                : testing::measure_heading(ahead, 1, 1, 0, 0.02, rng);
     FilterState after = before;
     ASSERT_TRUE(filter.update(after, m).accepted);
-    const model::TipHeading linear = filter.made_linear(m, before);
+    const DirectionReading linear = filter.made_linear(m, before);
     const Eigen::Matrix3d& W = linear.information_per_rad2;
     EXPECT_LT((W * ahead).norm(), 1e-9 * W.trace());
     Eigen::Matrix<double, 3, 9> H = Eigen::Matrix<double, 3, 9>::Zero();
     H.leftCols<6>() = filter.seen_heading(before).by_error;
     const Matrix9d P = (before.covariance.inverse() + H.transpose() * W * H).inverse();
     const Vector9d sd = P.diagonal().cwiseSqrt();
-    const Vector9d correction = P * H.transpose() * W * (linear.heading - ahead);
+    const Vector9d correction = P * H.transpose() * W * (linear.seen - ahead);
     EXPECT_LT((difference<9>(before, after) - correction).cwiseQuotient(sd).norm(), 1e-6);
   }
 }

@@ -6,7 +6,7 @@
 #include <vector>
 
 #include "estimator/config.hpp"
-#include "model/kinematics.hpp"
+#include "model/motion_direction.hpp"
 #include "model/samples.hpp"
 #include "model/slip.hpp"
 
@@ -30,6 +30,7 @@ struct InsertionPlan {
   double sigma_mm = 0.15;
   int cameras = 1;  // 1: one camera that sees all three axes; 2: (y, z) and (x, z), taken at different times
   double lost_share = 0;
+  bool headings_of_shaft = false;  // of two cameras: of the way the tip moves, not of the needle's own axis
   double heading_sd_rad = 0;  // 0: no headings; else one with each measurement, of two cameras the angle in its picture
 };
 
@@ -85,6 +86,11 @@ inline Insertion insert(const model::NeedleParameters& truth, const model::Pose&
   double rotation = 0;
   const auto slip = model::slip_parameters(truth);
   const double duration_s = plan.length_mm / plan.rate_mm_s;
+  const auto shown = [&]() -> Eigen::Vector3d {
+    model::MotionDirection motion;
+    if (plan.headings_of_shaft && model::motion_direction(pose.R, slip, motion)) return pose.R * motion.along;
+    return pose.R.col(2);
+  };
   // Steps of 1 ms hit every sample time of 100 Hz; measurements come every 33 ms, off the actuators' grid.
   std::int64_t seq = 0;
   for (int ms = 0; ms <= static_cast<int>(duration_s * 1000); ++ms) {
@@ -112,13 +118,13 @@ inline Insertion insert(const model::NeedleParameters& truth, const model::Pose&
         out.measurements.push_back(measure(pose.p_mm, utime, seq++, 0, {1, 1, 1}, plan.sigma_mm, rng));
       } else {
         if (plan.heading_sd_rad > 0)
-          out.headings.push_back(picture_heading(pose.R.col(2), utime, seq, 0, {1, 0, 0}, plan.heading_sd_rad, rng));
+          out.headings.push_back(picture_heading(shown(), utime, seq, 0, {1, 0, 0}, plan.heading_sd_rad, rng));
         out.measurements.push_back(measure(pose.p_mm, utime, seq++, 0, {0, 1, 1}, plan.sigma_mm, rng));
       }
     }
     if (plan.cameras == 2 && ms % 33 == 19 && unit(rng) >= plan.lost_share) {
       if (plan.heading_sd_rad > 0)
-        out.headings.push_back(picture_heading(pose.R.col(2), utime, seq, 1, {0, 1, 0}, plan.heading_sd_rad, rng));
+        out.headings.push_back(picture_heading(shown(), utime, seq, 1, {0, 1, 0}, plan.heading_sd_rad, rng));
       out.measurements.push_back(measure(pose.p_mm, utime, seq++, 1, {1, 0, 1}, plan.sigma_mm, rng));
     }
     if (!model::step(pose, {plan.rate_mm_s * 1e-3, rate * 1e-3, {truth.curvature_per_mm, 0}}, slip) ||

@@ -14,6 +14,7 @@
 #include "nodes/runtime.hpp"
 #include "tests/estimator/insertion.hpp"
 #include "tests/support/temporary_folder.hpp"
+#include "tools/replay/batch.hpp"
 #include "tools/replay/report.hpp"
 
 namespace bevel {
@@ -152,12 +153,15 @@ TEST(LiveReplay, AReplaySaysWhatHeadingsBring) {
   replay::print(said, with, 20);
   replay::print(said_without, without, 20);
   std::cout << "seed " << kSeed << "\n" << said.str();
-  for (const char* words : {"headings     303: 0 not usable", "heading NIS  0.9", "with them    k +- ",
-                            "without      k +- ", "without headings RMSE"})
+  for (const char* words : {"headings     303: 0 not usable", "heading NIS  0.9", "with them    k 0.00",
+                            "without      k 0.00", "without headings RMSE", "; pose NEES/6 "})
     EXPECT_THAT(said.str(), HasSubstr(words));
   EXPECT_THAT(said_without.str(), Not(HasSubstr("heading")));
+  const auto told = replay::replay_logs({(folder / "with.lcm").string()}, config, {.use_headings = false}).front();
+  EXPECT_EQ(told.states.back().state.unpacked().covariance, never.covariance);
+  EXPECT_EQ(told.counters.headings.offered, 0);
   replay::write_files(with, (folder / "out").string(), 20);
-  EXPECT_THAT(test::text_of(folder / "out/with.html"), HasSubstr("with them    k +- "));
+  EXPECT_THAT(test::text_of(folder / "out/with.html"), HasSubstr("with them    k 0.00"));
   EXPECT_THAT(test::text_of(folder / "out/with.headings.csv"), HasSubstr("innovation_a_rad"));
 }
 

@@ -42,7 +42,7 @@ SimulatedLoop::SimulatedLoop(std::uint64_t seed, const nodes::SystemConfig& sett
 }
 
 void SimulatedLoop::install_injector(nodes::Component component, nodes::LcmPort& to) {
-  auto injector = std::make_unique<nodes::FaultInjector>(nodes::channel_of(component));
+  auto injector = std::make_unique<nodes::FaultInjector>(component);
   injectors_.at(static_cast<std::size_t>(component)) = injector.get();
   to.inject(std::move(injector));
 }

@@ -1,4 +1,4 @@
-#include "model/kinematics.hpp"
+#include "model/motion_direction.hpp"
 
 #include <gtest/gtest.h>
 
@@ -18,6 +18,43 @@ NeedleParameters agar() {
 
 StepInput input_for(const NeedleParameters& needle, double insertion_mm, double rotation_rad) {
   return {insertion_mm, rotation_rad, {needle.curvature_per_mm, 0}};
+}
+
+TEST(MotionDirection, IsThatOfTheTwistAndItsDerivativesThoseOfPerturbation) {
+  std::mt19937_64 rng(kSeed);
+  std::uniform_real_distribution<double> unit(-1, 1);
+  for (const SlipDirection direction : {SlipDirection::isotropic, SlipDirection::bevel_plane})
+    for (int trial = 0; trial < 60; ++trial) {
+      NeedleParameters needle = agar();
+      needle.slip = direction;
+      const SlipParameters slip = slip_parameters(needle);
+      const Eigen::Matrix3d R = exp_so3({0.5 * unit(rng), 0.5 * unit(rng), unit(rng)});
+      MotionDirection motion;
+      ASSERT_TRUE(motion_direction(R, slip, motion));
+      Vector6d twist;
+      ASSERT_TRUE(body_twist(R, input_for(needle, 1.0, 0), slip, twist));
+      EXPECT_LT((motion.along - twist.head<3>().normalized()).norm(), 1e-14);
+      constexpr double kStep = 1e-6;
+      const auto at = [&](const Eigen::Vector3d& omega, double lambda1, double lambda2) {
+        SlipParameters moved = slip;
+        moved.lambda1_per_rad += lambda1, moved.lambda2 += lambda2;
+        MotionDirection there;
+        EXPECT_TRUE(motion_direction(R * exp_so3(omega), moved, there));
+        return Eigen::Vector3d(exp_so3(omega) * there.along);  // seen in the body as it was
+      };
+      const Eigen::Vector3d none = Eigen::Vector3d::Zero();
+      for (int i = 0; i < 3; ++i) {
+        const Eigen::Vector3d omega = kStep * Eigen::Vector3d::Unit(i);
+        EXPECT_LT(((at(omega, 0, 0) - at(-omega, 0, 0)) / (2 * kStep) - motion.by_turn.col(i)).norm(), 1e-8) << trial;
+      }
+      EXPECT_LT(((at(none, kStep, 0) - at(none, -kStep, 0)) / (2 * kStep) - motion.by_slip.col(0)).norm(), 1e-8);
+      EXPECT_LT(((at(none, 0, kStep) - at(none, 0, -kStep)) / (2 * kStep) - motion.by_slip.col(1)).norm(), 1e-8);
+    }
+  MotionDirection motion;
+  ASSERT_TRUE(motion_direction(Eigen::Matrix3d::Identity(), slip_parameters(agar()), motion));
+  EXPECT_EQ(motion.along, Eigen::Vector3d::UnitZ()) << "along z_A, where the direction of the tilt is undefined";
+  EXPECT_TRUE(motion.by_turn.allFinite());
+  EXPECT_FALSE(motion_direction(exp_so3({2.5, 0, 0}), slip_parameters(agar()), motion)) << "outside the domain";
 }
 
 TEST(Kinematics, TwistIsThePrintedOneInEveryVariant) {

@@ -36,7 +36,7 @@ void inject(const ProcessContext& context, nodes::LcmPort& port) {
   if (!context.fault) return;
   const auto& [component, kind, at_s] = *context.fault;
   const std::int64_t start_ns = context.started_ns + std::llround(at_s * 1e9);
-  auto injector = std::make_unique<nodes::FaultInjector>(nodes::channel_of(component));
+  auto injector = std::make_unique<nodes::FaultInjector>(component);
   injector->begin(kind, start_ns, kFaultSeed);
   port.inject(std::move(injector));
 }

@@ -109,6 +109,7 @@ int run(const BatchOptions& options, std::ostream& out, std::ostream& err) {
   ReplayOptions replay_options;
   replay_options.effects = setup.effects;
   replay_options.discrepancies = setup.discrepancies;
+  replay_options.use_headings = !options.without_headings;
   std::vector<estimator::EstimatorConfig> configs(logs.size(), setup.config);
   if (options.held_out) configs = held_out_configs(replay_logs(logs, configs, replay_options), options.width);
   replay_options.ahead_mm = options.ahead_mm;

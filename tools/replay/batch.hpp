@@ -14,10 +14,11 @@ struct BatchOptions {
   std::string system_path;  // instead of both: the file of the rig, as the live estimator reads it
   std::string out_folder;   // empty: no files
   double ahead_mm = 20;
-  bool bicycle = false;   // lambda = 0, held there: the plain bicycle
-  bool held_out = false;  // k and lambda of each log's prior learned on the other logs
-  double width = 0.3;     // of that prior, as a share of the prior's own standard deviations
-  bool cases = false;     // each path is a folder of case folders with model.toml and logs
+  bool bicycle = false;           // lambda = 0, held there: the plain bicycle
+  bool held_out = false;          // k and lambda of each log's prior learned on the other logs
+  double width = 0.3;             // of that prior, as a share of the prior's own standard deviations
+  bool cases = false;             // each path is a folder of case folders with model.toml and logs
+  bool without_headings = false;  // as if the logs had none
   std::vector<std::string> paths;
 };
 

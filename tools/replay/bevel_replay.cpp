@@ -17,6 +17,7 @@ int main(int argc, char** argv) {
       .option("-o,--out", options.out_folder, "folder for CSV files and a page per log")
       .positive("--ahead-mm", options.ahead_mm, "distance over which the filter is asked to foretell")
       .flag("--bicycle", options.bicycle, "the plain bicycle: lambda held at zero")
+      .flag("--without-headings", options.without_headings, "leave TIP_HEADING out")
       .flag("--held-out", options.held_out, "start each log from k and lambda learned on the others")
       .positive("--width", options.width, "prior of --held-out: share of [prior]'s standard deviations")
       .flag("--cases", options.cases, "a table, one line per folder with model.toml and logs")

@@ -169,15 +169,18 @@ void print_headings(std::ostream& out, const Replay& replay, const InnovationFig
   const auto print_spread = [&out](const char* name, const estimator::FilterState& s) {
     const Eigen::Vector3d spread = position_sd_mm(s);
     out << text_of(
-        "  %s k +- %.6f /mm, lambda2 +- %.4f, tip +- %.3f %.3f %.3f mm, tilt +- %.4f %.4f, roll +- %.4f rad\n", name,
-        sd(s, 6), sd(s, 8), spread.x(), spread.y(), spread.z(), sd(s, 3), sd(s, 4), sd(s, 5));
+        "  %s k %.6f +- %.6f /mm, lambda2 %.4f +- %.4f, tip +- %.3f %.3f %.3f mm, tilt +- %.4f %.4f, roll +- %.4f "
+        "rad\n",
+        name, s.curvature_per_mm, sd(s, 6), s.lambda2, sd(s, 8), spread.x(), spread.y(), spread.z(), sd(s, 3), sd(s, 4),
+        sd(s, 5));
   };
   print_spread("with them   ", replay.states.back().state.unpacked());
   print_spread("without     ", replay.without_headings->state.unpacked());
   if (replay.truth_without_headings.count == 0) return;
   const TruthFigures& truth = replay.truth_without_headings;
-  out << text_of("  truth        without headings RMSE position %.3f mm, tilt %.4f rad, roll %.4f rad\n",
-                 truth.position_rmse_mm, truth.tilt_rmse_rad, truth.roll_rmse_rad);
+  out << text_of(
+      "  truth        without headings RMSE position %.3f mm, tilt %.4f rad, roll %.4f rad; pose NEES/6 %.3f\n",
+      truth.position_rmse_mm, truth.tilt_rmse_rad, truth.roll_rmse_rad, truth.pose_nees.mean());
 }
 
 void print_foretold(std::ostream& out, const Foretold& next, const Foretold& ahead, double ahead_mm) {
