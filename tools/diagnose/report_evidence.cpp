@@ -97,6 +97,42 @@ void add_evidence(io::HtmlReport& page, const Findings& f) {
   });
 }
 
+namespace {
+
+// Two ways of one model: as a new insertion and continued, on the same readings.
+void add_two_ways(std::vector<std::vector<std::string>>& rows, const std::string& model, const InsertionPredicted& p) {
+  const auto add = [&](const char* way, const PredictionFigures& figures) {
+    std::vector<std::string> row{model, way, measured(figures.rmse_mm)};
+    for (const ChannelFigures& channel : figures.channels)
+      row.push_back(measured(channel.rmse) + " (" + percent(channel.share_in_95) + ")");
+    row.insert(row.end(), {percent(figures.share_in_95), number(figures.log_density, 3)});
+    rows.push_back(std::move(row));
+  };
+  add("new insertion, all readings", p.whole);
+  add("new insertion, beyond the first third", p.beyond);
+  add("continued, beyond the first third", p.continued);
+}
+
+void add_two_ways(io::HtmlReport& page, const Findings& f) {
+  const HeldOut& h = f.held_out;
+  std::vector<std::string> header{"model", "predicted as", "rms (mm)"};
+  for (std::size_t c = 0; c < f.channels.size(); ++c)
+    header.push_back(f.channels[c] + (c < f.units.size() ? " (" + f.units[c] + ")" : ""));
+  header.insert(header.end(), {"within 95 %", "log density per reading"});
+  std::vector<std::vector<std::string>> rows;
+  add_two_ways(rows, f.verdict == Verdict::nothing_missing ? "needle refitted" : "before", h.predicted_before);
+  if (f.verdict != Verdict::nothing_missing) add_two_ways(rows, "after", h.predicted_after);
+  page.subheading("As a new insertion, and continued");
+  page.paragraph(
+      "A new insertion is known only by how much insertions differ; of one that goes on, its first third has said what "
+      "it has of its own. Between the two lies what a few readings at the start are worth.");
+  page.table(header, rows,
+             "Of each channel the root mean square error, and in brackets the share of its readings within their 95 % "
+             "intervals. Before: the needle alone, by its own noise and variation.");
+}
+
+}  // namespace
+
 void add_held_out(io::HtmlReport& page, const Findings& f) {
   if (f.held_out.recordings.empty()) return;
   page.heading("Recordings predicted");
@@ -112,6 +148,7 @@ void add_held_out(io::HtmlReport& page, const Findings& f) {
             "none far off."
           : "Each recording predicted from the others, before and after. Blue should lie left of orange, and "
             "on the right picture near the line.");
+  add_two_ways(page, f);
 }
 
 void add_reach(io::HtmlReport& page, const Findings& f) {
