@@ -99,36 +99,40 @@ void add_evidence(io::HtmlReport& page, const Findings& f) {
 
 namespace {
 
-// Two ways of one model: as a new insertion and continued, on the same readings.
-void add_two_ways(std::vector<std::vector<std::string>>& rows, const std::string& model, const InsertionPredicted& p) {
-  const auto add = [&](const char* way, const PredictionFigures& figures) {
-    std::vector<std::string> row{model, way, measured(figures.rmse_mm)};
-    for (const ChannelFigures& channel : figures.channels)
-      row.push_back(measured(channel.rmse) + " (" + percent(channel.share_in_95) + ")");
-    row.insert(row.end(), {percent(figures.share_in_95), number(figures.log_density, 3)});
-    rows.push_back(std::move(row));
-  };
-  add("new insertion, all readings", p.whole);
-  add("new insertion, beyond the first third", p.beyond);
-  add("continued, beyond the first third", p.continued);
-}
-
+// As a new insertion and continued, on the same readings.
 void add_two_ways(io::HtmlReport& page, const Findings& f) {
   const HeldOut& h = f.held_out;
-  std::vector<std::string> header{"model", "predicted as", "rms (mm)"};
+  std::vector<std::pair<std::string, const InsertionPredicted*>> models;
+  if (f.verdict == Verdict::nothing_missing) {
+    models = {{"needle refitted", &h.predicted_before}};
+  } else {
+    models = {{"before", &h.predicted_before}, {"after", &h.predicted_after}};
+  }
+  std::vector<std::vector<std::string>> rows, channels;
+  for (const auto& [model, p] : models)
+    for (const auto& [way, figures] : {std::pair("new insertion, all readings", &p->whole),
+                                       std::pair("new insertion, beyond the first third", &p->beyond),
+                                       std::pair("continued, beyond the first third", &p->continued)})
+      rows.push_back(
+          {model, way, measured(figures->rmse_mm), percent(figures->share_in_95), number(figures->log_density, 3)});
   for (std::size_t c = 0; c < f.channels.size(); ++c)
-    header.push_back(f.channels[c] + (c < f.units.size() ? " (" + f.units[c] + ")" : ""));
-  header.insert(header.end(), {"within 95 %", "log density per reading"});
-  std::vector<std::vector<std::string>> rows;
-  add_two_ways(rows, f.verdict == Verdict::nothing_missing ? "needle refitted" : "before", h.predicted_before);
-  if (f.verdict != Verdict::nothing_missing) add_two_ways(rows, "after", h.predicted_after);
+    for (const auto& [model, p] : models) {
+      std::vector<std::string> row{f.channels[c], model};
+      for (const PredictionFigures* figures : {&p->whole, &p->beyond, &p->continued})
+        row.push_back(c < figures->channels.size() ? measured(figures->channels[c].rmse) + " " + f.units[c] + " (" +
+                                                         percent(figures->channels[c].share_in_95) + ")"
+                                                   : "-");
+      channels.push_back(std::move(row));
+    }
   page.subheading("As a new insertion, and continued");
   page.paragraph(
       "A new insertion is known only by how much insertions differ; of one that goes on, its first third has said what "
       "it has of its own. Between the two lies what a few readings at the start are worth.");
-  page.table(header, rows,
-             "Of each channel the root mean square error, and in brackets the share of its readings within their 95 % "
-             "intervals. Before: the needle alone, by its own noise and variation.");
+  page.table({"model", "predicted as", "rms (mm)", "within 95 %", "log density per reading"}, rows,
+             "Of all readings the share within their 95 % intervals. Before: the needle alone, by its own noise and "
+             "variation.");
+  page.table({"channel", "model", "new", "new, beyond the first third", "continued"}, channels,
+             "By channel: root mean square error, and the share of its readings within their 95 % intervals.");
 }
 
 }  // namespace
