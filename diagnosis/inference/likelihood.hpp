@@ -63,6 +63,7 @@ class Likelihood {
   // Columns of all of the system's rows: outliers taken out, whitened.
   Eigen::MatrixXd whitened(std::size_t recording, const Eigen::MatrixXd& columns) const;
   Eigen::MatrixXd kept(std::size_t recording, const Eigen::MatrixXd& columns) const;
+  const std::vector<Whitening>& whitening(std::size_t recording) const { return whitening_[recording]; }  // by channel
 
  private:
   void set_noise(Noise noise);

@@ -16,6 +16,7 @@ using Eigen::VectorXd;
 namespace {
 
 constexpr double kNegligible = 1e-3;  // share of a posterior that is not worth a computation
+constexpr double kShare = 0.02;       // of a model, given the others, that a prediction takes part of
 constexpr double kFarBehind = 15;     // log posterior: what no recording that is left out brings back
 
 ArrowSolution solve_without(const Fit& fit, const std::vector<ArrowBlock>& blocks, const CurveColumns& curve,
@@ -60,6 +61,11 @@ Posterior posterior_of(const Search& search, double discrepancy_size) {
 
 CurveColumns curve_of(const Search& search, const Fit& fit) {
   return fit.scales.curve ? search.discrepancy().columns(*fit.likelihood, *fit.scales.curve) : CurveColumns{};
+}
+
+const VectorXd& nuisance_weights_of(const Search& search, const Fit& fit) {
+  const Evaluated& at = *search.visited().at(fit.layout.set()).at;
+  return fit.scales.curve ? at.nuisance_weights_with_curve : at.nuisance_weights;
 }
 
 double Mixture::mean() const {
@@ -214,7 +220,14 @@ std::vector<LeftOutSelection> leave_out_selection(const Search& search) {
       without.push_back(model.log - model.parts[r].log_density);
       if (!likeliest || without.back() > likeliest->log - likeliest->parts[r].log_density) likeliest = &model;
     }
-    out.push_back({.log_density = log_sum(with) - log_sum(without), .fit = likeliest->fit});
+    const double rest = log_sum(without);
+    out.push_back({.log_density = log_sum(with) - rest, .fit = likeliest->fit, .shares = {}});
+    auto& shares = out.back().shares;
+    for (std::size_t m = 0; m < models.size(); ++m)
+      if (const double probability = std::exp(without[m] - rest); probability > kShare)
+        shares.push_back({.fit = models[m].fit, .probability = probability});
+    std::stable_sort(shares.begin(), shares.end(),
+                     [](const auto& a, const auto& b) { return a.probability > b.probability; });
   }
   return out;
 }

@@ -27,6 +27,8 @@ Posterior posterior_of(const Search& search, double discrepancy_size);
 
 // The curve of a fit with one, whitened by the fit's own noise; none for a fit without.
 CurveColumns curve_of(const Search& search, const Fit& fit);
+// Over the grid of the nuisances' standard deviations, of a fit of one of the sets that were visited.
+const Eigen::VectorXd& nuisance_weights_of(const Search& search, const Fit& fit);
 
 // A mixture of normals: over sets, with and without their curves, and over the nuisances' standard deviations.
 struct Mixture {
@@ -76,9 +78,14 @@ Predictive predictive_of(const Fit& fit, const std::vector<ArrowBlock>& blocks, 
 
 // Each recording given the others, sets and parameters: sets are weighed, and their parameters fitted, without it, by
 // the linear models. (Which sets were visited was decided with all recordings.)
+struct LeftOutShare {
+  const Fit* fit = nullptr;  // of all recordings; it lives as long as the search
+  double probability = 0;    // given the others
+};
 struct LeftOutSelection {
-  double log_density = 0;    // of the mixture; constants of 2 pi left out
-  const Fit* fit = nullptr;  // the likeliest without the recording; it lives as long as the search
+  double log_density = 0;            // of the mixture; constants of 2 pi left out
+  const Fit* fit = nullptr;          // the likeliest without the recording; it lives as long as the search
+  std::vector<LeftOutShare> shares;  // those that are worth a computation, the likeliest first
 };
 std::vector<LeftOutSelection> leave_out_selection(const Search& search);
 

@@ -213,6 +213,7 @@ Findings diagnose(const RecordedCase& recorded, const model::NeedleParameters& m
   findings.discrepancies = discrepancies_of(system, search, decision.model);
   findings.proposals = propose_forms(system, search, decision.model);
   findings.variation = variation_of(search, unknowns);
+  findings.insertions = insertions_of(system, search, decision.model);
   findings.needle = needle_estimate(system, decision.model);
   const inference::Fit& alone = search.visited().at({}).at->fit;
   findings.base = needle_estimate(system, model_of(search, alone, 0));

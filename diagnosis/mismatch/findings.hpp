@@ -59,15 +59,38 @@ struct FitFigures {
   double max_mm = 0, chi2_per_dof = 0;
   double log_density = 0, log_density_se = 0;  // predictive, natural, per reading, of mm
 };
+// Of one channel's readings: root mean square of measured - predicted in the channel's unit, and the share that lies
+// within its 95 % interval.
+struct ChannelFigures {
+  double rmse = 0, share_in_95 = 0;
+};
+// Of readings that were predicted as normals or sums of them; rmse_mm of positions, density and share of headings too.
+struct PredictionFigures {
+  double rmse_mm = 0;
+  double log_density = 0;  // natural, per reading, in mm and rad
+  double share_in_95 = 0;
+  std::vector<ChannelFigures> channels;  // in the order of Findings::channels; NaN: it has none of the readings
+  std::size_t readings = 0;              // scalar
+};
+// By one model, its parameters and its variation from the other recordings: as a new insertion, of which the standard
+// deviations between insertions are all that is known; and continued from its own first third, in time.
+struct InsertionPredicted {
+  PredictionFigures whole;      // all readings, as of a new insertion
+  PredictionFigures beyond;     // those beyond the first third, as of a new insertion
+  PredictionFigures continued;  // the same ones, given the first third
+};
 struct HeldOutRecording {
   std::string log;
   FitFigures before, after;
+  InsertionPredicted predicted_before, predicted_after;
 };
 // Each recording (of two groups: of the second) predicted as a new insertion.
 struct HeldOut {
   FitFigures as_it_stands;   // by the model file; noise alone is known
   FitFigures before, after;  // refitted to the others: the needle alone, and what the others select
   FitFigures noise_floor;    // of a prediction that is true and sure
+  // Reading by reading, with intervals: before by the noise and the variation of the needle alone.
+  InsertionPredicted predicted_before, predicted_after;
   std::vector<HeldOutRecording> recordings;
   double gain = 0;  // of log predictive density, natural, over all recordings
 };
@@ -128,6 +151,19 @@ struct VariationEstimate {
   double low = 0, high = 0;  // 95 %, of the values that were tried
 };
 
+// What one insertion has of its own, as a deviation from what all share: curvature as a share of the needle's, the
+// heading about x and y and the bevel's roll at the entry in rad, registration in x and y in mm.
+struct InsertionValue {
+  std::string name;   // as in model::OwnValues: "curvature_relative", "tilt_x_rad", ...
+  std::string group;  // of VariationEstimate::name
+  double value = 0, std_error = 0;
+  std::array<double, 2> ci95{};
+};
+struct InsertionValues {
+  std::string log;
+  std::vector<InsertionValue> values;
+};
+
 struct NextExperiment {
   std::string script;  // what to command
   std::array<std::string, 2> separates;
@@ -176,6 +212,7 @@ struct Findings {
   inference::Noise noise;
   std::vector<std::string> channels, units;  // in the order of noise.sigma
   std::vector<VariationEstimate> variation;
+  std::vector<InsertionValues> insertions;  // in the order of the recordings
   HeldOut held_out;
   NeedleEstimate base, needle;  // refitted without, and with what was found
   model::NeedleParameters model_file;

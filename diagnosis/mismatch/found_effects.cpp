@@ -1,10 +1,11 @@
 #include "diagnosis/mismatch/found_effects.hpp"
 
-#include <Eigen/Cholesky>
 #include <algorithm>
 #include <cmath>
 #include <numbers>
 #include <set>
+
+#include "diagnosis/inference/nuisances.hpp"
 
 namespace bevel::diagnosis {
 
@@ -19,16 +20,6 @@ namespace {
 
 constexpr double kRivalOdds = 20;
 constexpr double k95 = 1.96;
-
-// Variances of a recording's own unknowns that are not instants, in the order of free_locals.
-VectorXd local_variances(const inference::ArrowBlock& block, const inference::ArrowSolution& solution) {
-  MatrixXd inner = block.ll;
-  inner.diagonal() += block.precision;
-  const Eigen::LLT<MatrixXd> factor(inner);
-  const MatrixXd through = factor.solve(block.lz);
-  const MatrixXd own = factor.solve(MatrixXd::Identity(inner.rows(), inner.cols()));
-  return (own + through * solution.covariance * through.transpose()).diagonal();
-}
 
 FoundParameter shared_parameter(const NeedleSystem& system, const inference::Unknowns& unknowns,
                                 const ChosenModel& model, std::size_t member, std::size_t p) {
@@ -187,6 +178,27 @@ std::vector<VariationEstimate> variation_of(const Search& search, const inferenc
       if (below < 0.025) one.low = value;
       if (below < 0.975) one.high = value;
       below += share[i];
+    }
+    out.push_back(std::move(one));
+  }
+  return out;
+}
+
+std::vector<InsertionValues> insertions_of(const NeedleSystem& system, const Search& search, const ChosenModel& model) {
+  std::vector<InsertionValues> out;
+  const Fit& fit = *model.fit;
+  const auto posterior = nuisance_posterior(fit, model.blocks, model.curve, nuisance_weights_of(search, fit));
+  for (std::size_t r = 0; r < posterior.size(); ++r) {
+    InsertionValues one{.log = system.recorded().recordings[r].name, .values = {}};
+    for (std::size_t i = 0; i < posterior[r].size(); ++i) {
+      const inference::Nuisance& nuisance = system.nuisances()[i];
+      const inference::Mixture& value = posterior[r][i];
+      if (value.parts.empty()) continue;
+      one.values.push_back({.name = nuisance.name,
+                            .group = system.nuisance_groups()[nuisance.group].name,
+                            .value = value.mean(),
+                            .std_error = value.sd(),
+                            .ci95 = {value.quantile(0.025), value.quantile(0.975)}});
     }
     out.push_back(std::move(one));
   }

@@ -4,7 +4,9 @@
 #include <cmath>
 #include <limits>
 #include <numbers>
-#include <numeric>
+#include <set>
+
+#include "diagnosis/inference/predictive.hpp"
 
 namespace bevel::diagnosis {
 
@@ -47,6 +49,65 @@ FitFigures figures_of(const std::vector<Sums>& all) {
   return out;
 }
 
+// The same of readings that were predicted one by one, of one channel.
+struct ChannelSums {
+  double squares = 0, inside = 0, count = 0;
+};
+// Of one way of prediction, over recordings.
+class PredictionSums {
+ public:
+  explicit PredictionSums(const NeedleSystem& system)
+      : recorded_(&system.recorded()), channels_(system.recorded().channels.size()) {}
+  void add(const inference::SeriesSet& recording, const inference::Forecast& forecast) {
+    constexpr double kTail = 0.025;
+    std::vector<std::size_t> channel_of;
+    for (std::size_t c = 0; c < recording.series.size(); ++c)
+      channel_of.insert(channel_of.end(), recording.series[c].time_s.size(), c);
+    for (std::size_t i = 0; i < forecast.rows.size(); ++i) {
+      ChannelSums& sums = channels_[channel_of[static_cast<std::size_t>(forecast.rows[i])]];
+      const auto at = static_cast<Index>(i);
+      sums.squares += forecast.error[at] * forecast.error[at];
+      sums.inside += forecast.below[at] > kTail && forecast.below[at] < 1 - kTail ? 1 : 0;
+      ++sums.count;
+    }
+    log_density_ += forecast.log_density;
+  }
+  PredictionFigures figures() const {
+    PredictionFigures out;
+    ChannelSums all, positions;
+    for (std::size_t c = 0; c < channels_.size(); ++c) {
+      const ChannelSums& one = channels_[c];
+      out.channels.push_back({.rmse = std::sqrt(one.squares / one.count), .share_in_95 = one.inside / one.count});
+      all.inside += one.inside, all.count += one.count;
+      if (!recorded_->channels[c].heading) positions.squares += one.squares, positions.count += one.count;
+    }
+    out.rmse_mm = std::sqrt(positions.squares / positions.count);
+    out.log_density = log_density_ / all.count;
+    out.share_in_95 = all.inside / all.count;
+    out.readings = static_cast<std::size_t>(all.count);
+    return out;
+  }
+
+ private:
+  const RecordedCase* recorded_;
+  std::vector<ChannelSums> channels_;
+  double log_density_ = 0;
+};
+
+struct InsertionSums {
+  explicit InsertionSums(const NeedleSystem& system) : whole(system), beyond(system), continued(system) {}
+  void add(const inference::SeriesSet& recording, const inference::Forecasts& one) {
+    whole.add(recording, one.all);
+    if (one.continued.rows.empty()) return;
+    beyond.add(recording, one.beyond);
+    continued.add(recording, one.continued);
+  }
+  InsertionPredicted figures() const {
+    return {.whole = whole.figures(), .beyond = beyond.figures(), .continued = continued.figures()};
+  }
+  PredictionSums whole, beyond, continued;
+};
+
 double constant_of(double count) { return -0.5 * count * std::log(2 * std::numbers::pi); }
 
 void add_errors(const NeedleSystem& system, const Likelihood& likelihood, std::size_t r, const VectorXd& errors,
@@ -63,37 +124,42 @@ void add_errors(const NeedleSystem& system, const Likelihood& likelihood, std::s
 
 // As a new insertion: what differs between insertions at its mean. Phases and instants are the recording's own: nobody
 // predicts them.
-VectorXd new_insertion(const Fit& fit, std::size_t r) {
-  VectorXd local = fit.local[r];
+Fit new_insertion(Fit fit, std::size_t r) {
   for (std::size_t i = 0; i < fit.layout.local().size(); ++i)
-    if (!fit.layout.is_scanned(i)) local[static_cast<Index>(i)] = 0;
-  return local;
+    if (!fit.layout.is_scanned(i)) fit.local[r][static_cast<Index>(i)] = 0;
+  return fit;
 }
 
-// Refitted without the recording: where much is missing, the linear model about all of them says little of it.
-Fit refit_without(const inference::Search& search, const Fit& whole, std::size_t r) {
+// Refitted without the recording's readings after until_s: where much is missing, or hardly known, the linear model
+// about all of them says little of it.
+Fit refit_without(const inference::Search& search, const Fit& whole, const Fit& start, std::size_t r, double until_s) {
   const Likelihood& all = *whole.likelihood;
   inference::Readings without = all.outliers();
-  without[r].resize(all.system().data().recordings[r].messages);
-  std::iota(without[r].begin(), without[r].end(), std::size_t{0});
-  const Likelihood others(all.system(), without, all.noise());
+  std::set<std::size_t> gone(without[r].begin(), without[r].end());
+  for (const auto& series : all.data().recordings[r].series)
+    for (std::size_t i = 0; i < series.message.size(); ++i)
+      if (series.time_s[i] > until_s) gone.insert(series.message[i]);
+  without[r].assign(gone.begin(), gone.end());
+  const Likelihood some(all.system(), without, all.noise());
   const auto curve =
-      whole.scales.curve ? search.discrepancy().columns(others, *whole.scales.curve) : inference::CurveColumns{};
-  Fit out = inference::fit(others, whole.layout, whole.shared, whole.local, whole.scales, curve);
-  if (!out.valid) out = whole;
+      whole.scales.curve ? search.discrepancy().columns(some, *whole.scales.curve) : inference::CurveColumns{};
+  Fit out = inference::fit(some, whole.layout, start.shared, start.local, whole.scales, curve);
+  if (!out.valid) out = start;
+  return out;
+}
+Fit refit_without(const inference::Search& search, const Fit& whole, std::size_t r) {
+  Fit out = refit_without(search, whole, whole, r, -std::numeric_limits<double>::infinity());
   out.local[r] = whole.local[r];
   return out;
 }
 
-// judge: by whose noise and variation chi2 and density are.
-Sums sums_of(const NeedleSystem& system, const inference::Search& search, const Fit& whole, const Fit& judge,
-             std::size_t r) {
+// refitted: without the recording; judge: by whose noise and variation chi2 and density are.
+Sums sums_of(const NeedleSystem& system, const inference::Search& search, Fit fit, const Fit& judge, std::size_t r) {
   Sums out;
-  Fit fit = refit_without(search, whole, r);
   fit.likelihood = judge.likelihood;
   fit.scales.nuisance_sd = judge.scales.nuisance_sd;
   const auto curve = curve_of(search, fit);
-  VectorXd errors = fit.likelihood->errors(fit.layout, r, fit.shared, new_insertion(fit, r));
+  VectorXd errors = fit.likelihood->errors(fit.layout, r, fit.shared, new_insertion(fit, r).local[r]);
   const auto blocks = linearise(*fit.likelihood, fit, curve);
   if (errors.size() == 0 || blocks.empty()) return out;
   if (curve) errors -= curve.raw[r] * fit.curve_values;
@@ -102,6 +168,21 @@ Sums sums_of(const NeedleSystem& system, const inference::Search& search, const 
   out.chi2 = predictive.chi2;
   out.log_density = predictive.log_density + constant_of(out.count);
   return out;
+}
+
+// By the noise and the variation of the model itself. whole: the fit of all recordings, others: without this one.
+std::optional<inference::Forecasts> forecast_of(const inference::Search& search, const Fit& whole, Fit others,
+                                                std::size_t r) {
+  constexpr double kKnown = 1.0 / 3;
+  const double until_s = inference::time_of_share(whole.likelihood->data().recordings[r], kKnown);
+  Fit begun = refit_without(search, whole, new_insertion(others, r), r, until_s);
+  others.likelihood = begun.likelihood = whole.likelihood;
+  const auto curve = curve_of(search, whole);
+  auto of_others = linearise(*whole.likelihood, others, curve), of_begun = linearise(*whole.likelihood, begun, curve);
+  if (of_others.empty() || of_begun.empty()) return std::nullopt;
+  const auto spreads = likely_part(nuisance_grid(search.system()), nuisance_weights_of(search, whole));
+  return inference::forecast({&others, std::move(of_others)}, {&begun, std::move(of_begun)}, curve, spreads, r,
+                             until_s);
 }
 
 // By the model file as it is: nothing is refitted, and it knows of no variation.
@@ -144,22 +225,56 @@ HeldOut hold_out(const NeedleSystem& system, const inference::Search& search, co
   const Fit& base = search.visited().at({}).at->fit;
   const auto selected = leave_out_selection(search);
   std::vector<Sums> file, before, after, floor;
+  InsertionSums predicted_before(system), predicted_after(system);
   for (std::size_t r = 0; r < likelihood.recordings(); ++r) {
     const Recording& recording = system.recorded().recordings[r];
     if (system.recorded().two_groups() && !recording.changed) continue;
+    const Fit& found = *selected[r].fit;
+    const Fit alone_refitted = refit_without(search, base, r), found_refitted = refit_without(search, found, r);
     file.push_back(as_it_stands(system, likelihood, r));
-    before.push_back(sums_of(system, search, base, judge, r));
-    after.push_back(sums_of(system, search, *selected[r].fit, *selected[r].fit, r));
+    before.push_back(sums_of(system, search, alone_refitted, judge, r));
+    after.push_back(sums_of(system, search, found_refitted, found, r));
     after.back().log_density = selected[r].log_density + constant_of(after.back().count);
     floor.push_back(noise_floor(system, likelihood, r));
-    out.recordings.push_back(
-        {.log = recording.name, .before = figures_of({before.back()}), .after = figures_of({after.back()})});
+    HeldOutRecording one{.log = recording.name,
+                         .before = figures_of({before.back()}),
+                         .after = figures_of({after.back()}),
+                         .predicted_before = {},
+                         .predicted_after = {}};
+    const auto& rows = likelihood.data().recordings[r];
+    const auto note = [&](const std::vector<inference::Forecasts>& models, const std::vector<double>& probabilities,
+                          InsertionSums& sums) {
+      InsertionSums own(system);
+      if (!models.empty()) {
+        const auto all = averaged(models, probabilities);
+        own.add(rows, all);
+        sums.add(rows, all);
+      }
+      return own.figures();
+    };
+    std::vector<inference::Forecasts> models;
+    std::vector<double> probabilities;
+    if (auto forecast = forecast_of(search, base, alone_refitted, r)) models.push_back(std::move(*forecast));
+    one.predicted_before = note(models, {1}, predicted_before);
+    models.clear();
+    for (const auto& share : selected[r].shares) {
+      const bool likeliest = share.fit == &found;
+      if (auto forecast =
+              forecast_of(search, *share.fit, likeliest ? found_refitted : refit_without(search, *share.fit, r), r)) {
+        models.push_back(std::move(*forecast));
+        probabilities.push_back(share.probability);
+      }
+    }
+    one.predicted_after = note(models, probabilities, predicted_after);
+    out.recordings.push_back(std::move(one));
     out.gain += after.back().log_density - before.back().log_density;
   }
   out.as_it_stands = figures_of(file);
   out.before = figures_of(before);
   out.after = figures_of(after);
   out.noise_floor = figures_of(floor);
+  out.predicted_before = predicted_before.figures();
+  out.predicted_after = predicted_after.figures();
   return out;
 }
 

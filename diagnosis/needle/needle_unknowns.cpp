@@ -171,8 +171,8 @@ NeedleSystem::NeedleSystem(RecordedCase recorded, const model::NeedleParameters&
             .none = 0,
             .starts = {},
             .prior = inference::normal_prior(model.lambda2, kLambda2Width)}};
-  nuisances_ = {{"curvature", 0}, {"tilt_x_rad", 1}, {"tilt_y_rad", 1},
-                {"roll_rad", 3},  {"entry_x_mm", 2}, {"entry_y_mm", 2}};
+  nuisances_ = {{"curvature_relative", 0}, {"tilt_x_rad", 1}, {"tilt_y_rad", 1},
+                {"roll_rad", 3},           {"entry_x_mm", 2}, {"entry_y_mm", 2}};
   add_effects_of_library();
   if (two_groups_) add_common_errors();
   std::vector<const model::Motion*> motions;

@@ -94,6 +94,37 @@ FitFigures figures(double rmse_mm, double max_mm, double chi2_per_dof) {
           .log_density_se = 0.03};
 }
 
+InsertionPredicted predicted(double rmse_mm, double share) {
+  const auto figures = [&](double scale, std::size_t readings) {
+    return PredictionFigures{.rmse_mm = scale * rmse_mm,
+                             .log_density = -scale,
+                             .share_in_95 = share,
+                             .channels = {{scale * rmse_mm, share}, {0.9 * scale * rmse_mm, share}, {kNone, kNone}},
+                             .readings = readings};
+  };
+  return {.whole = figures(1, 900), .beyond = figures(1.2, 600), .continued = figures(0.4, 600)};
+}
+
+void add_insertions(Findings& findings) {
+  for (std::size_t i = 0; i < findings.traces.size(); ++i) {
+    const double off = std::sin(static_cast<double>(3 * i));
+    InsertionValues one{.log = findings.traces[i].log, .values = {}};
+    const auto add = [&](const char* name, const char* group, double size) {
+      const double value = size * off, sd = 0.4 * size;
+      one.values.push_back({.name = name,
+                            .group = group,
+                            .value = value,
+                            .std_error = sd,
+                            .ci95 = {value - 1.96 * sd, value + 1.96 * sd}});
+    };
+    add("curvature_relative", "curvature", 0.05);
+    for (const char* name : {"tilt_x_rad", "tilt_y_rad"}) add(name, "entry_angle", 0.003);
+    add("roll_rad", "roll", 0.02);
+    for (const char* name : {"entry_x_mm", "entry_y_mm"}) add(name, "entry_point", 0.1);
+    findings.insertions.push_back(std::move(one));
+  }
+}
+
 void add_ranking(Findings& findings) {
   double factor = findings.verdict == Verdict::nothing_missing ? 1.2 : 2112.7;
   for (const model::Effect* effect : model::all_effects()) {
@@ -154,6 +185,7 @@ Findings made_up(Verdict verdict) {
     n->lambda2_sd = 0.008;
   }
   f.channels = {"tip.x", "tip.y", "tip.z"};
+  f.units = {"mm", "mm", "mm"};
   f.noise = {.sigma = {0.151, 0.149, 0.26}, .ar1 = 0.6, .ar2 = -0.1, .outlier_share = 0.0167, .frame_s = 1.0 / 30};
   const auto truth = truth_of(verdict);
   const bool explained = verdict == Verdict::effects_found;
@@ -163,13 +195,17 @@ Findings made_up(Verdict verdict) {
     const double before = verdict == Verdict::nothing_missing ? 0.2 : 0.7 + 0.21 * i;
     const double after = explained ? 0.2 + 0.01 * i : before * 0.8;
     f.held_out.recordings.push_back({f.traces.back().log, figures(before, 3 * before, before * before / 0.04),
-                                     figures(after, 3 * after, after * after / 0.04)});
+                                     figures(after, 3 * after, after * after / 0.04), predicted(before, 0.6),
+                                     predicted(after, 0.951)});
   }
   f.outliers = 41;
   f.held_out.as_it_stands = figures(1.93, 6.1, 44);
   f.held_out.before = figures(1.21, 3.42, 15.2);
   f.held_out.after = figures(0.264, 0.91, 1.012);
   f.held_out.noise_floor = figures(0.201, 0, 1);
+  f.held_out.predicted_before = predicted(1.21, 0.612);
+  f.held_out.predicted_after = predicted(0.264, 0.951);
+  add_insertions(f);
   f.variation = {{"curvature", "relative", 0.05, 0.02, 0.02, 0.12}, {"entry_angle", "rad", 0.003, 0.6, 0, 0.007}};
   f.explanations = {{{"torsional_windup", "lost_steps (rotation)"}, 0.93, 0.04}, {{"rotation_backlash"}, 0.05, 0.01}};
   f.nothing_probability = 0.001;

@@ -41,6 +41,13 @@ TEST(Page, effects_found_names_them_with_sizes_and_rivals) {
   EXPECT_THAT(html, HasSubstr("1.21 → 0.264 mm"));
   EXPECT_THAT(html, HasSubstr("at (s), rec03.lcm"));
   EXPECT_THAT(html, Not(HasSubstr("The unknown part")));
+  // What each insertion has of its own, and both ways of predicting one.
+  EXPECT_THAT(html, HasSubstr("one standard deviation between insertions"));
+  EXPECT_THAT(html, HasSubstr("tilt x (rad)"));
+  EXPECT_THAT(
+      html,
+      HasSubstr("continued, beyond the first third</td><td class=\"number\">0.106</td><td class=\"number\">95 %"));
+  EXPECT_THAT(html, HasSubstr("<td>0.0950 mm (95 %)</td>"));
 }
 
 TEST(Page, nothing_missing_points_to_what_would_have_been_seen) {

@@ -57,6 +57,14 @@ TEST_F(Results, VerdictsFollowTheSchema) {
   std::ofstream(folder / "broken.json") << broken;
   EXPECT_NE(std::system((check + (folder / "broken.json").string() + " 2>/dev/null").c_str()), 0);
   broken = nlohmann::json::parse(text_of(folder / "found.json"));
+  broken["insertions"]["rec01.lcm"]["roll_rad"].erase("std_error");
+  std::ofstream(folder / "broken.json") << broken;
+  EXPECT_NE(std::system((check + (folder / "broken.json").string() + " 2>/dev/null").c_str()), 0);
+  broken = nlohmann::json::parse(text_of(folder / "found.json"));
+  broken["fit"]["predicted"]["after"]["beyond_first_third"]["continued"]["share_in_95"] = 1.1;
+  std::ofstream(folder / "broken.json") << broken;
+  EXPECT_NE(std::system((check + (folder / "broken.json").string() + " 2>/dev/null").c_str()), 0);
+  broken = nlohmann::json::parse(text_of(folder / "found.json"));
   broken["proposed_effect"] = {{"name", "of"}, {"file", "another verdict"}};
   std::ofstream(folder / "broken.json") << broken;
   EXPECT_NE(std::system((check + (folder / "broken.json").string() + " 2>/dev/null").c_str()), 0);
@@ -72,6 +80,12 @@ TEST_F(Results, TheVerdictSaysWhatWasFound) {
   EXPECT_EQ(j["where"][0]["range"][1], 52);
   EXPECT_EQ(j["fit"]["held_out"], "leave-one-recording-out");
   EXPECT_DOUBLE_EQ(j["fit"]["after"]["chi2_per_dof"], 1.012);
+  const auto& after = j["fit"]["predicted"]["after"];
+  EXPECT_DOUBLE_EQ(after["new_insertion"]["share_in_95"], 0.951);
+  EXPECT_DOUBLE_EQ(after["beyond_first_third"]["continued"]["channels"]["tip.y"]["rmse"], 0.9 * 0.4 * 0.264);
+  EXPECT_DOUBLE_EQ(j["fit"]["recordings"]["rec02.lcm"]["predicted"]["before"]["new_insertion"]["rmse_mm"], 0.91);
+  EXPECT_DOUBLE_EQ(j["insertions"]["rec02.lcm"]["tilt_x_rad"]["value"], 0.003 * std::sin(3));
+  EXPECT_DOUBLE_EQ(j["insertions"]["rec02.lcm"]["tilt_x_rad"]["std_error"], 0.4 * 0.003);
   EXPECT_TRUE(j["detectable"]["layer"]["curvature_ratio"].is_null());  // infinite
   EXPECT_TRUE(nlohmann::json::parse(verdict_json(made_up(Verdict::nothing_missing)))["next_experiment"].is_null());
 }

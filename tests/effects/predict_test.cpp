@@ -167,6 +167,60 @@ TEST_F(Predict, PredictsWithDiscrepanciesAndSaysHowFarOff) {
   EXPECT_EQ(by_curve.front()[5], 0);
 }
 
+// Without slip the heading turns by k for each mm inserted, and the tracker here says that it stays along z.
+TEST_F(Predict, SaysHowFarOffMeasuredHeadingsAre) {
+  constexpr double kPerMm = 0.004;
+  const std::string log_path = (folder / "headed.lcm").string();
+  io::LogWriter log(log_path);
+  for (int i = 0; i <= 100; ++i) {
+    ActuatorState a;
+    a.utime = 1'000'000 + 20'000 * i;
+    a.seq = i;
+    a.insertion_mm = i;
+    log.write_message(a.utime, io::channel::kActuatorState, io::to_message(a));
+    if (i % 10 != 0) continue;
+    TipMeasurement tip;
+    tip.utime = a.utime;
+    tip.information_per_mm2 = Eigen::Matrix3d::Identity();
+    log.write_message(a.utime, io::channel::kTipMeasurement, io::to_message(tip));
+    TipHeading heading;
+    heading.utime = a.utime;
+    heading.seq = i;
+    heading.heading = Eigen::Vector3d::UnitZ();
+    heading.information_per_rad2 = Eigen::Vector3d(1e6, 1e6, 0).asDiagonal();
+    heading.status = i == 50 ? 1 : 0;  // not usable
+    log.write_message(a.utime, io::channel::kTipHeading, io::to_message(heading));
+  }
+  log.close();
+  const Said said = run("--model " +
+                        folder.write("m.toml",
+                                     "[needle]\ncurvature_per_mm = 0.004\nwheelbase_mm = 20.0\n"
+                                     "lambda1_per_rad = 0.0\nlambda2 = 0.0\n") +
+                        " " + log_path);
+  ASSERT_EQ(said.status, 0) << said.err;
+  EXPECT_THAT(said.err, StartsWith("TIP_HEADING: 10 readings, measured less predicted "));
+  EXPECT_THAT(said.out, StartsWith("utime,x_mm,y_mm,z_mm,heading_x_residual_mrad,heading_y_residual_mrad\n"));
+  std::istringstream lines(said.out.substr(said.out.find('\n') + 1));
+  int i = 0;
+  for (std::string line; std::getline(lines, line); i += 10) {
+    const std::size_t cut = line.rfind(',', line.rfind(',') - 1);
+    if (i == 50) {
+      EXPECT_EQ(line.substr(cut), ",,");
+      continue;
+    }
+    double x_mrad = 0, y_mrad = 0;
+    ASSERT_EQ(std::sscanf(line.c_str() + cut, ",%lf,%lf", &x_mrad, &y_mrad), 2) << line;
+    EXPECT_NEAR(std::hypot(x_mrad, y_mrad), 1e3 * std::sin(kPerMm * i), 1e-3) << line;
+    // Predicted toward where the path goes: less of it than was measured.
+    double x_mm = 0, y_mm = 0;
+    ASSERT_EQ(std::sscanf(line.c_str(), "%*d,%lf,%lf", &x_mm, &y_mm), 2);
+    if (i > 0) {
+      EXPECT_LT(x_mrad * x_mm + y_mrad * y_mm, 0) << line;
+    }
+  }
+  EXPECT_EQ(i, 110);
+}
+
 TEST_F(Predict, PrintsALineForEachMeasurementInTheOrderOfTheLog) {
   const auto actuators = rich_script().actuators(0.02);
   std::vector<TipMeasurement> tips(4);

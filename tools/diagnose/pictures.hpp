@@ -33,6 +33,9 @@ std::string held_out_picture(const diagnosis::Findings& findings);
 // Parameters with their intervals, each on its own scale, with the value at which the effect would vanish.
 std::string interval_picture(const diagnosis::Findings& findings);
 
+// What each insertion has of its own, with intervals, beside the standard deviation between insertions.
+std::string insertion_picture(const diagnosis::Findings& findings);
+
 // |cosine| between what effects show, and what the needle's own parameters take of each.
 std::string confusion_picture(const diagnosis::Findings& findings);
 std::string discrepancy_picture(const std::vector<diagnosis::Discrepancy>& discrepancies);

@@ -220,6 +220,12 @@ void add_variation(io::HtmlReport& page, const Findings& f) {
   }
   page.table({"between insertions", "standard deviation", "95 %", "probability of none"}, rows,
              "Of the values that were tried. A recording more makes the needle no surer than this allows.");
+  const std::string picture = insertion_picture(f);
+  if (!picture.empty())
+    page.figure_svg(picture,
+                    "What each insertion has of its own, beside what all share: its curvature as a share of the "
+                    "needle's, the heading about x and y and the bevel's roll at the entry, and where it entered. An "
+                    "insertion far outside the band is one to look at.");
 }
 
 void add_location(io::HtmlReport& page, const Findings& f) {

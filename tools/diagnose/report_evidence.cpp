@@ -97,6 +97,46 @@ void add_evidence(io::HtmlReport& page, const Findings& f) {
   });
 }
 
+namespace {
+
+// As a new insertion and continued, on the same readings.
+void add_two_ways(io::HtmlReport& page, const Findings& f) {
+  const HeldOut& h = f.held_out;
+  std::vector<std::pair<std::string, const InsertionPredicted*>> models;
+  if (f.verdict == Verdict::nothing_missing) {
+    models = {{"needle refitted", &h.predicted_before}};
+  } else {
+    models = {{"before", &h.predicted_before}, {"after", &h.predicted_after}};
+  }
+  std::vector<std::vector<std::string>> rows, channels;
+  for (const auto& [model, p] : models)
+    for (const auto& [way, figures] : {std::pair("new insertion, all readings", &p->whole),
+                                       std::pair("new insertion, beyond the first third", &p->beyond),
+                                       std::pair("continued, beyond the first third", &p->continued)})
+      rows.push_back(
+          {model, way, measured(figures->rmse_mm), percent(figures->share_in_95), number(figures->log_density, 3)});
+  for (std::size_t c = 0; c < f.channels.size(); ++c)
+    for (const auto& [model, p] : models) {
+      std::vector<std::string> row{f.channels[c], model};
+      for (const PredictionFigures* figures : {&p->whole, &p->beyond, &p->continued})
+        row.push_back(c < figures->channels.size() ? measured(figures->channels[c].rmse) + " " + f.units[c] + " (" +
+                                                         percent(figures->channels[c].share_in_95) + ")"
+                                                   : "-");
+      channels.push_back(std::move(row));
+    }
+  page.subheading("As a new insertion, and continued");
+  page.paragraph(
+      "A new insertion is known only by how much insertions differ; of one that goes on, its first third has said what "
+      "it has of its own. Between the two lies what a few readings at the start are worth.");
+  page.table({"model", "predicted as", "rms (mm)", "within 95 %", "log density per reading"}, rows,
+             "Of all readings the share within their 95 % intervals. Before: the needle alone, by its own noise and "
+             "variation.");
+  page.table({"channel", "model", "new", "new, beyond the first third", "continued"}, channels,
+             "By channel: root mean square error, and the share of its readings within their 95 % intervals.");
+}
+
+}  // namespace
+
 void add_held_out(io::HtmlReport& page, const Findings& f) {
   if (f.held_out.recordings.empty()) return;
   page.heading("Recordings predicted");
@@ -112,6 +152,7 @@ void add_held_out(io::HtmlReport& page, const Findings& f) {
             "none far off."
           : "Each recording predicted from the others, before and after. Blue should lie left of orange, and "
             "on the right picture near the line.");
+  add_two_ways(page, f);
 }
 
 void add_reach(io::HtmlReport& page, const Findings& f) {

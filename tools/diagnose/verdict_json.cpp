@@ -60,16 +60,39 @@ json as_json(const FitFigures& f) {
           {"log_density", figure(f.log_density)}, {"log_density_std_error", figure(f.log_density_se)}};
 }
 
-json as_json(const HeldOut& held_out) {
+json as_json(const PredictionFigures& f, const Findings& of) {
+  json channels = json::object();
+  for (std::size_t c = 0; c < f.channels.size(); ++c)
+    channels[of.channels[c]] = {{"rmse", figure(f.channels[c].rmse)},
+                                {"unit", of.units[c]},
+                                {"share_in_95", figure(f.channels[c].share_in_95)}};
+  return {{"readings", f.readings},
+          {"rmse_mm", figure(f.rmse_mm)},
+          {"log_density", figure(f.log_density)},
+          {"share_in_95", figure(f.share_in_95)},
+          {"channels", channels}};
+}
+
+json as_json(const InsertionPredicted& p, const Findings& of) {
+  return {{"new_insertion", as_json(p.whole, of)},
+          {"beyond_first_third", {{"new_insertion", as_json(p.beyond, of)}, {"continued", as_json(p.continued, of)}}}};
+}
+
+json as_json(const HeldOut& held_out, const Findings& of) {
   json fit = {{"held_out", "leave-one-recording-out"},
               {"as_it_stands", as_json(held_out.as_it_stands)},
               {"before", as_json(held_out.before)},
               {"after", as_json(held_out.after)},
               {"noise_floor", as_json(held_out.noise_floor)},
               {"gain", figure(held_out.gain)},
+              {"predicted",
+               {{"before", as_json(held_out.predicted_before, of)}, {"after", as_json(held_out.predicted_after, of)}}},
               {"recordings", json::object()}};
   for (const auto& r : held_out.recordings)
-    fit["recordings"][r.log] = {{"before", as_json(r.before)}, {"after", as_json(r.after)}};
+    fit["recordings"][r.log] = {
+        {"before", as_json(r.before)},
+        {"after", as_json(r.after)},
+        {"predicted", {{"before", as_json(r.predicted_before, of)}, {"after", as_json(r.predicted_after, of)}}}};
   return fit;
 }
 
@@ -164,6 +187,18 @@ json as_json(const std::vector<VariationEstimate>& variation) {
   return all;
 }
 
+json as_json(const std::vector<InsertionValues>& insertions) {
+  json all = json::object();
+  for (const auto& insertion : insertions) {
+    json& own = all[insertion.log] = json::object();
+    for (const auto& v : insertion.values)
+      own[v.name] = {{"value", figure(v.value)},
+                     {"std_error", figure(v.std_error)},
+                     {"ci95", {figure(v.ci95[0]), figure(v.ci95[1])}}};
+  }
+  return all;
+}
+
 json experiment_json(const std::optional<NextExperiment>& next) {
   if (!next) return nullptr;
   return {{"script", next->script},
@@ -200,7 +235,7 @@ std::string verdict_json(const Findings& f) {
                 {"channels", f.channels},
                 {"units", f.units},
                 {"frame_s", figure(f.noise.frame_s)}};
-  j["fit"] = as_json(f.held_out);
+  j["fit"] = as_json(f.held_out, f);
   j["detectable"] = detectable_json(f.detectable);
   j["next_experiment"] = experiment_json(f.next_experiment);
   if (!f.two_groups)  // else it is held by the common errors, not measured
@@ -210,6 +245,7 @@ std::string verdict_json(const Findings& f) {
                     {"not_fitted", figure(f.not_visited)},
                     {"explanations", as_json(f.explanations)}};
   j["variation"] = as_json(f.variation);
+  j["insertions"] = as_json(f.insertions);
   j["discrepancies"] = as_json(f.discrepancies);
   j["proposals"] = as_json(f.proposals);
   j["proposed_effect"] = as_json(proposed_effect(f));

@@ -10,7 +10,8 @@ int main(int argc, char** argv) {
   bevel::tools::CommandLine command_line(
       "bevel-predict",
       "Integrates the model with its effects and discrepancies from ACTUATOR_STATE alone; CSV on stdout, one line per "
-      "TIP_MEASUREMENT, with standard deviations where the model file says what is uncertain.");
+      "TIP_MEASUREMENT, with standard deviations where the model file says what is uncertain, and residuals of "
+      "TIP_HEADING (mrad) where the log has any.");
   command_line.option("-m,--model", model_path, "model file (TOML)", true)
       .arguments("LOG", logs, "the log, one insertion")
       .reads_recordings()

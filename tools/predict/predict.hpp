@@ -28,6 +28,16 @@ std::vector<Eigen::Vector3d> standard_deviations_mm(const io::ModelFile& model, 
                                                     std::span<const model::ActuatorState> actuators,
                                                     std::span<const model::TipMeasurement> tips);
 
+// Measured less predicted heading, x and y of the unit vectors in {A}: small angles about -y and x, in mrad.
+struct HeadingResidual {
+  std::int64_t utime = 0;  // of the measurement, us since the epoch
+  double x_mrad = 0, y_mrad = 0;
+};
+// One per heading with status 0, in order of time. Throws as predict().
+std::vector<HeadingResidual> heading_residuals(const model::AugmentedNeedle& needle,
+                                               std::span<const model::ActuatorState> actuators,
+                                               std::span<const model::TipHeading> headings);
+
 // All of it; returns the exit status: 3 for a damaged log, whose readable part is predicted all the same.
 int run(const std::string& model_path, const std::string& log_path, std::ostream& out, std::ostream& err);
 

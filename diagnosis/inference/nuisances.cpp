@@ -1,0 +1,53 @@
+#include "diagnosis/inference/nuisances.hpp"
+
+#include <Eigen/Cholesky>
+#include <algorithm>
+#include <cmath>
+
+namespace bevel::inference {
+
+using Eigen::Index;
+using Eigen::MatrixXd;
+using Eigen::VectorXd;
+
+namespace {
+constexpr double kNegligible = 1e-3;  // share of a combination of standard deviations
+}
+
+VectorXd local_variances(const ArrowBlock& block, const ArrowSolution& solution) {
+  MatrixXd inner = block.ll;
+  inner.diagonal() += block.precision;
+  const Eigen::LLT<MatrixXd> factor(inner);
+  const MatrixXd through = factor.solve(block.lz);
+  const MatrixXd own = factor.solve(MatrixXd::Identity(inner.rows(), inner.cols()));
+  return (own + through * solution.covariance * through.transpose()).diagonal();
+}
+
+std::vector<std::vector<Mixture>> nuisance_posterior(const Fit& fit, std::vector<ArrowBlock> blocks,
+                                                     const CurveColumns& curve, const VectorXd& weights) {
+  const System& system = fit.layout.system();
+  const std::size_t count = system.nuisances().size();
+  std::vector<std::vector<Mixture>> out(fit.local.size(), std::vector<Mixture>(count));
+  const NuisanceGrid grid = nuisance_grid(system);
+  Fit about = fit;
+  for (Index k = 0; k < weights.size(); ++k) {
+    if (weights[k] < kNegligible) continue;
+    about.scales.nuisance_sd = grid.standard_deviations.col(k);
+    for (auto& block : blocks) block.precision = local_precision_of(fit.layout, about.scales);
+    const ArrowSolution solution = solve_about(about, blocks, curve);
+    if (!solution.valid) continue;
+    for (std::size_t r = 0; r < out.size(); ++r) {
+      const VectorXd variances = local_variances(blocks[r], solution);
+      // Nuisances come first among a recording's own unknowns, and none of them is an instant.
+      for (std::size_t i = 0; i < count; ++i) {
+        const auto at = static_cast<Index>(i);
+        out[r][i].parts.push_back({.weight = weights[k],
+                                   .mean = fit.local[r][at] + solution.local[r][at],
+                                   .sd = std::sqrt(std::max(0.0, variances[at]))});
+      }
+    }
+  }
+  return out;
+}
+
+}  // namespace bevel::inference
