@@ -26,7 +26,7 @@ using Matrix9d = Eigen::Matrix<double, 9, 9>;
 struct EffectState {
   model::BaseMotion entry, base;
   double tip_insertion_mm = 0, tip_rotation_rad = 0;
-  std::array<std::array<double, 3>, model::kMaxEffects> slot{};
+  std::array<std::array<double, model::EffectMemory::kSlots>, model::kMaxEffects> slot{};
   std::array<int, model::kMaxEffects> phase{};
 };
 

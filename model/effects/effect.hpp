@@ -71,7 +71,8 @@ std::span<const Covariate> all_covariates();
 
 // What an effect remembers between legs of one insertion. Slopes come with it.
 struct EffectMemory {
-  std::array<Dual, 3> slot;
+  static constexpr std::size_t kSlots = 4;
+  std::array<Dual, kSlots> slot;
   int phase = 0;  // 0 until it has seen a leg
 };
 

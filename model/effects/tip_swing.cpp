@@ -10,19 +10,19 @@ namespace {
 //   do = radius du - o ds / relax, with u the unit vector toward the bevel.
 //
 // bending_mm, guide_mm: 1 / lambda = (4 EI / k)^(1/4), the length over which the shaft bends: a beam on an elastic
-// foundation, to
-//   whose end the bevel's force belongs, clamped in its guide (Hetenyi, "Beams on Elastic Foundation", 1946, section 7:
-//   an end yields to a force by g, and turns by h, of what it does deep in the tissue). The tip cuts where it is, so
-//   that a step ds moves the force on, which is a moment F ds. With K the needle's curvature F / (EI lambda), L the
-//   depth of the tip, x = (L + guide) / bending, slope = K bending / 2 and radius = K bending^2 / 2:
+//   foundation, to whose end the bevel's force belongs, clamped in its guide (Hetenyi, "Beams on Elastic Foundation",
+//   1946, section 7: an end yields to a force by g, and turns by h, of what it does deep in the tissue). The tip cuts
+//   where it is, so that a step ds moves the force on, which is a moment F ds. With K the needle's curvature F / (EI
+//   lambda), L the depth of the tip, x = (L + guide) / bending, slope = K bending / 2 and radius = K bending^2 / 2:
 //     bicycle:  d theta = K g h u ds
 //     tip:      dp = (theta + 2 slope h u) ds + radius g du
+//     depth:    less by 3/2 (slope h)^2 ds: what is fed is the length of a bent shaft
 //     heading:  theta + slope h u
 //     g = (sinh x cosh x - sin x cos x) / (cosh^2 x + cos^2 x),  h = (sinh^2 x + sin^2 x) / (cosh^2 x + cos^2 x).
 //   That is the beam for small slopes; between guide and tissue the shaft bends as if it were held there too, which is
-//   the same to the fifth power of guide / bending. The other two parameters have no part.
-// Only across {A}: what is fed is the length of the shaft. Memory: the offset, and the heading's own tilt toward the
-// bevel.
+//   the same to the fifth power of guide / bending. The force is taken to act on the way back too, which it does for no
+//   more than the bevel's length. The other two parameters have no part.
+// Memory: the offset, and the heading's own tilt toward the bevel.
 class TipSwing final : public Effect {
  public:
   TipSwing()
@@ -56,12 +56,13 @@ class TipSwing final : public Effect {
       const Dual slope = 0.5 * side * leg.curvature_per_mm * p[2];
       const Dual2 toward = leg.toward_bevel();
       for (std::size_t i = 0; i < 2; ++i) body[i] = 2.0 * slope * end.h * leg.insertion_mm * toward[i];
-      of_turn_mm = slope * p[2] * end.g;
-      // The first touch bends what lies free before the tissue.
+      memory.slot[2] -= 1.5 * slope * slope * end.h * end.h * leg.insertion_mm;
+      // The first touch bends what lies free before the tissue; until then there is no force to turn.
       if (memory.phase == 0 && leg.insertion_mm.value > 0) {
         memory.phase = 1;
         body[1] -= side * slope * p[2] * end_at(p[3] / p[2]).g;
       }
+      of_turn_mm = memory.phase == 0 ? Dual(0) : slope * p[2] * end.g;
       memory.slot[kTilt] = side * slope * end.h;
     } else if (leg.insertion_mm.value > 0) {
       const Dual x = leg.insertion_mm / p[1];
@@ -71,11 +72,11 @@ class TipSwing final : public Effect {
     // By which the direction toward the bevel turned: from (0, -1).
     const Dual2 turned_by = {sin(leg.rotation_rad), 1.0 - cos(leg.rotation_rad)};
     for (std::size_t i = 0; i < 2; ++i) body[i] += side * of_turn_mm * turned_by[i];
-    const Dual2 world = leg.lateral_in_world(body);
-    for (std::size_t i = 0; i < 2; ++i) memory.slot[i] = memory.slot[i] * kept + world[i];
+    const Dual3 world = leg.in_world(body);
+    for (std::size_t i = 0; i < 3; ++i) memory.slot[i] = memory.slot[i] * kept + world[i];
   }
   void offset(Parameters /*p*/, const EffectMemory& memory, double /*time_s*/, Dual3& position_mm) const override {
-    for (std::size_t i = 0; i < 2; ++i) position_mm[i] += memory.slot[i];
+    for (std::size_t i = 0; i < 3; ++i) position_mm[i] += memory.slot[i];
   }
   void sensor(Parameters /*p*/, const EffectMemory& memory, Dual2& tilt_rad) const override {
     tilt_rad[0] += memory.slot[kTilt];
@@ -88,7 +89,7 @@ class TipSwing final : public Effect {
  private:
   static constexpr double kShortest_mm = 1e-6;
   static constexpr double kDeep = 15;  // bending lengths, from where on nothing changes
-  static constexpr std::size_t kTilt = 2;
+  static constexpr std::size_t kTilt = 3;
 
   static Dual depth_halfway(const LegView& leg) { return leg.tip_depth_mm + 0.5 * leg.insertion_mm * leg.heading_z; }
   struct End {

@@ -31,7 +31,8 @@ TEST(TipSwing, OfATurnIsGoneWhenItHasCutOn) {
     const Vector3d offset = path.position_mm[i] - nominal.position_mm[i];
     const double phi = base.rotation_rad;
     // From -y over +x to +y, across a needle that is tilted about x.
-    const Vector3d turned(std::sin(phi), (1 - std::cos(phi)) * std::cos(tilt_rad), 0);
+    const Vector3d turned(std::sin(phi), (1 - std::cos(phi)) * std::cos(tilt_rad),
+                          (1 - std::cos(phi)) * std::sin(tilt_rad));
     const double left = std::exp(-std::max(0.0, base.insertion_mm - kDeep_mm) / kRelax_mm);
     EXPECT_LT((offset - kRadius_mm * left * turned).norm(), 1e-9) << i;
     EXPECT_EQ(path.heading[i], nominal.heading[i]);
@@ -46,7 +47,7 @@ TEST(TipSwing, FollowsABaseThatTurnsAndCuts) {
   brute.after = [seen, offset = Vector3d(0, 0, 0)](const Instant& now) mutable {
     // Of the bevel's direction only what the roll makes of it: not that the needle bends.
     const Vector3d turn = now.dr_rad * (now.R * Vector3d(1, 0, 0));
-    offset += kRadius_mm * Vector3d(turn.x(), turn.y(), 0) - offset * std::max(now.ds_mm, 0.0) / kRelax_mm;
+    offset += kRadius_mm * turn - offset * std::max(now.ds_mm, 0.0) / kRelax_mm;
     seen->push_back(offset);
   };
   const Motion motion = script.fine();
@@ -99,7 +100,10 @@ TEST_P(TipSwingOfABeam, IsThatOfItsMechanics) {
   const OpenLoop stiff = with(needle, {active("tip_swing", {0, 5, 1 / lambda_per_mm, config.guide_gap_mm})}, motion);
   const OpenLoop slack = with(needle, {}, motion);
   EXPECT_LT(left_mm(stiff), 0.02 * left_mm(slack)) << left_mm(stiff) << " of " << left_mm(slack) << " mm";
-  EXPECT_NEAR(measured.back().z(), stiff.position_mm.back().z(), 0.1);
+  double deeper_mm = 0;
+  for (std::size_t i = 0; i < measured.size(); ++i)
+    deeper_mm = std::max(deeper_mm, std::abs(measured[i].z() - stiff.position_mm[i].z()));
+  EXPECT_LT(deeper_mm, 0.02 * left_mm(slack));
   EXPECT_LT(left_rad(stiff), 0.03 * left_rad(slack)) << left_rad(stiff) << " of " << left_rad(slack) << " rad";
 }
 INSTANTIATE_TEST_SUITE_P(Beams, TipSwingOfABeam,
