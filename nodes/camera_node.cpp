@@ -10,23 +10,28 @@ std::string camera_process_name(const SystemConfig& config) {
   return all ? "bevel-camera" : "bevel-camera-" + std::to_string(config.source.camera);
 }
 
-tip_measurement_t to_tip(const camera::TipObservation& seen, std::int64_t seq) {
-  tip_measurement_t m{};
+namespace {
+// When, of which camera, and whether to be used: what positions and headings have in common.
+template <class Message>
+Message stamped(const camera::TipObservation& seen, std::int64_t seq, camera::TipStatus status) {
+  Message m{};
   m.utime = seen.capture_utime;
   m.seq = seq;
   m.camera = seen.camera;
-  m.status = static_cast<std::int32_t>(seen.status);
+  m.status = static_cast<std::int32_t>(status);
+  return m;
+}
+}  // namespace
+
+tip_measurement_t to_tip(const camera::TipObservation& seen, std::int64_t seq) {
+  auto m = stamped<tip_measurement_t>(seen, seq, seen.status);
   std::ranges::copy(seen.position_mm, m.position_mm);
   std::ranges::copy(seen.information_per_mm2, m.information_per_mm2);
   return m;
 }
 
 tip_heading_t to_heading(const camera::TipObservation& seen, std::int64_t seq) {
-  tip_heading_t m{};
-  m.utime = seen.capture_utime;
-  m.seq = seq;
-  m.camera = seen.camera;
-  m.status = static_cast<std::int32_t>(seen.heading_status);
+  auto m = stamped<tip_heading_t>(seen, seq, seen.heading_status);
   std::ranges::copy(seen.heading.direction, m.heading);
   std::ranges::copy(seen.heading.information_per_rad2, m.information_per_rad2);
   return m;

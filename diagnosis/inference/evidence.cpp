@@ -74,12 +74,8 @@ GridEvidence over_nuisances(const Fit& fit, const CurveColumns& curve, const Nui
       not_normal.push_back(i);
   const double here = solve_about(fit, blocks, curve, not_normal).least;
   std::vector<double> logs;
-  Fit about = fit;
   for (Index k = 0; k < grid.log_prior.size(); ++k) {
-    about.scales.nuisance_sd = grid.standard_deviations.col(k);
-    const VectorXd precision = local_precision_of(fit.layout, about.scales);
-    for (auto& block : blocks) block.precision = precision;
-    const ArrowSolution solution = solve_about(about, blocks, curve, not_normal);
+    const ArrowSolution solution = solve_at(grid.standard_deviations.col(k), fit, blocks, curve, not_normal);
     logs.push_back(solution.valid ? -0.5 * (fit.cost + solution.least - here + solution.log_volume_ratio) +
                                         log_density_ratios(fit, solution.covariance) + grid.log_prior[k]
                                   : -std::numeric_limits<double>::infinity());
@@ -108,17 +104,6 @@ Noise noise_about(const Fit& fit, const CurveColumns& curve) {
     errors.push_back(by_channel(likelihood.data().recordings[r], all));
   }
   return refine_noise(likelihood.data(), errors, likelihood.noise());
-}
-
-// What of the readings is not known since the inputs are not, by this fit; empty: nothing. In the channels' units.
-std::vector<VectorXd> inputs_about(const Fit& fit) {
-  std::vector<VectorXd> out;
-  const Likelihood& likelihood = *fit.likelihood;
-  for (std::size_t r = 0; r < likelihood.recordings(); ++r) {
-    out.push_back(likelihood.system().by_inputs(fit.layout.set(), r, fit.shared, fit.local[r]));
-    if (out.back().size() == 0) return {};
-  }
-  return out;
 }
 
 bool alike(const std::vector<VectorXd>& a, const std::vector<VectorXd>& b, const Likelihood& likelihood) {
@@ -189,9 +174,7 @@ std::vector<LessSpread> with_less_spread(const Likelihood& likelihood, const Fit
   auto blocks = linearise(likelihood, fit, {});
   if (blocks.empty()) return out;
   const auto log_of = [&](const Fit& about) {
-    const VectorXd precision = local_precision_of(about.layout, about.scales);
-    for (auto& block : blocks) block.precision = precision;
-    const ArrowSolution solution = solve_about(about, blocks, {}, std::vector<Index>{});
+    const ArrowSolution solution = solve_at(about.scales.nuisance_sd, about, blocks, {}, std::vector<Index>{});
     return -0.5 * (solution.least + solution.log_volume_ratio);
   };
   const double here = log_of(fit);

@@ -29,7 +29,7 @@ MatrixXd correlation_of(const Curve& curve, double length) {
   return out;
 }
 
-Likelihood::Likelihood(const System& system, const Readings& outliers, Noise noise)
+Likelihood::Likelihood(const System& system, const Readings& outliers, Noise noise, const std::vector<VectorXd>& inputs)
     : system_(&system),
       outliers_(outliers),
       data_(without(system.data(), outliers)),
@@ -41,24 +41,22 @@ Likelihood::Likelihood(const System& system, const Readings& outliers, Noise noi
       for (const double value : series.measured) measured[row++] = value;
     measured_.push_back(std::move(measured));
   }
-  set_noise(std::move(noise));
+  set_noise(std::move(noise), inputs);
 }
 
 Likelihood::Likelihood(const Likelihood& other, Noise noise, const std::vector<VectorXd>& inputs) : Likelihood(other) {
-  for (std::size_t r = 0; r < data_.recordings.size(); ++r) {
-    const bool known = r >= inputs.size() || inputs[r].size() == 0;
-    const auto own = known ? std::vector<VectorXd>() : by_channel(data_.recordings[r], kept(r, inputs[r]));
-    for (std::size_t c = 0; c < data_.recordings[r].series.size(); ++c) {
-      auto& input_sd = data_.recordings[r].series[c].input_sd;
-      input_sd.clear();
-      if (!known)
-        for (const double sd : own[c]) input_sd.push_back(sd / noise.sigma[c]);
-    }
-  }
-  set_noise(std::move(noise));
+  set_noise(std::move(noise), inputs);
 }
 
-void Likelihood::set_noise(Noise noise) {
+void Likelihood::set_noise(Noise noise, const std::vector<VectorXd>& inputs) {
+  for (std::size_t r = 0; r < data_.recordings.size(); ++r) {
+    auto& series = data_.recordings[r].series;
+    for (Series& one : series) one.input_sd.clear();
+    if (inputs.empty()) continue;
+    const auto own = by_channel(data_.recordings[r], kept(r, inputs[r]));
+    for (std::size_t c = 0; c < series.size(); ++c)
+      for (const double sd : own[c]) series[c].input_sd.push_back(sd / noise.sigma[c]);
+  }
   noise_ = std::move(noise);
   log_weights_ = VectorXd::Zero(static_cast<Index>(data_.recordings.size()));
   whitening_.assign(data_.recordings.size(), {});
@@ -222,6 +220,23 @@ ArrowSolution solve_about(const Fit& fit, const std::vector<ArrowBlock>& blocks,
   const Pulls pulls = pulls_of(fit.layout, fit.shared, fit.curve_values, curve.covariance);
   ArrowRules how{.covariance_of = std::move(covariance_of)};
   return solve_within(fit, blocks, pulls, how);
+}
+
+ArrowSolution solve_at(const VectorXd& nuisance_sd, const Fit& fit, std::vector<ArrowBlock>& blocks,
+                       const CurveColumns& curve, std::optional<std::vector<Index>> covariance_of) {
+  const VectorXd precision = local_precision_of(fit.layout, {.nuisance_sd = nuisance_sd, .curve = {}});
+  for (ArrowBlock& block : blocks) block.precision = precision;
+  return solve_about(fit, blocks, curve, std::move(covariance_of));
+}
+
+std::vector<VectorXd> inputs_about(const Fit& fit) {
+  std::vector<VectorXd> out;
+  const Likelihood& likelihood = *fit.likelihood;
+  for (std::size_t r = 0; r < likelihood.recordings(); ++r) {
+    out.push_back(likelihood.system().by_inputs(fit.layout.set(), r, fit.shared, fit.local[r]));
+    if (out.back().size() == 0) return {};
+  }
+  return out;
 }
 
 std::vector<ArrowBlock> linearise(const Likelihood& likelihood, const Fit& fit, const CurveColumns& curve) {

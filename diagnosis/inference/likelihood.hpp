@@ -40,9 +40,10 @@ struct Residuals {
 // A system, its readings but for the outliers, and the noise.
 class Likelihood {
  public:
-  Likelihood(const System& system, const Readings& outliers, Noise noise);
-  // The same readings with another noise; inputs: by_inputs() of the model that they are to be judged by, per
-  // recording.
+  // inputs: of the model that the readings are to be judged by (inputs_about).
+  Likelihood(const System& system, const Readings& outliers, Noise noise,
+             const std::vector<Eigen::VectorXd>& inputs = {});
+  // The same readings with another noise.
   Likelihood(const Likelihood& other, Noise noise, const std::vector<Eigen::VectorXd>& inputs = {});
 
   const System& system() const { return *system_; }
@@ -66,7 +67,7 @@ class Likelihood {
   const std::vector<Whitening>& whitening(std::size_t recording) const { return whitening_[recording]; }  // by channel
 
  private:
-  void set_noise(Noise noise);
+  void set_noise(Noise noise, const std::vector<Eigen::VectorXd>& inputs);
   void whiten_rows(std::size_t recording, Eigen::Ref<Eigen::MatrixXd> rows) const;
 
   const System* system_;
@@ -93,6 +94,9 @@ struct Fit {
   int iterations = 0;
   bool valid = false;
 };
+
+// System::by_inputs() of a fit, per recording; empty: nothing.
+std::vector<Eigen::VectorXd> inputs_about(const Fit& fit);
 
 struct FitRules {
   int max_iterations = 25;
@@ -137,5 +141,8 @@ bool linearise(const Likelihood& likelihood, const Fit& fit, const CurveColumns&
 // The linear model about a fit, what presses against a bound held.
 ArrowSolution solve_about(const Fit& fit, const std::vector<ArrowBlock>& blocks, const CurveColumns& curve,
                           std::optional<std::vector<Eigen::Index>> covariance_of = {});
+// The same where the nuisances have these standard deviations, per group; the blocks keep them.
+ArrowSolution solve_at(const Eigen::VectorXd& nuisance_sd, const Fit& fit, std::vector<ArrowBlock>& blocks,
+                       const CurveColumns& curve, std::optional<std::vector<Eigen::Index>> covariance_of = {});
 
 }  // namespace bevel::inference

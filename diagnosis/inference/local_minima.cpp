@@ -64,10 +64,6 @@ void scan_local(const Likelihood& likelihood, const Layout& layout, const Vector
 
 bool has_scanned(const Layout& layout) { return layout.local().size() > layout.system().nuisances().size(); }
 
-bool has_many_minima(const Parameter& p) {
-  return (std::isnan(p.none) || p.shape) && p.starts.size() >= kGrid && !p.periodic;
-}
-
 // Distance to the farther of the neighbours in the grid.
 double grid_spacing(const Parameter& p, double value) {
   auto starts = p.starts;
@@ -129,6 +125,10 @@ class Profile {
 };
 
 }  // namespace
+
+bool has_many_minima(const Parameter& parameter) {
+  return (std::isnan(parameter.none) || parameter.shape) && parameter.starts.size() >= kGrid && !parameter.periodic;
+}
 
 void scan_locals(const Likelihood& likelihood, const CurveColumns& curve, Fit& fitted) {
   for (int scan = 0; scan < kScans && has_scanned(fitted.layout); ++scan) {

@@ -8,6 +8,9 @@ namespace bevel::inference {
 // Between instants that are tried.
 inline constexpr double kInstantSpacing_s = 0.3;
 
+// Of a shared parameter: its starts are a grid (a depth, a jump).
+bool has_many_minima(const Parameter& parameter);
+
 // Every phase and instant at the best of a grid, all else as it is, again and again until that helps no more.
 void scan_locals(const Likelihood& likelihood, const CurveColumns& curve, Fit& fitted);
 
@@ -15,7 +18,7 @@ void scan_locals(const Likelihood& likelihood, const CurveColumns& curve, Fit& f
 // parameters that are still off may hold them there.
 void doubt_instants(const Likelihood& likelihood, const CurveColumns& curve, Fit& fitted);
 
-// Each shared parameter that has many local minima (a depth, a jump: Parameter::starts is a grid of them) along a finer
+// Each shared parameter that has many local minima along a finer
 // grid about where it is, all else following by the linear model.
 void scan_shapes(const Likelihood& likelihood, const CurveColumns& curve, Fit& fitted);
 

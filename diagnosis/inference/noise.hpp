@@ -28,6 +28,7 @@ struct Noise {
 struct Whitening {
   std::vector<double> carry, carry2, weight;
   std::vector<double> gain;  // empty: one
+  double gain_at(std::size_t i) const { return gain.empty() ? 1 : gain[i]; }
 };
 Whitening make_whitening(const Series& series, const Noise& noise, double sigma);
 

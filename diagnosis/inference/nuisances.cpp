@@ -29,12 +29,9 @@ std::vector<std::vector<Mixture>> nuisance_posterior(const Fit& fit, std::vector
   const std::size_t count = system.nuisances().size();
   std::vector<std::vector<Mixture>> out(fit.local.size(), std::vector<Mixture>(count));
   const NuisanceGrid grid = nuisance_grid(system);
-  Fit about = fit;
   for (Index k = 0; k < weights.size(); ++k) {
     if (weights[k] < kNegligible) continue;
-    about.scales.nuisance_sd = grid.standard_deviations.col(k);
-    for (auto& block : blocks) block.precision = local_precision_of(fit.layout, about.scales);
-    const ArrowSolution solution = solve_about(about, blocks, curve);
+    const ArrowSolution solution = solve_at(grid.standard_deviations.col(k), fit, blocks, curve);
     if (!solution.valid) continue;
     for (std::size_t r = 0; r < out.size(); ++r) {
       const VectorXd variances = local_variances(blocks[r], solution);

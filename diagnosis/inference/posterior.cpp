@@ -111,18 +111,16 @@ Unknowns::Unknowns(const Search& search) : search_(&search) {
     const CurveColumns curve = curve_of(search, fit);
     auto blocks = linearise(*fit.likelihood, fit, curve);
     if (blocks.empty()) return;
-    Fit about = fit;
     for (Index k = 0; k < over.size(); ++k) {
       if (weight * over[k] < kNegligible) continue;
-      about.scales.nuisance_sd = grid.standard_deviations.col(k);
-      for (auto& block : blocks) block.precision = local_precision_of(fit.layout, about.scales);
-      const ArrowSolution solution = solve_about(about, blocks, curve);
+      const VectorXd nuisance_sd = grid.standard_deviations.col(k);
+      const ArrowSolution solution = solve_at(nuisance_sd, fit, blocks, curve);
       if (!solution.valid) continue;
       Part part{.weight = weight * over[k],
                 .layout = &fit.layout,
                 .mean = fit.shared,
                 .sd = fit.shared,
-                .nuisance_sd = about.scales.nuisance_sd};
+                .nuisance_sd = nuisance_sd};
       for (Index i = 0; i < fit.shared.size(); ++i) {
         part.mean[i] += solution.shared[i];
         part.sd[i] = std::sqrt(std::max(0.0, solution.covariance(i, i)));

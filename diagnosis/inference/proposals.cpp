@@ -21,7 +21,6 @@ namespace {
 constexpr double kFarthest = 4.0;  // sizes promised reach to so many times their start
 constexpr double kSmall = 0.1;     // of a start
 constexpr double kNever = -1e3;
-constexpr std::size_t kGrid = 5;  // starts of one parameter
 
 // Readings are about as far from those without the effect as the parameter is from where it vanishes.
 bool is_amplitude(const Parameter& p) { return !std::isnan(p.none) && !p.shape; }
@@ -96,10 +95,9 @@ void keep_best(std::vector<StartPoint>& starts, std::size_t count) {
 // The fits from which an effect is looked at: this one, and, where what is missing drove the base a standard deviation
 // from its prior, the same with the base where the prior has it. What an effect does may be in proportion to the base's
 // own parameters, and these may have been fitted away.
-std::vector<Fit> views_of(const Fit& about, const Effect& effect) {
+std::vector<Fit> views_of(const Fit& about) {
   std::vector<Fit> out{about};
   const auto& unknowns = about.layout.shared();
-  const bool grid = std::ranges::any_of(effect.parameters, [](const Parameter& p) { return p.starts.size() >= kGrid; });
   bool far = false;
   Fit at_prior = about;
   for (std::size_t i = 0; i < unknowns.size(); ++i) {
@@ -109,7 +107,7 @@ std::vector<Fit> views_of(const Fit& about, const Effect& effect) {
     far = far || std::abs(value - prior.middle) * std::sqrt(precision_of(prior)) > 1;
     value = prior.middle;
   }
-  if (far && !grid) out.push_back(std::move(at_prior));
+  if (far) out.push_back(std::move(at_prior));
   return out;
 }
 
@@ -117,12 +115,16 @@ std::vector<Fit> views_of(const Fit& about, const Effect& effect) {
 
 Proposals::Proposals(const Likelihood& likelihood, const Fit& about, int threads) : system_(&likelihood.system()) {
   candidates_.resize(system_->effects().size());
+  const auto views = views_of(about);
   parallel_for(candidates_.size(), threads,
-               [&](std::size_t e) { candidates_[e] = make_candidate(likelihood, about, e); });
+               [&](std::size_t e) { candidates_[e] = make_candidate(likelihood, views, e); });
 }
 
-Proposals::Candidate Proposals::make_candidate(const Likelihood& likelihood, const Fit& about, std::size_t e) const {
+Proposals::Candidate Proposals::make_candidate(const Likelihood& likelihood, std::span<const Fit> views,
+                                               std::size_t e) const {
   const Effect& effect = system_->effects()[e];
+  // A grid of starts takes its time from one view.
+  if (std::ranges::any_of(effect.parameters, has_many_minima)) views = views.first(1);
   Candidate out;
   for (std::size_t p = 0; p < effect.parameters.size(); ++p) {
     const Parameter& parameter = effect.parameters[p];
@@ -132,10 +134,9 @@ Proposals::Candidate Proposals::make_candidate(const Likelihood& likelihood, con
       out.amplitudes.push_back(p);
   }
   if (!system_->allows({e})) return out;
-  ModelSet rest = without(about.layout.set(), e);
+  ModelSet rest = without(views.front().layout.set(), e);
   if (!system_->allows(with(rest, e))) rest.clear();
   const Layout around(*system_, rest), layout(*system_, with(rest, e));
-  const auto views = views_of(about, effect);
   for (std::size_t r = 0; r < likelihood.recordings(); ++r) {
     std::vector<double> choices;
     if (out.local >= 0) {

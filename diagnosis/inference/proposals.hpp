@@ -1,6 +1,8 @@
 #pragma once
 // What each effect would do to the readings, from a grid of starts, once, about one fit; and from it, without any new
 // fit, what each promises beside a set that was fitted: an estimate of its log Bayes factor, and where to begin.
+#include <span>
+
 #include "diagnosis/inference/marginal.hpp"
 
 namespace bevel::inference {
@@ -64,7 +66,7 @@ class Proposals {
     std::size_t effect = 0, signature = 0;
     Eigen::Index first = 0, width = 0;
   };
-  Candidate make_candidate(const Likelihood& likelihood, const Fit& about, std::size_t effect) const;
+  Candidate make_candidate(const Likelihood& likelihood, std::span<const Fit> views, std::size_t effect) const;
   Proposal judge(const Candidate& candidate, std::size_t effect, const Marginal& beside, std::size_t starts) const;
   Proposal judge_local(const Candidate& candidate, std::size_t effect, const Marginal& beside,
                        std::size_t starts) const;

@@ -35,12 +35,15 @@ MatrixXd RecordingRows::coloured(MatrixXd rows, bool continued) const {
   if (continued)
     for (const Index i : first_) rows.row(i).setZero();
   each_channel([&](Index first, const Whitening& whitening) {
-    for (Index k = 0; k < static_cast<Index>(whitening.weight.size()); ++k) {
-      const auto at = static_cast<std::size_t>(k);
-      auto row = rows.row(first + k);
+    // The noise in the two rows before, as whiten() carries it on.
+    Eigen::RowVectorXd before = Eigen::RowVectorXd::Zero(rows.cols()), twice_before = before, predicted;
+    for (std::size_t at = 0; at < whitening.weight.size(); ++at) {
+      auto row = rows.row(first + static_cast<Index>(at));
       row /= whitening.weight[at];
-      if (k > 0) row += whitening.carry[at] * rows.row(first + k - 1);
-      if (k > 1) row += whitening.carry2[at] * rows.row(first + k - 2);
+      predicted = whitening.carry[at] * before + whitening.carry2[at] * twice_before;
+      twice_before = before;
+      before = predicted + whitening.gain_at(at) * row;
+      row += predicted;
     }
   });
   return rows;
@@ -50,15 +53,18 @@ VectorXd RecordingRows::noise_variances(bool continued) const {
   VectorXd known = VectorXd::Zero(size()), out = known;
   if (continued) known(first_).setOnes();
   each_channel([&](Index first, const Whitening& whitening) {
-    double before = 0, twice_before = 0, across = 0;  // variances of the two rows before, and their covariance
+    // Variances of what is carried on from the two rows before, and their covariance.
+    double before = 0, twice_before = 0, across = 0;
     for (Index k = 0; k < static_cast<Index>(whitening.weight.size()); ++k) {
       const auto at = static_cast<std::size_t>(k);
       const double a = whitening.carry[at], b = whitening.carry2[at];
       const double own = known[first + k] > 0 ? 0 : 1 / (whitening.weight[at] * whitening.weight[at]);
-      const double now = a * a * before + b * b * twice_before + 2 * a * b * across + own;
+      const double predicted = a * a * before + b * b * twice_before + 2 * a * b * across;
+      const double gain = whitening.gain_at(at);
       across = a * before + b * across;
       twice_before = before;
-      before = out[first + k] = now;
+      before = predicted + gain * gain * own;
+      out[first + k] = predicted + own;
     }
   });
   return out;
@@ -86,6 +92,7 @@ WhiteReadings RecordingRows::rest_alone(const MatrixXd& A, const VectorXd& error
       ++next;
       later.time_s.push_back(series.time_s[i]);
       later.relative_sd.push_back(series.relative_sd[i]);
+      if (!series.input_sd.empty()) later.input_sd.push_back(series.input_sd[i]);
     }
     const auto count = static_cast<Index>(later.time_s.size());
     const Whitening whitening = make_whitening(later, noise, noise.sigma[c]);

@@ -140,7 +140,7 @@ Fit refit_without(const inference::Search& search, const Fit& whole, const Fit& 
     for (std::size_t i = 0; i < series.message.size(); ++i)
       if (series.time_s[i] > until_s) gone.insert(series.message[i]);
   without[r].assign(gone.begin(), gone.end());
-  const Likelihood some(all.system(), without, all.noise());
+  const Likelihood some(all.system(), without, all.noise(), inputs_about(whole));
   const auto curve =
       whole.scales.curve ? search.discrepancy().columns(some, *whole.scales.curve) : inference::CurveColumns{};
   Fit out = inference::fit(some, whole.layout, start.shared, start.local, whole.scales, curve);

@@ -86,6 +86,20 @@ TEST(Heading, DerivativesAreThoseOfPerturbation) {
   }
 }
 
+// Of what is predicted, by the error of the state: central differences of the innovation.
+Eigen::Matrix<double, 3, 9> by_perturbation(const NeedleFilter& filter, const FilterState& at,
+                                            const model::TipHeading& measured) {
+  Eigen::Matrix<double, 3, 9> H = Eigen::Matrix<double, 3, 9>::Zero();
+  for (int i = 0; i < 9; ++i) {
+    constexpr double kStep = 1e-6;
+    FilterState up = at, down = at;
+    move<9>(up, kStep * Vector9d::Unit(i));
+    move<9>(down, -kStep * Vector9d::Unit(i));
+    H.col(i) = (filter.update(down, measured).innovation - filter.update(up, measured).innovation) / (2 * kStep);
+  }
+  return H;
+}
+
 // Information form, P^-1 + H^T R^-1 H, with H by central differences of the innovation where it is, not at zero.
 TEST(Heading, TheUpdateIsTheClosedFormWithDerivativesByPerturbation) {
   const NeedleFilter filter(agar_config());
@@ -107,14 +121,7 @@ TEST(Heading, TheUpdateIsTheClosedFormWithDerivativesByPerturbation) {
     if (!one_camera) {
       EXPECT_NEAR(update.innovation.head<2>().norm(), std::hypot(0.01, 0.02), 1e-5);
     }
-    Eigen::Matrix<double, 3, 9> H = Eigen::Matrix<double, 3, 9>::Zero();
-    for (int i = 0; i < 9; ++i) {
-      constexpr double kStep = 1e-6;
-      FilterState up = before, down = before;
-      move<9>(up, kStep * Vector9d::Unit(i));
-      move<9>(down, -kStep * Vector9d::Unit(i));
-      H.col(i) = (filter.update(down, m).innovation - filter.update(up, m).innovation) / (2 * kStep);
-    }
+    const auto H = by_perturbation(filter, before, m);
     EXPECT_LT((H.leftCols<3>().norm() + H.rightCols<4>().norm()), 1e-9) << "neither place nor roll nor parameters";
     const Matrix9d P = (before.covariance.inverse() + H.transpose() * H / (kSd_rad * kSd_rad)).inverse();
     const Vector9d correction = P * H.transpose() * update.innovation / (kSd_rad * kSd_rad);
@@ -146,14 +153,7 @@ TEST(Heading, OfTheShaftTheUpdateIsTheClosedFormToo) {
     FilterState after = before;
     const Update update = filter.update(after, m);
     ASSERT_TRUE(update.accepted);
-    Eigen::Matrix<double, 3, 9> H = Eigen::Matrix<double, 3, 9>::Zero();
-    for (int i = 0; i < 9; ++i) {
-      constexpr double kStep = 1e-6;
-      FilterState up = before, down = before;
-      move<9>(up, kStep * Vector9d::Unit(i));
-      move<9>(down, -kStep * Vector9d::Unit(i));
-      H.col(i) = (filter.update(down, m).innovation - filter.update(up, m).innovation) / (2 * kStep);
-    }
+    const auto H = by_perturbation(filter, before, m);
     EXPECT_LT(H.leftCols<3>().norm() + H.col(6).norm(), 1e-9) << "neither place nor k";
     by_slip = std::max(by_slip, H.rightCols<2>().norm());
     const Matrix9d P = (before.covariance.inverse() + H.transpose() * H / (kSd_rad * kSd_rad)).inverse();

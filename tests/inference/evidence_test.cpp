@@ -13,17 +13,10 @@ namespace {
 using Eigen::Index;
 using Eigen::MatrixXd;
 using Eigen::VectorXd;
+using testing::all_readings;
 using testing::LinearSystem;
 using testing::log_normal;
 using testing::white;
-
-VectorXd all_readings(const LinearSystem& system) {
-  VectorXd out(system.data().rows());
-  Index row = 0;
-  for (const auto& recording : system.data().recordings)
-    for (const double value : recording.series[0].measured) out[row++] = value;
-  return out;
-}
 
 // Covariance of all readings: noise, shared parameters, nuisances, a curve.
 MatrixXd covariance_of(const LinearSystem& system, const ModelSet& set, const Noise& noise, double nuisance_sd,

@@ -108,6 +108,15 @@ class LinearSystem final : public System {
   std::vector<Curve> curves_;
 };
 
+// Recording after recording.
+inline Eigen::VectorXd all_readings(const LinearSystem& system) {
+  Eigen::VectorXd out(system.data().rows());
+  Eigen::Index row = 0;
+  for (const auto& recording : system.data().recordings)
+    for (const double value : recording.series[0].measured) out[row++] = value;
+  return out;
+}
+
 // log N(y; 0, C) without the constant of 2 pi.
 inline double log_normal(const Eigen::VectorXd& y, const Eigen::MatrixXd& covariance) {
   const Eigen::PartialPivLU<Eigen::MatrixXd> lu(covariance);

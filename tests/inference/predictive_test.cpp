@@ -7,6 +7,7 @@
 
 #include "diagnosis/inference/log_sum.hpp"
 #include "diagnosis/inference/nuisances.hpp"
+#include "diagnosis/inference/recording_rows.hpp"
 #include "tests/inference/linear_system.hpp"
 
 namespace bevel::inference {
@@ -15,20 +16,13 @@ namespace {
 using Eigen::Index;
 using Eigen::MatrixXd;
 using Eigen::VectorXd;
+using testing::all_readings;
 using testing::LinearSystem;
 using testing::log_normal;
 
 constexpr Index kRows = LinearSystem::kCount;
 constexpr std::size_t kHeldOut = 1;
 constexpr double kLog2Pi = 1.8378770664093453;
-
-VectorXd all_readings(const LinearSystem& system) {
-  VectorXd out(system.data().rows());
-  Index row = 0;
-  for (const auto& recording : system.data().recordings)
-    for (const double value : recording.series[0].measured) out[row++] = value;
-  return out;
-}
 
 // Of an autoregressive process of second order by its Yule-Walker equations; ar1 and ar2 are partial correlations.
 double autocorrelation(const Noise& noise, Index lag) {
@@ -151,6 +145,39 @@ TEST_P(Predictive, NewAndContinuedAreTheConditionalDensitiesOfALinearModel) {
   EXPECT_NEAR(found->log_density_first, log_sum(by_both) - log_sum(by_others), 1e-6);
 }
 INSTANTIATE_TEST_SUITE_P(OfFirstAndSecondOrder, Predictive, ::testing::Values(0.0, -0.3));
+
+// Readings with an error of their own beside the noise (a jump's): back from whitened rows, and what the first part
+// says of the rest, as by the dense covariance.
+TEST(Predictive, ReadingsWithErrorsOfTheirOwnAreConditionedToo) {
+  const LinearSystem system(2, 8, 0.3, 0, 0);
+  Noise noise = testing::white(system);
+  noise.ar1 = 0.6;
+  VectorXd own = VectorXd::Zero(kRows);
+  for (const Index i : {5, 18, 19, 20, 41}) own[i] = 0.3;
+  const Likelihood likelihood(system, Readings(2), noise, {own, own});
+  const double until_s = time_of_share(system.data().recordings[kHeldOut], 1.0 / 3);
+  const RecordingRows rows(likelihood, kHeldOut, until_s);
+  MatrixXd C(kRows, kRows);
+  for (Index i = 0; i < kRows; ++i)
+    for (Index j = 0; j < kRows; ++j)
+      C(i, j) =
+          noise.sigma[0] * noise.sigma[0] * autocorrelation(noise, std::abs(i - j)) + (i == j ? own[i] * own[i] : 0);
+  const VectorXd errors = VectorXd::LinSpaced(kRows, -1, 2).array().sin();
+  const MatrixXd white = likelihood.whitened(kHeldOut, errors);
+  EXPECT_NEAR(white.squaredNorm(), errors.dot(C.ldlt().solve(errors)), 1e-9);
+  EXPECT_LT((rows.coloured(white, false) - errors).norm(), 1e-12);
+  EXPECT_LT((rows.noise_variances(false) - C.diagonal()).cwiseAbs().maxCoeff(), 1e-12);
+  const auto &first = rows.first(), &rest = rows.rest();
+  const Eigen::LDLT<MatrixXd> of_first(MatrixXd(C(first, first)));
+  const MatrixXd across = C(rest, first);
+  const VectorXd left = errors(rest) - across * of_first.solve(VectorXd(errors(first)));
+  EXPECT_LT((rows.coloured(white, true)(rest, Eigen::all) - left).norm(), 1e-10);
+  const VectorXd variances = (C(rest, rest) - across * of_first.solve(across.transpose())).diagonal();
+  EXPECT_LT((rows.noise_variances(true)(rest) - variances).cwiseAbs().maxCoeff(), 1e-12);
+  const WhiteReadings alone = rows.rest_alone(MatrixXd::Zero(kRows, 1), errors);
+  EXPECT_NEAR(alone.w.squaredNorm(), errors(rest).dot(MatrixXd(C(rest, rest)).ldlt().solve(VectorXd(errors(rest)))),
+              1e-9);
+}
 
 TEST(Predictive, ModelsAreWeighedByTheFirstReadingsTooWhenContinued) {
   const auto one = [](double error, double below, double log_density) {
