@@ -94,8 +94,10 @@ std::string describe_distribution() {
     shares += "- " + std::string(name_of(share.trial_class)) + ": " + std::to_string(share.count) + " (" +
               percent(static_cast<double>(share.count) / kBlockSize) + ")\n";
   return "# What the blind trial draws from\n\n"
-         "Printed by `bevel-blindtrial --describe`: the second edition. In the first, that of the campaigns up to the "
-         "ninth (`--edition 1`), stick_slip was on no list, and winding, side_gradient and axial_creep did not exist. "
+         "Printed by `bevel-blindtrial --describe`: the third edition. In the second (`--edition 2`) the beam was on "
+         "no "
+         "list; in the first (`--edition 1`) nor was stick_slip, and winding, side_gradient and axial_creep did not "
+         "exist. "
          "Units mm, s, rad. Uniform where nothing else is said.\n\n"
          "## Classes\n\nIn every block of " +
          std::to_string(kBlockSize) + " trials, shuffled by the seed:\n\n" + shares + "\nOf the unlisted ones " +
@@ -146,11 +148,14 @@ std::string describe_distribution() {
          table(false) +
          "| beam | modulus 3 to 20 kPa (log-uniform), force 0.7 to 1.2 N, guide gap 0.5 to 10, in half of the cases 10 "
          "to 40 % of the tissue relaxes in 1 to 6 s | the shaft as a beam in elastic tissue that remembers its cut |\n"
-         "\nThe beam is no bicycle with something added, so no listed effect is the truth about it. Its truth is one "
-         "unlisted effect: what the closest bicycle (k, lambda1, lambda2 refitted to the noise-free paths, ell drawn "
-         "as above) leaves over. Where that is invisible, silence is right. The lab's belief errs around that closest "
-         "bicycle. Listed effects are not put on top of it: which of them were then still there to be named would be a "
-         "matter of opinion. Results show the beam as a class of its own.\n\n"
+         "\nThe truth about a beam in elastic tissue is tip_swing, bending_mm = (4 EI / modulus)^(1/4) and guide_mm, "
+         "as "
+         "visible as what the closest bicycle (k, lambda1, lambda2 refitted to the noise-free paths, ell drawn as "
+         "above) leaves over. Where the tissue relaxes, what the closest beam in elastic tissue (modulus, force and "
+         "gap "
+         "refitted, by the same mechanics) leaves over is on no list. The lab's belief errs around the closest "
+         "bicycle. "
+         "Other effects are not put on top of a beam. Results show it as a class of its own.\n\n"
          "## Visible size, and the right answer\n\n"
          "`visible_sigmas`: the difference of the noise-free readings with and without the effect (the others given), "
          "with k, lambda1, lambda2 refitted by Gauss-Newton to absorb what they can, whitened with the true covariance "

@@ -104,7 +104,8 @@ std::vector<double> draw_instants(Random& random, const std::vector<AxisMotion>&
 }  // namespace
 
 const std::vector<EffectKind>& catalogue(int edition) {
-  static const std::array<std::vector<EffectKind>, kEditions> all{make_catalogue(1), make_catalogue(2)};
+  static const std::array<std::vector<EffectKind>, kEditions> all{make_catalogue(1), make_catalogue(2),
+                                                                  make_catalogue(3)};
   return all.at(static_cast<std::size_t>(edition - 1));
 }
 

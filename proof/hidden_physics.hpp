@@ -98,8 +98,9 @@ struct EffectKind {
 };
 
 // Of the distribution: the first is that of the campaigns up to the ninth. With the second stick_slip is on the list,
-// and others take its place off it.
-inline constexpr int kEditions = 2;
+// and others take its place off it; with the third a beam's stiff shaft is, as tip_swing.
+inline constexpr int kEditions = 3;
+inline constexpr int kBeamIsListed = 3;  // from this edition on
 const std::vector<EffectKind>& catalogue(int edition = kEditions);
 const EffectKind& kind_of(const ConcealedEffect& effect);  // throws std::out_of_range for a name it does not hold
 

@@ -166,29 +166,33 @@ Views conceal_in_kinematics(Truth& truth, Setting& setting, Random& random, int 
   return seen;
 }
 
-// The beam: what the closest bicycle leaves over is the one concealed thing, on no list.
-Views conceal_in_beam(Truth& truth, Setting& setting, Random& random) {
+// The beam: what the closest bicycle leaves over is a shaft that is stiff, tip_swing of the list. Tissue that relaxes
+// is on no list: visible is what of it no elastic tissue leaves so.
+Views conceal_in_beam(Truth& truth, Setting& setting, Random& random, int edition) {
   truth.beam_config = draw_beam(random);
-  Views seen;
-  for (std::size_t i = 0; i < setting.motions.size(); ++i) {
-    const InsertionVariation own = setting.variation.empty() ? InsertionVariation{} : setting.variation[i];
-    model::BeamPlantConfig config = *truth.beam_config;
-    config.bevel_force_N *= 1.0 + own.curvature_share;
-    // A beam's guide stands as it stands: the whole path is turned instead of the entry, and about z for the roll.
-    const Eigen::Matrix3d turned = (Eigen::AngleAxisd(own.about_y_rad, Eigen::Vector3d::UnitY()) *
-                                    Eigen::AngleAxisd(own.about_x_rad, Eigen::Vector3d::UnitX()) *
-                                    Eigen::AngleAxisd(own.roll_rad, Eigen::Vector3d::UnitZ()))
-                                       .toRotationMatrix();
-    Eigen::Matrix3Xd path = view(travel_beam(config, setting.motions[i]), setting.frames[i].times_s, {});
-    path = turned * path;
-    path.colwise() += Eigen::Vector3d(own.entry_x_mm, own.entry_y_mm, 0);
-    seen.push_back(std::move(path));
-  }
-  const Refit refit = refit_base(setting, seen, {0.002, truth.needle.wheelbase_mm, 0.1, 0.05}, {});
+  const model::BeamPlantConfig& beam = *truth.beam_config;
+  const Views seen = views_of(setting, beam);
+  const BaseNeedle anywhere{0.002, truth.needle.wheelbase_mm, 0.1, 0.05};
+  const Refit refit = refit_base(setting, seen, anywhere, {});
   truth.needle = refit.needle;
   truth.visible_sigmas = refit.sigmas;
   truth.departure = 0;
-  truth.entries.push_back({{"unknown", "beam", {}, {}}, refit.sigmas});
+  if (edition < kBeamIsListed) {
+    truth.entries.push_back({{"unknown", "beam", {}, {}}, refit.sigmas});
+    return seen;
+  }
+  TruthEntry swing{{"tip_swing", "", swing_of(beam), {}}, refit.sigmas};
+  if (beam.relaxing_fraction > 0) {
+    const ElasticFit elastic = nearest_elastic(setting, seen, beam);
+    swing.nearest = swing_of(elastic.beam);
+    swing.visible_sigmas = refit_base(setting, views_of(setting, elastic.beam), anywhere, {}).sigmas;
+    const std::map<std::string, double> relaxing{{"fraction", beam.relaxing_fraction},
+                                                 {"time_s", beam.relaxation_time_s}};
+    truth.entries.push_back({{"unknown", "beam_relaxation", relaxing, {}}, elastic.sigmas});
+  } else {
+    swing.nearest = swing.effect.parameters;
+  }
+  truth.entries.insert(truth.entries.begin(), swing);
   return seen;
 }
 
@@ -257,7 +261,7 @@ Trial draw_trial(std::uint64_t seed, int number, const Population& population) {
     setting.variation = truth.variation;
     setting.absorbers = find_absorbers(setting, truth.needle, truth.spread);
   }
-  const Views seen = truth.beam ? conceal_in_beam(truth, setting, random)
+  const Views seen = truth.beam ? conceal_in_beam(truth, setting, random, population.edition)
                                 : conceal_in_kinematics(truth, setting, random, population.edition);
   if (truth.entries.size() == 1 && truth.entries[0].effect.name == "unknown" && truth.visible_sigmas >= kVisible_sigmas)
     truth.rivals = find_rivals(setting, seen, truth.needle, kVisible_sigmas);

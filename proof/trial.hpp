@@ -26,7 +26,7 @@ struct TruthEntry {
 struct Truth {
   int trial = 0;
   TrialClass trial_class = TrialClass::nothing;
-  bool beam = false;  // the beam plant: its one entry is "unknown", kind "beam"
+  bool beam = false;  // the beam plant: tip_swing, and "unknown" where the tissue relaxes
   bool rich = true;   // scripts that excite everything
   std::vector<TruthEntry> entries;
   double visible_sigmas = 0;    // of all together

@@ -60,6 +60,18 @@ TEST(Trial, StatesWhatItConceals) {
   EXPECT_EQ(opened.effects[0].visible_sigmas, two.truth.entries[0].visible_sigmas);
 }
 
+TEST(Trial, AStiffShaftIsOnTheListFromTheThirdEditionOn) {
+  constexpr int number = 6;  // a beam
+  const Truth second = draw_trial(4, number, {.edition = 2}).truth;
+  const Truth third = draw_trial(4, number).truth;
+  ASSERT_TRUE(second.beam && third.beam);
+  EXPECT_EQ(second.entries[0].effect.name, "unknown");
+  EXPECT_EQ(third.entries[0].effect.name, "tip_swing");
+  EXPECT_EQ(third.visible_sigmas, second.visible_sigmas);
+  EXPECT_EQ(third.entries.size(), third.beam_config->relaxing_fraction > 0 ? 2U : 1U);
+  EXPECT_TRUE(third.entries[0].nearest.contains("guide_mm"));
+}
+
 TEST(Trial, VariationIsDrawnBesideAndLeavesTheRestAsItWas) {
   const int number = first_of(TrialClass::nothing);
   const Trial plain = draw_trial(4, number), varied = draw_trial(4, number, {.varied = 1.0});

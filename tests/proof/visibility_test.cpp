@@ -6,6 +6,7 @@
 #include <cmath>
 #include <map>
 
+#include "proof/beam_path.hpp"
 #include "proof/bounded_fit.hpp"
 
 namespace bevel::proof {
@@ -141,6 +142,46 @@ TEST(Rivals, AListedEffectIsItsOwnRival) {
   EXPECT_LT(by_name["insertion_scale"], 0.5);
   EXPECT_FALSE(by_name.contains("rotation_backlash"));
   EXPECT_FALSE(by_name.contains("camera_latency"));
+}
+
+// A beam that inserts, stands turned half over, and goes on.
+Setting flipped_setting() {
+  Random random(22);
+  const CameraNoise noise;
+  Setting setting;
+  setting.motions.push_back(follow({"flip", {{4, 10, 0}, {1, 0, 3.1}, {3, 10, 0}}}));
+  setting.frames.push_back(draw_frames(noise, setting.motions.back().duration_s(), random));
+  setting.whiteners.emplace_back(noise, setting.frames.back());
+  return setting;
+}
+
+TEST(Visibility, TheClosestElasticBeamIsTheBeamItselfWhereNothingRelaxes) {
+  const Setting setting = flipped_setting();
+  model::BeamPlantConfig beam;
+  beam.foundation_modulus_kPa = 8;
+  beam.bevel_force_N = 0.9;
+  beam.guide_gap_mm = 4;
+  model::BeamPlantConfig start = beam;
+  start.foundation_modulus_kPa = 11;
+  start.bevel_force_N = 0.7;
+  const ElasticFit fit = nearest_elastic(setting, views_of(setting, beam), start);
+  EXPECT_LT(fit.sigmas, 0.2);
+  EXPECT_NEAR(fit.beam.foundation_modulus_kPa, 8, 0.2);
+  EXPECT_NEAR(fit.beam.bevel_force_N, 0.9, 0.02);
+  // Hetenyi's lambda, by hand: (4 * 1.6e4 / 0.008)^(1/4) mm.
+  EXPECT_NEAR(swing_of(beam).at("bending_mm"), 53.18, 0.01);
+}
+
+TEST(Visibility, TissueThatRelaxesIsNoElasticTissue) {
+  const Setting setting = flipped_setting();
+  model::BeamPlantConfig beam;
+  beam.foundation_modulus_kPa = 5;
+  beam.bevel_force_N = 1.2;
+  beam.relaxing_fraction = 0.4;
+  beam.relaxation_time_s = 1.5;
+  const ElasticFit fit = nearest_elastic(setting, views_of(setting, beam), beam);
+  EXPECT_EQ(fit.beam.relaxing_fraction, 0);
+  EXPECT_GT(fit.sigmas, 1);
 }
 
 }  // namespace
