@@ -12,8 +12,10 @@ struct SteeringLimits {
 };
 
 struct SteeringGains {
-  double convergence_rad_s = 1.5;      // eta: guaranteed rate of approach to sigma = 0 outside the boundary layer
-  double boundary_layer_rad = 0.25;    // Phi
+  double convergence_rad_s = 1.5;    // eta: guaranteed rate of approach to sigma = 0 outside the boundary layer
+  double boundary_layer_rad = 0.25;  // Phi
+  // Of arcs: of the bend that is still to come, what the predicted miss may be off before it turns.
+  double tube_share = 0.6;
   double tolerance_mm = 0.05;          // inside this predicted miss the law stops turning; a target may bring its own
   double parameter_uncertainty = 0.3;  // relative error of k and f that the drift bound covers
 };
@@ -38,8 +40,20 @@ struct SafetyLimits {
   double target_miss_max_mm = 5.0;  // predicted miss above which a target is refused before insertion
 };
 
+// A stiff shaft, as the estimator's prior has it (Prior::bending_mm): its tip moves toward the bevel of where it
+// points.
+struct ShaftConfig {
+  double bending_mm = 0;  // 0: it moves where it points
+  double guide_mm = 0;
+};
+
+// How it steers: by arcs, the bevel resting between turns (arc_law.hpp), or turning all the way (steering_law.hpp).
+enum class Law { arcs, spin };
+
 struct ControllerConfig {
+  Law law = Law::arcs;
   double period_s = 0.02;
+  ShaftConfig shaft;
   SteeringLimits limits;
   SteeringGains gains;
   SafetyLimits safety;

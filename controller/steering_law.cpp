@@ -4,18 +4,24 @@
 #include <cmath>
 #include <numbers>
 
+#include "model/shaft_end.hpp"
+
 namespace bevel::controller {
 
 SteeringGeometry steering_geometry(const model::Pose& tip, const model::NeedleParameters& needle,
                                    const Eigen::Vector3d& target_mm, double insertion_rate_mm_s,
-                                   double parameter_uncertainty) {
+                                   double parameter_uncertainty, const ShaftConfig& shaft) {
   SteeringGeometry g;
   const model::StepInput unit{1.0, 0.0, {needle.curvature_per_mm, 0}};
   model::Vector6d twist;
   if (!model::body_twist(tip.R, unit, model::slip_parameters(needle), twist)) return g;
   g.in_domain = true;
   const Eigen::Vector3d q = tip.R.transpose() * (target_mm - tip.p_mm);
-  const Eigen::Vector2d f = twist.head<2>();
+  Eigen::Vector2d f = twist.head<2>();
+  if (shaft.bending_mm > 0) {
+    const model::ShaftEnd end = model::shaft_end((tip.p_mm.z() + shaft.guide_mm) / shaft.bending_mm);
+    f.y() -= 0.5 * needle.curvature_per_mm * shaft.bending_mm * end.h;
+  }
   g.ahead_mm = q.z();
   g.aim_mm = q.head<2>() - f * q.z();
   const double side = needle.curvature_per_mm < 0 ? -1.0 : 1.0;

@@ -29,10 +29,12 @@ struct SteeringGeometry {
   bool in_domain = false;                            // false: the pose has left the model's domain; the rest is zero
 };
 
-// target_mm in {A}. The drift bound is for `insertion_rate_mm_s` and parameters wrong by `parameter_uncertainty`.
+// target_mm in {A}. With a stiff shaft the tip moves toward the bevel of the shaft's end by half the angle at which it
+// cuts (estimator/stiff_shaft.cpp). The drift bound is for `insertion_rate_mm_s` and parameters wrong by
+// `parameter_uncertainty`.
 SteeringGeometry steering_geometry(const model::Pose& tip, const model::NeedleParameters& needle,
                                    const Eigen::Vector3d& target_mm, double insertion_rate_mm_s,
-                                   double parameter_uncertainty);
+                                   double parameter_uncertainty, const ShaftConfig& shaft = {});
 
 struct Rates {
   double insertion_mm_s = 0;

@@ -87,6 +87,12 @@ model::NeedleParameters Supervisor::needle_now() const {
   return needle;
 }
 
+ShaftConfig Supervisor::shaft_now() const {
+  ShaftConfig shaft = config_.shaft;
+  if (needle_state_->bending_mm > 0) shaft.bending_mm = needle_state_->bending_mm;
+  return shaft;
+}
+
 void Supervisor::stop(Reason reason, double value, const char* unit) {
   rates_ = {};
   if (status_.state == State::stopped || status_.state == State::fault) return;  // the first reason stays
@@ -112,6 +118,7 @@ void Supervisor::request(Request request, const std::optional<Target>& target, s
       if (!check_inputs(now_utime)) return;
       if (!check_axes()) return;
       reset_count_ = needle_state_->reset_count;
+      arcs_.restart();
       status_.state = State::steering;
       return;
     case Request::arm:
@@ -278,38 +285,62 @@ model::MotionCommand Supervisor::step(std::int64_t now_utime, double elapsed_s) 
     stop(Reason::state_reset, needle_state_->reset_count, "resets");
     return command;
   }
-  status_.geometry = steering_geometry(needle_state_->pose, needle_now(), target_->position_mm,
-                                       config_.limits.insertion_rate_mm_s, config_.gains.parameter_uncertainty);
-  if (!status_.geometry.in_domain) {
+  if (!see_geometry()) {
     stop(Reason::outside_model, model::tilt_rad(needle_state_->pose), "rad tilt");
     return command;
   }
+  const bool arcs = config_.law == Law::arcs;
+  const double ahead_mm = arcs ? status_.arc.ahead_mm : status_.geometry.ahead_mm;
   Rates wanted;
-  if (status_.geometry.ahead_mm <= 0) {  // closest approach: what still turns comes to rest by the ramp
+  if (ahead_mm <= 0) {  // closest approach: what still turns comes to rest by the ramp
     status_.state = State::hold;
   } else {
     wanted = steer();
   }
   rates_ = ramp(rates_, wanted, dt_s, config_.limits);
   remember(rates_);
-  status_.predicted_miss_mm = status_.geometry.aim_mm.norm();
+  status_.predicted_miss_mm =
+      arcs ? std::max(0.0, status_.arc.aim_mm.norm() - status_.arc.reach_mm) : status_.geometry.aim_mm.norm();
   command.mode = 1;
   command.insertion_rate_mm_s = rates_.insertion_mm_s;
   command.rotation_rate_rad_s = rates_.rotation_rad_s;
   return command;
 }
 
+bool Supervisor::see_geometry() {
+  const model::Pose& tip = needle_state_->pose;
+  if (config_.law == Law::arcs) {
+    status_.arc = arc_geometry(tip, needle_now(), shaft_now(), target_->position_mm);
+    return status_.arc.in_domain;
+  }
+  status_.geometry = steering_geometry(tip, needle_now(), target_->position_mm, config_.limits.insertion_rate_mm_s,
+                                       config_.gains.parameter_uncertainty, shaft_now());
+  return status_.geometry.in_domain;
+}
+
 // What the law wants at this instant, without ramps.
-Rates Supervisor::steer() const {
+Rates Supervisor::steer() {
   const double tolerance_mm = target_->tolerance_mm > 0 ? target_->tolerance_mm : config_.gains.tolerance_mm;
-  Rates wanted = steering_rates(status_.geometry, actuator_->rotation_rad, tolerance_mm, config_);
+  const double rotation_rad = actuator_->rotation_rad;
+  Rates wanted;
+  double ahead_mm = 0, off_rad = 0;
+  if (config_.law == Law::arcs) {
+    const ArcLaw::Wanted arc = arcs_.step(status_.arc, rotation_rad, tolerance_mm, config_);
+    wanted = {arc.insertion_mm_s, arc.rotation_rad_s};
+    ahead_mm = status_.arc.ahead_mm;
+    off_rad = status_.arc.facing_rad;
+  } else {
+    wanted = steering_rates(status_.geometry, rotation_rad, tolerance_mm, config_);
+    ahead_mm = status_.geometry.ahead_mm;
+    off_rad = status_.geometry.sigma_rad;
+  }
   if (axes_.turns_late()) {
-    const double share = std::min(1.0, std::abs(status_.geometry.sigma_rad) / config_.gains.boundary_layer_rad);
+    const double share = std::min(1.0, std::abs(off_rad) / config_.gains.boundary_layer_rad);
     wanted.rotation_rad_s =
         base_rate_rad_s(wanted.rotation_rad_s, axes_.take_up_rad(wanted.rotation_rad_s), share, config_.limits);
   }
   // Come to rest at the closest approach: never faster than the ramp can stop within what is left.
-  const double braking = std::sqrt(2 * 0.5 * config_.limits.insertion_acceleration_mm_s2 * status_.geometry.ahead_mm);
+  const double braking = std::sqrt(2 * 0.5 * config_.limits.insertion_acceleration_mm_s2 * ahead_mm);
   wanted.insertion_mm_s = std::min(wanted.insertion_mm_s, braking);
   return wanted;
 }

@@ -7,6 +7,7 @@
 #include <optional>
 #include <string>
 
+#include "controller/arc_law.hpp"
 #include "controller/axis_model.hpp"
 #include "controller/reach.hpp"
 #include "model/samples.hpp"
@@ -49,6 +50,7 @@ struct NeedleView {
   double curvature_per_mm = 0;
   double lambda1_per_rad = 0;
   double lambda2 = 0;
+  double bending_mm = 0;              // of a stiff shaft; 0: as configured
   double position_variance_mm2 = 0;  // largest along any axis
   std::int32_t health = 0;
   std::int32_t reset_count = 0;
@@ -65,7 +67,8 @@ struct Status {
   double value = 0;  // the value behind the reason (an age, a miss, a rate...), in `unit`
   const char* unit = "";
   double predicted_miss_mm = 0;  // of the best constant inputs, updated while steering
-  SteeringGeometry geometry;
+  SteeringGeometry geometry;     // of Law::spin
+  ArcGeometry arc;               // of Law::arcs
 };
 
 class Supervisor {
@@ -109,9 +112,11 @@ class Supervisor {
   bool check_axes();
   bool check_tracking(double elapsed_s);
   bool check_rest();
-  Rates steer() const;
+  Rates steer();
+  bool see_geometry();
   void remember(const Rates& commanded);
   model::NeedleParameters needle_now() const;
+  ShaftConfig shaft_now() const;
   bool in_motion_states() const {
     return status_.state == State::armed || status_.state == State::steering || status_.state == State::hold;
   }
@@ -123,6 +128,7 @@ class Supervisor {
   std::optional<model::ActuatorState> actuator_;
   std::optional<Target> target_;
   Status status_;
+  ArcLaw arcs_;
   Rates rates_;
   std::int64_t seq_ = 0;
   std::int32_t reset_count_ = 0;

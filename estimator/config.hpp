@@ -13,7 +13,13 @@ struct Prior {
   double curvature_sd_per_mm = 0.001;
   double lambda1_sd_per_rad = 0.15;
   double lambda2_sd = 0.08;
-  double wheelbase_sd_mm = 0;   // 0: ell is held at its mean, nine states; above: ell is the tenth
+  double wheelbase_sd_mm = 0;  // 0: ell is held at its mean, nine states; above: ell is the tenth
+  // A stiff shaft (stiff_shaft.cpp): the length over which it bends in the tissue, (4 EI / modulus)^(1/4), and from the
+  // guide to the entry point. Above 0 the bending length is the tenth state; ell is then held, there are no effects,
+  // and nothing is relinearised. Headings are not taken.
+  double bending_mm = 0;
+  double bending_sd_mm = 0;
+  double guide_mm = 0;
   double position_sd_mm = 0.3;  // tip at the entry point
   double tilt_sd_rad = 0.02;    // heading about body x and y
   double roll_sd_rad = 0.05;    // bevel about the heading

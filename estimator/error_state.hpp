@@ -14,8 +14,7 @@ inline const Matrix9d& get_covariance(const FilterState& state, std::integral_co
 }
 inline Covariance<10> get_covariance(const FilterState& state, std::integral_constant<int, 10>) {
   Covariance<10> P;
-  P << state.covariance, state.wheelbase_covariance, state.wheelbase_covariance.transpose(),
-      state.wheelbase_variance_mm2;
+  P << state.covariance, state.tenth_covariance, state.tenth_covariance.transpose(), state.tenth_variance;
   return P;
 }
 // The state's own matrix where that is all of it, a copy otherwise.
@@ -28,8 +27,8 @@ template <int kSize>
 void set_covariance(FilterState& state, const Covariance<kSize>& P) {
   state.covariance = P.template topLeftCorner<9, 9>();
   if constexpr (kSize == 10) {
-    state.wheelbase_covariance = P.template topRightCorner<9, 1>();
-    state.wheelbase_variance_mm2 = P(9, 9);
+    state.tenth_covariance = P.template topRightCorner<9, 1>();
+    state.tenth_variance = P(9, 9);
   }
 }
 
@@ -40,7 +39,7 @@ void move(FilterState& state, const Error<kSize>& error) {
   state.curvature_per_mm += error[6];
   state.lambda1_per_rad += error[7];
   state.lambda2 += error[8];
-  if constexpr (kSize == 10) state.wheelbase_mm += error[9];
+  if constexpr (kSize == 10) (state.bending_mm > 0 ? state.bending_mm : state.wheelbase_mm) += error[9];
 }
 
 // The error by which `from` is moved to `to`.
@@ -49,7 +48,8 @@ Error<kSize> difference(const FilterState& from, const FilterState& to) {
   Error<kSize> error;
   error.template head<9>() << model::log_se3(from.pose.inverse() * to.pose),
       to.curvature_per_mm - from.curvature_per_mm, to.lambda1_per_rad - from.lambda1_per_rad, to.lambda2 - from.lambda2;
-  if constexpr (kSize == 10) error[9] = to.wheelbase_mm - from.wheelbase_mm;
+  if constexpr (kSize == 10)  // one of the two is the same in both
+    error[9] = to.wheelbase_mm - from.wheelbase_mm + to.bending_mm - from.bending_mm;
   return error;
 }
 

@@ -108,6 +108,7 @@ Eigen::Vector3d NeedleFilter::motion_of(const FilterState& state) const {
 }
 
 Update NeedleFilter::update(FilterState& state, const model::TipHeading& measurement) const {
+  if (stiff_) return {};  // the inclination of the shaft's end is not in the derivatives below
   return wheelbase_estimated_ ? update_heading<10>(state, measurement) : update_heading<9>(state, measurement);
 }
 

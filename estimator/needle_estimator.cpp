@@ -11,7 +11,9 @@ namespace bevel::estimator {
 
 NeedleEstimator::NeedleEstimator(const EstimatorConfig& config, std::size_t history)
     : filter_(config),
-      past_(config.effects.empty() ? static_cast<std::size_t>(std::max(config.relinearised_steps, 0)) : 0),
+      past_(config.effects.empty() && config.prior.bending_mm == 0
+                ? static_cast<std::size_t>(std::max(config.relinearised_steps, 0))
+                : 0),
       walked_(std::make_unique_for_overwrite<WalkedStep[]>(past_.room())) {
   pool_.resize(std::max<std::size_t>(history, 8));
   order_.reserve(pool_.size());
@@ -240,6 +242,7 @@ Estimate NeedleEstimator::estimate(std::int64_t now_utime) const {
   const HealthLimits& limits = filter_.config().limits;
   result.utime = newest.utime;
   result.state = state;
+  result.tip = filter_.tip_pose(state);
   result.newest_update = newest_update_;
   result.health = kHealthy;
   const auto older_than = [now_utime](std::int64_t utime, double limit_s) {

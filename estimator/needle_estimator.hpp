@@ -32,6 +32,7 @@ struct Counters {
 struct Estimate {
   std::int64_t utime = 0;  // 0: nothing yet
   FilterState state;
+  model::Pose tip;  // NeedleFilter::tip_pose of it
   Update newest_update;
   std::int32_t health = 0;  // see health.hpp
 };

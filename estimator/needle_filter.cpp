@@ -17,6 +17,7 @@ namespace {
 
 constexpr double kLambda2Max = 0.9;                             // (24) with room: 1 - lambda2 stays away from zero
 constexpr double kWheelbaseMin_mm = 2, kWheelbaseMax_mm = 990;  // of the model's (1, 1000), with room
+constexpr double kBendingMin_mm = 5, kBendingMax_mm = 200;
 constexpr double kVarianceFloor = 1e-14;
 constexpr double kAtEntry_mm = 1.0;  // not inserted yet: within what an entry point is met by
 constexpr std::int32_t kCamerasCounted = 4;
@@ -56,6 +57,8 @@ NeedleFilter::NeedleFilter(const EstimatorConfig& config)
     : config_(config),
       slip_(model::slip_parameters(config.prior.needle)),
       wheelbase_estimated_(config.prior.wheelbase_sd_mm > 0),
+      stiff_(config.prior.bending_mm > 0),
+      ten_states_(wheelbase_estimated_ || stiff_),
       needle_(config.prior.needle, config.effects, wheelbase_estimated_ ? 10 : 9,
               {.curvature = 6, .lambda1 = 7, .lambda2 = 8, .wheelbase = wheelbase_estimated_ ? 9 : -1}) {
   for (int rank = 1; rank <= 3; ++rank)
@@ -70,7 +73,8 @@ FilterState NeedleFilter::initial(double insertion_mm, double rotation_rad) cons
   state.lambda1_per_rad = prior.needle.lambda1_per_rad;
   state.lambda2 = prior.needle.lambda2;
   state.wheelbase_mm = prior.needle.wheelbase_mm;
-  state.wheelbase_variance_mm2 = square(prior.wheelbase_sd_mm);
+  state.bending_mm = prior.bending_mm;
+  state.tenth_variance = square(stiff_ ? prior.bending_sd_mm : prior.wheelbase_sd_mm);
   const double aside_mm2 = square(prior.position_sd_mm) + square(prior.variation.entry_point_mm);
   const double tilt_rad2 = square(prior.tilt_sd_rad) + square(prior.variation.entry_angle_rad);
   state.covariance.diagonal() << aside_mm2, aside_mm2, square(prior.position_sd_mm), tilt_rad2, tilt_rad2,
@@ -126,6 +130,7 @@ void NeedleFilter::predict(FilterState& state, double insertion_mm, double rotat
     return;
   }
   if (insertion_mm == 0 && rotation_rad == 0) return;
+  if (stiff_) return predict_stiff(state, insertion_mm, rotation_rad);
   wheelbase_estimated_ ? predict_plain<10>(state, insertion_mm, rotation_rad)
                        : predict_plain<9>(state, insertion_mm, rotation_rad);
 }
@@ -133,6 +138,10 @@ void NeedleFilter::predict(FilterState& state, double insertion_mm, double rotat
 void NeedleFilter::predict_mean(FilterState& state, double insertion_mm, double rotation_rad, double duration_s) const {
   if (!config_.effects.empty()) return predict(state, insertion_mm, rotation_rad, duration_s);
   if (insertion_mm == 0 && rotation_rad == 0) return;
+  if (stiff_) {
+    state.outside_model = !move_stiff(state, insertion_mm, rotation_rad);
+    return;
+  }
   const model::StepInput input{insertion_mm, rotation_rad, {state.curvature_per_mm, 0}};
   state.outside_model = !model::advance(state.pose, input, slip_of(state));
 }
@@ -178,7 +187,7 @@ template Error<9> NeedleFilter::process_variance<9>(const Covariance<9>&, double
 template Error<10> NeedleFilter::process_variance<10>(const Covariance<10>&, double, double) const;
 
 Update NeedleFilter::update(FilterState& state, const model::TipMeasurement& measurement) const {
-  return wheelbase_estimated_ ? update_sized<10>(state, measurement) : update_sized<9>(state, measurement);
+  return ten_states_ ? update_sized<10>(state, measurement) : update_sized<9>(state, measurement);
 }
 
 template <int kSize>
@@ -222,7 +231,11 @@ void NeedleFilter::keep_in_domain(FilterState& state) const {
     if (!(variance > 0)) return;
     move<kSize>(state, -Pa * (excess / variance));
   };
-  if constexpr (kSize == 10) {
+  if (kSize == 10 && stiff_) {
+    const double inside_mm = std::clamp(state.bending_mm, kBendingMin_mm, kBendingMax_mm);
+    if (state.bending_mm != inside_mm) move_by(Error<kSize>::Unit(kSize - 1), state.bending_mm - inside_mm);
+    state.bending_mm = std::clamp(state.bending_mm, kBendingMin_mm, kBendingMax_mm);
+  } else if constexpr (kSize == 10) {
     const double inside_mm = std::clamp(state.wheelbase_mm, kWheelbaseMin_mm, kWheelbaseMax_mm);
     if (state.wheelbase_mm != inside_mm) move_by(Error<kSize>::Unit(9), state.wheelbase_mm - inside_mm);
   }
@@ -240,7 +253,7 @@ void NeedleFilter::keep_in_domain(FilterState& state) const {
   // Whatever the covariance allowed, the state ends inside.
   state.lambda2 = std::min(state.lambda2, kLambda2Max);
   state.lambda1_per_rad = std::max(state.lambda1_per_rad, square(state.lambda2) / (2 * std::numbers::pi) + 1e-9);
-  if constexpr (kSize == 10) state.wheelbase_mm = std::clamp(state.wheelbase_mm, kWheelbaseMin_mm, kWheelbaseMax_mm);
+  if (kSize == 10 && !stiff_) state.wheelbase_mm = std::clamp(state.wheelbase_mm, kWheelbaseMin_mm, kWheelbaseMax_mm);
   for (int i = 0; i < 9; ++i)
     if (state.covariance(i, i) != 0) state.covariance(i, i) = std::max(state.covariance(i, i), kVarianceFloor);
 }
@@ -252,8 +265,8 @@ void NeedleFilter::declare_reset(FilterState& state, double reach_mm) const {
   const FilterState prior = initial();
   const Gate& gate = config_.gate;
   state.covariance = prior.covariance;
-  state.wheelbase_covariance.setZero();
-  state.wheelbase_variance_mm2 = prior.wheelbase_variance_mm2;
+  state.tenth_covariance.setZero();
+  state.tenth_variance = prior.tenth_variance;
   state.covariance.diagonal().head<6>() << Eigen::Vector3d::Constant(
       square(std::max(gate.reset_position_sd_mm, reach_mm))),
       square(gate.reset_tilt_sd_rad), square(gate.reset_tilt_sd_rad),

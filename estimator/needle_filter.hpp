@@ -2,7 +2,8 @@
 // Extended Kalman filter of the needle: pose on SE(3), curvature and lambda, driven by actuator increments.
 //
 // State: pose of {B} in {A} (error in the body frame, mm | rad), k, lambda1, lambda2. Nine error states, in this order;
-// ell is a tenth where the prior gives it a width (Prior::wheelbase_sd_mm).
+// a tenth is ell where the prior gives it a width (Prior::wheelbase_sd_mm), or the bending length of a stiff shaft
+// (Prior::bending_mm).
 // Model: model/kinematics.hpp, (10) with the slip of (25); measurements: tip position in {A}, heading in {A}, each with
 // information of any rank. Pure: no clock, no allocation, fixed-size Eigen. Covariance by the Joseph form, symmetric
 // and floored.
@@ -36,10 +37,11 @@ struct FilterState {
   double lambda1_per_rad = 0;
   double lambda2 = 0;
   double wheelbase_mm = 0;
+  double bending_mm = 0;  // above 0: the shaft is stiff
   Matrix9d covariance = Matrix9d::Zero();
-  // Of ell with the nine, and its own; zero where ell is held.
-  Vector9d wheelbase_covariance = Vector9d::Zero();
-  double wheelbase_variance_mm2 = 0;
+  // Of ell, or the bending length, with the nine, and its own; zero where there are nine.
+  Vector9d tenth_covariance = Vector9d::Zero();
+  double tenth_variance = 0;
   std::int64_t measurement_utime = 0;  // newest position accepted; 0 before the first
   std::int32_t rejects_in_row = 0;
   std::array<std::uint8_t, 4> camera_rejects_in_row{};  // cameras 0 to 3; higher numbers share the last
@@ -125,6 +127,9 @@ class NeedleFilter {
   // The same without the covariance, for what is only foretold.
   void predict_mean(FilterState& state, double insertion_mm, double rotation_rad, double duration_s = 0) const;
 
+  // The tip in {A} and the shaft's end there: the state's own pose, but for what effects or a stiff shaft make of it.
+  model::Pose tip_pose(const FilterState& state) const;
+
   // Where the cameras see the tip of a state, and by how much they are late.
   Eigen::Vector3d seen_position_mm(const FilterState& state) const;
   SeenHeading seen_heading(const FilterState& state) const;
@@ -166,6 +171,8 @@ class NeedleFilter {
   // kSize: 9, or 10 with ell.
   template <int kSize>
   void predict_plain(FilterState& state, double insertion_mm, double rotation_rad) const;
+  bool move_stiff(FilterState& state, double insertion_mm, double rotation_rad) const;
+  void predict_stiff(FilterState& state, double insertion_mm, double rotation_rad) const;
   template <int kSize>
   bool predict_with_effects(FilterState& state, const model::BaseMotion& increment) const;
   template <int kSize>
@@ -197,6 +204,8 @@ class NeedleFilter {
   std::array<double, 3> gate_{};  // chi-square quantile by rank
   model::SlipParameters slip_;    // the variants; lambda and ell come from the state
   bool wheelbase_estimated_ = false;
+  bool stiff_ = false;
+  bool ten_states_ = false;
   // Its parameters are set to those of the state in each step: one filter serves one thread.
   mutable model::AugmentedNeedle needle_;
 };

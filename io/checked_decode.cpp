@@ -143,6 +143,12 @@ const char* find_inconsistency(const needle_state_t& m) {
   return could_be_covariance(m.covariance, 9) ? nullptr : "covariance";
 }
 template <>
+const char* find_inconsistency(const needle_shaft_t& m) {
+  if (!(m.bending_mm > 0.0)) return "bending_mm";
+  if (!(m.bending_sd_mm >= 0.0)) return "bending_sd_mm";
+  return m.guide_mm >= 0.0 ? nullptr : "guide_mm";
+}
+template <>
 const char* find_inconsistency(const steering_target_t& m) {
   return m.tolerance_mm >= 0.0 ? nullptr : "tolerance_mm";
 }
@@ -217,6 +223,7 @@ template Decoded<tip_heading_t> checked_decode(const void*, std::size_t) noexcep
 template Decoded<actuator_state_t> checked_decode(const void*, std::size_t) noexcept;
 template Decoded<motion_command_t> checked_decode(const void*, std::size_t) noexcept;
 template Decoded<needle_state_t> checked_decode(const void*, std::size_t) noexcept;
+template Decoded<needle_shaft_t> checked_decode(const void*, std::size_t) noexcept;
 template Decoded<steering_target_t> checked_decode(const void*, std::size_t) noexcept;
 template Decoded<process_status_t> checked_decode(const void*, std::size_t) noexcept;
 template std::optional<DecodeError> check_fields(const tip_measurement_t&) noexcept;
@@ -224,6 +231,7 @@ template std::optional<DecodeError> check_fields(const tip_heading_t&) noexcept;
 template std::optional<DecodeError> check_fields(const actuator_state_t&) noexcept;
 template std::optional<DecodeError> check_fields(const motion_command_t&) noexcept;
 template std::optional<DecodeError> check_fields(const needle_state_t&) noexcept;
+template std::optional<DecodeError> check_fields(const needle_shaft_t&) noexcept;
 template std::optional<DecodeError> check_fields(const steering_target_t&) noexcept;
 template std::optional<DecodeError> check_fields(const process_status_t&) noexcept;
 

@@ -12,6 +12,13 @@ void read_estimator_config(Section section, estimator::EstimatorConfig& config) 
   prior.read("lambda1_sd_per_rad", config.prior.lambda1_sd_per_rad, optional, in_range(0, 5));
   prior.read("lambda2_sd", config.prior.lambda2_sd, optional, in_range(0, 1));
   prior.read("wheelbase_sd_mm", config.prior.wheelbase_sd_mm, optional, in_range(0, 200));
+  prior.read("bending_mm", config.prior.bending_mm, optional, in_range(0, 200));
+  prior.read("bending_sd_mm", config.prior.bending_sd_mm, optional, in_range(0, 100));
+  prior.read("guide_mm", config.prior.guide_mm, optional, in_range(0, 500));
+  if (config.prior.bending_mm > 0 && config.prior.bending_mm < 5)
+    prior.fail("bending_mm", "is " + std::to_string(config.prior.bending_mm) + "; allowed: 0, or 5 to 200");
+  if (config.prior.bending_mm > 0 && config.prior.wheelbase_sd_mm > 0)
+    prior.fail("bending_mm", "is estimated as the tenth state, and so is ell by wheelbase_sd_mm; one or the other");
   prior.read("position_sd_mm", config.prior.position_sd_mm, optional, in_range(1e-4, 100));
   prior.read("tilt_sd_rad", config.prior.tilt_sd_rad, optional, in_range(1e-5, 1));
   prior.read("roll_sd_rad", config.prior.roll_sd_rad, optional, in_range(1e-5, 3.2));

@@ -12,6 +12,7 @@
 
 #include <bevel/actuator_state_t.hpp>
 #include <bevel/motion_command_t.hpp>
+#include <bevel/needle_shaft_t.hpp>
 #include <bevel/needle_state_t.hpp>
 #include <bevel/process_status_t.hpp>
 #include <bevel/steering_target_t.hpp>
@@ -91,6 +92,15 @@ void visit_fields(Message& m, Visitor&& v) {
   v.code("rank", m.rank, 0, 3);
   v.code("health", m.health, 0, kAnyCode);
   v.code("reset_count", m.reset_count, 0, kAnyCode);
+}
+
+template <MessageOf<needle_shaft_t> Message, class Visitor>
+void visit_fields(Message& m, Visitor&& v) {
+  v.time("utime", m.utime);
+  v.count("seq", m.seq);
+  v.number("bending_mm", &m.bending_mm, 1, kLargestLength_mm);
+  v.number("bending_sd_mm", &m.bending_sd_mm, 1, kLargestLength_mm);
+  v.number("guide_mm", &m.guide_mm, 1, kLargestLength_mm);
 }
 
 template <MessageOf<steering_target_t> Message, class Visitor>

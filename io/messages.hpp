@@ -18,6 +18,7 @@ inline constexpr const char* kTipHeading = "TIP_HEADING";
 inline constexpr const char* kActuatorState = "ACTUATOR_STATE";
 inline constexpr const char* kMotionCommand = "MOTION_COMMAND";
 inline constexpr const char* kNeedleState = "NEEDLE_STATE";
+inline constexpr const char* kNeedleShaft = "NEEDLE_SHAFT";
 inline constexpr const char* kNeedleTruth = "NEEDLE_TRUTH";
 inline constexpr const char* kSteeringTarget = "STEERING_TARGET";
 inline constexpr const char* kProcessStatus = "PROCESS_STATUS";

@@ -65,12 +65,18 @@ ControllerNode::ControllerNode(lcm::LCM& lcm, const SystemConfig& config)
       io::channel::kNeedleState, input_limits(config_.safety.state_age_s),
       [this](const needle_state_t& m) {
         check_alive(m);
-        supervisor_.set_needle(to_view(m));
+        controller::NeedleView view = to_view(m);
+        view.bending_mm = bending_mm_;
+        supervisor_.set_needle(view);
         if (!supervisor_.watch(port_.now().utime)) command(0);
       },
       [bounds](const needle_state_t& before, const needle_state_t& next) {
         return io::check_motion(before, next, bounds);
       });
+  // Not watched: without it the law steers by the configured shaft, and what it steers by is watched above.
+  port_.subscribe<needle_shaft_t>(io::channel::kNeedleShaft, [this](const needle_shaft_t& m) {
+    if (config_.shaft.bending_mm > 0) bending_mm_ = m.bending_mm;
+  });
   port_.subscribe<actuator_state_t>(
       io::channel::kActuatorState, input_limits(config_.safety.actuator_age_s),
       [this](const actuator_state_t& m) {

@@ -37,6 +37,7 @@ class ControllerNode {
   controller::ControllerConfig config_;
   LcmPort port_;
   controller::Supervisor supervisor_;
+  double bending_mm_ = 0;  // newest heard of a stiff shaft; 0: as configured
   StatusReporter status_;
   OperatorWords words_;
   std::array<double, 3> same_position_mm_{};

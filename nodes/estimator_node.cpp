@@ -38,7 +38,7 @@ needle_state_t to_message(const estimator::Estimate& estimate, std::int64_t seq)
   m.utime = estimate.utime;
   m.seq = seq;
   m.measurement_utime = s.measurement_utime;
-  write_pose(s.pose, m);
+  write_pose(estimate.tip, m);
   m.curvature_per_mm = s.curvature_per_mm;
   m.lambda1_per_rad = s.lambda1_per_rad;
   m.lambda2 = s.lambda2;
@@ -50,6 +50,20 @@ needle_state_t to_message(const estimator::Estimate& estimate, std::int64_t seq)
   m.reset_count = s.reset_count;
   return m;
 }
+
+namespace {
+
+needle_shaft_t shaft_message(const estimator::Estimate& estimate, double guide_mm, std::int64_t seq) {
+  needle_shaft_t m{};
+  m.utime = estimate.utime;
+  m.seq = seq;
+  m.bending_mm = estimate.state.bending_mm;
+  m.bending_sd_mm = std::sqrt(estimate.state.tenth_variance);
+  m.guide_mm = guide_mm;
+  return m;
+}
+
+}  // namespace
 
 EstimatorNode::EstimatorNode(lcm::LCM& lcm, const estimator::EstimatorConfig& config, const io::MotionBounds& bounds)
     : bounds_(bounds),
@@ -141,6 +155,9 @@ void EstimatorNode::publish() {
   if (estimate.utime <= published_utime_) return;
   published_utime_ = estimate.utime;
   estimate.health = health();
+  // First: who acts on the state knows the shaft by then.
+  if (const double guide_mm = estimator_.filter().config().prior.guide_mm; estimate.state.bending_mm > 0)
+    port_.publish(io::channel::kNeedleShaft, shaft_message(estimate, guide_mm, seq_));
   port_.publish(io::channel::kNeedleState, to_message(estimate, seq_++));
 }
 

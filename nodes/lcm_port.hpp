@@ -9,6 +9,7 @@
 #include <bevel/needle_state_t.hpp>
 #include <bevel/process_status_t.hpp>
 #include <bevel/steering_target_t.hpp>
+#include <bevel/needle_shaft_t.hpp>
 #include <bevel/tip_heading_t.hpp>
 #include <bevel/tip_measurement_t.hpp>
 #include <cstdint>

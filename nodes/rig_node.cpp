@@ -32,9 +32,11 @@ RigNode::RigNode(lcm::LCM& lcm, can::Bus& insertion_bus, can::Bus& rotation_bus,
   drives_[0] = std::make_unique<rig::SimulatedDrive>(buses_[0], drive_config(config.stepper.axes[0]));
   drives_[1] = std::make_unique<rig::SimulatedDrive>(buses_[1], drive_config(config.stepper.axes[1]));
   own_values_ = model::draw(config.rig.variation, static_cast<std::uint64_t>(config.rig.seed));
-  plant_ = std::make_unique<rig::KinematicPlant>(config.rig.truth,
-                                                 io::active_effects(config.rig.effects, config.rig.discrepancies, ""),
-                                                 config.rig.roll_error_rad, own_values_);
+  const auto effects = io::active_effects(config.rig.effects, config.rig.discrepancies, "");
+  if (config.rig.beam)
+    plant_ = std::make_unique<rig::BeamNeedle>(*config.rig.beam, effects, config.rig.roll_error_rad, own_values_);
+  else
+    plant_ = std::make_unique<rig::KinematicPlant>(config.rig.truth, effects, config.rig.roll_error_rad, own_values_);
   for (const CameraViewConfig& c : config.cameras) {
     rig::SceneConfig scene;
     scene.size_px = {c.width_px, c.height_px};

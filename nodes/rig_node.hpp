@@ -56,7 +56,7 @@ class RigNode {
   std::array<std::unique_ptr<rig::SimulatedDrive>, 2> drives_;
   std::optional<std::size_t> blocked_axis_;
   std::int64_t blocked_from_ns_ = 0;
-  std::unique_ptr<rig::KinematicPlant> plant_;
+  std::unique_ptr<rig::Plant> plant_;
   model::OwnValues own_values_;
   rig::FrameServer* frames_;
   std::vector<Eye> eyes_;

@@ -23,6 +23,8 @@ constexpr io::Range kShareOfStop = in_range(0.01, 0.12).because("the needle must
 void read_controller(Section s, controller::ControllerConfig& c) {
   s.read("period_s", c.period_s, optional,
          in_range(0.002, 0.03).because("set-points must be renewed before the driver takes them for old"));
+  s.read("law", c.law, optional,
+         io::Choices<controller::Law>{{"arcs", controller::Law::arcs}, {"spin", controller::Law::spin}});
   Section l = s.section("limits", optional);
   l.read("insertion_rate_mm_s", c.limits.insertion_rate_mm_s, optional, in_range(0.01, 100));
   l.read("insertion_rate_min_share", c.limits.insertion_rate_min_share, optional, in_range(0.01, 1));
@@ -33,6 +35,7 @@ void read_controller(Section s, controller::ControllerConfig& c) {
   Section g = s.section("gains", optional);
   g.read("convergence_rad_s", c.gains.convergence_rad_s, optional, in_range(0.01, 100));
   g.read("boundary_layer_rad", c.gains.boundary_layer_rad, optional, in_range(0.01, 3));
+  g.read("tube_share", c.gains.tube_share, optional, in_range(0, 10));
   g.read("tolerance_mm", c.gains.tolerance_mm, optional, in_range(0, 10));
   g.read("parameter_uncertainty", c.gains.parameter_uncertainty, optional, in_range(0, 2));
   Section f = s.section("safety", optional);
@@ -168,12 +171,26 @@ io::ModelFile read_model(Section& s, const std::filesystem::path& folder, io::Pr
   return model;
 }
 
+// The mechanical plant in place of [rig.needle].
+model::BeamPlantConfig read_beam(Section s) {
+  model::BeamPlantConfig beam;
+  s.read("foundation_modulus_kPa", beam.foundation_modulus_kPa, optional, in_range(0.1, 1000));
+  s.read("bevel_force_N", beam.bevel_force_N, optional, in_range(0, 10));
+  s.read("bending_stiffness_N_mm2", beam.bending_stiffness_N_mm2, optional, in_range(1, 1e7));
+  s.read("guide_gap_mm", beam.guide_gap_mm, optional, in_range(0, 100));
+  s.read("relaxing_fraction", beam.relaxing_fraction, optional, in_range(0, 0.99));
+  s.read("relaxation_time_s", beam.relaxation_time_s, optional, in_range(0.01, 1000));
+  s.read("windup_at_100mm_rad", beam.windup_at_100mm_rad, optional, in_range(0, 10));
+  return beam;
+}
+
 void read_rig(Section s, const std::filesystem::path& folder, RigConfig& c) {
   io::ModelFile model = read_model(s, folder, optional, c.truth);
   c.truth = model.needle;
   c.effects = std::move(model.effects);
   c.discrepancies = std::move(model.discrepancies);
   c.variation = model.variation.value_or(model::Variation{});
+  if (Section beam = s.section("beam", optional); beam.present()) c.beam = read_beam(beam);
   s.read("roll_error_rad", c.roll_error_rad, optional, in_range(-3.2, 3.2));
   s.read("frames_socket", c.frames_socket, optional);
   s.read("frame_rate_hz", c.frame_rate_hz, optional, in_range(1, 120));
@@ -202,6 +219,7 @@ SystemConfig load_system_config(const std::string& path) {
   c.needle = c.estimator.prior.needle = believed.needle;
   c.estimator.prior.variation = believed.variation.value_or(model::Variation{});
   io::read_estimator_config(file.section("estimator", optional), c.estimator);
+  c.controller.shaft = {c.estimator.prior.bending_mm, c.estimator.prior.guide_mm};
   read_controller(file.section("controller", optional), c.controller);
   read_stepper(file.section("stepper", optional), c.stepper);
   read_source(file.section("source", optional), c.source);
@@ -220,6 +238,9 @@ SystemConfig load_system_config(const std::string& path) {
   c.effects = std::move(believed.effects);
   c.discrepancies = std::move(believed.discrepancies);
   c.estimator.effects = c.live_effects.active;
+  if (c.estimator.prior.bending_mm > 0 && !c.estimator.effects.empty())
+    throw io::ConfigError({path + ": [estimator.prior] bending_mm: a stiff shaft is estimated without [[effect]]s; " +
+                           std::string(c.estimator.effects.front().effect->name()) + " is one"});
   return c;
 }
 

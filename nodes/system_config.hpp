@@ -2,6 +2,7 @@
 // One file for a whole rig: every process reads all of it, so that a wrong key is found by whichever starts first, and
 // uses its own part. Keys, ranges and defaults stand in system_config.cpp and in the structures named here.
 #include <array>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -12,6 +13,7 @@
 #include "drivers/stepper/stepper_config.hpp"
 #include "estimator/config.hpp"
 #include "io/live_effects.hpp"
+#include "model/beam/beam_plant.hpp"
 
 namespace bevel::nodes {
 
@@ -43,6 +45,8 @@ struct RigConfig {
   std::vector<io::EffectEntry> effects;
   std::vector<model::DiscrepancyCurve> discrepancies;
   model::Variation variation;
+  // [rig.beam]: the needle is a beam in elastic tissue instead; of the effects those of cameras act on it.
+  std::optional<model::BeamPlantConfig> beam;
   double roll_error_rad = 0;  // the bevel's true roll at the start; the software believes zero
   std::string frames_socket = "/tmp/bevel-rig-frames.sock";
   double frame_rate_hz = 30;

@@ -1,7 +1,9 @@
 #pragma once
-// The needle in its tissue, as the simulated rig moves it: axis increments in, tip and shaft out.
+// The needle in its tissue, as the simulated rig moves it: axis increments in, tip and shaft out. Two of them: the
+// model that everything else believes in, and mechanics that it does not.
 #include <vector>
 
+#include "model/beam/beam_plant.hpp"
 #include "model/effects/augmented_needle.hpp"
 #include "model/effects/variation.hpp"
 
@@ -15,6 +17,8 @@ class Plant {
   virtual model::Pose tip() const = 0;
   // Axis of the shaft in {A} from the entry point to the tip, at least two points once the needle is in.
   virtual const std::vector<Eigen::Vector3d>& shaft_mm() const = 0;
+  // k and lambda as they are, and what effects make of the cameras' pictures.
+  virtual const model::AugmentedNeedle& model() const = 0;
 };
 
 // The extended bicycle itself, with what a model file's effects make of it: the shaft lies where the tip has passed.
@@ -28,7 +32,7 @@ class KinematicPlant : public Plant {
   void advance(double insertion_mm, double rotation_rad, double dt_s) override;
   model::Pose tip() const override { return tip_; }
   const std::vector<Eigen::Vector3d>& shaft_mm() const override { return shaft_mm_; }
-  const model::AugmentedNeedle& model() const { return needle_; }
+  const model::AugmentedNeedle& model() const override { return needle_; }
 
  private:
   void follow_path();
@@ -41,7 +45,35 @@ class KinematicPlant : public Plant {
   std::vector<Eigen::Vector3d> shaft_mm_;
 };
 
+// A beam in elastic tissue (model/beam): no bicycle is its truth. Its guide stands as it stands, so that where
+// insertions differ in the entry, or the bevel's roll at the start is not zero, the whole of its path is turned.
+class BeamNeedle : public Plant {
+ public:
+  // effects: those of cameras act, others have no part in it. Throws as model::BeamPlantConfig::validate().
+  explicit BeamNeedle(const model::BeamPlantConfig& config, std::vector<model::ActiveEffect> effects = {},
+                      double roll_rad = 0, const model::OwnValues& own = {});
+  // What would be fed or drawn beyond the room for it stays outside. The beam is solved for each half millimetre, each
+  // fiftieth of a radian and each 5 ms, whichever comes first.
+  void advance(double insertion_mm, double rotation_rad, double dt_s) override;
+  model::Pose tip() const override { return tip_; }
+  const std::vector<Eigen::Vector3d>& shaft_mm() const override;
+  const model::AugmentedNeedle& model() const override { return needle_; }
+
+ private:
+  void solve();
+
+  model::BeamPlant beam_;
+  double room_mm_;
+  model::AugmentedNeedle needle_;
+  model::Pose entry_, tip_;
+  double due_insertion_mm_ = 0, due_rotation_rad_ = 0, due_s_ = 0;  // not solved for yet
+  mutable std::vector<Eigen::Vector3d> shaft_mm_;                   // drawn when it is asked for
+};
+
+// The bicycle that a beam is deep in uniform tissue: k = F / (EI lambda), lambda^4 = modulus / (4 EI); no slip law.
+model::NeedleParameters bicycle_of(const model::BeamPlantConfig& config);
+
 // The shaft as it appears to the camera that looks along x, the one that effects of a camera concern.
-std::vector<Eigen::Vector3d> shaft_seen_along_x(const KinematicPlant& plant);
+std::vector<Eigen::Vector3d> shaft_seen_along_x(const Plant& plant);
 
 }  // namespace bevel::rig

@@ -180,7 +180,7 @@ void expect_plain_filter_of_an_effect_that_is_none(double wheelbase_sd_mm) {
   EXPECT_LT((a.covariance - b.covariance).norm(), 1e-9 * a.covariance.norm());
   EXPECT_NEAR(a.lambda1_per_rad, b.lambda1_per_rad, 1e-9);
   EXPECT_NEAR(a.wheelbase_mm, b.wheelbase_mm, 1e-6);
-  EXPECT_NEAR(a.wheelbase_variance_mm2, b.wheelbase_variance_mm2, 1e-6);
+  EXPECT_NEAR(a.tenth_variance, b.tenth_variance, 1e-6);
 }
 
 TEST(EstimatorEffects, AnEffectThatIsNoneGivesThePlainFilter) { expect_plain_filter_of_an_effect_that_is_none(0); }

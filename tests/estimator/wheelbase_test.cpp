@@ -32,8 +32,8 @@ TEST(Wheelbase, HeldItStaysWhereTheModelFileHasIt) {
   config.prior.needle.wheelbase_mm = 23.5;
   const FilterState state = end_of(config, testing::insert(config.prior.needle, {}, {}, rng));
   EXPECT_EQ(state.wheelbase_mm, 23.5);
-  EXPECT_EQ(state.wheelbase_variance_mm2, 0);
-  EXPECT_EQ(state.wheelbase_covariance, Vector9d::Zero());
+  EXPECT_EQ(state.tenth_variance, 0);
+  EXPECT_EQ(state.tenth_covariance, Vector9d::Zero());
 }
 
 // With a width that is next to nothing ten states say what nine say.
@@ -88,10 +88,10 @@ TEST(Wheelbase, AnInsertionWithoutRotationDoesNotShowIt) {
   plan.rotation_rate_rad_s = 0;
   const EstimatorConfig config = config_with(5);
   const FilterState state = end_of(config, testing::insert(config.prior.needle, {}, plan, rng));
-  std::cout << "sd of ell after 100 mm without rotation: " << std::sqrt(state.wheelbase_variance_mm2)
+  std::cout << "sd of ell after 100 mm without rotation: " << std::sqrt(state.tenth_variance)
             << " mm, prior 5 mm\n";
-  EXPECT_GT(std::sqrt(state.wheelbase_variance_mm2), 0.8 * 5);
-  EXPECT_LT(std::sqrt(state.wheelbase_variance_mm2), 1.05 * 5);
+  EXPECT_GT(std::sqrt(state.tenth_variance), 0.8 * 5);
+  EXPECT_LT(std::sqrt(state.tenth_variance), 1.05 * 5);
 }
 
 TEST(Wheelbase, StaysInItsRangeWhateverThePrior) {
@@ -109,7 +109,7 @@ TEST(Wheelbase, StaysInItsRangeWhateverThePrior) {
       const FilterState state = estimator.estimate(actuator.utime).state;
       ASSERT_GT(state.wheelbase_mm, 1);
       ASSERT_LT(state.wheelbase_mm, 1000);
-      ASSERT_GT(state.wheelbase_variance_mm2, 0);
+      ASSERT_GT(state.tenth_variance, 0);
       ASSERT_TRUE(state.covariance.allFinite() && state.pose.p_mm.allFinite());
     }
   }
@@ -133,8 +133,8 @@ TEST(Wheelbase, TwoHundredInsertionsWithEllDrawnFromItsPrior) {
     nees += testing::nees_of<10>(state, data.final_pose, truth);
     nees_held += testing::nees_of(end_of(held, data), data.final_pose, truth);
     const double off_mm = state.wheelbase_mm - truth.wheelbase_mm;
-    wheelbase += off_mm * off_mm / state.wheelbase_variance_mm2;
-    sd_mm += std::sqrt(state.wheelbase_variance_mm2) / kRuns;
+    wheelbase += off_mm * off_mm / state.tenth_variance;
+    sd_mm += std::sqrt(state.tenth_variance) / kRuns;
   }
   const boost::math::chi_squared chi2(10.0 * kRuns), one(kRuns);
   std::cout << "seed " << kSeed << ", ell 20 +- 3 mm: NEES/10 " << nees / (10 * kRuns) << "  95 % band ["

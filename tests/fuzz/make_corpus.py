@@ -34,12 +34,13 @@ ACTUATOR = message("actuator_state_t", axis_status=[2, 2], insertion_mm=31.0, ro
 COMMAND = message("motion_command_t", mode=1, insertion_rate_mm_s=5.0, rotation_rate_rad_s=-3.0)
 NEEDLE = message("needle_state_t", measurement_utime=UTIME - 9, orientation_wxyz=[1, 0, 0, 0], curvature_per_mm=0.0047,
                  covariance=[float(i % 10 == 0) for i in range(81)], rank=3)
+SHAFT = message("needle_shaft_t", bending_mm=40.0, bending_sd_mm=8.0, guide_mm=15.0)
 TARGET = message("steering_target_t", request=1, position_mm=[4, -10, 95], tolerance_mm=0.5)
 STATUS = message("process_status_t", process="bevel-estimator", state="running", reason="", loop_period_s=0.02)
 
 
 def decode():
-    for name, data in [("tip", TIP), ("heading", HEADING), ("actuator", ACTUATOR), ("command", COMMAND), ("needle", NEEDLE),
+    for name, data in [("tip", TIP), ("heading", HEADING), ("actuator", ACTUATOR), ("command", COMMAND), ("needle", NEEDLE), ("shaft", SHAFT),
                        ("target", TARGET), ("status", STATUS)]:
         keep("checked_decode", name, data)
     keep("checked_decode", "empty", b"")

@@ -34,6 +34,10 @@ Message valid_message() {
     m.orientation_wxyz[0] = 1.0;
     for (int i = 0; i < 9; ++i) m.covariance[10 * i] = 0.01;
     m.rank = 3;
+  } else if constexpr (std::is_same_v<Message, needle_shaft_t>) {
+    m.bending_mm = 40.0;
+    m.bending_sd_mm = 8.0;
+    m.guide_mm = 15.0;
   } else if constexpr (std::is_same_v<Message, steering_target_t>) {
     m.position_mm[2] = 100.0;
     m.tolerance_mm = 0.5;
@@ -53,7 +57,7 @@ Decoded<Message> decode_bytes(const std::vector<std::uint8_t>& bytes) {
 template <class Message>
 class CheckedDecode : public ::testing::Test {};
 using MessageTypes = ::testing::Types<tip_measurement_t, tip_heading_t, actuator_state_t, motion_command_t,
-                                      needle_state_t, steering_target_t, process_status_t>;
+                                      needle_state_t, needle_shaft_t, steering_target_t, process_status_t>;
 TYPED_TEST_SUITE(CheckedDecode, MessageTypes);
 
 // Calls `action` for each field value in turn; base for the property tests below.

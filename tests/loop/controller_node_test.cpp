@@ -52,7 +52,7 @@ std::vector<model::MotionCommand> commands_of(const SystemConfig& config, int pe
   model::ActuatorState axes;
   axes.axis_status = {2, 2};
   steering_target_t target{};
-  target.position_mm[0] = 8;
+  target.position_mm[0] = 14;  // so far that the law turns at once
   target.position_mm[2] = 100;
   for (int period = 0; period < periods; ++period) {
     const std::int64_t utime = kStart_utime + period * kPeriod_us;

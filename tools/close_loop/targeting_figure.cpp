@@ -63,11 +63,31 @@ std::vector<model::ActiveEffect> for_one_insertion(const io::ModelFile& model, d
   return effects;
 }
 
-TargetingFigure summarised(const std::vector<Insertion>& insertions, double inserted_mm, int draws) {
+steering::Believed believed(const io::ModelFile& model, double forgiveness) {
+  steering::Believed out;
+  out.estimator.prior.needle = model.needle;
+  out.estimator.prior.variation = model.variation.value_or(model::Variation{});
+  out.estimator.effects = out.undone = io::live_effects(model.effects, model.discrepancies).active;
+  auto& process = out.estimator.process;
+  for (double* noise : {&process.position_mm, &process.tilt_rad, &process.roll_rad, &process.roll_per_sqrt_rad,
+                        &process.curvature_per_mm, &process.lambda1_per_rad, &process.lambda2})
+    *noise *= forgiveness;
+  return out;
+}
+
+steering::Cameras cameras_of(const diagnosis::RecordedCase& recorded, const inference::Noise& noise) {
+  steering::Cameras cameras;
+  cameras.ar1 = noise.ar1, cameras.frame_s = noise.frame_s;
+  for (std::size_t c = 0; c < recorded.channels.size(); ++c)
+    cameras.axes.push_back({recorded.channels[c].camera, recorded.channels[c].axis, noise.sigma[c]});
+  return cameras;
+}
+
+TargetingFigure summarised(const std::vector<steering::Insertion>& insertions, double inserted_mm, int draws) {
   TargetingFigure figure;
   std::map<std::string, int> reasons;
   double turned_rad = 0;
-  for (const Insertion& one : insertions) {
+  for (const steering::Insertion& one : insertions) {
     figure.miss_mm.push_back(one.miss_mm);
     turned_rad += one.turned_rad;
     if (one.arrived) continue;
@@ -108,6 +128,7 @@ std::vector<Eigen::Vector3d> choose_targets(const model::NeedleParameters& needl
 
 TargetingFigures steer_all(const Models& models, const diagnosis::RecordedCase& recorded, const inference::Noise& noise,
                            const TargetingOptions& options) {
+  const steering::Cameras cameras = cameras_of(recorded, noise);
   double deepest_mm = 0;
   for (const auto& recording : recorded.recordings)
     for (const auto& node : recording.motion.nodes)
@@ -118,29 +139,29 @@ TargetingFigures steer_all(const Models& models, const diagnosis::RecordedCase& 
   figures.targets_mm = choose_targets(truth.needle, deepest_mm);
   for (int s = 1; s <= options.seeds; ++s) figures.seeds.push_back(static_cast<std::uint64_t>(s));
 
-  std::vector<Believed> beliefs;
+  std::vector<steering::Believed> beliefs;
   for (const double forgiveness : {1.0, kForgiveness})
-    for (const io::ModelFile& model : models)
-      beliefs.push_back({model.needle, io::live_effects(model.effects, model.discrepancies).active, forgiveness, true,
-                         model.variation.value_or(model::Variation{})});
-  figures.axes_matter = controller::AxisModel(beliefs[kAugmented].effects).turns_late();
+    for (const io::ModelFile& model : models) beliefs.push_back(believed(model, forgiveness));
+  figures.axes_matter = controller::AxisModel(beliefs[kAugmented].undone).turns_late();
   if (figures.axes_matter) {
     beliefs.push_back(beliefs[kAugmented]);
-    beliefs.back().controller_knows_axes = false;
+    beliefs.back().undone.clear();
   }
 
   const std::size_t count = figures.targets_mm.size() * figures.seeds.size();
-  std::vector<std::vector<Insertion>> insertions(beliefs.size(), std::vector<Insertion>(count));
+  std::vector<std::vector<steering::Insertion>> insertions(beliefs.size(), std::vector<steering::Insertion>(count));
   const double nominal_s = deepest_mm / controller::SteeringLimits{}.insertion_rate_mm_s;
   parallel_for(beliefs.size() * count, options.threads, [&](std::size_t job) {
     const std::size_t belief = job / count, i = job % count, target = i / figures.seeds.size();
     const std::uint64_t seed = 1000 * figures.seeds[i % figures.seeds.size()] + target;
-    const SteeredRig rig{.needle = truth.needle,
-                         .effects = for_one_insertion(truth, nominal_s, seed),
-                         .channels = recorded.channels,
-                         .noise = noise,
-                         .own = model::draw(truth.variation.value_or(model::Variation{}), seed)};
-    insertions[belief][i] = steer(rig, beliefs[belief], figures.targets_mm[target], seed);
+    const auto own = model::draw(truth.variation.value_or(model::Variation{}), seed);
+    const steering::SteeredRig rig{.make_plant =
+                                       [&] {
+                                         return std::make_unique<rig::KinematicPlant>(
+                                             truth.needle, for_one_insertion(truth, nominal_s, seed), 0, own);
+                                       },
+                                   .cameras = cameras};
+    insertions[belief][i] = steering::steer(rig, beliefs[belief], figures.targets_mm[target], seed);
   });
   double inserted_mm = 0;
   for (const auto& target : figures.targets_mm) inserted_mm += target.z() * static_cast<double>(figures.seeds.size());

@@ -4,8 +4,9 @@
 #include <string>
 #include <vector>
 
+#include "diagnosis/needle/recorded_case.hpp"
 #include "tools/close_loop/models.hpp"
-#include "tools/close_loop/targeting.hpp"
+#include "tools/steering/steered_insertion.hpp"
 
 namespace bevel::close_loop {
 

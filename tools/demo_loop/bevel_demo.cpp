@@ -11,12 +11,19 @@ int main(int argc, char** argv) {
   options.programs = std::filesystem::read_symlink("/proc/self/exe").parent_path().string();
   tools::CommandLine command_line(
       "bevel-demo", "Steers a simulated needle with all five processes and a rendered camera in the loop.");
-  command_line.option("-c,--config", options.config_path, "system file")
+  std::string plant = "kinematic", config;
+  command_line
+      .choice("--plant", plant, "the simulated needle: the estimator's own model, or a beam in elastic tissue",
+              {"kinematic", "beam"})
+      .option("-c,--config", config, "system file; without, config/demo.toml or config/beam.toml by the plant")
       .numbers("--target", options.target_mm, "target in {A}, mm: x,y,z", 3)
       .option("--out", options.out, "folder for log, report and the processes' output")
       .option("--tolerance", options.tolerance_mm, "largest miss that counts as success, mm", 0.01, 100)
       .option("--time-limit", options.time_limit_s, "give up after, s", 1, 3600)
       .option("--fault", options.fault,
               "break something and show the stop: COMPONENT:KIND@SECONDSs, as in camera:off@5s");
-  return command_line.run(argc, argv, [&] { return tools::run_demo(options); });
+  return command_line.run(argc, argv, [&] {
+    options.config_path = !config.empty() ? config : plant == "beam" ? "config/beam.toml" : "config/demo.toml";
+    return tools::run_demo(options);
+  });
 }

@@ -8,6 +8,7 @@ KeptState::KeptState(const estimator::FilterState& state)
       lambda1_per_rad(state.lambda1_per_rad),
       lambda2(state.lambda2),
       wheelbase_mm(state.wheelbase_mm),
+      bending_mm(state.bending_mm),
       measurement_utime(state.measurement_utime),
       rejects_in_row(state.rejects_in_row),
       reset_count(state.reset_count),
@@ -15,8 +16,8 @@ KeptState::KeptState(const estimator::FilterState& state)
   double* entry = covariance_.data();
   for (Eigen::Index i = 0; i < 9; ++i)
     for (Eigen::Index j = 0; j <= i; ++j) *entry++ = state.covariance(i, j);
-  for (Eigen::Index j = 0; j < 9; ++j) *entry++ = state.wheelbase_covariance[j];
-  *entry = state.wheelbase_variance_mm2;
+  for (Eigen::Index j = 0; j < 9; ++j) *entry++ = state.tenth_covariance[j];
+  *entry = state.tenth_variance;
 }
 
 estimator::FilterState KeptState::unpacked() const {
@@ -26,6 +27,7 @@ estimator::FilterState KeptState::unpacked() const {
   state.lambda1_per_rad = lambda1_per_rad;
   state.lambda2 = lambda2;
   state.wheelbase_mm = wheelbase_mm;
+  state.bending_mm = bending_mm;
   state.measurement_utime = measurement_utime;
   state.rejects_in_row = rejects_in_row;
   state.reset_count = reset_count;
@@ -33,8 +35,8 @@ estimator::FilterState KeptState::unpacked() const {
   const double* entry = covariance_.data();
   for (Eigen::Index i = 0; i < 9; ++i)
     for (Eigen::Index j = 0; j <= i; ++j) state.covariance(i, j) = state.covariance(j, i) = *entry++;
-  for (Eigen::Index j = 0; j < 9; ++j) state.wheelbase_covariance[j] = *entry++;
-  state.wheelbase_variance_mm2 = *entry;
+  for (Eigen::Index j = 0; j < 9; ++j) state.tenth_covariance[j] = *entry++;
+  state.tenth_variance = *entry;
   return state;
 }
 

@@ -21,13 +21,14 @@ class KeptState {
   double lambda1_per_rad = 0;
   double lambda2 = 0;
   double wheelbase_mm = 0;
+  double bending_mm = 0;
   std::int64_t measurement_utime = 0;
   std::int32_t rejects_in_row = 0;
   std::int32_t reset_count = 0;
   bool outside_model = false;
 
  private:
-  static constexpr int kSize = 10;  // the nine and ell
+  static constexpr int kSize = 10;  // the nine and the tenth
   std::array<double, kSize*(kSize + 1) / 2> covariance_{};
 };
 

@@ -89,8 +89,10 @@ void compare(Replay& result, const std::vector<needle_state_t>& truths, const es
     pose.p_mm = {truth.position_mm[0], truth.position_mm[1], truth.position_mm[2]};
     const double* q = truth.orientation_wxyz;
     pose.R = Eigen::Quaterniond(q[0], q[1], q[2], q[3]).normalized().toRotationMatrix();
-    const model::Vector6d error = model::log_se3(state.pose.inverse() * pose);
-    const Eigen::Vector3d offset = pose.p_mm - state.pose.p_mm;
+    // What effects say of the tip is the model's; here it is what the filter itself estimates, but for a stiff shaft.
+    const model::Pose tip = state.bending_mm > 0 ? filter.tip_pose(state) : state.pose;
+    const model::Vector6d error = model::log_se3(tip.inverse() * pose);
+    const Eigen::Vector3d offset = pose.p_mm - tip.p_mm;
     position2 += offset.squaredNorm();
     lateral2 += offset.head<2>().squaredNorm();
     tilt2 += error.segment<2>(3).squaredNorm();

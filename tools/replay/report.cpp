@@ -73,7 +73,7 @@ void write_csv(const Replay& replay, const std::string& stem) {
                q.y(), q.z(), s.curvature_per_mm, s.lambda1_per_rad, s.lambda2);
     states.row("%.6g,%.6g,%.6g,%.6g,%.6g,%.6g,%.6g,%.6g,%.6g,%.6g,%d,%d,%.6g,%.6g\n", spread.x(), spread.y(),
                spread.z(), sd(s, 3), sd(s, 4), sd(s, 5), sd(s, 6), sd(s, 7), sd(s, 8), row.test_ratio, row.health,
-               s.reset_count, s.wheelbase_mm, std::sqrt(s.wheelbase_variance_mm2));
+               s.reset_count, s.wheelbase_mm, s.bending_mm > 0 ? 0 : std::sqrt(s.tenth_variance));
   }
   states.close();
   CsvFile innovations(stem + ".innovations.csv",
@@ -225,9 +225,12 @@ void print(std::ostream& out, const Replay& replay, double ahead_mm) {
   const estimator::FilterState last = replay.states.back().state.unpacked();
   out << text_of("  k            %.6f +- %.6f /mm\n  lambda1      %.4f +- %.4f /rad\n  lambda2      %.4f +- %.4f\n",
                  last.curvature_per_mm, sd(last, 6), last.lambda1_per_rad, sd(last, 7), last.lambda2, sd(last, 8));
+  if (prior.bending_mm > 0)
+    out << text_of("  bending      %.2f +- %.2f mm, prior %.2f +- %.2f\n", last.bending_mm,
+                   std::sqrt(last.tenth_variance), prior.bending_mm, prior.bending_sd_mm);
   if (prior.wheelbase_sd_mm > 0)
     out << text_of("  ell          %.2f +- %.2f mm, prior %.2f +- %.2f\n", last.wheelbase_mm,
-                   std::sqrt(last.wheelbase_variance_mm2), prior.needle.wheelbase_mm, prior.wheelbase_sd_mm);
+                   std::sqrt(last.tenth_variance), prior.needle.wheelbase_mm, prior.wheelbase_sd_mm);
   const Eigen::Vector3d spread = position_sd_mm(last);
   out << text_of("  tip          %.3f %.3f %.3f +- %.3f %.3f %.3f mm, roll +- %.3f rad, %s\n", last.pose.p_mm.x(),
                  last.pose.p_mm.y(), last.pose.p_mm.z(), spread.x(), spread.y(), spread.z(), sd(last, 5),

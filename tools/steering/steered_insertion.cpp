@@ -1,4 +1,4 @@
-#include "tools/close_loop/targeting.hpp"
+#include "tools/steering/steered_insertion.hpp"
 
 #include <algorithm>
 #include <cmath>
@@ -8,7 +8,7 @@
 
 #include "estimator/needle_estimator.hpp"
 
-namespace bevel::close_loop {
+namespace bevel::steering {
 namespace {
 
 constexpr std::int64_t kStart_utime = 1'700'000'000'000'000;
@@ -17,33 +17,37 @@ constexpr std::int64_t kActuatorPeriod_us = 10'000;
 constexpr std::int64_t kSettle_us = 500'000;  // at rest before it is told to go: the filter has seen the tip
 constexpr std::int64_t kTimeLimit_us = 240'000'000;
 
-// The cameras of a rig: coloured noise along each axis they see, and one message a frame from each.
-class Cameras {
+// Coloured noise along each axis that is seen, and one message a frame from each camera.
+class Eyes {
  public:
-  Cameras(const SteeredRig& rig, std::uint64_t seed)
-      : rig_(rig), random_(seed), coloured_mm_(rig.channels.size()), late_us_(0) {
-    for (std::size_t c = 0; c < coloured_mm_.size(); ++c) coloured_mm_[c] = rig.noise.sigma[c] * normal_(random_);
+  Eyes(const Cameras& cameras, std::uint64_t seed)
+      : cameras_(cameras),
+        random_(seed),
+        coloured_mm_(cameras.axes.size()),
+        turned_(model::exp_so3(cameras.turned_rad)) {
+    for (std::size_t c = 0; c < coloured_mm_.size(); ++c) coloured_mm_[c] = cameras.axes[c].sd_mm * normal_(random_);
   }
 
-  void take(const rig::KinematicPlant& plant, std::int64_t utime) {
+  void take(const rig::Plant& plant, std::int64_t utime) {
     model::TipReading reading{plant.tip().p_mm, model::PointColumns(3, 0)};
     plant.model().through_cameras(reading);
-    late_us_ = std::llround(1e6 * plant.model().latency_s().value);
+    const Eigen::Vector3d seen_mm = turned_ * reading.position_mm;
+    const std::int64_t late_us = std::llround(1e6 * plant.model().latency_s().value);
     std::map<int, model::TipMeasurement> frames;
-    const double rho = rig_.noise.ar1;
-    for (std::size_t c = 0; c < rig_.channels.size(); ++c) {
-      const diagnosis::Channel& channel = rig_.channels[c];
-      const double sigma_mm = rig_.noise.sigma[c];
-      coloured_mm_[c] = rho * coloured_mm_[c] + std::sqrt(1 - rho * rho) * sigma_mm * normal_(random_);
-      model::TipMeasurement& frame = frames[channel.camera];
-      frame.position_mm += channel.axis * (channel.axis.dot(reading.position_mm) + coloured_mm_[c]);
+    const double rho = cameras_.ar1;
+    for (std::size_t c = 0; c < cameras_.axes.size(); ++c) {
+      const SeenAxis& one = cameras_.axes[c];
+      coloured_mm_[c] = rho * coloured_mm_[c] + std::sqrt(1 - rho * rho) * one.sd_mm * normal_(random_);
+      model::TipMeasurement& frame = frames[one.camera];
+      frame.position_mm += one.axis * (one.axis.dot(seen_mm) + coloured_mm_[c]);
       // What frames of correlated noise are worth to a filter for white noise, as bevel-replay puts it.
-      const double white_variance = sigma_mm * sigma_mm * (1 + rho) / (1 - rho);
-      frame.information_per_mm2 += channel.axis * channel.axis.transpose() / white_variance;
+      const double white_variance = one.sd_mm * one.sd_mm * (1 + rho) / (1 - rho);
+      frame.information_per_mm2 += one.axis * one.axis.transpose() / white_variance;
     }
-    const std::int64_t transport_us = std::llround(1e6 * rig_.transport_s);
+    const std::int64_t transport_us = std::llround(1e6 * cameras_.transport_s);
     for (auto& [camera, frame] : frames) {
-      frame.utime = utime + late_us_;
+      spoil(frame, camera);
+      frame.utime = utime + late_us;
       frame.seq = seq_;
       frame.camera = camera;
       under_way_.push_back({std::max(frame.utime, utime + transport_us), frame});
@@ -61,11 +65,20 @@ class Cameras {
     std::int64_t arrives_utime;
     model::TipMeasurement measurement;
   };
-  const SteeredRig& rig_;
+  void spoil(model::TipMeasurement& frame, int camera) {
+    if (cameras_.outlier_share <= 0 || uniform_(random_) >= cameras_.outlier_share) return;
+    const Eigen::Vector3d off = Eigen::Vector3d(normal_(random_), normal_(random_), normal_(random_)).normalized();
+    const double by_mm = 3 + 7 * uniform_(random_);
+    for (const SeenAxis& one : cameras_.axes)
+      if (one.camera == camera) frame.position_mm += by_mm * one.axis * one.axis.dot(off);
+  }
+
+  const Cameras& cameras_;
   std::mt19937_64 random_;
   std::normal_distribution<double> normal_{0, 1};
+  std::uniform_real_distribution<double> uniform_{0, 1};
   std::vector<double> coloured_mm_;
-  std::int64_t late_us_;
+  Eigen::Matrix3d turned_;
   std::deque<UnderWay> under_way_;
   std::int64_t seq_ = 0;
 };
@@ -73,41 +86,30 @@ class Cameras {
 controller::NeedleView view_of(const estimator::Estimate& estimate) {
   controller::NeedleView view;
   view.utime = estimate.utime;
-  view.pose = estimate.state.pose;
+  view.pose = estimate.tip;
   view.curvature_per_mm = estimate.state.curvature_per_mm;
   view.lambda1_per_rad = estimate.state.lambda1_per_rad;
   view.lambda2 = estimate.state.lambda2;
+  view.bending_mm = estimate.state.bending_mm;
   view.position_variance_mm2 = estimate.state.covariance.diagonal().head<3>().maxCoeff();
   view.health = estimate.health;
   view.reset_count = estimate.state.reset_count;
   return view;
 }
 
-estimator::EstimatorConfig estimator_config(const SteeredRig& rig, const Believed& believed) {
-  estimator::EstimatorConfig config;
-  config.prior.needle = believed.needle;
-  config.prior.variation = believed.variation;
-  config.effects = believed.effects;
-  auto& process = config.process;
-  for (double* noise : {&process.position_mm, &process.tilt_rad, &process.roll_rad, &process.roll_per_sqrt_rad,
-                        &process.curvature_per_mm, &process.lambda1_per_rad, &process.lambda2})
-    *noise *= believed.forgiveness;
-  // A rig whose camera is late has its limit set for that: it is not what is looked at here.
-  config.limits.measurement_age_s += model::AugmentedNeedle(rig.needle, rig.effects).latency_s().value;
-  return config;
-}
-
 }  // namespace
 
 Insertion steer(const SteeredRig& rig, const Believed& believed, const Eigen::Vector3d& target_mm, std::uint64_t seed) {
-  rig::KinematicPlant plant(rig.needle, rig.effects, 0, rig.own);
-  Cameras cameras(rig, seed);
-  estimator::NeedleEstimator estimator(estimator_config(rig, believed));
-  const controller::ControllerConfig config;
-  controller::Supervisor supervisor(
-      config, model::AugmentedNeedle(believed.needle, believed.effects).needle(),
-      believed.controller_knows_axes ? believed.effects : std::vector<model::ActiveEffect>{});
-  const auto frame_us = std::llround(1e6 * rig.noise.frame_s);
+  const std::unique_ptr<rig::Plant> plant = rig.make_plant();
+  Eyes cameras(rig.cameras, seed);
+  estimator::EstimatorConfig settings = believed.estimator;
+  // A rig whose camera is late has its limit set for that: it is not what is looked at here.
+  settings.limits.measurement_age_s += plant->model().latency_s().value;
+  estimator::NeedleEstimator estimator(settings);
+  const controller::ControllerConfig& config = believed.controller;
+  const model::NeedleParameters needle = model::AugmentedNeedle(settings.prior.needle, settings.effects).needle();
+  controller::Supervisor supervisor(config, needle, believed.undone);
+  const auto frame_us = std::llround(1e6 * rig.cameras.frame_s);
   const auto control_us = std::llround(1e6 * config.period_s);
   const double tick_s = static_cast<double>(kTick_us) * 1e-6;
   Insertion result;
@@ -120,9 +122,10 @@ Insertion steer(const SteeredRig& rig, const Believed& believed, const Eigen::Ve
     const std::int64_t utime = kStart_utime + us;
     if (us > 0) {
       const double insertion_mm = axes.insertion_rate_mm_s * tick_s, rotation_rad = axes.rotation_rate_rad_s * tick_s;
-      plant.advance(insertion_mm, rotation_rad, tick_s);
+      plant->advance(insertion_mm, rotation_rad, tick_s);
       axes.insertion_mm += insertion_mm, axes.rotation_rad += rotation_rad;
       result.turned_rad += std::abs(rotation_rad);
+      if (started) result.duration_s += tick_s;
     }
     if (us % kActuatorPeriod_us == 0) {
       axes.utime = utime;
@@ -132,7 +135,7 @@ Insertion steer(const SteeredRig& rig, const Believed& believed, const Eigen::Ve
     }
     if (us >= next_frame_us) {
       next_frame_us += frame_us;
-      cameras.take(plant, utime);
+      cameras.take(*plant, utime);
     }
     cameras.deliver(estimator, utime);
     if (us % control_us != 0 || us < kSettle_us) continue;
@@ -148,11 +151,12 @@ Insertion steer(const SteeredRig& rig, const Believed& believed, const Eigen::Ve
     axes.rotation_rate_rad_s = command.rotation_rate_rad_s;
     if (supervisor.status().state != controller::State::steering) break;
   }
+  result.inserted_mm = axes.insertion_mm;
   result.arrived = supervisor.status().state == controller::State::hold;
   result.reason = supervisor.status().reason;
-  result.miss_mm = (plant.tip().p_mm - target_mm).norm();
-  result.estimate_error_mm = (estimator.estimate(axes.utime).state.pose.p_mm - plant.tip().p_mm).norm();
+  result.miss_mm = (plant->tip().p_mm - target_mm).norm();
+  result.estimate_error_mm = (estimator.estimate(axes.utime).tip.p_mm - plant->tip().p_mm).norm();
   return result;
 }
 
-}  // namespace bevel::close_loop
+}  // namespace bevel::steering

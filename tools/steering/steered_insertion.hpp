@@ -2,34 +2,48 @@
 // they run live, with a model of their own. No clock, no messages; the same seed gives the same run.
 #pragma once
 
+#include <Eigen/Core>
 #include <cstdint>
+#include <functional>
+#include <memory>
 #include <vector>
 
 #include "controller/supervisor.hpp"
-#include "diagnosis/inference/noise.hpp"
-#include "diagnosis/needle/recorded_case.hpp"
 #include "estimator/config.hpp"
 #include "rig/plant/plant.hpp"
 
-namespace bevel::close_loop {
+namespace bevel::steering {
 
-// Of the rig: what the software is not told.
-struct SteeredRig {
-  model::NeedleParameters needle;
-  std::vector<model::ActiveEffect> effects;
-  std::vector<diagnosis::Channel> channels;  // what its cameras see
-  inference::Noise noise;                    // of those; outliers, of which only the share is known, are left out
-  double transport_s = 0.05;                 // from the picture to its measurement
-  model::OwnValues own{};                    // of this insertion
+// One direction in which one camera sees the tip.
+struct SeenAxis {
+  int camera = 0;
+  Eigen::Vector3d axis;  // unit vector in {A}
+  double sd_mm = 0;      // of one reading
 };
 
-// What the software believes.
+struct Cameras {
+  std::vector<SeenAxis> axes;
+  double ar1 = 0;            // correlation of the errors of neighbouring frames
+  double outlier_share = 0;  // of messages, off by 3 to 10 mm in any direction
+  double frame_s = 1.0 / 30;
+  double transport_s = 0.05;                             // from the picture to its measurement
+  Eigen::Vector3d turned_rad = Eigen::Vector3d::Zero();  // rotation vector by which their frame is off {A}
+};
+
+// What the software is not told.
+struct SteeredRig {
+  std::function<std::unique_ptr<rig::Plant>()> make_plant;
+  Cameras cameras;
+  // Where the target is so many seconds after the word to go; none: where it was said to be.
+  std::function<Eigen::Vector3d(double time_s)> target_mm{};
+};
+
+// What the software believes, and how it is set.
 struct Believed {
-  model::NeedleParameters needle;
-  std::vector<model::ActiveEffect> effects;
-  double forgiveness = 1;             // times the filter's process noise as it runs live
-  bool controller_knows_axes = true;  // effects of the axes are undone by the controller too, not only followed
-  model::Variation variation{};       // by how much insertions differ
+  estimator::EstimatorConfig estimator;
+  controller::ControllerConfig controller{};
+  // Effects between base and tip that the controller undoes; those of the estimator it follows in any case.
+  std::vector<model::ActiveEffect> undone{};
 };
 
 struct Insertion {
@@ -38,8 +52,9 @@ struct Insertion {
   controller::Reason reason = controller::Reason::none;  // why not
   double estimate_error_mm = 0;                          // estimate to true tip, at the end
   double turned_rad = 0;                                 // of the base, both ways together
+  double inserted_mm = 0, duration_s = 0;                // from the word to go until it stopped
 };
 
 Insertion steer(const SteeredRig& rig, const Believed& believed, const Eigen::Vector3d& target_mm, std::uint64_t seed);
 
-}  // namespace bevel::close_loop
+}  // namespace bevel::steering

@@ -1,0 +1,128 @@
+#include "controller/arc_law.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <numbers>
+
+#include "model/shaft_end.hpp"
+
+namespace bevel::controller {
+namespace {
+
+constexpr double kStep_mm = 4.0;
+
+// What a stiff shaft does at a depth, for the needle's k; of a slack one only the curvature.
+struct End {
+  double curvature_per_mm = 0, cut_rad = 0, swing_mm = 0;
+};
+End end_at(double depth_mm, const model::NeedleParameters& needle, const ShaftConfig& shaft) {
+  const double k = needle.curvature_per_mm, b = shaft.bending_mm;
+  if (!(b > 0)) return {k, 0, 0};
+  const model::ShaftEnd end = model::shaft_end((depth_mm + shaft.guide_mm) / b);
+  return {k * end.g * end.h, k * b * end.h, 0.5 * k * b * b * end.g};
+}
+
+// Where the tip passes the plane through the target across `along`, from the middle of its swing, with the bevel kept
+// and this share of the bend.
+bool landing(model::Pose middle, const model::NeedleParameters& needle, const ShaftConfig& shaft,
+             const Eigen::Vector3d& target_mm, const Eigen::Vector3d& along, double share, Eigen::Vector3d& at_mm) {
+  const model::SlipParameters slip = model::slip_parameters(needle);
+  for (int i = 0; i < 100; ++i) {
+    const double ahead_mm = along.dot(target_mm - middle.p_mm);
+    if (ahead_mm <= 1e-3) break;
+    const double step_mm = std::min(kStep_mm, ahead_mm / std::max(0.2, along.dot(middle.R.col(2))));
+    const End end = end_at(middle.p_mm.z() + 0.5 * step_mm, needle, shaft);
+    middle.p_mm -= middle.R.col(1) * (share * end.cut_rad * step_mm);
+    if (!model::step(middle, {step_mm, 0, {share * end.curvature_per_mm, 0}}, slip)) return false;
+  }
+  at_mm = middle.p_mm - middle.R.col(1) * (share * end_at(middle.p_mm.z(), needle, shaft).swing_mm);
+  return true;
+}
+
+double wrapped(double angle_rad) { return std::remainder(angle_rad, 2 * std::numbers::pi); }
+
+}  // namespace
+
+ArcGeometry arc_geometry(const model::Pose& tip, const model::NeedleParameters& needle, const ShaftConfig& shaft,
+                         const Eigen::Vector3d& target_mm) {
+  ArcGeometry g;
+  const End now = end_at(tip.p_mm.z(), needle, shaft);
+  model::Pose middle = tip;
+  middle.R = tip.R * model::exp_so3({-0.5 * now.cut_rad, 0, 0});
+  middle.p_mm += middle.R.col(1) * now.swing_mm;
+  const Eigen::Matrix3d R = middle.R;
+  const Eigen::Vector3d along = R.col(2);
+  g.ahead_mm = along.dot(target_mm - tip.p_mm);
+  if (g.ahead_mm <= 0) {
+    g.in_domain = true;
+    return g;
+  }
+  Eigen::Vector3d straight_mm, kept_mm, facing_mm;
+  if (!landing(middle, needle, shaft, target_mm, along, 0, straight_mm) ||
+      !landing(middle, needle, shaft, target_mm, along, 1, kept_mm))
+    return g;
+  const auto across = [&](const Eigen::Vector3d& v) -> Eigen::Vector2d { return (R.transpose() * v).head<2>(); };
+  g.aim_mm = across(target_mm - straight_mm);
+  g.miss_mm = across(target_mm - kept_mm);
+  const double side = needle.curvature_per_mm < 0 ? -1.0 : 1.0;
+  g.facing_rad = std::atan2(side * g.aim_mm.x(), -side * g.aim_mm.y());
+  // The reach is that of the side on which it is wanted: slip makes it differ by the side.
+  model::Pose turned = middle;
+  turned.R = R * model::exp_so3({0, 0, g.facing_rad});
+  if (!landing(turned, needle, shaft, target_mm, along, 1, facing_mm)) return g;
+  g.reach_mm = across(facing_mm - straight_mm).norm();
+  const End there = end_at(tip.p_mm.z() + 0.5 * g.ahead_mm, needle, shaft);
+  g.reach_per_mm = std::abs(there.cut_rad) + std::abs(there.curvature_per_mm) * g.ahead_mm;
+  g.in_domain = true;
+  return g;
+}
+
+ArcLaw::Wanted ArcLaw::step(const ArcGeometry& g, double rotation_rad, double tolerance_mm,
+                            const ControllerConfig& config) {
+  const SteeringLimits& limits = config.limits;
+  if (!g.in_domain || g.ahead_mm <= 0) return {};
+  const double turn_feed_mm_s = limits.insertion_rate_mm_s * limits.insertion_rate_min_share;
+  const double half_turn_s =
+      std::numbers::pi / limits.rotation_rate_rad_s + limits.rotation_rate_rad_s / limits.rotation_acceleration_rad_s2;
+  const double half_turn_mm = half_turn_s * turn_feed_mm_s;
+  const double smallest_mm = g.reach_per_mm * half_turn_mm;  // half of what away and back changes
+  const double width_mm = std::max(tolerance_mm + config.gains.tube_share * g.reach_per_mm * g.ahead_mm, smallest_mm);
+  const double S = g.aim_mm.norm() - g.reach_mm;
+  // Away, and back before it is there: two half turns, and room to brake.
+  const bool time_for_both = g.ahead_mm > 3 * half_turn_mm;
+  if (side_ == Side::undecided) side_ = S < -width_mm ? Side::away : Side::facing;
+  const double S_turned = S + g.reach_per_mm * half_turn_mm;
+  // The target has come to lie on the other side: that is away, already.
+  const bool passed = std::abs(g.facing_rad) > 0.5 * std::numbers::pi && S_turned < -0.5 * width_mm;
+  if (side_ == Side::facing && (S < -width_mm || passed) && time_for_both)
+    side_ = Side::away;
+  else if (side_ == Side::away && (S_turned >= -0.5 * width_mm || !time_for_both))
+    side_ = Side::facing;
+
+  double error_rad = side_ == Side::facing ? g.facing_rad : wrapped(g.facing_rad + std::numbers::pi);
+  // Away is a half plane; facing matters by what the miss across is.
+  const double across_mm = g.aim_mm.norm() * std::abs(std::sin(error_rad));
+  const bool far_off = std::abs(error_rad) > 0.5 * std::numbers::pi;
+  const bool must_turn =
+      side_ == Side::facing ? far_off || across_mm > 0.5 * width_mm : std::abs(error_rad) > std::numbers::pi / 3;
+  const bool done = side_ == Side::facing ? !far_off && across_mm < 0.1 * width_mm : std::abs(error_rad) < 0.2;
+  turning_ = turning_ ? !done : must_turn;
+  Wanted wanted{limits.insertion_rate_mm_s, 0};
+  if (!turning_) {
+    turn_ = rotation_rad > 0 ? -1 : 1;  // the next half turn unwinds the cable
+    return wanted;
+  }
+  if (std::abs(error_rad) > 0.8 * std::numbers::pi) error_rad = std::copysign(error_rad, turn_);
+  const double room_rad = limits.total_rotation_rad - std::abs(rotation_rad);
+  if (error_rad * rotation_rad > 0 && std::abs(error_rad) > room_rad)
+    error_rad -= std::copysign(2 * std::numbers::pi, error_rad);
+  turn_ = std::copysign(1.0, error_rad);
+  // As fast as the axis can still stop at the angle; in proportion at the end.
+  const double braking = std::sqrt(2 * 0.6 * limits.rotation_acceleration_rad_s2 * std::abs(error_rad));
+  wanted.rotation_rad_s =
+      std::copysign(std::min({limits.rotation_rate_rad_s, braking, 8.0 * std::abs(error_rad)}), error_rad);
+  wanted.insertion_mm_s = std::abs(error_rad) > 0.3 ? turn_feed_mm_s : limits.insertion_rate_mm_s;
+  return wanted;
+}
+
+}  // namespace bevel::controller

@@ -1,0 +1,26 @@
+// bevel-targets: steers to many targets in simulated time, on needles that are the filter's model and on some that are
+// not. Exit status: 0 finished, 1 failed, 2 usage.
+#include <iostream>
+#include <thread>
+
+#include "tools/common/command_line.hpp"
+#include "tools/steering/targets.hpp"
+
+int main(int argc, char** argv) {
+  bevel::steering::TargetsOptions o;
+  o.threads = static_cast<int>(std::max(1U, std::thread::hardware_concurrency()));
+  int seed = 1;
+  bevel::tools::CommandLine command_line(
+      "bevel-targets",
+      "Steers to random targets in simulated time and prints how far from them the needle comes to rest.");
+  command_line.option("-n,--targets", o.targets, "targets in each scenario", 1, 100000)
+      .option("--seed", seed, "the same seed draws the same targets, needles and noise", 0, 2147483647)
+      .option("--scenario", o.scenario, "one of them; without, all")
+      .option("--tube-share", o.tube_share, "of the law by arcs; below 0: as the controller has it", -1, 10)
+      .option("--threads", o.threads, "at a time", 1, 256)
+      .option("--json", o.json, "writes the figures to this file as well");
+  return command_line.run(argc, argv, [&] {
+    o.seed = static_cast<std::uint64_t>(seed);
+    return bevel::steering::run_targets(o, std::cout);
+  });
+}

@@ -1,0 +1,151 @@
+#include "tools/steering/scenarios.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <numbers>
+#include <random>
+
+namespace bevel::steering {
+namespace {
+
+constexpr double kNoise_mm = 0.2;
+constexpr double kShareOfReach = 0.6;
+constexpr double kWidest_mm = 30;
+
+class Draw {
+ public:
+  explicit Draw(std::uint64_t seed) : random_(seed) {}
+  double uniform(double low, double high) { return std::uniform_real_distribution<double>(low, high)(random_); }
+  double normal() { return std::normal_distribution<double>(0, 1)(random_); }
+  double log_uniform(double low, double high) { return std::exp(uniform(std::log(low), std::log(high))); }
+
+ private:
+  std::mt19937_64 random_;
+};
+
+Cameras cameras(int count) {
+  Cameras out;
+  for (int camera = 0; camera < count; ++camera) {
+    out.axes.push_back({camera, camera == 0 ? Eigen::Vector3d::UnitY() : Eigen::Vector3d::UnitX(), kNoise_mm});
+    out.axes.push_back({camera, Eigen::Vector3d::UnitZ(), kNoise_mm});
+  }
+  return out;
+}
+
+Eigen::Vector3d draw_target(Draw& draw, double curvature_per_mm) {
+  const double depth_mm = draw.uniform(80, 120);
+  const double reach_mm = std::min(0.5 * curvature_per_mm * depth_mm * depth_mm, kWidest_mm / kShareOfReach);
+  const double aside_mm = kShareOfReach * reach_mm * std::sqrt(draw.uniform(0, 1));
+  const double angle = draw.uniform(0, 2 * std::numbers::pi);
+  return {aside_mm * std::cos(angle), aside_mm * std::sin(angle), depth_mm};
+}
+
+model::NeedleParameters agar() {
+  model::NeedleParameters needle;
+  needle.lambda1_per_rad = 0.49;
+  needle.lambda2 = 0.22;
+  return needle;
+}
+
+struct Kinematic {
+  double parameters_off = 0;  // uniform, relative, of k, lambda1, lambda2
+  double roll_sd_rad = 0;
+  int cameras = 2;
+  double outlier_share = 0;
+  double windup_at_100mm_rad = 0;
+  bool windup_known = false;
+};
+Trial kinematic(const Kinematic& kind, std::uint64_t seed) {
+  Draw draw(seed);
+  Trial trial;
+  const model::NeedleParameters believed = agar();
+  model::NeedleParameters truth = believed;
+  truth.curvature_per_mm *= 1 + kind.parameters_off * draw.uniform(-1, 1);
+  truth.lambda1_per_rad *= 1 + kind.parameters_off * draw.uniform(-1, 1);
+  truth.lambda2 *= 1 + kind.parameters_off * draw.uniform(-1, 1);
+  const double roll_rad = kind.roll_sd_rad * draw.normal();
+  estimator::Prior& prior = trial.believed.estimator.prior;
+  prior.needle = believed;
+  prior.curvature_sd_per_mm = std::max(prior.curvature_sd_per_mm, 0.3 * believed.curvature_per_mm);
+  if (kind.roll_sd_rad > 0) prior.roll_sd_rad = kind.roll_sd_rad;
+  std::vector<model::ActiveEffect> effects;
+  if (kind.windup_at_100mm_rad > 0) {
+    model::ActiveEffect windup{.effect = model::find_effect("torsional_windup"), .parameters = {}};
+    windup.parameters[0] = kind.windup_at_100mm_rad;
+    effects.push_back(windup);
+    if (kind.windup_known) trial.believed.estimator.effects = trial.believed.undone = effects;
+  }
+  trial.target_mm = draw_target(draw, std::min(truth.curvature_per_mm, believed.curvature_per_mm));
+  trial.rig.cameras = cameras(kind.cameras);
+  trial.rig.cameras.outlier_share = kind.outlier_share;
+  trial.rig.make_plant = [truth, effects, roll_rad] {
+    return std::make_unique<rig::KinematicPlant>(truth, effects, roll_rad);
+  };
+  return trial;
+}
+
+struct Beam {
+  double modulus_kPa = 0, force_N = 0;  // 0: drawn, 2 to 100 kPa, 0.2 to 1 N
+  double windup_at_100mm_rad = 0;
+  double relaxing_fraction = 0;
+};
+// The software is told a curvature and a bending length, each off by up to 30 %, and a bicycle's slip of none.
+Trial beam(const Beam& kind, std::uint64_t seed) {
+  Draw draw(seed);
+  Trial trial;
+  model::BeamPlantConfig config;
+  config.foundation_modulus_kPa = kind.modulus_kPa > 0 ? kind.modulus_kPa : draw.log_uniform(2, 100);
+  config.bevel_force_N = kind.force_N > 0 ? kind.force_N : draw.uniform(0.2, 1);
+  config.windup_at_100mm_rad = kind.windup_at_100mm_rad;
+  config.relaxing_fraction = kind.relaxing_fraction;
+  config.relaxation_time_s = 3;
+  config.max_depth_mm = 150;
+  const model::NeedleParameters deep = rig::bicycle_of(config);
+  const double bending_mm = std::pow(4 * config.bending_stiffness_N_mm2 / (1e-3 * config.foundation_modulus_kPa), 0.25);
+  estimator::Prior& prior = trial.believed.estimator.prior;
+  prior.needle = deep;
+  prior.needle.curvature_per_mm *= draw.uniform(0.7, 1.3);
+  prior.curvature_sd_per_mm = 0.2 * prior.needle.curvature_per_mm;
+  prior.lambda1_sd_per_rad = prior.lambda2_sd = 0;
+  prior.bending_mm = bending_mm * draw.uniform(0.7, 1.3);
+  prior.bending_sd_mm = 0.2 * prior.bending_mm;
+  prior.guide_mm = config.guide_gap_mm;
+  trial.believed.controller.shaft = {prior.bending_mm, prior.guide_mm};
+  trial.target_mm = draw_target(draw, deep.curvature_per_mm);
+  trial.rig.cameras = cameras(2);
+  trial.rig.make_plant = [config] { return std::make_unique<rig::BeamNeedle>(config); };
+  return trial;
+}
+
+template <class Kind>
+Scenario scenario(const char* name, const char* what, const Kind& kind, Trial (*draw)(const Kind&, std::uint64_t)) {
+  return {name, what, [=](std::uint64_t seed) { return draw(kind, seed); }};
+}
+
+}  // namespace
+
+const std::vector<Scenario>& scenarios() {
+  static const std::vector<Scenario> all{
+      scenario<Kinematic>("kinematic", "the filter's own model, parameters as told", {}, kinematic),
+      scenario<Kinematic>("kinematic-30", "k, lambda1, lambda2 off by up to 30 %", {.parameters_off = 0.3}, kinematic),
+      scenario<Beam>("beam-100-0.3", "beam, 100 kPa, 0.3 N", {100, 0.3}, beam),
+      scenario<Beam>("beam-100-1", "beam, 100 kPa, 1 N", {100, 1}, beam),
+      scenario<Beam>("beam-50-1", "beam, 50 kPa, 1 N", {50, 1}, beam),
+      scenario<Beam>("beam-20-0.5", "beam, 20 kPa, 0.5 N", {20, 0.5}, beam),
+      scenario<Beam>("beam-any", "beam, 2 to 100 kPa, 0.2 to 1 N", {}, beam),
+      scenario<Beam>("beam-relaxing", "beam, 20 kPa, 0.5 N, of which 30 % relax in 3 s",
+                     {.modulus_kPa = 20, .force_N = 0.5, .relaxing_fraction = 0.3}, beam),
+      scenario<Beam>("beam-windup", "beam, 100 kPa, 1 N, wind-up of 0.5 rad at 100 mm, unknown",
+                     {.modulus_kPa = 100, .force_N = 1, .windup_at_100mm_rad = 0.5}, beam),
+      scenario<Kinematic>("windup", "wind-up of 0.5 rad at 100 mm, unknown", {.windup_at_100mm_rad = 0.5}, kinematic),
+      scenario<Kinematic>("windup-known", "the same, in the model file",
+                          {.windup_at_100mm_rad = 0.5, .windup_known = true}, kinematic),
+      scenario<Kinematic>("roll", "the bevel's roll at the start off by 0.5 rad (standard deviation)",
+                          {.roll_sd_rad = 0.5}, kinematic),
+      scenario<Kinematic>("one-camera", "one camera, along x", {.cameras = 1}, kinematic),
+      scenario<Kinematic>("outliers", "a tenth of the messages off by 3 to 10 mm", {.outlier_share = 0.1}, kinematic),
+  };
+  return all;
+}
+
+}  // namespace bevel::steering

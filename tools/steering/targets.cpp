@@ -1,0 +1,136 @@
+#include "tools/steering/targets.hpp"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <cstdio>
+#include <fstream>
+#include <map>
+#include <nlohmann/json.hpp>
+#include <numbers>
+#include <ostream>
+#include <stdexcept>
+
+#include "diagnosis/parallel.hpp"
+#include "tools/steering/scenarios.hpp"
+
+namespace bevel::steering {
+namespace {
+
+struct LawTried {
+  const char* name;
+  controller::Law law;
+};
+constexpr std::array<LawTried, 2> kLaws{{{"arcs", controller::Law::arcs}, {"spin", controller::Law::spin}}};
+
+// Of those that came to rest at the target's depth.
+struct Figures {
+  int targets = 0, arrived = 0, refused = 0;
+  double median_mm = 0, mean_mm = 0, sd_mm = 0, at_95_mm = 0, worst_mm = 0;
+  double turns_per_100mm = 0, feed_mm_s = 0, estimate_error_mm = 0;
+  std::map<std::string, int> stopped;  // by reason
+};
+
+Figures figures_of(const std::vector<Insertion>& all) {
+  Figures f;
+  std::vector<double> miss_mm;
+  double turned_rad = 0, inserted_mm = 0, duration_s = 0;
+  for (const Insertion& one : all) {
+    ++f.targets;
+    if (!one.arrived) {
+      if (one.reason == controller::Reason::target_unreachable && one.inserted_mm == 0)
+        ++f.refused;
+      else
+        ++f.stopped[one.reason == controller::Reason::none ? "not there in time" : to_string(one.reason)];
+      continue;
+    }
+    ++f.arrived;
+    miss_mm.push_back(one.miss_mm);
+    turned_rad += one.turned_rad, inserted_mm += one.inserted_mm, duration_s += one.duration_s;
+    f.estimate_error_mm += one.estimate_error_mm;
+  }
+  if (miss_mm.empty()) return f;
+  const auto n = static_cast<double>(miss_mm.size());
+  std::ranges::sort(miss_mm);
+  const auto at = [&](double share) { return miss_mm[static_cast<std::size_t>(share * (n - 1) + 0.5)]; };
+  f.median_mm = at(0.5), f.at_95_mm = at(0.95), f.worst_mm = miss_mm.back();
+  for (const double m : miss_mm) f.mean_mm += m / n;
+  for (const double m : miss_mm) f.sd_mm += (m - f.mean_mm) * (m - f.mean_mm);
+  f.sd_mm = std::sqrt(f.sd_mm / std::max(n - 1, 1.0));
+  f.turns_per_100mm = turned_rad / (2 * std::numbers::pi) / inserted_mm * 100;
+  f.feed_mm_s = inserted_mm / duration_s;
+  f.estimate_error_mm /= n;
+  return f;
+}
+
+std::string row_of(const std::string& scenario, const char* law, const Figures& f) {
+  std::array<char, 256> text{};
+  std::snprintf(
+      text.data(), text.size(), "| %s | %s | %.2f | %.2f +- %.2f | %.2f | %.2f | %.1f | %d | %.1f | %.2f | %.2f |",
+      scenario.c_str(), law, f.median_mm, f.mean_mm, f.sd_mm, f.at_95_mm, f.worst_mm,
+      100.0 * f.arrived / std::max(f.targets, 1), f.refused, f.turns_per_100mm, f.feed_mm_s, f.estimate_error_mm);
+  std::string row = text.data();
+  for (const auto& [reason, count] : f.stopped) row += " " + std::to_string(count) + " " + reason + ";";
+  return row + " |";
+}
+
+nlohmann::json json_of(const Scenario& scenario, const char* law, const Figures& f) {
+  return {{"scenario", scenario.name},
+          {"what", scenario.what},
+          {"law", law},
+          {"targets", f.targets},
+          {"arrived", f.arrived},
+          {"refused", f.refused},
+          {"stopped", f.stopped},
+          {"median_mm", f.median_mm},
+          {"mean_mm", f.mean_mm},
+          {"sd_mm", f.sd_mm},
+          {"at_95_mm", f.at_95_mm},
+          {"worst_mm", f.worst_mm},
+          {"turns_per_100mm", f.turns_per_100mm},
+          {"feed_mm_s", f.feed_mm_s},
+          {"estimate_error_mm", f.estimate_error_mm}};
+}
+
+}  // namespace
+
+int run_targets(const TargetsOptions& options, std::ostream& out) {
+  std::vector<const Scenario*> wanted;
+  std::string names;
+  for (const Scenario& scenario : scenarios()) {
+    names += (names.empty() ? "" : ", ") + scenario.name;
+    if (options.scenario.empty() || options.scenario == scenario.name) wanted.push_back(&scenario);
+  }
+  if (wanted.empty()) throw std::runtime_error("no scenario '" + options.scenario + "'; there are: " + names);
+  std::ofstream file;
+  if (!options.json.empty()) {
+    file.open(options.json);
+    if (!file) throw std::runtime_error(options.json + ": cannot be written");
+  }
+  out << options.targets << " targets each, seed " << options.seed << "; mm, of those that arrived\n\n"
+      << "| scenario | law | median | mean +- sd | 95 % | worst | arrived, % | refused before | turns per 100 mm | "
+         "feed, mm/s | estimate to tip | stopped |\n| --- | --- | --- | --- | --- | --- | --- | --- | --- | --- | --- "
+         "| "
+         "--- |\n";
+  nlohmann::json all = nlohmann::json::array();
+  for (const Scenario* scenario : wanted)
+    for (const LawTried& law : kLaws) {
+      std::vector<Insertion> insertions(static_cast<std::size_t>(options.targets));
+      parallel_for(insertions.size(), options.threads, [&](std::size_t i) {
+        const std::uint64_t seed = 1'000'003 * options.seed + i;
+        Trial trial = scenario->draw(seed);
+        trial.believed.controller.law = law.law;
+        if (options.tube_share >= 0) trial.believed.controller.gains.tube_share = options.tube_share;
+        insertions[i] = steer(trial.rig, trial.believed, trial.target_mm, seed);
+      });
+      const Figures figures = figures_of(insertions);
+      out << row_of(scenario->name, law.name, figures) << std::endl;
+      all.push_back(json_of(*scenario, law.name, figures));
+    }
+  out << "\n";
+  for (const Scenario* scenario : wanted) out << "- " << scenario->name << ": " << scenario->what << "\n";
+  if (file.is_open()) file << nlohmann::json{{"seed", options.seed}, {"rows", all}}.dump(1) << "\n";
+  return 0;
+}
+
+}  // namespace bevel::steering
