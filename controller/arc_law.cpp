@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <numbers>
 
 #include "model/shaft_end.hpp"
@@ -9,7 +10,15 @@
 namespace bevel::controller {
 namespace {
 
-constexpr double kStep_mm = 4.0;
+constexpr double kStep_mm = 4.0;  // of the prediction
+// Where it turns and where it has turned enough; between the two it rests. Facing: what the miss is across, of the
+// tube's width. Away: half a plane is away, so that coarsely will do.
+constexpr double kTurnAcross = 0.5, kRestAcross = 0.1;
+constexpr double kTurnAway_rad = std::numbers::pi / 3, kRestAway_rad = 0.2;
+constexpr double kEitherWay_rad = 0.8 * std::numbers::pi;  // a turn this long may as well go the other way round
+constexpr double kBrakingShare = 0.6;                      // of the acceleration, for an axis that follows late
+constexpr double kConvergence_per_s = 8;                   // at the end of a turn
+constexpr double kNearly_rad = 0.3;                        // from here on the feed is not slowed for a turn
 
 // What a stiff shaft does at a depth, for the needle's k; of a slack one only the curvature.
 struct End {
@@ -77,8 +86,12 @@ ArcGeometry arc_geometry(const model::Pose& tip, const model::NeedleParameters& 
   return g;
 }
 
-ArcLaw::Wanted ArcLaw::step(const ArcGeometry& g, double rotation_rad, double tolerance_mm,
-                            const ControllerConfig& config) {
+double arc_miss_mm(const ArcGeometry& geometry) {
+  if (!geometry.in_domain || geometry.ahead_mm <= 0) return std::numeric_limits<double>::infinity();
+  return std::max(0.0, geometry.aim_mm.norm() - geometry.reach_mm);
+}
+
+Rates ArcLaw::step(const ArcGeometry& g, double rotation_rad, double tolerance_mm, const ControllerConfig& config) {
   const SteeringLimits& limits = config.limits;
   if (!g.in_domain || g.ahead_mm <= 0) return {};
   const double turn_feed_mm_s = limits.insertion_rate_mm_s * limits.insertion_rate_min_share;
@@ -100,28 +113,28 @@ ArcLaw::Wanted ArcLaw::step(const ArcGeometry& g, double rotation_rad, double to
     side_ = Side::facing;
 
   double error_rad = side_ == Side::facing ? g.facing_rad : wrapped(g.facing_rad + std::numbers::pi);
-  // Away is a half plane; facing matters by what the miss across is.
   const double across_mm = g.aim_mm.norm() * std::abs(std::sin(error_rad));
   const bool far_off = std::abs(error_rad) > 0.5 * std::numbers::pi;
   const bool must_turn =
-      side_ == Side::facing ? far_off || across_mm > 0.5 * width_mm : std::abs(error_rad) > std::numbers::pi / 3;
-  const bool done = side_ == Side::facing ? !far_off && across_mm < 0.1 * width_mm : std::abs(error_rad) < 0.2;
+      side_ == Side::facing ? far_off || across_mm > kTurnAcross * width_mm : std::abs(error_rad) > kTurnAway_rad;
+  const bool done =
+      side_ == Side::facing ? !far_off && across_mm < kRestAcross * width_mm : std::abs(error_rad) < kRestAway_rad;
   turning_ = turning_ ? !done : must_turn;
-  Wanted wanted{limits.insertion_rate_mm_s, 0};
+  Rates wanted{limits.insertion_rate_mm_s, 0};
   if (!turning_) {
     turn_ = rotation_rad > 0 ? -1 : 1;  // the next half turn unwinds the cable
     return wanted;
   }
-  if (std::abs(error_rad) > 0.8 * std::numbers::pi) error_rad = std::copysign(error_rad, turn_);
+  if (std::abs(error_rad) > kEitherWay_rad) error_rad = std::copysign(error_rad, turn_);
   const double room_rad = limits.total_rotation_rad - std::abs(rotation_rad);
   if (error_rad * rotation_rad > 0 && std::abs(error_rad) > room_rad)
     error_rad -= std::copysign(2 * std::numbers::pi, error_rad);
   turn_ = std::copysign(1.0, error_rad);
   // As fast as the axis can still stop at the angle; in proportion at the end.
-  const double braking = std::sqrt(2 * 0.6 * limits.rotation_acceleration_rad_s2 * std::abs(error_rad));
-  wanted.rotation_rad_s =
-      std::copysign(std::min({limits.rotation_rate_rad_s, braking, 8.0 * std::abs(error_rad)}), error_rad);
-  wanted.insertion_mm_s = std::abs(error_rad) > 0.3 ? turn_feed_mm_s : limits.insertion_rate_mm_s;
+  const double braking = std::sqrt(2 * kBrakingShare * limits.rotation_acceleration_rad_s2 * std::abs(error_rad));
+  wanted.rotation_rad_s = std::copysign(
+      std::min({limits.rotation_rate_rad_s, braking, kConvergence_per_s * std::abs(error_rad)}), error_rad);
+  wanted.insertion_mm_s = std::abs(error_rad) > kNearly_rad ? turn_feed_mm_s : limits.insertion_rate_mm_s;
   return wanted;
 }
 

@@ -2,11 +2,11 @@
 // Steering by arcs: the bevel rests, and is turned only when the predicted miss leaves what can still be corrected.
 //
 // With the bevel kept as it is, inputs are constant and the tip will pass the target's depth at a landing that does not
-// depend on when it is predicted. Let W be where the target lies beside the landing of a needle that spins (no net
-// bend), and reach >= 0 by how much the landing lies to the bevel's side if the bevel is kept, both at the target's
-// depth. The predicted miss is the vector
+// depend on when it is predicted (to 3 % with slip, whose side the shaft's tilt turns). Let W be where the target lies
+// beside the landing of a needle that spins (no net bend), and reach >= 0 by how much the landing lies to the bevel's
+// side if the bevel is kept, both at the target's depth. The predicted miss is the vector
 //     m = W - reach u,    u the unit vector toward the bevel's side.
-// Insertion alone leaves m as it is (tested for drawn poses and needles); turning changes it by -reach du. So
+// Insertion alone leaves m as it is (tested on drawn poses and needles); turning changes it by -reach du. So
 //     facing  (u along W):    |m| = | |W| - reach |: overshoot where reach > |W|, out of reach where reach < |W|;
 //     away    (u against W):  inserting ds makes |W| - reach grow by 2 d(reach)/ds ds.
 // Sliding variable: S = |W| - reach. The law keeps S inside the tube [-width, 0]:
@@ -16,8 +16,7 @@
 // The width is what can still be corrected: a share of the bend to come, but no less than what the shortest correction,
 // two half turns at the limits of rate and acceleration, would change; nothing smaller can be put right, and trying
 // would make it worse. Where S > 0 (out of reach) the bevel faces W: nothing comes nearer.
-#include "controller/config.hpp"
-#include "model/kinematics.hpp"
+#include "controller/steering_law.hpp"
 
 namespace bevel::controller {
 
@@ -35,15 +34,15 @@ struct ArcGeometry {
 ArcGeometry arc_geometry(const model::Pose& tip, const model::NeedleParameters& needle, const ShaftConfig& shaft,
                          const Eigen::Vector3d& target_mm);
 
+// The least that can still be missed by: what lies out of reach. Infinite for a target that lies behind, and outside
+// the model's domain.
+double arc_miss_mm(const ArcGeometry& geometry);
+
 class ArcLaw {
  public:
-  struct Wanted {
-    double insertion_mm_s = 0;
-    double rotation_rad_s = 0;
-  };
   void restart() { *this = {}; }
-  // rotation_rad: of the axis, for the cable.
-  Wanted step(const ArcGeometry& geometry, double rotation_rad, double tolerance_mm, const ControllerConfig& config);
+  // What it would command now, without ramps. rotation_rad: of the axis, for the cable.
+  Rates step(const ArcGeometry& geometry, double rotation_rad, double tolerance_mm, const ControllerConfig& config);
 
  private:
   enum class Side { undecided, facing, away };

@@ -131,10 +131,13 @@ void Supervisor::request(Request request, const std::optional<Target>& target, s
   status_.unit = "";
   rates_ = {};
   if (!check_inputs(now_utime)) return;
-  const Reach reach =
-      predict_reach(needle_state_->pose, needle_now(), target->position_mm, config_.safety.target_miss_max_mm);
-  status_.predicted_miss_mm = reach.miss_mm;
-  if (!reach.reachable) return stop(Reason::target_unreachable, reach.miss_mm, "mm predicted miss");
+  const double largest_mm = config_.safety.target_miss_max_mm;
+  status_.predicted_miss_mm =
+      shaft_now().bending_mm > 0
+          ? arc_miss_mm(arc_geometry(needle_state_->pose, needle_now(), shaft_now(), target->position_mm))
+          : predict_reach(needle_state_->pose, needle_now(), target->position_mm, largest_mm).miss_mm;
+  if (!(status_.predicted_miss_mm <= largest_mm))
+    return stop(Reason::target_unreachable, status_.predicted_miss_mm, "mm predicted miss");
   target_ = target;
   status_.state = State::armed;
   axes_were_enabled_ = false;
@@ -299,8 +302,7 @@ model::MotionCommand Supervisor::step(std::int64_t now_utime, double elapsed_s) 
   }
   rates_ = ramp(rates_, wanted, dt_s, config_.limits);
   remember(rates_);
-  status_.predicted_miss_mm =
-      arcs ? std::max(0.0, status_.arc.aim_mm.norm() - status_.arc.reach_mm) : status_.geometry.aim_mm.norm();
+  if (ahead_mm > 0) status_.predicted_miss_mm = arcs ? arc_miss_mm(status_.arc) : status_.geometry.aim_mm.norm();
   command.mode = 1;
   command.insertion_rate_mm_s = rates_.insertion_mm_s;
   command.rotation_rate_rad_s = rates_.rotation_rad_s;
@@ -325,8 +327,7 @@ Rates Supervisor::steer() {
   Rates wanted;
   double ahead_mm = 0, off_rad = 0;
   if (config_.law == Law::arcs) {
-    const ArcLaw::Wanted arc = arcs_.step(status_.arc, rotation_rad, tolerance_mm, config_);
-    wanted = {arc.insertion_mm_s, arc.rotation_rad_s};
+    wanted = arcs_.step(status_.arc, rotation_rad, tolerance_mm, config_);
     ahead_mm = status_.arc.ahead_mm;
     off_rad = status_.arc.facing_rad;
   } else {

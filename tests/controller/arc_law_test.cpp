@@ -96,8 +96,7 @@ Steered steer_to(const Eigen::Vector3d& target, const model::NeedleParameters& t
   for (int i = 0; i < 10000; ++i) {
     const ArcGeometry g = arc_geometry(tip, believed, {}, target);
     if (!g.in_domain || g.ahead_mm <= 0) break;
-    const ArcLaw::Wanted wanted = law.step(g, rotation_rad, 0.05, config);
-    const Rates next = ramp(rates, {wanted.insertion_mm_s, wanted.rotation_rad_s}, dt, config.limits);
+    const Rates next = ramp(rates, law.step(g, rotation_rad, 0.05, config), dt, config.limits);
     run.largest_acceleration =
         std::max(run.largest_acceleration, std::abs(next.rotation_rad_s - rates.rotation_rad_s) / dt);
     rates = next;
@@ -151,7 +150,7 @@ TEST(ArcLaw, FacesATargetThatIsOutOfReach) {
   const ArcGeometry g = arc_geometry(tip, agar(), {}, {30, 0, 60});
   ASSERT_GT(g.aim_mm.norm(), g.reach_mm);
   ArcLaw law;
-  const ArcLaw::Wanted wanted = law.step(g, 0, 0.05, config);
+  const Rates wanted = law.step(g, 0, 0.05, config);
   EXPECT_GT(wanted.rotation_rad_s * g.facing_rad, 0);
   const Steered run = steer_to({30, 0, 60}, agar(), agar(), config);
   EXPECT_NEAR(run.miss_mm, g.aim_mm.norm() - g.reach_mm, 2.5) << "as near as it comes, but for the first half turn";

@@ -52,7 +52,7 @@ std::vector<model::MotionCommand> commands_of(const SystemConfig& config, int pe
   model::ActuatorState axes;
   axes.axis_status = {2, 2};
   steering_target_t target{};
-  target.position_mm[0] = 14;  // so far that the law turns at once
+  target.position_mm[0] = 8;
   target.position_mm[2] = 100;
   for (int period = 0; period < periods; ++period) {
     const std::int64_t utime = kStart_utime + period * kPeriod_us;
@@ -81,8 +81,10 @@ std::vector<model::MotionCommand> commands_of(const SystemConfig& config, int pe
 
 // At the entry half the width lies before the tip turns: the base turns faster by what it can brake within that.
 TEST(ControllerNode, UndoesTheBacklashThatItsFileSpeaksOf) {
-  const SystemConfig config = system_of(std::string(kNeedle) + kBacklash);
-  const auto plain = commands_of(system_of(kNeedle), kPeriods), undone = commands_of(config, kPeriods);
+  // By the law that turns all the way, at a rate that leaves room for more.
+  const std::string spinning = std::string(kNeedle) + "[controller]\nlaw = \"spin\"\n";
+  const SystemConfig config = system_of(spinning + kBacklash);
+  const auto plain = commands_of(system_of(spinning), kPeriods), undone = commands_of(config, kPeriods);
   ASSERT_THAT(plain, SizeIs(kPeriods));
   ASSERT_THAT(undone, SizeIs(kPeriods));
   EXPECT_EQ(plain.back().mode, 1);
