@@ -11,6 +11,7 @@ namespace bevel::controller {
 namespace {
 
 constexpr double kStep_mm = 4.0;  // of the prediction
+constexpr double kDeviations = 1;
 // Where it turns and where it has turned enough; between the two it rests. Facing: what the miss is across, of the
 // tube's width. Away: half a plane is away, so that coarsely will do.
 constexpr double kTurnAcross = 0.5, kRestAcross = 0.1;
@@ -53,7 +54,7 @@ double wrapped(double angle_rad) { return std::remainder(angle_rad, 2 * std::num
 }  // namespace
 
 ArcGeometry arc_geometry(const model::Pose& tip, const model::NeedleParameters& needle, const ShaftConfig& shaft,
-                         const Eigen::Vector3d& target_mm) {
+                         const Eigen::Vector3d& target_mm, const BendUncertainty& uncertain) {
   ArcGeometry g;
   const End now = end_at(tip.p_mm.z(), needle, shaft);
   model::Pose middle = tip;
@@ -82,6 +83,11 @@ ArcGeometry arc_geometry(const model::Pose& tip, const model::NeedleParameters& 
   g.reach_mm = across(facing_mm - straight_mm).norm();
   const End there = end_at(tip.p_mm.z() + 0.5 * g.ahead_mm, needle, shaft);
   g.reach_per_mm = std::abs(there.cut_rad) + std::abs(there.curvature_per_mm) * g.ahead_mm;
+  // Of k (b^2 / 2 + b q + q^2 / 2), the reach deep in the tissue. Where the tip is is known: of the swing, b^2 / 2,
+  // only what it goes through until the bevel faces W is not.
+  const double k = needle.curvature_per_mm, b = shaft.bending_mm, q = g.ahead_mm, swings = 1 - std::cos(g.facing_rad);
+  g.reach_sd_mm = std::hypot((swings * 0.5 * b * b + b * q + 0.5 * q * q) * uncertain.curvature_per_mm,
+                             k * (swings * b + q) * uncertain.bending_mm);
   g.in_domain = true;
   return g;
 }
@@ -99,7 +105,8 @@ Rates ArcLaw::step(const ArcGeometry& g, double rotation_rad, double tolerance_m
       std::numbers::pi / limits.rotation_rate_rad_s + limits.rotation_rate_rad_s / limits.rotation_acceleration_rad_s2;
   const double half_turn_mm = half_turn_s * turn_feed_mm_s;
   const double smallest_mm = g.reach_per_mm * half_turn_mm;  // half of what away and back changes
-  const double width_mm = std::max(tolerance_mm + config.gains.tube_share * g.reach_per_mm * g.ahead_mm, smallest_mm);
+  const double width_mm = std::max({tolerance_mm + config.gains.tube_share * g.reach_per_mm * g.ahead_mm, smallest_mm,
+                                    2 * kDeviations * g.reach_sd_mm});
   const double S = g.aim_mm.norm() - g.reach_mm;
   // Away, and back before it is there: two half turns, and room to brake.
   const bool time_for_both = g.ahead_mm > 3 * half_turn_mm;

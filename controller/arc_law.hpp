@@ -14,8 +14,9 @@
 //     tube is reached after at most (-S) / (2 d(reach)/ds); once S >= -width / 2, counting what is inserted while it
 //     turns, it turns to W and rests; the rest is the angle to W, kept within the tube as well.
 // The width is what can still be corrected: a share of the bend to come, but no less than what the shortest correction,
-// two half turns at the limits of rate and acceleration, would change; nothing smaller can be put right, and trying
-// would make it worse. Where S > 0 (out of reach) the bevel faces W: nothing comes nearer.
+// two half turns at the limits of rate and acceleration, would change (nothing smaller can be put right, and trying
+// would make it worse), and no less than what the reach is uncertain by: too far can be mended later, too short cannot.
+// Where S > 0 (out of reach) the bevel faces W: nothing comes nearer.
 #include "controller/steering_law.hpp"
 
 namespace bevel::controller {
@@ -25,14 +26,20 @@ struct ArcGeometry {
   double ahead_mm = 0;                               // to go until the target's depth, along the shaft
   Eigen::Vector2d aim_mm = Eigen::Vector2d::Zero();  // W, in the frame of the shaft
   double reach_mm = 0;
+  double reach_sd_mm = 0;                             // by what is not known of k and the bending length
   double reach_per_mm = 0;                            // by which it falls with insertion
   double facing_rad = 0;                              // turn of the bevel that points it at W, in (-pi, pi]
   Eigen::Vector2d miss_mm = Eigen::Vector2d::Zero();  // m
 };
 
+// Standard deviations of the estimate.
+struct BendUncertainty {
+  double curvature_per_mm = 0, bending_mm = 0;
+};
+
 // tip: of the shaft's end, in {A}; target in {A}.
 ArcGeometry arc_geometry(const model::Pose& tip, const model::NeedleParameters& needle, const ShaftConfig& shaft,
-                         const Eigen::Vector3d& target_mm);
+                         const Eigen::Vector3d& target_mm, const BendUncertainty& uncertain = {});
 
 // The least that can still be missed by: what lies out of reach. Infinite for a target that lies behind, and outside
 // the model's domain.

@@ -312,7 +312,7 @@ model::MotionCommand Supervisor::step(std::int64_t now_utime, double elapsed_s) 
 bool Supervisor::see_geometry() {
   const model::Pose& tip = needle_state_->pose;
   if (config_.law == Law::arcs) {
-    status_.arc = arc_geometry(tip, needle_now(), shaft_now(), target_->position_mm);
+    status_.arc = arc_geometry(tip, needle_now(), shaft_now(), target_->position_mm, needle_state_->uncertain);
     return status_.arc.in_domain;
   }
   status_.geometry = steering_geometry(tip, needle_now(), target_->position_mm, config_.limits.insertion_rate_mm_s,

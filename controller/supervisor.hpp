@@ -50,7 +50,8 @@ struct NeedleView {
   double curvature_per_mm = 0;
   double lambda1_per_rad = 0;
   double lambda2 = 0;
-  double bending_mm = 0;             // of a stiff shaft; 0: as configured
+  double bending_mm = 0;  // of a stiff shaft; 0: as configured
+  BendUncertainty uncertain;
   double position_variance_mm2 = 0;  // largest along any axis
   std::int32_t health = 0;
   std::int32_t reset_count = 0;

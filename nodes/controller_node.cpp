@@ -39,6 +39,7 @@ controller::NeedleView to_view(const needle_state_t& m) {
   v.curvature_per_mm = m.curvature_per_mm;
   v.lambda1_per_rad = m.lambda1_per_rad;
   v.lambda2 = m.lambda2;
+  v.uncertain.curvature_per_mm = std::sqrt(m.covariance[9 * 6 + 6]);
   Eigen::Matrix3d position;
   for (int r = 0; r < 3; ++r)
     for (int c = 0; c < 3; ++c) position(r, c) = m.covariance[9 * r + c];
@@ -67,6 +68,7 @@ ControllerNode::ControllerNode(lcm::LCM& lcm, const SystemConfig& config)
         check_alive(m);
         controller::NeedleView view = to_view(m);
         view.bending_mm = bending_mm_;
+        view.uncertain.bending_mm = bending_sd_mm_;
         supervisor_.set_needle(view);
         if (!supervisor_.watch(port_.now().utime)) command(0);
       },
@@ -75,7 +77,7 @@ ControllerNode::ControllerNode(lcm::LCM& lcm, const SystemConfig& config)
       });
   // Not watched: without it the law steers by the configured shaft, and what it steers by is watched above.
   port_.subscribe<needle_shaft_t>(io::channel::kNeedleShaft, [this](const needle_shaft_t& m) {
-    if (config_.shaft.bending_mm > 0) bending_mm_ = m.bending_mm;
+    if (config_.shaft.bending_mm > 0) bending_mm_ = m.bending_mm, bending_sd_mm_ = m.bending_sd_mm;
   });
   port_.subscribe<actuator_state_t>(
       io::channel::kActuatorState, input_limits(config_.safety.actuator_age_s),

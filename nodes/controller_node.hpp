@@ -38,6 +38,7 @@ class ControllerNode {
   LcmPort port_;
   controller::Supervisor supervisor_;
   double bending_mm_ = 0;  // newest heard of a stiff shaft; 0: as configured
+  double bending_sd_mm_ = 0;
   StatusReporter status_;
   OperatorWords words_;
   std::array<double, 3> same_position_mm_{};

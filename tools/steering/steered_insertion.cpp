@@ -91,6 +91,8 @@ controller::NeedleView view_of(const estimator::Estimate& estimate) {
   view.lambda1_per_rad = estimate.state.lambda1_per_rad;
   view.lambda2 = estimate.state.lambda2;
   view.bending_mm = estimate.state.bending_mm;
+  view.uncertain = {std::sqrt(estimate.state.covariance(6, 6)),
+                    estimate.state.bending_mm > 0 ? std::sqrt(estimate.state.tenth_variance) : 0};
   view.position_variance_mm2 = estimate.state.covariance.diagonal().head<3>().maxCoeff();
   view.health = estimate.health;
   view.reset_count = estimate.state.reset_count;
