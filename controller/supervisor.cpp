@@ -121,6 +121,13 @@ void Supervisor::request(Request request, const std::optional<Target>& target, s
       arcs_.restart();
       status_.state = State::steering;
       return;
+    case Request::follow:
+      if (!in_motion_states() || !target || !target->position_mm.allFinite() || !check_inputs(now_utime)) return;
+      if (const double miss_mm = predicted_miss_mm(target->position_mm);
+          !(miss_mm <= config_.safety.target_miss_max_mm))
+        return stop(Reason::target_unreachable, miss_mm, "mm predicted miss");
+      target_->position_mm = target->position_mm;
+      return;
     case Request::arm:
       break;
   }
@@ -131,12 +138,8 @@ void Supervisor::request(Request request, const std::optional<Target>& target, s
   status_.unit = "";
   rates_ = {};
   if (!check_inputs(now_utime)) return;
-  const double largest_mm = config_.safety.target_miss_max_mm;
-  status_.predicted_miss_mm =
-      shaft_now().bending_mm > 0
-          ? arc_miss_mm(arc_geometry(needle_state_->pose, needle_now(), shaft_now(), target->position_mm))
-          : predict_reach(needle_state_->pose, needle_now(), target->position_mm, largest_mm).miss_mm;
-  if (!(status_.predicted_miss_mm <= largest_mm))
+  status_.predicted_miss_mm = predicted_miss_mm(target->position_mm);
+  if (!(status_.predicted_miss_mm <= config_.safety.target_miss_max_mm))
     return stop(Reason::target_unreachable, status_.predicted_miss_mm, "mm predicted miss");
   target_ = target;
   status_.state = State::armed;
@@ -144,6 +147,15 @@ void Supervisor::request(Request request, const std::optional<Target>& target, s
   enabling_s_ = tracking_bad_s_ = 0;
   commands_ = 0;
   resting_.reset();
+}
+
+double Supervisor::predicted_miss_mm(const Eigen::Vector3d& target_mm) const {
+  const model::Pose& tip = needle_state_->pose;
+  if (shaft_now().bending_mm > 0) {
+    const ArcGeometry arc = arc_geometry(tip, needle_now(), shaft_now(), target_mm);
+    return arc.in_domain && arc.ahead_mm <= 0 ? (target_mm - tip.p_mm).norm() : arc_miss_mm(arc);
+  }
+  return predict_reach(tip, needle_now(), target_mm, config_.safety.target_miss_max_mm).miss_mm;
 }
 
 // Everything that must hold for motion; latches the first thing that does not.

@@ -41,7 +41,7 @@ enum class Reason {
 const char* to_string(State state);
 const char* to_string(Reason reason);
 
-enum class Request : std::int32_t { stop = 0, arm = 1, start = 2, hold = 3 };
+enum class Request : std::int32_t { stop = 0, arm = 1, start = 2, hold = 3, follow = 6 };
 
 // What the controller needs of NEEDLE_STATE.
 struct NeedleView {
@@ -88,7 +88,8 @@ class Supervisor {
 
   // An operator's word. arm: takes the target and leaves off, hold or stopped; refused (reason latched) when out of
   // reach. start: from armed or hold to steering, once both axes are enabled. hold: comes to rest within the limits of
-  // acceleration, may go on. stop: latched.
+  // acceleration, may go on. stop: latched. follow: another target from now on, in motion too; one that is out of reach
+  // stops.
   void request(Request request, const std::optional<Target>& target, std::int64_t now_utime);
   // Latches what others found: overrun, input_refused, ending.
   void report(Reason reason) { stop(reason, 0, ""); }
@@ -115,6 +116,7 @@ class Supervisor {
   bool check_rest();
   Rates steer();
   bool see_geometry();
+  double predicted_miss_mm(const Eigen::Vector3d& target_mm) const;
   void remember(const Rates& commanded);
   model::NeedleParameters needle_now() const;
   ShaftConfig shaft_now() const;

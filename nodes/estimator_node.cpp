@@ -119,6 +119,7 @@ void EstimatorNode::on_word(Word word) {
     case Word::stop:
     case Word::start:
     case Word::hold:
+    case Word::follow:
       return;  // of motion
   }
   port_.forget_senders();

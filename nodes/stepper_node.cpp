@@ -74,6 +74,7 @@ void StepperNode::on_word(Word word) {
       break;
     case Word::start:
     case Word::hold:
+    case Word::follow:
       break;  // the controller's
   }
 }

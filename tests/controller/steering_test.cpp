@@ -315,6 +315,24 @@ TEST_F(SupervisorTest, UnreachableTargetIsRefusedWithTheMiss) {
   EXPECT_GT(supervisor.status().value, 20);
 }
 
+TEST_F(SupervisorTest, FollowsATargetThatMovesAndStopsWhereItGoesOutOfReach) {
+  supervisor.set_needle(view(now));
+  supervisor.set_actuator(axes(now));
+  supervisor.request(Request::follow, Target{{2, -8, 100}, 0}, now);
+  EXPECT_EQ(supervisor.status().state, State::off) << "it arms nothing";
+  start();
+  EXPECT_EQ(good_step().mode, 1);
+  const Eigen::Vector2d before = supervisor.status().arc.aim_mm;
+  supervisor.request(Request::follow, Target{{4, -8, 100}, 0}, now);
+  EXPECT_EQ(good_step().mode, 1);
+  EXPECT_NEAR((supervisor.status().arc.aim_mm - before - Eigen::Vector2d(2, 0)).norm(), 0, 0.05);
+  supervisor.request(Request::follow, Target{{std::nan(""), 0, 100}, 0}, now);
+  EXPECT_EQ(good_step().mode, 1) << "no target at all is none";
+  supervisor.request(Request::follow, Target{{0, 60, 60}, 0}, now);
+  EXPECT_GT(supervisor.status().value, 20);
+  expect_stopped(Reason::target_unreachable);
+}
+
 TEST_F(SupervisorTest, HoldsAtTheClosestApproach) {
   start();
   good_step();

@@ -54,6 +54,8 @@ struct Kinematic {
   double outlier_share = 0;
   double windup_at_100mm_rad = 0;
   bool windup_known = false;
+  double drift_mm = 0;      // of the target in 20 s, in a drawn direction across
+  double breathing_mm = 0;  // of the target, amplitude at 0.25 Hz along x, phase drawn
 };
 Trial kinematic(const Kinematic& kind, std::uint64_t seed) {
   Draw draw(seed);
@@ -76,6 +78,17 @@ Trial kinematic(const Kinematic& kind, std::uint64_t seed) {
     if (kind.windup_known) trial.believed.estimator.effects = trial.believed.undone = effects;
   }
   trial.target_mm = draw_target(draw, std::min(truth.curvature_per_mm, believed.curvature_per_mm));
+  const double angle = draw.uniform(0, 2 * std::numbers::pi);
+  const Eigen::Vector3d target = trial.target_mm;
+  if (kind.drift_mm > 0)
+    trial.rig.target_mm = [=](double time_s) -> Eigen::Vector3d {
+      return target + kind.drift_mm * time_s / 20 * Eigen::Vector3d(std::cos(angle), std::sin(angle), 0);
+    };
+  if (kind.breathing_mm > 0)
+    trial.rig.target_mm = [=](double time_s) -> Eigen::Vector3d {
+      return target +
+             kind.breathing_mm * std::sin(2 * std::numbers::pi * 0.25 * time_s + angle) * Eigen::Vector3d::UnitX();
+    };
   trial.rig.cameras = cameras(kind.cameras);
   trial.rig.cameras.outlier_share = kind.outlier_share;
   trial.rig.make_plant = [truth, effects, roll_rad] {
@@ -140,6 +153,10 @@ const std::vector<Scenario>& scenarios() {
       scenario<Kinematic>("windup", "wind-up of 0.5 rad at 100 mm, unknown", {.windup_at_100mm_rad = 0.5}, kinematic),
       scenario<Kinematic>("windup-known", "the same, in the model file",
                           {.windup_at_100mm_rad = 0.5, .windup_known = true}, kinematic),
+      scenario<Kinematic>("moving", "a target that moves by 5 mm in 20 s, told of at 17 Hz", {.drift_mm = 5},
+                          kinematic),
+      scenario<Kinematic>("breathing", "a target that breathes by +-3 mm at 0.25 Hz, told of at 17 Hz",
+                          {.breathing_mm = 3}, kinematic),
       scenario<Kinematic>("roll", "the bevel's roll at the start off by 0.5 rad (standard deviation)",
                           {.roll_sd_rad = 0.5}, kinematic),
       scenario<Kinematic>("one-camera", "one camera, along x", {.cameras = 1}, kinematic),

@@ -15,6 +15,7 @@ constexpr std::int64_t kStart_utime = 1'700'000'000'000'000;
 constexpr std::int64_t kTick_us = 5'000;
 constexpr std::int64_t kActuatorPeriod_us = 10'000;
 constexpr std::int64_t kSettle_us = 500'000;  // at rest before it is told to go: the filter has seen the tip
+constexpr std::int64_t kFollow_us = 60'000;   // between words on a target that moves
 constexpr std::int64_t kTimeLimit_us = 240'000'000;
 
 // Coloured noise along each axis that is seen, and one message a frame from each camera.
@@ -120,6 +121,7 @@ Insertion steer(const SteeredRig& rig, const Believed& believed, const Eigen::Ve
                       static_cast<std::int32_t>(model::AxisStatus::enabled)};
   std::int64_t next_frame_us = 0;
   bool started = false;
+  const auto target_now = [&] { return rig.target_mm ? rig.target_mm(result.duration_s) : target_mm; };
   for (std::int64_t us = 0; us < kTimeLimit_us; us += kTick_us) {
     const std::int64_t utime = kStart_utime + us;
     if (us > 0) {
@@ -148,6 +150,8 @@ Insertion steer(const SteeredRig& rig, const Believed& believed, const Eigen::Ve
       supervisor.request(controller::Request::start, target, utime);
       started = true;
     }
+    if (rig.target_mm && us % kFollow_us == 0)
+      supervisor.request(controller::Request::follow, controller::Target{target_now(), 0}, utime);
     const model::MotionCommand command = supervisor.step(utime, config.period_s);
     axes.insertion_rate_mm_s = command.insertion_rate_mm_s;
     axes.rotation_rate_rad_s = command.rotation_rate_rad_s;
@@ -156,7 +160,7 @@ Insertion steer(const SteeredRig& rig, const Believed& believed, const Eigen::Ve
   result.inserted_mm = axes.insertion_mm;
   result.arrived = supervisor.status().state == controller::State::hold;
   result.reason = supervisor.status().reason;
-  result.miss_mm = (plant->tip().p_mm - target_mm).norm();
+  result.miss_mm = (plant->tip().p_mm - target_now()).norm();
   result.estimate_error_mm = (estimator.estimate(axes.utime).tip.p_mm - plant->tip().p_mm).norm();
   return result;
 }
