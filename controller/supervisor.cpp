@@ -144,8 +144,9 @@ void Supervisor::request(Request request, const std::optional<Target>& target, s
   target_ = target;
   status_.state = State::armed;
   axes_were_enabled_ = false;
-  enabling_s_ = tracking_bad_s_ = 0;
-  commands_ = 0;
+  enabling_s_ = 0;
+  followed_utime_.reset();
+  commands_.restart();
   resting_.reset();
 }
 
@@ -222,41 +223,27 @@ bool Supervisor::check_axes() {
   return false;
 }
 
-void Supervisor::remember(const Rates& commanded) { commanded_[commands_++ % kCommands] = commanded; }
-
-// The axes do what they were told within the last axis_delay_s, at any time in it.
-bool Supervisor::check_tracking(double elapsed_s) {
+// The axes do what they were told.
+bool Supervisor::check_tracking() {
   const SafetyLimits& safety = config_.safety;
-  if (commands_ == 0) return true;
-  const auto window = static_cast<std::size_t>(std::ceil(safety.axis_delay_s / config_.period_s)) + 1;
-  Rates low = commanded_[(commands_ - 1) % kCommands], high = low;
-  for (std::size_t i = 2; i <= std::min({window, commands_, kCommands}); ++i) {
-    const Rates& r = commanded_[(commands_ - i) % kCommands];
-    low = {std::min(low.insertion_mm_s, r.insertion_mm_s), std::min(low.rotation_rad_s, r.rotation_rad_s)};
-    high = {std::max(high.insertion_mm_s, r.insertion_mm_s), std::max(high.rotation_rad_s, r.rotation_rad_s)};
-  }
-  const auto outside = [](double value, double from, double to) { return std::max({from - value, value - to, 0.0}); };
-  const double insertion = outside(actuator_->insertion_rate_mm_s, low.insertion_mm_s, high.insertion_mm_s);
-  const double rotation = outside(actuator_->rotation_rate_rad_s, low.rotation_rad_s, high.rotation_rad_s);
-  const bool bad = !(insertion <= safety.tracking_error_mm_s && rotation <= safety.tracking_error_rad_s);
-  tracking_bad_s_ = bad ? tracking_bad_s_ + elapsed_s : 0;
-  if (tracking_bad_s_ <= safety.tracking_error_s) return true;
-  insertion > safety.tracking_error_mm_s ? stop(Reason::insertion_tracking, insertion, "mm/s off")
-                                         : stop(Reason::rotation_tracking, rotation, "rad/s off");
+  const Rates excess = commands_.excess(*actuator_, safety.axis_delay_s);
+  const bool follow =
+      excess.insertion_mm_s <= safety.tracking_error_mm_s && excess.rotation_rad_s <= safety.tracking_error_rad_s;
+  if (follow || !followed_utime_) followed_utime_ = actuator_->utime;
+  if (model::age_s(actuator_->utime, *followed_utime_) <= safety.tracking_error_s) return true;
+  excess.insertion_mm_s > safety.tracking_error_mm_s
+      ? stop(Reason::insertion_tracking, excess.insertion_mm_s, "mm/s off")
+      : stop(Reason::rotation_tracking, excess.rotation_rad_s, "rad/s off");
   return false;
 }
 
 // What was told to rest rests: axes by their positions, which catches what is too slow for rates, and the estimate.
-bool Supervisor::check_rest() {
+bool Supervisor::check_rest(std::int64_t now_utime) {
   const SafetyLimits& safety = config_.safety;
-  const auto settled = static_cast<std::size_t>(std::ceil(2 * safety.axis_delay_s / config_.period_s)) + 1;
-  if (!axes_were_enabled_ || commands_ < settled) return true;
-  for (std::size_t i = 1; i <= std::min(settled, kCommands); ++i) {
-    const Rates& r = commanded_[(commands_ - i) % kCommands];
-    if (r.insertion_mm_s != 0 || r.rotation_rad_s != 0) {
-      resting_.reset();
-      return true;
-    }
+  if (!axes_were_enabled_) return true;
+  if (!commands_.told_to_rest(now_utime, 2 * safety.axis_delay_s)) {
+    resting_.reset();
+    return true;
   }
   if (!resting_) resting_ = Resting{actuator_->insertion_mm, actuator_->rotation_rad, needle_state_->pose.p_mm};
   const double moved_mm = std::abs(actuator_->insertion_mm - resting_->insertion_mm);
@@ -285,11 +272,11 @@ model::MotionCommand Supervisor::step(std::int64_t now_utime, double elapsed_s) 
     return command;
   }
   if (waits_for_axes(now_utime, elapsed_s)) return command;
-  if (!check_inputs(now_utime) || !check_axes() || !check_tracking(elapsed_s)) return command;
+  if (!check_inputs(now_utime) || !check_axes() || !check_tracking()) return command;
   if (status_.state != State::steering) {
     rates_ = ramp(rates_, {}, dt_s, config_.limits);
-    if (!check_rest()) return command;
-    remember(rates_);
+    if (!check_rest(now_utime)) return command;
+    commands_.remember(now_utime, rates_);
     command.mode = status_.state == State::hold ? 1 : 0;
     command.insertion_rate_mm_s = rates_.insertion_mm_s;
     command.rotation_rate_rad_s = rates_.rotation_rad_s;
@@ -313,7 +300,7 @@ model::MotionCommand Supervisor::step(std::int64_t now_utime, double elapsed_s) 
     wanted = steer();
   }
   rates_ = ramp(rates_, wanted, dt_s, config_.limits);
-  remember(rates_);
+  commands_.remember(now_utime, rates_);
   if (ahead_mm > 0) status_.predicted_miss_mm = arcs ? arc_miss_mm(status_.arc) : status_.geometry.aim_mm.norm();
   command.mode = 1;
   command.insertion_rate_mm_s = rates_.insertion_mm_s;

@@ -9,6 +9,7 @@
 
 #include "controller/arc_law.hpp"
 #include "controller/axis_model.hpp"
+#include "controller/command_watch.hpp"
 #include "controller/reach.hpp"
 #include "model/samples.hpp"
 
@@ -112,12 +113,11 @@ class Supervisor {
   bool see_enabled(std::int64_t now_utime);
   bool waits_for_axes(std::int64_t now_utime, double elapsed_s);
   bool check_axes();
-  bool check_tracking(double elapsed_s);
-  bool check_rest();
+  bool check_tracking();
+  bool check_rest(std::int64_t now_utime);
   Rates steer();
   bool see_geometry();
   double predicted_miss_mm(const Eigen::Vector3d& target_mm) const;
-  void remember(const Rates& commanded);
   model::NeedleParameters needle_now() const;
   ShaftConfig shaft_now() const;
   bool in_motion_states() const {
@@ -135,13 +135,10 @@ class Supervisor {
   Rates rates_;
   std::int64_t seq_ = 0;
   std::int32_t reset_count_ = 0;
-  double tracking_bad_s_ = 0;
-  bool axes_were_enabled_ = false;  // since armed
+  std::optional<std::int64_t> followed_utime_;  // of the last report that was as told
+  bool axes_were_enabled_ = false;              // since armed
   double enabling_s_ = 0;
-  // What was commanded within the delay of the axes, newest last.
-  static constexpr std::size_t kCommands = 64;
-  std::array<Rates, kCommands> commanded_{};
-  std::size_t commands_ = 0;  // since armed
+  CommandWatch commands_;  // since armed
   // Where everything stood when the axes had come to rest.
   struct Resting {
     double insertion_mm, rotation_rad;

@@ -234,21 +234,55 @@ void NeedleEstimator::process_from(std::size_t index) {
 }
 
 Estimate NeedleEstimator::estimate(std::int64_t now_utime) const {
-  Estimate result;
-  result.health = kNoMeasurement | kActuatorStale;
-  if (processed_ == 0) return result;
+  if (processed_ == 0) {
+    Estimate nothing;
+    nothing.health = kNoMeasurement | kActuatorStale;
+    return nothing;
+  }
   const Node& newest = node(processed_ - 1);
-  const FilterState& state = newest.state;
+  return describe(newest.state, newest.utime, newest_update_, now_utime);
+}
+
+Estimate NeedleEstimator::estimate_ahead(const model::ActuatorState& axes, std::int64_t now_utime) const {
+  if (processed_ == 0 || axes.utime <= node(order_.size() - 1).utime) return estimate(now_utime);
+  const Node& from = node(processed_ - 1);
+  FilterState state = from.state;
+  Update newest_update = newest_update_;
+  std::int64_t utime = from.utime;
+  double insertion_mm = from.insertion_mm, rotation_rad = from.rotation_rad;
+  const auto predict_to = [&](std::int64_t to_utime) {
+    const double share = static_cast<double>(to_utime - utime) / static_cast<double>(axes.utime - utime);
+    const double by_mm = share * (axes.insertion_mm - insertion_mm),
+                 by_rad = share * (axes.rotation_rad - rotation_rad);
+    filter_.predict(state, by_mm, by_rad, static_cast<double>(to_utime - utime) * 1e-6);
+    insertion_mm += by_mm, rotation_rad += by_rad;
+    utime = to_utime;
+  };
+  for (std::size_t i = processed_; i < order_.size(); ++i) {
+    const Node& n = node(i);
+    predict_to(n.utime);
+    if (n.kind == Kind::heading)
+      filter_.update(state, n.heading);
+    else
+      newest_update = filter_.update(state, n.measurement);
+  }
+  predict_to(axes.utime);
+  return describe(state, axes.utime, newest_update, now_utime);
+}
+
+Estimate NeedleEstimator::describe(const FilterState& state, std::int64_t utime, const Update& newest_update,
+                                   std::int64_t now_utime) const {
+  Estimate result;
   const HealthLimits& limits = filter_.config().limits;
-  result.utime = newest.utime;
+  result.utime = utime;
   result.state = state;
   result.tip = filter_.tip_pose(state);
-  result.newest_update = newest_update_;
+  result.newest_update = newest_update;
   result.health = kHealthy;
-  const auto older_than = [now_utime](std::int64_t utime, double limit_s) {
-    return model::age_s(now_utime, utime) > limit_s;
+  const auto older_than = [now_utime](std::int64_t stamp, double limit_s) {
+    return model::age_s(now_utime, stamp) > limit_s;
   };
-  if (older_than(newest.utime, limits.actuator_age_s)) result.health |= kActuatorStale;
+  if (older_than(node(processed_ - 1).utime, limits.actuator_age_s)) result.health |= kActuatorStale;
   if (state.measurement_utime == 0) {
     result.health |= kNoMeasurement;
   } else if (older_than(state.measurement_utime, limits.measurement_age_s)) {

@@ -55,6 +55,11 @@ class NeedleEstimator {
   // The newest estimate. `now_utime` is only for the age limits of health; pass the newest sample's time in a replay.
   Estimate estimate(std::int64_t now_utime) const;
 
+  // The estimate where the axes stand at `axes.utime`, a guess of now by the rates they last reported: with the
+  // readings that wait for the axes, and without any trace in the history. An instant not newer than the newest node
+  // gives estimate().
+  Estimate estimate_ahead(const model::ActuatorState& axes, std::int64_t now_utime) const;
+
   // Called, if set, once for each measurement when it is first applied: for replay's statistics. Not for late
   // roll-backs.
   struct Applied {
@@ -102,6 +107,8 @@ class NeedleEstimator {
   void remember(const Node& before, const Node& node);
   void relinearise_if_due();
   void interpolate(std::size_t index);
+  Estimate describe(const FilterState& state, std::int64_t utime, const Update& newest_update,
+                    std::int64_t now_utime) const;
 
   NeedleFilter filter_;
   std::vector<Node> pool_;            // sized once

@@ -15,11 +15,12 @@ namespace {
 // A loop this late has lost the needle: at 5 mm/s it is half a millimetre.
 constexpr double kLateStop_s = 0.1;
 constexpr double kSeenToMove_mm = 0.1;     // of insertion within which an estimate must have moved
-constexpr double kFastestCycle_hz = 1200;  // of drives; the estimator sends a state for each of theirs
+constexpr double kFastestCycle_hz = 1200;  // of drives
+constexpr double kFastestState_hz = 3200;  // the estimator sends one for each cycle and each reading
 
-io::SenderLimits input_limits(double age_s) {
+io::SenderLimits input_limits(double age_s, double fastest_hz) {
   const auto age_us = std::llround(age_s * 1e6);
-  return {.longest_age_us = age_us, .fastest_hz = kFastestCycle_hz, .silence_us = age_us};
+  return {.longest_age_us = age_us, .fastest_hz = fastest_hz, .silence_us = age_us};
 }
 
 bool latched(controller::State state) {
@@ -63,14 +64,17 @@ ControllerNode::ControllerNode(lcm::LCM& lcm, const SystemConfig& config)
   const io::MotionBounds bounds = motion_bounds(config.stepper);
   port_.on_trouble = [this](const InputTrouble& trouble) { on_trouble(trouble); };
   port_.subscribe<needle_state_t>(
-      io::channel::kNeedleState, input_limits(config_.safety.state_age_s),
+      io::channel::kNeedleState, input_limits(config_.safety.state_age_s, kFastestState_hz),
       [this](const needle_state_t& m) {
         check_alive(m);
         controller::NeedleView view = to_view(m);
         view.bending_mm = bending_mm_;
         view.uncertain.bending_mm = bending_sd_mm_;
         supervisor_.set_needle(view);
-        if (!supervisor_.watch(port_.now().utime)) command(0);
+        if (!supervisor_.watch(port_.now().utime))
+          command(0);
+        else if (supervisor_.status().state == controller::State::steering)
+          command_now();
       },
       [bounds](const needle_state_t& before, const needle_state_t& next) {
         return io::check_motion(before, next, bounds);
@@ -80,7 +84,7 @@ ControllerNode::ControllerNode(lcm::LCM& lcm, const SystemConfig& config)
     if (config_.shaft.bending_mm > 0) bending_mm_ = m.bending_mm, bending_sd_mm_ = m.bending_sd_mm;
   });
   port_.subscribe<actuator_state_t>(
-      io::channel::kActuatorState, input_limits(config_.safety.actuator_age_s),
+      io::channel::kActuatorState, input_limits(config_.safety.actuator_age_s, kFastestCycle_hz),
       [this](const actuator_state_t& m) {
         insertion_mm_ = m.insertion_mm;
         supervisor_.set_actuator(io::to_sample(m));
@@ -138,6 +142,14 @@ void ControllerNode::command(double elapsed_s) {
   report();
 }
 
+// Periods that were missed count too: under load a limit of seconds is one of seconds.
+void ControllerNode::command_now() {
+  const std::int64_t now_ns = port_.now().ns;
+  const double elapsed_s = stepped_ns_ == 0 ? config_.period_s : static_cast<double>(now_ns - stepped_ns_) * 1e-9;
+  stepped_ns_ = now_ns;
+  command(elapsed_s);
+}
+
 void ControllerNode::step(const Now& now, double late_s) {
   port_.tell_time(now);
   port_.rethrow();
@@ -147,9 +159,10 @@ void ControllerNode::step(const Now& now, double late_s) {
   }
   if (status_.name_taken())
     stop(controller::Reason::input_refused, "another bevel-controller is heard on this network");
-  // Periods that were missed count too: under load a limit of seconds is one of seconds.
-  command(stepped_ns_ == 0 ? config_.period_s : static_cast<double>(now.ns - stepped_ns_) * 1e-9);
-  stepped_ns_ = now.ns;
+  // While it steers each estimate is a step of its own, and the period only fills the gaps.
+  const bool stepped = supervisor_.status().state == controller::State::steering && stepped_ns_ != 0 &&
+                       static_cast<double>(now.ns - stepped_ns_) * 1e-9 < 0.5 * config_.period_s;
+  if (!stepped) command_now();
   report();
 }
 

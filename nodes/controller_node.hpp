@@ -1,6 +1,6 @@
 #pragma once
-// bevel-controller: NEEDLE_STATE, ACTUATOR_STATE and STEERING_TARGET in, MOTION_COMMAND out at a fixed rate, and at
-// once when motion must stop.
+// bevel-controller: NEEDLE_STATE, ACTUATOR_STATE and STEERING_TARGET in, MOTION_COMMAND out: at a fixed rate, while it
+// steers with each estimate, and at once when motion must stop.
 #include <array>
 
 #include "controller/supervisor.hpp"
@@ -18,7 +18,8 @@ class ControllerNode {
  public:
   ControllerNode(lcm::LCM& lcm, const SystemConfig& config);
   void tell_time(const Now& now) { port_.tell_time(now); }
-  // One period; call at config.controller.period_s. late_s: how much later than due; past a bound it stops motion.
+  // Call at config.controller.period_s: the watchdog of its inputs. late_s: how much later than due; past a bound it
+  // stops motion.
   void step(const Now& now, double late_s);
   // Says stop, because this process ends.
   void end();
@@ -32,6 +33,7 @@ class ControllerNode {
   void on_trouble(const InputTrouble& trouble);
   void stop(controller::Reason reason, std::string detail = "");
   void command(double elapsed_s);
+  void command_now();
   void report();
 
   controller::ControllerConfig config_;

@@ -3,6 +3,7 @@
 #include <cmath>
 
 #include "estimator/health.hpp"
+#include "model/age.hpp"
 #include "nodes/needle_pose.hpp"
 
 namespace bevel::nodes {
@@ -91,18 +92,20 @@ void EstimatorNode::on_axes(const actuator_state_t& m) {
   if (new_zero) entry_.restart();
   if (entry_.see_axes(m.insertion_mm) || new_zero) estimator_.restart();
   estimator_.add(io::to_sample(m));
-  publish();
+  publish(estimator_.estimate(port_.now().utime));
 }
 
 void EstimatorNode::on_tip(const tip_measurement_t& m) {
   cameras_.hear(m, axes_ ? axes_->insertion_mm : 0, port_.now().ns);
   if (m.status == 0 && m.information_per_mm2[8] > 0) entry_.see_tip(m.position_mm[2]);
   estimator_.add(io::to_sample(m));
+  publish_evidence();
 }
 
 void EstimatorNode::on_heading(const tip_heading_t& m) {
   headings_.hear(m, axes_ ? axes_->insertion_mm : 0, port_.now().ns);
   estimator_.add(io::to_sample(m));
+  publish_evidence();
 }
 
 void EstimatorNode::on_word(Word word) {
@@ -151,8 +154,19 @@ std::int32_t EstimatorNode::health() const {
   return health;
 }
 
-void EstimatorNode::publish() {
-  estimator::Estimate estimate = estimator_.estimate(port_.now().utime);
+void EstimatorNode::publish_evidence() {
+  if (!axes_) return;
+  const std::int64_t now_utime = port_.now().utime;
+  const double ahead_s = model::age_s(now_utime, axes_->utime);
+  if (!(ahead_s <= estimator_.filter().config().limits.actuator_age_s)) return;  // rates of then say nothing of now
+  model::ActuatorState axes = io::to_sample(*axes_);
+  axes.utime = now_utime;
+  axes.insertion_mm += axes.insertion_rate_mm_s * ahead_s;
+  axes.rotation_rad += axes.rotation_rate_rad_s * ahead_s;
+  publish(estimator_.estimate_ahead(axes, now_utime));
+}
+
+void EstimatorNode::publish(estimator::Estimate estimate) {
   if (estimate.utime <= published_utime_) return;
   published_utime_ = estimate.utime;
   estimate.health = health();

@@ -1,5 +1,7 @@
 #pragma once
-// bevel-estimator: TIP_MEASUREMENT, TIP_HEADING and ACTUATOR_STATE in, NEEDLE_STATE out, one for each actuator state.
+// bevel-estimator: TIP_MEASUREMENT, TIP_HEADING and ACTUATOR_STATE in, NEEDLE_STATE out: one for each actuator state,
+// at its time, and one for each reading as it arrives, at that moment, the axes carried on at the rates that they last
+// reported. Who acts on it need not wait for the next actuator state.
 //
 // Of the operator's words (nodes/operator_words.hpp) it obeys `entry` (the tip is at the entry point: begin there),
 // `confirm` (go on from where the axes say the needle is, although nobody watched it go there) and `arm` (inputs that
@@ -35,7 +37,8 @@ class EstimatorNode {
   void on_heading(const tip_heading_t& m);
   void on_word(Word word);
   void on_trouble(const InputTrouble& trouble);
-  void publish();
+  void publish(estimator::Estimate estimate);
+  void publish_evidence();
 
   io::MotionBounds bounds_;
   LcmPort port_;

@@ -6,10 +6,10 @@
 // per thread; no exception leaves a handler: it is kept, and step() of the node raises it.
 #include <bevel/actuator_state_t.hpp>
 #include <bevel/motion_command_t.hpp>
+#include <bevel/needle_shaft_t.hpp>
 #include <bevel/needle_state_t.hpp>
 #include <bevel/process_status_t.hpp>
 #include <bevel/steering_target_t.hpp>
-#include <bevel/needle_shaft_t.hpp>
 #include <bevel/tip_heading_t.hpp>
 #include <bevel/tip_measurement_t.hpp>
 #include <cstdint>

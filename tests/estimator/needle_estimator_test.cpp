@@ -209,6 +209,43 @@ TEST(NeedleEstimator, AMeasurementOfTheNewestActuatorStatesOwnInstantIsAppliedAt
   EXPECT_EQ(estimator.estimate(a.utime).newest_update.rank, 2);
 }
 
+TEST(NeedleEstimator, AheadIsWhatTheNextActuatorStateWouldGiveAndLeavesNoTrace) {
+  constexpr unsigned kSeed = 21;
+  std::mt19937_64 rng(kSeed);
+  const EstimatorConfig config = agar_config();
+  InsertionPlan plan;
+  plan.cameras = 2;
+  const Insertion data = testing::draw_insertion(config.prior, plan, rng).data;
+  NeedleEstimator estimator(config), looked_ahead(config);
+  int waited = 0;
+  std::size_t next = 0;
+  for (const model::ActuatorState& axes : data.actuators) {
+    // What was measured since the actuator state before waits for this one.
+    for (; next < data.measurements.size() && data.measurements[next].utime < axes.utime; ++next) {
+      estimator.add(data.measurements[next]);
+      looked_ahead.add(data.measurements[next]);
+      ++waited;
+    }
+    const Estimate ahead = looked_ahead.estimate_ahead(axes, axes.utime);
+    const std::int64_t runs = estimator.counters().relinearised;
+    estimator.add(axes);
+    looked_ahead.add(axes);
+    const Estimate then = estimator.estimate(axes.utime), now = looked_ahead.estimate(axes.utime);
+    ASSERT_EQ(now.state.covariance, then.state.covariance);
+    ASSERT_EQ(now.state.pose.p_mm, then.state.pose.p_mm);
+    if (&axes == &data.actuators.front()) continue;  // there was nothing to look ahead from
+    ASSERT_EQ(ahead.utime, then.utime);
+    ASSERT_EQ(ahead.state.measurement_utime, then.state.measurement_utime);
+    ASSERT_EQ(ahead.health, then.health);
+    // The positions between are interpolated along the way and not anew for each: the same but for rounding, and but
+    // for the past that a new node may have run again.
+    if (estimator.counters().relinearised > runs) continue;
+    ASSERT_NEAR((ahead.tip.p_mm - then.tip.p_mm).norm(), 0, 1e-9);
+    ASSERT_NEAR((ahead.state.covariance - then.state.covariance).norm(), 0, 1e-9);
+  }
+  EXPECT_GT(waited, 500);
+}
+
 TEST(NeedleEstimator, AnActuatorStateThatFindsTheHistoryFullOfWaitingMeasurementsIsTaken) {
   std::mt19937_64 rng(16);
   constexpr std::size_t kHistory = 16;

@@ -160,15 +160,21 @@ TEST_F(SystemFile, TheLiveNodeAppliesItsEffectsAsAReplayWithTheSameFileDoes) {
   nodes::EstimatorNode node(lcm, config.estimator, {});
   nodes::LcmPort port(lcm);
   std::vector<needle_state_t> live;
-  port.subscribe<needle_state_t>(io::channel::kNeedleState, [&live](const needle_state_t& m) { live.push_back(m); });
+  bool at_axes = false;
+  // Between them come those of readings as they arrive, which hold at that moment.
+  port.subscribe<needle_state_t>(io::channel::kNeedleState, [&](const needle_state_t& m) {
+    if (at_axes) live.push_back(m);
+  });
   in_order(
       data,
       [&](const model::ActuatorState& a) {
+        at_axes = true;
         node.tell_time({a.utime * 1000, a.utime});
         port.publish(io::channel::kActuatorState, io::to_message(a));
         nodes::pump(lcm);
       },
       [&](const model::TipMeasurement& m) {
+        at_axes = false;
         node.tell_time({m.utime * 1000, m.utime});
         port.publish(io::channel::kTipMeasurement, io::to_message(m));
         nodes::pump(lcm);

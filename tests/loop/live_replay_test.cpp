@@ -55,7 +55,11 @@ void expect_live_is_replay(double heading_sd_rad) {
   nodes::EstimatorNode node(lcm, config, {});
   nodes::LcmPort port(lcm);
   std::vector<needle_state_t> live;
-  port.subscribe<needle_state_t>(io::channel::kNeedleState, [&live](const needle_state_t& m) { live.push_back(m); });
+  bool at_axes = false;
+  // Between them come those of readings as they arrive, which hold at that moment.
+  port.subscribe<needle_state_t>(io::channel::kNeedleState, [&](const needle_state_t& m) {
+    if (at_axes) live.push_back(m);
+  });
   const test::TemporaryFolder folder;
   const std::string path = (folder / "live.lcm").string();
   {
@@ -67,6 +71,7 @@ void expect_live_is_replay(double heading_sd_rad) {
         port.publish(channel, message);
         log.write_message(event.arrival, channel, message);
       };
+      at_axes = event.kind == Event::actuator;
       switch (event.kind) {
         case Event::actuator:
           send(io::channel::kActuatorState, io::to_message(data.actuators[event.index]));

@@ -1,4 +1,4 @@
-// bevel-controller: NEEDLE_STATE, ACTUATOR_STATE and STEERING_TARGET in, MOTION_COMMAND out at a fixed rate.
+// bevel-controller: NEEDLE_STATE, ACTUATOR_STATE and STEERING_TARGET in, MOTION_COMMAND out.
 #include "nodes/controller_node.hpp"
 #include "tools/processes/process_main.hpp"
 

@@ -1,0 +1,117 @@
+#include "controller/target_track.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <numbers>
+
+#include "model/age.hpp"
+
+namespace bevel::controller {
+namespace {
+
+constexpr double kSlowest_hz = 0.08, kFastest_hz = 0.6;
+// Between neighbours: over the half minute of an insertion, a tenth of a turn at a quarter of a hertz.
+constexpr double kFrequencyStep = 1.015;
+
+}  // namespace
+
+TargetTrack::TargetTrack(const TargetMotion& motion) : motion_(motion) {
+  for (double hz = kSlowest_hz; hz <= kFastest_hz; hz *= kFrequencyStep)
+    breaths_.emplace_back().frequency_rad_s = 2 * std::numbers::pi * hz;
+  restart();
+}
+
+void TargetTrack::restart() {
+  count_ = 0;
+  const double v = motion_.velocity_sd_mm_s, a = motion_.breathing_sd_mm;
+  const double c = motion_.reading_sd_mm + a;  // from the first reading, which is the origin
+  for (Breath& breath : breaths_) {
+    breath.mean.setZero();
+    breath.covariance = Eigen::Vector4d(c * c, v * v, a * a, a * a).asDiagonal();
+    breath.log_weight = 0;
+  }
+}
+
+double TargetTrack::ahead_s(std::int64_t utime) const { return model::age_s(utime, newest_utime_); }
+
+void TargetTrack::observe(std::int64_t utime, const Eigen::Vector3d& position_mm) {
+  if (count_ > 0 && utime <= newest_utime_) return;
+  if (count_ == 0) {
+    newest_utime_ = utime;
+    origin_mm_ = position_mm;
+  }
+  const double since_s = ahead_s(utime);
+  const double a = motion_.breathing_sd_mm, v = motion_.velocity_sd_mm_s;
+  const Eigen::Vector4d renewed = Eigen::Vector4d(0, v * v, a * a, a * a) * since_s / motion_.renewed_after_s;
+  const double reading_mm2 = motion_.reading_sd_mm * motion_.reading_sd_mm;
+  double largest = -std::numeric_limits<double>::infinity();
+  for (Breath& breath : breaths_) {
+    const double cosine = std::cos(breath.frequency_rad_s * since_s), sine = std::sin(breath.frequency_rad_s * since_s);
+    Eigen::Matrix4d F = Eigen::Matrix4d::Identity();
+    F(0, 1) = since_s;
+    F.bottomRightCorner<2, 2>() << cosine, sine, -sine, cosine;
+    breath.mean = (F * breath.mean).eval();
+    breath.covariance = (F * breath.covariance * F.transpose()).eval();
+    breath.covariance.diagonal() += renewed;
+    const Eigen::Vector4d Ph = breath.covariance.col(0) + breath.covariance.col(2);  // what is read is m + s
+    const double variance_mm2 = Ph[0] + Ph[2] + reading_mm2;
+    const Eigen::Vector3d innovation_mm =
+        position_mm - origin_mm_ - (breath.mean.row(0) + breath.mean.row(2)).transpose();
+    breath.mean += Ph / variance_mm2 * innovation_mm.transpose();
+    breath.covariance -= Ph * Ph.transpose() / variance_mm2;
+    breath.log_weight -= 0.5 * (innovation_mm.squaredNorm() / variance_mm2 + 3 * std::log(variance_mm2));
+    largest = std::max(largest, breath.log_weight);
+  }
+  for (Breath& breath : breaths_) breath.log_weight -= largest;
+  newest_utime_ = utime;
+  newest_mm_ = position_mm;
+  ++count_;
+}
+
+const TargetTrack::Breath& TargetTrack::likeliest() const {
+  return *std::ranges::max_element(breaths_, {}, &Breath::log_weight);
+}
+
+Eigen::Vector3d TargetTrack::position_mm(std::int64_t utime) const {
+  if (empty()) return Eigen::Vector3d::Zero();
+  Eigen::Vector3d sum = Eigen::Vector3d::Zero();
+  double weights = 0;
+  for (const Breath& breath : breaths_) {
+    const double weight = std::exp(breath.log_weight);
+    const double turned_rad = breath.frequency_rad_s * ahead_s(utime);
+    sum += weight *
+           (breath.mean.transpose() * Eigen::Vector4d(1, ahead_s(utime), std::cos(turned_rad), std::sin(turned_rad)));
+    weights += weight;
+  }
+  return origin_mm_ + sum / weights;
+}
+
+Eigen::Vector3d TargetTrack::velocity_mm_s(std::int64_t utime) const {
+  if (empty()) return Eigen::Vector3d::Zero();
+  const Breath& breath = likeliest();
+  const double w = breath.frequency_rad_s, t_s = ahead_s(utime);
+  return breath.mean.transpose() * Eigen::Vector4d(0, 1, -w * std::sin(w * t_s), w * std::cos(w * t_s));
+}
+
+double TargetTrack::period_s() const { return 2 * std::numbers::pi / likeliest().frequency_rad_s; }
+
+double TargetTrack::breathing_mm() const {
+  // The longer half axis of the ellipse s cos + c sin.
+  const Eigen::Vector3d s = likeliest().mean.row(2), c = likeliest().mean.row(3);
+  const double sum = s.squaredNorm() + c.squaredNorm(), difference = s.squaredNorm() - c.squaredNorm();
+  return std::sqrt(0.5 * (sum + std::hypot(difference, 2 * s.dot(c))));
+}
+
+std::int64_t TargetTrack::next_turn_utime(std::int64_t from_utime) const {
+  if (empty()) return from_utime;
+  const Breath& breath = likeliest();
+  // s cos + c sin is at an end of its longer half axis where tan 2 w t = 2 s.c / (s.s - c.c).
+  const Eigen::Vector3d s = breath.mean.row(2), c = breath.mean.row(3);
+  const double half_s = std::numbers::pi / breath.frequency_rad_s;
+  const double first_s = 0.5 * std::atan2(2 * s.dot(c), s.squaredNorm() - c.squaredNorm()) / breath.frequency_rad_s;
+  const double turns = std::ceil((ahead_s(from_utime) - first_s) / half_s);
+  return newest_utime_ + std::llround(1e6 * (first_s + turns * half_s));
+}
+
+}  // namespace bevel::controller

@@ -1,0 +1,66 @@
+#pragma once
+// Where a target that moves will be: a middle that drifts and a breath about it. Along each axis, after a time t from
+// now,
+//   m + v t + s cos(w t) + c sin(w t),
+// with one frequency w for all. The state (m, v, s, c) is linear for each w, so that for each of a grid (0.08 to 0.6
+// Hz) there is a Kalman filter, whose process noise lets the coefficients change: no breath is like the one before. The
+// frequencies are weighed by what each predicted, their likelihoods (a bank of filters: Magill, IEEE Trans. Automat.
+// Contr. 10(4), 1965). A target at rest and one that only drifts are cases of it.
+//
+// Frame {A}, mm, mm/s, times in microseconds of one clock. Nothing allocates after the constructor.
+#include <Eigen/Core>
+#include <cstdint>
+#include <vector>
+
+namespace bevel::controller {
+
+struct TargetMotion {
+  double reading_sd_mm = 0.3;     // of a told position, along each axis
+  double velocity_sd_mm_s = 0.5;  // of the drift, prior
+  double breathing_sd_mm = 3.0;   // of s and c, prior
+  double renewed_after_s = 60.0;  // by then drift and breath may be others altogether
+};
+
+class TargetTrack {
+ public:
+  explicit TargetTrack(const TargetMotion& motion = {});
+
+  // Begins anew with the next position.
+  void restart();
+  // A position that is not newer than the one before is left out.
+  void observe(std::int64_t utime, const Eigen::Vector3d& position_mm);
+  bool empty() const { return count_ == 0; }
+  Eigen::Vector3d newest_mm() const { return newest_mm_; }
+
+  // By the frequencies' mean. Before the first position: zeros.
+  Eigen::Vector3d position_mm(std::int64_t utime) const;
+  // Of the likeliest frequency.
+  Eigen::Vector3d velocity_mm_s(std::int64_t utime) const;
+  double period_s() const;
+
+  // The first instant, from `from_utime` on and within one period, at which the target turns round along the direction
+  // in which it breathes most: it hardly moves about then. The later turns of the same side are whole periods on.
+  std::int64_t next_turn_utime(std::int64_t from_utime) const;
+  // Largest distance from the middle of its breath; of the likeliest frequency.
+  double breathing_mm() const;
+
+ private:
+  using Coefficients = Eigen::Matrix<double, 4, 3>;  // m, v, s, c at the newest reading; of x, y, z
+  struct Breath {
+    double frequency_rad_s = 0;
+    Coefficients mean = Coefficients::Zero();
+    Eigen::Matrix4d covariance;  // of each axis alike
+    double log_weight = 0;
+  };
+  double ahead_s(std::int64_t utime) const;
+  const Breath& likeliest() const;
+
+  TargetMotion motion_;
+  std::vector<Breath> breaths_;  // sized once
+  std::int64_t newest_utime_ = 0;
+  Eigen::Vector3d origin_mm_ = Eigen::Vector3d::Zero();  // the first position
+  Eigen::Vector3d newest_mm_ = Eigen::Vector3d::Zero();
+  std::int64_t count_ = 0;
+};
+
+}  // namespace bevel::controller
