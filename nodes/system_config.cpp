@@ -67,6 +67,7 @@ void read_axis(Section s, stepper::AxisConfig& axis) {
   s.read("rate_limit_unit_s", axis.rate_limit_unit_s, optional, above(0));
   s.read("acceleration_unit_s2", axis.acceleration_unit_s2, optional, above(0));
   s.read("quick_stop_unit_s2", axis.quick_stop_unit_s2, optional, above(0));
+  s.read("following_error_unit", axis.following_error_unit, optional, io::at_least(0));
   s.read("position_min_unit", axis.position_min_unit, optional, io::any_finite());
   s.read("position_max_unit", axis.position_max_unit, optional, io::any_finite());
 }
@@ -74,6 +75,9 @@ void read_axis(Section s, stepper::AxisConfig& axis) {
 void read_stepper(Section s, stepper::StepperConfig& c) {
   read_axis(s.section("insertion", optional), c.axes[stepper::kInsertion]);
   read_axis(s.section("rotation", optional), c.axes[stepper::kRotation]);
+  s.read("mode", c.mode, optional,
+         io::Choices<stepper::VelocityMode>{{"pv", stepper::VelocityMode::profile},
+                                            {"csv", stepper::VelocityMode::cyclic}});
   const auto read_ms = [&s](const char* key, std::int64_t& ns) {
     double ms = static_cast<double>(ns) * 1e-6;
     s.read(key, ms, optional, in_range(1, 1000));
@@ -84,6 +88,7 @@ void read_stepper(Section s, stepper::StepperConfig& c) {
   read_ms("setpoint_stop_age_ms", c.setpoint_stop_age_ns);
   read_ms("drive_heartbeat_ms", c.drive_heartbeat_ns);
   read_ms("drive_heartbeat_timeout_ms", c.drive_heartbeat_timeout_ns);
+  read_ms("following_error_ms", c.following_error_ns);
   read_ms("master_heartbeat_ms", c.master_heartbeat_ns);
   read_ms("master_heartbeat_timeout_ms", c.master_heartbeat_timeout_ns);
   for (const std::string& problem : stepper::problems_of(c)) s.fail("", problem);

@@ -13,7 +13,7 @@ constexpr std::uint32_t kPdoOff = 0x80000000;
 constexpr std::uint32_t kCobIdMask = 0x800007FF;  // switched off, and the identifier
 constexpr std::uint32_t kEverySync = 1;
 constexpr std::uint32_t kOnReception = 255;
-constexpr std::uint32_t kProfileVelocity = 3;
+constexpr std::uint32_t kMilliseconds = 0xFD;  // of 0x60C2:2: ten to the power of -3
 
 struct Mapped {
   std::uint16_t index;
@@ -56,6 +56,15 @@ class Script {
   std::vector<SdoJob> jobs_;
 };
 
+// Velocities travel as position units per second: drives whose maker set rpm are told, or refused. How the two terms of
+// the factor act differs between makers, except where both are 1.
+void set_velocity_unit(Script& script) {
+  for (const std::uint8_t term : {std::uint8_t{1}, std::uint8_t{2}}) {
+    script.write_if_present({0x6096, term}, 4, 1);
+    script.expect({0x6096, term}, 1, 0xFFFFFFFF, StopReason::configuration_failed, Kind::expect_if_present);
+  }
+}
+
 std::uint32_t counts(double units, double counts_per_unit) {
   return static_cast<std::uint32_t>(std::lround(units * std::abs(counts_per_unit)));
 }
@@ -72,8 +81,11 @@ std::vector<SdoJob> configuration_script(const StepperConfig& config, std::size_
   for (std::size_t i = 0; i < identity.size(); ++i)
     if (identity.at(i) != 0)
       script.expect({0x1018, static_cast<std::uint8_t>(i + 1)}, identity.at(i), 0xFFFFFFFF, StopReason::wrong_device);
-  constexpr std::uint32_t kVelocityModeBit = 1U << (kProfileVelocity - 1);
-  script.expect({0x6502, 0}, kVelocityModeBit, kVelocityModeBit, StopReason::wrong_device);
+  const auto mode = static_cast<std::uint32_t>(config.mode);
+  const bool cyclic = config.mode == VelocityMode::cyclic;
+  const std::uint32_t mode_bit = 1U << (mode - 1);
+  script.expect({0x6502, 0}, mode_bit, mode_bit, StopReason::wrong_device);
+  set_velocity_unit(script);
 
   // Each side watches the other. On our silence the drive quick-stops and leaves NMT operational, so that a driver that
   // comes back has to start it anew.
@@ -84,19 +96,28 @@ std::vector<SdoJob> configuration_script(const StepperConfig& config, std::size_
   script.write_if_present({0x1029, 1}, 1, 0);
   script.write_and_check({0x6007, 0}, 2, 3);
 
-  script.map_pdo(0x1400, 0x1600, cia301::rpdo1_id(node), kOnReception, {{0x6040, 16}, {0x60FF, 32}});
+  script.map_pdo(0x1400, 0x1600, cia301::rpdo1_id(node), cyclic ? kEverySync : kOnReception,
+                 {{0x6040, 16}, {0x60FF, 32}});
   script.map_pdo(0x1800, 0x1A00, cia301::tpdo1_id(node), kEverySync, {{0x6041, 16}, {0x606C, 32}});
   script.map_pdo(0x1801, 0x1A01, cia301::tpdo2_id(node), kEverySync, {{0x6064, 32}, {0x6061, 8}});
 
   script.write_and_check({0x605A, 0}, 2, static_cast<std::uint16_t>(config.quick_stop_option));
   script.write_if_present({0x605E, 0}, 2, 2);  // fault: quick-stop ramp, then no torque
+  if (axis.following_error_unit > 0.0) {
+    script.write({0x6065, 0}, 4, counts(axis.following_error_unit, axis.counts_per_unit));
+    script.write({0x6066, 0}, 2, static_cast<std::uint32_t>(config.following_error_ns / kMs));
+  }
   script.write_if_present({0x607F, 0}, 4, counts(axis.rate_limit_unit_s, axis.counts_per_unit));
   script.write({0x6083, 0}, 4, counts(axis.acceleration_unit_s2, axis.counts_per_unit));
   script.write({0x6084, 0}, 4, counts(axis.acceleration_unit_s2, axis.counts_per_unit));
   script.write({0x6085, 0}, 4, counts(axis.quick_stop_unit_s2, axis.counts_per_unit));
+  if (cyclic) {
+    script.write_if_present({0x60C2, 1}, 1, static_cast<std::uint32_t>(config.period_ns / kMs));
+    script.write_if_present({0x60C2, 2}, 1, kMilliseconds);
+  }
   script.write({0x60FF, 0}, 4, 0);
-  script.write({0x6060, 0}, 1, kProfileVelocity);
-  script.expect({0x6061, 0}, kProfileVelocity, 0xFF, StopReason::wrong_mode, Kind::expect_eventually);
+  script.write({0x6060, 0}, 1, mode);
+  script.expect({0x6061, 0}, mode, 0xFF, StopReason::wrong_mode, Kind::expect_eventually);
   return script.take();
 }
 

@@ -14,8 +14,9 @@ namespace bevel::stepper {
 struct SdoJob {
   enum class Kind : std::uint8_t {
     write,
-    write_if_present,   // an object that drives may leave out; an abort is accepted
-    expect,             // read, (value & mask) must be `value`
+    write_if_present,  // an object that drives may leave out; an abort is accepted
+    expect,            // read, (value & mask) must be `value`
+    expect_if_present,
     expect_eventually,  // the same, asked again until transition_timeout_ns
   };
   Kind kind = Kind::write;

@@ -14,7 +14,6 @@ constexpr std::int64_t kResetPause_ns = 500 * kMs;
 constexpr std::int64_t kStartPause_ns = 100 * kMs;
 constexpr std::uint8_t kStatusPdoBytes = 6;    // 6041, 606C
 constexpr std::uint8_t kPositionPdoBytes = 5;  // 6064, 6061
-constexpr std::uint8_t kProfileVelocity = 3;
 constexpr cia301::ObjectAddress kErrorCode{0x603F, 0};
 
 }  // namespace
@@ -93,7 +92,8 @@ void DriveNode::on_position(const can::Frame& frame, std::int64_t now_ns) {
   position_pdo_ns_ = now_ns;
   position_pdo_due_ = false;
   sampled_ns_ = sync_ns_;  // a synchronous PDO holds what was there at the SYNC
-  if (phase_ == Phase::operational && frame.data[4] != kProfileVelocity) trouble(StopReason::wrong_mode, frame.data[4]);
+  if (phase_ == Phase::operational && frame.data[4] != static_cast<std::uint8_t>(config_.mode))
+    trouble(StopReason::wrong_mode, frame.data[4]);
 }
 
 void DriveNode::on_heartbeat(const can::Frame& frame, std::int64_t now_ns) {
@@ -206,7 +206,7 @@ void DriveNode::next_job(std::int64_t now_ns) {
 
 void DriveNode::finish_job(std::int64_t now_ns) {
   const SdoJob& job = script_.at(job_);
-  const bool reads = job.kind == SdoJob::Kind::expect || job.kind == SdoJob::Kind::expect_eventually;
+  const bool reads = job.kind != SdoJob::Kind::write && job.kind != SdoJob::Kind::write_if_present;
   if (!reads || (sdo_.value() & job.mask) == job.value) return next_job(now_ns);
   if (job.kind == SdoJob::Kind::expect_eventually && now_ns - job_since_ns_ < config_.transition_timeout_ns)
     return begin_job();
@@ -227,7 +227,8 @@ void DriveNode::transfer(std::int64_t now_ns, Transmitter& out) {
       break;
     case Status::aborted:
       if (sdo_.frame_to_send()) break;
-      if (job.kind == SdoJob::Kind::write_if_present) return next_job(now_ns);
+      if (job.kind == SdoJob::Kind::write_if_present || job.kind == SdoJob::Kind::expect_if_present)
+        return next_job(now_ns);
       trouble(StopReason::sdo_aborted, sdo_.abort_code());
       break;
     case Status::timed_out:

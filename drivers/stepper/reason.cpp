@@ -34,6 +34,8 @@ const char* to_string(StopReason reason) {
       return "drive does not enable";
     case StopReason::not_following:
       return "axis does not follow the commanded rate";
+    case StopReason::travel_limit:
+      return "axis is at a limit switch or at the drive's own limit";
     case StopReason::bus_error_passive:
       return "CAN controller error-passive";
     case StopReason::bus_off:
@@ -59,7 +61,7 @@ const char* to_string(StopReason reason) {
     case StopReason::start_timeout:
       return "drive does not become operational";
     case StopReason::wrong_mode:
-      return "drive left the profile velocity mode";
+      return "drive left its mode of operation";
     case StopReason::second_drive:
       return "two drives answer with one node id";
     case StopReason::foreign_master:

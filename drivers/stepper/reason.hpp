@@ -21,6 +21,7 @@ enum class StopReason : std::uint8_t {
   pdo_lost,              // no positions within tpdo_timeout_ns
   enable_timeout,
   not_following,  // is not where the commanded rate should have brought it
+  travel_limit,   // the drive's limit switch or its software limit stopped the axis (statusword bit 11)
   bus_error_passive,
   bus_off,
   link_down,  // the interface is down or gone
@@ -34,7 +35,7 @@ enum class StopReason : std::uint8_t {
   sdo_aborted,           // code: SDO abort code
   sdo_timeout,           // code: index << 8 | sub
   start_timeout,         // configured, but does not become operational
-  wrong_mode,            // 0x6061 is no longer profile velocity
+  wrong_mode,            // 0x6061 is no longer the mode that was set
   second_drive,          // more answers than questions: two drives with one node id, or old frames sent again
   foreign_master,        // another driver commands our drives; code: the CAN id it used
 };

@@ -42,6 +42,9 @@ void check_axis(Checker& check, const AxisConfig& axis, const std::string& name)
   rate(axis.rate_limit_unit_s, ".rate_limit_unit_s");
   rate(axis.acceleration_unit_s2, ".acceleration_unit_s2");
   rate(axis.quick_stop_unit_s2, ".quick_stop_unit_s2");
+  const double window = axis.following_error_unit;
+  check.require(std::isfinite(window) && window >= 0.0 && window * counts < kLargestCounts,
+                name + ".following_error_unit", window, "0 (the drive's own), or positive and below 1e9 counts");
   check.require(axis.position_min_unit < axis.position_max_unit, name + ".position_min_unit", axis.position_min_unit,
                 "below position_max_unit");
 }
@@ -75,6 +78,9 @@ std::vector<std::string> problems_of(const StepperConfig& config) {
   duration(config.setpoint_zero_age_ns, "setpoint_zero_age_ms", config.period_ns);
   duration(config.setpoint_stop_age_ns, "setpoint_stop_age_ms", config.setpoint_zero_age_ns);
   duration(config.not_following_ns, "not_following_ms", config.period_ns);
+  duration(config.following_error_ns, "following_error_ms", kMs);
+  check.require(config.mode == VelocityMode::profile || (config.period_ns % kMs == 0 && config.period_ns <= 255 * kMs),
+                "period_ms", in_ms(config.period_ns), "whole milliseconds, at most 255, with mode \"csv\" (0x60C2)");
   check.require(config.sdo_retries >= 0 && config.sdo_retries <= 10, "sdo_retries", config.sdo_retries, "0 to 10");
   check.require(config.queue_full_limit >= 1, "queue_full_limit", config.queue_full_limit, "at least 1");
   check.require(config.quick_stop_option == 2 || config.quick_stop_option == 6, "quick_stop_option",

@@ -24,6 +24,9 @@ struct AxisConfig {
   // Workspace, applied while the position is trusted: the rate falls so that the axis comes to rest at the limit.
   double position_min_unit = -std::numeric_limits<double>::infinity();
   double position_max_unit = std::numeric_limits<double>::infinity();
+  // The drive's own supervision of its motor (0x6065, 0x6066): by how much it may lag before it faults. 0 leaves the
+  // drive's setting.
+  double following_error_unit = 0.0;
   // Identity as in object 0x1018; 0 accepts any. The device type (0x1000 = 402) is always checked.
   std::uint32_t vendor_id = 0;
   std::uint32_t product_code = 0;
@@ -32,6 +35,12 @@ struct AxisConfig {
 };
 
 inline constexpr std::int64_t kMs = 1'000'000;  // ns
+
+// Modes of operation (0x6060) in which a drive takes a velocity. In both the driver shapes the rate.
+enum class VelocityMode : std::uint8_t {
+  profile = 3,  // pv: the drive ramps by itself; a set-point acts when it arrives, so jitter of the bus is harmless
+  cyclic = 9,   // csv: set-points are latched by SYNC and interpolated over one period: both axes act at one instant
+};
 
 struct StepperConfig {
   std::array<AxisConfig, kAxes> axes{AxisConfig{.node_id = 1,
@@ -45,6 +54,7 @@ struct StepperConfig {
                                                 .acceleration_unit_s2 = 60.0,
                                                 .quick_stop_unit_s2 = 200.0}};
   std::uint8_t master_id = 127;  // node id of our own heartbeat
+  VelocityMode mode = VelocityMode::profile;
 
   std::int64_t period_ns = 10 * kMs;                     // of step(), hence of SYNC
   std::int64_t listen_ns = 300 * kMs;                    // silence demanded before our first frame: no second driver
@@ -61,6 +71,7 @@ struct StepperConfig {
   std::int64_t setpoint_zero_age_ns = 60 * kMs;     // older: rate 0 by the normal ramp
   std::int64_t setpoint_stop_age_ns = 100 * kMs;    // older: quick stop, latched
   std::int64_t not_following_ns = 80 * kMs;         // by which an axis may lag behind the commanded rate
+  std::int64_t following_error_ns = 50 * kMs;       // 0x6066, where following_error_unit is not 0
   int queue_full_limit = 5;                         // refused frames in a row
   std::int16_t quick_stop_option = 6;               // 0x605A: 6 stays in quick stop with torque, 2 lets go
 };

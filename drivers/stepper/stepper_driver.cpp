@@ -23,6 +23,8 @@ StepperConfig checked(const StepperConfig& config) {
   return config;
 }
 
+bool says_limit(const DriveNode& node) { return (node.statusword() & cia402::kInternalLimit) != 0; }
+
 }  // namespace
 
 StepperDriver::StepperDriver(can::Bus& bus, const StepperConfig& config)
@@ -71,7 +73,11 @@ void StepperDriver::stop_now(StopReason reason, std::int64_t now_ns) {
   if (latched()) return;
   receive(now_ns);  // echoes, so that nothing holds the stop back
   latch({reason, -1, 0});
-  if (bus_.is_open() && !silent_) send_commands(now_ns);
+  if (!bus_.is_open() || silent_) return;
+  send_commands(now_ns);
+  // What SYNC latches must not wait for the next one.
+  if (config_.mode == VelocityMode::cyclic && out_.send(cia301::sync(), now_ns))
+    for (auto& node : nodes_) node.on_sync(now_ns);
 }
 
 bool StepperDriver::rearm() {
@@ -301,7 +307,10 @@ void StepperDriver::run_ready(std::int64_t now_ns) {
     state_ = DriverState::enabled;
     fresh_setpoint_ns_ = now_ns;
     refusing_setpoints_ = false;
-    for (std::size_t axis = 0; axis < kAxes; ++axis) follows_.at(axis).begin(now_ns, nodes_.at(axis).position_unit());
+    for (std::size_t axis = 0; axis < kAxes; ++axis) {
+      follows_.at(axis).begin(now_ns, nodes_.at(axis).position_unit());
+      at_limit_.at(axis) = says_limit(nodes_.at(axis));
+    }
   } else if (now_ns - enable_since_ns_ > config_.transition_timeout_ns) {
     latch({StopReason::enable_timeout, -1, 0});
   }
@@ -370,6 +379,10 @@ void StepperDriver::supervise_motion(std::int64_t now_ns) {
       default:
         return latch({StopReason::drive_left_operation, static_cast<int>(axis), node.statusword()});
     }
+    // One that was enabled there may leave it again.
+    const bool came_to_limit = says_limit(node) && !at_limit_.at(axis);
+    at_limit_.at(axis) = says_limit(node);
+    if (came_to_limit) return latch({StopReason::travel_limit, static_cast<int>(axis), 0});
     if (!follows_.at(axis).follows(now_ns, shapers_.at(axis).rate_unit_s(), node.position_unit()))
       return latch({StopReason::not_following, static_cast<int>(axis), 0});
   }

@@ -143,6 +143,7 @@ class StepperDriver {
   // Of a stop: how fast each axis was, whether it has come to rest since, and whether it was behind then.
   std::array<double, kAxes> stopped_from_unit_s_{};
   std::array<bool, kAxes> judged_{}, held_back_{};
+  std::array<bool, kAxes> at_limit_{};  // what the statuswords said last
   DriverCounters counters_;
 };
 

@@ -1,4 +1,9 @@
-// The power stage, motor and encoder of the simulated drive: ramps, following error, position. Counts and seconds.
+// The power stage, motor and encoder of the simulated drive: ramps, following error, position. Encoder increments and
+// seconds.
+//
+// The demand's velocity v_d runs to its target by at most a ramp; the shaft x follows the demand's position d as a
+// first-order lag, x' = (d - x) / T. Both are integrated exactly, so that position and velocity at an instant do not
+// depend on how often, or how evenly, step() is called.
 #pragma once
 
 namespace bevel::rig {
@@ -7,24 +12,24 @@ class DriveMotion {
  public:
   explicit DriveMotion(double following_time_s) : following_time_s_(following_time_s) {}
 
-  // Demand runs towards `target` by at most `ramp`; the motor follows it as a first-order lag.
-  void step(double dt_s, double target_counts_s, double ramp_counts_s2);
+  void step(double dt_s, double target_per_s, double ramp_per_s2);
   void let_go();  // no torque: friction holds the needle where it is
-  void power_on() { *this = DriveMotion{following_time_s_}; }
   void set_blocked(bool blocked) { blocked_ = blocked; }
 
-  double demand_counts_s() const { return demand_counts_s_; }
-  double position_counts() const { return position_counts_; }
-  double velocity_counts_s() const { return velocity_counts_s_; }
-  double following_error_counts() const { return demand_position_counts_ - position_counts_; }
+  double demand_per_s() const { return demand_per_s_; }
+  double demand_position() const { return demand_position_; }
+  double position() const { return position_; }
+  double velocity_per_s() const;  // of the shaft at this instant
+  double following_error() const { return demand_position_ - position_; }
 
  private:
+  void follow(double dt_s, double acceleration_per_s2);
+
   double following_time_s_;
   bool blocked_ = false;
-  double demand_counts_s_ = 0.0;
-  double demand_position_counts_ = 0.0;
-  double position_counts_ = 0.0;
-  double velocity_counts_s_ = 0.0;
+  double demand_per_s_ = 0.0;
+  double demand_position_ = 0.0;
+  double position_ = 0.0;
 };
 
 }  // namespace bevel::rig

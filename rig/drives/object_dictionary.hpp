@@ -4,6 +4,7 @@
 
 #include <cstdint>
 #include <map>
+#include <string>
 #include <utility>
 
 namespace bevel::rig {
@@ -11,6 +12,7 @@ namespace bevel::rig {
 // SDO abort codes of CiA 301, table 22. none is not one of them.
 enum class Abort : std::uint32_t {
   none = 0,
+  toggle = 0x05030000,
   time_out = 0x05040000,
   unknown_command = 0x05040001,
   write_only = 0x06010001,
@@ -29,13 +31,14 @@ enum class Access : std::uint8_t { read_only, read_write };
 enum class Mapping : std::uint8_t { none, transmit, receive, both };
 
 struct Object {
-  std::uint8_t bytes = 4;  // 1, 2 or 4
+  std::uint8_t bytes = 4;  // 1, 2 or 4; of a text none
   std::uint32_t value = 0;
   Access access = Access::read_write;
   Mapping mapping = Mapping::none;
   std::int64_t low = INT64_MIN;  // allowed values; of the signed value where is_signed
   std::int64_t high = INT64_MAX;
   bool is_signed = false;
+  std::string text{};  // of a VISIBLE_STRING, which has no value; constant
 };
 
 class ObjectDictionary {
@@ -51,6 +54,8 @@ class ObjectDictionary {
 
   // Every object from index `first` to `last` has its value in `source` again.
   void restore(const ObjectDictionary& source, std::uint16_t first, std::uint16_t last);
+
+  const std::map<Key, Object>& all() const { return objects_; }
 
   Abort check_presence(std::uint16_t index, std::uint8_t sub) const;
   Abort check_write(std::uint16_t index, std::uint8_t sub, std::uint32_t value, unsigned bytes) const;
@@ -68,6 +73,9 @@ struct Identity {
   std::uint32_t product = 402;
   std::uint32_t revision = 1;
   std::uint32_t serial = 1;
+  std::string device_name = "Bevel simulated stepper drive";  // 1008
+  std::string hardware_version = "simulated";                 // 1009
+  std::string software_version = "2.0";                       // 100A
 };
 ObjectDictionary factory_dictionary(std::uint8_t node, const Identity& identity);
 

@@ -11,7 +11,7 @@ constexpr unsigned kFaultReset = 1U << 7;
 
 }  // namespace
 
-void PowerStateMachine::on_controlword(std::uint16_t word) {
+void PowerStateMachine::on_controlword(std::uint16_t word, int quick_stop_option) {
   const bool reset_edge = (word & kFaultReset) != 0 && !reset_bit_;
   reset_bit_ = (word & kFaultReset) != 0;
   if (state_ == State::fault) {
@@ -26,7 +26,7 @@ void PowerStateMachine::on_controlword(std::uint16_t word) {
   }
   if ((word & kQuickStopOff) == 0) {  // quick stop: 7, 10, 11
     if (state_ == State::operation_enabled) {
-      state_ = State::quick_stop_active;
+      quick_stop(quick_stop_option);
     } else if (state_ != State::quick_stop_active) {
       state_ = State::switch_on_disabled;
     }
@@ -73,8 +73,9 @@ void PowerStateMachine::on_fault() {
   state_ = has_torque() ? State::fault_reaction_active : State::fault;  // 13
 }
 
-void PowerStateMachine::quick_stop() {
-  if (state_ == State::operation_enabled) state_ = State::quick_stop_active;  // 11
+void PowerStateMachine::quick_stop(int quick_stop_option) {
+  if (state_ == State::operation_enabled)
+    state_ = quick_stop_option == 0 ? State::switch_on_disabled : State::quick_stop_active;  // 9 or 11
 }
 
 void PowerStateMachine::disable_voltage() {

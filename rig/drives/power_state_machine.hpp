@@ -18,11 +18,12 @@ class PowerStateMachine {
     fault,
   };
 
-  void on_controlword(std::uint16_t controlword);
+  // quick_stop_option: object 605A. 0 lets go at once; 1 and 2 brake and let go; 5 and 6 brake and stay.
+  void on_controlword(std::uint16_t controlword, int quick_stop_option = 2);
   void on_standstill(int quick_stop_option);  // the ramp of a quick stop or of a fault reaction has ended
   void on_fault();
-  void quick_stop();       // by the drive itself, as on the loss of its master
-  void disable_voltage();  // the same
+  void quick_stop(int quick_stop_option);  // by the drive itself, as on the loss of its master
+  void disable_voltage();                  // the same
 
   State state() const { return state_; }
   std::uint16_t statusword_bits() const;  // bits 0 to 6

@@ -1,7 +1,6 @@
 #include "rig/drives/simulated_drive.hpp"
 
 #include <algorithm>
-#include <cmath>
 
 #include "rig/drives/little_endian.hpp"
 
@@ -11,13 +10,8 @@ namespace {
 constexpr std::uint32_t kPdoInvalid = 0x80000000;
 constexpr std::uint32_t kIdMask = 0x7FF;
 constexpr std::uint8_t kLastSynchronous = 240;
-constexpr int kProfileVelocity = 3;
-constexpr std::uint16_t kRemote = 1U << 9;
-constexpr std::uint16_t kTargetReached = 1U << 10;
-constexpr std::uint16_t kHalt = 1U << 8;
 constexpr std::uint16_t kHeartbeatError = 0x8130;
 constexpr std::uint16_t kPdoTooShort = 0x8210;
-constexpr std::uint16_t kFollowingError = 0x8611;
 constexpr int kFramesPerStep = 256;
 
 std::uint16_t nth(std::uint16_t first, std::size_t n) { return static_cast<std::uint16_t>(first + n); }
@@ -28,7 +22,8 @@ SimulatedDrive::SimulatedDrive(can::Bus& bus, const SimulatedDriveConfig& config
     : bus_(bus),
       config_(config),
       od_(factory_dictionary(config.node_id, config.identity)),
-      motion_(config.following_time_s) {}
+      motion_(config.following_time_s),
+      units_(UnitFactors::of(od_)) {}
 
 void SimulatedDrive::send(const can::Frame& frame) {
   if (!silent_) (void)bus_.send(frame);
@@ -48,6 +43,7 @@ void SimulatedDrive::boot() {
   master_lost_ = false;
   syncs_ = {};
   held_rpdos_ = {};
+  uploading_ = false;
   next_heartbeat_ns_ = now_ns_;
   send({0x700U + config_.node_id, 1, {0}});
 }
@@ -61,7 +57,11 @@ void SimulatedDrive::reset_communication() {
 void SimulatedDrive::power_cycle() {
   od_ = factory_dictionary(config_.node_id, config_.identity);
   power_ = PowerStateMachine{};
-  motion_.power_on();
+  units_ = UnitFactors::of(od_);
+  homing_.forget();
+  motion_.let_go();
+  zero_increments_ = motion_.position();  // the counter begins anew, the shaft stays where it is
+  old_controlword_ = 0;
   following_error_s_ = 0.0;
   boot();
 }
@@ -97,37 +97,6 @@ void SimulatedDrive::step(std::int64_t now_ns) {
   }
 }
 
-void SimulatedDrive::advance(double dt_s) {
-  const double quick_ramp = od_.get(0x6085);
-  if (power_.moves()) {
-    const double limit = od_.get(0x607F);
-    const bool runs = od_.get_signed(0x6061) == kProfileVelocity && (od_.get(0x6040) & kHalt) == 0;
-    const double target = runs ? std::clamp(static_cast<double>(od_.get_signed(0x60FF)), -limit, limit) : 0.0;
-    const bool speeds_up = std::abs(target) > std::abs(motion_.demand_counts_s());
-    motion_.step(dt_s, target, speeds_up ? od_.get(0x6083) : od_.get(0x6084));
-  } else if (power_.brakes()) {
-    motion_.step(dt_s, 0.0, quick_ramp);
-    if (motion_.demand_counts_s() == 0.0) power_.on_standstill(od_.get_signed(0x605A));
-  } else if (power_.has_torque()) {
-    motion_.step(dt_s, 0.0, od_.get(0x6084));  // "disable operation" ramps down
-  } else {
-    motion_.let_go();
-  }
-  const bool off_track = std::abs(motion_.following_error_counts()) > static_cast<double>(od_.get(0x6065));
-  following_error_s_ = off_track ? following_error_s_ + dt_s : 0.0;
-  if (off_track && power_.moves() && following_error_s_ * 1000.0 > static_cast<double>(od_.get(0x6066)))
-    raise_fault(kFollowingError);
-}
-
-void SimulatedDrive::update_status() {
-  unsigned status = power_.statusword_bits() | kRemote;
-  if (power_.moves() && motion_.demand_counts_s() == static_cast<double>(od_.get_signed(0x60FF)))
-    status |= kTargetReached;
-  od_.set(0x6041, 0, status);
-  od_.set(0x6064, 0, static_cast<std::uint32_t>(std::llround(motion_.position_counts())));
-  od_.set(0x606C, 0, static_cast<std::uint32_t>(std::lround(motion_.velocity_counts_s())));
-}
-
 void SimulatedDrive::on_frame(const can::Frame& frame, std::int64_t now_ns) {
   const std::uint32_t master = (od_.get(0x1016, 1) >> 16) & 0x7F;
   if (frame.id == 0x000) return on_nmt(frame);
@@ -148,7 +117,7 @@ void SimulatedDrive::on_nmt(const can::Frame& frame) {
       break;
     case 0x02:
       nmt_ = NmtState::stopped;
-      power_.quick_stop();
+      power_.quick_stop(od_.get_signed(0x605A));
       break;
     case 0x80:
       nmt_ = NmtState::pre_operational;
@@ -195,7 +164,7 @@ void SimulatedDrive::on_master_lost() {
       power_.disable_voltage();
       break;
     case 3:
-      power_.quick_stop();
+      power_.quick_stop(od_.get_signed(0x605A));
       break;
     default:
       break;
@@ -253,20 +222,6 @@ void SimulatedDrive::obey(std::size_t pdo, const can::Frame& frame) {
     (void)write(static_cast<std::uint16_t>(entry >> 16), static_cast<std::uint8_t>(entry >> 8), load(frame, at, bytes),
                 bytes);
     at += bytes;
-  }
-}
-
-void SimulatedDrive::written(std::uint16_t index) {
-  if (index == 0x6060) {
-    od_.set(0x6061, 0, od_.get(0x6060));
-  } else if (index == 0x6040) {
-    const bool was_fault = power_.state() == PowerStateMachine::State::fault;
-    power_.on_controlword(static_cast<std::uint16_t>(od_.get(0x6040)));
-    if (was_fault && power_.state() != PowerStateMachine::State::fault) {
-      od_.set(0x603F, 0, 0);
-      od_.set(0x1001, 0, 0);
-      send_emergency(0);
-    }
   }
 }
 

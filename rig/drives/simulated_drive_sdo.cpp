@@ -1,4 +1,7 @@
-// The simulated drive's SDO server (CiA 301 section 7.2.4, expedited transfers) and its rules for changing PDOs.
+// The simulated drive's SDO server (CiA 301 section 7.2.4; expedited transfers, and texts in segments) and its rules
+// for changing PDOs.
+#include <algorithm>
+
 #include "rig/drives/little_endian.hpp"
 #include "rig/drives/simulated_drive.hpp"
 
@@ -7,6 +10,9 @@ namespace {
 
 constexpr std::uint32_t kPdoInvalid = 0x80000000;
 constexpr unsigned kPdoBits = 64;
+constexpr unsigned kExpeditedBytes = 4;
+constexpr std::size_t kSegmentBytes = 7;
+constexpr std::uint8_t kToggle = 0x10;
 
 bool between(std::uint16_t index, std::uint16_t first) { return index >= first && index < first + 4; }
 bool is_communication(std::uint16_t index) { return between(index, 0x1400) || between(index, 0x1800); }
@@ -35,35 +41,97 @@ void SimulatedDrive::on_sdo(const can::Frame& frame) {
         answer.data[0] = 0x60;
       }
       break;
-    case 2:  // initiate upload
-      abort = od_.check_presence(index, sub);
-      if (abort == Abort::none) {
-        update_status();
-        const Object& object = *od_.find(index, sub);
-        answer.data[0] = static_cast<std::uint8_t>(0x43 | (4 - object.bytes) << 2);
-        store(answer, 4, object.value, object.bytes);
-      }
+    case 2:
+      abort = begin_upload(index, sub, answer);
       break;
-    case 4:
-      return;  // the client gives up
+    case 3:
+      abort = next_segment(command, answer);
+      break;
+    case 4:  // the client gives up
+      uploading_ = false;
+      return;
     default:
       abort = Abort::unknown_command;
   }
   if (abort != Abort::none) {
+    uploading_ = false;
     answer.data[0] = 0x80;
+    store(answer, 1, index, 2);
+    answer.data[3] = sub;
     store(answer, 4, static_cast<std::uint32_t>(abort), 4);
   }
   send(answer);
+}
+
+Abort SimulatedDrive::begin_upload(std::uint16_t index, std::uint8_t sub, can::Frame& answer) {
+  if (const Abort absent = od_.check_presence(index, sub); absent != Abort::none) return absent;
+  update_status();
+  const Object& object = *od_.find(index, sub);
+  uploading_ = object.text.size() > kExpeditedBytes;
+  if (uploading_) {
+    upload_ = object.text;
+    toggle_ = 0;
+    answer.data[0] = 0x41;
+    store(answer, 4, static_cast<std::uint32_t>(upload_.size()), 4);
+    return Abort::none;
+  }
+  const auto bytes = object.text.empty() ? object.bytes : static_cast<unsigned>(object.text.size());
+  answer.data[0] = static_cast<std::uint8_t>(0x43 | (kExpeditedBytes - bytes) << 2);
+  if (object.text.empty()) {
+    store(answer, 4, object.value, bytes);
+  } else {
+    std::copy(object.text.begin(), object.text.end(), answer.data.begin() + 4);
+  }
+  return Abort::none;
+}
+
+// Seven characters an answer; a toggle bit tells a request that came twice from the next one.
+Abort SimulatedDrive::next_segment(std::uint8_t command, can::Frame& answer) {
+  if (!uploading_) return Abort::unknown_command;
+  if ((command & kToggle) != toggle_) return Abort::toggle;
+  const std::size_t bytes = std::min(upload_.size(), kSegmentBytes);
+  const bool last = bytes == upload_.size();
+  answer.data = {};
+  answer.data[0] = static_cast<std::uint8_t>(toggle_ | (kSegmentBytes - bytes) << 1 | (last ? 1U : 0U));
+  std::copy_n(upload_.begin(), bytes, answer.data.begin() + 1);
+  upload_.erase(0, bytes);
+  toggle_ ^= kToggle;
+  uploading_ = !last;
+  return Abort::none;
 }
 
 Abort SimulatedDrive::write(std::uint16_t index, std::uint8_t sub, std::uint32_t value, unsigned bytes) {
   Abort abort = od_.check_write(index, sub, value, bytes);
   if (abort == Abort::none && (is_communication(index) || is_mapping(index)))
     abort = check_pdo_setting(index, sub, value);
+  if (abort == Abort::none) abort = check_profile_setting(index, sub, value);
   if (abort != Abort::none) return abort;
   od_.set(index, sub, value);
   written(index);
   return Abort::none;
+}
+
+// What a range cannot say.
+Abort SimulatedDrive::check_profile_setting(std::uint16_t index, std::uint8_t sub, std::uint32_t value) const {
+  const auto number = static_cast<std::int32_t>(value);
+  bool allowed = true;
+  switch (index) {
+    case 0x605A:  // braking by the current limit or the voltage is not there to be simulated
+      allowed = number != 3 && number != 4;
+      break;
+    case 0x6060:
+      allowed = number == 0 || number == 3 || number == 6 || number == 9;
+      break;
+    case 0x607D:
+      allowed = sub == 1 ? number < od_.get_signed(0x607D, 2) : number > od_.get_signed(0x607D, 1);
+      break;
+    case 0x6098:
+      allowed = number == 0 || Homing::knows(number);
+      break;
+    default:
+      break;
+  }
+  return allowed ? Abort::none : Abort::value_range;
 }
 
 Abort SimulatedDrive::check_pdo_setting(std::uint16_t index, std::uint8_t sub, std::uint32_t value) const {
@@ -82,6 +150,7 @@ Abort SimulatedDrive::check_pdo_setting(std::uint16_t index, std::uint8_t sub, s
 }
 
 Abort SimulatedDrive::check_mapping(std::uint16_t index, std::uint32_t entry) const {
+  if (entry == 0) return Abort::none;  // taken out again; check_mapping_length() lets it not be counted
   const auto target = static_cast<std::uint16_t>(entry >> 16);
   const auto target_sub = static_cast<std::uint8_t>(entry >> 8);
   if (const Abort absent = od_.check_presence(target, target_sub); absent != Abort::none) return absent;

@@ -84,6 +84,20 @@ TEST_F(Fault, OurHeartbeatLostStopsTheDrivesByThemselves) {
   expect_rearm_works();
 }
 
+// The drives' own watch alone: PDOs go on arriving, and neither their emergencies nor their states reach the driver, so
+// that it goes on commanding.
+TEST_F(Fault, OurHeartbeatLostStopsTheDrivesWhilePdosStillArrive) {
+  bench.wire.set_tap([](can::Frame& frame) {
+    if (frame.id == 0x181 || frame.id == 0x182) frame.data[0] = 0x37;
+    return frame.id != 0x77F && frame.id != 0x081 && frame.id != 0x082;
+  });
+  expect_rest_within_ms(200);
+  EXPECT_EQ(bench.insertion.state(), PowerStateMachine::State::quick_stop_active);
+  EXPECT_EQ(bench.rotation.state(), PowerStateMachine::State::quick_stop_active);
+  bench.run_ms(50);
+  EXPECT_TRUE(bench.at_rest());
+}
+
 TEST_F(Fault, AKilledDriverMayBeReplaced) {
   bench.driver_runs = false;
   expect_rest_within_ms(200);

@@ -5,11 +5,11 @@
 #include "drivers/stepper/cia301.hpp"
 #include "drivers/stepper/cia402.hpp"
 #include "tests/drives/bench.hpp"
+#include "tests/drives/raw_drive.hpp"
 
 namespace bevel::test {
 namespace {
 
-using can::Frame;
 using stepper::cia301::SdoClient;
 namespace cia402 = stepper::cia402;
 
@@ -217,37 +217,6 @@ TEST(Configuring, AFaultFoundAtTheStartWaitsForTheOperator) {
 }
 
 // The drive's rules, with raw frames: the driver alone would never break them.
-class RawDrive : public testing::Test {
- protected:
-  void SetUp() override { step(); }
-  void step() {
-    now_ns += kMs;
-    drive.step(now_ns);
-  }
-  std::uint32_t abort_of(const Frame& request) {
-    while (peer->receive().kind != can::Reception::Kind::nothing) {
-    }
-    (void)peer->send(request);
-    step();
-    for (auto found = peer->receive(); found.kind != can::Reception::Kind::nothing; found = peer->receive())
-      if (found.kind == can::Reception::Kind::frame && found.frame.id == 0x581)
-        return found.frame.data[0] == 0x80 ? stepper::cia301::get_u32(found.frame, 4) : 0;
-    return 0xFFFFFFFF;
-  }
-  static Frame write(std::uint8_t command, std::uint16_t index, std::uint8_t sub, std::uint32_t value) {
-    Frame frame{0x601, 8, {command}};
-    stepper::cia301::put_u16(frame, 1, index);
-    frame.data[3] = sub;
-    stepper::cia301::put_u32(frame, 4, value);
-    return frame;
-  }
-  can::MemoryNetwork wire;
-  std::unique_ptr<can::MemoryBus> peer = wire.attach();
-  std::unique_ptr<can::MemoryBus> bus = wire.attach();
-  rig::SimulatedDrive drive{*bus, {}};
-  std::int64_t now_ns = kMs;
-};
-
 TEST_F(RawDrive, AbortCodes) {
   EXPECT_EQ(abort_of(write(0x40, 0x1000, 0, 0)), 0U);
   EXPECT_EQ(abort_of(write(0x40, 0x5FFF, 0, 0)), 0x06020000U);

@@ -1,0 +1,157 @@
+// Profile velocity and cyclic synchronous velocity, and what the drives themselves supervise: the same insertion in
+// both.
+#include <gmock/gmock.h>
+
+#include "tests/drives/bench.hpp"
+
+namespace bevel::test {
+namespace {
+
+using stepper::VelocityMode;
+
+stepper::StepperConfig in_mode(VelocityMode mode) {
+  stepper::StepperConfig config;
+  config.mode = mode;
+  return config;
+}
+
+class Mode : public testing::TestWithParam<VelocityMode> {
+ protected:
+  Bench bench{in_mode(GetParam())};
+};
+
+TEST_P(Mode, AxesFollowAndStop) {
+  ASSERT_TRUE(bench.enable()) << describe(bench.report().stop);
+  for (auto* drive : {&bench.insertion, &bench.rotation})
+    EXPECT_EQ(drive->objects().get(0x6061), static_cast<std::uint32_t>(GetParam()));
+  bench.move(5.0, -2.0);
+  bench.run_ms(1000);
+  EXPECT_EQ(bench.report().state, DriverState::enabled) << describe(bench.report().stop);
+  EXPECT_NEAR(bench.report().insertion_rate_mm_s, 5.0, 0.005);
+  EXPECT_NEAR(bench.report().rotation_rate_rad_s, -2.0, 0.002);
+  EXPECT_NEAR(bench.report().insertion_mm, 5.0, 0.3);
+  bench.driver->stop_now(StopReason::operator_stop, bench.now_ns);
+  const auto ms = bench.ms_to_rest();
+  ASSERT_TRUE(ms.has_value());
+  EXPECT_LE(*ms, 60);  // 10 ms at 500 mm/s^2, 10 ms at 200 rad/s^2, and the shafts' lag
+  EXPECT_EQ(bench.insertion.state(), rig::PowerStateMachine::State::quick_stop_active);
+}
+
+TEST_P(Mode, AKilledDriver) {
+  ASSERT_TRUE(bench.enable());
+  bench.move(10.0, 3.0);
+  bench.run_ms(400);
+  bench.driver_runs = false;
+  const auto ms = bench.ms_to_rest();
+  ASSERT_TRUE(ms.has_value());
+  EXPECT_LE(*ms, 200);
+}
+
+// A stop that is not due at a SYNC does not wait for the next one.
+TEST_P(Mode, AStopBetweenTwoCyclesActsAtOnce) {
+  ASSERT_TRUE(bench.enable());
+  bench.move(10.0, 3.0);
+  bench.run_ms(400);
+  while (bench.now_ns / kMs % 10 != 3) bench.run_ms(1);
+  bench.driver->stop_now(StopReason::operator_stop, bench.now_ns);
+  bench.run_ms(2);
+  EXPECT_EQ(bench.insertion.state(), rig::PowerStateMachine::State::quick_stop_active);
+  EXPECT_EQ(bench.rotation.state(), rig::PowerStateMachine::State::quick_stop_active);
+}
+
+TEST_P(Mode, AnotherModeOfTheDriveIsAFault) {
+  ASSERT_TRUE(bench.enable());
+  bench.wire.set_tap([](can::Frame& frame) {
+    if (frame.id == 0x281) frame.data[4] = 1;
+    return true;
+  });
+  bench.run_ms(50);
+  EXPECT_EQ(bench.reason(), StopReason::wrong_mode);
+  EXPECT_EQ(bench.report().state, DriverState::fault);
+}
+
+INSTANTIATE_TEST_SUITE_P(Velocity, Mode, testing::Values(VelocityMode::profile, VelocityMode::cyclic),
+                         [](const auto& mode) { return mode.param == VelocityMode::profile ? "pv" : "csv"; });
+
+TEST(CyclicMode, BothAxesActAtOneSync) {
+  Bench bench(in_mode(VelocityMode::cyclic));
+  ASSERT_TRUE(bench.enable());
+  // The rotation's command is late, but still before the SYNC of the next cycle: both begin with that one.
+  bench.wire.set_tap([](can::Frame& frame) { return frame.id != 0x080; });
+  bench.move(5.0, 2.0);
+  bench.run_ms(30);
+  EXPECT_TRUE(bench.at_rest()) << "commands without a SYNC move nothing";
+  bench.wire.set_tap(nullptr);
+  bench.run_until([&] { return !bench.at_rest(); }, 30);
+  EXPECT_GT(bench.insertion.velocity_unit_s(), 0.0);
+  EXPECT_GT(bench.rotation.velocity_unit_s(), 0.0);
+}
+
+TEST(CyclicMode, APeriodThatTheDriveCannotBeToldIsRefused) {
+  auto config = in_mode(VelocityMode::cyclic);
+  config.period_ns = 7'500'000;
+  EXPECT_THAT(stepper::problems_of(config), testing::ElementsAre(testing::HasSubstr("period_ms = 7.5")));
+}
+
+TEST(DriveSupervision, ALimitSwitchIsALatchedStopAndIsLeftAgain) {
+  Bench bench({}, {-5.0 * 2000.0, 5.0 * 2000.0});
+  ASSERT_TRUE(bench.enable());
+  bench.move(10.0, 3.0);
+  ASSERT_TRUE(bench.run_until([&] { return bench.insertion.position_unit() >= 5.0; }, 2000));
+  const auto ms = bench.ms_to_rest();
+  ASSERT_TRUE(ms.has_value());
+  EXPECT_LE(*ms, 100);
+  bench.run_ms(100);
+  EXPECT_EQ(bench.reason(), StopReason::travel_limit);
+  EXPECT_EQ(bench.report().stop.axis, 0);
+  EXPECT_EQ(bench.report().state, DriverState::stopped);
+  // Enabled again, it may go back, and not on.
+  bench.command = stepper::MotionSetpoint{};
+  ASSERT_TRUE(bench.driver->rearm());
+  ASSERT_TRUE(bench.enable());
+  const double stands_mm = bench.insertion.position_unit();
+  bench.move(10.0, 0.0);
+  bench.run_ms(300);
+  EXPECT_NEAR(bench.insertion.position_unit(), stands_mm, 0.01);
+  EXPECT_EQ(bench.reason(), StopReason::travel_limit);
+  bench.command = stepper::MotionSetpoint{};
+  ASSERT_TRUE(bench.driver->rearm());
+  ASSERT_TRUE(bench.enable());
+  bench.move(-5.0, 0.0);
+  bench.run_ms(500);
+  EXPECT_LT(bench.insertion.position_unit(), 4.0);
+  EXPECT_EQ(bench.report().state, DriverState::enabled) << describe(bench.report().stop);
+}
+
+TEST(DriveSupervision, FollowingErrorWindowReachesTheDrive) {
+  stepper::StepperConfig config;
+  config.axes[0].following_error_unit = 0.2;
+  config.following_error_ns = 10 * kMs;
+  Bench bench(config);
+  ASSERT_TRUE(bench.enable());
+  EXPECT_EQ(bench.insertion.objects().get(0x6065), 400U);
+  EXPECT_EQ(bench.insertion.objects().get(0x6066), 10U);
+  EXPECT_EQ(bench.rotation.objects().get(0x6065), 2000U) << "left as the drive has it";
+  bench.move(10.0, 0.0);
+  bench.run_ms(400);
+  bench.insertion.set_motor_blocked(true);
+  EXPECT_TRUE(bench.ms_to_rest().has_value());
+  bench.run_ms(100);
+  EXPECT_EQ(bench.report().stop.code, 0x8611U) << "the drive's own watch, narrower than the driver's";
+}
+
+// A drive that insists on another velocity unit would run at another speed than it is told.
+TEST(DriveSupervision, AVelocityFactorThatStaysIsRefused) {
+  Bench bench;
+  bench.wire.set_tap([](can::Frame& frame) {
+    const bool factor = frame.data[1] == 0x96 && frame.data[2] == 0x60 && frame.data[3] == 1;
+    if (frame.id == 0x581 && frame.data[0] == 0x43 && factor) frame.data[4] = 60;
+    return true;
+  });
+  ASSERT_TRUE(bench.reach(DriverState::fault));
+  EXPECT_EQ(bench.reason(), StopReason::configuration_failed);
+  EXPECT_EQ(bench.report().stop.code, 0x609601U);
+}
+
+}  // namespace
+}  // namespace bevel::test
