@@ -1,5 +1,7 @@
 #pragma once
 // What the controller may do and when it stops. One plain structure, filled from a file elsewhere.
+#include "controller/rendezvous.hpp"
+
 namespace bevel::controller {
 
 struct SteeringLimits {
@@ -56,6 +58,7 @@ struct ControllerConfig {
   ShaftConfig shaft;
   SteeringLimits limits;
   SteeringGains gains;
+  FollowConfig follow;
   SafetyLimits safety;
 };
 

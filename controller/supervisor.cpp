@@ -8,8 +8,9 @@
 
 namespace bevel::controller {
 namespace {
-constexpr double kDeviations = 4;  // of the estimate's own standard deviation
-}
+constexpr double kDeviations = 4;        // of the estimate's own standard deviation
+constexpr double kTargetDeviations = 2;  // of where a target that moves will be
+}  // namespace
 
 const char* to_string(State state) {
   switch (state) {
@@ -77,7 +78,7 @@ const char* to_string(Reason reason) {
 
 Supervisor::Supervisor(const ControllerConfig& config, const model::NeedleParameters& needle,
                        std::vector<model::ActiveEffect> effects)
-    : config_(config), needle_(needle), axes_(std::move(effects)) {}
+    : config_(config), needle_(needle), axes_(std::move(effects)), rendezvous_(config.follow) {}
 
 model::NeedleParameters Supervisor::needle_now() const {
   model::NeedleParameters needle = needle_;
@@ -121,13 +122,16 @@ void Supervisor::request(Request request, const std::optional<Target>& target, s
       arcs_.restart();
       status_.state = State::steering;
       return;
-    case Request::follow:
+    case Request::follow: {
       if (!in_motion_states() || !target || !target->position_mm.allFinite() || !check_inputs(now_utime)) return;
-      if (const double miss_mm = predicted_miss_mm(target->position_mm);
-          !(miss_mm <= config_.safety.target_miss_max_mm))
-        return stop(Reason::target_unreachable, miss_mm, "mm predicted miss");
-      target_->position_mm = target->position_mm;
+      rendezvous_.observe(target->utime != 0 ? target->utime : now_utime, target->position_mm);
+      rendezvous_.plan(now_utime, to_go_mm(), config_.limits.insertion_rate_mm_s);
+      // A prediction that is hardly one yet is no reason.
+      const double miss_mm = predicted_miss_mm(rendezvous_.target_mm());
+      if (!(miss_mm - kTargetDeviations * rendezvous_.target_sd_mm() <= config_.safety.target_miss_max_mm))
+        stop(Reason::target_unreachable, miss_mm, "mm predicted miss");
       return;
+    }
     case Request::arm:
       break;
   }
@@ -142,6 +146,7 @@ void Supervisor::request(Request request, const std::optional<Target>& target, s
   if (!(status_.predicted_miss_mm <= config_.safety.target_miss_max_mm))
     return stop(Reason::target_unreachable, status_.predicted_miss_mm, "mm predicted miss");
   target_ = target;
+  rendezvous_.restart(target->utime != 0 ? target->utime : now_utime, target->position_mm);
   status_.state = State::armed;
   axes_were_enabled_ = false;
   enabling_s_ = 0;
@@ -287,7 +292,7 @@ model::MotionCommand Supervisor::step(std::int64_t now_utime, double elapsed_s) 
     stop(Reason::state_reset, needle_state_->reset_count, "resets");
     return command;
   }
-  if (!see_geometry()) {
+  if (!see_geometry(now_utime)) {
     stop(Reason::outside_model, model::tilt_rad(needle_state_->pose), "rad tilt");
     return command;
   }
@@ -297,7 +302,7 @@ model::MotionCommand Supervisor::step(std::int64_t now_utime, double elapsed_s) 
   if (ahead_mm <= 0) {  // closest approach: what still turns comes to rest by the ramp
     status_.state = State::hold;
   } else {
-    wanted = steer();
+    wanted = steer(now_utime);
   }
   rates_ = ramp(rates_, wanted, dt_s, config_.limits);
   commands_.remember(now_utime, rates_);
@@ -308,19 +313,27 @@ model::MotionCommand Supervisor::step(std::int64_t now_utime, double elapsed_s) 
   return command;
 }
 
-bool Supervisor::see_geometry() {
+// To the plane through the target across the needle.
+double Supervisor::to_go_mm() const {
   const model::Pose& tip = needle_state_->pose;
+  return tip.R.col(2).dot(rendezvous_.target_mm() - tip.p_mm);
+}
+
+bool Supervisor::see_geometry(std::int64_t now_utime) {
+  const model::Pose& tip = needle_state_->pose;
+  rendezvous_.plan(now_utime, to_go_mm(), config_.limits.insertion_rate_mm_s);
+  const Eigen::Vector3d& target_mm = rendezvous_.target_mm();
   if (config_.law == Law::arcs) {
-    status_.arc = arc_geometry(tip, needle_now(), shaft_now(), target_->position_mm, needle_state_->uncertain);
+    status_.arc = arc_geometry(tip, needle_now(), shaft_now(), target_mm, needle_state_->uncertain);
     return status_.arc.in_domain;
   }
-  status_.geometry = steering_geometry(tip, needle_now(), target_->position_mm, config_.limits.insertion_rate_mm_s,
+  status_.geometry = steering_geometry(tip, needle_now(), target_mm, config_.limits.insertion_rate_mm_s,
                                        config_.gains.parameter_uncertainty, shaft_now());
   return status_.geometry.in_domain;
 }
 
 // What the law wants at this instant, without ramps.
-Rates Supervisor::steer() {
+Rates Supervisor::steer(std::int64_t now_utime) {
   const double tolerance_mm = target_->tolerance_mm > 0 ? target_->tolerance_mm : config_.gains.tolerance_mm;
   const double rotation_rad = actuator_->rotation_rad;
   Rates wanted;
@@ -341,7 +354,7 @@ Rates Supervisor::steer() {
   }
   // Come to rest at the closest approach: never faster than the ramp can stop within what is left.
   const double braking = std::sqrt(2 * 0.5 * config_.limits.insertion_acceleration_mm_s2 * ahead_mm);
-  wanted.insertion_mm_s = std::min(wanted.insertion_mm_s, braking);
+  wanted.insertion_mm_s = std::min({wanted.insertion_mm_s, braking, rendezvous_.rate_limit_mm_s(now_utime, ahead_mm)});
   return wanted;
 }
 

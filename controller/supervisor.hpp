@@ -11,6 +11,7 @@
 #include "controller/axis_model.hpp"
 #include "controller/command_watch.hpp"
 #include "controller/reach.hpp"
+#include "controller/rendezvous.hpp"
 #include "model/samples.hpp"
 
 namespace bevel::controller {
@@ -61,6 +62,7 @@ struct NeedleView {
 struct Target {
   Eigen::Vector3d position_mm = Eigen::Vector3d::Zero();
   double tolerance_mm = 0;  // 0: the configured one
+  std::int64_t utime = 0;   // when it was there; 0: now
 };
 
 struct Status {
@@ -89,8 +91,8 @@ class Supervisor {
 
   // An operator's word. arm: takes the target and leaves off, hold or stopped; refused (reason latched) when out of
   // reach. start: from armed or hold to steering, once both axes are enabled. hold: comes to rest within the limits of
-  // acceleration, may go on. stop: latched. follow: another target from now on, in motion too; one that is out of reach
-  // stops.
+  // acceleration, may go on. stop: latched. follow: where the target is now, in motion too; it is aimed at
+  // where it will be (rendezvous.hpp), and stops the needle when that is out of reach.
   void request(Request request, const std::optional<Target>& target, std::int64_t now_utime);
   // Latches what others found: overrun, input_refused, ending.
   void report(Reason reason) { stop(reason, 0, ""); }
@@ -115,8 +117,9 @@ class Supervisor {
   bool check_axes();
   bool check_tracking();
   bool check_rest(std::int64_t now_utime);
-  Rates steer();
-  bool see_geometry();
+  Rates steer(std::int64_t now_utime);
+  bool see_geometry(std::int64_t now_utime);
+  double to_go_mm() const;
   double predicted_miss_mm(const Eigen::Vector3d& target_mm) const;
   model::NeedleParameters needle_now() const;
   ShaftConfig shaft_now() const;
@@ -131,6 +134,7 @@ class Supervisor {
   std::optional<model::ActuatorState> actuator_;
   std::optional<Target> target_;
   Status status_;
+  Rendezvous rendezvous_;
   ArcLaw arcs_;
   Rates rates_;
   std::int64_t seq_ = 0;

@@ -13,6 +13,8 @@ namespace {
 constexpr double kSlowest_hz = 0.08, kFastest_hz = 0.6;
 // Between neighbours: over the half minute of an insertion, a tenth of a turn at a quarter of a hertz.
 constexpr double kFrequencyStep = 1.015;
+constexpr double kJump = 30.7;       // chi-square of three axes, one reading in a million
+constexpr double kNegligible = -30;  // log weight, of the likeliest's 0
 
 }  // namespace
 
@@ -24,6 +26,7 @@ TargetTrack::TargetTrack(const TargetMotion& motion) : motion_(motion) {
 
 void TargetTrack::restart() {
   count_ = 0;
+  jumped_before_ = false;
   const double v = motion_.velocity_sd_mm_s, a = motion_.breathing_sd_mm;
   const double c = motion_.reading_sd_mm + a;  // from the first reading, which is the origin
   for (Breath& breath : breaths_) {
@@ -35,6 +38,12 @@ void TargetTrack::restart() {
 
 double TargetTrack::ahead_s(std::int64_t utime) const { return model::age_s(utime, newest_utime_); }
 
+bool TargetTrack::is_jump(std::int64_t utime, const Eigen::Vector3d& position_mm) const {
+  if (empty()) return false;
+  const double sd_mm = std::hypot(position_sd_mm(utime), motion_.reading_sd_mm);
+  return (position_mm - TargetTrack::position_mm(utime)).squaredNorm() > kJump * sd_mm * sd_mm;
+}
+
 void TargetTrack::observe(std::int64_t utime, const Eigen::Vector3d& position_mm) {
   if (count_ > 0 && utime <= newest_utime_) return;
   if (count_ == 0) {
@@ -45,6 +54,16 @@ void TargetTrack::observe(std::int64_t utime, const Eigen::Vector3d& position_mm
   const double a = motion_.breathing_sd_mm, v = motion_.velocity_sd_mm_s;
   const Eigen::Vector4d renewed = Eigen::Vector4d(0, v * v, a * a, a * a) * since_s / motion_.renewed_after_s;
   const double reading_mm2 = motion_.reading_sd_mm * motion_.reading_sd_mm;
+  if (is_jump(utime, position_mm)) {
+    // One may be a slip of who reads it; two are another target.
+    if (!jumped_before_) {
+      jumped_before_ = true;
+      return;
+    }
+    restart();
+    return observe(utime, position_mm);
+  }
+  jumped_before_ = false;
   double largest = -std::numeric_limits<double>::infinity();
   for (Breath& breath : breaths_) {
     const double cosine = std::cos(breath.frequency_rad_s * since_s), sine = std::sin(breath.frequency_rad_s * since_s);
@@ -73,18 +92,38 @@ const TargetTrack::Breath& TargetTrack::likeliest() const {
   return *std::ranges::max_element(breaths_, {}, &Breath::log_weight);
 }
 
+Eigen::Vector4d TargetTrack::reading_after(const Breath& breath, double ahead_s) {
+  const double turned_rad = breath.frequency_rad_s * ahead_s;
+  return {1, ahead_s, std::cos(turned_rad), std::sin(turned_rad)};
+}
+
 Eigen::Vector3d TargetTrack::position_mm(std::int64_t utime) const {
   if (empty()) return Eigen::Vector3d::Zero();
   Eigen::Vector3d sum = Eigen::Vector3d::Zero();
   double weights = 0;
   for (const Breath& breath : breaths_) {
+    if (breath.log_weight < kNegligible) continue;
     const double weight = std::exp(breath.log_weight);
-    const double turned_rad = breath.frequency_rad_s * ahead_s(utime);
-    sum += weight *
-           (breath.mean.transpose() * Eigen::Vector4d(1, ahead_s(utime), std::cos(turned_rad), std::sin(turned_rad)));
+    sum += weight * (breath.mean.transpose() * reading_after(breath, ahead_s(utime)));
     weights += weight;
   }
   return origin_mm_ + sum / weights;
+}
+
+double TargetTrack::position_sd_mm(std::int64_t utime) const {
+  if (empty()) return 0;
+  const Eigen::Vector3d mean_mm = position_mm(utime) - origin_mm_;
+  Eigen::Vector3d between_mm2 = Eigen::Vector3d::Zero();
+  double within_mm2 = 0, weights = 0;
+  for (const Breath& breath : breaths_) {
+    if (breath.log_weight < kNegligible) continue;
+    const double weight = std::exp(breath.log_weight);
+    const Eigen::Vector4d h = reading_after(breath, ahead_s(utime));
+    within_mm2 += weight * h.dot(breath.covariance * h);
+    between_mm2 += weight * (breath.mean.transpose() * h - mean_mm).cwiseAbs2();
+    weights += weight;
+  }
+  return std::sqrt((within_mm2 + between_mm2.maxCoeff()) / weights);
 }
 
 Eigen::Vector3d TargetTrack::velocity_mm_s(std::int64_t utime) const {

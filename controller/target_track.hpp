@@ -27,13 +27,16 @@ class TargetTrack {
 
   // Begins anew with the next position.
   void restart();
-  // A position that is not newer than the one before is left out.
+  // A position that is not newer than the one before is left out. Two in a row that no breath explains are another
+  // target, with which it begins anew; one is left out.
   void observe(std::int64_t utime, const Eigen::Vector3d& position_mm);
   bool empty() const { return count_ == 0; }
   Eigen::Vector3d newest_mm() const { return newest_mm_; }
 
   // By the frequencies' mean. Before the first position: zeros.
   Eigen::Vector3d position_mm(std::int64_t utime) const;
+  // Of that prediction, along the axis that is known least: within each frequency and between them.
+  double position_sd_mm(std::int64_t utime) const;
   // Of the likeliest frequency.
   Eigen::Vector3d velocity_mm_s(std::int64_t utime) const;
   double period_s() const;
@@ -53,6 +56,9 @@ class TargetTrack {
     double log_weight = 0;
   };
   double ahead_s(std::int64_t utime) const;
+  bool is_jump(std::int64_t utime, const Eigen::Vector3d& position_mm) const;
+  // What is read, m + s, after so long.
+  static Eigen::Vector4d reading_after(const Breath& breath, double ahead_s);
   const Breath& likeliest() const;
 
   TargetMotion motion_;
@@ -61,6 +67,7 @@ class TargetTrack {
   Eigen::Vector3d origin_mm_ = Eigen::Vector3d::Zero();  // the first position
   Eigen::Vector3d newest_mm_ = Eigen::Vector3d::Zero();
   std::int64_t count_ = 0;
+  bool jumped_before_ = false;
 };
 
 }  // namespace bevel::controller

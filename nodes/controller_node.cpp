@@ -112,7 +112,7 @@ void ControllerNode::on_word(Word word, const steering_target_t& m) {
     port_.forget_senders();
     detail_.clear();  // of the stop before: what this arm is refused for is another
   }
-  const controller::Target target{{m.position_mm[0], m.position_mm[1], m.position_mm[2]}, m.tolerance_mm};
+  const controller::Target target{{m.position_mm[0], m.position_mm[1], m.position_mm[2]}, m.tolerance_mm, m.utime};
   supervisor_.request(static_cast<controller::Request>(word), target, port_.now().utime);
   if (word == Word::stop) command(0);
 }

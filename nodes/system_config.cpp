@@ -38,6 +38,12 @@ void read_controller(Section s, controller::ControllerConfig& c) {
   g.read("tube_share", c.gains.tube_share, optional, in_range(0, 10));
   g.read("tolerance_mm", c.gains.tolerance_mm, optional, in_range(0, 10));
   g.read("parameter_uncertainty", c.gains.parameter_uncertainty, optional, in_range(0, 2));
+  Section t = s.section("target", optional);
+  t.read("gate_breathing", c.follow.gate_breathing, optional);
+  t.read("reading_sd_mm", c.follow.motion.reading_sd_mm, optional, in_range(0.001, 10));
+  t.read("velocity_sd_mm_s", c.follow.motion.velocity_sd_mm_s, optional, in_range(0, 20));
+  t.read("breathing_sd_mm", c.follow.motion.breathing_sd_mm, optional, in_range(0, 30));
+  t.read("renewed_after_s", c.follow.motion.renewed_after_s, optional, in_range(1, 1e6));
   Section f = s.section("safety", optional);
   controller::SafetyLimits& safety = c.safety;
   f.read("state_age_s", safety.state_age_s, optional, kShareOfStop);

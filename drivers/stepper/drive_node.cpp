@@ -138,9 +138,12 @@ void DriveNode::on_emergency(const can::Frame& frame) {
 void DriveNode::on_sync(std::int64_t now_ns) {
   if (phase_ != Phase::operational && phase_ != Phase::starting) return;
   if (status_pdo_due_ || position_pdo_due_) ++counters_.missed_pdos;
-  // One that was late comes beside the next, and was missed before; what goes on coming is not this drive's.
+  // Answers less questions. One that was missed may come yet, for as long as the time-out lets it, and several at once
+  // where the drive or this process stood still; what goes on coming beyond that is not this drive's.
   const int missed = (status_pdo_due_ ? 1 : 0) + (position_pdo_due_ ? 1 : 0);
-  surplus_balance_ = std::max(surplus_balance_ + (surplus_pdos_ > 0 ? surplus_pdos_ : -1) - missed, 0);
+  const auto under_way = static_cast<int>(2 * (config_.tpdo_timeout_ns / config_.period_ns + 1));
+  surplus_balance_ = std::max(surplus_balance_ + surplus_pdos_ - missed, -under_way);
+  if (surplus_pdos_ == 0 && surplus_balance_ > 0) --surplus_balance_;
   surplus_pdos_ = 0;
   if (phase_ == Phase::operational && surplus_balance_ >= kSurplusPdos) trouble(StopReason::second_drive);
   status_pdo_due_ = position_pdo_due_ = true;

@@ -89,7 +89,7 @@ class DriveNode {
   bool status_pdo_due_ = false;
   bool position_pdo_due_ = false;
   int surplus_pdos_ = 0;     // answers beyond one to each since the last SYNC
-  int surplus_balance_ = 0;  // less those that were missed
+  int surplus_balance_ = 0;  // those less the ones that were missed and may still come
 
   std::uint16_t statusword_ = 0;
   std::uint16_t error_code_ = 0;

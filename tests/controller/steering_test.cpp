@@ -325,9 +325,12 @@ TEST_F(SupervisorTest, FollowsATargetThatMovesAndStopsWhereItGoesOutOfReach) {
   const Eigen::Vector2d before = supervisor.status().arc.aim_mm;
   supervisor.request(Request::follow, Target{{4, -8, 100}, 0}, now);
   EXPECT_EQ(good_step().mode, 1);
-  EXPECT_NEAR((supervisor.status().arc.aim_mm - before - Eigen::Vector2d(2, 0)).norm(), 0, 0.05);
+  EXPECT_NEAR((supervisor.status().arc.aim_mm - before - Eigen::Vector2d(2, 0)).norm(), 0, 0.3)
+      << "two positions say little of how it moves";
   supervisor.request(Request::follow, Target{{std::nan(""), 0, 100}, 0}, now);
   EXPECT_EQ(good_step().mode, 1) << "no target at all is none";
+  supervisor.request(Request::follow, Target{{0, 60, 60}, 0}, now);
+  EXPECT_EQ(good_step().mode, 1) << "one such position is a slip, a second is another target";
   supervisor.request(Request::follow, Target{{0, 60, 60}, 0}, now);
   EXPECT_GT(supervisor.status().value, 20);
   expect_stopped(Reason::target_unreachable);

@@ -172,6 +172,40 @@ TEST_F(Fault, AFewLostPdosAreCountedAndBorne) {
   EXPECT_GT(bench.report().counters.missed_pdos, 20U);
 }
 
+// As a simulated drive on a busy machine, or this process: four questions lie there and are answered in one go.
+TEST_F(Fault, ADriveThatStoodStillForAMomentIsNotTwoDrives) {
+  for (int i = 0; i < 10; ++i) {
+    bench.drives_run = false;
+    bench.run_ms(43);
+    bench.drives_run = true;
+    bench.run_ms(100 + i);
+    ASSERT_EQ(bench.report().state, DriverState::enabled) << i << ": " << bench.reason();
+  }
+  EXPECT_GT(bench.report().counters.missed_pdos, 20U);
+}
+
+TEST_F(Fault, TwoDrivesWithOneNodeIdStopTheAxes) {
+  // After such a moment too: what it owed is not credit for somebody else.
+  bench.drives_run = false;
+  bench.run_ms(43);
+  bench.drives_run = true;
+  bench.run_ms(200);
+  std::vector<can::Frame> again;
+  bool listening = true;
+  bench.wire.set_tap([&](const can::Frame& frame) {
+    if (listening && (frame.id == 0x181 || frame.id == 0x281)) again.push_back(frame);
+    return true;
+  });
+  bench.each_ms = [&] {
+    listening = false;
+    for (const can::Frame& frame : again) bench.wire.inject(frame);
+    again.clear();
+    listening = true;
+  };
+  expect_rest_within_ms(300);
+  expect_latched(StopReason::second_drive, DriverState::fault);
+}
+
 TEST_F(Fault, FrozenPdosOfALivingDrive) {
   bench.insertion.set_pdos_frozen(true);
   bench.run_ms(300);

@@ -56,6 +56,7 @@ struct Kinematic {
   bool windup_known = false;
   double drift_mm = 0;      // of the target in 20 s, in a drawn direction across
   double breathing_mm = 0;  // of the target, amplitude at 0.25 Hz along x, phase drawn
+  bool gated = false;
 };
 Trial kinematic(const Kinematic& kind, std::uint64_t seed) {
   Draw draw(seed);
@@ -89,6 +90,7 @@ Trial kinematic(const Kinematic& kind, std::uint64_t seed) {
       return target +
              kind.breathing_mm * std::sin(2 * std::numbers::pi * 0.25 * time_s + angle) * Eigen::Vector3d::UnitX();
     };
+  trial.believed.controller.follow.gate_breathing = kind.gated;
   trial.rig.cameras = cameras(kind.cameras);
   trial.rig.cameras.outlier_share = kind.outlier_share;
   trial.rig.make_plant = [truth, effects, roll_rad] {
@@ -157,6 +159,8 @@ const std::vector<Scenario>& scenarios() {
                           kinematic),
       scenario<Kinematic>("breathing", "a target that breathes by +-3 mm at 0.25 Hz, told of at 17 Hz",
                           {.breathing_mm = 3}, kinematic),
+      scenario<Kinematic>("breathing-gated", "the same, arriving where it turns round",
+                          {.breathing_mm = 3, .gated = true}, kinematic),
       scenario<Kinematic>("roll", "the bevel's roll at the start off by 0.5 rad (standard deviation)",
                           {.roll_sd_rad = 0.5}, kinematic),
       scenario<Kinematic>("one-camera", "one camera, along x", {.cameras = 1}, kinematic),
