@@ -12,6 +12,7 @@ namespace {
 
 // Of the largest rate, what is left of it on the way: it is lower while the bevel turns (docs/steering.md, feed).
 constexpr double kUsualShare = 0.82;
+constexpr double kLargestShare = 0.9;  // and what it is at best: a turn that wants more will be missed
 // By so much the target may be from where it turns round before the turn counts as missed: the tolerance of a target.
 constexpr double kMissedBy_mm = 0.05;
 
@@ -30,7 +31,7 @@ void Rendezvous::restart(std::int64_t utime, const Eigen::Vector3d& position_mm)
 void Rendezvous::plan(std::int64_t now_utime, double ahead_mm, double rate_mm_s) {
   const double way_mm = std::max(ahead_mm, 0.0);
   const std::int64_t usual_utime = later(now_utime, way_mm / (kUsualShare * rate_mm_s));
-  meeting_utime_ = gate_ ? plan_turn(now_utime, usual_utime, way_mm / rate_mm_s) : usual_utime;
+  meeting_utime_ = gate_ ? plan_turn(now_utime, usual_utime, way_mm / (kLargestShare * rate_mm_s)) : usual_utime;
   target_mm_ = track_.position_mm(meeting_utime_);
 }
 
@@ -51,7 +52,7 @@ std::int64_t Rendezvous::plan_turn(std::int64_t now_utime, std::int64_t usual_ut
 double Rendezvous::rate_limit_mm_s(std::int64_t now_utime, double ahead_mm) const {
   if (!turn_utime_) return std::numeric_limits<double>::infinity();
   const double left_s = model::age_s(*turn_utime_, now_utime);
-  return left_s > 0 ? std::max(ahead_mm, 0.0) / left_s : std::numeric_limits<double>::infinity();
+  return left_s > 0 ? std::max(ahead_mm, 0.0) / (kUsualShare * left_s) : std::numeric_limits<double>::infinity();
 }
 
 }  // namespace bevel::controller
