@@ -16,13 +16,15 @@ class FollowWatch {
   // period_ns: of the calls.
   FollowWatch(std::int64_t allowed_lag_ns, std::int64_t period_ns)
       : window_(std::clamp<std::size_t>(
-            static_cast<std::size_t>(allowed_lag_ns / std::max<std::int64_t>(period_ns, 1)) + 1, 2, kRoom)) {}
+            static_cast<std::size_t>(allowed_lag_ns / std::max<std::int64_t>(period_ns, 1)) + 1, 2, kRoom)),
+        lag_s_(static_cast<double>(allowed_lag_ns) * 1e-9),
+        delay_varies_s_(kDelayVaries_periods * static_cast<double>(period_ns) * 1e-9) {}
 
   // The axis rests at position_unit (mm or rad), and nothing is commanded.
   void begin(std::int64_t now_ns, double position_unit) {
     now_ns_ = now_ns;
     anchor_ = position_unit;
-    told_ = stands_ = 0;
+    told_ = stands_ = commanded_unit_s_ = by_changes_ = 0;
     count_ = 0;
   }
 
@@ -39,9 +41,15 @@ class FollowWatch {
       high = std::max(high, history_.at((count_ - i) % kRoom));
     }
     const double outside = stands_ - std::clamp(stands_, low, high);
-    // A scale that is not quite right must not add up over an insertion.
-    const double forgiven = kScaleError * std::abs(commanded_unit_s) * dt_s;
-    anchor_ += std::clamp(outside, -forgiven, forgiven);
+    // What must not add up over an insertion: a scale that is not quite right, and changes of rate of which one was
+    // obeyed a little sooner than the next, which shows within the lag.
+    const double scale = kScaleError * std::abs(commanded_unit_s) * dt_s;
+    by_changes_ += delay_varies_s_ * std::abs(commanded_unit_s - commanded_unit_s_);
+    commanded_unit_s_ = commanded_unit_s;
+    const double forgiven = std::clamp(outside, -scale - by_changes_, scale + by_changes_);
+    anchor_ += forgiven;
+    by_changes_ -= std::max(0.0, std::abs(forgiven) - scale);
+    by_changes_ *= std::max(0.0, 1 - dt_s / lag_s_);
     return std::abs(outside) <= kLeast_unit;
   }
 
@@ -51,9 +59,14 @@ class FollowWatch {
  private:
   static constexpr std::size_t kRoom = 128;
   static constexpr double kScaleError = 0.02;  // of a drive's rates against its positions
+  static constexpr double kDelayVaries_periods = 2;
   static constexpr double kLeast_unit = 0.05;  // mm or rad: steps, play, an encoder's noise
 
   std::size_t window_;
+  double lag_s_;
+  double delay_varies_s_;                // from a command to its being obeyed
+  double commanded_unit_s_ = 0;          // last
+  double by_changes_ = 0;                // what changes of rate may still explain
   std::array<double, kRoom> history_{};  // integral of the commanded rate, each cycle
   std::size_t count_ = 0;
   std::int64_t now_ns_ = 0;
