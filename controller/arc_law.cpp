@@ -19,6 +19,8 @@ constexpr double kTurnAway_rad = std::numbers::pi / 3, kRestAway_rad = 0.2;
 constexpr double kEitherWay_rad = 0.8 * std::numbers::pi;  // a turn this long may as well go the other way round
 constexpr double kBrakingShare = 0.6;                      // of the acceleration, for an axis that follows late
 constexpr double kConvergence_per_s = 8;                   // at the end of a turn
+constexpr double kOutside_mm = 1;                          // up to here the needle may be turned by any angle
+constexpr double kTurned_rad = 0.02;                       // a half turn is at its end
 constexpr double kNearly_rad = 0.3;                        // from here on the feed is not slowed for a turn
 
 // What a stiff shaft does at a depth, for the needle's k; of a slack one only the curvature.
@@ -47,6 +49,18 @@ bool landing(model::Pose middle, const model::NeedleParameters& needle, const Sh
   }
   at_mm = middle.p_mm - middle.R.col(1) * (share * end_at(middle.p_mm.z(), needle, shaft).swing_mm);
   return true;
+}
+
+double half_turn_s(const SteeringLimits& limits) {
+  return std::numbers::pi / limits.rotation_rate_rad_s +
+         limits.rotation_rate_rad_s / limits.rotation_acceleration_rad_s2;
+}
+
+// As fast as the axis can still stop at the angle; in proportion at the end.
+double turn_rate_rad_s(double left_rad, const SteeringLimits& limits) {
+  const double braking = std::sqrt(2 * kBrakingShare * limits.rotation_acceleration_rad_s2 * std::abs(left_rad));
+  return std::copysign(std::min({limits.rotation_rate_rad_s, braking, kConvergence_per_s * std::abs(left_rad)}),
+                       left_rad);
 }
 
 double wrapped(double angle_rad) { return std::remainder(angle_rad, 2 * std::numbers::pi); }
@@ -97,21 +111,42 @@ double arc_miss_mm(const ArcGeometry& geometry) {
   return std::max(0.0, geometry.aim_mm.norm() - geometry.reach_mm);
 }
 
-Rates ArcLaw::step(const ArcGeometry& g, double rotation_rad, double tolerance_mm, const ControllerConfig& config) {
+// At rest, by half turns from where the bevel stands, each to its end, and none before the last one has had an effect.
+Rates ArcLaw::flip(double error_rad, double rotation_rad, double inserted_mm, const ControllerConfig& config) {
+  const SteeringLimits& limits = config.limits;
+  const bool again =
+      inserted_mm - flipped_at_mm_ > limits.insertion_rate_min_share * limits.insertion_rate_mm_s * half_turn_s(limits);
+  if (!flip_to_rad_ && std::abs(error_rad) > 0.5 * std::numbers::pi && again)
+    flip_to_rad_ = rotation_rad + (rotation_rad > 0 ? -std::numbers::pi : std::numbers::pi);  // unwinds the cable
+  if (!flip_to_rad_) return {limits.insertion_rate_mm_s, 0};
+  const double left_rad = *flip_to_rad_ - rotation_rad;
+  if (std::abs(left_rad) < kTurned_rad) {
+    flip_to_rad_.reset();
+    flipped_at_mm_ = inserted_mm;
+    return {limits.insertion_rate_mm_s, 0};
+  }
+  return {0, turn_rate_rad_s(left_rad, limits)};
+}
+
+Rates ArcLaw::step(const ArcGeometry& g, double rotation_rad, double inserted_mm, double tolerance_mm,
+                   const ControllerConfig& config) {
   const SteeringLimits& limits = config.limits;
   if (!g.in_domain || g.ahead_mm <= 0) return {};
   const double turn_feed_mm_s = limits.insertion_rate_mm_s * limits.insertion_rate_min_share;
-  const double half_turn_s =
-      std::numbers::pi / limits.rotation_rate_rad_s + limits.rotation_rate_rad_s / limits.rotation_acceleration_rad_s2;
-  const double half_turn_mm = half_turn_s * turn_feed_mm_s;
+  const double half_turn_mm = half_turn_s(limits) * turn_feed_mm_s;
   const double smallest_mm = g.reach_per_mm * half_turn_mm;  // half of what away and back changes
   const double width_mm = std::max({tolerance_mm + config.gains.tube_share * g.reach_per_mm * g.ahead_mm, smallest_mm,
                                     2 * kDeviations * g.reach_sd_mm});
-  const double S = g.aim_mm.norm() - g.reach_mm;
+  // Half turns alone steer within the plane of the bevel; what lies beside it they leave, and while they turn nothing
+  // is inserted.
+  const bool flips = config.law == Law::flip;
+  const double inserted_turning_mm = flips ? 0 : half_turn_mm;
+  const double aside_mm = g.aim_mm.norm() * (flips ? std::abs(std::cos(g.facing_rad)) : 1);
+  const double S = aside_mm - g.reach_mm;
   // Away, and back before it is there: two half turns, and room to brake.
-  const bool time_for_both = g.ahead_mm > 3 * half_turn_mm;
+  const bool time_for_both = g.ahead_mm > 3 * inserted_turning_mm;
   if (side_ == Side::undecided) side_ = S < -width_mm ? Side::away : Side::facing;
-  const double S_turned = S + g.reach_per_mm * half_turn_mm;
+  const double S_turned = S + g.reach_per_mm * inserted_turning_mm;
   // The target has come to lie on the other side: that is away, already.
   const bool passed = std::abs(g.facing_rad) > 0.5 * std::numbers::pi && S_turned < -0.5 * width_mm;
   if (side_ == Side::facing && (S < -width_mm || passed) && time_for_both)
@@ -120,6 +155,11 @@ Rates ArcLaw::step(const ArcGeometry& g, double rotation_rad, double tolerance_m
     side_ = Side::facing;
 
   double error_rad = side_ == Side::facing ? g.facing_rad : wrapped(g.facing_rad + std::numbers::pi);
+  if (flips && inserted_mm > kOutside_mm) return flip(error_rad, rotation_rad, inserted_mm, config);
+  // Before that it faces the target: but one that lies as good as ahead has no side.
+  if (flips && std::abs(error_rad) > kTurned_rad && g.aim_mm.norm() * std::abs(std::sin(error_rad)) > tolerance_mm)
+    return {0, turn_rate_rad_s(error_rad, limits)};
+  if (flips) return {limits.insertion_rate_mm_s, 0};
   const double across_mm = g.aim_mm.norm() * std::abs(std::sin(error_rad));
   const bool far_off = std::abs(error_rad) > 0.5 * std::numbers::pi;
   const bool must_turn =
@@ -137,10 +177,7 @@ Rates ArcLaw::step(const ArcGeometry& g, double rotation_rad, double tolerance_m
   if (error_rad * rotation_rad > 0 && std::abs(error_rad) > room_rad)
     error_rad -= std::copysign(2 * std::numbers::pi, error_rad);
   turn_ = std::copysign(1.0, error_rad);
-  // As fast as the axis can still stop at the angle; in proportion at the end.
-  const double braking = std::sqrt(2 * kBrakingShare * limits.rotation_acceleration_rad_s2 * std::abs(error_rad));
-  wanted.rotation_rad_s = std::copysign(
-      std::min({limits.rotation_rate_rad_s, braking, kConvergence_per_s * std::abs(error_rad)}), error_rad);
+  wanted.rotation_rad_s = turn_rate_rad_s(error_rad, limits);
   wanted.insertion_mm_s = std::abs(error_rad) > kNearly_rad ? turn_feed_mm_s : limits.insertion_rate_mm_s;
   return wanted;
 }

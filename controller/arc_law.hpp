@@ -48,14 +48,20 @@ double arc_miss_mm(const ArcGeometry& geometry);
 class ArcLaw {
  public:
   void restart() { *this = {}; }
-  // What it would command now, without ramps. rotation_rad: of the axis, for the cable.
-  Rates step(const ArcGeometry& geometry, double rotation_rad, double tolerance_mm, const ControllerConfig& config);
+  // What it would command now, without ramps. rotation_rad, inserted_mm: of the axes; for the cable, and since a needle
+  // that is not in the tissue yet may be turned by any angle.
+  Rates step(const ArcGeometry& geometry, double rotation_rad, double inserted_mm, double tolerance_mm,
+             const ControllerConfig& config);
 
  private:
   enum class Side { undecided, facing, away };
   Side side_ = Side::undecided;
+  Rates flip(double error_rad, double rotation_rad, double inserted_mm, const ControllerConfig& config);
+
   bool turning_ = false;
-  double turn_ = 1;  // the way round where both are as long
+  std::optional<double> flip_to_rad_;  // of the axis, while a half turn is under way
+  double flipped_at_mm_ = 0;           // of insertion
+  double turn_ = 1;                    // the way round where both are as long
 };
 
 }  // namespace bevel::controller

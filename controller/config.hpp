@@ -49,8 +49,9 @@ struct ShaftConfig {
   double guide_mm = 0;
 };
 
-// How it steers: by arcs, the bevel resting between turns (arc_law.hpp), or turning all the way (steering_law.hpp).
-enum class Law { arcs, spin };
+// How it steers: by arcs, the bevel resting between turns (arc_law.hpp); by arcs with half turns at rest alone, for a
+// rig that cannot turn while it inserts; or turning all the way (steering_law.hpp).
+enum class Law { arcs, flip, spin };
 
 struct ControllerConfig {
   Law law = Law::arcs;

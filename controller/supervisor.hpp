@@ -72,7 +72,7 @@ struct Status {
   const char* unit = "";
   double predicted_miss_mm = 0;  // of the best constant inputs, updated while steering
   SteeringGeometry geometry;     // of Law::spin
-  ArcGeometry arc;               // of Law::arcs
+  ArcGeometry arc;               // of Law::arcs and Law::flip
 };
 
 class Supervisor {

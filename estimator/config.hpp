@@ -78,6 +78,9 @@ struct EstimatorConfig {
   // the midpoint rule, off by less than a thousandth of what the step does. False: by those of the step itself, as
   // longer ones, at 1.2 times the time. The path is the same.
   bool midpoint_derivatives = true;
+  // What slopes at the entry are expected of insertions on this rig, standard deviation about each axis; one that no
+  // such insertion has is said (entry_line.hpp). Repeated insertions in the literature: 0.2 to 0.7 degrees.
+  double entry_slope_sd_rad = 0.009;
   // Cameras (tip_heading_t.camera) whose headings are the tangent of the shaft's end. The shaft lies where the tip has
   // passed, so that is the way the tip moves, gamma; the others' are of what the needle's tip points along, e3 of {B}.
   // Taken for one another they are wrong by alpha, more than hundreds of headings are uncertain by.

@@ -49,6 +49,7 @@ void read_estimator_config(Section section, estimator::EstimatorConfig& config) 
     config.shaft_cameras.push_back(static_cast<int>(camera));
   }
 
+  section.read("entry_slope_sd_rad", config.entry_slope_sd_rad, optional, in_range(1e-4, 1));
   section.read("relinearised_steps", config.relinearised_steps, optional, in_range(0, 100000));
 
   Section limits = section.section("limits", optional);

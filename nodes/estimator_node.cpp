@@ -1,6 +1,9 @@
 #include "nodes/estimator_node.hpp"
 
+#include <array>
 #include <cmath>
+#include <cstdio>
+#include <numbers>
 
 #include "estimator/health.hpp"
 #include "model/age.hpp"
@@ -32,6 +35,17 @@ estimator::EstimatorConfig live(estimator::EstimatorConfig config) {
 }
 
 }  // namespace
+
+std::string describe(const estimator::EntryLine& entry) {
+  if (!entry.is_turned()) return "";
+  constexpr double kDegrees = 180 / std::numbers::pi;
+  std::array<char, 160> text{};
+  std::snprintf(
+      text.data(), text.size(),
+      "the needle goes in %.1f degrees (x) and %.1f (y) off the frame's z, each +- %.1f: camera frame or guide turned",
+      kDegrees * entry.slope().x(), kDegrees * entry.slope().y(), kDegrees * entry.slope_sd());
+  return text.data();
+}
 
 needle_state_t to_message(const estimator::Estimate& estimate, std::int64_t seq) {
   needle_state_t m{};
@@ -70,6 +84,7 @@ EstimatorNode::EstimatorNode(lcm::LCM& lcm, const estimator::EstimatorConfig& co
     : bounds_(bounds),
       port_(lcm),
       estimator_(live(config)),
+      entry_line_(live(config)),
       status_(port_, "bevel-estimator", kPeriod_s),
       words_(port_, status_, Receiver::estimator, [this](Word word, const steering_target_t&) { on_word(word); }),
       cameras_(config.limits.measurement_silence_s),
@@ -90,15 +105,19 @@ void EstimatorNode::on_axes(const actuator_state_t& m) {
       axes_ && io::at_rest_and_off(*axes_) && io::at_rest_and_off(m) && io::check_jump(*axes_, m, bounds_);
   axes_ = m;
   if (new_zero) entry_.restart();
-  if (entry_.see_axes(m.insertion_mm) || new_zero) estimator_.restart();
-  estimator_.add(io::to_sample(m));
+  if (entry_.see_axes(m.insertion_mm) || new_zero) restart();
+  const model::ActuatorState axes = io::to_sample(m);
+  estimator_.add(axes);
+  entry_line_.add(axes);
   publish(estimator_.estimate(port_.now().utime));
 }
 
 void EstimatorNode::on_tip(const tip_measurement_t& m) {
   cameras_.hear(m, axes_ ? axes_->insertion_mm : 0, port_.now().ns);
   if (m.status == 0 && m.information_per_mm2[8] > 0) entry_.see_tip(m.position_mm[2]);
-  estimator_.add(io::to_sample(m));
+  const model::TipMeasurement measurement = io::to_sample(m);
+  estimator_.add(measurement);
+  entry_line_.add(measurement);
   publish_evidence();
 }
 
@@ -108,12 +127,17 @@ void EstimatorNode::on_heading(const tip_heading_t& m) {
   publish_evidence();
 }
 
+void EstimatorNode::restart() {
+  estimator_.restart();
+  entry_line_.restart();
+}
+
 void EstimatorNode::on_word(Word word) {
   switch (word) {
     case Word::arm:
       break;
     case Word::entry:
-      estimator_.restart();
+      restart();
       entry_.restart();
       break;
     case Word::confirm:
@@ -184,7 +208,7 @@ void EstimatorNode::step(const Now& now) {
     remark_ = "another bevel-estimator is heard on this network";
   }
   std::string reason = estimator::describe_health(health());
-  for (const std::string& more : {remark_, words_.refusal()})
+  for (const std::string& more : {remark_, describe(entry_line_), words_.refusal()})
     if (!more.empty()) reason += "; " + more;
   status_.report(axes_ ? "running" : "waiting", reason);
 }

@@ -9,6 +9,7 @@
 #include <optional>
 #include <string>
 
+#include "estimator/entry_line.hpp"
 #include "estimator/needle_estimator.hpp"
 #include "nodes/camera_watch.hpp"
 #include "nodes/entry_watch.hpp"
@@ -16,6 +17,8 @@
 
 namespace bevel::nodes {
 
+// What an operator should know of how the needle went in; empty where all is as expected.
+std::string describe(const estimator::EntryLine& entry);
 needle_state_t to_message(const estimator::Estimate& estimate, std::int64_t seq);
 
 class EstimatorNode {
@@ -39,10 +42,12 @@ class EstimatorNode {
   void on_trouble(const InputTrouble& trouble);
   void publish(estimator::Estimate estimate);
   void publish_evidence();
+  void restart();
 
   io::MotionBounds bounds_;
   LcmPort port_;
   estimator::NeedleEstimator estimator_;
+  estimator::EntryLine entry_line_;
   StatusReporter status_;
   OperatorWords words_;
   CameraWatch cameras_, headings_;

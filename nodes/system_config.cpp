@@ -24,7 +24,7 @@ void read_controller(Section s, controller::ControllerConfig& c) {
   s.read("period_s", c.period_s, optional,
          in_range(0.002, 0.03).because("set-points must be renewed before the driver takes them for old"));
   s.read("law", c.law, optional,
-         io::Choices<controller::Law>{{"arcs", controller::Law::arcs}, {"spin", controller::Law::spin}});
+         io::Choices<controller::Law>{{"arcs", controller::Law::arcs}, {"flip", controller::Law::flip}, {"spin", controller::Law::spin}});
   Section l = s.section("limits", optional);
   l.read("insertion_rate_mm_s", c.limits.insertion_rate_mm_s, optional, in_range(0.01, 100));
   l.read("insertion_rate_min_share", c.limits.insertion_rate_min_share, optional, in_range(0.01, 1));

@@ -96,7 +96,7 @@ Steered steer_to(const Eigen::Vector3d& target, const model::NeedleParameters& t
   for (int i = 0; i < 10000; ++i) {
     const ArcGeometry g = arc_geometry(tip, believed, {}, target);
     if (!g.in_domain || g.ahead_mm <= 0) break;
-    const Rates next = ramp(rates, law.step(g, rotation_rad, 0.05, config), dt, config.limits);
+    const Rates next = ramp(rates, law.step(g, rotation_rad, 10, 0.05, config), dt, config.limits);
     run.largest_acceleration =
         std::max(run.largest_acceleration, std::abs(next.rotation_rad_s - rates.rotation_rad_s) / dt);
     rates = next;
@@ -150,10 +150,50 @@ TEST(ArcLaw, FacesATargetThatIsOutOfReach) {
   const ArcGeometry g = arc_geometry(tip, agar(), {}, {30, 0, 60});
   ASSERT_GT(g.aim_mm.norm(), g.reach_mm);
   ArcLaw law;
-  const Rates wanted = law.step(g, 0, 0.05, config);
+  const Rates wanted = law.step(g, 0, 10, 0.05, config);
   EXPECT_GT(wanted.rotation_rad_s * g.facing_rad, 0);
   const Steered run = steer_to({30, 0, 60}, agar(), agar(), config);
   EXPECT_NEAR(run.miss_mm, g.aim_mm.norm() - g.reach_mm, 2.5) << "as near as it comes, but for the first half turn";
+}
+
+// A rig that cannot turn while it inserts: nothing is inserted while the shaft turns, half turns in the tissue alone,
+// and in the plane of the bevel the target is met.
+TEST(ArcLaw, FlipsByHalfTurnsAtRest) {
+  ControllerConfig config;
+  config.law = Law::flip;
+  constexpr double kDepth_mm = 100;
+  const double dt = 0.01;
+  for (const double aside_mm : {0.0, 3.0, 8.0, -6.0}) {
+    const Eigen::Vector3d target(0.6 * aside_mm, 0.8 * aside_mm, kDepth_mm);
+    const model::NeedleParameters needle = agar();
+    model::Pose tip;
+    ArcLaw law;
+    Rates rates;
+    double rotation_rad = 0, inserted_mm = 0, kept_rad = 0, worst_off_half_rad = 0, while_turning_mm = 0;
+    int flips = 0;
+    for (int i = 0; i < 20'000; ++i) {
+      const ArcGeometry g = arc_geometry(tip, needle, {}, target);
+      if (g.ahead_mm <= 0) break;
+      rates = ramp(rates, law.step(g, rotation_rad, inserted_mm, 0.05, config), dt, config.limits);
+      const bool turns = std::abs(rates.rotation_rad_s) > 1e-6;
+      if (turns && inserted_mm > 1.5) while_turning_mm += rates.insertion_mm_s * dt;
+      if (!turns && std::abs(rotation_rad - kept_rad) > 0.5) {
+        if (inserted_mm > 1.5) {
+          ++flips;
+          worst_off_half_rad =
+              std::max(worst_off_half_rad, std::abs(std::abs(rotation_rad - kept_rad) - std::numbers::pi));
+        }
+        kept_rad = rotation_rad;
+      }
+      model::advance(tip, {rates.insertion_mm_s * dt, rates.rotation_rad_s * dt, {needle.curvature_per_mm, 0}},
+                     model::slip_parameters(needle));
+      rotation_rad += rates.rotation_rad_s * dt, inserted_mm += rates.insertion_mm_s * dt;
+    }
+    EXPECT_GT(flips, 0) << aside_mm;
+    EXPECT_LT(worst_off_half_rad, 0.1) << aside_mm;
+    EXPECT_LT(while_turning_mm / flips, 0.5) << "what the ramps take";
+    EXPECT_LT((tip.p_mm - target).norm(), 0.7) << aside_mm << ", " << flips << " flips";
+  }
 }
 
 }  // namespace

@@ -19,7 +19,7 @@ void arcs(benchmark::State& state, const ShaftConfig& shaft) {
   const ControllerConfig config;
   const model::Pose tip;
   for (auto _ : state)
-    benchmark::DoNotOptimize(law.step(arc_geometry(tip, agar(), shaft, kTarget), 0, 0.05, config).rotation_rad_s);
+    benchmark::DoNotOptimize(law.step(arc_geometry(tip, agar(), shaft, kTarget), 0, 10, 0.05, config).rotation_rad_s);
 }
 void Arcs(benchmark::State& state) { arcs(state, {}); }
 void ArcsWithAStiffShaft(benchmark::State& state) { arcs(state, {40, 15}); }

@@ -4,6 +4,7 @@
 #include <cmath>
 #include <numbers>
 #include <random>
+#include <type_traits>
 
 namespace bevel::steering {
 namespace {
@@ -57,6 +58,7 @@ struct Kinematic {
   double drift_mm = 0;      // of the target in 20 s, in a drawn direction across
   double breathing_mm = 0;  // of the target, amplitude at 0.25 Hz along x, phase drawn
   bool gated = false;
+  double camera_turned_rad = 0;  // of both, about a drawn axis across the needle
 };
 Trial kinematic(const Kinematic& kind, std::uint64_t seed) {
   Draw draw(seed);
@@ -93,6 +95,7 @@ Trial kinematic(const Kinematic& kind, std::uint64_t seed) {
   trial.believed.controller.follow.gate_breathing = kind.gated;
   trial.rig.cameras = cameras(kind.cameras);
   trial.rig.cameras.outlier_share = kind.outlier_share;
+  trial.rig.cameras.turned_rad = kind.camera_turned_rad * Eigen::Vector3d(std::cos(angle), std::sin(angle), 0);
   trial.rig.make_plant = [truth, effects, roll_rad] {
     return std::make_unique<rig::KinematicPlant>(truth, effects, roll_rad);
   };
@@ -134,7 +137,7 @@ Trial beam(const Beam& kind, std::uint64_t seed) {
 
 template <class Kind>
 Scenario scenario(const char* name, const char* what, const Kind& kind, Trial (*draw)(const Kind&, std::uint64_t)) {
-  return {name, what, [=](std::uint64_t seed) { return draw(kind, seed); }};
+  return {name, what, [=](std::uint64_t seed) { return draw(kind, seed); }, std::is_same_v<Kind, Beam>};
 }
 
 }  // namespace
@@ -164,6 +167,8 @@ const std::vector<Scenario>& scenarios() {
       scenario<Kinematic>("roll", "the bevel's roll at the start off by 0.5 rad (standard deviation)",
                           {.roll_sd_rad = 0.5}, kinematic),
       scenario<Kinematic>("one-camera", "one camera, along x", {.cameras = 1}, kinematic),
+      scenario<Kinematic>("camera-turned", "both cameras' frame turned by 2 degrees about an axis across the needle",
+                          {.camera_turned_rad = 2 * std::numbers::pi / 180}, kinematic),
       scenario<Kinematic>("outliers", "a tenth of the messages off by 3 to 10 mm", {.outlier_share = 0.1}, kinematic),
   };
   return all;

@@ -6,6 +6,7 @@
 #include <map>
 #include <random>
 
+#include "estimator/entry_line.hpp"
 #include "estimator/needle_estimator.hpp"
 
 namespace bevel::steering {
@@ -56,9 +57,11 @@ class Eyes {
     ++seq_;
   }
 
-  void deliver(estimator::NeedleEstimator& estimator, std::int64_t utime) {
-    for (; !under_way_.empty() && under_way_.front().arrives_utime <= utime; under_way_.pop_front())
+  void deliver(estimator::NeedleEstimator& estimator, estimator::EntryLine& entry, std::int64_t utime) {
+    for (; !under_way_.empty() && under_way_.front().arrives_utime <= utime; under_way_.pop_front()) {
       estimator.add(under_way_.front().measurement);
+      entry.add(under_way_.front().measurement);
+    }
   }
 
  private:
@@ -102,13 +105,15 @@ controller::NeedleView view_of(const estimator::Estimate& estimate) {
 
 }  // namespace
 
-Insertion steer(const SteeredRig& rig, const Believed& believed, const Eigen::Vector3d& target_mm, std::uint64_t seed) {
+Insertion steer(const SteeredRig& rig, const Believed& believed, const Eigen::Vector3d& target_mm, std::uint64_t seed,
+                bool told_the_tip) {
   const std::unique_ptr<rig::Plant> plant = rig.make_plant();
   Eyes cameras(rig.cameras, seed);
   estimator::EstimatorConfig settings = believed.estimator;
   // A rig whose camera is late has its limit set for that: it is not what is looked at here.
   settings.limits.measurement_age_s += plant->model().latency_s().value;
   estimator::NeedleEstimator estimator(settings);
+  estimator::EntryLine entry(settings);
   const controller::ControllerConfig& config = believed.controller;
   const model::NeedleParameters needle = model::AugmentedNeedle(settings.prior.needle, settings.effects).needle();
   controller::Supervisor supervisor(config, needle, believed.undone);
@@ -135,15 +140,19 @@ Insertion steer(const SteeredRig& rig, const Believed& believed, const Eigen::Ve
       axes.utime = utime;
       ++axes.seq;
       estimator.add(axes);
+      entry.add(axes);
       supervisor.set_actuator(axes);
     }
     if (us >= next_frame_us) {
       next_frame_us += frame_us;
       cameras.take(*plant, utime);
     }
-    cameras.deliver(estimator, utime);
+    cameras.deliver(estimator, entry, utime);
+    if (result.turned_frame_said_mm == 0 && entry.is_turned()) result.turned_frame_said_mm = axes.insertion_mm;
     if (us % control_us != 0 || us < kSettle_us) continue;
-    supervisor.set_needle(view_of(estimator.estimate(utime)));
+    controller::NeedleView view = view_of(estimator.estimate(utime));
+    if (told_the_tip) view.pose = plant->tip();
+    supervisor.set_needle(view);
     if (!started) {
       const controller::Target target{target_mm, 0};
       supervisor.request(controller::Request::arm, target, utime);

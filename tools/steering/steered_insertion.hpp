@@ -50,11 +50,15 @@ struct Insertion {
   double miss_mm = 0;  // true tip to target where it came to rest
   bool arrived = false;
   controller::Reason reason = controller::Reason::none;  // why not
+  double turned_frame_said_mm = 0;                       // of insertion; 0: it was not
   double estimate_error_mm = 0;                          // estimate to true tip, at the end
   double turned_rad = 0;                                 // of the base, both ways together
   double inserted_mm = 0, duration_s = 0;                // from the word to go until it stopped
 };
 
-Insertion steer(const SteeredRig& rig, const Believed& believed, const Eigen::Vector3d& target_mm, std::uint64_t seed);
+// told_the_tip: the controller sees the true tip instead of the estimate's, its parameters as they are estimated: what
+// is left is not the camera's.
+Insertion steer(const SteeredRig& rig, const Believed& believed, const Eigen::Vector3d& target_mm, std::uint64_t seed,
+                bool told_the_tip = false);
 
 }  // namespace bevel::steering

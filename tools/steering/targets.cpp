@@ -20,14 +20,19 @@ namespace {
 struct LawTried {
   const char* name;
   controller::Law law;
+  bool told_the_tip = false;  // what an estimate without error would bring: asked where the tip swings
 };
-constexpr std::array<LawTried, 2> kLaws{{{"arcs", controller::Law::arcs}, {"spin", controller::Law::spin}}};
+constexpr std::array<LawTried, 4> kLaws{{{"arcs", controller::Law::arcs},
+                                         {"arcs, told the tip", controller::Law::arcs, true},
+                                         {"flip", controller::Law::flip},
+                                         {"spin", controller::Law::spin}}};
 
 // Of those that came to rest at the target's depth.
 struct Figures {
   int targets = 0, arrived = 0, refused = 0;
   double median_mm = 0, mean_mm = 0, sd_mm = 0, at_95_mm = 0, worst_mm = 0;
   double turns_per_100mm = 0, feed_mm_s = 0, estimate_error_mm = 0;
+  int turned_frame_said = 0;           // of all targets
   std::map<std::string, int> stopped;  // by reason
 };
 
@@ -37,6 +42,7 @@ Figures figures_of(const std::vector<Insertion>& all) {
   double turned_rad = 0, inserted_mm = 0, duration_s = 0;
   for (const Insertion& one : all) {
     ++f.targets;
+    if (one.turned_frame_said_mm > 0) ++f.turned_frame_said;
     if (!one.arrived) {
       if (one.reason == controller::Reason::target_unreachable && one.inserted_mm == 0)
         ++f.refused;
@@ -71,6 +77,7 @@ std::string row_of(const std::string& scenario, const char* law, const Figures& 
       100.0 * f.arrived / std::max(f.targets, 1), f.refused, f.turns_per_100mm, f.feed_mm_s, f.estimate_error_mm);
   std::string row = text.data();
   for (const auto& [reason, count] : f.stopped) row += " " + std::to_string(count) + " " + reason + ";";
+  if (f.turned_frame_said > 0) row += " frame said to be turned: " + std::to_string(f.turned_frame_said) + ";";
   return row + " |";
 }
 
@@ -82,6 +89,7 @@ nlohmann::json json_of(const Scenario& scenario, const char* law, const Figures&
           {"arrived", f.arrived},
           {"refused", f.refused},
           {"stopped", f.stopped},
+          {"turned_frame_said", f.turned_frame_said},
           {"median_mm", f.median_mm},
           {"mean_mm", f.mean_mm},
           {"sd_mm", f.sd_mm},
@@ -115,13 +123,14 @@ int run_targets(const TargetsOptions& options, std::ostream& out) {
   nlohmann::json all = nlohmann::json::array();
   for (const Scenario* scenario : wanted)
     for (const LawTried& law : kLaws) {
+      if (law.told_the_tip && !scenario->swings) continue;
       std::vector<Insertion> insertions(static_cast<std::size_t>(options.targets));
       parallel_for(insertions.size(), options.threads, [&](std::size_t i) {
         const std::uint64_t seed = 1'000'003 * options.seed + i;
         Trial trial = scenario->draw(seed);
         trial.believed.controller.law = law.law;
         if (options.tube_share >= 0) trial.believed.controller.gains.tube_share = options.tube_share;
-        insertions[i] = steer(trial.rig, trial.believed, trial.target_mm, seed);
+        insertions[i] = steer(trial.rig, trial.believed, trial.target_mm, seed, law.told_the_tip);
       });
       const Figures figures = figures_of(insertions);
       out << row_of(scenario->name, law.name, figures) << std::endl;
