@@ -1,11 +1,10 @@
 #include "tools/check/link_probe.hpp"
 
-#include <time.h>
-
 #include <algorithm>
 #include <cerrno>
 #include <chrono>
 #include <cstring>
+#include <ctime>
 #include <stdexcept>
 #include <thread>
 #include <utility>
