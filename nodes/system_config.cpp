@@ -69,6 +69,15 @@ void read_axis(Section s, stepper::AxisConfig& axis) {
   int node_id = axis.node_id;
   s.read("node_id", node_id, optional, in_range(1, 127));
   axis.node_id = static_cast<std::uint8_t>(node_id);
+  const auto read_identity = [&s](const char* key, std::uint32_t& number) {
+    std::int64_t value = number;
+    s.read(key, value, optional, in_range(0, 4294967295));
+    number = static_cast<std::uint32_t>(value);
+  };
+  read_identity("vendor_id", axis.vendor_id);
+  read_identity("product_code", axis.product_code);
+  read_identity("revision", axis.revision);
+  read_identity("serial", axis.serial);
   s.read("counts_per_unit", axis.counts_per_unit, optional, in_range(-1e7, 1e7));
   s.read("rate_limit_unit_s", axis.rate_limit_unit_s, optional, above(0));
   s.read("acceleration_unit_s2", axis.acceleration_unit_s2, optional, above(0));

@@ -9,7 +9,11 @@ constexpr std::uint8_t kUpload = 0x40;
 constexpr std::uint8_t kUploadExpedited = 0x42;  // command specifier and the expedited bit
 constexpr std::uint8_t kUploadMask = 0xE2;
 constexpr std::uint8_t kAbort = 0x80;
+constexpr std::uint8_t kSegment = 0x60;  // request; the answer's command specifier is 0
+constexpr std::uint8_t kCommandMask = 0xE0;
+constexpr std::uint8_t kToggle = 0x10;
 constexpr std::uint32_t kAbortCommand = 0x05040001;
+constexpr std::uint32_t kAbortMemory = 0x05040005;
 
 }  // namespace
 
@@ -65,6 +69,7 @@ void SdoClient::begin(Frame request, ObjectAddress object, bool is_upload) {
   request_ = request;
   object_ = object;
   is_upload_ = is_upload;
+  is_text_ = in_segments_ = false;
   status_ = Status::to_send;
 }
 
@@ -72,6 +77,12 @@ void SdoClient::upload(ObjectAddress object) {
   Frame request;
   request.data[0] = kUpload;
   begin(request, object, true);
+}
+
+void SdoClient::upload_text(ObjectAddress object) {
+  upload(object);
+  is_text_ = true;
+  text_size_ = 0;
 }
 
 void SdoClient::download(ObjectAddress object, std::uint32_t value, std::uint8_t size_bytes) {
@@ -117,9 +128,48 @@ void SdoClient::check_time(std::int64_t now_ns) {
   give_up(Status::timed_out, kAbortTimeout);
 }
 
+void SdoClient::ask_for_segment() {
+  request_ = {sdo_request_id(node_), 8, {static_cast<std::uint8_t>(kSegment | toggle_)}};
+  status_ = Status::to_send;
+}
+
+void SdoClient::append(const Frame& frame, std::size_t from, std::size_t bytes) {
+  if (text_size_ + bytes > kLongestText) return give_up(Status::aborted, kAbortMemory);
+  for (std::size_t i = 0; i < bytes; ++i) text_.at(text_size_++) = static_cast<char>(frame.data.at(from + i));
+}
+
+void SdoClient::on_upload_begun(const Frame& frame) {
+  const std::uint8_t command = frame.data[0];
+  if ((command & kUploadMask) == kUploadExpedited) {
+    const unsigned unused = (command & 1U) != 0 ? (command >> 2) & 3U : 0U;
+    value_ = get_u32(frame, 4) & (0xFFFFFFFFU >> (8 * unused));
+    if (is_text_) append(frame, 4, 4 - unused);
+    status_ = Status::done;
+  } else if (is_text_) {
+    in_segments_ = true;
+    toggle_ = 0;
+    ask_for_segment();
+  } else {
+    give_up(Status::aborted, kAbortCommand);  // no number is longer than 4 bytes
+  }
+}
+
+void SdoClient::on_segment(const Frame& frame) {
+  const std::uint8_t command = frame.data[0];
+  if ((command & (kCommandMask | kToggle)) != toggle_) {
+    ++ignored_;  // of another transfer, or the one before again
+    return;
+  }
+  status_ = Status::done;
+  append(frame, 1, 7U - ((command >> 1) & 7U));
+  toggle_ ^= kToggle;
+  if (status_ == Status::done && (command & 1U) == 0) ask_for_segment();
+}
+
 void SdoClient::on_response(const Frame& frame) {
-  const bool matches = status_ == Status::waiting && frame.size == 8 && get_u16(frame, 1) == object_.index &&
-                       frame.data[3] == object_.sub;
+  const bool is_answer = status_ == Status::waiting && frame.size == 8;
+  if (is_answer && in_segments_ && frame.data[0] != kAbort) return on_segment(frame);
+  const bool matches = is_answer && get_u16(frame, 1) == object_.index && frame.data[3] == object_.sub;
   if (!matches) {
     ++ignored_;  // late, duplicate, or meant for a request that was given up
     return;
@@ -130,12 +180,8 @@ void SdoClient::on_response(const Frame& frame) {
     status_ = Status::aborted;
   } else if (!is_upload_ && command == kDownloadDone) {
     status_ = Status::done;
-  } else if (is_upload_ && (command & kUploadMask) == kUploadExpedited) {
-    const unsigned unused = (command & 1U) != 0 ? (command >> 2) & 3U : 0U;
-    value_ = get_u32(frame, 4) & (0xFFFFFFFFU >> (8 * unused));
-    status_ = Status::done;
-  } else if (is_upload_ && (command & kUploadMask) == kUpload) {
-    give_up(Status::aborted, kAbortCommand);  // segmented: nothing read here is longer than 4 bytes
+  } else if (is_upload_ && (command & kCommandMask) == kUpload) {
+    on_upload_begun(frame);
   } else {
     ++ignored_;
   }

@@ -1,8 +1,10 @@
 // The part of CANopen (CiA 301) that a master of two drives needs: identifiers, NMT, SYNC, heartbeat, expedited SDO.
 #pragma once
 
+#include <array>
 #include <cstdint>
 #include <optional>
+#include <string_view>
 
 #include "drivers/can/frame.hpp"
 
@@ -56,22 +58,26 @@ struct ObjectAddress {
   bool operator==(const ObjectAddress&) const = default;
 };
 
-// Client of one node's default SDO server; expedited transfers only (a segmented answer is aborted), one at a time.
-// An answer is taken only when command, index and sub-index match the request; anything else is counted and ignored.
+// Client of one node's default SDO server, one transfer at a time: numbers expedited (a segmented answer to upload() is
+// aborted), texts also in segments. An answer is taken only when command, index and sub-index match the request, or
+// command and toggle bit that of a segment; anything else is counted and ignored.
 class SdoClient {
  public:
   enum class Status : std::uint8_t {
     idle,
     to_send,  // frame_to_send() has a frame to send
     waiting,
-    done,       // value() is valid after an upload
+    done,       // value() or text() is valid after an upload
     aborted,    // abort_code() says why
     timed_out,  // an abort is to be sent first: frame_to_send()
   };
 
   SdoClient(std::uint8_t node, std::int64_t timeout_ns) : node_(node), timeout_ns_(timeout_ns) {}
 
+  static constexpr std::size_t kLongestText = 64;  // of a longer one the transfer is aborted
+
   void upload(ObjectAddress object);
+  void upload_text(ObjectAddress object);  // each segment has the whole time-out
   void download(ObjectAddress object, std::uint32_t value, std::uint8_t size_bytes);
   void cancel();  // forget the transfer, without a word to the server
 
@@ -82,12 +88,17 @@ class SdoClient {
 
   Status status() const { return status_; }
   std::uint32_t value() const { return value_; }
+  std::string_view text() const { return {text_.data(), text_size_}; }
   std::uint32_t abort_code() const { return abort_code_; }
   std::uint64_t ignored() const { return ignored_; }
 
  private:
   void begin(Frame request, ObjectAddress object, bool is_upload);
   void give_up(Status end, std::uint32_t code);
+  void on_upload_begun(const Frame& frame);
+  void on_segment(const Frame& frame);
+  void ask_for_segment();
+  void append(const Frame& frame, std::size_t from, std::size_t bytes);
 
   std::uint8_t node_;
   std::int64_t timeout_ns_;
@@ -95,6 +106,11 @@ class SdoClient {
   Frame request_{};
   ObjectAddress object_{};
   bool is_upload_ = false;
+  bool is_text_ = false;
+  bool in_segments_ = false;
+  std::uint8_t toggle_ = 0;
+  std::array<char, kLongestText> text_{};
+  std::size_t text_size_ = 0;
   std::optional<Frame> abort_;  // of a transfer given up, yet to be sent
   std::int64_t sent_ns_ = 0;
   std::uint32_t value_ = 0;

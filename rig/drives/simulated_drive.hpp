@@ -77,6 +77,7 @@ class SimulatedDrive {
   void send(const can::Frame& frame);
   void send_emergency(std::uint16_t code);
   void advance(double dt_s);
+  void advance_cycle(double dt_s);
   double wanted_increments_s() const;
   double ramp_increments_s2(double target) const;
   double quick_stop_ramp() const;

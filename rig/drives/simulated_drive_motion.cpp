@@ -76,7 +76,15 @@ void SimulatedDrive::advance_homing() {
   }
 }
 
+// The drive's own control cycle: limits and switches are looked at a thousand times a second, however late step() is.
 void SimulatedDrive::advance(double dt_s) {
+  constexpr double kCycle_s = 0.001;
+  constexpr double kMostCycles = 1000.0;  // of one step
+  const double cycles = std::clamp(std::ceil(dt_s / kCycle_s), 1.0, kMostCycles);
+  for (int i = 0; i < static_cast<int>(cycles); ++i) advance_cycle(dt_s / cycles);
+}
+
+void SimulatedDrive::advance_cycle(double dt_s) {
   at_limit_ = false;
   if (power_.moves()) {
     advance_homing();

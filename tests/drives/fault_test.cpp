@@ -1,6 +1,11 @@
 // Each row of the fault table that can be made on a wire in memory. Every stop is latched: see expect_latched().
 #include <gmock/gmock.h>
 
+#include <cstdio>
+#include <deque>
+#include <random>
+#include <utility>
+
 #include "tests/drives/bench.hpp"
 
 namespace bevel::test {
@@ -23,6 +28,16 @@ class Fault : public testing::Test {
     const auto ms = bench.ms_to_rest();
     ASSERT_TRUE(ms.has_value());
     EXPECT_LE(*ms, limit_ms);
+    std::printf("%s: at rest after %d ms\n", testing::UnitTest::GetInstance()->current_test_info()->name(), *ms);
+  }
+
+  // From here on: a velocity in any command on the wire.
+  void watch_for_commands(bool& moves) {
+    bench.wire.set_tap([&moves](can::Frame& frame) {
+      const bool command = frame.id == 0x201 || frame.id == 0x202;
+      moves = moves || (command && stepper::cia301::get_u32(frame, 2) != 0);
+      return true;
+    });
   }
 
   // Latched, and fresh set-points and a repaired world change nothing.
@@ -223,6 +238,64 @@ TEST_F(Fault, PdosOfAWrongLengthAreNotTaken) {
   EXPECT_GT(bench.report().counters.malformed, 0U);
 }
 
+// All of a drive's answers late by 80 ms: they are not taken for those to the newest SYNC.
+TEST_F(Fault, DelayedPdosStopTheAxes) {
+  std::deque<std::pair<std::int64_t, can::Frame>> late;
+  bool passing = false;
+  bench.wire.set_tap([&](can::Frame& frame) {
+    if (passing || (frame.id != 0x181 && frame.id != 0x281)) return true;
+    late.emplace_back(bench.now_ns + 80 * kMs, frame);
+    return false;
+  });
+  bench.each_ms = [&] {
+    passing = true;
+    for (; !late.empty() && late.front().first <= bench.now_ns; late.pop_front())
+      bench.wire.inject(late.front().second);
+    passing = false;
+  };
+  expect_rest_within_ms(200);
+  bench.run_ms(300);
+  EXPECT_THAT(bench.reason(), testing::AnyOf(StopReason::pdo_lost, StopReason::not_following));
+}
+
+// One frame in twenty lost, whatever it is, for ten seconds: borne, or a latched stop; never axes that run on.
+TEST_F(Fault, FramesLostAtRandom) {
+  for (const unsigned seed : {1U, 2U, 3U, 4U, 5U}) {
+    Bench world;
+    ASSERT_TRUE(world.enable());
+    world.move(5.0, 1.0);
+    std::mt19937 random(seed);
+    world.wire.set_tap([&random](can::Frame&) { return random() % 20 != 0; });
+    world.run_ms(10'000);
+    if (world.report().state == DriverState::enabled) {
+      EXPECT_NEAR(world.report().insertion_mm, 50.0, 3.0);
+    } else {
+      EXPECT_TRUE(world.at_rest()) << describe(world.report().stop);
+    }
+    world.command.reset();  // the controller falls silent, and frames are still being lost
+    const auto ms = world.ms_to_rest();
+    ASSERT_TRUE(ms.has_value());
+    EXPECT_LE(*ms, 200);
+  }
+}
+
+// A bit that turned on the way: a command with another drive's identifier, a controlword of another state.
+TEST_F(Fault, ACorruptedCommandIsUndoneByTheNext) {
+  bool corrupted = false;
+  bench.wire.set_tap([&corrupted](can::Frame& frame) {
+    if (frame.id == 0x201 && !corrupted) {
+      corrupted = true;
+      frame.data[4] ^= 0x01;  // 65536 counts/s more
+    }
+    return true;
+  });
+  bench.run_ms(200);
+  EXPECT_TRUE(corrupted);
+  EXPECT_EQ(bench.report().state, DriverState::enabled) << describe(bench.report().stop);
+  // 607F bounds what the drive makes of it, the ramp what it reaches within a cycle.
+  EXPECT_NEAR(bench.report().insertion_rate_mm_s, 10.0, 0.1);
+}
+
 TEST_F(Fault, DriveStoppedByAnNmtStateOfItsOwn) {
   bench.wire.inject({0x701, 1, {0x04}});
   expect_rest_within_ms(100);
@@ -237,11 +310,7 @@ TEST_F(Fault, NobodyAcknowledges_QueuedCommandsAreNeverReplayed) {
   EXPECT_GE(bench.report().counters.held_back, 1U);
   // What goes out when the bus returns: not one old velocity.
   bool replayed = false;
-  bench.wire.set_tap([&](can::Frame& frame) {
-    const bool moves = frame.id == 0x201 && (frame.data[2] | frame.data[3] | frame.data[4] | frame.data[5]) != 0;
-    replayed = replayed || moves;
-    return true;
-  });
+  watch_for_commands(replayed);
   bench.run_ms(300);
   bench.wire.set_acknowledged(true);
   bench.run_ms(300);
@@ -289,9 +358,13 @@ TEST_F(Fault, LinkDownIsReopenedButStaysLatched) {
   bench.wire.set_link_up(false);
   expect_rest_within_ms(200);
   expect_latched(StopReason::link_down, DriverState::stopped);
+  bool replayed = false;
+  watch_for_commands(replayed);
   bench.wire.set_link_up(true);
   bench.run_ms(1500);
   EXPECT_TRUE(bench.driver_bus->is_open());
+  EXPECT_FALSE(replayed);
+  bench.wire.set_tap(nullptr);
   expect_latched(StopReason::link_down, DriverState::stopped);
   expect_rearm_works();
 }

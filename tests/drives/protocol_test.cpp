@@ -40,6 +40,67 @@ TEST(Sdo, ATransferGivenUpIsEndedUnderItsOwnObjectBeforeTheNext) {
   EXPECT_EQ(client.status(), SdoClient::Status::waiting);
 }
 
+// "Bevel 402" in two segments.
+constexpr std::array<Frame, 3> kText{{{0x581, 8, {0x41, 0x08, 0x10, 0x00, 9, 0, 0, 0}},
+                                      {0x581, 8, {0x00, 'B', 'e', 'v', 'e', 'l', ' ', '4'}},
+                                      {0x581, 8, {0x1B, '0', '2'}}}};
+
+SdoClient waiting_for_text() {
+  SdoClient client(1, kTimeout_ns);
+  client.upload_text({0x1008, 0});
+  client.sent(0);
+  return client;
+}
+
+TEST(Sdo, ATextInSegments) {
+  auto client = waiting_for_text();
+  client.on_response(kText[0]);
+  EXPECT_EQ(*client.frame_to_send(), (Frame{0x601, 8, {0x60}}));
+  client.sent(1);
+  client.on_response(kText[1]);
+  EXPECT_EQ(*client.frame_to_send(), (Frame{0x601, 8, {0x70}}));
+  client.sent(2);
+  client.on_response(kText[1]);  // the first one again
+  EXPECT_EQ(client.status(), SdoClient::Status::waiting);
+  EXPECT_EQ(client.ignored(), 1U);
+  client.on_response(kText[2]);
+  EXPECT_EQ(client.status(), SdoClient::Status::done);
+  EXPECT_EQ(client.text(), "Bevel 402");
+}
+
+TEST(Sdo, ATextOfFourCharactersAtOnce) {
+  auto client = waiting_for_text();
+  client.on_response({0x581, 8, {0x47, 0x08, 0x10, 0x00, '2', '.', '0'}});
+  EXPECT_EQ(client.status(), SdoClient::Status::done);
+  EXPECT_EQ(client.text(), "2.0");
+}
+
+TEST(Sdo, ATextWithoutAnEndIsAborted) {
+  auto client = waiting_for_text();
+  client.on_response(kText[0]);
+  int segments = 0;
+  for (std::uint8_t toggle = 0; client.status() == SdoClient::Status::to_send; toggle ^= 0x10, ++segments) {
+    client.sent(0);
+    client.on_response({0x581, 8, {toggle, 'a', 'b', 'c', 'd', 'e', 'f', 'g'}});
+  }
+  EXPECT_EQ(segments, 10);
+  EXPECT_EQ(client.status(), SdoClient::Status::aborted);
+  EXPECT_EQ(client.text().size(), 63U);
+  EXPECT_EQ(client.frame_to_send()->data[0], 0x80);
+}
+
+TEST(Sdo, ATextThatEndsHalfWay) {
+  auto client = waiting_for_text();
+  client.on_response(kText[0]);
+  client.sent(0);
+  auto refused = client;
+  refused.on_response({0x581, 8, {0x80, 0x08, 0x10, 0x00, 0, 0, 4, 5}});
+  EXPECT_EQ(refused.status(), SdoClient::Status::aborted);
+  client.check_time(kTimeout_ns);
+  EXPECT_EQ(client.status(), SdoClient::Status::timed_out);
+  EXPECT_EQ(client.frame_to_send()->data[0], 0x80);
+}
+
 class Unfit : public testing::TestWithParam<Frame> {};
 
 TEST_P(Unfit, AnswersAreIgnoredUntilTheTimeIsUp) {

@@ -146,6 +146,15 @@ case $case in
   load)
     load_study 1 switch:4:19 mixed:2:19
     ;;
+  command_latency)  # SAMPLES
+    "$bin/bevel-rig" --config "$work/demo.toml" >"$work/rig.txt" 2>&1 & rig=$!
+    "$bin/bevel-stepper" --config "$work/demo.toml" >"$work/stepper.txt" 2>&1 & stepper=$!
+    "$bin/command_latency" "$work/demo.toml" "${4:-200}" >"$work/latency.txt" 2>&1; status=$?
+    kill $stepper $rig; wait $stepper $rig
+    cat "$work/latency.txt"
+    [ $status -eq 0 ] || fail "exit status $status"
+    grep -q "^ratio at p50" "$work/latency.txt" || fail "no ratio"
+    ;;
   loads)  # ROUNDS SEED
     for round in $(seq "${4:-1}"); do
       load_study $((${5:-1} + round)) switch:4:19 matrix:4:19 vm:1:19 mixed:2:19 mixed:4:10
