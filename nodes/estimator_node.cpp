@@ -13,6 +13,7 @@ namespace bevel::nodes {
 namespace {
 
 constexpr double kPeriod_s = 0.01;
+constexpr std::int64_t kDescribed_ns = 500'000'000;
 constexpr double kFastestCamera_hz = 1000, kFastestCycle_hz = 1200;
 // How late a picture may be and still count; the history of the filter is shorter at 100 Hz.
 constexpr std::int64_t kLatestPicture_us = 600'000;
@@ -45,6 +46,19 @@ std::string describe(const estimator::EntryLine& entry) {
       "the needle goes in %.1f degrees (x) and %.1f (y) off the frame's z, each +- %.1f: camera frame or guide turned",
       kDegrees * entry.slope().x(), kDegrees * entry.slope().y(), kDegrees * entry.slope_sd());
   return text.data();
+}
+
+std::string describe(const estimator::InnovationWatch& innovations) {
+  std::string text, too_large;
+  for (const auto& [camera, channel] : innovations.channels()) {
+    std::array<char, 64> one{};
+    std::snprintf(one.data(), one.size(), "%s%.1f (camera %d)", text.empty() ? "innovations " : ", ", channel.ratio(),
+                  camera);
+    text += one.data();
+    if (channel.is_too_large()) too_large += (too_large.empty() ? " " : ", ") + std::to_string(camera);
+  }
+  if (too_large.empty()) return text;
+  return text + " of what is expected: too large of camera" + too_large + ": model or camera is not what the file says";
 }
 
 needle_state_t to_message(const estimator::Estimate& estimate, std::int64_t seq) {
@@ -89,6 +103,13 @@ EstimatorNode::EstimatorNode(lcm::LCM& lcm, const estimator::EstimatorConfig& co
       words_(port_, status_, Receiver::estimator, [this](Word word, const steering_target_t&) { on_word(word); }),
       cameras_(config.limits.measurement_silence_s),
       headings_(config.limits.measurement_silence_s) {
+  estimator_.observe(
+      [](void* context, const estimator::NeedleEstimator::Applied& applied) {
+        if (applied.measurement)
+          static_cast<estimator::InnovationWatch*>(context)->see(applied.camera, applied.utime,
+                                                                 applied.update.mahalanobis2, applied.update.rank);
+      },
+      &innovations_);
   port_.on_trouble = [this](const InputTrouble& trouble) { on_trouble(trouble); };
   port_.subscribe<tip_measurement_t>(io::channel::kTipMeasurement, tip_limits(config.limits),
                                      [this](const tip_measurement_t& m) { on_tip(m); });
@@ -130,6 +151,7 @@ void EstimatorNode::on_heading(const tip_heading_t& m) {
 void EstimatorNode::restart() {
   estimator_.restart();
   entry_line_.restart();
+  innovations_.restart();
 }
 
 void EstimatorNode::on_word(Word word) {
@@ -207,8 +229,13 @@ void EstimatorNode::step(const Now& now) {
     input_refused_ = true;
     remark_ = "another bevel-estimator is heard on this network";
   }
+  if (now.ns - described_ns_ >= kDescribed_ns) {  // numbers that change all the time
+    innovation_text_ = describe(innovations_);
+    entry_text_ = describe(entry_line_);
+    described_ns_ = now.ns;
+  }
   std::string reason = estimator::describe_health(health());
-  for (const std::string& more : {remark_, describe(entry_line_), words_.refusal()})
+  for (const std::string& more : {innovation_text_, entry_text_, remark_, words_.refusal()})
     if (!more.empty()) reason += "; " + more;
   status_.report(axes_ ? "running" : "waiting", reason);
 }

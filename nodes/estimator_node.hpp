@@ -10,6 +10,7 @@
 #include <string>
 
 #include "estimator/entry_line.hpp"
+#include "estimator/innovation_watch.hpp"
 #include "estimator/needle_estimator.hpp"
 #include "nodes/camera_watch.hpp"
 #include "nodes/entry_watch.hpp"
@@ -19,6 +20,8 @@ namespace bevel::nodes {
 
 // What an operator should know of how the needle went in; empty where all is as expected.
 std::string describe(const estimator::EntryLine& entry);
+// The ratio of each camera's innovations to what is expected of them, and which are too large. Empty before any.
+std::string describe(const estimator::InnovationWatch& innovations);
 needle_state_t to_message(const estimator::Estimate& estimate, std::int64_t seq);
 
 class EstimatorNode {
@@ -48,6 +51,7 @@ class EstimatorNode {
   LcmPort port_;
   estimator::NeedleEstimator estimator_;
   estimator::EntryLine entry_line_;
+  estimator::InnovationWatch innovations_;  // by camera
   StatusReporter status_;
   OperatorWords words_;
   CameraWatch cameras_, headings_;
@@ -56,7 +60,9 @@ class EstimatorNode {
   std::int64_t published_utime_ = 0;
   std::int64_t seq_ = 0;
   bool input_refused_ = false;
-  std::string remark_;  // what the last trouble was
+  std::string innovation_text_, entry_text_;  // as of described_ns_
+  std::int64_t described_ns_ = 0;             // steady
+  std::string remark_;                        // what the last trouble was
 };
 
 }  // namespace bevel::nodes
