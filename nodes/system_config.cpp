@@ -154,6 +154,10 @@ CameraViewConfig read_camera(Section s) {
   s.read("entry_half_width_px", t.entry_half_width_px, optional);
   s.read("needle_diameter_mm", t.needle_diameter_mm, optional, in_range(0.05, 10));
   s.read("bevel_length_mm", t.bevel_length_mm, optional, in_range(0, 50));
+  s.read("bevel_length_sd", t.bevel_length_sd, optional, in_range(0.01, 2));
+  s.read("tip_point", t.tip_point, optional,
+         io::Choices<camera::TipPoint>{{"axis", camera::TipPoint::axis}, {"seen", camera::TipPoint::seen}});
+  s.read("max_along_sd_mm", t.max_along_sd_mm, optional, in_range(1e-3, 50));
   s.read("min_contrast_gray", t.min_contrast_gray, optional, in_range(1, 255));
   s.read("min_length_mm", t.min_length_mm, optional, in_range(0.5, 1000));
   s.read("floor_across_mm", t.floor_across_mm, optional, in_range(1e-4, 100));

@@ -1,8 +1,10 @@
 #include "drivers/camera/centreline.hpp"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <limits>
+#include <numbers>
 
 namespace bevel::camera {
 namespace {
@@ -73,24 +75,6 @@ double Centreline::variance_px2(double row) const {
   return g.dot(covariance * g);
 }
 
-double TangentFit::slope(double row) const {
-  const double t = (row - last_row) / scale_px;
-  return (coefficient[1] + 2.0 * t * coefficient[2]) / scale_px;
-}
-
-double TangentFit::angle_variance_rad2(double row) const {
-  const double t = (row - last_row) / scale_px;
-  const cv::Vec3d g(0.0, 1.0 / scale_px, 2.0 * t / scale_px);
-  double variance = g.dot(covariance * g);
-  for (int i = 0; i < kBends; ++i) {
-    const double true_slope = std::max(0.0, row - last_row + (i + 0.5) * bend_spacing_px);
-    const double off = g.dot(by_bend[static_cast<size_t>(i)]) - true_slope;
-    variance += off * off * curvature_change_per_px * curvature_change_per_px / kBends;
-  }
-  const double s = slope(row);
-  return variance / ((1.0 + s * s) * (1.0 + s * s));
-}
-
 cv::Point2d Centreline::along(double row, double arc_px) const {
   // Midpoint steps of at most two pixels; the curve turns by far less than a degree in one.
   const int steps = std::max(1, static_cast<int>(std::ceil(std::abs(arc_px) / 2.0)));
@@ -101,42 +85,6 @@ cv::Point2d Centreline::along(double row, double arc_px) const {
   }
   return {col(row), row};
 }
-
-namespace {
-
-TangentFit fit_tangent(const Centreline& line, const std::vector<cv::Point2d>& centres,
-                       const std::vector<double>& weight, const CentrelinePriors& priors) {
-  TangentFit fit;
-  fit.last_row = line.last_row;
-  fit.scale_px = line.scale_px;
-  fit.bend_spacing_px = line.scale_px / TangentFit::kBends;
-  fit.curvature_change_per_px = priors.curvature_change_per_px;
-  cv::Matx33d normal = cv::Matx33d::zeros();
-  cv::Vec3d right(0.0, 0.0, 0.0);
-  std::array<cv::Vec3d, TangentFit::kBends> drawn;
-  for (size_t i = 0; i < centres.size(); ++i) {
-    const double off_px = centres[i].y - fit.last_row;
-    const double t = off_px / fit.scale_px;
-    const cv::Vec3d g(1.0, t, t * t);
-    normal += weight[i] * (g * g.t());
-    right += weight[i] * centres[i].x * g;
-    for (int k = 0; k < TangentFit::kBends; ++k) {
-      const double beyond_px = std::max(0.0, off_px + (k + 0.5) * fit.bend_spacing_px);
-      drawn[static_cast<size_t>(k)] += 0.5 * weight[i] * beyond_px * beyond_px * g;
-    }
-  }
-  const double variance_px2 = line.residual_px * line.residual_px * priors.tangent_correlation_px;
-  const double bend_sigma_px = 0.5 * priors.curvature_sigma_per_px * fit.scale_px * fit.scale_px;
-  // Residuals of exactly nothing, of a drawing, would leave no prior at all and its covariance undefined.
-  normal(2, 2) += std::max(variance_px2, kLeastVariance_px2) / (bend_sigma_px * bend_sigma_px);
-  const cv::Matx33d inverse = normal.inv(cv::DECOMP_CHOLESKY);
-  fit.coefficient = inverse * right;
-  fit.covariance = inverse * std::max(variance_px2, kLeastVariance_px2);
-  for (size_t k = 0; k < drawn.size(); ++k) fit.by_bend[k] = inverse * drawn[k];
-  return fit;
-}
-
-}  // namespace
 
 Centreline fit_centreline(const std::vector<cv::Point2d>& centres, const CentrelinePriors& priors) {
   Centreline fit;
@@ -183,61 +131,111 @@ Centreline fit_centreline(const std::vector<cv::Point2d>& centres, const Centrel
   fit.residual_px = std::sqrt(variance);
   fit.covariance = inverse * (variance * priors.correlation_px);
   fit.rows_used = static_cast<int>(weight_sum);
-  fit.tangent = fit_tangent(fit, centres, weight, priors);
   return fit;
 }
 
-double darkness_across(const cv::Mat& patch, const cv::Point2d& p, double slope, const RidgeScale& scale) {
-  const double length = std::hypot(1.0, slope);
-  const cv::Point2d normal(1.0 / length, -slope / length);
-  const auto mean = [&](double middle, int half) {
-    double sum = 0.0;
-    for (int i = -half; i <= half; ++i) {
-      const cv::Point2d at = p + (middle + i) * normal;
-      sum += bilinear(patch, at.x, at.y);
+EndProfile profile_along(const cv::Mat& patch, const Centreline& line, double row, int from_px, int to_px, int reach_px,
+                         const RidgeScale& scale) {
+  constexpr int side_half = 2;
+  const int side = scale.offset_px + 1;
+  const double margin = side + side_half + 1.0;
+  EndProfile profile;
+  cv::Point2d p = line.along(row, from_px);
+  for (int i = from_px; i <= to_px; ++i, p = line.along(p.y, 1.0)) {
+    const bool inside = p.y >= 0.0 && p.y <= patch.rows - 1.0 && p.x >= margin && p.x <= patch.cols - 1.0 - margin;
+    if (!inside) {
+      if (profile.dark.empty()) continue;
+      break;
     }
-    return sum / (2 * half + 1);
-  };
-  const double sides = 0.5 * (mean(-scale.offset_px, 1) + mean(scale.offset_px, 1));
-  return sides - mean(0.0, scale.core_px / 2 + 1);
+    const double slope = line.slope(p.y);
+    const double length = std::hypot(1.0, slope);
+    const cv::Point2d right(1.0 / length, -slope / length);
+    const auto gray_at = [&](double off) { return bilinear(patch, p.x + off * right.x, p.y + off * right.y); };
+    double left_gray = 0.0, right_gray = 0.0;
+    for (int k = -side_half; k <= side_half; ++k) {
+      left_gray += gray_at(-side + k);
+      right_gray += gray_at(side + k);
+    }
+    left_gray /= 2 * side_half + 1, right_gray /= 2 * side_half + 1;
+    double dark = 0.0, moment = 0.0, spread = 0.0;
+    for (int k = -reach_px; k <= reach_px; ++k) {
+      const double share = 0.5 + 0.5 * k / side;
+      const double d = (1.0 - share) * left_gray + share * right_gray - gray_at(k);
+      dark += d, moment += d * k, spread += d * spread_weight(k, reach_px + 0.5);
+    }
+    if (profile.dark.empty()) profile.first_s_px = i;
+    profile.dark.push_back(dark);
+    profile.moment.push_back(moment);
+    profile.spread.push_back(spread);
+    profile.beside.push_back(0.5 * (left_gray + right_gray));
+  }
+  return profile;
 }
+
+namespace {
+
+/// Robust sum of squares of mean[i] - (height * bar(i) + base + tilt * i), with the bar blurred by `blur_px`; i from
+/// -reach.
+double misfit(const std::vector<double>& mean, int reach, double half_width_px, double blur_px) {
+  const auto step = [blur_px](double x) { return 0.5 * std::erfc(-x / (blur_px * std::numbers::sqrt2)); };
+  std::vector<cv::Vec3d> shape(mean.size());
+  for (size_t i = 0; i < mean.size(); ++i) {
+    const double x = static_cast<double>(i) - reach;
+    shape[i] = {step(x + half_width_px) - step(x - half_width_px), 1.0, x / reach};
+  }
+  std::vector<double> weight(mean.size(), 1.0);
+  std::vector<double> size(mean.size());
+  double cost = 0.0;
+  for (int turn = 0; turn < 3; ++turn) {
+    cv::Matx33d normal = cv::Matx33d::eye() * 1e-9;
+    cv::Vec3d right(0.0, 0.0, 0.0);
+    for (size_t i = 0; i < mean.size(); ++i) {
+      normal += weight[i] * (shape[i] * shape[i].t());
+      right += weight[i] * mean[i] * shape[i];
+    }
+    const cv::Vec3d solved = normal.inv(cv::DECOMP_CHOLESKY) * right;
+    for (size_t i = 0; i < mean.size(); ++i) size[i] = std::abs(mean[i] - solved.dot(shape[i]));
+    // What lies beside the needle (a track, a printed line) is no part of its profile.
+    constexpr double typical_gray = 2.0;
+    cost = 0.0;
+    for (size_t i = 0; i < mean.size(); ++i) {
+      const double z = size[i] / typical_gray;
+      weight[i] = 1.0 / (1.0 + z * z);
+      cost += std::log1p(z * z);
+    }
+  }
+  return cost;
+}
+
+}  // namespace
 
 double blur_across_px(const cv::Mat& patch, const Centreline& line, int first_row, int last_row,
                       double needle_width_px) {
-  constexpr double tail_share = 0.1;  // of the peak: below it is background
-  const int reach = static_cast<int>(std::ceil(3.0 * needle_width_px)) + 4;
-  const auto at = [reach](int i) {
-    const int shifted = reach + i;
-    return static_cast<size_t>(shifted);
-  };
-  std::vector<double> mean(at(reach) + 1, 0.0);
+  const int reach = static_cast<int>(std::ceil(1.6 * needle_width_px)) + 4;
+  std::vector<double> mean(static_cast<size_t>(2 * reach + 1), 0.0);
   double cosine = 1.0;
   int rows = 0;
   for (int r = std::max(0, first_row); r <= last_row; ++r, ++rows) {
     const double middle = line.col(r);
-    for (int i = -reach; i <= reach; ++i) mean[at(i)] += bilinear(patch, middle + i, r);
+    for (size_t i = 0; i < mean.size(); ++i) mean[i] += bilinear(patch, middle + static_cast<double>(i) - reach, r);
     cosine = 1.0 / std::hypot(1.0, line.slope(r));
   }
   if (rows == 0) return 0.0;
   for (double& m : mean) m /= rows;
-  std::vector<double> copy = mean;
-  const auto bright = copy.begin() + static_cast<std::ptrdiff_t>(copy.size() * 3 / 4);
-  std::nth_element(copy.begin(), bright, copy.end());
-  const double background = *bright;
-  const double peak = background - mean[at(0)];
-  if (peak <= 0.0) return 0.0;
-  double weight = peak;
-  double second = 0.0;
-  for (const int side : {-1, 1}) {
-    for (int i = 1; i <= reach; ++i) {
-      const double dark = background - mean[at(side * i)];
-      if (dark < tail_share * peak) break;  // what lies beyond a bright gap is another line
-      weight += dark;
-      second += dark * i * i;
-    }
+  const double half_width_px = 0.5 * needle_width_px / cosine;  // in a row
+  constexpr int tries = 13;
+  constexpr double first_px = 0.35;
+  const double ratio = std::pow(std::max(1.0, 1.5 * needle_width_px) / first_px, 1.0 / (tries - 1));
+  std::array<double, tries> cost{};
+  for (size_t k = 0; k < tries; ++k)
+    cost[k] = misfit(mean, reach, half_width_px, first_px * std::pow(ratio, static_cast<double>(k)));
+  const auto best = static_cast<size_t>(std::min_element(cost.begin(), cost.end()) - cost.begin());
+  double place = static_cast<double>(best);
+  if (best > 0 && best + 1 < tries) {
+    const double bend = cost[best - 1] - 2.0 * cost[best] + cost[best + 1];
+    if (bend > 0.0) place += std::clamp(0.5 * (cost[best - 1] - cost[best + 1]) / bend, -0.5, 0.5);
   }
-  const double variance_px2 = second / weight * cosine * cosine - needle_width_px * needle_width_px / 12.0;
-  return std::sqrt(std::max(0.0, variance_px2));
+  return cosine * first_px * std::pow(ratio, place);
 }
 
 }  // namespace bevel::camera

@@ -40,8 +40,9 @@ RidgePath RidgePathFinder::find(const cv::Mat& response, const PathQuery& query)
   RidgePath path;
   if (rows < 2 || cols < 3) return path;
   response.convertTo(gain_, CV_32F);
-  gain_ = cv::min(gain_, query.cap_gray);
-  gain_ -= query.threshold_gray;
+  cv::min(gain_, query.cap_gray, gain_);
+  cv::multiply(gain_, gain_, gain_, 1.0 / query.cap_gray);
+  gain_ -= query.threshold_gray * query.threshold_gray / query.cap_gray;
   sum_.create(rows, cols, CV_32F);
   constexpr float unreachable = -1e9F;
   float* first = sum_.ptr<float>(0);
@@ -84,24 +85,69 @@ RidgePath RidgePathFinder::find(const cv::Mat& response, const PathQuery& query)
   return path;
 }
 
-int end_of_needle(const RidgePath& path, int window_rows, double share) {
+namespace {
+
+/// The first row after which the path leaves the needle for something else: where it is faint for longer than a needle
+/// is wide, and goes on elsewhere than straight ahead. A needle that is hidden for a while goes on where it went.
+int first_kink(const RidgePath& path, int window_rows, int width_px, double faint) {
   const int rows = static_cast<int>(path.ridge.size());
-  if (rows == 0) return -1;
-  std::vector<double> recent(path.ridge.end() - std::min(rows, window_rows), path.ridge.end());
-  const auto quartile = recent.begin() + static_cast<std::ptrdiff_t>(recent.size() * 3 / 4);
-  std::nth_element(recent.begin(), quartile, recent.end());
-  const double typical = *quartile;
-  double sum = 0.0;
-  double best = -std::numeric_limits<double>::infinity();
-  int best_row = rows - 1;
-  for (int r = std::max(0, rows - window_rows); r < rows; ++r) {
-    sum += std::min(path.ridge[static_cast<size_t>(r)], typical) - share * typical;
-    if (sum > best) {
-      best = sum;
-      best_row = r;
+  const auto dark = [&](int r) { return path.ridge[static_cast<size_t>(r)] > faint; };
+  for (int r = 0; r < rows; ++r) {
+    if (dark(r)) continue;
+    int on = r;
+    while (on < rows && !dark(on)) ++on;
+    const int behind = std::min(window_rows / 2, r);
+    if (on - r > width_px && behind > 2 * width_px && on < rows) {
+      // Straight line through the rows before the gap; what follows is met a needle's width on.
+      double n = 0.0, sum_t = 0.0, sum_x = 0.0, sum_tt = 0.0, sum_tx = 0.0;
+      for (int i = r - behind; i < r; ++i) {
+        const double t = i - r, x = path.cols[static_cast<size_t>(i)];
+        n += 1.0, sum_t += t, sum_x += x, sum_tt += t * t, sum_tx += t * x;
+      }
+      const double slope = (n * sum_tx - sum_t * sum_x) / (n * sum_tt - sum_t * sum_t);
+      const int met = std::min(rows - 1, on + width_px);
+      const double ahead = met - r;
+      const double expected = (sum_x - slope * sum_t) / n + slope * ahead;
+      // An arc of ten needle lengths' radius, and as much as the slope is uncertain by.
+      const double allowed = width_px + ahead * ahead / (20.0 * window_rows) + 0.5 * width_px * ahead / behind;
+      if (std::abs(path.cols[static_cast<size_t>(met)] - expected) > allowed) return r;
     }
+    r = on;
   }
-  return best_row;
+  return rows;
+}
+
+}  // namespace
+
+int end_of_needle(const RidgePath& path, int window_rows, int width_px, double share) {
+  int rows = static_cast<int>(path.ridge.size());
+  if (rows == 0) return -1;
+  // Half of the evidence lies on rows at least as dark as this.
+  const auto typical_in = [&](int from, int to) {
+    std::vector<double> ridge(path.ridge.begin() + from, path.ridge.begin() + to);
+    std::sort(ridge.begin(), ridge.end());
+    double all = 0.0, sum = 0.0;
+    for (const double r : ridge) all += r * r;
+    for (const double r : ridge)
+      if ((sum += r * r) >= 0.5 * all) return r;
+    return 0.0;
+  };
+  double typical = typical_in(0, rows);
+  rows = first_kink(path, window_rows, width_px, share * typical);
+  int end = rows - 1;
+  for (int turn = 0; turn < 2; ++turn) {
+    double sum = 0.0;
+    double best = -std::numeric_limits<double>::infinity();
+    for (int r = 0; r < rows; ++r) {
+      sum += std::min(path.ridge[static_cast<size_t>(r)], typical) - share * typical;
+      if (sum <= best) continue;
+      best = sum;
+      end = r;
+    }
+    // Light differs along a needle: what counts is how dark it is near its end.
+    typical = typical_in(std::max(0, end - window_rows), end + 1);
+  }
+  return end;
 }
 
 double share_of_rows_above(const RidgePath& path, double threshold_gray) {

@@ -31,7 +31,7 @@ class RidgeResponse {
 struct RidgePath {
   std::vector<int> cols;      ///< one per row from the first row of the patch to the last row of the path
   std::vector<double> ridge;  ///< response along it
-  double score = 0.0;         ///< sum of (response - threshold); zero if there is no path
+  double score = 0.0;         ///< sum of (response^2 - threshold^2) / cap; zero if there is no path
   int last_row() const { return static_cast<int>(cols.size()) - 1; }
 };
 
@@ -39,10 +39,14 @@ struct PathQuery {
   int first_col = 0;  ///< columns in which the path may start, in the first row
   int last_col = 0;
   double threshold_gray = 10.0;  ///< rows below this count against the path
-  double cap_gray = 60.0;        ///< rows count no more than this
+  /// Rows count no more than this. Below it they count by their square, as the logarithm of a likelihood does: a dark
+  /// needle that is seen over a few rows is more than a printed line or an old track that runs through the whole
+  /// picture.
+  double cap_gray = 80.0;
 };
 
-/// Best path by dynamic programming; a path moves by at most one column a row.
+/// Best path by dynamic programming; a path moves by at most one column a row. Rows without needle cost so little
+/// that it needs none above: it may come in behind a frame or the edge of the glass.
 class RidgePathFinder {
  public:
   RidgePath find(const cv::Mat& response, const PathQuery& query);
@@ -53,9 +57,11 @@ class RidgePathFinder {
 };
 
 /// The row up to which the path really is needle: where the sum of (response - share * its typical response) peaks.
-/// Typical is the upper quartile over the last `window_rows`, so that a fainter line which continues the needle (an old
-/// track) is not taken for it.
-int end_of_needle(const RidgePath& path, int window_rows, double share);
+/// Typical is what half of the evidence lies above, in the last `window_rows` before that row, so that a fainter line
+/// which continues the needle (an old track, a printed one) is not taken for it.
+/// The path ends before that where it is interrupted and goes on aside of where it went, as a needle `width_px` wide
+/// does not.
+int end_of_needle(const RidgePath& path, int window_rows, int width_px, double share);
 
 double share_of_rows_above(const RidgePath& path, double threshold_gray);
 

@@ -6,14 +6,17 @@
 #include <stdexcept>
 #include <string>
 
-#include "drivers/camera/edge_fit.hpp"
+#include "drivers/camera/needle_end.hpp"
 
 namespace bevel::camera {
 namespace {
 
+// Narrower than this, a needle is not shrunk further: where it lies is then seen worse. A wider one costs more, and
+// shows nothing more but the grain of the sensor.
+constexpr double kLeastNeedle_px = 5.0;
+
 Centreline moved(Centreline line, const cv::Point& by) {
   line.last_row += by.y;
-  line.tangent.last_row += by.y;
   line.coefficient[0] += by.x;
   return line;
 }
@@ -59,7 +62,10 @@ std::string_view name_of(TipStatus status) {
 }
 
 TipTracker::TipTracker(const TrackerConfig& config, double px_per_mm)
-    : config_(config), px_per_mm_(px_per_mm), scale_(ridge_scale(config.needle_diameter_mm * px_per_mm)) {
+    : config_(config),
+      shrink_(std::max(1, static_cast<int>(config.needle_diameter_mm * px_per_mm / kLeastNeedle_px))),
+      work_px_per_mm_(px_per_mm / shrink_),
+      scale_(ridge_scale(config.needle_diameter_mm * px_per_mm / shrink_)) {
   check(config_);
   if (!std::isfinite(px_per_mm) || px_per_mm <= 0.0)
     throw std::invalid_argument("tracker px_per_mm is " + std::to_string(px_per_mm) + ", allowed: above 0");
@@ -102,7 +108,7 @@ bool TipTracker::follows(int64_t utime) {
 
 TipResult TipTracker::track(const Frame& frame, int64_t now_utime, std::optional<cv::Point2d> predicted_tip_px) {
   if (auto refusal = refuse_unseen(frame, now_utime)) return *refusal;
-  const Canonical turn(config_.entry_side, frame.gray.size());
+  const Canonical turn(config_.entry_side, frame.gray.size(), shrink_);
   Found found;
   if (track_) {
     const auto elapsed_us = static_cast<double>(frame.capture_utime - track_->utime);
@@ -144,12 +150,12 @@ TipTracker::Search TipTracker::whole(const Canonical& turn) const {
 
 TipTracker::Search TipTracker::near(const Canonical& turn, const cv::Point2d& predicted) const {
   const cv::Size size = turn.size();
-  const double side_px = config_.roi_side_mm * px_per_mm_ + scale_.offset_px;
-  const double back_px = config_.fit_length_mm * px_per_mm_ + 4.0 * scale_.core_px;
+  const double side_px = config_.roi_side_mm * work_px_per_mm_ + scale_.offset_px;
+  const double back_px = config_.fit_length_mm * work_px_per_mm_ + 4.0 * scale_.core_px;
   const double first_tip_row = std::min(track_->tip.y, predicted.y);
   const double last_tip_row = std::max(track_->tip.y, predicted.y);
   const int top = std::clamp(cvFloor(first_tip_row - back_px), entry_row(turn), size.height - 1);
-  const int bottom = std::clamp(cvCeil(last_tip_row + config_.roi_ahead_mm * px_per_mm_), top, size.height - 1);
+  const int bottom = std::clamp(cvCeil(last_tip_row + config_.roi_ahead_mm * work_px_per_mm_), top, size.height - 1);
   const double top_col = track_->line.col(top);
   const double low = std::min({top_col, track_->tip.x, predicted.x}) - side_px;
   const double high = std::max({top_col, track_->tip.x, predicted.x}) + side_px;
@@ -213,107 +219,89 @@ TipTracker::Found TipTracker::look(const cv::Mat& gray, const Canonical& turn, c
   PathQuery query;
   query.first_col = search.first_col;
   query.last_col = search.last_col;
-  query.cap_gray = 3.0 * config_.min_contrast_gray;
+  query.cap_gray = 4.0 * config_.min_contrast_gray;
   // Half the wanted contrast, and well above what texture gives by chance.
   query.threshold_gray = std::max(0.5 * config_.min_contrast_gray, 6.0 * cv::mean(response)[0]);
   const RidgePath path = finder_.find(response, query);
   const int above = search.region.y - entry_row(turn);
-  const int window_rows = cvRound(config_.fit_length_mm * px_per_mm_);
-  const int end_row = end_of_needle(path, window_rows, 0.4);
-  const int trusted_rows = std::max(2 * scale_.core_px, cvRound(0.3 * config_.min_length_mm * px_per_mm_));
-  if (path.score < query.threshold_gray * trusted_rows) {
+  const int window_rows = cvRound(config_.fit_length_mm * work_px_per_mm_);
+  const int end_row = end_of_needle(path, window_rows, scale_.core_px, 0.4);
+  const int trusted_rows = std::max(2 * scale_.core_px, cvRound(0.3 * config_.min_length_mm * work_px_per_mm_));
+  const double least_gray = std::max(0.75 * config_.min_contrast_gray, query.threshold_gray);
+  if (path.score < trusted_rows * least_gray * least_gray / query.cap_gray) {
     if (saturated_share(raw, cv::Rect(0, 0, raw.cols, raw.rows)) > config_.saturated_fraction)
       return finish(TipStatus::saturated, "most of the picture is at 255 or 0");
     return found;
   }
   result.visible_length_px = above + end_row;
-  if (result.visible_length_px < config_.min_length_mm * px_per_mm_)
+  if (result.visible_length_px < config_.min_length_mm * work_px_per_mm_)
     return finish(TipStatus::too_short, "less than min_length_mm visible");
   if (search.full && second_needle(path, query))
     return finish(TipStatus::two_candidates, "a second line with similar evidence");
 
   measure(patch, path, end_row, found);
-  if (result.status != TipStatus::ok) return found;
+  if (result.status != TipStatus::ok && result.status != TipStatus::unsure) return found;
   const int d = scale_.offset_px;
   const cv::Rect around(cvRound(found.tip.x) - 2 * d, cvRound(found.tip.y) - 2 * d, 4 * d + 1, 4 * d + 1);
   if (saturated_share(raw, around) > config_.saturated_fraction)
     return finish(TipStatus::saturated, "pixels around the tip at 255 or 0");
-  if (result.blur_px > config_.max_blur_mm * px_per_mm_)
+  if (result.blur_px > config_.max_blur_mm * work_px_per_mm_)
     return finish(TipStatus::blurred, "the end is smeared over more than max_blur_mm");
 
   found.tip += cv::Point2d(search.region.tl());
   found.line = moved(found.line, search.region.tl());
   result.tip_px = turn.to_picture(found.tip);
-  const double slope = found.line.tangent.slope(found.tip.y);
-  const cv::Vec2d forward = cv::normalize(cv::Vec2d(slope, 1.0));
+  const cv::Vec2d forward = cv::normalize(cv::Vec2d(found.slope, 1.0));
   result.direction_px = turn.direction_to_picture(forward);
   // Turning is a permutation with signs: the covariance turns with its two axes.
   const cv::Vec2d u = turn.direction_to_picture({1.0, 0.0});
   const cv::Vec2d v = turn.direction_to_picture({0.0, 1.0});
   const cv::Matx22d basis(u[0], v[0], u[1], v[1]);
-  result.covariance_px2 = basis * result.covariance_px2 * basis.t();
+  const double s = shrink_;
+  result.covariance_px2 = s * s * (basis * result.covariance_px2 * basis.t());
+  for (double* length_px : {&result.blur_px, &result.bevel_px, &result.visible_length_px}) *length_px *= s;
   return found;
 }
 
 void TipTracker::measure(const cv::Mat& patch, const RidgePath& path, int end_row, Found& found) const {
   TipResult& result = found.result;
   result.status = result.heading_status = TipStatus::lost;
-  result.reason = "no steady centreline";
-  const double taper_px = config_.bevel_length_mm * px_per_mm_;
-  const int last_shaft_row = end_row - cvRound(0.5 * taper_px) - scale_.core_px;
-  const int first_row = std::max(0, end_row - cvRound(config_.fit_length_mm * px_per_mm_));
-  std::vector<cv::Point2d> centres;
-  centres.reserve(static_cast<size_t>(std::max(0, last_shaft_row - first_row + 1)));
-  for (int r = first_row; r <= last_shaft_row; ++r) {
-    const double col = centre_in_row(patch, r, path.cols[static_cast<size_t>(r)], scale_);
-    if (std::isfinite(col)) centres.emplace_back(col, r);
-  }
-  found.line = fit_centreline(
-      centres, {config_.correlation_px, config_.heading_correlation_px, config_.curvature_sigma_per_mm / px_per_mm_,
-                config_.curvature_change_per_mm / px_per_mm_});
-  if (found.line.rows_used == 0) return;
-
-  result.reason = "the end of the needle is not seen";
-  const int back_px = std::min(end_row, cvRound(1.5 * taper_px) + 6 * scale_.core_px);
-  const int ahead_px = cvRound(taper_px) + 4 * scale_.core_px;
-  std::vector<double> s;
-  std::vector<double> profile;
-  for (int i = -back_px; i <= ahead_px; ++i) {
-    const cv::Point2d p = found.line.along(end_row, i);
-    const bool inside = p.y >= 0.0 && p.y <= patch.rows - 1.0 && p.x >= scale_.offset_px + 1.0 &&
-                        p.x <= patch.cols - scale_.offset_px - 2.0;
-    if (!inside) continue;
-    s.push_back(i);
-    profile.push_back(darkness_across(patch, p, found.line.slope(p.y), scale_));
-  }
-  if (s.size() < 16 || s.back() < 0.5 * taper_px + 2.0) return;
-  std::vector<double> shaft(profile.begin(), profile.begin() + static_cast<std::ptrdiff_t>(profile.size() / 4 + 1));
-  const auto middle = shaft.begin() + static_cast<std::ptrdiff_t>(shaft.size() / 2);
-  std::nth_element(shaft.begin(), middle, shaft.end());
-  const int blur_rows = std::min(60, found.line.rows_used);
-  const double lens_blur_px = blur_across_px(patch, found.line, last_shaft_row - blur_rows, last_shaft_row,
-                                             config_.needle_diameter_mm * px_per_mm_);
-  const EdgeGuess guess{0.4 * taper_px, *middle, taper_px, lens_blur_px};
-  const EdgeFit edge = fit_edge(s, profile, guess, config_.correlation_px);
-  if (!edge.converged || edge.height < 0.4 * config_.min_contrast_gray) return;
-
-  found.tip = found.line.along(end_row, edge.tip_px);
-  const double slope = found.line.slope(found.tip.y);
-  const cv::Vec2d tangent = cv::normalize(cv::Vec2d(slope, 1.0));
+  EndSettings settings;
+  settings.needle_px = config_.needle_diameter_mm * work_px_per_mm_;
+  settings.bevel_px = config_.bevel_length_mm * work_px_per_mm_;
+  settings.bevel_log_sd = config_.bevel_length_sd;
+  settings.fit_length_px = config_.fit_length_mm * work_px_per_mm_;
+  settings.curvature_sigma_per_px = config_.curvature_sigma_per_mm / work_px_per_mm_;
+  settings.curvature_change_per_px = config_.curvature_change_per_mm / work_px_per_mm_;
+  settings.min_contrast_gray = config_.min_contrast_gray;
+  const NeedleEnd end = find_end(patch, path, end_row, scale_, settings);
+  result.reason = end.reason;
+  if (!end.found) return;
+  found.line = end.line;
+  found.slope = end.slope_col_per_row;
+  const bool axis = config_.tip_point == TipPoint::axis;
+  const EndPoint& point = axis ? end.fit.tip : end.fit.seen;
+  found.tip = axis ? end.axis_tip : end.seen;
+  const cv::Vec2d& tangent = end.tangent;
   const cv::Vec2d normal(tangent[1], -tangent[0]);
-  const double floor_along_px = config_.floor_along_mm * px_per_mm_;
-  const double floor_across_px = config_.floor_across_mm * px_per_mm_;
-  const double along = edge.tip_variance_px2 + floor_along_px * floor_along_px;
-  const double across =
-      found.line.variance_px2(found.tip.y) * tangent[1] * tangent[1] + floor_across_px * floor_across_px;
+  const double floor_along_px = config_.floor_along_mm * work_px_per_mm_;
+  const double floor_across_px = config_.floor_across_mm * work_px_per_mm_;
+  const double along = point.s_variance_px2 + floor_along_px * floor_along_px;
+  const double across = point.across_variance_px2 + floor_across_px * floor_across_px;
   result.covariance_px2 = along * (tangent * tangent.t()) + across * (normal * normal.t());
-  result.blur_px = std::max(lens_blur_px, edge.blur_px);
-  result.taper_px = edge.taper_px;
-  result.contrast_gray = edge.height;
+  result.blur_px = end.lens_blur_px;
+  result.bevel_px = end.fit.bevel_px;
+  result.bevel_roll_rad = end.fit.roll_rad;
+  result.contrast_gray = end.contrast_gray;
+  const double max_sd_px = config_.max_along_sd_mm * work_px_per_mm_;
+  if (along > max_sd_px * max_sd_px || !end.doubt.empty()) {
+    result.status = result.heading_status = TipStatus::unsure;
+    result.reason = end.doubt.empty() ? "where the needle ends is in doubt" : end.doubt;
+    return;
+  }
   result.status = TipStatus::ok;
   result.reason = {};
-  result.direction_variance_rad2 =
-      found.line.tangent.angle_variance_rad2(found.tip.y) + config_.floor_heading_rad * config_.floor_heading_rad;
+  result.direction_variance_rad2 = end.fit.slope_variance + config_.floor_heading_rad * config_.floor_heading_rad;
   const bool sure = result.direction_variance_rad2 <= config_.max_heading_sd_rad * config_.max_heading_sd_rad;
   result.heading_status = sure ? TipStatus::ok : TipStatus::unsure;
 }

@@ -1,12 +1,13 @@
 #pragma once
-// The tip of a dark needle in the frames of one camera. Steps: region of interest from the last tips (whole picture
-// when lost), background and illumination gain, ridge response and best path (ridge_path.hpp), sub-pixel centreline and
-// robust arc (centreline.hpp), blurred edge of a bevelled end along the tangent (edge_fit.hpp), covariance from the
-// residuals of both fits; the direction of the arc at the tip, with what noise and a change of
-// curvature along the piece do to it. A frame in which any of this is in doubt gets a status instead of a position.
+// The tip of a dark needle in the frames of one camera. Steps: region of interest from the estimate or the last tips
+// (whole picture when lost), background and illumination gain, ridge response and best path (ridge_path.hpp), sub-pixel
+// centreline (centreline.hpp), the model of a bevelled end fitted to darkness and its moments along it (end_fit.hpp):
+// tip, axis and tangent with the covariance of that fit. A frame in which any of this is in doubt gets a status instead
+// of a position. docs/camera.md says what the tip is and how wrong it is.
 //
 // The tip is the point of the shaft's AXIS at the depth of the foremost point of the bevel: it does not move when the
-// needle is rotated in place, whereas the foremost point itself circles the axis at half the diameter.
+// needle is rotated in place, whereas the foremost point itself circles the axis at half the diameter. On request
+// (TipPoint::seen) it is what an eye marks.
 #include <cstdint>
 #include <opencv2/core.hpp>
 #include <optional>
@@ -14,8 +15,8 @@
 #include <vector>
 
 #include "drivers/camera/canonical.hpp"
-#include "drivers/camera/centreline.hpp"
 #include "drivers/camera/frame.hpp"
+#include "drivers/camera/needle_end.hpp"
 #include "drivers/camera/ridge_path.hpp"
 #include "drivers/camera/tracker_config.hpp"
 
@@ -31,7 +32,7 @@ enum class TipStatus : int32_t {
   blurred = 5,         ///< the end is smeared over more than max_blur_mm
   frozen = 6,          ///< the same bytes as the frame before
   late = 7,            ///< older than max_age_us, or not newer than the frame before
-  unsure = 8,          ///< of a heading alone: its standard deviation is above max_heading_sd_rad
+  unsure = 8,          ///< the end is in doubt; of a heading alone: its standard deviation is above max_heading_sd_rad
 };
 inline constexpr size_t kTipStatuses = 9;
 std::string_view name_of(TipStatus status);
@@ -45,7 +46,8 @@ struct TipResult {
   double direction_variance_rad2 = 0.0;        ///< of the angle of direction_px in the picture
   TipStatus heading_status = TipStatus::lost;  ///< whether direction_px is worth to be measured by; `status` unless ok
   double blur_px = 0.0;
-  double taper_px = 0.0;  ///< over which the bevel fades, as fitted
+  double bevel_px = 0.0;        ///< length of the cut, as fitted
+  double bevel_roll_rad = 0.0;  ///< of the cut as the picture shows it (bevel_shape.hpp), -pi/2 to pi/2
   double contrast_gray = 0.0;
   double visible_length_px = 0.0;
   bool full_search = false;  ///< the whole picture was searched
@@ -80,8 +82,9 @@ class TipTracker {
   };
   struct Found {
     TipResult result;
-    cv::Point2d tip;  // canonical, whole picture
-    Centreline line;  // the same
+    cv::Point2d tip;     // canonical, whole picture
+    Centreline line;     // the same
+    double slope = 0.0;  // of the axis at the tip, columns a row
   };
 
   /// Whether a frame with this stamp goes on from those before. Several that are older than those, but in order among
@@ -99,7 +102,8 @@ class TipTracker {
   int entry_row(const Canonical& turn) const;
 
   TrackerConfig config_;
-  double px_per_mm_;
+  int shrink_;  // pixels of the picture to one of those that are worked in
+  double work_px_per_mm_;
   RidgeScale scale_;
   RidgeResponse ridge_;
   RidgePathFinder finder_;

@@ -13,6 +13,13 @@ enum class Background {
   first_frame,  ///< the first frame shows no needle and is subtracted from all others (gain corrected)
 };
 
+/// What of the needle is reported.
+enum class TipPoint {
+  axis,  ///< the shaft's axis at the depth of the foremost point: stays where it is when the needle is rotated
+  seen,  ///< the end that an eye marks (end_fit.hpp): short of a point too thin to be seen, and beside the axis by up
+         ///< to half the diameter, on the side to which the bevel runs out
+};
+
 /// Lengths in mm are turned into pixels by the view. "Gray" is levels of 255.
 struct TrackerConfig {
   // Where the needle comes in
@@ -22,8 +29,10 @@ struct TrackerConfig {
   // The needle
   double needle_diameter_mm = 1.27;  ///< 18 gauge
   double bevel_length_mm = 3.49;     ///< diameter / tan(bevel angle); 20 degrees here. Zero for a blunt end
-  double min_contrast_gray = 20.0;   ///< darker than its surroundings by at least this; fainter lines are ignored
-  double min_length_mm = 6.0;        ///< shorter visible needles are reported as `too_short`
+  double bevel_length_sd = 0.35;     ///< of its logarithm: needles of one gauge are ground at 10 to 30 degrees
+  TipPoint tip_point = TipPoint::axis;
+  double min_contrast_gray = 20.0;  ///< darker than its surroundings by at least this; fainter lines are ignored
+  double min_length_mm = 6.0;       ///< shorter visible needles are reported as `too_short`
   // What is fitted
   /// Piece behind the tip which fixes direction and curvature. A needle whose bevel is turned changes its curvature by
   /// up to 2 k at once, and a parabola cannot follow that: its end is then wrong by about k length^2 / 10, slowly, and
@@ -33,7 +42,7 @@ struct TrackerConfig {
   /// Change of curvature along that piece, as where the bevel was turned. A parabola cannot follow it, and the
   /// heading's information says so. With 0.003, needles of 0.005 / mm that are turned by up to 0.3 rad / mm have errors
   /// of 1.1 times what is claimed, needles that are not, of 0.83 times.
-  double curvature_change_per_mm = 0.003;
+  double curvature_change_per_mm = 0.0035;
   // Region of interest
   double roi_ahead_mm = 10.0;  ///< how far beyond the prediction the tip may be
   double roi_side_mm = 8.0;    ///< how far beside it
@@ -41,12 +50,11 @@ struct TrackerConfig {
   double max_blur_mm = 0.9;         ///< standard deviation of the edge at the tip
   double saturated_fraction = 0.3;  ///< of the pixels around the tip at 255 or 0
   double second_score_ratio = 0.6;  ///< a second needle with this share of the first one's evidence is an ambiguity
+  double max_along_sd_mm = 0.7;     ///< an end that is known less well is `unsure`
   int64_t max_age_us = 500'000;     ///< older frames are `late`
-  // Honesty of the covariance. Neighbouring rows share blur and texture, so they are not independent samples.
-  double correlation_px = 4.0;          ///< length over which residuals are correlated
-  double heading_correlation_px = 2.0;  ///< the same for the heading, of which rendered needles show how large it is
-  double floor_across_mm = 0.03;        ///< standard deviation below which no measurement is trusted
-  double floor_along_mm = 0.10;
+  // Honesty of the covariance: what no residual shows.
+  double floor_across_mm = 0.005;  ///< standard deviation below which no measurement is trusted
+  double floor_along_mm = 0.02;
   double floor_heading_rad = 0.003;
   double max_heading_sd_rad = 0.15;  ///< no heading that is known less well is `ok`: it would bring nothing
   Background background = Background::local;

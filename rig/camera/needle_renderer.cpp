@@ -31,6 +31,11 @@ void check(const SceneConfig& s) {
   require(s.bevel_length_mm >= 0.0 && s.bevel_length_mm <= 50.0, "bevel_length_mm", s.bevel_length_mm, "0 to 50");
   require(s.blur_px >= 0.0 && s.blur_px <= 50.0, "blur_px", s.blur_px, "0 to 50");
   require(s.noise_gray >= 0.0 && s.noise_gray <= 100.0, "noise_gray", s.noise_gray, "0 to 100");
+  require(s.face_gray <= 255.0, "face_gray", s.face_gray, "up to 255; negative for none");
+  for (int k = 0; k < 2; ++k) {
+    require(std::abs(s.light_gradient[k]) <= 0.9, "light_gradient", s.light_gradient[k], "-0.9 to 0.9");
+    require(std::abs(s.shutter.motion_px[k]) <= 100.0, "shutter.motion_px", s.shutter.motion_px[k], "-100 to 100");
+  }
   require(s.gain > 0.0 && s.gain <= 100.0, "gain", s.gain, "above 0, up to 100");
 }
 
@@ -44,12 +49,19 @@ cv::Mat paint_background(const SceneConfig& s, const camera::PlanarView& view) {
     const double d = std::abs(off_px - spacing_px * std::round(off_px / spacing_px));
     return std::clamp(1.0 - 0.5 * d, 0.0, 1.0);
   };
+  std::vector<double> column_line(static_cast<size_t>(light.cols));
+  // Half a spacing aside, so that no line lies under a straight needle.
+  for (int u = 0; u < light.cols; ++u) column_line[static_cast<size_t>(u)] = line(u - origin.x + 0.5 * spacing_px);
+  const double per_square = s.vignette_gray / (half_diagonal_px * half_diagonal_px);
   for (int v = 0; v < light.rows; ++v) {
+    const double row_line = line(v - origin.y);
+    const double off_v = v - 0.5 * light.rows;
+    float* here = light.ptr<float>(v);
     for (int u = 0; u < light.cols; ++u) {
-      const double out = std::hypot(u - 0.5 * light.cols, v - 0.5 * light.rows) / half_diagonal_px;
-      // Half a spacing aside, so that no line lies under a straight needle.
-      const double grid = std::max(line(u - origin.x + 0.5 * spacing_px), line(v - origin.y));
-      light.at<float>(v, u) = static_cast<float>(s.background_gray - s.vignette_gray * out * out - s.grid_gray * grid);
+      const double off_u = u - 0.5 * light.cols;
+      const double grid = std::max(column_line[static_cast<size_t>(u)], row_line);
+      const double dimmer = per_square * (off_u * off_u + off_v * off_v);
+      here[u] = static_cast<float>(s.background_gray - dimmer - s.grid_gray * grid);
     }
   }
   return light;
@@ -84,9 +96,19 @@ void add_glare(cv::Mat& light, const Spot& spot) {
 }  // namespace
 
 NeedleRenderer::NeedleRenderer(const SceneConfig& scene, const camera::PlanarView& view)
-    : scene_(scene), view_(view), random_(scene.seed) {
+    : scene_(scene),
+      optics_(scene.lens, scene.refraction, scene.size_px, view.px_per_mm()),
+      view_(view),
+      random_(scene.seed) {
   check(scene_);
-  background_ = paint_background(scene_, view_);
+  background_ = optics_.seen(paint_background(scene_, view_));
+}
+
+cv::Point2d NeedleRenderer::while_read_out(const cv::Point2d& p) const {
+  const cv::Vec2d& m = scene_.shutter.motion_px;
+  const double v = p.y / (1.0 - m[1] / scene_.size_px.height);  // the row in which the moving point is met
+  const double time = v / scene_.size_px.height;
+  return {p.x + m[0] * time, v};
 }
 
 void NeedleRenderer::add_needle(cv::Mat& light, const std::vector<cv::Point2d>& axis_px, double roll_rad) const {
@@ -101,9 +123,16 @@ void NeedleRenderer::add_needle(cv::Mat& light, const std::vector<cv::Point2d>& 
     const double foremost = side * across + deep * std::sqrt(std::max(0.0, 1.0 - side * side));
     return length_px - 0.5 * bevel_px * (1.0 - foremost);
   };
+  // Beyond this the wall before the cut has ended, and its face is what is seen.
+  const bool face_seen = scene_.face_gray >= 0.0 && std::cos(roll_rad) > 0.0;
+  const auto wall_end_px = [&](double side) {
+    const double nearest = side * across - deep * std::sqrt(std::max(0.0, 1.0 - side * side));
+    return length_px - 0.5 * bevel_px * (1.0 - nearest);
+  };
   const cv::Rect box = box_of(axis_px, radius_px + 2.0, light.size());
   if (box.empty()) return;
   cv::Mat dark = cv::Mat::zeros(box.height * kSamples, box.width * kSamples, CV_8UC1);
+  cv::Mat face = face_seen ? dark.clone() : cv::Mat();
   const double first_sample = 0.5 / kSamples - 0.5;  // pixel u covers [u - 0.5, u + 0.5)
   const cv::Point2d corner = cv::Point2d(box.tl()) + cv::Point2d(first_sample, first_sample);
   double before_px = 0.0;
@@ -126,20 +155,42 @@ void NeedleRenderer::add_needle(cv::Mat& light, const std::vector<cv::Point2d>& 
         const double side = (d.x * t.y - d.y * t.x) / radius_px;
         // Segments overlap a little, so that the outer side of a bend has no cracks.
         if (along < -0.5 || along > step_px + 0.5 || std::abs(side) > 1.0) continue;
-        if (before_px + along <= end_px(side)) dark.at<uchar>(v, u) = 255;
+        if (before_px + along > end_px(side)) continue;
+        dark.at<uchar>(v, u) = 255;
+        if (face_seen && before_px + along > wall_end_px(side)) face.at<uchar>(v, u) = 255;
       }
     }
     before_px += step_px;
   }
-  cv::Mat share;
+  cv::Mat share, pale;
   cv::resize(dark, share, box.size(), 0.0, 0.0, cv::INTER_AREA);
+  if (face_seen) cv::resize(face, pale, box.size(), 0.0, 0.0, cv::INTER_AREA);
+  const auto needle = static_cast<float>(scene_.needle_gray);
+  const float paler = static_cast<float>(scene_.face_gray) - needle;
   for (int v = 0; v < box.height; ++v) {
     for (int u = 0; u < box.width; ++u) {
       const float covered = static_cast<float>(share.at<uchar>(v, u)) / 255.0F;
       float& here = light.at<float>(box.y + v, box.x + u);
-      here += covered * (static_cast<float>(scene_.needle_gray) - here);
+      const float metal =
+          face_seen ? needle + paler * static_cast<float>(pale.at<uchar>(v, u)) / 255.0F / std::max(covered, 1e-3F)
+                    : needle;
+      here += covered * (metal - here);
     }
   }
+}
+
+void NeedleRenderer::add_what_is_before(cv::Mat& light) const {
+  for (const Occluder& o : scene_.occluders) {
+    const cv::Rect area(cvRound(o.area_px.x), cvRound(o.area_px.y), cvRound(o.area_px.width),
+                        cvRound(o.area_px.height));
+    light(area & cv::Rect({0, 0}, light.size())).setTo(o.gray);
+  }
+  const cv::Vec2d& g = scene_.light_gradient;
+  if (g == cv::Vec2d(0.0, 0.0)) return;
+  for (int v = 0; v < light.rows; ++v)
+    for (int u = 0; u < light.cols; ++u)
+      light.at<float>(v, u) *=
+          static_cast<float>(1.0 + g[0] * (2.0 * u / light.cols - 1.0) + g[1] * (2.0 * v / light.rows - 1.0));
 }
 
 NeedlePicture NeedleRenderer::render(const std::vector<camera::Vector3>& path_mm, double roll_rad) {
@@ -150,7 +201,7 @@ NeedlePicture NeedleRenderer::render(const std::vector<camera::Vector3>& path_mm
   if (path_mm.size() >= 2) {
     std::vector<cv::Point2d> axis_px;
     axis_px.emplace_back();
-    for (const camera::Vector3& p : path_mm) axis_px.push_back(view_.pixel(p));
+    for (const camera::Vector3& p : path_mm) axis_px.push_back(while_read_out(optics_.seen(view_.pixel(p))));
     const cv::Point2d first = axis_px[2] - axis_px[1];
     const cv::Point2d last = axis_px.back() - axis_px[axis_px.size() - 2];
     if (cv::norm(first) <= 0.0 || cv::norm(last) <= 0.0)
@@ -167,6 +218,7 @@ NeedlePicture NeedleRenderer::render(const std::vector<camera::Vector3>& path_mm
     cv::circle(light, centre, radius, cv::Scalar(scene_.background_gray), cv::FILLED);
     cv::circle(light, centre, radius, cv::Scalar(scene_.background_gray - b.strength_gray), 1);
   }
+  add_what_is_before(light);
   for (const Spot& g : scene_.glare) add_glare(light, g);
   if (scene_.blur_px > 0.0)
     cv::GaussianBlur(light, light, cv::Size(), scene_.blur_px, scene_.blur_px, cv::BORDER_REPLICATE);

@@ -1,12 +1,14 @@
 #pragma once
 // A picture of a needle whose tip is known: what the trackers of drivers/camera are measured against. The silhouette is
-// that of a cylinder cut by a plane (the bevel), supersampled; then bubbles, glare, blur, gain and noise in the order
-// in which light meets them. Not here: refraction, lens distortion, rolling shutter.
+// that of a cylinder cut by a plane (the bevel), supersampled; then bubbles, what stands before it, uneven light,
+// glare, blur, gain and noise in the order in which light meets them. Lens and refraction move the background and the
+// axis's points (optics.hpp), not the needle's width. Each is off, or as small as it says, unless it is asked for.
 #include <cstdint>
 #include <opencv2/core.hpp>
 #include <vector>
 
 #include "drivers/camera/planar_view.hpp"
+#include "rig/camera/optics.hpp"
 
 namespace bevel::rig {
 
@@ -14,6 +16,17 @@ struct Spot {
   cv::Point2d centre_px;
   double radius_px = 5.0;
   double strength_gray = 60.0;  ///< glare: added light at the middle; bubble: darkness of the rim
+};
+
+/// Stands before the gel: a clamp, a cable, a finger.
+struct Occluder {
+  cv::Rect2d area_px;
+  double gray = 120.0;
+};
+
+/// Rows are exposed one after the other, the first at the frame's stamp, while the needle moves.
+struct RollingShutter {
+  cv::Vec2d motion_px{0.0, 0.0};  ///< of the needle while the whole picture is read out
 };
 
 struct SceneConfig {
@@ -30,12 +43,18 @@ struct SceneConfig {
   double gain = 1.0;              ///< of the light
   std::vector<Spot> bubbles;
   std::vector<Spot> glare;
+  std::vector<Occluder> occluders;
+  cv::Vec2d light_gradient{0.0, 0.0};  ///< brighter by this share at the right (below) than in the middle
+  double face_gray = -1.0;  ///< of the bevel's face where it is turned to the camera; negative: as the needle
+  LensDistortion lens;
+  FlatRefraction refraction;
+  RollingShutter shutter;
   uint64_t seed = 1;  ///< of the noise
 };
 
 struct NeedlePicture {
   cv::Mat gray;
-  cv::Point2d tip_px;      ///< on the shaft's axis, at the depth of the foremost point of the bevel
+  cv::Point2d tip_px;      ///< on the shaft's axis, at the depth of the foremost point of the bevel; where it is seen
   cv::Vec2d direction_px;  ///< unit vector of the shaft at the tip
 };
 
@@ -54,8 +73,11 @@ class NeedleRenderer {
 
  private:
   void add_needle(cv::Mat& light, const std::vector<cv::Point2d>& axis_px, double roll_rad) const;
+  void add_what_is_before(cv::Mat& light) const;
+  cv::Point2d while_read_out(const cv::Point2d& p) const;
 
   SceneConfig scene_;
+  Optics optics_;
   camera::PlanarView view_;
   cv::Mat background_;  // CV_32F
   cv::Mat noise_;

@@ -30,8 +30,7 @@ void track(benchmark::State& state, bool full) {
   config.px_per_mm *= scale;
   config.origin_px *= scale;
   const PlanarView view(config);
-  auto tracker_config = bevel::test::tracker_config();
-  tracker_config.entry_px *= scale;
+  const auto tracker_config = bevel::test::tracker_config();
   TipTracker tracker(tracker_config, view.px_per_mm());
   const auto frames = pictures(size_px, view);
   Frame frame;

@@ -107,7 +107,11 @@ inline Needle random_needle(std::mt19937_64& random, uint64_t seed) {
   return n;
 }
 
-inline camera::TrackerConfig tracker_config() {
+/// Nothing is said of where the needle comes in but the side.
+inline camera::TrackerConfig tracker_config() { return {}; }
+
+/// For what a picture cannot tell.
+inline camera::TrackerConfig with_entry() {
   camera::TrackerConfig config;
   config.entry_px = {320.0, 20.0};
   config.entry_half_width_px = 40.0;

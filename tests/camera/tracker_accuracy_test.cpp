@@ -1,4 +1,4 @@
-// The tracker against rendered needles of known tip. Figures are printed; the bounds are loose on purpose.
+// The tracker against rendered needles of known tip. Figures are printed; the bounds are the goals.
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -72,12 +72,13 @@ TEST(TrackerAccuracy, RandomRenderedNeedles) {
               percentile(nees, 0.5), percentile(nees, 0.95));
 
   EXPECT_GE(by_status[0], frames * 95 / 100);
-  EXPECT_LT(percentile(error_px, 0.5) / view.px_per_mm(), 0.2);
-  EXPECT_LT(percentile(error_px, 0.95) / view.px_per_mm(), 0.6);
-  EXPECT_LT(percentile(across_px, 0.95) / view.px_per_mm(), 0.15);
+  EXPECT_LT(percentile(across_px, 0.95), 0.5);
+  EXPECT_LT(percentile(along_size, 0.95), 1.0);
+  for (const auto& along : {along_px, along_side_px, along_face_px})
+    EXPECT_LT(std::abs(mean(along)) / view.px_per_mm(), 0.03);
   EXPECT_LT(percentile(direction_deg, 0.95), 2.0);
-  EXPECT_LT(mean(nees), 4.0) << "the covariance is too small";
-  EXPECT_GT(mean(nees), 0.3) << "the covariance is too large";
+  EXPECT_LT(mean(nees) / 2.0, 1.25) << "the covariance is too small";
+  EXPECT_GT(mean(nees) / 2.0, 0.8) << "the covariance is too large";
 }
 
 TEST(TrackerAccuracy, RegionOfInterestEqualsFullSearch) {
@@ -111,6 +112,47 @@ TEST(TrackerAccuracy, RegionOfInterestEqualsFullSearch) {
               percentile(gap_px, 1.0));
   EXPECT_GE(roi_frames, 140);
   EXPECT_LT(percentile(gap_px, 1.0), 0.2);
+}
+
+// As the demo's cameras see it: 4.4 px/mm, 30 Hz, 10 mm/s, and the shaft rotated as it goes in. What matters to a
+// filter that averages a thousand frames is what they have in common.
+TEST(TrackerAccuracy, AnInsertionHasNoOffsetInCommon) {
+  constexpr uint64_t seed = 3;
+  PlanarViewConfig config;
+  config.px_per_mm = 4.4;
+  config.origin_px = {240.0, 40.0};
+  const PlanarView view(config);
+  rig::SceneConfig scene;
+  scene.size_px = {480, 640};
+  scene.seed = seed;
+  rig::NeedleRenderer renderer(scene, view);
+  TipTracker tracker(test::tracker_config(), view.px_per_mm());
+  std::vector<double> along_mm, across_mm, nees;
+  for (int i = 0; i < 270; ++i) {
+    const double inserted_mm = 10.0 + i / 3.0;
+    const test::SpacePath path = test::space_path(
+        {.length_mm = inserted_mm, .curvature_per_mm = 0.005, .slope_y_rad = 0.02, .turn_rad_per_mm = 0.06});
+    const rig::NeedlePicture picture = renderer.render(path.points_mm, 0.06 * inserted_mm);
+    const TipResult tip = tracker.track({1 + i * 33'333, i, 0, picture.gray});
+    if (tip.status != TipStatus::ok) continue;
+    const cv::Vec2d e(tip.tip_px.x - picture.tip_px.x, tip.tip_px.y - picture.tip_px.y);
+    const cv::Vec2d& t = picture.direction_px;
+    along_mm.push_back(e.dot(t) / view.px_per_mm());
+    across_mm.push_back((e[0] * t[1] - e[1] * t[0]) / view.px_per_mm());
+    nees.push_back((e.t() * tip.covariance_px2.inv() * e)(0));
+  }
+  const auto rms = [](const std::vector<double>& v) {
+    double sum = 0.0;
+    for (const double x : v) sum += x * x;
+    return std::sqrt(sum / static_cast<double>(v.size()));
+  };
+  std::printf(
+      "seed %llu, %zu of 270 frames: along mean %.4f mm, rms %.4f; across mean %.4f mm, rms %.4f; squared / 2 %.2f\n",
+      static_cast<unsigned long long>(seed), along_mm.size(), mean(along_mm), rms(along_mm), mean(across_mm),
+      rms(across_mm), mean(nees) / 2.0);
+  EXPECT_GE(along_mm.size(), 265U);
+  EXPECT_LT(std::abs(mean(along_mm)), 0.03);
+  EXPECT_LT(std::abs(mean(across_mm)), 0.03);
 }
 
 TEST(TrackerAccuracy, EverySideOfEntryGivesTheSameTip) {

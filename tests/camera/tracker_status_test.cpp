@@ -56,7 +56,7 @@ TEST_F(TrackerStatus, FullSearchFindsATipThatJumped) {
   EXPECT_LT(cv::norm(far.tip_px - truth_px), 3.0);
 }
 
-TEST_F(TrackerStatus, TooShort) { EXPECT_EQ(track(needle(4.0)).status, TipStatus::too_short); }
+TEST_F(TrackerStatus, TooShort) { EXPECT_EQ(track(needle(1.5)).status, TipStatus::too_short); }
 
 TEST_F(TrackerStatus, SaturatedByLight) {
   scene_.gain = 5.0;
@@ -76,11 +76,9 @@ TEST_F(TrackerStatus, TwoCandidates) {
   cv::Mat moved;
   cv::warpAffine(other, moved, cv::Matx23d(1, 0, 100, 0, 1, 0), other.size(), cv::INTER_NEAREST, cv::BORDER_REPLICATE);
   two = cv::min(two, moved);
-  TrackerConfig anywhere = test::tracker_config();
-  anywhere.entry_half_width_px = -1.0;
-  EXPECT_EQ(TipTracker(anywhere, view_.px_per_mm()).track({1, 0, 0, two}).status, TipStatus::two_candidates);
+  EXPECT_EQ(track(two).status, TipStatus::two_candidates);
   // Knowing where the needle enters settles it.
-  EXPECT_EQ(track(two).status, TipStatus::ok);
+  EXPECT_EQ(TipTracker(test::with_entry(), view_.px_per_mm()).track({1, 0, 0, two}).status, TipStatus::ok);
 }
 
 TEST_F(TrackerStatus, Blurred) {

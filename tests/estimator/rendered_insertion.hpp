@@ -15,8 +15,8 @@ struct RenderedPlan {
   double frame_rate_hz = 30;
   camera::TrackerConfig tracker = [] {
     camera::TrackerConfig c;
-    c.floor_across_mm = 0.1;  // as in config/demo.toml, for the same reason
-    c.floor_along_mm = 0.2;
+    c.floor_across_mm = 0.05;  // as in config/demo.toml, for the same reason
+    c.floor_along_mm = 0.08;
     return c;
   }();
 };

@@ -1,0 +1,99 @@
+#include "drivers/camera/end_problem.hpp"
+
+#include <algorithm>
+#include <cmath>
+
+namespace bevel::camera::end {
+
+cv::Vec2d Problem::seen(const Vector& p, const BlurredBevel& table) const {
+  double low = -4.0 * priors_.blur_px, high = std::exp(p[log_bevel]) + 4.0 * priors_.blur_px;
+  const auto share_at = [&](double x) {
+    const BevelMoments m = table.at(x).moments;
+    return m.outline.share - p[pale] * m.face.share;
+  };
+  for (int i = 0; i < 20; ++i) {
+    const double middle = 0.5 * (low + high);
+    (share_at(middle) < kSeenShare ? low : high) = middle;
+  }
+  // In the middle of the last needle's width before it, the darker the more.
+  double aside = 0.0, weights = 0.0;
+  constexpr int steps = 8;
+  for (int i = 0; i < steps; ++i) {
+    const double x = high + 2.0 * priors_.radius_px * (i + 0.5) / steps;
+    const BevelMoments m = table.at(x).moments;
+    const double share = share_at(x);
+    aside += share * priors_.radius_px * (m.outline.moment - p[pale] * m.face.moment), weights += share * share;
+  }
+  aside /= weights;
+  const double s_px = p[tip] - high;
+  const double ti = t(s_px);
+  return {s_px, p[c0] + ti * (p[c1] + ti * p[c2]) + aside};
+}
+
+cv::Vec2d Problem::aside_of_model(const Vector& p, const Noise& noise, double until_s) {
+  build(p, tables_, false);
+  double weighted = 0.0, squares = 0.0;
+  Sample sample_i;
+  for (int i = 0; i < size(); ++i) {
+    if (s(i) > until_s || s(i) < until_s - 2.0 * priors_.radius_px) continue;
+    sample(p, tables_, i, false, sample_i);
+    const double g = p[height] * moment_scale_ * sample_i.share;
+    const double w = weight(sample_i.residual[1], 1, noise);
+    weighted += w * g * sample_i.residual[1], squares += w * g * g;
+  }
+  if (squares <= 0.0) return {0.0, 0.0};
+  const double variance = 1.0 / (noise.information(1) * squares);
+  // As much of it as is more than chance, where an offset of a radius is nothing unusual.
+  const double likely = priors_.radius_px * priors_.radius_px;
+  const double share = likely / (likely + variance);
+  return {share * weighted / squares, share * variance};
+}
+
+cv::Vec2d Problem::beyond_model(const Vector& p, const Noise& noise, double about_s) {
+  build(p, tables_, true);
+  double weighted = 0.0, squares = 0.0;
+  Sample sample_i;
+  for (int i = 0; i < size(); ++i) {
+    if (std::abs(s(i) - about_s) > priors_.radius_px) continue;
+    sample(p, tables_, i, true, sample_i);
+    for (const int channel : {0, 2}) {
+      const double g = sample_i.gradient[channel][tip];
+      const double w = noise.information(channel);
+      weighted += w * g * sample_i.residual[channel], squares += w * g * g;
+    }
+  }
+  if (squares <= 0.0) return {0.0, 0.0};
+  const double variance = 1.0 / squares;
+  const double likely = priors_.radius_px * priors_.radius_px;
+  const double share = likely / (likely + variance);
+  return {share * weighted / squares, share * variance};
+}
+
+Problem::Seen Problem::seen_with_gradient(const Vector& p) const {
+  Seen out;
+  out.place = seen(p, tables_.here);
+  for (const int k : {tip, roll, log_bevel, pale, c0, c1, c2}) {
+    const double step = k == roll ? kRollStep_rad : k == log_bevel ? kLogStep : 0.02;
+    Vector moved = p;
+    moved[k] += step;
+    const BlurredBevel& table = k == roll ? tables_.rolled : k == log_bevel ? tables_.longer : tables_.here;
+    const cv::Vec2d change = (seen(moved, table) - out.place) * (1.0 / step);
+    out.by_s[k] = change[0], out.by_across[k] = change[1];
+  }
+  return out;
+}
+
+Vector Problem::drawn_by_bend(const Vector& p, const Matrix& covariance, const Noise& noise, double from_s) {
+  Vector right{};
+  Sample sample_i;
+  for (int i = 0; i < size(); ++i) {
+    const double beyond = s(i) - from_s;
+    if (beyond <= 0.0) continue;
+    sample(p, tables_, i, true, sample_i);
+    const double signal = moment_scale_ * p[height] * sample_i.share * 0.5 * beyond * beyond;
+    right += noise.information(1) * weight(sample_i.residual[1], 1, noise) * signal * sample_i.gradient[1];
+  }
+  return covariance * right;
+}
+
+}  // namespace bevel::camera::end

@@ -1,0 +1,119 @@
+#include "tests/camera/real_tips.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <cstdio>
+#include <fstream>
+#include <opencv2/imgcodecs.hpp>
+#include <sstream>
+#include <stdexcept>
+
+#include "drivers/camera/frame_source.hpp"
+
+namespace bevel::test {
+
+namespace fs = std::filesystem;
+
+std::vector<TipLabel> read_labels(const fs::path& csv) {
+  std::ifstream file(csv);
+  if (!file) throw std::runtime_error(csv.string() + ": cannot be read");
+  std::vector<TipLabel> labels;
+  std::string line;
+  int number = 0;
+  for (bool heading = true; std::getline(file, line);) {
+    ++number;
+    if (line.empty() || line[0] == '#') continue;
+    if (std::exchange(heading, false)) continue;
+    std::istringstream words(line);
+    TipLabel l;
+    std::array<std::string, 4> value;
+    std::getline(words, l.set, ',');
+    std::getline(words, l.folder, ',');
+    std::getline(words, l.file, ',');
+    for (std::string& v : value) std::getline(words, v, ',');
+    try {
+      l.tip_px = {std::stod(value[0]), std::stod(value[1])};
+      l.across_sd_px = std::stod(value[2]);
+      l.along_sd_px = std::stod(value[3]);
+    } catch (const std::exception&) {
+      throw std::runtime_error(csv.string() + ":" + std::to_string(number) + ": four numbers wanted: " + line);
+    }
+    labels.push_back(l);
+  }
+  return labels;
+}
+
+std::vector<SeenFrame> track_folders(const fs::path& root, const camera::TrackerConfig& config, double px_per_mm) {
+  std::vector<fs::path> folders;
+  for (const auto& entry : fs::directory_iterator(root))
+    if (entry.is_directory()) folders.push_back(entry.path());
+  std::sort(folders.begin(), folders.end());
+  std::vector<SeenFrame> seen;
+  for (const fs::path& folder : folders) {
+    std::vector<std::string> files;
+    for (const auto& entry : fs::directory_iterator(folder)) files.push_back(entry.path().filename().string());
+    std::sort(files.begin(), files.end(), camera::natural_less);
+    camera::TipTracker tracker(config, px_per_mm);
+    int64_t seq = 0;
+    for (const std::string& file : files) {
+      const cv::Mat gray = cv::imread((folder / file).string(), cv::IMREAD_GRAYSCALE);
+      if (gray.empty()) throw std::runtime_error((folder / file).string() + ": no picture");
+      ++seq;
+      seen.push_back({folder.filename().string(), file, gray, tracker.track({seq * 1'000'000, seq, 0, gray})});
+    }
+  }
+  return seen;
+}
+
+LabelFigures compare(const std::vector<TipLabel>& labels, const std::vector<SeenFrame>& seen, const std::string& set) {
+  LabelFigures f;
+  for (const TipLabel& label : labels) {
+    if (label.set != set) continue;
+    const auto at = std::find_if(seen.begin(), seen.end(),
+                                 [&](const SeenFrame& s) { return s.folder == label.folder && s.file == label.file; });
+    if (at == seen.end()) throw std::runtime_error("labelled, but not there: " + label.folder + "/" + label.file);
+    ++f.labels;
+    ++f.by_status.at(static_cast<size_t>(at->tip.status));
+    if (at->tip.status != camera::TipStatus::ok) continue;
+    ++f.ok;
+    const cv::Vec2d t = at->tip.direction_px;
+    const cv::Vec2d n(-t[1], t[0]);
+    const cv::Vec2d e(at->tip.tip_px.x - label.tip_px.x, at->tip.tip_px.y - label.tip_px.y);
+    LabelError error{&label, &*at, e.dot(n), e.dot(t), 0.0};
+    const cv::Matx22d together = at->tip.covariance_px2 + label.across_sd_px * label.across_sd_px * (n * n.t()) +
+                                 label.along_sd_px * label.along_sd_px * (t * t.t());
+    error.squared = e.dot(together.inv() * e);
+    f.errors.push_back(error);
+    f.beyond_6_px += cv::norm(e) > 6.0 ? 1 : 0;
+  }
+  return f;
+}
+
+double percentile(std::vector<double> values, double share) {
+  if (values.empty()) return std::nan("");
+  std::sort(values.begin(), values.end());
+  return values.at(static_cast<size_t>(std::lround(share * static_cast<double>(values.size() - 1))));
+}
+
+void print(const char* name, const LabelFigures& f) {
+  std::vector<double> across, along;
+  double squared = 0.0, mean_across = 0.0, mean_along = 0.0;
+  for (const LabelError& e : f.errors) {
+    across.push_back(std::abs(e.across_px));
+    along.push_back(std::abs(e.along_px));
+    squared += e.squared, mean_across += e.across_px, mean_along += e.along_px;
+  }
+  const double n = std::max(1, f.ok);
+  std::printf("%s: %d labelled, %d found", name, f.labels, f.ok);
+  for (size_t k = 1; k < f.by_status.size(); ++k)
+    if (f.by_status[k] != 0)
+      std::printf(", %d %s", f.by_status[k], std::string(camera::name_of(static_cast<camera::TipStatus>(k))).c_str());
+  std::printf("\n  across px: median %.2f, 95 %% %.2f, largest %.2f, mean %+.2f\n", percentile(across, 0.5),
+              percentile(across, 0.95), percentile(across, 1.0), mean_across / n);
+  std::printf("  along px: median %.2f, 95 %% %.2f, largest %.2f, mean %+.2f; beyond 6 px and called ok: %d\n",
+              percentile(along, 0.5), percentile(along, 0.95), percentile(along, 1.0), mean_along / n, f.beyond_6_px);
+  std::printf("  normalised squared error %.2f (2 if both the tracker and the labeller know how wrong they are)\n",
+              squared / n);
+}
+
+}  // namespace bevel::test

@@ -1,0 +1,61 @@
+#pragma once
+// The tracker on real frames, beside tips labelled by eye (real_tips.csv): what the test and the contact sheet share.
+#include <array>
+#include <filesystem>
+#include <string>
+#include <vector>
+
+#include "drivers/camera/frame.hpp"
+#include "drivers/camera/tip_tracker.hpp"
+
+namespace bevel::test {
+
+struct TipLabel {
+  std::string set;  ///< "tuned" or "held_out"
+  std::string folder, file;
+  cv::Point2d tip_px;
+  double across_sd_px = 1.0, along_sd_px = 2.0;  ///< the labeller's own opinion
+};
+
+/// Throws std::runtime_error naming the line that cannot be read.
+std::vector<TipLabel> read_labels(const std::filesystem::path& csv);
+
+/// What is known of these pictures and of this needle: the scale its authors state, and that labels are what an eye
+/// sees.
+inline constexpr double kRealPxPerMm = 5.607;
+inline camera::TrackerConfig real_config() {
+  camera::TrackerConfig config;
+  config.tip_point = camera::TipPoint::seen;
+  return config;
+}
+
+struct SeenFrame {
+  std::string folder, file;
+  cv::Mat gray;
+  camera::TipResult tip;
+};
+
+/// Every folder of `root` through a tracker of its own, in natural order, one second a frame.
+std::vector<SeenFrame> track_folders(const std::filesystem::path& root, const camera::TrackerConfig& config,
+                                     double px_per_mm);
+
+/// One labelled frame: error in the directions of the tip found, px.
+struct LabelError {
+  const TipLabel* label = nullptr;
+  const SeenFrame* seen = nullptr;
+  double across_px = 0.0, along_px = 0.0;  ///< along: positive beyond the label
+  double squared = 0.0;                    ///< normalised by the covariance claimed and the label's own
+};
+
+struct LabelFigures {
+  int labels = 0, ok = 0, beyond_6_px = 0;
+  std::array<int, camera::kTipStatuses> by_status{};
+  std::vector<LabelError> errors;  ///< of those that are ok
+};
+LabelFigures compare(const std::vector<TipLabel>& labels, const std::vector<SeenFrame>& seen, const std::string& set);
+void print(const char* name, const LabelFigures& figures);
+
+/// Value below which the share `share` of `values` lies; NaN of none.
+double percentile(std::vector<double> values, double share);
+
+}  // namespace bevel::test
