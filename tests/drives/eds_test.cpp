@@ -106,7 +106,9 @@ TEST_F(Eds, DefaultsAndTypesAreWhatTheDriveAnswers) {
 
 TEST_F(Eds, AccessLimitsAndMappingAreWhatTheDriveAllows) {
   constexpr std::uint32_t kReadOnly = 0x06010002, kOutOfRange = 0x06090030, kNotMappable = 0x06040041;
-  for (const auto& [key, section] : objects()) {
+  for (const auto& object : objects()) {
+    const auto& key = object.first;
+    const Section& section = object.second;
     SCOPED_TRACE(testing::Message() << std::hex << key.first << " sub " << int{key.second});
     const Described type = kTypes.at(std::stoi(section.at("DataType"), nullptr, 0));
     const unsigned bytes = type.bytes == 0 ? 4 : type.bytes;

@@ -93,7 +93,7 @@ class DrivesBehindTheLine {
 
   void step(std::int64_t now_ns) {
     std::array<char, 4096> bytes{};
-    for (ssize_t got; (got = ::read(terminal_, bytes.data(), bytes.size())) > 0;)
+    for (ssize_t got = 0; (got = ::read(terminal_, bytes.data(), bytes.size())) > 0;)
       text_.append(bytes.data(), static_cast<std::size_t>(got));
     for (auto end = text_.find('\r'); end != std::string::npos; end = text_.find('\r')) {
       if (text_.front() == 't') hear(text_.substr(0, end));
