@@ -48,7 +48,10 @@ void StepperNode::on_command(const motion_command_t& m) {
   const bool ran = setpoint_ && setpoint_->run;
   setpoint_ = stepper::MotionSetpoint{0, m.mode == 1, m.insertion_rate_mm_s, m.rotation_rate_rad_s};
   // A stop does not wait for the next cycle.
-  if (ran && !setpoint_->run && driver_.moving()) stop(stepper::StopReason::controller_stop);
+  if (ran && !setpoint_->run && driver_.moving()) return stop(stepper::StopReason::controller_stop);
+  setpoint_->age_ns = age_us * 1000;
+  driver_.take(port_.now().ns, *setpoint_);
+  note_latch();
 }
 
 void StepperNode::on_word(Word word) {

@@ -28,6 +28,12 @@ class FollowWatch {
     count_ = 0;
   }
 
+  // The rate commanded until now is about to change between two cycles.
+  void advance(std::int64_t now_ns, double commanded_unit_s) {
+    told_ += commanded_unit_s * static_cast<double>(now_ns - now_ns_) * 1e-9;
+    now_ns_ = now_ns;
+  }
+
   // Each cycle: the rate commanded until now, and where the axis is. False: it does not follow.
   bool follows(std::int64_t now_ns, double commanded_unit_s, double position_unit) {
     const double dt_s = static_cast<double>(now_ns - now_ns_) * 1e-9;

@@ -305,7 +305,7 @@ void StepperDriver::run_ready(std::int64_t now_ns) {
   if (!enable_wanted_) return;
   if (all_in(cia402::State::operation_enabled)) {
     state_ = DriverState::enabled;
-    fresh_setpoint_ns_ = now_ns;
+    fresh_setpoint_ns_ = shaped_ns_ = now_ns;
     refusing_setpoints_ = false;
     for (std::size_t axis = 0; axis < kAxes; ++axis) {
       follows_.at(axis).begin(now_ns, nodes_.at(axis).position_unit());
@@ -352,9 +352,26 @@ void StepperDriver::run_enabled(std::int64_t now_ns, const std::optional<MotionS
   if (state_ != DriverState::enabled) return;
   const auto rates = wanted_rates(now_ns, setpoint);
   if (state_ != DriverState::enabled) return;
+  shape(now_ns, rates);
+}
+
+void StepperDriver::take(std::int64_t now_ns, const MotionSetpoint& setpoint) {
+  if (state_ != DriverState::enabled || config_.mode != VelocityMode::profile) return;
+  receive(now_ns);  // echoes, so that nothing holds the command back
+  if (state_ != DriverState::enabled) return;
+  const auto rates = wanted_rates(now_ns, setpoint);
+  if (state_ == DriverState::enabled) {
+    for (std::size_t axis = 0; axis < kAxes; ++axis) follows_.at(axis).advance(now_ns, shapers_.at(axis).rate_unit_s());
+    shape(now_ns, rates);
+  }
+  if (bus_.is_open() && !silent_) send_commands(now_ns);
+}
+
+void StepperDriver::shape(std::int64_t now_ns, const std::array<double, kAxes>& rates) {
   // A late step does not buy a larger change of rate.
   const double dt_s =
-      static_cast<double>(std::clamp<std::int64_t>(now_ns - last_step_ns_, 0, 2 * config_.period_ns)) * 1e-9;
+      static_cast<double>(std::clamp<std::int64_t>(now_ns - shaped_ns_, 0, 2 * config_.period_ns)) * 1e-9;
+  shaped_ns_ = now_ns;
   bool clamped = false;
   for (std::size_t axis = 0; axis < kAxes; ++axis) {
     // Where the axis will be when this command takes effect: the position is a cycle old, the drive lags by another.

@@ -86,6 +86,9 @@ class StepperDriver {
   // One cycle, every config.period_ns. now_ns: steady clock. setpoint: the newest known (hand it in again while its age
   // grows), or nothing. Does not allocate, lock or block.
   void step(std::int64_t now_ns, const std::optional<MotionSetpoint>& setpoint);
+  // Optional, between steps, when a new set-point has arrived: in profile velocity it is on the bus at once, in cyclic
+  // velocity with the next SYNC. The limits hold as in step().
+  void take(std::int64_t now_ns, const MotionSetpoint& setpoint);
   // Optional, between steps, when the bus is readable: takes in frames early.
   void receive(std::int64_t now_ns);
 
@@ -111,6 +114,7 @@ class StepperDriver {
   void run_configuring(std::int64_t now_ns);
   void run_ready(std::int64_t now_ns);
   void run_enabled(std::int64_t now_ns, const std::optional<MotionSetpoint>& setpoint);
+  void shape(std::int64_t now_ns, const std::array<double, kAxes>& rates);
   void supervise_motion(std::int64_t now_ns);
   void judge_rest(std::int64_t now_ns);
   std::array<double, kAxes> wanted_rates(std::int64_t now_ns, const std::optional<MotionSetpoint>& setpoint);
@@ -133,6 +137,7 @@ class StepperDriver {
   bool enable_wanted_ = false;
   bool reset_faults_ = false;  // rearm() was called
   std::int64_t last_step_ns_ = 0;
+  std::int64_t shaped_ns_ = 0;  // when the rates were last shaped
   std::int64_t state_since_ns_ = 0;
   std::int64_t listen_since_ns_ = 0;
   std::int64_t enable_since_ns_ = 0;

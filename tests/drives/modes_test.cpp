@@ -2,6 +2,8 @@
 // both.
 #include <gmock/gmock.h>
 
+#include <limits>
+
 #include "tests/drives/bench.hpp"
 
 namespace bevel::test {
@@ -72,6 +74,65 @@ TEST_P(Mode, AnotherModeOfTheDriveIsAFault) {
 
 INSTANTIATE_TEST_SUITE_P(Velocity, Mode, testing::Values(VelocityMode::profile, VelocityMode::cyclic),
                          [](const auto& mode) { return mode.param == VelocityMode::profile ? "pv" : "csv"; });
+
+// A set-point that arrives between two cycles.
+TEST(ASetpointTaken, IsOnTheBusAtOnceAndWithinTheLimits) {
+  Bench bench;
+  ASSERT_TRUE(bench.enable());
+  std::int32_t commanded = 0;
+  int commands = 0;
+  bench.wire.set_tap([&](can::Frame& frame) {
+    if (frame.id == 0x201) {
+      commanded = static_cast<std::int32_t>(stepper::cia301::get_u32(frame, 2));
+      ++commands;
+    }
+    return true;
+  });
+  while (bench.now_ns / kMs % 10 != 4) bench.run_ms(1);
+  commands = 0;
+  bench.move(10.0, 0.0);
+  bench.driver->take(bench.now_ns, *bench.command);
+  EXPECT_EQ(commands, 1);
+  EXPECT_EQ(commanded, 1600) << "4 ms at 200 mm/s^2, 2000 counts a mm";
+  // However often they arrive, no more than the acceleration.
+  double steepest = 0, before = bench.insertion.velocity_unit_s();
+  bench.each_ms = [&] {
+    bench.driver->take(bench.now_ns, *bench.command);
+    steepest = std::max(steepest, (bench.insertion.velocity_unit_s() - before) / 1e-3);
+    before = bench.insertion.velocity_unit_s();
+  };
+  bench.run_ms(300);
+  EXPECT_LE(steepest, 1.01 * bench.config.axes[0].acceleration_unit_s2);
+  EXPECT_NEAR(bench.report().insertion_rate_mm_s, 10.0, 0.02);
+  bench.run_ms(1000);
+  EXPECT_EQ(bench.report().state, DriverState::enabled) << describe(bench.report().stop);
+}
+
+TEST(ASetpointTaken, IsRefusedStaleOrNotFiniteAndMovesNothingThatIsNotEnabled) {
+  Bench bench;
+  ASSERT_TRUE(bench.reach(DriverState::ready));
+  bench.driver->take(bench.now_ns, {0, true, 10.0, 0.0});
+  bench.run_ms(50);
+  EXPECT_TRUE(bench.at_rest());
+  ASSERT_TRUE(bench.enable());
+  bench.driver->take(bench.now_ns, {0, true, std::numeric_limits<double>::quiet_NaN(), 0.0});
+  EXPECT_GT(bench.report().counters.setpoints_refused, 0U);
+  bench.driver->take(bench.now_ns, {90 * kMs, true, 10.0, 0.0});
+  bench.run_ms(5);
+  EXPECT_TRUE(bench.at_rest()) << "as old as one whose rate is zero";
+}
+
+TEST(ASetpointTaken, WaitsForTheSyncInCyclicVelocity) {
+  Bench bench(in_mode(VelocityMode::cyclic));
+  ASSERT_TRUE(bench.enable());
+  int commands = 0;
+  bench.wire.set_tap([&commands](can::Frame& frame) {
+    commands += frame.id == 0x201 ? 1 : 0;
+    return true;
+  });
+  bench.driver->take(bench.now_ns, {0, true, 10.0, 0.0});
+  EXPECT_EQ(commands, 0);
+}
 
 TEST(CyclicMode, BothAxesActAtOneSync) {
   Bench bench(in_mode(VelocityMode::cyclic));
