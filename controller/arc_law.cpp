@@ -139,9 +139,9 @@ Rates ArcLaw::step(const ArcGeometry& g, double rotation_rad, double inserted_mm
                                     2 * kDeviations * g.reach_sd_mm});
   // Half turns alone steer within the plane of the bevel; what lies beside it they leave, and while they turn nothing
   // is inserted.
-  const bool flips = config.law == Law::flip;
+  const bool flips = config.law == Law::flip, by_halves = flips && inserted_mm > kOutside_mm;
   const double inserted_turning_mm = flips ? 0 : half_turn_mm;
-  const double aside_mm = g.aim_mm.norm() * (flips ? std::abs(std::cos(g.facing_rad)) : 1);
+  const double aside_mm = g.aim_mm.norm() * (by_halves ? std::abs(std::cos(g.facing_rad)) : 1);
   const double S = aside_mm - g.reach_mm;
   // Away, and back before it is there: two half turns, and room to brake.
   const bool time_for_both = g.ahead_mm > 3 * inserted_turning_mm;
@@ -155,7 +155,7 @@ Rates ArcLaw::step(const ArcGeometry& g, double rotation_rad, double inserted_mm
     side_ = Side::facing;
 
   double error_rad = side_ == Side::facing ? g.facing_rad : wrapped(g.facing_rad + std::numbers::pi);
-  if (flips && inserted_mm > kOutside_mm) return flip(error_rad, rotation_rad, inserted_mm, config);
+  if (by_halves) return flip(error_rad, rotation_rad, inserted_mm, config);
   // Before that it faces the target: but one that lies as good as ahead has no side.
   if (flips && std::abs(error_rad) > kTurned_rad && g.aim_mm.norm() * std::abs(std::sin(error_rad)) > tolerance_mm)
     return {0, turn_rate_rad_s(error_rad, limits)};
