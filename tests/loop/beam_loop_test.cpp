@@ -66,7 +66,7 @@ TEST(BeamLoop, AShaftThatCannotBeIsRefusedByName) {
           "torsional_windup is one");
   refused("[rig.beam]\nfoundation_modulus_kPa = -1.0\n", "foundation_modulus_kPa");
   refused("[rig.beam]\nmodulus = 3.0\n", "modulus");
-  refused("[controller]\nlaw = \"flip\"\n", "law");
+  refused("[controller]\nlaw = \"zigzag\"\n", "law");
 }
 
 }  // namespace
