@@ -65,7 +65,7 @@ class FollowWatch {
  private:
   static constexpr std::size_t kRoom = 128;
   static constexpr double kScaleError = 0.02;  // of a drive's rates against its positions
-  static constexpr double kDelayVaries_periods = 2;
+  static constexpr double kDelayVaries_periods = 0.5;
   static constexpr double kLeast_unit = 0.05;  // mm or rad: steps, play, an encoder's noise
 
   std::size_t window_;

@@ -72,7 +72,8 @@ std::vector<std::string> causes_of(Component component, FaultKind kind) {
   }
   if (!process) {
     causes.push_back("another master commands the drives");
-    if (kind == FaultKind::stuck)
+    // An old report tells an old rate.
+    if (kind == FaultKind::stuck || kind == FaultKind::replayed)
       causes.push_back(component == Component::insertion_drive ? "insertion does not follow"
                                                                : "rotation does not follow");
     // Positions that are not those of the shaft are known by their jumps.
