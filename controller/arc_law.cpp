@@ -51,9 +51,15 @@ bool landing(model::Pose middle, const model::NeedleParameters& needle, const Sh
   return true;
 }
 
-double half_turn_s(const SteeringLimits& limits) {
-  return std::numbers::pi / limits.rotation_rate_rad_s +
-         limits.rotation_rate_rad_s / limits.rotation_acceleration_rad_s2;
+double turn_feed_mm_s(const SteeringLimits& limits) {
+  return limits.insertion_rate_mm_s * limits.insertion_rate_min_share;
+}
+
+// Inserted during half a turn, at the feed of a turn.
+double half_turn_mm(const SteeringLimits& limits) {
+  const double half_turn_s =
+      std::numbers::pi / limits.rotation_rate_rad_s + limits.rotation_rate_rad_s / limits.rotation_acceleration_rad_s2;
+  return half_turn_s * turn_feed_mm_s(limits);
 }
 
 // As fast as the axis can still stop at the angle; in proportion at the end.
@@ -114,8 +120,7 @@ double arc_miss_mm(const ArcGeometry& geometry) {
 // At rest, by half turns from where the bevel stands, each to its end, and none before the last one has had an effect.
 Rates ArcLaw::flip(double error_rad, double rotation_rad, double inserted_mm, const ControllerConfig& config) {
   const SteeringLimits& limits = config.limits;
-  const bool again =
-      inserted_mm - flipped_at_mm_ > limits.insertion_rate_min_share * limits.insertion_rate_mm_s * half_turn_s(limits);
+  const bool again = inserted_mm - flipped_at_mm_ > half_turn_mm(limits);
   if (!flip_to_rad_ && std::abs(error_rad) > 0.5 * std::numbers::pi && again)
     flip_to_rad_ = rotation_rad + (rotation_rad > 0 ? -std::numbers::pi : std::numbers::pi);  // unwinds the cable
   if (!flip_to_rad_) return {limits.insertion_rate_mm_s, 0};
@@ -132,15 +137,13 @@ Rates ArcLaw::step(const ArcGeometry& g, double rotation_rad, double inserted_mm
                    const ControllerConfig& config) {
   const SteeringLimits& limits = config.limits;
   if (!g.in_domain || g.ahead_mm <= 0) return {};
-  const double turn_feed_mm_s = limits.insertion_rate_mm_s * limits.insertion_rate_min_share;
-  const double half_turn_mm = half_turn_s(limits) * turn_feed_mm_s;
-  const double smallest_mm = g.reach_per_mm * half_turn_mm;  // half of what away and back changes
+  const double smallest_mm = g.reach_per_mm * half_turn_mm(limits);  // half of what away and back changes
   const double width_mm = std::max({tolerance_mm + config.gains.tube_share * g.reach_per_mm * g.ahead_mm, smallest_mm,
                                     2 * kDeviations * g.reach_sd_mm});
   // Half turns alone steer within the plane of the bevel; what lies beside it they leave, and while they turn nothing
   // is inserted.
   const bool flips = config.law == Law::flip, by_halves = flips && inserted_mm > kOutside_mm;
-  const double inserted_turning_mm = flips ? 0 : half_turn_mm;
+  const double inserted_turning_mm = flips ? 0 : half_turn_mm(limits);
   const double aside_mm = g.aim_mm.norm() * (by_halves ? std::abs(std::cos(g.facing_rad)) : 1);
   const double S = aside_mm - g.reach_mm;
   // Away, and back before it is there: two half turns, and room to brake.
@@ -156,11 +159,11 @@ Rates ArcLaw::step(const ArcGeometry& g, double rotation_rad, double inserted_mm
 
   double error_rad = side_ == Side::facing ? g.facing_rad : wrapped(g.facing_rad + std::numbers::pi);
   if (by_halves) return flip(error_rad, rotation_rad, inserted_mm, config);
+  const double across_mm = g.aim_mm.norm() * std::abs(std::sin(error_rad));
   // Before that it faces the target: but one that lies as good as ahead has no side.
-  if (flips && std::abs(error_rad) > kTurned_rad && g.aim_mm.norm() * std::abs(std::sin(error_rad)) > tolerance_mm)
+  if (flips && std::abs(error_rad) > kTurned_rad && across_mm > tolerance_mm)
     return {0, turn_rate_rad_s(error_rad, limits)};
   if (flips) return {limits.insertion_rate_mm_s, 0};
-  const double across_mm = g.aim_mm.norm() * std::abs(std::sin(error_rad));
   const bool far_off = std::abs(error_rad) > 0.5 * std::numbers::pi;
   const bool must_turn =
       side_ == Side::facing ? far_off || across_mm > kTurnAcross * width_mm : std::abs(error_rad) > kTurnAway_rad;
@@ -178,7 +181,7 @@ Rates ArcLaw::step(const ArcGeometry& g, double rotation_rad, double inserted_mm
     error_rad -= std::copysign(2 * std::numbers::pi, error_rad);
   turn_ = std::copysign(1.0, error_rad);
   wanted.rotation_rad_s = turn_rate_rad_s(error_rad, limits);
-  wanted.insertion_mm_s = std::abs(error_rad) > kNearly_rad ? turn_feed_mm_s : limits.insertion_rate_mm_s;
+  wanted.insertion_mm_s = std::abs(error_rad) > kNearly_rad ? turn_feed_mm_s(limits) : limits.insertion_rate_mm_s;
   return wanted;
 }
 

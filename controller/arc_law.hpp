@@ -17,6 +17,9 @@
 // two half turns at the limits of rate and acceleration, would change (nothing smaller can be put right, and trying
 // would make it worse), and no less than what the reach is uncertain by: too far can be mended later, too short cannot.
 // Where S > 0 (out of reach) the bevel faces W: nothing comes nearer.
+#include <Eigen/Core>
+#include <optional>
+
 #include "controller/steering_law.hpp"
 
 namespace bevel::controller {
@@ -55,9 +58,9 @@ class ArcLaw {
 
  private:
   enum class Side { undecided, facing, away };
-  Side side_ = Side::undecided;
   Rates flip(double error_rad, double rotation_rad, double inserted_mm, const ControllerConfig& config);
 
+  Side side_ = Side::undecided;
   bool turning_ = false;
   std::optional<double> flip_to_rad_;  // of the axis, while a half turn is under way
   double flipped_at_mm_ = 0;           // of insertion

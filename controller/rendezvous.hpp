@@ -30,8 +30,6 @@ class Rendezvous {
   // Above this the tip would be there too early.
   double rate_limit_mm_s(std::int64_t now_utime, double ahead_mm) const;
 
-  const TargetTrack& track() const { return track_; }
-
  private:
   std::int64_t plan_turn(std::int64_t now_utime, std::int64_t usual_utime, double least_s);
 

@@ -124,7 +124,7 @@ void Supervisor::request(Request request, const std::optional<Target>& target, s
       return;
     case Request::follow: {
       if (!in_motion_states() || !target || !target->position_mm.allFinite() || !check_inputs(now_utime)) return;
-      rendezvous_.observe(target->utime != 0 ? target->utime : now_utime, target->position_mm);
+      rendezvous_.observe(target->utime_or(now_utime), target->position_mm);
       rendezvous_.plan(now_utime, to_go_mm(), config_.limits.insertion_rate_mm_s);
       // A prediction that is hardly one yet is no reason.
       const double miss_mm = predicted_miss_mm(rendezvous_.target_mm());
@@ -146,7 +146,7 @@ void Supervisor::request(Request request, const std::optional<Target>& target, s
   if (!(status_.predicted_miss_mm <= config_.safety.target_miss_max_mm))
     return stop(Reason::target_unreachable, status_.predicted_miss_mm, "mm predicted miss");
   target_ = target;
-  rendezvous_.restart(target->utime != 0 ? target->utime : now_utime, target->position_mm);
+  rendezvous_.restart(target->utime_or(now_utime), target->position_mm);
   status_.state = State::armed;
   axes_were_enabled_ = false;
   enabling_s_ = 0;
@@ -296,7 +296,7 @@ model::MotionCommand Supervisor::step(std::int64_t now_utime, double elapsed_s) 
     stop(Reason::outside_model, model::tilt_rad(needle_state_->pose), "rad tilt");
     return command;
   }
-  const bool arcs = config_.law != Law::spin;
+  const bool arcs = by_arcs();
   const double ahead_mm = arcs ? status_.arc.ahead_mm : status_.geometry.ahead_mm;
   Rates wanted;
   if (ahead_mm <= 0) {  // closest approach: what still turns comes to rest by the ramp
@@ -323,7 +323,7 @@ bool Supervisor::see_geometry(std::int64_t now_utime) {
   const model::Pose& tip = needle_state_->pose;
   rendezvous_.plan(now_utime, to_go_mm(), config_.limits.insertion_rate_mm_s);
   const Eigen::Vector3d& target_mm = rendezvous_.target_mm();
-  if (config_.law != Law::spin) {
+  if (by_arcs()) {
     status_.arc = arc_geometry(tip, needle_now(), shaft_now(), target_mm, needle_state_->uncertain);
     return status_.arc.in_domain;
   }
@@ -338,7 +338,7 @@ Rates Supervisor::steer(std::int64_t now_utime) {
   const double rotation_rad = actuator_->rotation_rad;
   Rates wanted;
   double ahead_mm = 0, off_rad = 0;
-  if (config_.law != Law::spin) {
+  if (by_arcs()) {
     wanted = arcs_.step(status_.arc, rotation_rad, actuator_->insertion_mm, tolerance_mm, config_);
     ahead_mm = status_.arc.ahead_mm;
     off_rad = status_.arc.facing_rad;

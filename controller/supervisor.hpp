@@ -63,6 +63,7 @@ struct Target {
   Eigen::Vector3d position_mm = Eigen::Vector3d::Zero();
   double tolerance_mm = 0;  // 0: the configured one
   std::int64_t utime = 0;   // when it was there; 0: now
+  std::int64_t utime_or(std::int64_t now_utime) const { return utime != 0 ? utime : now_utime; }
 };
 
 struct Status {
@@ -120,6 +121,7 @@ class Supervisor {
   Rates steer(std::int64_t now_utime);
   bool see_geometry(std::int64_t now_utime);
   double to_go_mm() const;
+  bool by_arcs() const { return config_.law != Law::spin; }
   double predicted_miss_mm(const Eigen::Vector3d& target_mm) const;
   model::NeedleParameters needle_now() const;
   ShaftConfig shaft_now() const;

@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <limits>
 #include <numbers>
 
 #include "model/age.hpp"
@@ -25,7 +24,7 @@ TargetTrack::TargetTrack(const TargetMotion& motion) : motion_(motion) {
 }
 
 void TargetTrack::restart() {
-  count_ = 0;
+  empty_ = true;
   jumped_before_ = false;
   const double v = motion_.velocity_sd_mm_s, a = motion_.breathing_sd_mm;
   const double c = motion_.reading_sd_mm + a;  // from the first reading, which is the origin
@@ -39,22 +38,17 @@ void TargetTrack::restart() {
 double TargetTrack::ahead_s(std::int64_t utime) const { return model::age_s(utime, newest_utime_); }
 
 bool TargetTrack::is_jump(std::int64_t utime, const Eigen::Vector3d& position_mm) const {
-  if (empty()) return false;
   const double sd_mm = std::hypot(position_sd_mm(utime), motion_.reading_sd_mm);
   return (position_mm - TargetTrack::position_mm(utime)).squaredNorm() > kJump * sd_mm * sd_mm;
 }
 
 void TargetTrack::observe(std::int64_t utime, const Eigen::Vector3d& position_mm) {
-  if (count_ > 0 && utime <= newest_utime_) return;
-  if (count_ == 0) {
+  if (empty()) {
     newest_utime_ = utime;
     origin_mm_ = position_mm;
-  }
-  const double since_s = ahead_s(utime);
-  const double a = motion_.breathing_sd_mm, v = motion_.velocity_sd_mm_s;
-  const Eigen::Vector4d renewed = Eigen::Vector4d(0, v * v, a * a, a * a) * since_s / motion_.renewed_after_s;
-  const double reading_mm2 = motion_.reading_sd_mm * motion_.reading_sd_mm;
-  if (is_jump(utime, position_mm)) {
+  } else if (utime <= newest_utime_) {
+    return;
+  } else if (is_jump(utime, position_mm)) {
     // One may be a slip of who reads it; two are another target.
     if (!jumped_before_) {
       jumped_before_ = true;
@@ -63,8 +57,11 @@ void TargetTrack::observe(std::int64_t utime, const Eigen::Vector3d& position_mm
     restart();
     return observe(utime, position_mm);
   }
-  jumped_before_ = false;
-  double largest = -std::numeric_limits<double>::infinity();
+  empty_ = jumped_before_ = false;
+  const double since_s = ahead_s(utime);
+  const double a = motion_.breathing_sd_mm, v = motion_.velocity_sd_mm_s;
+  const Eigen::Vector4d renewed = Eigen::Vector4d(0, v * v, a * a, a * a) * since_s / motion_.renewed_after_s;
+  const double reading_mm2 = motion_.reading_sd_mm * motion_.reading_sd_mm;
   for (Breath& breath : breaths_) {
     const double cosine = std::cos(breath.frequency_rad_s * since_s), sine = std::sin(breath.frequency_rad_s * since_s);
     Eigen::Matrix4d F = Eigen::Matrix4d::Identity();
@@ -80,12 +77,21 @@ void TargetTrack::observe(std::int64_t utime, const Eigen::Vector3d& position_mm
     breath.mean += Ph / variance_mm2 * innovation_mm.transpose();
     breath.covariance -= Ph * Ph.transpose() / variance_mm2;
     breath.log_weight -= 0.5 * (innovation_mm.squaredNorm() / variance_mm2 + 3 * std::log(variance_mm2));
-    largest = std::max(largest, breath.log_weight);
   }
-  for (Breath& breath : breaths_) breath.log_weight -= largest;
+  weigh();
   newest_utime_ = utime;
-  newest_mm_ = position_mm;
-  ++count_;
+}
+
+// Once a reading: predictions are asked for in every step of the law.
+void TargetTrack::weigh() {
+  const double largest = likeliest().log_weight;
+  double sum = 0;
+  for (Breath& breath : breaths_) {
+    breath.log_weight -= largest;
+    breath.weight = breath.log_weight < kNegligible ? 0 : std::exp(breath.log_weight);
+    sum += breath.weight;
+  }
+  for (Breath& breath : breaths_) breath.weight /= sum;
 }
 
 const TargetTrack::Breath& TargetTrack::likeliest() const {
@@ -99,38 +105,24 @@ Eigen::Vector4d TargetTrack::reading_after(const Breath& breath, double ahead_s)
 
 Eigen::Vector3d TargetTrack::position_mm(std::int64_t utime) const {
   if (empty()) return Eigen::Vector3d::Zero();
-  Eigen::Vector3d sum = Eigen::Vector3d::Zero();
-  double weights = 0;
-  for (const Breath& breath : breaths_) {
-    if (breath.log_weight < kNegligible) continue;
-    const double weight = std::exp(breath.log_weight);
-    sum += weight * (breath.mean.transpose() * reading_after(breath, ahead_s(utime)));
-    weights += weight;
-  }
-  return origin_mm_ + sum / weights;
+  Eigen::Vector3d mean_mm = origin_mm_;
+  for (const Breath& breath : breaths_)
+    if (breath.weight > 0) mean_mm += breath.weight * (breath.mean.transpose() * reading_after(breath, ahead_s(utime)));
+  return mean_mm;
 }
 
 double TargetTrack::position_sd_mm(std::int64_t utime) const {
   if (empty()) return 0;
   const Eigen::Vector3d mean_mm = position_mm(utime) - origin_mm_;
   Eigen::Vector3d between_mm2 = Eigen::Vector3d::Zero();
-  double within_mm2 = 0, weights = 0;
+  double within_mm2 = 0;
   for (const Breath& breath : breaths_) {
-    if (breath.log_weight < kNegligible) continue;
-    const double weight = std::exp(breath.log_weight);
+    if (breath.weight <= 0) continue;
     const Eigen::Vector4d h = reading_after(breath, ahead_s(utime));
-    within_mm2 += weight * h.dot(breath.covariance * h);
-    between_mm2 += weight * (breath.mean.transpose() * h - mean_mm).cwiseAbs2();
-    weights += weight;
+    within_mm2 += breath.weight * h.dot(breath.covariance * h);
+    between_mm2 += breath.weight * (breath.mean.transpose() * h - mean_mm).cwiseAbs2();
   }
-  return std::sqrt((within_mm2 + between_mm2.maxCoeff()) / weights);
-}
-
-Eigen::Vector3d TargetTrack::velocity_mm_s(std::int64_t utime) const {
-  if (empty()) return Eigen::Vector3d::Zero();
-  const Breath& breath = likeliest();
-  const double w = breath.frequency_rad_s, t_s = ahead_s(utime);
-  return breath.mean.transpose() * Eigen::Vector4d(0, 1, -w * std::sin(w * t_s), w * std::cos(w * t_s));
+  return std::sqrt(within_mm2 + between_mm2.maxCoeff());
 }
 
 double TargetTrack::period_s() const { return 2 * std::numbers::pi / likeliest().frequency_rad_s; }

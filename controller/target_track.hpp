@@ -30,16 +30,13 @@ class TargetTrack {
   // A position that is not newer than the one before is left out. Two in a row that no breath explains are another
   // target, with which it begins anew; one is left out.
   void observe(std::int64_t utime, const Eigen::Vector3d& position_mm);
-  bool empty() const { return count_ == 0; }
-  Eigen::Vector3d newest_mm() const { return newest_mm_; }
+  bool empty() const { return empty_; }
 
   // By the frequencies' mean. Before the first position: zeros.
   Eigen::Vector3d position_mm(std::int64_t utime) const;
   // Of that prediction, along the axis that is known least: within each frequency and between them.
   double position_sd_mm(std::int64_t utime) const;
-  // Of the likeliest frequency.
-  Eigen::Vector3d velocity_mm_s(std::int64_t utime) const;
-  double period_s() const;
+  double period_s() const;  // of the likeliest frequency
 
   // The first instant, from `from_utime` on and within one period, at which the target turns round along the direction
   // in which it breathes most: it hardly moves about then. The later turns of the same side are whole periods on.
@@ -53,20 +50,21 @@ class TargetTrack {
     double frequency_rad_s = 0;
     Coefficients mean = Coefficients::Zero();
     Eigen::Matrix4d covariance;  // of each axis alike
-    double log_weight = 0;
+    double log_weight = 0;       // the likeliest has 0
+    double weight = 0;           // all together 1; 0 where it is negligible
   };
   double ahead_s(std::int64_t utime) const;
   bool is_jump(std::int64_t utime, const Eigen::Vector3d& position_mm) const;
   // What is read, m + s, after so long.
   static Eigen::Vector4d reading_after(const Breath& breath, double ahead_s);
   const Breath& likeliest() const;
+  void weigh();
 
   TargetMotion motion_;
   std::vector<Breath> breaths_;  // sized once
   std::int64_t newest_utime_ = 0;
   Eigen::Vector3d origin_mm_ = Eigen::Vector3d::Zero();  // the first position
-  Eigen::Vector3d newest_mm_ = Eigen::Vector3d::Zero();
-  std::int64_t count_ = 0;
+  bool empty_ = true;
   bool jumped_before_ = false;
 };
 

@@ -33,8 +33,7 @@ class EntryLine {
   void add(const model::TipMeasurement& measurement);
 
   bool knows() const { return began_ && inserted_mm_ >= kFrom_mm && readings_ > 0; }
-  // About x and y of {A}: along -y and x a slope of a hundredth is a hundredth of a millimetre for each that is
-  // inserted. Its standard deviation is the larger of the two.
+  // (a, b): mm along x and y of {A} for each that is inserted. Its standard deviation is the larger of the two.
   Eigen::Vector2d slope() const { return mean_.segment<2>(2); }
   double slope_sd() const;
   // Squared slope over its variance and that which is expected of insertions: chi-square of two, if all is well.

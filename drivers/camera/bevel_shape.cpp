@@ -6,10 +6,7 @@
 namespace bevel::camera {
 namespace {
 
-Moments mix(const Moments& a, const Moments& b, double share) {
-  return {a.share + share * (b.share - a.share), a.moment + share * (b.moment - a.moment),
-          a.second + share * (b.second - a.second)};
-}
+Moments mix(const Moments& a, const Moments& b, double share) { return a + share * (b - a); }
 
 Moments between(double lo, double hi) {
   return {0.5 * (hi - lo), 0.25 * (hi * hi - lo * lo), (hi * hi * hi - lo * lo * lo) / 6.0};
@@ -31,15 +28,9 @@ BevelMoments bevel_moments(double x, double length, double sin_rho) {
   m.outline = between(all_left ? -1.0 : left, all_right ? 1.0 : right);
   // The wall before the cut is there where the plane has already left it: beyond the same two lines.
   Moments wall;
-  if (all_right) {
-    const Moments w = between(right, 1.0);
-    wall = {wall.share + w.share, wall.moment + w.moment, wall.second + w.second};
-  }
-  if (all_left) {
-    const Moments w = between(-1.0, left);
-    wall = {wall.share + w.share, wall.moment + w.moment, wall.second + w.second};
-  }
-  m.face = {m.outline.share - wall.share, m.outline.moment - wall.moment, m.outline.second - wall.second};
+  if (all_right) wall = wall + between(right, 1.0);
+  if (all_left) wall = wall + between(-1.0, left);
+  m.face = m.outline - wall;
   return m;
 }
 
@@ -66,11 +57,8 @@ void BlurredBevel::build(double length, double sin_rho, double blur) {
   for (size_t i = 0; i < count; ++i) {
     const size_t here = i + margin;
     const auto add = [&](double weight, const BevelMoments& m) {
-      const auto to = [weight](Moments& into, const Moments& more) {
-        into.share += weight * more.share, into.moment += weight * more.moment, into.second += weight * more.second;
-      };
-      to(table_[i].outline, m.outline);
-      to(table_[i].face, m.face);
+      table_[i].outline = table_[i].outline + weight * m.outline;
+      table_[i].face = table_[i].face + weight * m.face;
     };
     table_[i] = {};
     add(kernel_[0], sharp_[here]);
@@ -89,10 +77,7 @@ BlurredBevel::Value BlurredBevel::at(double x) const {
   const BevelMoments& a = table_[i];
   const BevelMoments& b = table_[i + 1];
   const double share = place - static_cast<double>(i);
-  const auto slope = [this](const Moments& from, const Moments& to) {
-    return Moments{(to.share - from.share) / step_, (to.moment - from.moment) / step_,
-                   (to.second - from.second) / step_};
-  };
+  const auto slope = [this](const Moments& from, const Moments& to) { return 1.0 / step_ * (to - from); };
   return {{mix(a.outline, b.outline, share), mix(a.face, b.face, share)},
           {slope(a.outline, b.outline), slope(a.face, b.face)}};
 }

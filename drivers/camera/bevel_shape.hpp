@@ -18,9 +18,20 @@ struct Moments {
   double moment = 0.0;  ///< positive toward positive rho
   double second = 0.0;  ///< about the axis, 1/3 on the shaft
 };
+inline Moments operator+(const Moments& a, const Moments& b) {
+  return {a.share + b.share, a.moment + b.moment, a.second + b.second};
+}
+inline Moments operator*(double factor, const Moments& m) {
+  return {factor * m.share, factor * m.moment, factor * m.second};
+}
+inline Moments operator-(const Moments& a, const Moments& b) { return a + -1.0 * b; }
+
 struct BevelMoments {
   Moments outline;
   Moments face;  ///< the part of `outline` in which the cut's face is what is seen
+
+  /// Of what is dark, where the face lacks the share `pale` of the wall's darkness.
+  Moments dark(double pale) const { return outline - pale * face; }
 };
 BevelMoments bevel_moments(double x, double length, double sin_rho);
 

@@ -45,10 +45,7 @@ void Problem::sample(const Vector& p, const Tables& tables, int i, bool gradient
     const double second = r * r * m.second + 2.0 * c * r * m.moment + (c * c + width_px2_) * m.share;
     return Sums{{m.share, moment_scale_ * moment, by_second * second + by_share * m.share}};
   };
-  const auto seen_of = [&](const BevelMoments& b) {
-    return sums_of({b.outline.share - p[pale] * b.face.share, b.outline.moment - p[pale] * b.face.moment,
-                    b.outline.second - p[pale] * b.face.second});
-  };
+  const auto seen_of = [&](const BevelMoments& b) { return sums_of(b.dark(p[pale])); };
   const BlurredBevel::Value v = tables.here.at(x);
   const Sums here = seen_of(v.moments);
   const auto k = static_cast<size_t>(i);
@@ -62,7 +59,7 @@ void Problem::sample(const Vector& p, const Tables& tables, int i, bool gradient
   const Sums turned = seen_of(tables.rolled.at(x).moments);
   const Sums longer = seen_of(tables.longer.at(x).moments);
   const Sums face = sums_of(v.moments.face);
-  const double moment = v.moments.outline.moment - p[pale] * v.moments.face.moment;
+  const double moment = v.moments.dark(p[pale]).moment;
   const double by_offset[kChannels] = {0.0, h * moment_scale_ * out.share,
                                        h * by_second * 2.0 * (r * moment + c * out.share)};
   for (int n = 0; n < kChannels; ++n) {

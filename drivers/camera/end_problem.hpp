@@ -59,7 +59,6 @@ class Problem {
   double last_s() const { return s(size() - 1); }
   double t(double s_px) const { return s_px / length_px_; }
   double length_px() const { return length_px_; }
-  double moment_scale() const { return moment_scale_; }
 
   struct Tables {
     BlurredBevel here, rolled, longer;
@@ -116,6 +115,8 @@ class Problem {
  private:
   /// What blur adds to the second moment, from how wide the shaft is where it is whole.
   double shaft_width_px2() const;
+  /// As much of an offset as is more than chance, where one of a radius is nothing unusual, and the variance of that.
+  cv::Vec2d more_than_chance(double offset_px, double variance_px2) const;
   const EndProfile& profile_;
   const EndPriors& priors_;
   double length_px_ = 1.0;

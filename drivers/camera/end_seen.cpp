@@ -7,27 +7,29 @@ namespace bevel::camera::end {
 
 cv::Vec2d Problem::seen(const Vector& p, const BlurredBevel& table) const {
   double low = -4.0 * priors_.blur_px, high = std::exp(p[log_bevel]) + 4.0 * priors_.blur_px;
-  const auto share_at = [&](double x) {
-    const BevelMoments m = table.at(x).moments;
-    return m.outline.share - p[pale] * m.face.share;
-  };
+  const auto dark_at = [&](double x) { return table.at(x).moments.dark(p[pale]); };
   for (int i = 0; i < 20; ++i) {
     const double middle = 0.5 * (low + high);
-    (share_at(middle) < kSeenShare ? low : high) = middle;
+    (dark_at(middle).share < kSeenShare ? low : high) = middle;
   }
   // In the middle of the last needle's width before it, the darker the more.
   double aside = 0.0, weights = 0.0;
   constexpr int steps = 8;
   for (int i = 0; i < steps; ++i) {
     const double x = high + 2.0 * priors_.radius_px * (i + 0.5) / steps;
-    const BevelMoments m = table.at(x).moments;
-    const double share = share_at(x);
-    aside += share * priors_.radius_px * (m.outline.moment - p[pale] * m.face.moment), weights += share * share;
+    const Moments dark = dark_at(x);
+    aside += dark.share * priors_.radius_px * dark.moment, weights += dark.share * dark.share;
   }
   aside /= weights;
   const double s_px = p[tip] - high;
   const double ti = t(s_px);
   return {s_px, p[c0] + ti * (p[c1] + ti * p[c2]) + aside};
+}
+
+cv::Vec2d Problem::more_than_chance(double offset_px, double variance_px2) const {
+  const double likely_px2 = priors_.radius_px * priors_.radius_px;
+  const double share = likely_px2 / (likely_px2 + variance_px2);
+  return {share * offset_px, share * variance_px2};
 }
 
 cv::Vec2d Problem::aside_of_model(const Vector& p, const Noise& noise, double until_s) {
@@ -42,11 +44,7 @@ cv::Vec2d Problem::aside_of_model(const Vector& p, const Noise& noise, double un
     weighted += w * g * sample_i.residual[1], squares += w * g * g;
   }
   if (squares <= 0.0) return {0.0, 0.0};
-  const double variance = 1.0 / (noise.information(1) * squares);
-  // As much of it as is more than chance, where an offset of a radius is nothing unusual.
-  const double likely = priors_.radius_px * priors_.radius_px;
-  const double share = likely / (likely + variance);
-  return {share * weighted / squares, share * variance};
+  return more_than_chance(weighted / squares, 1.0 / (noise.information(1) * squares));
 }
 
 cv::Vec2d Problem::beyond_model(const Vector& p, const Noise& noise, double about_s) {
@@ -63,10 +61,7 @@ cv::Vec2d Problem::beyond_model(const Vector& p, const Noise& noise, double abou
     }
   }
   if (squares <= 0.0) return {0.0, 0.0};
-  const double variance = 1.0 / squares;
-  const double likely = priors_.radius_px * priors_.radius_px;
-  const double share = likely / (likely + variance);
-  return {share * weighted / squares, share * variance};
+  return more_than_chance(weighted / squares, 1.0 / squares);
 }
 
 Problem::Seen Problem::seen_with_gradient(const Vector& p) const {

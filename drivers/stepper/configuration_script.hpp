@@ -20,6 +20,8 @@ struct SdoJob {
     expect_eventually,  // the same, asked again until transition_timeout_ns
   };
   Kind kind = Kind::write;
+  bool writes() const { return kind == Kind::write || kind == Kind::write_if_present; }
+  bool may_be_absent() const { return kind == Kind::write_if_present || kind == Kind::expect_if_present; }
   cia301::ObjectAddress object{};
   std::uint8_t size_bytes = 4;  // writes only
   std::uint32_t value = 0;

@@ -190,7 +190,7 @@ void DriveNode::configure(std::int64_t now_ns, Transmitter& out) {
 
 void DriveNode::begin_job() {
   const SdoJob& job = script_.at(job_);
-  if (job.kind == SdoJob::Kind::write || job.kind == SdoJob::Kind::write_if_present) {
+  if (job.writes()) {
     sdo_.download(job.object, job.value, job.size_bytes);
   } else {
     sdo_.upload(job.object);
@@ -209,8 +209,7 @@ void DriveNode::next_job(std::int64_t now_ns) {
 
 void DriveNode::finish_job(std::int64_t now_ns) {
   const SdoJob& job = script_.at(job_);
-  const bool reads = job.kind != SdoJob::Kind::write && job.kind != SdoJob::Kind::write_if_present;
-  if (!reads || (sdo_.value() & job.mask) == job.value) return next_job(now_ns);
+  if (job.writes() || (sdo_.value() & job.mask) == job.value) return next_job(now_ns);
   if (job.kind == SdoJob::Kind::expect_eventually && now_ns - job_since_ns_ < config_.transition_timeout_ns)
     return begin_job();
   sdo_.cancel();
@@ -230,8 +229,7 @@ void DriveNode::transfer(std::int64_t now_ns, Transmitter& out) {
       break;
     case Status::aborted:
       if (sdo_.frame_to_send()) break;
-      if (job.kind == SdoJob::Kind::write_if_present || job.kind == SdoJob::Kind::expect_if_present)
-        return next_job(now_ns);
+      if (job.may_be_absent()) return next_job(now_ns);
       trouble(StopReason::sdo_aborted, sdo_.abort_code());
       break;
     case Status::timed_out:

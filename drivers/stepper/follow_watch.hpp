@@ -65,6 +65,7 @@ class FollowWatch {
  private:
   static constexpr std::size_t kRoom = 128;
   static constexpr double kScaleError = 0.02;  // of a drive's rates against its positions
+  // A command finds its drive in the middle of a cycle, sooner or later by up to half of it.
   static constexpr double kDelayVaries_periods = 0.5;
   static constexpr double kLeast_unit = 0.05;  // mm or rad: steps, play, an encoder's noise
 

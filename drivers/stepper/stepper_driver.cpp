@@ -5,10 +5,11 @@
 #include <stdexcept>
 #include <string>
 
+#include "drivers/can/drain.hpp"
+
 namespace bevel::stepper {
 namespace {
 
-constexpr int kReceptionsPerCall = 256;
 constexpr double kHeldBack_unit = 0.04;  // mm or rad that an axis may jump by when it comes free
 constexpr double kResting_unit_s = 0.05;
 constexpr double kTold_s = 0.03;  // from a command to its effect: two cycles and the drive's own
@@ -190,22 +191,9 @@ void StepperDriver::on_frame(const can::Frame& frame, std::int64_t now_ns) {
 }
 
 void StepperDriver::receive(std::int64_t now_ns) {
-  for (int i = 0; i < kReceptionsPerCall; ++i) {
-    const can::Reception found = bus_.receive();
-    switch (found.kind) {
-      case can::Reception::Kind::nothing:
-        return;
-      case can::Reception::Kind::frame:
-        on_frame(found.frame, now_ns);
-        break;
-      case can::Reception::Kind::echo:
-        out_.on_echo(found.frame);
-        break;
-      case can::Reception::Kind::event:
-        on_event(found.event, now_ns);
-        break;
-    }
-  }
+  can::drain(
+      bus_, [&](const can::Frame& frame) { on_frame(frame, now_ns); },
+      [&](const can::Frame& frame) { out_.on_echo(frame); }, [&](can::BusEvent event) { on_event(event, now_ns); });
 }
 
 void StepperDriver::note_timing(std::int64_t now_ns) {

@@ -7,15 +7,8 @@
 namespace bevel::estimator {
 namespace {
 
-EstimatorConfig agar() {
-  EstimatorConfig config;
-  config.prior.needle.lambda1_per_rad = 0.49;
-  config.prior.needle.lambda2 = 0.22;
-  return config;
-}
-
 void BM_predict_update(benchmark::State& bench) {
-  const NeedleFilter filter(agar());
+  const NeedleFilter filter(testing::agar_config());
   FilterState state = filter.initial();
   model::TipMeasurement m;
   m.information_per_mm2 = Eigen::Vector3d(0, 44, 44).asDiagonal();  // one camera
@@ -29,7 +22,7 @@ void BM_predict_update(benchmark::State& bench) {
 BENCHMARK(BM_predict_update);
 
 void BM_predict_heading(benchmark::State& bench) {
-  const NeedleFilter filter(agar());
+  const NeedleFilter filter(testing::agar_config());
   FilterState state = filter.initial();
   model::TipHeading m;
   long i = 0;
@@ -43,7 +36,7 @@ void BM_predict_heading(benchmark::State& bench) {
 BENCHMARK(BM_predict_heading);
 
 void BM_predict(benchmark::State& bench) {
-  const NeedleFilter filter(agar());
+  const NeedleFilter filter(testing::agar_config());
   FilterState state = filter.initial();
   long i = 0;
   for (auto _ : bench) {
@@ -59,7 +52,7 @@ template <class Jacobian, class Step>
 void run_steps_with(benchmark::State& bench, Step step) {
   model::Pose pose;
   Jacobian jacobian;
-  const auto slip = model::slip_parameters(agar().prior.needle);
+  const auto slip = model::slip_parameters(testing::agar_config().prior.needle);
   long i = 0;
   for (auto _ : bench) {
     const model::StepInput input{(i++ / 500) % 2 ? -0.1 : 0.1, 0.006, {0.0047, 0}};
@@ -85,7 +78,7 @@ BENCHMARK(BM_model_step_with_midpoint_jacobian);
 
 void BM_model_step(benchmark::State& bench) {
   model::Pose pose;
-  const auto slip = model::slip_parameters(agar().prior.needle);
+  const auto slip = model::slip_parameters(testing::agar_config().prior.needle);
   long i = 0;
   for (auto _ : bench) {
     benchmark::DoNotOptimize(model::advance(pose, {(i++ / 500) % 2 ? -0.1 : 0.1, 0.006, {0.0047, 0}}, slip));
@@ -115,7 +108,7 @@ BENCHMARK(BM_floor_dense_9x9);
 
 void BM_whole_insertion_per_message(benchmark::State& bench) {
   std::mt19937_64 rng(1);
-  const auto config = agar();
+  const auto config = testing::agar_config();
   const testing::Insertion data = testing::insert(config.prior.needle, {}, {}, rng);
   for (auto _ : bench) {
     NeedleEstimator estimator(config);

@@ -11,13 +11,7 @@
 namespace bevel::estimator {
 namespace {
 
-EstimatorConfig agar_config() {
-  EstimatorConfig config;
-  config.prior.needle.lambda1_per_rad = 0.49;
-  config.prior.needle.lambda2 = 0.22;
-  return config;
-}
-
+using testing::agar_config;
 // Each reading 50 ms after its capture, through a frame that is turned by `turned`.
 EntryLine watched(const EstimatorConfig& config, const testing::Insertion& data, const Eigen::Vector3d& turned_rad) {
   EntryLine entry(config);

@@ -12,15 +12,9 @@
 namespace bevel::estimator {
 namespace {
 
+using testing::agar_config;
 using testing::Insertion;
 using testing::InsertionPlan;
-
-EstimatorConfig agar_config() {
-  EstimatorConfig config;
-  config.prior.needle.lambda1_per_rad = 0.49;
-  config.prior.needle.lambda2 = 0.22;
-  return config;
-}
 
 Eigen::Vector3d random_vector(std::mt19937_64& rng, double size) {
   std::uniform_real_distribution<double> unit(-1, 1);

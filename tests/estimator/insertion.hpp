@@ -34,6 +34,14 @@ struct InsertionPlan {
   double heading_sd_rad = 0;  // 0: no headings; else one with each measurement, of two cameras the angle in its picture
 };
 
+// What the filter believes of agar (Table I).
+inline EstimatorConfig agar_config() {
+  EstimatorConfig config;
+  config.prior.needle.lambda1_per_rad = 0.49;
+  config.prior.needle.lambda2 = 0.22;
+  return config;
+}
+
 inline constexpr std::int64_t kStart_utime = 1'700'000'000'000'000;
 
 inline model::TipMeasurement measure(const Eigen::Vector3d& tip_mm, std::int64_t utime, std::int64_t seq, int camera,

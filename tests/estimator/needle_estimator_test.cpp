@@ -14,16 +14,10 @@
 namespace bevel::estimator {
 namespace {
 
+using testing::agar_config;
 using testing::Insertion;
 using testing::InsertionPlan;
 using testing::play;
-
-EstimatorConfig agar_config() {
-  EstimatorConfig config;
-  config.prior.needle.lambda1_per_rad = 0.49;
-  config.prior.needle.lambda2 = 0.22;
-  return config;
-}
 
 TEST(NeedleEstimator, TwoHundredInsertionsAreConsistent) {
   constexpr int kRuns = 200;

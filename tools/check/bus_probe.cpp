@@ -2,6 +2,8 @@
 
 #include <algorithm>
 
+#include "drivers/can/drain.hpp"
+
 namespace bevel::tools::check {
 namespace {
 
@@ -67,26 +69,16 @@ void BusProbe::on_frame(const can::Frame& frame, std::int64_t now_ns) {
   }
 }
 
+void BusProbe::on_echo(std::int64_t now_ns) {
+  ++measured_.echoed;
+  if (awaiting_echo_ns_) measured_.slowest_echo_ns = std::max(measured_.slowest_echo_ns, now_ns - *awaiting_echo_ns_);
+  if (measured_.echoed == measured_.sent) awaiting_echo_ns_.reset();
+}
+
 void BusProbe::receive(std::int64_t now_ns) {
-  for (int i = 0; i < 256; ++i) {
-    const can::Reception found = bus_.receive();
-    switch (found.kind) {
-      case can::Reception::Kind::nothing:
-        return;
-      case can::Reception::Kind::frame:
-        on_frame(found.frame, now_ns);
-        break;
-      case can::Reception::Kind::echo:
-        ++measured_.echoed;
-        if (awaiting_echo_ns_)
-          measured_.slowest_echo_ns = std::max(measured_.slowest_echo_ns, now_ns - *awaiting_echo_ns_);
-        if (measured_.echoed == measured_.sent) awaiting_echo_ns_.reset();
-        break;
-      case can::Reception::Kind::event:
-        on_event(found.event);
-        break;
-    }
-  }
+  can::drain(
+      bus_, [&](const can::Frame& frame) { on_frame(frame, now_ns); }, [&](const can::Frame&) { on_echo(now_ns); },
+      [&](can::BusEvent event) { on_event(event); });
 }
 
 void BusProbe::exchange(Asked& asked, std::int64_t now_ns) {

@@ -68,6 +68,7 @@ class BusProbe {
 
   void receive(std::int64_t now_ns);
   void on_frame(const can::Frame& frame, std::int64_t now_ns);
+  void on_echo(std::int64_t now_ns);
   void on_event(can::BusEvent event);
   void ask(std::size_t axis, std::int64_t now_ns);
   void begin_job(std::size_t axis);
