@@ -7,7 +7,7 @@ in_vm=$1
 shift
 [ -e /sys/class/net/vcan0 ] && exec "$@"
 command -v "$1" >/dev/null || { echo "on_can.sh: cannot run $1" >&2; exit 127; }  # not to be taken for a missing guest
-"$in_vm" -t 200 "$@"
+"$in_vm" -t 500 "$@"
 status=$?
 if [ $status = 126 ]; then
   echo "SKIPPED: no vcan0 here, and no guest that has one (see above)."

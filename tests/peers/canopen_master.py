@@ -246,7 +246,7 @@ class Master(unittest.TestCase):
         self.assertTrue(self.node.statusword & 0x1000, "follows")
 
     def test_heartbeat_watch_while_pdos_go_on(self):
-        self.sdo(0x1016, 1).raw = MASTER << 16 | 100
+        self.sdo(0x1016, 1).raw = MASTER << 16 | 100 * support.PATIENCE
         self.sdo(0x6007).raw = 3
         self.sdo(0x1029, 1).raw = 0
         self.map_pdos()
