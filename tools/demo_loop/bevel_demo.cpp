@@ -20,6 +20,7 @@ int main(int argc, char** argv) {
       .option("--out", options.out, "folder for log, report and the processes' output")
       .option("--tolerance", options.tolerance_mm, "largest miss that counts as success, mm", 0.01, 100)
       .option("--time-limit", options.time_limit_s, "give up after, s", 1, 3600)
+      .flag("--view", options.view, "show it on a live page while it runs")
       .option("--fault", options.fault,
               "break something and show the stop: COMPONENT:KIND@SECONDSs, as in camera:off@5s");
   return command_line.run(argc, argv, [&] {

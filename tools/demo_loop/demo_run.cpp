@@ -1,9 +1,11 @@
 #include "tools/demo_loop/demo_run.hpp"
 
+#include <chrono>
 #include <cstdio>
 #include <filesystem>
 #include <fstream>
 #include <stdexcept>
+#include <thread>
 
 #include "nodes/claim_name.hpp"
 #include "nodes/fault_injector.hpp"
@@ -76,6 +78,28 @@ std::string program_of(const nodes::Fault& fault) {
   return "bevel-rig";
 }
 
+// Not one of the processes that the needle depends on.
+void start_view(ProcessGroup& viewer, const std::string& lcm_url, const DemoOptions& options) {
+  const std::string log_path = options.out + "/bevel-view.txt";
+  std::vector<std::string> command{options.programs + "/bevel-view"};
+  if (!lcm_url.empty()) command.insert(command.end(), {"--lcm-url", lcm_url});
+  viewer.start("bevel-view", command, log_path);
+  for (int waited_ms = 0; waited_ms < 2000; waited_ms += 20) {
+    if (const auto death = viewer.first_death()) {
+      std::fprintf(stderr, "bevel-demo: no live page: %s\n%s", death->c_str(), tail_of(log_path).c_str());
+      return;
+    }
+    std::string address;
+    std::ifstream file(log_path);
+    if (std::getline(file, address) && !file.eof()) {
+      std::printf("%s\n", address.c_str());
+      std::fflush(stdout);
+      return;
+    }
+    std::this_thread::sleep_for(std::chrono::milliseconds(20));
+  }
+}
+
 }  // namespace
 
 int run_demo(const DemoOptions& options) {
@@ -94,7 +118,8 @@ int run_demo(const DemoOptions& options) {
   End end = End::interrupted;
   bool clean = false;
   {
-    ProcessGroup processes;
+    ProcessGroup viewer, processes;
+    if (options.view) start_view(viewer, config.lcm_url, options);
     for (const char* program : kPrograms) {
       std::vector<std::string> command{options.programs + "/" + program, "--config", options.config_path};
       if (!options.fault.empty() && program_of(nodes::parse_fault(options.fault)) == program)

@@ -12,6 +12,7 @@ struct DemoOptions {
   std::vector<double> target_mm{6, -9, 100};
   double tolerance_mm = 2;
   double time_limit_s = 55;
+  bool view = false;  // bevel-view beside the five; whatever becomes of it, the insertion goes on
   std::string fault;  // "" or as nodes::parse_fault() takes it: the demo then shows the stop
 };
 

@@ -1,0 +1,40 @@
+#include "view/view_node.hpp"
+
+namespace bevel::view {
+
+ViewNode::ViewNode(lcm::LCM& lcm, int socket)
+    : port_(lcm), server_(socket, [this] {
+        const std::lock_guard lock(mutex_);
+        return picture_.history();
+      }) {
+  watch<tip_measurement_t>(io::channel::kTipMeasurement);
+  watch<actuator_state_t>(io::channel::kActuatorState);
+  watch<motion_command_t>(io::channel::kMotionCommand);
+  watch<needle_state_t>(io::channel::kNeedleState);
+  watch<steering_target_t>(io::channel::kSteeringTarget);
+  watch<process_status_t>(io::channel::kProcessStatus);
+  port_.subscribe<needle_state_t>(io::channel::kNeedleTruth, [this](const needle_state_t& message) {
+    const std::lock_guard lock(mutex_);
+    picture_.on_truth(message, moment());
+  });
+}
+
+template <class Message>
+void ViewNode::watch(const char* channel) {
+  port_.subscribe<Message>(channel, [this](const Message& message) {
+    const std::lock_guard lock(mutex_);
+    picture_.on(message, moment());
+  });
+}
+
+void ViewNode::step(const nodes::Now& now) {
+  port_.rethrow();
+  std::string snapshot;
+  {
+    const std::lock_guard lock(mutex_);
+    snapshot = picture_.snapshot({now.ns, now.utime});
+  }
+  server_.publish(std::move(snapshot));
+}
+
+}  // namespace bevel::view

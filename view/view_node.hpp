@@ -1,0 +1,34 @@
+// The live page wired to LCM: hears every channel of the loop, says nothing on any.
+#pragma once
+
+#include <lcm/lcm-cpp.hpp>
+#include <mutex>
+
+#include "nodes/lcm_port.hpp"
+#include "view/live_view.hpp"
+#include "view/page_server.hpp"
+
+namespace bevel::view {
+
+class ViewNode {
+ public:
+  // The LCM must be good and outlive the node; `socket` as PageServer::open_port() returns it.
+  ViewNode(lcm::LCM& lcm, int socket);
+
+  void tell_time(const nodes::Now& now) { port_.tell_time(now); }
+  // Publishes a snapshot; the rate of the page is that of these calls.
+  void step(const nodes::Now& now);
+  std::string address() const { return server_.address(); }
+
+ private:
+  template <class Message>
+  void watch(const char* channel);
+  Moment moment() const { return {port_.now().ns, port_.now().utime}; }
+
+  std::mutex mutex_;  // of the picture, which the server's threads read for its history
+  LiveView picture_;
+  nodes::LcmPort port_;
+  PageServer server_;
+};
+
+}  // namespace bevel::view
