@@ -115,7 +115,7 @@ void write_commitments(const CampaignOptions& options) {
 
 // Results of two tools must not mix.
 std::string claim_tool(const CampaignOptions& options) {
-  std::string sha256 = sha256_of_file(options.diagnose.string());
+  std::string sha256 = io::sha256_of_file(options.diagnose.string());
   const fs::path path = options.out / "tool.json";
   if (fs::exists(path)) {
     const std::string before = json::parse(read_text(path)).at("sha256");
@@ -132,7 +132,7 @@ std::string claim_tool(const CampaignOptions& options) {
 void check_inputs(const TrialFolders& folders) {
   const json commitment = json::parse(read_text(folders.commitment));
   for (const auto& [name, sha256] : commitment.at("sha256_of_inputs").items())
-    if (sha256_of_file((folders.given / name).string()) != sha256)
+    if (io::sha256_of_file((folders.given / name).string()) != sha256)
       throw std::runtime_error((folders.given / name).string() + ": changed since it was sealed");
 }
 
@@ -166,7 +166,7 @@ bool examine(const CampaignOptions& options, const fs::path& program, int number
                                      {"sealed", !options.unsealed},
                                      {"tool_sha256", tool_sha256},
                                      {"verdict_sha256", fs::is_regular_file(fs::symlink_status(verdict))
-                                                            ? json(sha256_of_file(verdict.string()))
+                                                            ? json(io::sha256_of_file(verdict.string()))
                                                             : json(nullptr)}}
                                         .dump(1) +
                                     "\n");
@@ -187,7 +187,7 @@ std::string write_verdicts(const CampaignOptions& options) {
   }
   const std::string text = all.dump(1) + "\n";
   write_atomically(options.out / "verdicts.json", text);
-  return sha256_hex(text);
+  return io::sha256_hex(text);
 }
 
 TrialScore score_trial(const CampaignOptions& options, int number) {
@@ -199,7 +199,7 @@ TrialScore score_trial(const CampaignOptions& options, int number) {
     if (run.at("exit_status") != 0) return score_abstention(truth, "exit status " + run.at("exit_status").dump());
     if (run.at("verdict_sha256").is_null()) return score_abstention(truth, "no verdict.json");
     const fs::path path = folders.tool_output / "verdict.json";
-    if (sha256_of_file(path.string()) != run.at("verdict_sha256"))
+    if (io::sha256_of_file(path.string()) != run.at("verdict_sha256"))
       throw std::runtime_error(path.string() + ": changed since the tool wrote it");
     try {
       return score_verdict(truth, parse_verdict(read_text(path)));
@@ -245,7 +245,7 @@ int run_campaign(const CampaignOptions& options, std::ostream& progress) {
 
   CampaignFacts facts;
   facts.seed = options.seed;
-  facts.commitments_sha256 = sha256_of_file((options.out / "commitments.json").string());
+  facts.commitments_sha256 = io::sha256_of_file((options.out / "commitments.json").string());
   facts.tool_sha256 = claim_tool(options);
   const fs::path program = fs::canonical(options.diagnose);
   in_parallel(options.trials, options.jobs, [&](int i) {

@@ -3,13 +3,13 @@
 #include <string>
 #include <string_view>
 
+#include "io/sha256.hpp"
+
 namespace bevel::proof {
 
-std::string sha256_hex(std::string_view bytes);       // 64 hexadecimal digits
-std::string sha256_of_file(const std::string& path);  // throws std::runtime_error naming the file
-std::string draw_salt();                              // 32 bytes from the system's generator, as hexadecimal
+std::string draw_salt();  // 32 bytes from the system's generator, as hexadecimal
 inline std::string commitment_to(std::string_view salt, std::string_view truth) {
-  return sha256_hex(std::string(salt) + std::string(truth));
+  return io::sha256_hex(std::string(salt) + std::string(truth));
 }
 
 }  // namespace bevel::proof

@@ -221,10 +221,10 @@ void write_trial(const fs::path& out, const Trial& trial) {
   json inputs;
   for (std::size_t i = 0; i < trial.recordings.size(); ++i) {
     write_log(unfinished / log_name(i), trial.recordings[i], trial.truth.noise);
-    inputs[log_name(i)] = sha256_of_file(unfinished / log_name(i));
+    inputs[log_name(i)] = io::sha256_of_file(unfinished / log_name(i));
   }
   write_atomically(unfinished / "model.toml", model_file_text(trial.truth));
-  inputs["model.toml"] = sha256_of_file(unfinished / "model.toml");
+  inputs["model.toml"] = io::sha256_of_file(unfinished / "model.toml");
   fs::remove_all(folders.given);
   fs::rename(unfinished, folders.given);
 

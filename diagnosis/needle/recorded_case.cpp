@@ -67,10 +67,41 @@ Point point_of(const model::TipMeasurement& m) {
           .information = m.information_per_mm2};
 }
 
-// Axes that a message sees, each with its information; the coordinate axes where the matrix is as good as diagonal.
-std::vector<std::pair<Eigen::Vector3d, double>> seen_axes(const Point& point) {
+using SeenAxes = std::vector<std::pair<Eigen::Vector3d, double>>;
+
+// Axes that a message sees, each with its information, of which nothing is lost.
+SeenAxes principal_axes(const Eigen::Matrix3d& information, double rank_tolerance) {
+  SeenAxes axes;
+  const Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> eigen(information);
+  for (int i = 0; i < 3; ++i)
+    if (eigen.eigenvalues()[i] > rank_tolerance * eigen.eigenvalues()[2]) {
+      Eigen::Vector3d axis = eigen.eigenvectors().col(i);
+      Eigen::Index at = 0;
+      axis.cwiseAbs().maxCoeff(&at);
+      axes.emplace_back(axis[at] < 0 ? Eigen::Vector3d(-axis) : axis, eigen.eigenvalues()[i]);
+    }
+  return axes;
+}
+
+// The coordinate axes that a camera sees, where they are as many as all that it sees, each with the information of its
+// own marginal. The principal axes turn with the needle, which is seen better across than along, and a channel does
+// not; what correlates two channels within one message is left out.
+SeenAxes coordinate_axes(const SeenAxes& principal) {
+  Eigen::Matrix3d seen = Eigen::Matrix3d::Zero(), covariance = Eigen::Matrix3d::Zero();
+  for (const auto& [axis, information] : principal) {
+    seen += axis * axis.transpose();
+    covariance += axis * axis.transpose() / information;
+  }
+  SeenAxes axes;
+  for (int i = 0; i < 3; ++i)
+    if (seen(i, i) > kSameAxis * kSameAxis) axes.emplace_back(Eigen::Vector3d::Unit(i), 1 / covariance(i, i));
+  return axes.size() == principal.size() ? axes : SeenAxes{};
+}
+
+// The coordinate axes wherever they will do.
+SeenAxes seen_axes(const Point& point) {
   const Eigen::Matrix3d& information = point.information;
-  std::vector<std::pair<Eigen::Vector3d, double>> axes;
+  SeenAxes axes;
   const double largest = information.cwiseAbs().maxCoeff();
   if (!(largest > 0) || !information.allFinite() || !point.value.allFinite()) return axes;
   const Eigen::Matrix3d off = information - Eigen::Matrix3d(information.diagonal().asDiagonal());
@@ -82,15 +113,9 @@ std::vector<std::pair<Eigen::Vector3d, double>> seen_axes(const Point& point) {
       if (information(i, i) > rank * largest) axes.emplace_back(Eigen::Vector3d::Unit(i), information(i, i));
     return axes;
   }
-  const Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> eigen(information);
-  for (int i = 0; i < 3; ++i)
-    if (eigen.eigenvalues()[i] > rank * largest) {
-      Eigen::Vector3d axis = eigen.eigenvectors().col(i);
-      Eigen::Index at = 0;
-      axis.cwiseAbs().maxCoeff(&at);
-      axes.emplace_back(axis[at] < 0 ? Eigen::Vector3d(-axis) : axis, eigen.eigenvalues()[i]);
-    }
-  return axes;
+  const SeenAxes principal = principal_axes(information, rank);
+  if (!point.heading) axes = coordinate_axes(principal);
+  return axes.empty() ? principal : axes;
 }
 
 std::size_t channel_of(std::vector<Channel>& channels, const Point& point, const Eigen::Vector3d& axis) {
@@ -107,9 +132,9 @@ std::size_t channel_of(std::vector<Channel>& channels, const Point& point, const
 
 // Known channels first: of equal eigenvalues any directions in their plane are eigenvectors, and the last digits of a
 // message would choose others for the next.
-std::vector<std::pair<Eigen::Vector3d, double>> axes_of(const Point& point, const std::vector<Channel>& channels) {
+SeenAxes axes_of(const Point& point, const std::vector<Channel>& channels) {
   auto axes = seen_axes(point);
-  std::vector<std::pair<Eigen::Vector3d, double>> known;
+  SeenAxes known;
   for (const Channel& channel : channels) {
     if (channel.camera != point.camera || channel.heading != point.heading) continue;
     const Eigen::Vector3d seen = point.information * channel.axis;
@@ -215,8 +240,9 @@ void check_same_rig(const RecordedCase& recorded) {
     for (std::size_t c = 0; c < recorded.channels.size(); ++c) {
       const std::string where = recording.name + " and " + first.name + ": recordings of different rigs: ";
       const std::string& channel = recorded.channels[c].name;
-      if (recording.series[c].time_s.size() < 2 || first.series[c].time_s.size() < 2)
-        throw std::invalid_argument(where + "channel " + channel + " is not in both");
+      if (recording.series[c].time_s.size() < 2)
+        throw std::invalid_argument(recording.name + ": no channel " + channel +
+                                    ", which another recording has: recordings of different rigs");
       const double a_s = period(recording.series[c]);
       const double b_s = period(first.series[c]);
       if (differ(a_s, b_s))

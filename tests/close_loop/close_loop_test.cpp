@@ -93,7 +93,7 @@ TEST_F(CloseTheLoop, InsertionScaleFoundMakesAllThreeBetterAndTheFilesSaySo) {
   EXPECT_GT(loop.targeting.gain_forgiving_mm.low, 0) << "also where the filter is told to forgive";
 
   EXPECT_THAT(table_text(loop), HasSubstr("scale: found insertion_scale (ratio 0.93)"));
-  write_results(loop, o.folder + "/model.toml", o.out_folder);
+  write_results(loop, o.out_folder);
   const auto json = nlohmann::json::parse(text_of(folder / "out/close-the-loop.json"));
   EXPECT_EQ(json["found"][0]["name"], "insertion_scale");
   EXPECT_GT(json["rig"]["refitted"]["chi2_per_reading"], json["rig"]["augmented"]["chi2_per_reading"]);

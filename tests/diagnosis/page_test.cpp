@@ -19,7 +19,7 @@ using ::testing::HasSubstr;
 using ::testing::Not;
 
 std::string page_of(Verdict verdict, const std::string& name) {
-  std::string html = report_html(made_up(verdict), "rig/model.toml");
+  std::string html = report_html(made_up(verdict), {"0.1.0", {"model.toml", "ab12"}, {{"rec01.lcm", "cd34"}}});
   std::ofstream(std::filesystem::path(BEVEL_BINARY_DIR) / name) << html;
   return html;
 }
@@ -71,7 +71,7 @@ TEST(Page, holds_when_findings_are_bare) {
   diagnosis::Findings bare;
   bare.sentence = "Nothing <b>at all</b>.";
   bare.held_out.before.rmse_mm = std::nan("");
-  const std::string html = report_html(bare, "model.toml");
+  const std::string html = report_html(bare, {});
   EXPECT_THAT(html, HasSubstr("Nothing &lt;b&gt;at all"));
   EXPECT_FALSE(std::regex_search(html, std::regex("[\" >M]-?(nan|inf)[\" <,]")));
 }

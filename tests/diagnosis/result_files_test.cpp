@@ -133,7 +133,8 @@ TEST_F(Results, WhatTheyDoNotHaveIsTakenAwayWithTheOlderOnes) {
 
 TEST_F(Results, AProposedEffectIsThereForAnUnknownOneAlone) {
   const auto write = [&](const diagnosis::Findings& findings) {
-    write_together(folder.path(), result_files(findings, model_of(findings), "model.toml"));
+    write_together(folder.path(), result_files(findings, model_of(findings),
+                                               {"0.1.0", {"model.toml", "ab12"}, {{"rec01.lcm", "cd34"}}}));
     std::ostringstream out;
     print_verdict(out, findings);
     return std::pair{nlohmann::json::parse(text_of(folder / "verdict.json")), out.str() + result_names(findings)};

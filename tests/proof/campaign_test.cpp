@@ -67,7 +67,7 @@ TEST_F(Campaign, GoesOnWhereItWas) {
   const json results = json::parse(read_text(o.out / "results.json"));
   EXPECT_EQ(results["summary"]["trials"], 2);
   EXPECT_EQ(results["sealed"], false);
-  EXPECT_EQ(results["verdicts_sha256"], sha256_hex(read_text(o.out / "verdicts.json")));
+  EXPECT_EQ(results["verdicts_sha256"], io::sha256_hex(read_text(o.out / "verdicts.json")));
   EXPECT_THAT(read_text(o.out / "results.html"), HasSubstr("Blind trial"));
 
   fs::remove(TrialFolders(o.out, 1).run);

@@ -7,9 +7,9 @@ namespace {
 
 // FIPS 180-4, examples.
 TEST(Commitment, IsSha256) {
-  EXPECT_EQ(sha256_hex(""), "e3b0c44298fc1c149afbf4c8996fb92427ae41e4649b934ca495991b7852b855");
-  EXPECT_EQ(sha256_hex("abc"), "ba7816bf8f01cfea414140de5dae2223b00361a396177a9cb410ff61f20015ad");
-  EXPECT_EQ(commitment_to("a", "bc"), sha256_hex("abc"));
+  EXPECT_EQ(io::sha256_hex(""), "e3b0c44298fc1c149afbf4c8996fb92427ae41e4649b934ca495991b7852b855");
+  EXPECT_EQ(io::sha256_hex("abc"), "ba7816bf8f01cfea414140de5dae2223b00361a396177a9cb410ff61f20015ad");
+  EXPECT_EQ(commitment_to("a", "bc"), io::sha256_hex("abc"));
 }
 
 TEST(Commitment, SaltsAreLongAndDiffer) {
@@ -19,7 +19,7 @@ TEST(Commitment, SaltsAreLongAndDiffer) {
 }
 
 TEST(Commitment, AMissingFileIsNamed) {
-  EXPECT_THAT([] { sha256_of_file("/nowhere/at-all"); },
+  EXPECT_THAT([] { io::sha256_of_file("/nowhere/at-all"); },
               testing::ThrowsMessage<std::runtime_error>(testing::HasSubstr("/nowhere/at-all")));
 }
 

@@ -38,6 +38,7 @@ ClosedLoop close_the_loop(const Options& options, std::ostream& err) {
   diagnosis.quiet = options.quiet;
   diagnose::Found found = diagnose::find(diagnosis, err);
   loop.findings = std::move(found.findings);
+  loop.made_of = std::move(found.made_of);
   loop.input_damaged = found.input_damaged;
   const diagnosis::Findings& findings = loop.findings;
 
@@ -66,8 +67,8 @@ ClosedLoop close_the_loop(const Options& options, std::ostream& err) {
   return loop;
 }
 
-void write_results(const ClosedLoop& loop, const std::string& model_path, const std::string& out_folder) {
-  auto files = diagnose::result_files(loop.findings, loop.models[kAugmented], model_path);
+void write_results(const ClosedLoop& loop, const std::string& out_folder) {
+  auto files = diagnose::result_files(loop.findings, loop.models[kAugmented], loop.made_of);
   files.push_back({"close-the-loop.html", page_html(loop)});
   files.push_back({"close-the-loop.json", to_json(loop)});
   diagnose::write_together(out_folder, files);
@@ -76,7 +77,7 @@ void write_results(const ClosedLoop& loop, const std::string& model_path, const 
 int run(const Options& options, std::ostream& out, std::ostream& err) {
   diagnose::check_writable(options.out_folder);
   const ClosedLoop loop = close_the_loop(options, err);
-  write_results(loop, find_case(options.folder).model_path, options.out_folder);
+  write_results(loop, options.out_folder);
   out << table_text(loop) << "\nwritten: " << options.out_folder
       << "/close-the-loop.html, close-the-loop.json, and the diagnosis: " << diagnose::result_names(loop.findings)
       << '\n';

@@ -9,6 +9,7 @@
 #include "tools/close_loop/models.hpp"
 #include "tools/close_loop/rig_figure.hpp"
 #include "tools/close_loop/targeting_figure.hpp"
+#include "tools/diagnose/provenance.hpp"
 
 namespace bevel::close_loop {
 
@@ -28,6 +29,7 @@ struct EstimatorFigures {
 struct ClosedLoop {
   std::string case_name;
   diagnosis::Findings findings;
+  diagnose::Provenance made_of;
   bool input_damaged = false;  // as in diagnose::Found
   Models models;
   std::array<RigFigure, kStages> rig;
@@ -41,7 +43,7 @@ ClosedLoop close_the_loop(const Options& options, std::ostream& err);
 
 // The mismatch tool's three files, close-the-loop.json and close-the-loop.html, all or none. Throws std::runtime_error
 // naming the file and the reason.
-void write_results(const ClosedLoop& loop, const std::string& model_path, const std::string& out_folder);
+void write_results(const ClosedLoop& loop, const std::string& out_folder);
 
 // All of it, the table on `out`. Returns the exit status.
 int run(const Options& options, std::ostream& out, std::ostream& err);

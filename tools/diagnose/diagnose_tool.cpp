@@ -1,13 +1,16 @@
 #include "tools/diagnose/diagnose_tool.hpp"
 
+#include <algorithm>
 #include <cmath>
 #include <cstdio>
+#include <filesystem>
 #include <ostream>
 #include <stdexcept>
 
 #include "diagnosis/mismatch/diagnose.hpp"
 #include "diagnosis/mismatch/effect_source.hpp"
 #include "io/model_file.hpp"
+#include "io/sha256.hpp"
 #include "tools/common/exit_status.hpp"
 #include "tools/diagnose/figures.hpp"
 #include "tools/diagnose/progress.hpp"
@@ -31,6 +34,25 @@ std::string listed(const std::vector<std::string>& names) {
   std::string text;
   for (const auto& name : names) text += (text.empty() ? "" : ", ") + name;
   return text;
+}
+
+// What a fitted needle says of itself that nobody should take on trust.
+std::vector<std::string> remarks_on_needle(const Findings& f) {
+  if (f.two_groups) return {};
+  constexpr double k95 = 1.96;
+  const NeedleEstimate& n = f.needle;
+  std::vector<std::string> remarks;
+  const std::string k = with_error(n.value.curvature_per_mm, n.curvature_sd_per_mm) + " 1/mm";
+  if (std::abs(n.value.curvature_per_mm) < k95 * n.curvature_sd_per_mm)
+    remarks.push_back("k " + k +
+                      ": its 95 % interval holds zero, so these recordings do not say to which side the "
+                      "needle bends. Record insertions in which the base does not turn.");
+  else if (n.value.curvature_per_mm * f.model_file.curvature_per_mm < 0)
+    remarks.push_back("k " + k + " has the other sign than in the model file, " +
+                      number(f.model_file.curvature_per_mm) +
+                      " 1/mm: the bevel faces the other way than the model file has it (a roll of pi at the start), or "
+                      "these recordings hardly show it. Do not steer by model.toml before that is known.");
+  return remarks;
 }
 
 }  // namespace
@@ -58,8 +80,14 @@ Found find(const Options& options, std::ostream& err) {
   how.progress = [&](const std::string& text) { progress.say(text); };
   Findings findings = diagnosis::diagnose(input.recorded, model.needle, how);
   findings.remarks.insert(findings.remarks.begin(), input.remarks.begin(), input.remarks.end());
+  const auto on_needle = remarks_on_needle(findings);
+  findings.remarks.insert(findings.remarks.end(), on_needle.begin(), on_needle.end());
   findings.times.insert(findings.times.begin(), {"reading the logs", reading_s});
-  return {std::move(findings), std::move(model), !input.remarks.empty()};
+  Provenance made_of{
+      BEVEL_VERSION,
+      {std::filesystem::path(options.model_path).filename().string(), io::sha256_of_file(options.model_path)},
+      std::move(input.files)};
+  return {std::move(findings), std::move(model), std::move(made_of), !input.remarks.empty()};
 }
 
 void print_verdict(std::ostream& out, const Findings& f) {
@@ -99,17 +127,20 @@ void print_verdict(std::ostream& out, const Findings& f) {
   for (std::size_t i = 0; i < f.where.size() && i < 3; ++i)
     out << "  " << (i == 0 ? "worst: " : "       ") << f.where[i].log << " " << f.where[i].channel << ", "
         << number(f.where[i].from_s) << " to " << number(f.where[i].to_s) << " s\n";
+  if (const auto unseen = not_to_be_seen(f); !unseen.empty())
+    out << "  not to be seen in these recordings at its usual size: " << listed(unseen)
+        << "; the page says which motions would show it\n";
   for (const auto& remark : f.remarks) out << "  - " << remark << '\n';
 }
 
 std::vector<ResultFile> result_files(const Findings& findings, const io::ModelFile& augmented,
-                                     const std::string& model_path) {
+                                     const Provenance& made_of) {
   ResultFile effect{kProposedEffectFile, {}};
   if (auto proposed = proposed_effect(findings)) effect.text = std::move(proposed->text);
-  return {{"report.html", report_html(findings, model_path)},
+  return {{"report.html", report_html(findings, made_of)},
           {"model.toml", io::to_toml(augmented)},
           std::move(effect),
-          {"verdict.json", verdict_json(findings)}};
+          {"verdict.json", verdict_json(findings, made_of)}};
 }
 
 std::string result_names(const Findings& findings) {
@@ -121,7 +152,7 @@ int run(const Options& options, std::ostream& out, std::ostream& err) {
   check_writable(options.out_folder);
   const Found found = find(options, err);
   const Findings& findings = found.findings;
-  write_together(options.out_folder, result_files(findings, model_of(findings, found.model), options.model_path));
+  write_together(options.out_folder, result_files(findings, model_of(findings, found.model), found.made_of));
   print_verdict(out, findings);
   out << "\nwritten: " << options.out_folder << "/" << result_names(findings) << '\n';
   return found.input_damaged ? tools::kDamagedInput : tools::kOk;

@@ -8,6 +8,7 @@
 
 #include "diagnosis/mismatch/findings.hpp"
 #include "io/model_file.hpp"
+#include "tools/diagnose/provenance.hpp"
 #include "tools/diagnose/result_files.hpp"
 
 namespace bevel::diagnose {
@@ -25,7 +26,8 @@ std::string usage_fault(const Options& options);
 
 struct Found {
   diagnosis::Findings findings;
-  io::ModelFile model;         // in use
+  io::ModelFile model;  // in use
+  Provenance made_of;
   bool input_damaged = false;  // so that it did not stand in the way; the findings' remarks say how
 };
 
@@ -37,7 +39,7 @@ void print_verdict(std::ostream& out, const diagnosis::Findings& findings);
 
 // For write_together(): the page, the augmented model, the proposed effect where there is one, and last the verdict.
 std::vector<ResultFile> result_files(const diagnosis::Findings& findings, const io::ModelFile& augmented,
-                                     const std::string& model_path);
+                                     const Provenance& made_of);
 // Of those files, for a message.
 std::string result_names(const diagnosis::Findings& findings);
 

@@ -119,6 +119,21 @@ bool is_kind_of(std::string_view tried, const diagnosis::FoundEffect& found) {
          tried == found.name;
 }
 
+bool was_found(const diagnosis::Findings& f, std::string_view effect) {
+  return std::any_of(f.effects.begin(), f.effects.end(), [&](const auto& e) { return e.name == effect; });
+}
+
+std::vector<std::string> not_to_be_seen(const diagnosis::Findings& f) {
+  std::vector<std::string> names;
+  for (const auto& d : f.detectable) {
+    const bool seen = std::any_of(f.detectable.begin(), f.detectable.end(),
+                                  [&](const auto& o) { return o.effect == d.effect && o.size <= o.typical; });
+    if (seen || was_found(f, d.effect) || std::find(names.begin(), names.end(), d.effect) != names.end()) continue;
+    names.push_back(d.effect);
+  }
+  return names;
+}
+
 std::string unit_of(std::string_view name) { return std::string(split(name).second); }
 
 std::string in_words(std::string_view name) {

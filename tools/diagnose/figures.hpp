@@ -3,6 +3,7 @@
 
 #include <string>
 #include <string_view>
+#include <vector>
 
 #include "diagnosis/mismatch/findings.hpp"
 
@@ -31,6 +32,10 @@ std::string in_words(std::string_view name);
 bool is_kind_of(std::string_view tried, const diagnosis::FoundEffect& found);
 // The same for a parameter of an effect.
 bool is_kind_of(std::string_view tried, std::string_view effect, std::string_view parameter);
+
+bool was_found(const diagnosis::Findings& findings, std::string_view effect);
+// Effects of which no parameter, at the size that the field reports, would have been seen; none that was found.
+std::vector<std::string> not_to_be_seen(const diagnosis::Findings& findings);
 
 std::string headline_of(diagnosis::Verdict verdict, bool two_groups = false);  // "Effects found", ...
 

@@ -9,6 +9,7 @@
 #include "io/file_bytes.hpp"
 #include "io/find_logs.hpp"
 #include "io/recording_clock.hpp"
+#include "io/sha256.hpp"
 #include "tools/diagnose/figures.hpp"
 
 namespace bevel::diagnose {
@@ -101,6 +102,7 @@ class Reader {
     io::Recording recording = io::read_recording(bytes);
     recording.file_change = files_.back().change();
     const std::string name = group + fs::path(log).filename().string();
+    result_.files.push_back({name, io::sha256_hex({reinterpret_cast<const char*>(bytes.data()), bytes.size()})});
     const bool has_clock = io::has_clock(recording);
     const std::string remark = judge_damage(name, recording);
     if (!remark.empty()) result_.remarks.push_back(remark);

@@ -6,11 +6,13 @@
 
 #include "diagnosis/needle/recorded_case.hpp"
 #include "io/recording.hpp"
+#include "tools/diagnose/provenance.hpp"
 
 namespace bevel::diagnose {
 
 struct ReadCase {
   diagnosis::RecordedCase recorded;
+  std::vector<KnownFile> files;
   std::vector<std::string> remarks;  // on damage that does not stand in the way
 };
 

@@ -333,7 +333,7 @@ void add_paths(io::HtmlReport& page, const Findings& f) {
     });
 }
 
-std::string report_html(const Findings& findings, const std::string& model_path) {
+std::string report_html(const Findings& findings, const Provenance& made_of) {
   io::HtmlReport page(findings.two_groups ? "What changed" : "What the model leaves out");
   add_verdict(page, findings);
   add_what_to_do(page, findings);
@@ -348,7 +348,7 @@ std::string report_html(const Findings& findings, const std::string& model_path)
   add_reach(page, findings);
   add_next_experiment(page, findings);
   add_noise_and_checks(page, findings);
-  add_making(page, findings, model_path);
+  add_making(page, findings, made_of);
   return page.html();
 }
 

@@ -5,10 +5,11 @@
 
 #include "diagnosis/mismatch/findings.hpp"
 #include "io/html_report.hpp"
+#include "tools/diagnose/provenance.hpp"
 
 namespace bevel::diagnose {
 
-std::string report_html(const diagnosis::Findings& findings, const std::string& model_path);
+std::string report_html(const diagnosis::Findings& findings, const Provenance& made_of);
 
 // Its sections, in order. One with nothing to say adds nothing.
 void add_verdict(io::HtmlReport& page, const diagnosis::Findings& findings);
@@ -24,6 +25,6 @@ void add_held_out(io::HtmlReport& page, const diagnosis::Findings& findings);
 void add_reach(io::HtmlReport& page, const diagnosis::Findings& findings);  // what the recordings could have shown
 void add_next_experiment(io::HtmlReport& page, const diagnosis::Findings& findings);
 void add_noise_and_checks(io::HtmlReport& page, const diagnosis::Findings& findings);
-void add_making(io::HtmlReport& page, const diagnosis::Findings& findings, const std::string& model_path);
+void add_making(io::HtmlReport& page, const diagnosis::Findings& findings, const Provenance& made_of);
 
 }  // namespace bevel::diagnose

@@ -33,10 +33,10 @@ std::string words_of(const std::string& parameter) {
 std::string seconds_of(double seconds) { return seconds < 0.05 ? "< 0.1" : measured(seconds, seconds < 1 ? 1 : 3); }
 
 // The same motion often shows several effects: said once.
-std::vector<std::string> experiments_of(const std::vector<DetectableSize>& sizes) {
+std::vector<std::string> experiments_of(const Findings& f) {
   std::vector<std::pair<std::string, std::vector<std::string>>> by_motion;
-  for (const auto& d : sizes) {
-    if (d.experiment.empty()) continue;
+  for (const auto& d : f.detectable) {
+    if (d.experiment.empty() || was_found(f, d.effect)) continue;
     auto at = std::find_if(by_motion.begin(), by_motion.end(), [&](const auto& m) { return m.first == d.experiment; });
     if (at == by_motion.end()) at = by_motion.insert(by_motion.end(), {d.experiment, {}});
     if (std::find(at->second.begin(), at->second.end(), d.effect) == at->second.end()) at->second.push_back(d.effect);
@@ -168,7 +168,7 @@ void add_reach(io::HtmlReport& page, const Findings& f) {
     for (const auto& d : f.detectable)
       rows.push_back({d.effect, words_of(d.parameter), size_of(d, d.size), size_of(d, d.typical), percent(d.absorbed)});
     page.table({"effect", "parameter", "seen from", "typical", "absorbed"}, rows);
-    const auto experiments = experiments_of(f.detectable);
+    const auto experiments = experiments_of(f);
     if (!experiments.empty())
       page.paragraph("Effects that these recordings could not show at their usual size, and motions that would:")
           .list(experiments);
@@ -219,8 +219,13 @@ void add_noise_and_checks(io::HtmlReport& page, const Findings& f) {
   if (!f.remarks.empty()) page.subheading("Remarks").list(f.remarks);
 }
 
-void add_making(io::HtmlReport& page, const Findings& f, const std::string& model_path) {
+void add_making(io::HtmlReport& page, const Findings& f, const Provenance& made_of) {
   page.heading("How this was made");
+  std::vector<std::vector<std::string>> files{{"model in use", made_of.model.name, made_of.model.sha256}};
+  for (const auto& file : made_of.recordings) files.push_back({"recording", file.name, file.sha256});
+  page.table({"", "file", "SHA-256"}, files,
+             "By bevel-diagnose " + made_of.version +
+                 ". Nothing is drawn at random: the same files and version give the same verdict, to the last bit.");
   std::vector<std::vector<std::string>> rows;
   double total = 0;
   for (const auto& t : f.times) {
@@ -229,10 +234,6 @@ void add_making(io::HtmlReport& page, const Findings& f, const std::string& mode
   }
   rows.push_back({"all", seconds_of(total)});
   page.table({"stage", "seconds"}, rows);
-  std::string logs;
-  for (const auto& trace : f.traces) logs += (logs.empty() ? "" : ", ") + trace.log;
-  page.paragraph("Model in use: " + model_path + ". Recordings: " + logs +
-                 ". Nothing is drawn at random: the same input and version give the same verdict.");
 }
 
 }  // namespace bevel::diagnose

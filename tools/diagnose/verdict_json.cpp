@@ -222,7 +222,7 @@ json checks_json(const Checks& c) {
 
 }  // namespace
 
-std::string verdict_json(const Findings& f) {
+std::string verdict_json(const Findings& f, const Provenance& made_of) {
   json j = {{"verdict", name_of(f.verdict, f.two_groups)}, {"sentence", f.sentence}, {"effects", json::array()}};
   if (f.two_groups) j["changes"] = json::array();
   for (const auto& effect : f.effects) j[f.two_groups ? "changes" : "effects"].push_back(as_json(effect));
@@ -256,6 +256,13 @@ std::string verdict_json(const Findings& f) {
   j["confusion"] = confusion_json(f);
   j["remarks"] = f.remarks;
   j["measurements"] = {{"used", f.readings}, {"outliers", f.outliers}};
+  if (!made_of.version.empty()) {
+    json recordings = json::object();
+    for (const auto& file : made_of.recordings) recordings[file.name] = file.sha256;
+    j["made_of"] = {{"version", made_of.version},
+                    {"model", {{"file", made_of.model.name}, {"sha256", made_of.model.sha256}}},
+                    {"recordings_sha256", recordings}};
+  }
   // Clock times are not here but on the page: the same input gives the same file, to the last bit.
   return j.dump(2, ' ', false, json::error_handler_t::replace) + "\n";
 }

@@ -5,13 +5,14 @@
 
 #include "diagnosis/mismatch/findings.hpp"
 #include "io/model_file.hpp"
+#include "tools/diagnose/provenance.hpp"
 
 namespace bevel::diagnose {
 
 // Where the source of the proposed effect stands, if there is one.
 inline constexpr const char* kProposedEffectFile = "proposed_effect.cpp";
 
-std::string verdict_json(const diagnosis::Findings& findings);
+std::string verdict_json(const diagnosis::Findings& findings, const Provenance& made_of = {});
 
 // What was found, beside what the model in use had already, as a model that the rig, the estimator and bevel-predict
 // accept. Of an unknown effect it carries the discrepancy: a name is never invented.
