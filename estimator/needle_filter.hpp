@@ -124,7 +124,7 @@ class NeedleFilter {
   // answer the pose stays, and outside_model is set.
   void predict(FilterState& state, double insertion_mm, double rotation_rad, double duration_s = 0) const;
 
-  // The same without the covariance, for what is only foretold.
+  // The same without the covariance, for what is only predicted.
   void predict_mean(FilterState& state, double insertion_mm, double rotation_rad, double duration_s = 0) const;
 
   // The tip in {A} and the shaft's end there: the state's own pose, but for what effects or a stiff shaft make of it.

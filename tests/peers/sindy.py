@@ -8,7 +8,7 @@ choices. The prediction is the model's path plus the integral of the terms.
 
 Two settings are kinder than PySINDy's own, found on the first cases: a window of 31 readings for 11 (noise in the
 velocity falls to a seventh of its variance), and no polynomial of degree 3 (each recording moves in its own way, and
-its 56 terms foretold no recording that they were not fitted on).
+its 56 terms predicted no recording that they were not fitted on).
 """
 import warnings
 
@@ -101,7 +101,7 @@ def learn(recordings, errors, chosen):
     return {rule: (choice[0], fit(tracks, *choice)) for rule, choice in choose(tracks).items()}
 
 
-def foretell(library, model, recording):
+def predict(library, model, recording):
     t = np.arange(recording.tip_s[0], recording.tip_s[-1] + FRAME_S, FRAME_S)
     rate = np.asarray(model.predict(np.zeros((len(t), 3)), LIBRARIES[library][0](recording, t)))
     drift = np.concatenate((np.zeros((1, 3)), np.cumsum(0.5 * FRAME_S * (rate[1:] + rate[:-1]), axis=0)))
@@ -127,7 +127,7 @@ def run(case):
         others = [i for i in every if i != r]
         base = problem.errors(problem.refit(null, Noise(null.noise.sigma_mm, 0.0), others))
         for rule, (library, model) in learn(case.recordings, base, others).items():
-            held_out[rule].append(base[r] - foretell(library, model, case.recordings[r]))
+            held_out[rule].append(base[r] - predict(library, model, case.recordings[r]))
     models = learn(case.recordings, problem.errors(null), every)
     return {rule: {"names": name_terms(model), "library": library, "errors": held_out[rule]}
             for rule, (library, model) in models.items()}  # fmt: skip

@@ -124,7 +124,7 @@ class Problem:
         return self.judge(self.refit(white, white.noise))
 
     def held_out(self, fit):
-        """Each recording foretold by the selected model, fitted on the others; its own phase or instant on itself."""
+        """Each recording predicted by the selected model, fitted on the others; its own phase or instant on itself."""
         errors = []
         for r in range(len(self.recordings)):
             others = [i for i in range(len(self.recordings)) if i != r]

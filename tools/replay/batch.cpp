@@ -71,8 +71,8 @@ std::vector<Replay> replay_logs(const std::vector<std::string>& logs,
         replays[i] = replay_log(file.bytes(), name_of(logs[i]), own, options);
         if (!file.change().empty()) replays[i].remarks += replays[i].name + ": damaged: " + file.change() + "\n";
         if (!(options.ahead_mm > 0)) continue;
-        replays[i].next = foretell(replays[i], 1e-6);
-        replays[i].ahead = foretell(replays[i], options.ahead_mm);
+        replays[i].next = predict(replays[i], 1e-6);
+        replays[i].ahead = predict(replays[i], options.ahead_mm);
       } catch (...) {
         const std::lock_guard lock(failure_mutex);
         failure = std::current_exception();

@@ -15,7 +15,7 @@ int main(int argc, char** argv) {
       .option("-s,--system", options.system_path, "instead of -m and -c: the rig's file, with its estimator's settings")
       .option("-c,--config", options.config_path, "estimator settings (TOML); see docs/estimator.md")
       .option("-o,--out", options.out_folder, "folder for CSV files and a page per log")
-      .positive("--ahead-mm", options.ahead_mm, "distance over which the filter is asked to foretell")
+      .positive("--ahead-mm", options.ahead_mm, "distance over which the filter is asked to predict")
       .flag("--bicycle", options.bicycle, "the plain bicycle: lambda held at zero")
       .flag("--without-headings", options.without_headings, "leave TIP_HEADING out")
       .flag("--held-out", options.held_out, "start each log from k and lambda learned on the others")

@@ -1,5 +1,5 @@
 #pragma once
-// Parameters learned on the other insertions of one tissue, so that a log is foretold by what it has had no part in.
+// Parameters learned on the other insertions of one tissue, so that a log is predicted by what it has had no part in.
 #include <vector>
 
 #include "tools/replay/replay.hpp"

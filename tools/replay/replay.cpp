@@ -186,23 +186,23 @@ Replay replay_log(std::span<const std::uint8_t> log, const std::string& name, co
   return result;
 }
 
-void Foretold::add(const Foretold& other) {
+void Predicted::add(const Predicted& other) {
   for (std::size_t i = 0; i < 2; ++i) {
     count[i] += other.count[i];
     squares_mm2[i] += other.squares_mm2[i];
   }
 }
 
-double Foretold::lateral_rmse_mm() const {
+double Predicted::lateral_rmse_mm() const {
   double mean_mm2 = 0;
   for (std::size_t i = 0; i < 2; ++i)
     if (count[i] > 0) mean_mm2 += squares_mm2[i] / static_cast<double>(count[i]);
   return std::sqrt(mean_mm2);
 }
 
-Foretold foretell(const Replay& replay, double ahead_mm) {
+Predicted predict(const Replay& replay, double ahead_mm) {
   const estimator::NeedleFilter filter(replay.config);
-  Foretold result;
+  Predicted result;
   for (auto from = replay.states.begin(); from != replay.states.end(); ++from) {
     // The first accepted measurement that lies so far ahead of a state, and is not yet part of it.
     const auto to = std::find_if(replay.innovations.begin(), replay.innovations.end(), [&](const InnovationRow& row) {

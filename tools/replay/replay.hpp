@@ -58,13 +58,13 @@ struct TruthFigures {
   std::array<ChiSquareMean, 6> axis_nees;  // of each error of the pose on its own: x, y, along the needle, tilts, roll
 };
 
-// How well the filter foretells measurements that it has not seen yet: lateral (x, y) error in mm, each axis over the
+// How well the filter predicts measurements that it has not seen yet: lateral (x, y) error in mm, each axis over the
 // measurements that see it.
-struct Foretold {
+struct Predicted {
   std::array<std::int64_t, 2> count{};
   std::array<double, 2> squares_mm2{};
 
-  void add(const Foretold& other);
+  void add(const Predicted& other);
   double lateral_rmse_mm() const;  // of both axes together; 0 if neither was seen
 };
 
@@ -86,8 +86,8 @@ struct Replay {
   double run_s = 0;     // wall time of decoding and estimating
   double processor_s = 0;
   estimator::EstimatorConfig config;
-  Foretold next;   // one measurement ahead; both by replay_logs, if asked
-  Foretold ahead;  // ReplayOptions::ahead_mm ahead
+  Predicted next;   // one measurement ahead; both by replay_logs, if asked
+  Predicted ahead;  // ReplayOptions::ahead_mm ahead
 };
 
 // The whole state of a row, as the filter can go on from it.
@@ -96,7 +96,7 @@ estimator::FilterState filter_state(const Replay& replay, std::size_t row);
 struct ReplayOptions {
   std::size_t history = 64;
   bool use_headings = true;  // false: as if the log had none
-  double ahead_mm = 0;       // for replay_logs: 0, nothing is foretold
+  double ahead_mm = 0;       // for replay_logs: 0, nothing is predicted
   // Replaces each measurement's information by that of this noise, per axis; empty: as the camera says.
   std::vector<NoiseColour> noise_by_axis{};
   // Of the model file, for replay_logs: some effects are a recording's own.
@@ -110,7 +110,7 @@ Replay replay_log(std::span<const std::uint8_t> log, const std::string& name, co
                   const ReplayOptions& options = {});
 
 // Of measurements at least `ahead_mm` further in, from the filter's state just after a measurement, by the model alone.
-Foretold foretell(const Replay& replay, double ahead_mm);
+Predicted predict(const Replay& replay, double ahead_mm);
 
 // Figures over the innovations of one or more replays.
 struct InnovationFigures {

@@ -183,9 +183,9 @@ void print_headings(std::ostream& out, const Replay& replay, const InnovationFig
       truth.position_rmse_mm, truth.tilt_rmse_rad, truth.roll_rmse_rad, truth.pose_nees.mean());
 }
 
-void print_foretold(std::ostream& out, const Foretold& next, const Foretold& ahead, double ahead_mm) {
-  const auto times = [](const Foretold& f) { return static_cast<long long>(std::max(f.count[0], f.count[1])); };
-  out << text_of("  foretold     lateral RMSE %.3f mm one measurement ahead (%lld), %.3f mm %g mm ahead (%lld)\n",
+void print_predicted(std::ostream& out, const Predicted& next, const Predicted& ahead, double ahead_mm) {
+  const auto times = [](const Predicted& f) { return static_cast<long long>(std::max(f.count[0], f.count[1])); };
+  out << text_of("  predicted     lateral RMSE %.3f mm one measurement ahead (%lld), %.3f mm %g mm ahead (%lld)\n",
                  next.lateral_rmse_mm(), times(next), ahead.lateral_rmse_mm(), ahead_mm, times(ahead));
 }
 
@@ -248,14 +248,14 @@ void print(std::ostream& out, const Replay& replay, double ahead_mm) {
                    nees[0].mean(), nees[1].mean(), nees[2].mean(), nees[3].mean(), nees[4].mean(), nees[5].mean());
   }
   print_headings(out, replay, figures);
-  print_foretold(out, replay.next, replay.ahead, ahead_mm);
+  print_predicted(out, replay.next, replay.ahead, ahead_mm);
 }
 
 void print_together(std::ostream& out, const std::vector<Replay>& replays, double ahead_mm) {
   ChiSquareMean nis, heading_nis;
   std::int64_t rejected = 0;
   std::int64_t measurements = 0;
-  Foretold next, ahead;
+  Predicted next, ahead;
   for (const Replay& replay : replays) {
     const InnovationFigures figures = innovation_figures(replay);
     nis.add(figures.nis.sum, figures.nis.degrees);
@@ -269,7 +269,7 @@ void print_together(std::ostream& out, const std::vector<Replay>& replays, doubl
   if (heading_nis.degrees > 0)
     out << "  heading NIS  " << with_band(heading_nis)
         << text_of("; %lld axes\n", static_cast<long long>(heading_nis.degrees));
-  print_foretold(out, next, ahead, ahead_mm);
+  print_predicted(out, next, ahead, ahead_mm);
 }
 
 void print_speed(std::ostream& out, const std::vector<Replay>& replays) {

@@ -10,7 +10,7 @@
 namespace bevel::replay {
 
 void print(std::ostream& out, const Replay& replay, double ahead_mm);
-// What several replays say together: NIS, and measurements foretold.
+// What several replays say together: NIS, and measurements predicted.
 void print_together(std::ostream& out, const std::vector<Replay>& replays, double ahead_mm);
 void print_speed(std::ostream& out, const std::vector<Replay>& replays);
 
