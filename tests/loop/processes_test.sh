@@ -119,6 +119,11 @@ case $case in
     "${demo[@]}" --fault camera:off >"$work/demo.txt" 2>&1 && fail "a fault without a time was taken"
     grep -q "camera:off@5s" "$work/demo.txt" || fail "does not say how a fault is given"
     ;;
+  out_of_reach)  # an answer, not something to wait for
+    "${demo[@]}" --target=60,0,60 --time-limit 30 >"$work/demo.txt" 2>&1; status=$?
+    [ $status -eq 1 ] || fail "exit status $status, wanted 1"
+    grep -q "stopped: .*target out of reach" "$work/demo.txt" || fail "does not say that it is out of reach"
+    ;;
   kills)
     "$bin/kill_study" "$bin" "$work/demo.toml" "$work/out" "unix:$work/s-can.sock" "${4:-3}" "${5:-1}" || fail "see above"
     ;;

@@ -3,6 +3,8 @@
 #include <cstdio>
 #include <stdexcept>
 
+#include "controller/supervisor.hpp"
+
 namespace bevel::tools {
 namespace {
 constexpr std::int64_t kWordPeriod_ns = 300'000'000;
@@ -77,7 +79,12 @@ SteeringSession::Progress SteeringSession::step(const nodes::Now& now) {
     return now.ns - arrived_ns_ > kSettle_ns ? Progress::arrived : Progress::going_on;
   }
   if (controller == "steering") steering_seen_ = true;
-  if (steering_seen_ && (controller == "stopped" || controller == "fault")) return Progress::stopped;
+  if (controller == "stopped" || controller == "fault") {
+    // Before the start most reasons pass, and the words are said again; that of a target does not.
+    const std::string& why = processes_["bevel-controller"].reason;
+    if (steering_seen_ || why.starts_with(controller::to_string(controller::Reason::target_unreachable)))
+      return Progress::stopped;
+  }
   if (steering_seen_ || now.ns < next_word_ns_) return Progress::going_on;
   // The operator's words, repeated until they take effect.
   next_word_ns_ = now.ns + kWordPeriod_ns;
