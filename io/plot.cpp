@@ -69,6 +69,8 @@ std::string legend_command(Plot::Legend legend) {
       return "set key bottom left Left reverse" + style;
     case Plot::Legend::bottom_right:
       return "set key bottom right Left reverse" + style;
+    case Plot::Legend::below:
+      return "set key below horizontal maxrows 1 Left reverse samplen 2 width 1 textcolor rgb '#333333'\n";
     case Plot::Legend::none:
       break;
   }

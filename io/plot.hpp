@@ -26,7 +26,7 @@ struct ReferenceLine {
 };
 
 struct Plot {
-  enum class Legend { top_left, top_right, bottom_left, bottom_right, none };
+  enum class Legend { top_left, top_right, bottom_left, bottom_right, below, none };
   std::string title;
   std::string x_label;  // with the unit: "depth (mm)"
   std::string y_label;

@@ -150,7 +150,7 @@ int run_demo(const DemoOptions& options) {
   }
   const LoopFigures figures = loop_figures(log_path);
   std::printf("\n%s\n", to_text(figures).c_str());
-  write_loop_report(log_path, figures, options.out + "/report.html");
+  write_loop_report(log_path, figures, options.tolerance_mm, options.out + "/report.html");
   std::printf("report %s/report.html, log %s\n", options.out.c_str(), log_path.c_str());
   if (figures.targeting_error_mm <= options.tolerance_mm) return clean ? 0 : 1;
   std::fprintf(stderr, "bevel-demo: missed by %.2f mm, more than %.2f mm\n", figures.targeting_error_mm,

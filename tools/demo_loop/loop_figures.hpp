@@ -38,6 +38,7 @@ struct LoopFigures {
 LoopFigures loop_figures(const std::string& log_path);
 std::string to_text(const LoopFigures& figures);
 // A self-contained page: paths with target and uncertainty, errors over time, commands.
-void write_loop_report(const std::string& log_path, const LoopFigures& figures, const std::string& html_path);
+void write_loop_report(const std::string& log_path, const LoopFigures& figures, double tolerance_mm,
+                       const std::string& html_path);
 
 }  // namespace bevel::tools
