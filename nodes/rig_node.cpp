@@ -38,6 +38,11 @@ RigNode::RigNode(lcm::LCM& lcm, can::Bus& insertion_bus, can::Bus& rotation_bus,
   else
     plant_ = std::make_unique<rig::KinematicPlant>(config.rig.truth, effects, config.rig.roll_error_rad, own_values_);
   for (const CameraViewConfig& c : config.cameras) {
+    if (c.calibrated)
+      throw std::invalid_argument(
+          "camera " + std::to_string(c.camera) +
+          ": calibration is given, and the simulated rig draws planar views only; allowed: px_per_mm, "
+          "origin_px, columns_carry, rows_carry");
     rig::SceneConfig scene;
     scene.size_px = {c.width_px, c.height_px};
     scene.needle_diameter_mm = c.tracker.needle_diameter_mm;

@@ -79,7 +79,7 @@ TEST(Fit, TwoCamerasAndTheirWalls) {
       EXPECT_LT(std::abs(wall[kIndex] - 1.333), fit_index ? std::min(4 * sd[kIndex], 0.02) : 1e-12);
       EXPECT_NEAR(camera.fit.held_out_rms_px, kNoise_px * std::sqrt(2.0), 0.02);
     }
-    const CameraModel& second = got.calibration.cameras[1].model;
+    const CameraModel second = camera_in(got.rig, 1, true);
     const double off_mm = cv::norm(second.p_CA_mm - cameras[1].t_mm), off_rad = angle_rad(second.R_CA, cameras[1].R);
     std::printf("second camera: off by %.3f mm and %.5f rad\n", off_mm, off_rad);
     EXPECT_LT(off_mm, 1.0);

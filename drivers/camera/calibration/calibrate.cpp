@@ -158,6 +158,23 @@ void fill_figures(const CalibrationInput& in, const Board& board, Calibrated& ou
   }
 }
 
+// Until {A} is known: as if the needle went down in the first camera's picture, in the middle of where the boards were.
+// Views need a needle's plane to put their points on; what they know, across the ray, does not depend on it.
+void set_provisional_frame(const Board& board, Calibrated& out) {
+  const bool any_immersed = std::ranges::any_of(out.shots, &Shot::immersed);
+  const BoardSpec& spec = board.spec();
+  const cv::Vec3d middle_B(0.5 * spec.columns * spec.square_mm, 0.5 * spec.rows * spec.square_mm, 0.0);
+  cv::Vec3d sum;
+  int count = 0;
+  for (size_t s = 0; s < out.shots.size(); ++s) {
+    if (out.shots[s].immersed != any_immersed) continue;
+    sum += out.rig.boards[s](middle_B);
+    ++count;
+  }
+  // Columns: x ahead, y to the right, z down, in {C0}.
+  move_frame({0, 1, 0, 0, 0, 1, 1, 0, 0}, sum * (1.0 / count), out.calibration);
+}
+
 }  // namespace
 
 Calibrated calibrate(const Board& board, const CalibrationInput& input) {
@@ -180,6 +197,7 @@ Calibrated calibrate(const Board& board, const CalibrationInput& input) {
   out.sd = deviations(board, out.shots, input.options, rig);
   out.rig = std::move(rig);
   fill_figures(input, board, out);
+  set_provisional_frame(board, out);
   hold_out(board, input, out);
   return out;
 }

@@ -40,7 +40,8 @@ struct TriangulationFigures {
 
 struct Calibrated {
   std::vector<int> numbers;
-  Calibration calibration;  ///< {A} is {C0}, FrameKind::none
+  /// FrameKind::none: {A} is provisional, z down in the first camera's picture, x ahead, origin among the boards.
+  Calibration calibration;
   Rig rig;
   RigSd sd;
   std::vector<Shot> shots;  ///< with what was left out emptied

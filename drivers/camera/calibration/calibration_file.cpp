@@ -189,6 +189,13 @@ Calibration read_all(const cv::FileStorage& storage, const std::string& name) {
 
 std::string_view name_of(FrameKind kind) { return kFrames[static_cast<size_t>(kind)]; }
 
+void move_frame(const cv::Matx33d& R, const cv::Vec3d& t_mm, Calibration& calibration) {
+  for (CalibratedCamera& camera : calibration.cameras) {
+    camera.model.p_CA_mm += camera.model.R_CA * t_mm;
+    camera.model.R_CA = camera.model.R_CA * R;
+  }
+}
+
 std::string with_checksum(const std::string& body) { return body + kChecksum + fnv1a(body) + "\"\n"; }
 
 std::string to_yaml(const Calibration& calibration) {

@@ -16,7 +16,7 @@ inline constexpr int kCalibrationVersion = 1;
 
 /// What {A} of a calibration is.
 enum class FrameKind {
-  none,       ///< camera-fixed, that of the first camera: not yet the needle's
+  none,       ///< provisional, of the first camera (calibrate.hpp): not yet the needle's
   fiducial,   ///< from a board at a known place
   insertion,  ///< from a straight insertion
 };
@@ -62,5 +62,8 @@ const CalibratedCamera& camera_of(const Calibration& calibration, int number, co
 std::string with_checksum(const std::string& body);
 
 std::string_view name_of(FrameKind kind);
+
+/// Every camera's pose, for a frame {A'} in which p_A = R p_A' + t.
+void move_frame(const cv::Matx33d& R, const cv::Vec3d& t_mm, Calibration& calibration);
 
 }  // namespace bevel::camera

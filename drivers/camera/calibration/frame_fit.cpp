@@ -69,13 +69,6 @@ cv::Matx33d rotation_of_axes(const std::string& board_x_along, const std::string
   return {x[0], y[0], z[0], x[1], y[1], z[1], x[2], y[2], z[2]};
 }
 
-void move_frame(const cv::Matx33d& R, const cv::Vec3d& t_mm, Calibration& calibration) {
-  for (CalibratedCamera& camera : calibration.cameras) {
-    camera.model.p_CA_mm += camera.model.R_CA * t_mm;
-    camera.model.R_CA = camera.model.R_CA * R;
-  }
-}
-
 FrameFigures set_frame_by_fiducial(const Board& board, const Shot& fiducial, const FiducialPlace& place, const Rig& rig,
                                    Calibration& calibration) {
   for (size_t c = 0; c < rig.lenses.size(); ++c)
@@ -94,6 +87,10 @@ FrameFigures set_frame_by_fiducial(const Board& board, const Shot& fiducial, con
   const auto residuals = residuals_of(board, {fiducial}, alone);
   figures.rms_px = rms(residuals);
   figures.readings = static_cast<int>(residuals.size());
+  for (size_t c = 0; c < rig.from_first.size(); ++c) {
+    calibration.cameras[c].model.R_CA = rig.from_first[c].R();
+    calibration.cameras[c].model.p_CA_mm = rig.from_first[c].t_mm();
+  }
   // p_C0 = pose(p_B), p_B = R_AB^T (p_A - origin).
   const cv::Matx33d R = pose.R() * place.R_AB.t();
   move_frame(R, pose.t_mm() - R * place.origin_A_mm, calibration);

@@ -24,7 +24,7 @@ struct FrameFigures {
   int readings = 0;
 };
 
-/// `calibration` must have been fitted in {C0} (FrameKind::none), `rig` is its rig. Throws std::invalid_argument if no
+/// `calibration` is that of `rig`, whatever frame it has. Throws std::invalid_argument if no
 /// camera found the fiducial.
 FrameFigures set_frame_by_fiducial(const Board& board, const Shot& fiducial, const FiducialPlace& place, const Rig& rig,
                                    Calibration& calibration);
@@ -42,8 +42,5 @@ struct InsertedTip {
 /// std::invalid_argument naming what is wrong: fewer than 20 readings or 20 mm, one camera only (a line through rays of
 /// one eye has no depth), a length seen that is not the length inserted within 5 %.
 FrameFigures set_frame_by_insertion(const std::vector<InsertedTip>& tips, double roll_rad, Calibration& calibration);
-
-/// Every camera's pose, for a frame {A'} in which p_A = R p_A' + t.
-void move_frame(const cv::Matx33d& R, const cv::Vec3d& t_mm, Calibration& calibration);
 
 }  // namespace bevel::camera
