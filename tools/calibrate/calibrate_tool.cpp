@@ -86,7 +86,7 @@ int fit_pictures(const camera::Board& board, const Options& o, std::ostream& out
         "insertion with it, then: bevel-calibrate --calibration cameras.yaml --insertion LOG.";
   }
   fs::create_directories(o.out_folder);
-  told.yaml_path = (fs::path(o.out_folder) / "cameras.yaml").string();
+  told.yaml_path = fs::absolute(fs::path(o.out_folder) / "cameras.yaml").lexically_normal().string();
   told.tables = tables_of(got.calibration, told.yaml_path);
   camera::save_calibration(got.calibration, told.yaml_path);
   write_figures(got, o.out_folder);
@@ -142,7 +142,7 @@ int fit_insertion(const Options& o, std::ostream& out, std::ostream& err) {
   const auto figures = camera::set_frame_by_insertion(tips, o.roll_deg * CV_PI / 180.0, calibration);
   calibration.made_utc = utc_now();
   fs::create_directories(o.out_folder);
-  const std::string yaml = (fs::path(o.out_folder) / "cameras.yaml").string();
+  const std::string yaml = fs::absolute(fs::path(o.out_folder) / "cameras.yaml").lexically_normal().string();
   camera::save_calibration(calibration, yaml);
   out << figures.readings << " readings, " << format_significant(figures.rms_mm) << " mm RMS beside the line; "
       << format_significant(figures.scale, 5) << " mm seen per mm inserted (sd "
