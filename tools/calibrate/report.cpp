@@ -18,6 +18,7 @@ using io::HtmlReport;
 
 constexpr int kCellsAcross = 8, kCellsDown = 6;
 constexpr double kGood_px = 0.3, kFair_px = 1.0;
+constexpr double kSeenShare = 0.5;  // of the cells
 
 struct Cell {
   cv::Point2d sum_px, place_px;
@@ -140,8 +141,11 @@ double worst_held_out_px(const Calibrated& got) {
 
 void tell_verdict(const Calibrated& got, HtmlReport& page) {
   const double worst_px = worst_held_out_px(got);
-  double ratio = 0;
-  for (size_t c = 0; c < got.numbers.size(); ++c) ratio = std::max(ratio, systematic_ratio(got, c));
+  double ratio = 0, seen = 1;
+  for (size_t c = 0; c < got.numbers.size(); ++c) {
+    ratio = std::max(ratio, systematic_ratio(got, c));
+    seen = std::min(seen, 1.0 * covered(cells_of(got, c)) / (kCellsAcross * kCellsDown));
+  }
   if (worst_px > kFair_px)
     page.callout(
         io::Tone::bad, "Do not use it",
@@ -154,6 +158,11 @@ void tell_verdict(const Calibrated& got, HtmlReport& page) {
             ? "Pictures held out are missed by more than 0.3 px: sharper pictures, a flatter board, more of them."
             : "Residuals are alike over parts of the picture, more than chance would have them: the red lines "
               "below. A board that is not flat, or a lens that needs --k3.");
+  else if (seen < kSeenShare)
+    page.callout(io::Tone::warning, "Good where the board was",
+                 "Pictures that were not fitted are met as well as the corners can be found, but the board was seen in "
+                 "less than half of "
+                 "a picture. If the needle goes where the maps below are empty, take pictures with the board there.");
   else
     page.callout(io::Tone::good, "Good", "Pictures that were not fitted are met as well as the corners can be found.");
 }
