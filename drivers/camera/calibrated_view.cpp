@@ -1,5 +1,6 @@
 #include "drivers/camera/calibrated_view.hpp"
 
+#include <algorithm>
 #include <limits>
 #include <stdexcept>
 #include <string>
@@ -13,6 +14,12 @@ constexpr double kNaN = std::numeric_limits<double>::quiet_NaN();
 constexpr double kSineAlongNeedle = 0.342;  // 20 degrees
 
 Vector3 array(const cv::Vec3d& v) { return {v[0], v[1], v[2]}; }
+
+Matrix3 array(const cv::Matx33d& m) {
+  Matrix3 out{};
+  std::copy_n(m.val, 9, out.begin());
+  return out;
+}
 
 cv::Point2d middle(const cv::Size& size) { return {0.5 * (size.width - 1), 0.5 * (size.height - 1)}; }
 
@@ -86,19 +93,13 @@ cv::Point2d CalibratedView::pixel(const Vector3& position_mm) const {
 }
 
 Matrix3 CalibratedView::information_per_mm2(const cv::Point2d& pixel, const cv::Matx22d& covariance_px2) const {
-  Matrix3 out{};
   const auto at = spot(pixel);
-  if (!at) return out;
-  const cv::Matx22d covariance_mm2 = at->mm_per_px * covariance_px2 * at->mm_per_px.t();
-  const cv::Matx22d information = covariance_mm2.inv();
-  const cv::Vec3d axes[2] = {at->right, at->down};
-  for (int i = 0; i < 2; ++i)
-    for (int j = 0; j < 2; ++j)
-      for (int r = 0; r < 3; ++r)
-        for (int c = 0; c < 3; ++c)
-          out[static_cast<size_t>(3 * r + c)] +=
-              0.5 * (information(i, j) + information(j, i)) * axes[i][r] * axes[j][c];
-  return out;
+  if (!at) return {};
+  const cv::Matx22d information = (at->mm_per_px * covariance_px2 * at->mm_per_px.t()).inv();
+  const double cross = 0.5 * (information(0, 1) + information(1, 0));
+  const cv::Vec3d &u = at->right, &v = at->down;
+  const cv::Matx33d uv = u * v.t();
+  return array(information(0, 0) * (u * u.t()) + information(1, 1) * (v * v.t()) + cross * (uv + uv.t()));
 }
 
 // The curve lies in the surface of all rays through its picture, so that its tangent has no part across the plane
@@ -114,9 +115,7 @@ SeenDirection CalibratedView::direction(const cv::Point2d& pixel, const cv::Vec2
   const cv::Vec3d across = -unit[1] * at->right + unit[0] * at->down;
   const double turn = cv::determinant(at->mm_per_px) / image.dot(image);
   seen.direction = array(along);
-  for (int r = 0; r < 3; ++r)
-    for (int c = 0; c < 3; ++c)
-      seen.information_per_rad2[static_cast<size_t>(3 * r + c)] = across[r] * across[c] / (turn * turn * variance_rad2);
+  seen.information_per_rad2 = array(across * across.t() * (1.0 / (turn * turn * variance_rad2)));
   return seen;
 }
 

@@ -40,7 +40,9 @@ constexpr int kMarkers = 250;
 
 // Chessboards come in any of the orders that look alike; `grid` is turned so that it runs as printed.
 void turn_as_printed(const cv::Mat& gray, int across, int down, std::vector<cv::Point2f>& grid) {
-  const auto at = [&](int row, int col) -> cv::Point2f& { return grid[static_cast<size_t>(row * across + col)]; };
+  const auto at = [&](int row, int col) -> cv::Point2f& {
+    return grid[static_cast<size_t>(row) * static_cast<size_t>(across) + static_cast<size_t>(col)];
+  };
   const cv::Point2f right = at(0, across - 1) - at(0, 0), below = at(down - 1, 0) - at(0, 0);
   if (right.cross(below) < 0.0F)
     for (int row = 0; row < down; ++row) std::reverse(&at(row, 0), &at(row, 0) + across);
@@ -101,8 +103,8 @@ Board::Board(const BoardSpec& spec) : spec_(spec) {
 Board::~Board() = default;
 
 cv::Vec3d Board::corner_mm(int id) const {
-  const int across = spec_.columns - 1;
-  return {(id % across + 1) * spec_.square_mm, (id / across + 1) * spec_.square_mm, 0.0};
+  const int across = spec_.columns - 1, row = id / across, column = id % across;
+  return {(column + 1) * spec_.square_mm, (row + 1) * spec_.square_mm, 0.0};
 }
 
 Sighting Board::find(const cv::Mat& gray) const {

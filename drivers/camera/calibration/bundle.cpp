@@ -3,6 +3,7 @@
 #include <ceres/ceres.h>
 #include <ceres/rotation.h>
 
+#include <memory>
 #include <stdexcept>
 
 namespace bevel::camera {
@@ -98,14 +99,21 @@ struct Immersed : Corner {
   }
 };
 
+ceres::Problem::Options keeping_the_loss() {
+  ceres::Problem::Options options;
+  options.loss_function_ownership = ceres::DO_NOT_TAKE_OWNERSHIP;
+  return options;
+}
+
 struct Problem {
-  ceres::Problem ceres;
+  std::unique_ptr<ceres::LossFunction> huber;  // shared by all residuals; none is least squares
+  ceres::Problem ceres{keeping_the_loss()};
   int residuals = 0;
 
   Problem(const Board& board, const std::vector<Shot>& shots, const FitOptions& options, double loss_px, const Rig& rig,
           Blocks& blocks) {
-    // Shared by all residuals, and the problem's to delete once.
-    ceres::LossFunction* loss = loss_px > 0.0 ? new ceres::HuberLoss(loss_px) : nullptr;
+    if (loss_px > 0.0) huber = std::make_unique<ceres::HuberLoss>(loss_px);
+    ceres::LossFunction* const loss = huber.get();
     bool any_immersed = false;
     for (size_t s = 0; s < shots.size(); ++s)
       for (size_t c = 0; c < shots[s].seen.size(); ++c)
@@ -243,9 +251,9 @@ RigSd deviations(const Board& board, const std::vector<Shot>& shots, const FitOp
   const double scale = std::sqrt(2.0 * cost / spare);
   const auto read = [&](const double* block, int size, double* sd) {
     if (!problem.ceres.HasParameterBlock(block) || problem.ceres.IsParameterBlockConstant(block)) return;
-    std::vector<double> all(static_cast<size_t>(size) * static_cast<size_t>(size));
-    covariance.GetCovarianceBlock(block, block, all.data());
-    for (int i = 0; i < size; ++i) sd[i] = scale * std::sqrt(all[static_cast<size_t>(i * size + i)]);
+    cv::Mat_<double> all(size, size);
+    covariance.GetCovarianceBlock(block, block, all.ptr<double>());
+    for (int i = 0; i < size; ++i) sd[i] = scale * std::sqrt(all(i, i));
   };
   RigSd out;
   for (auto& camera : blocks.cameras) {
