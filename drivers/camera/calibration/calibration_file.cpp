@@ -29,7 +29,7 @@ std::string fnv1a(std::string_view text) {
 // Reads nodes by their full name, which every message gives.
 class Reader {
  public:
-  Reader(cv::FileNode node, std::string path, const std::string& file)
+  Reader(const cv::FileNode& node, std::string path, const std::string& file)
       : node_(node), path_(std::move(path)), file_(file) {}
 
   [[noreturn]] void refuse(const std::string& key, const std::string& what) const {
@@ -167,7 +167,7 @@ Calibration read_all(const cv::FileStorage& storage, const std::string& name) {
   if (kind == std::end(kFrames)) root.refuse("frame", "is '" + frame + "', allowed: none, fiducial, insertion");
   out.frame = static_cast<FrameKind>(kind - std::begin(kFrames));
   const cv::FileNode cameras = root.need("cameras");
-  if (!cameras.isSeq() || cameras.size() < 1 || cameras.size() > 16)
+  if (!cameras.isSeq() || cameras.begin() == cameras.end() || cameras.size() > 16)
     root.refuse("cameras",
                 "are " + std::to_string(cameras.isSeq() ? cameras.size() : 0) + ", allowed: a list of 1 to 16");
   std::set<int> numbers;

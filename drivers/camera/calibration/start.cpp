@@ -41,7 +41,7 @@ Lens start_lens(const Board& board, const std::vector<Shot>& shots, size_t camer
   Lens lens;
   lens.picture_px = size_px;
   lens.parameters = {K.at<double>(0, 0), K.at<double>(1, 1), K.at<double>(0, 2), K.at<double>(1, 2)};
-  for (int i = 0; i < 5; ++i) lens.parameters[static_cast<size_t>(kK1 + i)] = distortion.at<double>(i);
+  std::copy_n(distortion.ptr<double>(), 5, &lens.parameters[kK1]);
   return lens;
 }
 
