@@ -167,6 +167,23 @@ TEST_F(Tool, TheLogOfAStraightInsertionGivesTheFrame) {
   EXPECT_LT(worst_mm, 0.35);
 }
 
+// Water in the pictures, gel in the file: the walls stay where they were found.
+TEST_F(Tool, TheGelsIndexTakesTheWaters) {
+  Options o = options();
+  ASSERT_EQ(run(o, out_, err_), 0);
+  const camera::Calibration water = camera::load_calibration(path("out/cameras.yaml"));
+  o.gel_index = 1.345;
+  o.out_folder = path("gel");
+  ASSERT_EQ(run(o, out_, err_), 0);
+  const camera::Calibration gel = camera::load_calibration(path("gel/cameras.yaml"));
+  for (size_t c = 0; c < 2; ++c) {
+    const auto &before = water.cameras[c].model.wall->parameters, &after = gel.cameras[c].model.wall->parameters;
+    EXPECT_EQ(before[camera::kIndex], 1.333);
+    EXPECT_EQ(after[camera::kIndex], 1.345);
+    EXPECT_NEAR(after[camera::kDistance], before[camera::kDistance], 1e-9);
+  }
+}
+
 TEST_F(Tool, AnUnreadablePictureIsToldByTheStatus) {
   Options o = options();
   o.air = {path("air0")};
@@ -209,6 +226,9 @@ TEST_F(Tool, WhatIsWrongIsNamed) {
   o = options();
   o.board.columns = 2;
   expect_refused(o, {"columns is 2", "allowed: 4 to 60"});
+  o = options();
+  o.gel_index = 0.5;
+  expect_refused(o, {"--gel-index is 0.5", "allowed: 1 to 2.5"});
   o = options();
   o.print_board = path("board.jpg");
   expect_refused(o, {"'.jpg', allowed: .svg, .png"});

@@ -17,6 +17,8 @@ int main(int argc, char** argv) {
       .paths("--air", o.air, "folder of pictures in air, one per camera; one name is one moment")
       .paths("--immersed", o.immersed, "the same of the board in the gel or water, behind its wall")
       .option("--index", o.fit.index, "refractive index behind the wall: water 1.333, gelatin 1.335 to 1.35", 1.0, 2.5)
+      .option("--gel-index", o.gel_index, "of the gel that takes the water's place after the pictures; 0: the same", 0,
+              2.5)
       .flag("--fit-index", o.fit.fit_index, "fit the index too")
       .option("--pane-mm", o.fit.pane.thickness_mm, "thickness of the wall's pane", 0, 100)
       .option("--pane-index", o.fit.pane.index, "its index: glass 1.52, acrylic 1.49", 1.0, 2.5)

@@ -66,6 +66,8 @@ std::vector<std::string> tables_of(const camera::Calibration& calibration, const
 }
 
 int fit_pictures(const camera::Board& board, const Options& o, std::ostream& out, std::ostream& err) {
+  if (o.gel_index != 0 && !(o.gel_index >= 1))
+    throw std::invalid_argument("--gel-index is " + format_significant(o.gel_index) + ", allowed: 1 to 2.5, or 0");
   const Pictures pictures = read_pictures(board, o);
   camera::Calibrated got = camera::calibrate(board, pictures.input);
   got.calibration.made_utc = utc_now();
@@ -84,6 +86,12 @@ int fit_pictures(const camera::Board& board, const Options& o, std::ostream& out
         "Not known yet: the cameras know each other and a provisional frame (z down in the first one's picture). "
         "Record a straight "
         "insertion with it, then: bevel-calibrate --calibration cameras.yaml --insertion LOG.";
+  }
+  if (o.gel_index != 0) {
+    for (auto& c : got.calibration.cameras)
+      if (c.model.wall) c.model.wall->parameters[camera::kIndex] = o.gel_index;
+    told.frame += " Behind the walls the index is that of the gel, " + format_significant(o.gel_index, 5) +
+                  ", and not that of the pictures.";
   }
   fs::create_directories(o.out_folder);
   told.yaml_path = fs::absolute(fs::path(o.out_folder) / "cameras.yaml").lexically_normal().string();

@@ -21,6 +21,7 @@ struct Options {
   std::string fiducial_x = "+z", fiducial_y = "+y";
   std::vector<double> fiducial_origin_mm{0, 0, 0};
   camera::FitOptions fit;
+  double gel_index = 0;  // of the gel that takes the water's place after the pictures; 0: what the pictures have
 
   std::string calibration;  // a YAML to give a frame to ...
   std::string insertion;    // ... by this log

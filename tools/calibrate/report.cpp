@@ -16,7 +16,7 @@ using camera::Residual;
 using io::format_significant;
 using io::HtmlReport;
 
-constexpr int kCellsAcross = 8, kCellsDown = 6;
+constexpr int kCellsAcross = 8, kCellsDown = 6, kCells = kCellsAcross * kCellsDown;
 constexpr double kGood_px = 0.3, kFair_px = 1.0;
 constexpr double kSeenShare = 0.5;  // of the cells
 
@@ -28,12 +28,12 @@ struct Cell {
 
 std::vector<Cell> cells_of(const Calibrated& got, size_t camera) {
   const cv::Size size = got.rig.lenses[camera].picture_px;
-  std::vector<Cell> cells(static_cast<size_t>(kCellsAcross * kCellsDown));
+  std::vector<Cell> cells(kCells);
   for (const Residual& r : got.residuals) {
     if (r.camera != camera) continue;
     const int col = std::clamp(static_cast<int>(r.at_px.x * kCellsAcross / size.width), 0, kCellsAcross - 1);
     const int row = std::clamp(static_cast<int>(r.at_px.y * kCellsDown / size.height), 0, kCellsDown - 1);
-    Cell& cell = cells[static_cast<size_t>(row * kCellsAcross + col)];
+    Cell& cell = cells.at(static_cast<size_t>(row) * kCellsAcross + static_cast<size_t>(col));
     cell.sum_px += r.seen_less_fitted_px;
     cell.place_px += r.at_px;
     cell.squares_px2 += r.seen_less_fitted_px.dot(r.seen_less_fitted_px);
@@ -144,7 +144,7 @@ void tell_verdict(const Calibrated& got, HtmlReport& page) {
   double ratio = 0, seen = 1;
   for (size_t c = 0; c < got.numbers.size(); ++c) {
     ratio = std::max(ratio, systematic_ratio(got, c));
-    seen = std::min(seen, 1.0 * covered(cells_of(got, c)) / (kCellsAcross * kCellsDown));
+    seen = std::min(seen, 1.0 * covered(cells_of(got, c)) / kCells);
   }
   if (worst_px > kFair_px)
     page.callout(
@@ -209,11 +209,10 @@ void write_report(const Calibrated& got, const Told& told, const std::string& fo
       "model "
       "does not fit there. Where there are no lines nothing was seen, and the lens is a guess.");
   for (size_t c = 0; c < got.numbers.size(); ++c)
-    page.figure_svg(residual_map(got, c), "Camera " + std::to_string(got.numbers[c]) + ": corners in " +
-                                              std::to_string(covered(cells_of(got, c))) + " of " +
-                                              std::to_string(kCellsAcross * kCellsDown) + " cells; means " +
-                                              format_significant(systematic_ratio(got, c), 2) +
-                                              " times what chance leaves.");
+    page.figure_svg(residual_map(got, c),
+                    "Camera " + std::to_string(got.numbers[c]) + ": corners in " +
+                        std::to_string(covered(cells_of(got, c))) + " of " + std::to_string(kCells) + " cells; means " +
+                        format_significant(systematic_ratio(got, c), 2) + " times what chance leaves.");
   page.heading("What was fitted");
   tell_parameters(got, page);
   page.heading("What was left out");
@@ -251,7 +250,7 @@ void write_figures(const Calibrated& got, const std::string& folder) {
                        {"held_out_rms_px", fit.held_out_rms_px},
                        {"systematic_ratio", systematic_ratio(got, c)},
                        {"cells_covered", covered(cells_of(got, c))},
-                       {"cells", kCellsAcross * kCellsDown}});
+                       {"cells", kCells}});
   }
   for (const auto& t : got.triangulation)
     boards.push_back({{"immersed", t.immersed},
