@@ -1,10 +1,12 @@
 // The YAML: read back as written, by OpenCV too; what is damaged, stale or impossible is refused by name.
 #include <gtest/gtest.h>
 
+#include <cstdio>
 #include <filesystem>
 #include <fstream>
 #include <functional>
 #include <opencv2/core/persistence.hpp>
+#include <random>
 
 #include "drivers/camera/calibration/calibration_file.hpp"
 #include "tests/calibration/true_optics.hpp"
@@ -130,6 +132,32 @@ TEST(CalibrationFile, StaleForeignAndImpossibleFilesNameTheThing) {
   expect_refused(with("camera: 3", "camera: 0"), {"number 0 twice"});
   expect_refused(with("cols: 5", "cols: 4"), {"rig.yaml"});
   expect_refused(with("%YAML:1.0", "{]"), {"rig.yaml"});
+}
+
+// Whatever stands before a checksum that is right: an answer or a CalibrationError, never anything else.
+TEST(CalibrationFile, NoTextBreaksTheReader) {
+  constexpr unsigned kSeed = 2024;
+  std::mt19937 random(kSeed);
+  const auto any = [&](size_t below) { return std::uniform_int_distribution<size_t>(0, below - 1)(random); };
+  const std::string good = body_of(to_yaml(example()));
+  const std::string bytes = "{}[]:-,\"' \n\t.0e!%#&*|>~\x80\xff";
+  int refused = 0;
+  for (int i = 0; i < 3000; ++i) {
+    std::string text = good;
+    for (size_t changes = 1 + any(3); changes > 0; --changes) {
+      const size_t at = any(text.size()), how = any(3);
+      if (how == 0) text[at] = bytes[any(bytes.size())];
+      if (how == 1) text.erase(at, 1 + any(40));
+      if (how == 2) text.insert(at, 1 + any(3), bytes[any(bytes.size())]);
+    }
+    try {
+      from_yaml(with_checksum(text), "rig.yaml");
+    } catch (const CalibrationError&) {
+      ++refused;
+    }
+  }
+  std::printf("seed %u: %d of 3000 refused\n", kSeed, refused);
+  EXPECT_GT(refused, 1000);
 }
 
 TEST(CalibrationFile, NoFileAndNoCameraAreNamed) {

@@ -236,8 +236,12 @@ Calibration from_yaml(const std::string& text, const std::string& name) {
     const cv::FileStorage storage(text, cv::FileStorage::READ | cv::FileStorage::MEMORY | cv::FileStorage::FORMAT_YAML);
     if (!storage.isOpened()) throw CalibrationError(name + ": not YAML");
     return read_all(storage, name);
+  } catch (const CalibrationError&) {
+    throw;
   } catch (const cv::Exception& error) {
     throw CalibrationError(name + ": not YAML that OpenCV reads: " + error.err);
+  } catch (const std::exception& error) {  // its parser lets some of the library's own through
+    throw CalibrationError(name + ": not YAML that OpenCV reads: " + error.what());
   }
 }
 
