@@ -1,5 +1,6 @@
 #include "estimator/past.hpp"
 
+#include <Eigen/Eigenvalues>
 #include <cmath>
 
 #include "estimator/measurement_update.hpp"
@@ -14,6 +15,16 @@ constexpr double kSkew_mm_rad = 0.01;  // turns the heading by k times half of t
 bool in_proportion(double insertion_mm, double rotation_rad, const PastStep& step) {
   return insertion_mm * step.insertion_mm >= 0 && rotation_rad * step.rotation_rad >= 0 &&
          std::abs(insertion_mm * step.rotation_rad - rotation_rad * step.insertion_mm) <= kSkew_mm_rad;
+}
+
+// Inverse along the axes that are seen, zero along the others.
+Eigen::Matrix3d inverse_of_seen(const Eigen::Matrix3d& information) {
+  Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> eigen;
+  eigen.compute(information);  // a camera that turned little sees along its rays almost nothing, but that exactly
+  Eigen::Vector3d inverse = Eigen::Vector3d::Zero();
+  for (int i = 0; i < 3; ++i)
+    if (eigen.eigenvalues()[i] > kRankTolerance * eigen.eigenvalues()[2]) inverse[i] = 1 / eigen.eigenvalues()[i];
+  return eigen.eigenvectors() * inverse.asDiagonal() * eigen.eigenvectors().transpose();
 }
 
 bool diagonal(const Eigen::Matrix3d& W) { return W(0, 1) == 0 && W(0, 2) == 0 && W(1, 2) == 0; }
@@ -32,8 +43,7 @@ void Past::restart(const FilterState& start) {
 bool Past::joins(const PastStep& step) const {
   return in_proportion(open_.insertion_mm, open_.rotation_rad, step) &&
          std::abs(open_.insertion_mm + step.insertion_mm) <= kLongest_mm &&
-         std::abs(open_.rotation_rad + step.rotation_rad) <= kLongest_rad && diagonal(open_.information_per_mm2) &&
-         diagonal(step.information_per_mm2);
+         std::abs(open_.rotation_rad + step.rotation_rad) <= kLongest_rad;
 }
 
 void Past::add(const FilterState& before, const PastStep& step, const FilterState& after, const Moved& moved,
@@ -51,7 +61,17 @@ void Past::add(const FilterState& before, const PastStep& step, const FilterStat
   // From the new end to where the tip was, in {A}; then the mean with the new reading, whose tip is the end itself.
   Eigen::Vector3d offset_mm = Eigen::Vector3d::Zero();
   if (open_.measured) offset_mm = before.pose.R * open_.point_mm - moved.tip_mm;
-  if (step.measured) {
+  if (step.measured && !(diagonal(open_.information_per_mm2) && diagonal(step.information_per_mm2))) {
+    // Of cameras that look along no axis of {A}: sums of information, and the mean along the axes that either sees.
+    const Eigen::Matrix3d had = open_.information_per_mm2;
+    const Eigen::Matrix3d sum = had + step.information_per_mm2;
+    const Eigen::Matrix3d inverse = inverse_of_seen(sum);
+    open_.position_mm += inverse * (step.information_per_mm2 * (step.position_mm - open_.position_mm));
+    offset_mm = inverse * (had * offset_mm);
+    open_.information_per_mm2 = sum;
+    measured_at_ += (progress_ - measured_at_) * step.information_per_mm2.trace() / sum.trace();
+    open_.measured = true;
+  } else if (step.measured) {
     const Eigen::Vector3d had = open_.information_per_mm2.diagonal();
     const Eigen::Vector3d comes = step.information_per_mm2.diagonal();
     for (int i = 0; i < 3; ++i) {

@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <stdexcept>
 
+#include "drivers/camera/calibrated_view.hpp"
+
 namespace bevel::nodes {
 
 std::string camera_process_name(const SystemConfig& config) {
@@ -43,7 +45,12 @@ CameraNode::CameraNode(lcm::LCM& lcm, const SystemConfig& config)
   std::vector<camera::CameraSetup> setups;
   for (const CameraViewConfig& c : config.cameras) {
     if (c.headings) with_headings_.insert(c.camera);
-    setups.push_back({c.camera, std::make_shared<camera::PlanarView>(c.view), c.tracker, {}});
+    std::shared_ptr<const camera::View> view;
+    if (c.calibrated)
+      view = std::make_shared<camera::CalibratedView>(*c.calibrated);
+    else
+      view = std::make_shared<camera::PlanarView>(c.view);
+    setups.push_back({c.camera, std::move(view), c.tracker, {}});
   }
   pipeline_ = std::make_unique<camera::CameraPipeline>(camera::make_frame_source(config.source), setups);
   port_.subscribe<needle_state_t>(

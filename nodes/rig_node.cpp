@@ -4,6 +4,7 @@
 #include <cmath>
 #include <stdexcept>
 
+#include "drivers/camera/calibrated_view.hpp"
 #include "nodes/needle_pose.hpp"
 
 namespace bevel::nodes {
@@ -45,6 +46,12 @@ RigNode::RigNode(lcm::LCM& lcm, can::Bus& insertion_bus, can::Bus& rotation_bus,
     scene.noise_gray = config.rig.noise_gray;
     scene.blur_px = config.rig.blur_px;
     scene.seed = static_cast<std::uint64_t>(config.rig.seed + c.camera);
+    if (c.calibrated) {
+      auto view = std::make_shared<camera::CalibratedView>(*c.calibrated);
+      const bool nearer_x = std::abs(view->plane_normal()[0]) > std::abs(view->plane_normal()[1]);
+      eyes_.push_back({c.camera, nearer_x, rig::NeedleRenderer(scene, std::move(view))});
+      continue;
+    }
     const bool along_x = c.view.u_axis.axis != camera::WorldAxis::x && c.view.v_axis.axis != camera::WorldAxis::x;
     eyes_.push_back({c.camera, along_x, rig::NeedleRenderer(scene, camera::PlanarView(c.view))});
   }

@@ -5,6 +5,8 @@
 #include <filesystem>
 #include <utility>
 
+#include "drivers/camera/calibrated_view.hpp"
+#include "drivers/camera/calibration/calibration_file.hpp"
 #include "io/config.hpp"
 #include "io/estimator_config.hpp"
 
@@ -24,7 +26,8 @@ void read_controller(Section s, controller::ControllerConfig& c) {
   s.read("period_s", c.period_s, optional,
          in_range(0.002, 0.03).because("set-points must be renewed before the driver takes them for old"));
   s.read("law", c.law, optional,
-         io::Choices<controller::Law>{{"arcs", controller::Law::arcs}, {"flip", controller::Law::flip}, {"spin", controller::Law::spin}});
+         io::Choices<controller::Law>{
+             {"arcs", controller::Law::arcs}, {"flip", controller::Law::flip}, {"spin", controller::Law::spin}});
   Section l = s.section("limits", optional);
   l.read("insertion_rate_mm_s", c.limits.insertion_rate_mm_s, optional, in_range(0.01, 100));
   l.read("insertion_rate_min_share", c.limits.insertion_rate_min_share, optional, in_range(0.01, 1));
@@ -131,17 +134,60 @@ const io::Choices<camera::SignedAxis> kAxisChoices{
     {"+x", {camera::WorldAxis::x, 1}},  {"-x", {camera::WorldAxis::x, -1}}, {"+y", {camera::WorldAxis::y, 1}},
     {"-y", {camera::WorldAxis::y, -1}}, {"+z", {camera::WorldAxis::z, 1}},  {"-z", {camera::WorldAxis::z, -1}}};
 
-CameraViewConfig read_camera(Section s) {
+void read_planar_view(Section& s, io::Presence presence, camera::PlanarViewConfig& view) {
+  s.read("px_per_mm", view.px_per_mm, presence, in_range(0.1, 1000));
+  std::array<double, 2> origin{0, 0};
+  s.read("origin_px", origin, presence);
+  view.origin_px = {origin[0], origin[1]};
+  s.read("columns_carry", view.u_axis, presence, kAxisChoices);
+  s.read("rows_carry", view.v_axis, presence, kAxisChoices);
+}
+
+// The camera's lens, pose and wall from the file that its key `calibration` names, in place of the keys of a planar
+// view.
+void read_calibration(Section& s, const std::string& path, CameraViewConfig& c) {
+  for (const char* key : {"px_per_mm", "origin_px", "columns_carry", "rows_carry"})
+    if (s.has(key)) s.fail(key, "stands beside calibration, which says where every pixel looks; one or the other");
+  camera::PlanarViewConfig unused;
+  read_planar_view(s, optional, unused);
+  bool provisional = false;
+  s.read("provisional_frame", provisional, optional);
+  try {
+    const camera::Calibration calibration = camera::load_calibration(path);
+    c.calibrated = camera::camera_of(calibration, c.camera, path).model;
+    if (calibration.frame == camera::FrameKind::none && !provisional)
+      return s.fail("calibration",
+                    path +
+                        ": frame is none: its cameras know each other and not the needle's frame; allowed: "
+                        "fiducial, insertion (bevel-calibrate), or provisional_frame = true, to record the "
+                        "insertion that gives it, with no controller running");
+    const camera::CalibratedView check(*c.calibrated);
+  } catch (const std::exception& error) {
+    return s.fail("calibration", error.what());
+  }
+  const cv::Size size = c.calibrated->lens.picture_px;
+  const auto must_be = [&s, &path](const char* key, int given, int calibrated) {
+    if (s.has(key) && given != calibrated)
+      s.fail(key,
+             "is " + std::to_string(given) + ", allowed: " + std::to_string(calibrated) + ", of which " + path + " is");
+  };
+  must_be("width_px", c.width_px, size.width);
+  must_be("height_px", c.height_px, size.height);
+  c.width_px = size.width;
+  c.height_px = size.height;
+}
+
+CameraViewConfig read_camera(Section s, const std::filesystem::path& folder) {
   CameraViewConfig c;
   s.read("camera", c.camera, required, in_range(0, 15));
-  s.read("px_per_mm", c.view.px_per_mm, required, in_range(0.1, 1000));
-  std::array<double, 2> origin{0, 0};
-  s.read("origin_px", origin, required);
-  c.view.origin_px = {origin[0], origin[1]};
-  s.read("columns_carry", c.view.u_axis, required, kAxisChoices);
-  s.read("rows_carry", c.view.v_axis, required, kAxisChoices);
   s.read("width_px", c.width_px, optional, in_range(16, 8192));
   s.read("height_px", c.height_px, optional, in_range(16, 8192));
+  std::string calibration;
+  s.read("calibration", calibration, optional);
+  if (!calibration.empty())
+    read_calibration(s, (folder / calibration).string(), c);
+  else
+    read_planar_view(s, required, c.view);
   camera::TrackerConfig& t = c.tracker;
   s.read("entry_side", t.entry_side, optional,
          io::Choices<camera::EntrySide>{{"top", camera::EntrySide::top},
@@ -247,7 +293,16 @@ SystemConfig load_system_config(const std::string& path) {
   read_controller(file.section("controller", optional), c.controller);
   read_stepper(file.section("stepper", optional), c.stepper);
   read_source(file.section("source", optional), c.source);
-  for (const Section& s : file.sections("camera", optional)) c.cameras.push_back(read_camera(s));
+  for (const Section& s : file.sections("camera", optional)) c.cameras.push_back(read_camera(s, folder));
+  if (c.source.kind == camera::SourceKind::device)
+    for (const CameraViewConfig& camera : c.cameras)
+      if (camera.calibrated && camera.camera == c.source.camera &&
+          camera.calibrated->lens.picture_px != cv::Size(c.source.width_px, c.source.height_px))
+        file.section("source", optional)
+            .fail("width_px", "and height_px are " + std::to_string(c.source.width_px) + " x " +
+                                  std::to_string(c.source.height_px) + ", allowed: " + std::to_string(camera.width_px) +
+                                  " x " + std::to_string(camera.height_px) + ", of which the calibration of camera " +
+                                  std::to_string(camera.camera) + " is");
   // Whoever of them gives headings gives the shaft's.
   for (const CameraViewConfig& camera : c.cameras) c.estimator.shaft_cameras.push_back(camera.camera);
   c.rig.truth = c.needle;

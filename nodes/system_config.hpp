@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "controller/config.hpp"
+#include "drivers/camera/calibration/camera_model.hpp"
 #include "drivers/camera/frame_source.hpp"
 #include "drivers/camera/planar_view.hpp"
 #include "drivers/camera/tracker_config.hpp"
@@ -20,12 +21,14 @@ namespace bevel::nodes {
 struct CameraViewConfig {
   int camera = 0;
   camera::PlanarViewConfig view;
+  // In its place where the camera has a `calibration`: a file of bevel-calibrate.
+  std::optional<camera::CameraModel> calibrated;
   camera::TrackerConfig tracker;
   // Whether the tangent of the shaft's end goes out on TIP_HEADING. Off by default: beside the positions of the same
   // frames it brings the estimate next to nothing (docs/estimator.md), and to who does not know that it is the shaft's
   // it is a wrong heading, by the slip angle. On where the estimate may have to start deep in the tissue.
   bool headings = false;
-  int width_px = 640;  // of the rig's rendered picture
+  int width_px = 640;  // of the rig's rendered picture; of a calibrated camera those of its calibration
   int height_px = 480;
 };
 

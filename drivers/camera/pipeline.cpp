@@ -1,9 +1,17 @@
 #include "drivers/camera/pipeline.hpp"
 
+#include <algorithm>
 #include <cmath>
 #include <stdexcept>
 
 namespace bevel::camera {
+namespace {
+
+std::string text_of(const cv::Size& size) {
+  return std::to_string(size.width) + " x " + std::to_string(size.height) + " px";
+}
+
+}  // namespace
 
 CameraPipeline::CameraPipeline(std::unique_ptr<FrameSource> source, const std::vector<CameraSetup>& cameras,
                                Clock clock)
@@ -42,6 +50,9 @@ CameraPipeline::Result CameraPipeline::next(std::chrono::milliseconds timeout) {
     const Frame& frame = std::get<Frame>(got);
     const auto eye = eyes_.find(frame.camera);
     if (eye != eyes_.end()) {
+      if (const auto size = eye->second.view->picture_size(); size && *size != frame.gray.size())
+        return SourceFailure{"camera " + std::to_string(frame.camera) + ": a picture is " + text_of(frame.gray.size()) +
+                             ", allowed: " + text_of(*size) + ", of which its calibration is; calibrate at this size"};
       const auto begun = std::chrono::steady_clock::now();
       TipObservation seen = observe(eye->second, frame);
       seen.run_s = std::chrono::duration<double>(std::chrono::steady_clock::now() - begun).count();
@@ -55,7 +66,15 @@ TipObservation CameraPipeline::observe(Eye& eye, const Frame& frame) {
   ++counters_.frames;
   if (eye.last_seq && frame.seq > *eye.last_seq + 1) counters_.lost_frames += frame.seq - *eye.last_seq - 1;
   eye.last_seq = frame.seq;
-  const TipResult tip = eye.tracker.track(frame, clock_ ? clock_() : 0, std::exchange(eye.predicted_px, {}));
+  TipResult tip = eye.tracker.track(frame, clock_ ? clock_() : 0, std::exchange(eye.predicted_px, {}));
+  Vector3 position_mm{};
+  if (tip.status == TipStatus::ok) {
+    position_mm = eye.view->position_mm(tip.tip_px);
+    if (!std::ranges::all_of(position_mm, [](double x) { return std::isfinite(x); })) {
+      tip.status = tip.heading_status = TipStatus::lost;
+      tip.reason = "the view has no point for that pixel";
+    }
+  }
   ++counters_.by_status[static_cast<size_t>(tip.status)];
   TipObservation seen;
   seen.capture_utime = frame.capture_utime;
@@ -65,7 +84,7 @@ TipObservation CameraPipeline::observe(Eye& eye, const Frame& frame) {
   seen.heading_status = tip.heading_status;
   seen.reason = tip.reason;
   if (tip.status != TipStatus::ok) return seen;
-  seen.position_mm = eye.view->position_mm(tip.tip_px);
+  seen.position_mm = position_mm;
   seen.information_per_mm2 = eye.view->information_per_mm2(tip.tip_px, tip.covariance_px2);
   seen.tip_px = tip.tip_px;
   seen.direction_px = tip.direction_px;

@@ -1,8 +1,8 @@
 #pragma once
 // Port: what a pixel of one camera says about a point of {A} (mm; origin at the entry point, z into the tissue).
 #include <array>
-
 #include <opencv2/core.hpp>
+#include <optional>
 
 namespace bevel::camera {
 
@@ -38,6 +38,9 @@ class View {
                                   double variance_rad2) const = 0;
 
   virtual double px_per_mm() const = 0;
+
+  /// The one size of picture for which the view holds; nothing if it holds for all.
+  virtual std::optional<cv::Size> picture_size() const { return {}; }
 
  protected:
   View(const View&) = default;

@@ -39,9 +39,9 @@ void check(const SceneConfig& s) {
   require(s.gain > 0.0 && s.gain <= 100.0, "gain", s.gain, "above 0, up to 100");
 }
 
-cv::Mat paint_background(const SceneConfig& s, const camera::PlanarView& view) {
+cv::Mat paint_background(const SceneConfig& s, const camera::View& view) {
   cv::Mat light(s.size_px, CV_32F);
-  const cv::Point2d origin = view.config().origin_px;
+  const cv::Point2d origin = view.pixel({0.0, 0.0, 0.0});
   const double spacing_px = s.grid_mm * view.px_per_mm();
   const double half_diagonal_px = 0.5 * std::hypot(s.size_px.width, s.size_px.height);
   const auto line = [spacing_px](double off_px) {  // a printed line one pixel wide, 0 to 1
@@ -96,12 +96,15 @@ void add_glare(cv::Mat& light, const Spot& spot) {
 }  // namespace
 
 NeedleRenderer::NeedleRenderer(const SceneConfig& scene, const camera::PlanarView& view)
+    : NeedleRenderer(scene, std::make_shared<camera::PlanarView>(view)) {}
+
+NeedleRenderer::NeedleRenderer(const SceneConfig& scene, std::shared_ptr<const camera::View> view)
     : scene_(scene),
-      optics_(scene.lens, scene.refraction, scene.size_px, view.px_per_mm()),
-      view_(view),
+      optics_(scene.lens, scene.refraction, scene.size_px, view->px_per_mm()),
+      view_(std::move(view)),
       random_(scene.seed) {
   check(scene_);
-  background_ = optics_.seen(paint_background(scene_, view_));
+  background_ = optics_.seen(paint_background(scene_, *view_));
 }
 
 cv::Point2d NeedleRenderer::while_read_out(const cv::Point2d& p) const {
@@ -112,8 +115,8 @@ cv::Point2d NeedleRenderer::while_read_out(const cv::Point2d& p) const {
 }
 
 void NeedleRenderer::add_needle(cv::Mat& light, const std::vector<cv::Point2d>& axis_px, double roll_rad) const {
-  const double radius_px = 0.5 * scene_.needle_diameter_mm * view_.px_per_mm();
-  const double bevel_px = scene_.bevel_length_mm * view_.px_per_mm();
+  const double radius_px = 0.5 * scene_.needle_diameter_mm * view_->px_per_mm();
+  const double bevel_px = scene_.bevel_length_mm * view_->px_per_mm();
   double length_px = 0.0;
   for (size_t i = 1; i < axis_px.size(); ++i) length_px += cv::norm(axis_px[i] - axis_px[i - 1]);
   // Silhouette: at `side` (in radii) from the axis the metal ends where the bevel plane leaves the cylinder's outline.
@@ -198,10 +201,11 @@ NeedlePicture NeedleRenderer::render(const std::vector<camera::Vector3>& path_mm
   constexpr double none = std::numeric_limits<double>::quiet_NaN();
   picture.tip_px = {none, none};
   cv::Mat light = background_.clone();
-  if (path_mm.size() >= 2) {
-    std::vector<cv::Point2d> axis_px;
-    axis_px.emplace_back();
-    for (const camera::Vector3& p : path_mm) axis_px.push_back(while_read_out(optics_.seen(view_.pixel(p))));
+  std::vector<cv::Point2d> axis_px;
+  axis_px.emplace_back();
+  for (const camera::Vector3& p : path_mm) axis_px.push_back(while_read_out(optics_.seen(view_->pixel(p))));
+  const auto in_view = [](const cv::Point2d& p) { return std::isfinite(p.x) && std::isfinite(p.y); };
+  if (path_mm.size() >= 2 && std::ranges::all_of(axis_px, in_view)) {
     const cv::Point2d first = axis_px[2] - axis_px[1];
     const cv::Point2d last = axis_px.back() - axis_px[axis_px.size() - 2];
     if (cv::norm(first) <= 0.0 || cv::norm(last) <= 0.0)

@@ -4,6 +4,7 @@
 // glare, blur, gain and noise in the order in which light meets them. Lens and refraction move the background and the
 // axis's points (optics.hpp), not the needle's width. Each is off, or as small as it says, unless it is asked for.
 #include <cstdint>
+#include <memory>
 #include <opencv2/core.hpp>
 #include <vector>
 
@@ -62,10 +63,13 @@ class NeedleRenderer {
  public:
   /// Throws std::invalid_argument naming the key, the value and what is allowed.
   NeedleRenderer(const SceneConfig& scene, const camera::PlanarView& view);
+  /// Of any view, with its own lens and wall: the axis lies where it is seen, the width is that at the picture's
+  /// middle.
+  NeedleRenderer(const SceneConfig& scene, std::shared_ptr<const camera::View> view);
 
   /// `path_mm`: axis of the shaft in {A} from the entry point to the tip, at least two points; the shaft outside
   /// continues straight backward from the first segment. `roll_rad`: 0 the bevel faces the camera, pi/2 it is seen from
-  /// the side. Fewer than two points: a picture without a needle (tip_px is then NaN).
+  /// the side. Fewer than two points, or one that the view cannot see: a picture without a needle (tip_px is then NaN).
   NeedlePicture render(const std::vector<camera::Vector3>& path_mm, double roll_rad);
 
   void set_gain(double gain) { scene_.gain = gain; }
@@ -78,7 +82,7 @@ class NeedleRenderer {
 
   SceneConfig scene_;
   Optics optics_;
-  camera::PlanarView view_;
+  std::shared_ptr<const camera::View> view_;
   cv::Mat background_;  // CV_32F
   cv::Mat noise_;
   cv::RNG random_;

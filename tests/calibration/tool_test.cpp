@@ -1,0 +1,252 @@
+// bevel-calibrate from picture files on: what it writes is what finds a tip in the gel, and what it refuses it names.
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <cstdio>
+#include <filesystem>
+#include <fstream>
+#include <nlohmann/json.hpp>
+#include <opencv2/imgcodecs.hpp>
+#include <sstream>
+
+#include "drivers/camera/calibrated_view.hpp"
+#include "io/log_writer.hpp"
+#include "io/messages.hpp"
+#include "tests/calibration/true_optics.hpp"
+#include "tests/support/temporary_folder.hpp"
+#include "tools/calibrate/calibrate_tool.hpp"
+
+namespace bevel::calibrate {
+namespace {
+
+namespace fs = std::filesystem;
+using camera::BoardKind;
+using camera::CalibratedView;
+using ::testing::HasSubstr;
+
+constexpr std::uint64_t kSeed = 31;
+const camera::BoardSpec kBoard{BoardKind::charuco, 8, 6, 9.0, 6.75};
+const cv::Vec3d kEntry_W = test::kBox_mm + cv::Vec3d(0, -30, 0);
+const cv::Matx33d kR_WA = test::turned(0.03, -0.02, 0.02) * cv::Matx33d(0, 1, 0, 0, 0, 1, 1, 0, 0);  // x ahead, z down
+
+// Pictures of two cameras: 10 places in air, 8 immersed, a fiducial in the needle's plane; made once, they take
+// seconds.
+class Tool : public testing::Test {
+ protected:
+  static void SetUpTestSuite() {
+    folder_ = new test::TemporaryFolder();
+    cameras_ = new std::vector<test::TrueCamera>(test::two_cameras());
+    const camera::Board board(kBoard);
+    std::vector<test::BoardPlace> places;
+    const auto shots = test::shots_of(*cameras_, board, 10, 8, 0, kSeed, &places);
+    const cv::Matx33d R_AB = camera::rotation_of_axes("+z", "-y");
+    const test::BoardPlace fiducial{kR_WA * R_AB, kR_WA * cv::Vec3d(0, 25, 2) + kEntry_W};
+    for (size_t c = 0; c < 2; ++c) {
+      const fs::path air = path("air" + std::to_string(c)), wet = path("wet" + std::to_string(c));
+      fs::create_directories(air), fs::create_directories(wet);
+      for (size_t s = 0; s < shots.size(); ++s)
+        cv::imwrite((shots[s].immersed ? wet : air) / shots[s].name,
+                    test::photograph((*cameras_)[c], board, places[s], shots[s].immersed, kSeed + 100 * c + s));
+      cv::imwrite(path("fiducial" + std::to_string(c) + ".png"),
+                  test::photograph((*cameras_)[c], board, fiducial, true, kSeed + 900 + c));
+    }
+    cv::imwrite(fs::path(path("air0")) / "empty.png", cv::Mat(480, 640, CV_8UC1, cv::Scalar(130)));
+  }
+  static void TearDownTestSuite() {
+    delete folder_;
+    delete cameras_;
+  }
+  static std::string path(const std::string& name) { return (fs::path(folder_->path()) / name).string(); }
+  static Options options() {
+    Options o;
+    o.board = kBoard;
+    o.air = {path("air0"), path("air1")};
+    o.immersed = {path("wet0"), path("wet1")};
+    o.out_folder = path("out");
+    return o;
+  }
+  static cv::Point2d pixel(size_t c, const cv::Vec3d& p_A) {
+    return (*cameras_)[c].pixel(kR_WA * p_A + kEntry_W, true);
+  }
+  // Largest distance of triangulated tips from the truth, cameras as the file has them.
+  static double worst_tip_mm(const std::string& yaml) {
+    const camera::Calibration calibration = camera::load_calibration(yaml);
+    const CalibratedView views[2] = {CalibratedView(calibration.cameras[0].model),
+                                     CalibratedView(calibration.cameras[1].model)};
+    double worst = 0;
+    for (const double x : {-8.0, 0.0, 8.0})
+      for (const double y : {-8.0, 0.0, 8.0})
+        for (const double z : {5.0, 30.0, 55.0}) {
+          cv::Matx33d sum = cv::Matx33d::zeros();
+          cv::Vec3d right;
+          for (size_t c = 0; c < 2; ++c) {
+            const cv::Matx33d W(views[c].information_per_mm2(pixel(c, {x, y, z}), cv::Matx22d::eye()).data());
+            sum += W;
+            right += W * cv::Vec3d(views[c].position_mm(pixel(c, {x, y, z})).data());
+          }
+          worst = std::max(worst, cv::norm(sum.inv() * right - cv::Vec3d(x, y, z)));
+        }
+    return worst;
+  }
+  static test::TemporaryFolder* folder_;
+  static std::vector<test::TrueCamera>* cameras_;
+  std::ostringstream out_, err_;
+};
+test::TemporaryFolder* Tool::folder_ = nullptr;
+std::vector<test::TrueCamera>* Tool::cameras_ = nullptr;
+
+TEST_F(Tool, PicturesAndAFiducialGiveCamerasThatFindTheTip) {
+  Options o = options();
+  o.fiducial = {path("fiducial0.png"), path("fiducial1.png")};
+  o.fiducial_immersed = true;
+  o.fiducial_y = "-y";
+  o.fiducial_origin_mm = {0, 25, 2};
+  EXPECT_EQ(run(o, out_, err_), 0);
+  std::printf("seed %llu\n%s%s", static_cast<unsigned long long>(kSeed), out_.str().c_str(), err_.str().c_str());
+  EXPECT_THAT(err_.str(), HasSubstr("empty.png: no board found"));
+  const double worst_mm = worst_tip_mm(path("out/cameras.yaml"));
+  std::printf("largest error of a tip in the gel: %.3f mm\n", worst_mm);
+  EXPECT_LT(worst_mm, 0.35);
+  const auto figures = nlohmann::json::parse(std::ifstream(path("out/figures.json")));
+  for (const auto& camera : figures["cameras"]) {
+    EXPECT_LT(camera["held_out_rms_px"].get<double>(), 0.15);
+    EXPECT_GT(camera["held_out_rms_px"].get<double>(), 0.01);
+  }
+  std::stringstream page;
+  page << std::ifstream(path("out/report.html")).rdbuf();
+  for (const char* words : {"empty.png", "no board found", "held out", "if refraction were ignored",
+                            "calibration = ", "<svg", "wall: distance"})
+    EXPECT_THAT(page.str(), HasSubstr(words));
+}
+
+TEST_F(Tool, TheLogOfAStraightInsertionGivesTheFrame) {
+  ASSERT_EQ(run(options(), out_, err_), 0);
+  const camera::Calibration provisional = camera::load_calibration(path("out/cameras.yaml"));
+  EXPECT_EQ(provisional.frame, camera::FrameKind::none);
+  // What bevel-camera would publish while the needle goes in at 2 mm/s, 20 Hz; noise of 0.1 px.
+  std::mt19937_64 random(kSeed);
+  std::normal_distribution<double> noise(0, 0.1);
+  {
+    io::LogWriter log(path("insertion.lcm"));
+    std::int64_t seq = 0;
+    for (std::int64_t i = 0; i <= 600; ++i) {
+      const std::int64_t utime = 1'700'000'000'000'000 + i * 50'000;
+      model::ActuatorState axes;
+      axes.utime = utime;
+      axes.seq = i;
+      axes.axis_status = {2, 2};
+      axes.insertion_mm = 0.1 * static_cast<double>(i);
+      axes.insertion_rate_mm_s = 2;
+      log.write_message(utime, io::channel::kActuatorState, io::to_message(axes));
+      for (size_t c = 0; c < 2; ++c) {
+        const CalibratedView view(provisional.cameras[c].model);
+        const cv::Point2d px = pixel(c, {0, 0, axes.insertion_mm}) + cv::Point2d(noise(random), noise(random));
+        model::TipMeasurement m;
+        m.utime = utime;
+        m.seq = seq++ / 2;
+        m.camera = static_cast<std::int32_t>(c);
+        const auto p = view.position_mm(px);
+        const auto W = view.information_per_mm2(px, cv::Matx22d(0.01, 0, 0, 0.01));
+        m.position_mm = Eigen::Map<const Eigen::Vector3d>(p.data());
+        m.information_per_mm2 = Eigen::Map<const Eigen::Matrix3d>(W.data());
+        log.write_message(utime, io::channel::kTipMeasurement, io::to_message(m));
+      }
+    }
+    log.close();
+  }
+  Options o;
+  o.calibration = path("out/cameras.yaml");
+  o.insertion = path("insertion.lcm");
+  o.out_folder = path("framed");
+  const cv::Vec3d looks = kR_WA.t() * cv::Vec3d(0, 0, 1);
+  o.roll_deg = -std::atan2(looks[1], looks[0]) * 180 / CV_PI;
+  std::ostringstream out;
+  EXPECT_EQ(run(o, out, err_), 0) << err_.str();
+  const double worst_mm = worst_tip_mm(path("framed/cameras.yaml"));
+  std::printf("%slargest error of a tip in the gel: %.3f mm\n", out.str().c_str(), worst_mm);
+  EXPECT_LT(worst_mm, 0.35);
+}
+
+// Water in the pictures, gel in the file: the walls stay where they were found.
+TEST_F(Tool, TheGelsIndexTakesTheWaters) {
+  Options o = options();
+  ASSERT_EQ(run(o, out_, err_), 0);
+  const camera::Calibration water = camera::load_calibration(path("out/cameras.yaml"));
+  o.gel_index = 1.345;
+  o.out_folder = path("gel");
+  ASSERT_EQ(run(o, out_, err_), 0);
+  const camera::Calibration gel = camera::load_calibration(path("gel/cameras.yaml"));
+  for (size_t c = 0; c < 2; ++c) {
+    const auto &before = water.cameras[c].model.wall->parameters, &after = gel.cameras[c].model.wall->parameters;
+    EXPECT_EQ(before[camera::kIndex], 1.333);
+    EXPECT_EQ(after[camera::kIndex], 1.345);
+    EXPECT_NEAR(after[camera::kDistance], before[camera::kDistance], 1e-9);
+  }
+}
+
+TEST_F(Tool, AnUnreadablePictureIsToldByTheStatus) {
+  Options o = options();
+  o.air = {path("air0")};
+  o.immersed.clear();
+  std::ofstream(fs::path(path("air0")) / "broken.png") << "no picture";
+  EXPECT_EQ(run(o, out_, err_), 3);
+  EXPECT_THAT(err_.str(), HasSubstr("broken.png: not a readable picture"));
+  fs::remove(fs::path(path("air0")) / "broken.png");
+}
+
+void expect_refused(const Options& o, const std::vector<std::string>& words) {
+  std::ostringstream out, err;
+  try {
+    run(o, out, err);
+    ADD_FAILURE() << words.front() << ": was accepted";
+  } catch (const std::exception& error) {
+    for (const std::string& word : words) EXPECT_THAT(error.what(), HasSubstr(word));
+  }
+}
+
+TEST_F(Tool, WhatIsWrongIsNamed) {
+  const std::string mixed = path("mixed"), none = path("none"), few = path("few");
+  for (const std::string& folder : {mixed, none, few}) fs::create_directories(folder);
+  cv::imwrite(mixed + "/a.png", cv::Mat(480, 640, CV_8UC1, cv::Scalar(1)));
+  cv::imwrite(mixed + "/b.png", cv::Mat(240, 320, CV_8UC1, cv::Scalar(1)));
+  cv::imwrite(few + "/a.png", cv::Mat(480, 640, CV_8UC1, cv::Scalar(1)));
+  Options o = options();
+  o.immersed.clear();
+  o.air = {mixed};
+  expect_refused(o, {"b.png' is 320 x 240 px, allowed: 640 x 480 px"});
+  o.air = {none};
+  expect_refused(o, {"none' has no picture", "allowed"});
+  o.air = {path("nowhere")};
+  expect_refused(o, {"nowhere' is not a folder", "allowed"});
+  o.air = {few};
+  expect_refused(o, {"camera 0: pictures in air with a board are 0, allowed: 6 or more"});
+  o = options();
+  o.immersed = {path("wet0")};
+  expect_refused(o, {"--immersed has 1 values, allowed: 2"});
+  o = options();
+  o.board.columns = 2;
+  expect_refused(o, {"columns is 2", "allowed: 4 to 60"});
+  o = options();
+  o.gel_index = 0.5;
+  expect_refused(o, {"--gel-index is 0.5", "allowed: 1 to 2.5"});
+  o = options();
+  o.print_board = path("board.jpg");
+  expect_refused(o, {"'.jpg', allowed: .svg, .png"});
+  o = Options{};
+  o.calibration = path("nowhere.yaml");
+  o.insertion = path("insertion.lcm");
+  expect_refused(o, {"nowhere.yaml: not a file"});
+}
+
+TEST_F(Tool, ABoardToPrintIsFoundInItsOwnPicture) {
+  Options o = options();
+  o.print_board = path("board.png");
+  EXPECT_EQ(run(o, out_, err_), 0);
+  EXPECT_EQ(camera::Board(kBoard).find(cv::imread(o.print_board, cv::IMREAD_GRAYSCALE)).ids.size(), 35U);
+  o.print_board = path("board.svg");
+  EXPECT_EQ(run(o, out_, err_), 0);
+  EXPECT_GT(fs::file_size(o.print_board), 5000U);
+}
+
+}  // namespace
+}  // namespace bevel::calibrate

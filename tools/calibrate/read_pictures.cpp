@@ -1,0 +1,115 @@
+#include <algorithm>
+#include <cctype>
+#include <filesystem>
+#include <map>
+#include <opencv2/imgcodecs.hpp>
+#include <stdexcept>
+
+#include "drivers/camera/frame_source.hpp"
+#include "tools/calibrate/calibrate_tool.hpp"
+
+namespace bevel::calibrate {
+namespace {
+
+namespace fs = std::filesystem;
+
+std::string text_of(const cv::Size& size) {
+  return std::to_string(size.width) + " x " + std::to_string(size.height) + " px";
+}
+
+bool is_picture(const fs::path& file) {
+  std::string extension = file.extension().string();
+  std::ranges::transform(extension, extension.begin(),
+                         [](unsigned char c) { return static_cast<char>(std::tolower(c)); });
+  static constexpr std::array known = {".jpg", ".jpeg", ".png", ".bmp", ".pgm", ".ppm", ".tif", ".tiff"};
+  return std::ranges::find(known, extension) != known.end();
+}
+
+std::vector<fs::path> pictures_in(const std::string& folder) {
+  std::error_code error;
+  if (!fs::is_directory(folder, error))
+    throw std::invalid_argument("'" + folder + "' is not a folder; allowed: a folder of pictures");
+  std::vector<fs::path> files;
+  for (const auto& entry : fs::directory_iterator(folder))
+    if (entry.is_regular_file() && is_picture(entry.path())) files.push_back(entry.path());
+  if (files.empty())
+    throw std::invalid_argument("'" + folder + "' has no picture; allowed: jpg, png, bmp, pgm, ppm, tif");
+  std::ranges::sort(files, [](const fs::path& a, const fs::path& b) {
+    return camera::natural_less(a.filename().string(), b.filename().string());
+  });
+  return files;
+}
+
+class Reader {
+ public:
+  Reader(const camera::Board& board, size_t cameras, Pictures& out) : board_(board), first_(cameras), out_(out) {
+    out.input.sizes_px.resize(cameras);
+  }
+
+  // Corners in one picture; none, with the reason noted, where there is no board.
+  camera::Sighting read(const fs::path& file, size_t camera) {
+    cv::Mat gray;
+    try {
+      gray = cv::imread(file.string(), cv::IMREAD_GRAYSCALE);
+    } catch (const cv::Exception&) {
+      gray.release();
+    }
+    if (gray.empty()) {
+      ++out_.unreadable;
+      out_.left_out.push_back({file.string(), "not a readable picture"});
+      return {};
+    }
+    cv::Size& size = out_.input.sizes_px[camera];
+    if (first_[camera].empty()) first_[camera] = file.string(), size = gray.size();
+    if (gray.size() != size)
+      throw std::invalid_argument("'" + file.string() + "' is " + text_of(gray.size()) + ", allowed: " + text_of(size) +
+                                  " as '" + first_[camera] +
+                                  "', the first of this camera; a calibration holds for one size");
+    camera::Sighting seen = board_.find(gray);
+    if (seen.ids.empty()) out_.left_out.push_back({file.string(), "no board found in it"});
+    return seen;
+  }
+
+ private:
+  const camera::Board& board_;
+  std::vector<std::string> first_;
+  Pictures& out_;
+};
+
+}  // namespace
+
+Pictures read_pictures(const camera::Board& board, const Options& options) {
+  const size_t cameras = options.air.size();
+  for (const auto& [what, given] :
+       {std::pair("--immersed", options.immersed.size()), {"--fiducial", options.fiducial.size()}})
+    if (given != 0 && given != cameras)
+      throw std::invalid_argument(std::string(what) + " has " + std::to_string(given) + " values, allowed: " +
+                                  std::to_string(cameras) + ", one per folder of --air, or none");
+  if (options.numbers.size() < cameras)
+    throw std::invalid_argument("--numbers has " + std::to_string(options.numbers.size()) +
+                                " values, allowed: " + std::to_string(cameras) + " or more");
+  Pictures out;
+  out.input.options = options.fit;
+  for (size_t c = 0; c < cameras; ++c) out.input.numbers.push_back(static_cast<int>(options.numbers[c]));
+  Reader reader(board, cameras, out);
+  for (const bool immersed : {false, true}) {
+    const std::vector<std::string>& folders = immersed ? options.immersed : options.air;
+    std::map<std::string, size_t> by_name;
+    for (size_t c = 0; c < folders.size(); ++c)
+      for (const fs::path& file : pictures_in(folders[c])) {
+        const std::string name = (immersed ? "immersed " : "air ") + file.filename().string();
+        const auto [at, is_new] = by_name.emplace(name, out.input.shots.size());
+        if (is_new) out.input.shots.push_back({name, immersed, std::vector<camera::Sighting>(cameras)});
+        out.input.shots[at->second].seen[c] = reader.read(file, c);
+      }
+  }
+  out.fiducial = {"fiducial", options.fiducial_immersed, {}};
+  for (size_t c = 0; c < options.fiducial.size(); ++c) {
+    if (!fs::is_regular_file(options.fiducial[c]))
+      throw std::invalid_argument("--fiducial '" + options.fiducial[c] + "' is not a file; allowed: a picture");
+    out.fiducial.seen.push_back(reader.read(options.fiducial[c], c));
+  }
+  return out;
+}
+
+}  // namespace bevel::calibrate
