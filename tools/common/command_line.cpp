@@ -106,7 +106,11 @@ CommandLine& CommandLine::flag(const std::string& names, bool& value, const std:
 }
 
 CommandLine& CommandLine::reads_recordings() {
-  impl_->statuses += ", 3 done, but the input was damaged (said on stderr)";
+  return exit_status("3 done, but the input was damaged (said on stderr)");
+}
+
+CommandLine& CommandLine::exit_status(const std::string& status) {
+  impl_->statuses += ", " + status;
   return *this;
 }
 
@@ -122,7 +126,7 @@ CommandLine& CommandLine::arguments(const std::string& name, std::vector<std::st
 }
 
 int CommandLine::run(int argc, char** argv, const std::function<int()>& body) {
-  impl_->app.footer(impl_->example + impl_->statuses + ".");
+  impl_->app.footer(impl_->example + impl_->statuses + ".\n");
   if (const std::string unknown = unknown_option(impl_->app, argc, argv); !unknown.empty()) {
     std::fprintf(stderr, "%s\nRun with --help for more information.\n", unknown.c_str());
     return kUsage;

@@ -37,6 +37,8 @@ class CommandLine {
   CommandLine& reads_recordings();
   // A whole command, for --help.
   CommandLine& example(const std::string& command);
+  // A further one for --help: "130 interrupted".
+  CommandLine& exit_status(const std::string& status);
 
   // For what one option alone cannot say: `problem` is asked after parsing; text it returns is a usage error.
   CommandLine& check(std::function<std::string()> problem);
