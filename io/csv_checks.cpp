@@ -93,14 +93,14 @@ std::string far_tips(const PlacedReadings& readings, const std::vector<Base>& ba
     if (moved_mm <= allowed_mm || far++ > 0) continue;
     where = path + ":" + std::to_string(readings.tips[i].line) + ": the tip is " + figure(moved_mm) +
             " mm from where it was first (line " + std::to_string(readings.tips.front().line) +
-            "), and the base had moved by " + figure(base[i].range_mm) + " mm; allowed " +
-            figure(allowed_mm) + " mm";
+            "), and the base had moved by " + figure(base[i].range_mm) + " mm; allowed " + figure(allowed_mm) + " mm";
   }
   if (far == 0) return "";
   const std::string share = std::to_string(far) + " of " + std::to_string(readings.tips.size()) + " tips";
   if (static_cast<double>(far) > kMostLeftOut * static_cast<double>(readings.tips.size()))
-    throw std::runtime_error(where + "; so are " + share + ". Are tip.unit, insertion.unit and the columns right?");
-  return where + "; so are " + share + ", which stay in the log";
+    throw std::runtime_error(where + "; in all " + share +
+                             " are too far. Are tip.unit, insertion.unit and the columns right?");
+  return where + "; in all " + share + " are too far, and stay in the log";
 }
 
 void require_inward(const PlacedReadings& readings, const std::vector<Base>& base, const std::string& path) {
@@ -118,9 +118,9 @@ void require_inward(const PlacedReadings& readings, const std::vector<Base>& bas
   if (share >= kFollowShare) return;
   const double in_mm = base[i].at_mm - base.front().at_mm;
   throw std::runtime_error(path + ":" + std::to_string(readings.tips[i].line) + ": the tip's z changed by " +
-                           figure(share * in_mm) + " mm from line " +
-                           std::to_string(readings.tips.front().line) + " on, while the insertion changed by " +
-                           figure(in_mm) + " mm; allowed: " + figure(kFollowShare * in_mm) +
+                           figure(share * in_mm) + " mm from line " + std::to_string(readings.tips.front().line) +
+                           " on, while the insertion changed by " + figure(in_mm) +
+                           " mm; allowed: " + figure(kFollowShare * in_mm) +
                            " mm or more in that direction, since z of {A} leads into the tissue. Are the units, the "
                            "signs and the order of " +
                            "tip.axes right?");

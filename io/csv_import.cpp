@@ -158,7 +158,7 @@ std::string ImportedRecording::remarks(const std::string& name) const {
   if (!far_tips.empty()) text += far_tips + "\n";
   if (rows_without_base > 0)
     text += name + ": " + std::to_string(rows_without_base) +
-            " readings of the tip are from before the base's first or after its last; left out\n";
+            " of the tip's readings are from before the base's first or after its last; left out\n";
   if (time_shift_s != 0)
     text += name + ": time starts at " + format_number(1e-6 * static_cast<double>(kOwnEpoch_us) - time_shift_s) +
             " s, and messages need a time after 0; shifted by " + format_number(time_shift_s) + " s\n";

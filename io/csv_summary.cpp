@@ -37,7 +37,7 @@ std::string rate(const std::vector<Sample>& samples, bool has_clock) {
 
 std::string base_lines(const ImportedRecording& r) {
   Extent depth_mm, angle_rad;
-  double fastest_mm_s = 0, fastest_rad_s = 0, turned_rad = 0, gap_s = 0, moved_in_gap_mm = 0;
+  double fastest_mm_s = 0, fastest_rad_s = 0, turned_rad = 0, gap_s = 0, step_mm = 0;
   for (std::size_t i = 0; i < r.actuators.size(); ++i) {
     const model::ActuatorState& a = r.actuators[i];
     depth_mm.add(a.insertion_mm);
@@ -47,11 +47,11 @@ std::string base_lines(const ImportedRecording& r) {
     if (i == 0) continue;
     const model::ActuatorState& before = r.actuators[i - 1];
     turned_rad += std::abs(a.rotation_rad - before.rotation_rad);
-    const double dt_s = static_cast<double>(a.utime - before.utime) * 1e-6;
-    if (dt_s > gap_s) gap_s = dt_s, moved_in_gap_mm = std::abs(a.insertion_mm - before.insertion_mm);
+    gap_s = std::max(gap_s, static_cast<double>(a.utime - before.utime) * 1e-6);
+    step_mm = std::max(step_mm, std::abs(a.insertion_mm - before.insertion_mm));
   }
   std::string out = "  base     " + rate(r.actuators, r.has_clock);
-  if (r.has_clock) out += text("; longest gap %.4g s, in which it moved %.4g mm", gap_s, moved_in_gap_mm);
+  if (r.has_clock) out += text("; longest gap %.4g s, longest step %.4g mm", gap_s, step_mm);
   out += text("\n  depth    %.4g to %.4g mm", depth_mm.lowest, depth_mm.highest);
   if (r.has_clock) out += text(", fastest %.4g mm/s", fastest_mm_s);
   if (std::abs(r.actuators.front().insertion_mm) > 1) out += "; does not begin at 0, which is the entry point";

@@ -169,7 +169,7 @@ TEST_F(OwnCsv, TheSummaryLetsOneSeeTheMotion) {
   EXPECT_EQ(summary(r),
             "  rows     50, 0 without data, 0 between steps, 0 left out; ',' between cells\n"
             "  time     4.9 s\n"
-            "  base     50 readings, 10 a second; longest gap 0.1 s, in which it moved 1 mm\n"
+            "  base     50 readings, 10 a second; longest gap 0.1 s, longest step 1 mm\n"
             "  depth    0 to 49 mm, fastest 10 mm/s\n"
             "  turning  2.45 rad in all (0.3899 turns), from 0 to 2.45 rad, fastest 0.5 rad/s\n"
             "  tip      50 readings, 10 a second; x 0 to 0.49 mm; y -4.802 to 0 mm; z 0 to 49 mm\n");
@@ -187,7 +187,8 @@ TEST_F(OwnCsv, WhatCannotBeOfANeedleIsRefusedWithFiguresAndLine) {
                     HasSubstr("tip.axes")));
   const auto base_in_m = [](int, std::vector<std::string>& cells) { cells[1] = number(std::stod(cells[1]) / 1000); };
   EXPECT_THAT(refusal(csv({}, ",", base_in_m), in_mm),
-              AllOf(HasSubstr("own.csv:9: the tip is 7.001 mm from where it was first (line 2), and the base had moved by 0.007 mm; allowed 6.007 mm; so are 43 of 50 tips"),
+              AllOf(HasSubstr("own.csv:9: the tip is 7.001 mm from where it was first (line 2), and the base had moved "
+                              "by 0.007 mm; allowed 6.007 mm; in all 43 of 50 tips are too far"),
                     HasSubstr("tip.unit")));
   const auto outward = [](int, std::vector<std::string>& cells) { cells[5] = "-" + cells[5]; };
   EXPECT_THAT(refusal(csv({}, ",", outward), in_mm), HasSubstr("own.csv:37: the tip's z changed by -35 mm"));
@@ -208,7 +209,8 @@ TEST_F(OwnCsv, ACameraThatTookSomethingElseForTheTipForAWhileIsSaidAndStays) {
   });
   const ImportedRecording r = import_csv(path, load_column_map(map({})));
   EXPECT_EQ(r.tips.size(), 50U);
-  EXPECT_THAT(r.remarks("own.csv"), AllOf(HasSubstr("own.csv:22: the tip is 63"), HasSubstr("so are 5 of 50 tips")));
+  EXPECT_THAT(r.remarks("own.csv"),
+              AllOf(HasSubstr("own.csv:22: the tip is 63"), HasSubstr("in all 5 of 50 tips are too far, and stay")));
 }
 
 // Base and tip in files of their own, at rates of their own, by clocks that are 2 s apart.
@@ -228,7 +230,7 @@ TEST_F(OwnCsv, SeparateFilesKeepTheirInstantsAndTheBaseIsReadOffInBetween) {
       test::run_program(folder, "bevel-import",
                         "-c " + both + " -o " + (folder / "logs").string() + " " + tip_path + " --base " + base_path);
   EXPECT_EQ(said.status, 0) << said.err;
-  EXPECT_THAT(said.err, HasSubstr("5 readings of the tip are from before the base's first or after its last"));
+  EXPECT_THAT(said.err, HasSubstr("5 of the tip's readings are from before the base's first or after its last"));
   const Recording back = read_recording((folder / "logs/tip.lcm").string());
   EXPECT_TRUE(back.intact()) << back.describe_faults();
   ASSERT_EQ(back.actuators.size(), 11U);
