@@ -117,6 +117,23 @@ TEST_F(Help, AnUnknownOptionIsNamedWithTheNearestBeforeWhatIsMissing) {
   EXPECT_THAT(run(diagnose, "-o v a.lcm").err, HasSubstr("--model is required"));
 }
 
+TEST_F(Help, ConfigurationThatComesWithTheProgramsIsFoundFromAnyFolder) {
+  const fs::path build(BEVEL_BINARY_DIR);
+  if (!build.string().starts_with(BEVEL_SOURCE_DIR)) GTEST_SKIP() << "the build is outside the sources";
+  // Each gets past its configuration, and stops at the next thing that is wrong.
+  const Said demo = run((build / "bin/bevel-demo").string(), "--fault camera:nonsense");
+  EXPECT_EQ(demo.status, 1);
+  EXPECT_THAT(demo.err, AllOf(HasSubstr("camera:off@5s"), Not(HasSubstr(".toml"))));
+  fs::create_directories(folder / "case");
+  folder.write("case/model.toml",
+               "[needle]\ncurvature_per_mm = 0.0047\nwheelbase_mm = 20.0\nlambda1_per_rad = 0.49\nlambda2 = 0.22\n");
+  folder.write("case/rec01.lcm", "");
+  const Said loop = run((build / "bin/bevel-close-the-loop").string(), "-q " + at("case") + " --out " + at("results"));
+  EXPECT_EQ(loop.status, 1);
+  EXPECT_THAT(loop.err, AllOf(HasSubstr("rec01.lcm"), Not(HasSubstr("strict.toml"))));
+  EXPECT_TRUE(fs::is_empty(folder / "here"));
+}
+
 TEST(CommandLine, ValuesThatBeginWithADashAreValues) {
   std::vector<double> target{0, 0, 0};
   std::vector<std::string> rest;

@@ -147,6 +147,10 @@ TEST_F(RoundTrip, ThePrograms) {
   run("bevel-import", "-o " + path("logs") + " " + path("csv/rec") + "/");
   run("bevel-export", "-o " + path("csv2") + " " + path("logs"));
   EXPECT_EQ(files_in(path("csv/rec")), files_in(path("csv2/rec")));
+  const test::Said over =
+      test::run_program(folder, "bevel-import", "-o " + folder.path().string() + " " + path("csv/rec"));
+  EXPECT_EQ(over.status, 1) << "it would have replaced the log itself";
+  EXPECT_THAT(over.err, HasSubstr("rec.lcm: is there already"));
 }
 
 TEST_F(RoundTrip, AnExportThatReplacesOneLeavesNothingOfIt) {

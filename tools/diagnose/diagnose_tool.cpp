@@ -45,8 +45,7 @@ std::string usage_fault(const Options& options) {
 Found find(const Options& options, std::ostream& err) {
   Progress progress(options.quiet ? nullptr : stderr);
   io::ModelFile model = io::load_model_file(options.model_path);
-  progress.say(options.changed.empty() ? std::string("reading the logs")
-                                       : "reading two groups of logs");
+  progress.say(options.changed.empty() ? "reading the logs" : "reading two groups of logs");
   ReadCase input = options.changed.empty() ? read_case(options.logs) : read_groups(options.baseline, options.changed);
   for (const auto& remark : input.remarks) err << remark << std::endl;  // before the minutes of work
   const double reading_s = progress.seconds();

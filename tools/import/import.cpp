@@ -53,6 +53,9 @@ std::vector<std::string> log_paths(const std::vector<std::string>& recordings, c
 int import_exports(const Options& o) {
   const auto logs = log_paths(o.inputs, o.out_folder);
   for (std::size_t i = 0; i < logs.size(); ++i) {
+    if (fs::exists(logs[i]))
+      throw std::runtime_error(logs[i] + ": is there already, and may be the log that was exported, which holds more " +
+                               "than the export; give another folder with --out");
     const io::Recording recording = io::import_exported(o.inputs[i]);
     io::write_log(recording, logs[i]);
     std::printf("%s: %zu TIP_MEASUREMENT, %zu TIP_HEADING, %zu ACTUATOR_STATE, %zu MOTION_COMMAND, %zu NEEDLE_STATE\n",
