@@ -64,12 +64,15 @@ function(bevel_library name)
   endif()
 endfunction()
 
-# bevel_program(NAME SOURCES... [LINK libs...]): an executable in build/bin.
+# bevel_program(NAME SOURCES... [LINK libs...]): an executable in build/bin. Those that users call are named bevel-*.
 function(bevel_program name)
   cmake_parse_arguments(arg "" "" "LINK" ${ARGN})
   add_executable(${name} ${arg_UNPARSED_ARGUMENTS})
   target_link_libraries(${name} PRIVATE bevel_options ${arg_LINK})
   target_compile_definitions(${name} PRIVATE BEVEL_VERSION="${PROJECT_VERSION}")
+  if(name MATCHES "^bevel-")
+    set_property(GLOBAL APPEND PROPERTY BEVEL_PROGRAMS ${name})
+  endif()
   if(name MATCHES "^(bench|study)_" AND BEVEL_SANITIZE)
     set_target_properties(${name} PROPERTIES EXCLUDE_FROM_ALL ON)  # nothing runs them there
   endif()

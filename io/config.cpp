@@ -255,8 +255,12 @@ void Section::read(std::string_view key, std::vector<std::string>& values, Prese
 }
 
 int Section::read_choice(std::string_view key, Presence presence, const std::vector<std::string>& names) {
-  const void* node = find(key, presence);
-  if (node == nullptr) return -1;
+  const void* node = find(key, optional);
+  if (node == nullptr) {
+    if (table_ != nullptr && presence == required)
+      file_->add_fault(line(), dotted(key) + " is missing and is required; allowed: " + join(names));
+    return -1;
+  }
   const auto text = as_node(node).value_exact<std::string>();
   if (!text) {
     fail_type(key, node, "one of " + join(names));

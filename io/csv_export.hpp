@@ -1,6 +1,8 @@
 // A recording as CSV files for spreadsheets and scripts: tip_measurement.csv, tip_heading.csv, actuator_state.csv,
-// motion_command.csv, needle_state.csv, needle_truth.csv; only those the recording has. First line: the fields' names,
-// units in them.
+// motion_command.csv, needle_state.csv, needle_truth.csv, and config.toml; only those the recording has. First line:
+// the fields' names, units in them. Numbers have as many digits as it takes to read the same one back. A position's
+// cell is empty along an axis that the measurement says nothing about. `arrival` numbers tips, headings and axes
+// together in the order in which they came.
 #pragma once
 
 #include <string>
@@ -11,7 +13,18 @@
 
 namespace bevel::io {
 
-// Makes `folder`. Returns each file with its number of rows. Throws std::runtime_error naming a file it cannot write.
+// Makes `folder`, and replaces what an export before left in it. Returns each file with its number of rows. Throws
+// std::runtime_error naming a file it cannot write.
 std::vector<std::pair<std::string, std::int64_t>> export_csv(const Recording& recording, const std::string& folder);
+
+// Such a folder back. Not in it: steering targets and status, and when a message was received (it is taken to have been
+// at its own time, in the order of arrival). Throws std::runtime_error naming file, line and column for what is no
+// export or would be refused by readers.
+Recording import_exported(const std::string& folder);
+// Whether a folder is meant to be one: it has one of the files.
+bool is_exported(const std::string& folder);
+
+// Throws std::runtime_error, and leaves no file.
+void write_log(const Recording& recording, const std::string& log_path);
 
 }  // namespace bevel::io

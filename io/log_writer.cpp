@@ -3,6 +3,7 @@
 #include <array>
 #include <cerrno>
 #include <cstring>
+#include <filesystem>
 #include <stdexcept>
 
 namespace bevel::io {
@@ -50,6 +51,20 @@ void LogWriter::close() {
   if (!file_) return;
   if (std::fclose(file_.release()) != 0)
     throw std::runtime_error(path_ + ": cannot be written: " + std::strerror(errno));
+}
+
+void write_whole_log(const std::string& path, const std::function<void(LogWriter&)>& fill) {
+  const std::string unfinished = path + ".unfinished";
+  try {
+    LogWriter log(unfinished);
+    fill(log);
+    log.close();
+    std::filesystem::rename(unfinished, path);
+  } catch (...) {
+    std::error_code ignored;
+    std::filesystem::remove(unfinished, ignored);
+    throw;
+  }
 }
 
 }  // namespace bevel::io

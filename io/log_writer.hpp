@@ -3,6 +3,7 @@
 
 #include <cstdint>
 #include <cstdio>
+#include <functional>
 #include <memory>
 #include <span>
 #include <string>
@@ -37,5 +38,9 @@ class LogWriter {
   std::unique_ptr<std::FILE, Closer> file_;
   std::int64_t events_ = 0;
 };
+
+// A log that is there whole or not at all: `fill` writes it under another name first. Throws what `fill` throws, and
+// std::runtime_error as above.
+void write_whole_log(const std::string& path, const std::function<void(LogWriter&)>& fill);
 
 }  // namespace bevel::io

@@ -114,15 +114,30 @@ std::vector<EffectEntry> read_effects(Section parent) {
   return effects;
 }
 
+// A recording is named by its log's file name, and where several logs of a case have one name, by the folders before it
+// as well: of the names that end the recording's path the longest is meant. end() if there is none.
+auto find_recording(const std::map<std::string, std::map<std::string, double>>& recordings, std::string_view path) {
+  auto found = recordings.end();
+  for (auto one = recordings.begin(); one != recordings.end(); ++one) {
+    const std::string& name = one->first;
+    if (!path.ends_with(name) || (path.size() > name.size() && path[path.size() - name.size() - 1] != '/')) continue;
+    if (found == recordings.end() || name.size() > found->first.size()) found = one;
+  }
+  return found;
+}
+
 std::vector<model::ActiveEffect> active_effects(const std::vector<EffectEntry>& effects,
                                                 std::string_view recording_name) {
-  const std::string recording = std::filesystem::path(recording_name).filename().string();
+  // Given from the folder that the log is in, the folders before it are not in the name.
+  const std::string recording =
+      recording_name.empty() ? "" : std::filesystem::absolute(recording_name).lexically_normal().string();
   std::vector<model::ActiveEffect> active;
   for (const auto& entry : effects) {
     model::ActiveEffect one{.effect = model::find_effect(entry.name), .parameters = {}};
     if (one.effect == nullptr) throw std::invalid_argument("there is no effect \"" + entry.name + "\"");
     std::map<std::string, double> values;
-    if (const auto own = entry.recordings.find(recording); own != entry.recordings.end()) values = own->second;
+    if (const auto own = find_recording(entry.recordings, recording); own != entry.recordings.end())
+      values = own->second;
     values.insert(entry.parameters.begin(), entry.parameters.end());  // the recording's own come first
     for (std::size_t i = 0; const auto& parameter : one.effect->parameters()) {
       const auto given = values.extract(std::string(parameter.name));

@@ -54,7 +54,12 @@ TEST_F(ReadLogs, AFileThatIsNotThere) {
 }
 
 TEST_F(ReadLogs, AFolderInPlaceOfALog) {
-  EXPECT_THAT(refusal({logs[0], folder.path().string()}), HasSubstr("give the logs in it"));
+  const ReadCase read = read_case({folder.path().string()});
+  ASSERT_EQ(read.recorded.recordings.size(), 3U);
+  EXPECT_EQ(read.recorded.recordings[2].name, "rec03.lcm");
+  EXPECT_THAT(refusal({logs[0], folder.path().string()}), HasSubstr("rec01.lcm: given twice"));
+  fs::create_directories(folder / "empty");
+  EXPECT_THAT(refusal({logs[0], (folder / "empty").string()}), HasSubstr("empty: holds no file that ends in .lcm"));
 }
 
 TEST_F(ReadLogs, TheSameLogTwice) {
@@ -65,9 +70,16 @@ TEST_F(ReadLogs, TheSameLogTwice) {
               AllOf(HasSubstr("copy.lcm: the same recording as"), HasSubstr("rec02")));
 }
 
-TEST_F(ReadLogs, TwoLogsOfOneName) {
-  fs::create_directories(folder / "other");
-  EXPECT_THAT(refusal({logs[0], write("other/rec01.lcm", {.script = 5})}), HasSubstr("two logs of one name"));
+// Logs of the demo are all named insertion.lcm.
+TEST_F(ReadLogs, LogsOfOneNameAreToldApartByTheirFolders) {
+  for (const char* name : {"a/day", "b/day", "c"}) fs::create_directories(folder / name);
+  const ReadCase read =
+      read_case({write("a/day/insertion.lcm", {.script = 5}), logs[0], write("b/day/insertion.lcm", {.script = 1}),
+                 write("c/insertion.lcm", {.script = 2})});
+  std::vector<std::string> names;
+  for (const auto& recording : read.recorded.recordings) names.push_back(recording.name);
+  EXPECT_THAT(names, ::testing::UnorderedElementsAre("a/day/insertion.lcm", "rec01.lcm", "b/day/insertion.lcm",
+                                                     "c/insertion.lcm"));
 }
 
 TEST_F(ReadLogs, NoTipMeasurement) {

@@ -16,8 +16,8 @@ constexpr std::string_view kSeparator = "\n---\n";
 
 io::ColumnMap fixed_map() {
   io::ColumnMap map;
-  map.seconds = "s";
-  map.nanoseconds = "ns";
+  map.time.column = "s";
+  map.time.nanoseconds = "ns";
   map.tip = {io::SignedColumn{"z", 1}, {"x", -1}, {"y", -1}};
   map.origin = {{"ez", 1}, {"ex", -1}, {"ey", -1}};
   map.sigma_mm = {0.1, 0.2, 0};
@@ -28,25 +28,30 @@ io::ColumnMap fixed_map() {
   return map;
 }
 
-void check(const io::ImportedRecording& recording) {
-  const auto samples = static_cast<int>(recording.actuators.size());
-  BEVEL_MUST(samples > 0 && recording.tips.size() == recording.actuators.size());
-  BEVEL_MUST(recording.headings.empty() || recording.headings.size() == recording.tips.size());
-  BEVEL_MUST(samples + recording.rows_without_data + recording.rows_unsettled + recording.rows_implausible ==
-             recording.rows);
-  for (std::size_t i = 0; i < recording.actuators.size(); ++i) {
-    const auto& actuator = recording.actuators[i];
-    const auto& tip = recording.tips[i];
-    BEVEL_MUST(actuator.seq == static_cast<std::int64_t>(i) && tip.seq == actuator.seq && tip.utime == actuator.utime);
-    BEVEL_MUST(i == 0 || actuator.utime > recording.actuators[i - 1].utime);
-    // What is written to a log has to be read from it.
-    BEVEL_MUST(!io::check_fields(io::to_message(actuator)));
-    BEVEL_MUST(!io::check_fields(io::to_message(tip)));
-    if (recording.headings.empty()) continue;
-    const auto& heading = recording.headings[i];
-    BEVEL_MUST(heading.seq == tip.seq && heading.utime == tip.utime);
-    BEVEL_MUST(!io::check_fields(io::to_message(heading)));
+// One channel: numbered, its times grow, and what is written to a log has to be read from it.
+template <class Sample>
+void check_channel(const std::vector<Sample>& samples) {
+  for (std::size_t i = 0; i < samples.size(); ++i) {
+    BEVEL_MUST(samples[i].seq == static_cast<std::int64_t>(i));
+    BEVEL_MUST(i == 0 || samples[i].utime > samples[i - 1].utime);
+    BEVEL_MUST(!io::check_fields(io::to_message(samples[i])));
   }
+}
+
+void check(const io::ImportedRecording& recording) {
+  BEVEL_MUST(!recording.actuators.empty() && !(recording.tips.empty() && recording.headings.empty()));
+  check_channel(recording.actuators);
+  check_channel(recording.tips);
+  check_channel(recording.headings);
+  const auto no_more_than_rows = [&](std::size_t readings) {
+    BEVEL_MUST(static_cast<int>(readings) + recording.rows_without_data + recording.rows_unsettled <= recording.rows);
+  };
+  no_more_than_rows(recording.actuators.size());
+  no_more_than_rows(recording.tips.size());
+  no_more_than_rows(recording.headings.size());
+  for (const auto& tip : recording.tips)  // nobody knows where the base was outside its readings
+    BEVEL_MUST(tip.utime >= recording.actuators.front().utime && tip.utime <= recording.actuators.back().utime);
+  BEVEL_MUST(!io::summary(recording).empty());
 }
 
 }  // namespace

@@ -19,9 +19,10 @@ using ::testing::HasSubstr;
 class CsvImport : public ::testing::Test {
  protected:
   std::string file(const std::string& name, const std::string& text) const { return folder.write(name, text); }
-  std::string map(const std::string& insertion = "column = \"-Base y\"\nsettled = true\n") const {
+  std::string map(const std::string& insertion = "column = \"-Base y\"\nunit = \"mm\"\nsettled = true\n") const {
     return file("map.toml",
-                "[time]\nseconds = \"s\"\nnanoseconds = \"ns\"\n[tip]\naxes = [\"Tip z\", \"-Tip x\", \"-Tip y\"]\n"
+                "[time]\nseconds = \"s\"\nnanoseconds = \"ns\"\n[tip]\naxes = [\"Tip z\", \"-Tip x\", \"-Tip "
+                "y\"]\nunit = \"mm\"\n"
                 "origin = [\"E z\", \"-E x\", \"-E y\"]\nsigma_mm = [0.1, 0.2, 0]\n[insertion]\n" +
                     insertion + "[rows]\nnonzero = [\"Tip x\", \"E x\"]\n");
   }
@@ -64,8 +65,9 @@ TEST_F(CsvImport, MapsAxesDropsEmptyRowsAndKeepsOnlySettledSteps) {
 TEST_F(CsvImport, RowsOfOneStopAreOneReadingWithoutAClock) {
   const std::string stops =
       file("stops.toml",
-           "[tip]\naxes = [\"x\", \"y\", \"z\"]\nsigma_mm = [0.1, 0.1, 0.1]\nheading = [\"hx\", \"hy\", \"hz\"]\n"
-           "heading_sd_rad = 0.01\n[insertion]\ncolumn = \"depth\"\nstops = true\n");
+           "[tip]\naxes = [\"x\", \"y\", \"z\"]\nunit = \"mm\"\nsigma_mm = [0.1, 0.1, 0.1]\nheading = [\"hx\", \"hy\", "
+           "\"hz\"]\n"
+           "heading_sd_rad = 0.01\n[insertion]\ncolumn = \"depth\"\nunit = \"mm\"\nstops = true\n");
   const std::string csv = file("stops.csv",
                                "depth,x,y,z,hx,hy,hz\n"
                                "0,0.1,0,0.1,0,0,1\n0,0.0,0,0.0,0,0,1\n0,0.2,0,0.2,0,0,1\n"
@@ -103,9 +105,10 @@ TEST_F(CsvImport, ALogHasAClockUnlessItsConfigSaysNo) {
 }
 
 TEST_F(CsvImport, ATimeBesideStopsIsRefused) {
-  const std::string both = file("both.toml",
-                                "[time]\nrate_hz = 10.0\n[tip]\naxes = [\"x\", \"y\", \"z\"]\n"
-                                "sigma_mm = [0.1, 0.1, 0.1]\n[insertion]\ncolumn = \"depth\"\nstops = true\n");
+  const std::string both =
+      file("both.toml",
+           "[time]\nrate_hz = 10.0\n[tip]\naxes = [\"x\", \"y\", \"z\"]\nunit = \"mm\"\n"
+           "sigma_mm = [0.1, 0.1, 0.1]\n[insertion]\ncolumn = \"depth\"\nunit = \"mm\"\nstops = true\n");
   EXPECT_THAT([&] { load_column_map(both); },
               ::testing::ThrowsMessage<ConfigError>(::testing::AllOf(HasSubstr("stops"), HasSubstr("clock"))));
 }
@@ -120,9 +123,9 @@ TEST_F(CsvImport, FaultsNameFileLineColumnAndTheNearestName) {
     return std::string();
   };
   const std::string row = "101,0,10,0.5,30,10,0.5,30,0\n";
-  EXPECT_NE(
-      message(file("b.csv", std::string(kHeader) + row), map("column = \"-Bass y\"\n")).find("nearest is 'Base y'"),
-      std::string::npos);
+  EXPECT_NE(message(file("b.csv", std::string(kHeader) + row), map("column = \"-Bass y\"\nunit = \"mm\"\n"))
+                .find("nearest is 'Base y'"),
+            std::string::npos);
   const std::string text = message(file("c.csv", std::string(kHeader) + row + "102,0,ten,0,0,10,0,30,-5\n"), map());
   EXPECT_NE(text.find("c.csv:3: column 'Tip x' is 'ten'"), std::string::npos) << text;
   EXPECT_NE(message(file("d.csv", std::string(kHeader)), map()).find("no row with data"), std::string::npos);
@@ -136,8 +139,9 @@ class PlainCsv : public CsvImport {
  protected:
   std::string columns =
       file("plain.toml",
-           "[time]\nseconds = \"t\"\nnanoseconds = \"ns\"\n[tip]\naxes = [\"x\", \"y\", \"z\"]\n"
-           "sigma_mm = [0.1, 0.1, 0.2]\n[insertion]\ncolumn = \"depth\"\n[rotation]\ncolumn = \"roll\"\n");
+           "[time]\nseconds = \"t\"\nnanoseconds = \"ns\"\n[tip]\naxes = [\"x\", \"y\", \"z\"]\nunit = \"mm\"\n"
+           "sigma_mm = [0.1, 0.1, 0.2]\n[insertion]\ncolumn = \"depth\"\nunit = \"mm\"\n[rotation]\ncolumn = "
+           "\"roll\"\nunit = \"rad\"\n");
   std::string csv(const std::function<void(int, std::vector<std::string>&)>& change = [](int, auto&) {}) const {
     std::string text = "t,ns,depth,roll,x,y,z\n";
     for (int i = 0; i < 40; ++i) {
@@ -169,9 +173,9 @@ TEST_F(PlainCsv, ReadsBackIntact) {
 TEST_F(PlainCsv, AHeadingsColumnsBecomeATipHeadingEachAndComeBackInTheExport) {
   const std::string with_heading =
       file("heading.toml",
-           "[time]\nseconds = \"t\"\n[tip]\naxes = [\"x\", \"y\", \"z\"]\nsigma_mm = [0.1, 0.1, 0.2]\n"
+           "[time]\nseconds = \"t\"\n[tip]\naxes = [\"x\", \"y\", \"z\"]\nunit = \"mm\"\nsigma_mm = [0.1, 0.1, 0.2]\n"
            "heading = [\"heading_x\", \"-heading_y\", \"heading_z\"]\nheading_sd_rad = 0.02\n"
-           "[insertion]\ncolumn = \"depth\"\n");
+           "[insertion]\ncolumn = \"depth\"\nunit = \"mm\"\n");
   const std::string table = file("heading.csv",
                                  "t,depth,x,y,z,heading_x,heading_y,heading_z\n"
                                  "1,0,0,0,0,0,0,1\n2,5,0,0,5,0,0.6,0.8\n3,10,0,0,10,0.707,0.0,0.707\n");
@@ -201,9 +205,9 @@ TEST_F(PlainCsv, AHeadingsColumnsBecomeATipHeadingEachAndComeBackInTheExport) {
     EXPECT_THAT(e.what(), HasSubstr("bad.csv:2: column 'heading_x' is '0', and the heading's length is 0.8485"));
   }
   const std::string unsure = file("unsure.toml",
-                                  "[time]\nrate_hz = 30.0\n[tip]\naxes = [\"x\", \"y\", \"z\"]\n"
+                                  "[time]\nrate_hz = 30.0\n[tip]\naxes = [\"x\", \"y\", \"z\"]\nunit = \"mm\"\n"
                                   "sigma_mm = [0.1, 0.1, 0]\nheading = [\"a\", \"b\", \"c\"]\n"
-                                  "[insertion]\ncolumn = \"depth\"\n");
+                                  "[insertion]\ncolumn = \"depth\"\nunit = \"mm\"\n");
   try {
     load_column_map(unsure);
     FAIL() << "taken";
@@ -280,8 +284,8 @@ TEST_F(PlainCsv, AFolderThatCannotBeWrittenToIsNamedAndNothingIsLeft) {
 
 TEST_F(PlainCsv, SigmasWithoutInformationThatReadersAcceptAreRefused) {
   const std::string wild = file("wild.toml",
-                                "[time]\nrate_hz = 30.0\n[tip]\naxes = [\"x\", \"y\", \"z\"]\n"
-                                "sigma_mm = [1e-9, 0.1, 0]\n[insertion]\ncolumn = \"depth\"\n");
+                                "[time]\nrate_hz = 30.0\n[tip]\naxes = [\"x\", \"y\", \"z\"]\nunit = \"mm\"\n"
+                                "sigma_mm = [1e-9, 0.1, 0]\n[insertion]\ncolumn = \"depth\"\nunit = \"mm\"\n");
   try {
     load_column_map(wild);
     FAIL() << "taken";

@@ -131,6 +131,29 @@ TEST(ModelFile, unknowns_of_one_recording_stand_apart) {
   EXPECT_EQ(active_effects(model, "").at(0).effect, model::find_effect("tissue_motion"));
 }
 
+// Several logs of one name are told apart by their folders (tools/diagnose/read_case.hpp).
+TEST(ModelFile, a_recording_is_meant_by_as_much_of_its_path_as_the_file_names) {
+  const char* text = R"(
+[[effect]]
+name = "lost_steps"
+rotation_rad = 0.8
+[effect.recordings."insertion.lcm"]
+at_s = 1.0
+[effect.recordings."b/insertion.lcm"]
+at_s = 2.0
+)";
+  const ModelFile model = parse_model_file(needle_with("", "") + text, "m.toml");
+  EXPECT_EQ(parse_model_file(to_toml(model), "again.toml"), model) << to_toml(model);
+  const auto at_s = [&](std::string_view recording) {
+    return active_effects(model, recording).at(0).parameters.at(2).value;
+  };
+  EXPECT_EQ(at_s("/a/insertion.lcm"), 1);
+  EXPECT_EQ(at_s("/x/b/insertion.lcm"), 2);
+  EXPECT_EQ(at_s("b/insertion.lcm"), 2);
+  EXPECT_EQ(at_s("/xb/insertion.lcm"), 1) << "another folder's name only ends like it";
+  EXPECT_EQ(at_s("/b/my_insertion.lcm"), 0) << "another log's name only ends like it";
+}
+
 TEST(ModelFile, every_effect_of_the_registry_is_read_back_as_written) {
   for (const model::Effect* effect : model::all_effects()) {
     ModelFile model;

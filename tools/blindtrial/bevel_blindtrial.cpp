@@ -15,7 +15,8 @@ int main(int argc, char** argv) {
   bevel::tools::CommandLine command_line(
       "bevel-blindtrial",
       "A blind trial of a mismatch tool: physics concealed and sealed, verdicts hashed, then scored.");
-  command_line.option("--trials", o.trials, "number of trials", 1, 10000)
+  command_line.example("bevel-blindtrial --trials 3 --out trials --diagnose build/bin/bevel-diagnose")
+      .option("--trials", o.trials, "number of trials", 1, 10000)
       .option("--seed", seed, "the same seed draws the same trials", 0, 2147483647)
       .option("--varied", o.population.varied, "share of trials whose insertions differ", 0.0, 1.0)
       .option("--edition", o.population.edition,

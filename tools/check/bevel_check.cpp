@@ -10,10 +10,13 @@ int main(int argc, char** argv) {
   using namespace bevel;
   tools::CommandLine command_line(
       "bevel-check",
-      "Proves the link before motion: multicast, CAN, the drives' identities and heartbeats, timers, cameras. Moves "
-      "nothing, and sends nothing to drives that another program commands. Exit status 1 if something is not right.");
+      "Proves the link before motion: multicast, CAN, the drives' identities and heartbeats, timers, "
+      "cameras.\nMoves nothing, and sends nothing to drives that another program commands. Status 1 if something is "
+      "not "
+      "right.");
   std::string config_path, lcm_url, can;
-  command_line.option("-c,--config", config_path, "system file (TOML); config/demo.toml is one", true)
+  command_line.example("bevel-check --config config/demo.toml --can can0")
+      .option("-c,--config", config_path, "system file (TOML); config/demo.toml is one", true)
       .option("--lcm-url", lcm_url, "LCM provider; default: system.lcm_url, then LCM_DEFAULT_URL")
       .option("--can", can, "bus instead of the file's: can0, or unix:/path for the rig's local bus");
   return command_line.run(argc, argv, [&] {

@@ -6,6 +6,7 @@
 
 #include "tools/close_loop/close_loop.hpp"
 #include "tools/common/command_line.hpp"
+#include "tools/common/shipped_file.hpp"
 #include "tools/diagnose/result_files.hpp"
 
 int main(int argc, char** argv) {
@@ -17,8 +18,10 @@ int main(int argc, char** argv) {
       "Diagnoses a case, and shows what rig, estimator and controller make of the model before and after.");
   command_line.arguments("CASE", folders, "folder with model.toml and rec*.lcm")
       .reads_recordings()
+      .example("bevel-close-the-loop --insertions 20 CASE")
       .option("-o,--out", o.out_folder, "folder for the results; out/close-the-loop/CASE if not given")
-      .option("-c,--config", o.estimator_path, "the estimator's settings for the replays (TOML)")
+      .option("-c,--config", o.estimator_path,
+              "the estimator's settings for the replays (TOML); without, tools/replay/strict.toml")
       .option("--insertions", o.targeting.seeds, "steered to each target with each model", 1, 1000)
       .option("--threads", o.threads, "at work at once; the results do not depend on it", 1, 64)
       .flag("-q,--quiet", o.quiet, "no progress on stderr")
@@ -26,6 +29,7 @@ int main(int argc, char** argv) {
   bevel::diagnose::end_on_signals("bevel-close-the-loop");
   return command_line.run(argc, argv, [&] {
     o.folder = folders.front();
+    if (o.estimator_path.empty()) o.estimator_path = bevel::tools::shipped_file("tools/replay/strict.toml");
     if (o.out_folder.empty())
       o.out_folder = "out/close-the-loop/" + std::filesystem::weakly_canonical(o.folder).filename().string();
     return bevel::close_loop::run(o, std::cout, std::cerr);

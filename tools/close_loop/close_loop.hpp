@@ -15,7 +15,7 @@ namespace bevel::close_loop {
 
 struct Options {
   std::string folder, out_folder;
-  std::string estimator_path = "tools/replay/strict.toml";
+  std::string estimator_path;
   int threads = 2;
   bool quiet = false;  // no progress on stderr
   TargetingOptions targeting;

@@ -1,8 +1,11 @@
 #include "tools/common/command_line.hpp"
 
 #include <CLI/CLI.hpp>
+#include <algorithm>
+#include <cctype>
 #include <cstdio>
 
+#include "io/config.hpp"
 #include "tools/common/exit_status.hpp"
 
 namespace bevel::tools {
@@ -11,7 +14,34 @@ struct CommandLine::Impl {
   Impl(const std::string& program, const std::string& description) : app(description, program) {}
   CLI::App app;
   std::vector<std::function<std::string()>> checks;
+  std::string example, statuses = "Exit status: 0 ok, 1 failed, 2 usage";
 };
+
+namespace {
+
+// "" if every argument that looks like an option is one.
+std::string unknown_option(const CLI::App& app, int argc, char** argv) {
+  for (int i = 1; i < argc; ++i) {
+    const std::string argument = argv[i];
+    if (argument == "--") break;
+    if (argument.size() < 2 || argument[0] != '-') continue;
+    const bool is_long = argument[1] == '-';
+    // -4,10,95 is a value
+    if (!is_long && (std::isdigit(static_cast<unsigned char>(argument[1])) != 0 || argument[1] == '.')) continue;
+    // -qm FILE is -q -m FILE
+    const std::string given = is_long ? argument.substr(0, argument.find('=')) : argument.substr(0, 2);
+    std::vector<std::string> known;
+    for (const CLI::Option* option : app.get_options()) {
+      for (const std::string& name : option->get_lnames()) known.push_back("--" + name);
+      for (const std::string& name : option->get_snames()) known.push_back("-" + name);
+    }
+    if (std::ranges::find(known, given) != known.end()) continue;
+    return "unknown option " + given + "; did you mean " + io::nearest_name(given, known) + "?";
+  }
+  return "";
+}
+
+}  // namespace
 
 CommandLine::CommandLine(const std::string& program, const std::string& description)
     : impl_(std::make_unique<Impl>(program, description)) {
@@ -76,7 +106,16 @@ CommandLine& CommandLine::flag(const std::string& names, bool& value, const std:
 }
 
 CommandLine& CommandLine::reads_recordings() {
-  impl_->app.footer("Exit status: 0 ok, 1 failed, 2 usage, 3 done, but the input was damaged (said on stderr).");
+  return exit_status("3 done, but the input was damaged (said on stderr)");
+}
+
+CommandLine& CommandLine::exit_status(const std::string& status) {
+  impl_->statuses += ", " + status;
+  return *this;
+}
+
+CommandLine& CommandLine::example(const std::string& command) {
+  impl_->example = "Example: " + command + "\n";
   return *this;
 }
 
@@ -87,6 +126,11 @@ CommandLine& CommandLine::arguments(const std::string& name, std::vector<std::st
 }
 
 int CommandLine::run(int argc, char** argv, const std::function<int()>& body) {
+  impl_->app.footer(impl_->example + impl_->statuses + ".\n");
+  if (const std::string unknown = unknown_option(impl_->app, argc, argv); !unknown.empty()) {
+    std::fprintf(stderr, "%s\nRun with --help for more information.\n", unknown.c_str());
+    return kUsage;
+  }
   try {
     impl_->app.parse(argc, argv);
     for (const auto& check : impl_->checks)

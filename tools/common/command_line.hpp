@@ -1,6 +1,7 @@
 #pragma once
 // Command lines for all programs, with CLI11 behind it: that header costs ten seconds a main, here it is compiled once.
-// Exit status everywhere: 0 ok, 1 failed, 2 usage; of what reads recordings also 3, see exit_status.hpp.
+// Exit status everywhere: 0 ok, 1 failed, 2 usage; of what reads recordings also 3, see exit_status.hpp. --help is
+// alike everywhere: what the program does, usage, options, an example, exit statuses.
 #include <functional>
 #include <memory>
 #include <optional>
@@ -34,11 +35,16 @@ class CommandLine {
 
   // Says in --help what status 3 means.
   CommandLine& reads_recordings();
+  // A whole command, for --help.
+  CommandLine& example(const std::string& command);
+  // A further one for --help: "130 interrupted".
+  CommandLine& exit_status(const std::string& status);
 
   // For what one option alone cannot say: `problem` is asked after parsing; text it returns is a usage error.
   CommandLine& check(std::function<std::string()> problem);
 
-  // Parses, then runs `body`, whose exceptions become one message on stderr and status 1. Returns the exit status.
+  // Parses, then runs `body`, whose exceptions become one message on stderr and status 1. Returns the exit status. An
+  // unknown option is told of first, with the nearest known one: what it should have given is then missing as well.
   int run(int argc, char** argv, const std::function<int()>& body);
 
  private:

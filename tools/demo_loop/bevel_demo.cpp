@@ -3,6 +3,7 @@
 #include <filesystem>
 
 #include "tools/common/command_line.hpp"
+#include "tools/common/shipped_file.hpp"
 #include "tools/demo_loop/demo_run.hpp"
 
 int main(int argc, char** argv) {
@@ -12,7 +13,8 @@ int main(int argc, char** argv) {
   tools::CommandLine command_line(
       "bevel-demo", "Steers a simulated needle with all five processes and a rendered camera in the loop.");
   std::string plant = "kinematic", config;
-  command_line
+  command_line.exit_status("130 interrupted")
+      .example("bevel-demo --target 4,-10,95 --out somewhere")
       .choice("--plant", plant, "the simulated needle: the estimator's own model, or a beam in elastic tissue",
               {"kinematic", "beam"})
       .option("-c,--config", config, "system file; without, config/demo.toml or config/beam.toml by the plant")
@@ -24,7 +26,8 @@ int main(int argc, char** argv) {
       .option("--fault", options.fault,
               "break something and show the stop: COMPONENT:KIND@SECONDSs, as in camera:off@5s");
   return command_line.run(argc, argv, [&] {
-    options.config_path = !config.empty() ? config : plant == "beam" ? "config/beam.toml" : "config/demo.toml";
+    options.config_path =
+        !config.empty() ? config : tools::shipped_file(plant == "beam" ? "config/beam.toml" : "config/demo.toml");
     return tools::run_demo(options);
   });
 }

@@ -6,7 +6,7 @@
 namespace bevel::tools {
 
 struct DemoOptions {
-  std::string config_path = "config/demo.toml";
+  std::string config_path;
   std::string out = "out/demo";
   std::string programs;  // folder of the five programs
   std::vector<double> target_mm{6, -9, 100};

@@ -12,11 +12,12 @@ int main(int argc, char** argv) {
   o.threads = std::clamp(static_cast<int>(std::thread::hardware_concurrency()), 1, 64);
   bevel::tools::CommandLine command_line(
       "bevel-diagnose", "Where the model in use goes wrong, what physics it leaves out, and the model with it.");
-  command_line.arguments("LOG", o.logs, "logs of one rig, at least two", false)
+  command_line.arguments("LOG", o.logs, "logs of one rig, or folders of them: at least two logs", false)
       .paths("--baseline", o.baseline, "with --changed, in place of LOG: logs, or folders of them, as it was")
       .paths("--changed", o.changed, "the same, as it is now: what changed?")
       .check([&] { return bevel::diagnose::usage_fault(o); })
       .reads_recordings()
+      .example("bevel-diagnose --model model.toml --out verdict recordings/")
       .option("-m,--model", o.model_path, "the model in use (TOML)", true)
       .option("-o,--out", o.out_folder, "folder for verdict.json, report.html, model.toml and a proposed effect", true)
       .option("--threads", o.threads, "at work at once; the verdict does not depend on it", 1, 64)

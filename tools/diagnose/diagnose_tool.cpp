@@ -9,6 +9,7 @@
 
 #include "diagnosis/mismatch/diagnose.hpp"
 #include "diagnosis/mismatch/effect_source.hpp"
+#include "io/find_logs.hpp"
 #include "io/model_file.hpp"
 #include "io/sha256.hpp"
 #include "tools/common/exit_status.hpp"
@@ -67,9 +68,10 @@ std::string usage_fault(const Options& options) {
 Found find(const Options& options, std::ostream& err) {
   Progress progress(options.quiet ? nullptr : stderr);
   io::ModelFile model = io::load_model_file(options.model_path);
-  progress.say(options.changed.empty() ? "reading " + std::to_string(options.logs.size()) + " logs"
+  const auto logs = io::find_logs(options.logs);  // folders among them
+  progress.say(options.changed.empty() ? "reading " + std::to_string(logs.size()) + " logs"
                                        : "reading two groups of logs");
-  ReadCase input = options.changed.empty() ? read_case(options.logs) : read_groups(options.baseline, options.changed);
+  ReadCase input = options.changed.empty() ? read_case(logs) : read_groups(options.baseline, options.changed);
   for (const auto& remark : input.remarks) err << remark << std::endl;  // before the minutes of work
   const double reading_s = progress.seconds();
   DiagnosisOptions how;

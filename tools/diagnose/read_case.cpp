@@ -58,16 +58,31 @@ void check_motion_known(const std::string& name, std::vector<model::ActuatorStat
 }
 
 void check_each_once(const std::vector<std::string>& logs) {
-  std::map<std::string, std::string> by_name;
-  for (const auto& log : logs) {
-    if (fs::is_directory(log)) throw std::runtime_error(log + ": a folder; give the logs in it, " + log + "/*.lcm");
-    const auto [known, is_new] = by_name.emplace(fs::path(log).filename().string(), log);
-    if (is_new) continue;
-    std::error_code ignored;
-    if (fs::equivalent(known->second, log, ignored)) throw std::runtime_error(log + ": given twice");
-    throw std::runtime_error(known->second + " and " + log +
-                             ": two logs of one name; a verdict names a recording by its file name, so rename one");
+  std::map<fs::path, std::string> known;
+  for (const auto& log : logs)
+    if (!known.emplace(fs::weakly_canonical(log), log).second) throw std::runtime_error(log + ": given twice");
+}
+
+// The last `parts` parts of a path: "monday/insertion.lcm" for 2.
+std::string end_of(const fs::path& path, std::size_t parts) {
+  fs::path end;
+  for (fs::path rest = path; parts > 0 && rest.has_filename(); rest = rest.parent_path(), --parts)
+    end = end.empty() ? rest.filename() : rest.filename() / end;
+  return end.string();
+}
+
+// What tells each log from the others: they are different files, so their whole paths differ.
+std::vector<std::string> names_of(const std::vector<std::string>& logs) {
+  std::vector<fs::path> whole;
+  for (const auto& log : logs) whole.push_back(fs::absolute(log).lexically_normal());
+  std::vector<std::string> names;
+  for (const fs::path& path : whole) {
+    std::size_t parts = 1;
+    const auto alike = [&](const fs::path& other) { return end_of(other, parts) == end_of(path, parts); };
+    while (std::ranges::count_if(whole, alike) > 1) ++parts;
+    names.push_back(end_of(path, parts));
   }
+  return names;
 }
 
 }  // namespace
@@ -91,7 +106,18 @@ namespace {
 // Reads logs one after the other; the same recording twice is refused.
 class Reader {
  public:
-  void add(const std::string& log, const std::string& group, bool changed) {
+  void add_all(const std::vector<std::string>& logs, const std::string& group, bool changed) {
+    check_each_once(logs);
+    const auto names = names_of(logs);
+    for (std::size_t i = 0; i < logs.size(); ++i) add(logs[i], group + names[i], changed);
+  }
+  ReadCase take() {
+    result_.recorded = diagnosis::make_case(std::move(raw_));
+    return std::move(result_);
+  }
+
+ private:
+  void add(const std::string& log, const std::string& name, bool changed) {
     files_.emplace_back(log);
     paths_.push_back(log);
     const auto bytes = files_.back().bytes();
@@ -101,7 +127,6 @@ class Reader {
                                  "; counted twice it would make everything look surer than it is");
     io::Recording recording = io::read_recording(bytes);
     recording.file_change = files_.back().change();
-    const std::string name = group + fs::path(log).filename().string();
     result_.files.push_back({name, io::sha256_hex({reinterpret_cast<const char*>(bytes.data()), bytes.size()})});
     const bool has_clock = io::has_clock(recording);
     const std::string remark = judge_damage(name, recording);
@@ -113,12 +138,7 @@ class Reader {
                     .has_clock = has_clock,
                     .changed = changed});
   }
-  ReadCase take() {
-    result_.recorded = diagnosis::make_case(std::move(raw_));
-    return std::move(result_);
-  }
 
- private:
   ReadCase result_;
   std::vector<diagnosis::RawRecording> raw_;
   std::vector<io::FileBytes> files_;
@@ -127,10 +147,9 @@ class Reader {
 
 }  // namespace
 
-ReadCase read_case(const std::vector<std::string>& logs) {
-  check_each_once(logs);
+ReadCase read_case(const std::vector<std::string>& paths) {
   Reader reader;
-  for (const std::string& log : logs) reader.add(log, "", false);
+  reader.add_all(io::find_logs(paths), "", false);
   return reader.take();
 }
 
@@ -139,13 +158,12 @@ ReadCase read_groups(const std::vector<std::string>& baseline, const std::vector
   Reader reader;
   for (const bool second : {false, true}) {
     const auto logs = io::find_logs(second ? changed : baseline);
-    check_each_once(logs);
     if (logs.size() < kFewest)
       throw std::runtime_error(std::string(second ? "--changed" : "--baseline") + ": " + std::to_string(logs.size()) +
                                " recording; at least " + std::to_string(kFewest) +
                                " are needed to know how much insertions differ by themselves, and three or more are "
                                "better");
-    for (const std::string& log : logs) reader.add(log, second ? "changed/" : "baseline/", second);
+    reader.add_all(logs, second ? "changed/" : "baseline/", second);
   }
   return reader.take();
 }

@@ -16,9 +16,10 @@ struct ReadCase {
   std::vector<std::string> remarks;  // on damage that does not stand in the way
 };
 
-// A recording is named by its log's file name. Throws std::runtime_error for a log that cannot be read or lost too
-// much, for a log given twice, for two of one name, and with what diagnosis::make_case says of the rest.
-ReadCase read_case(const std::vector<std::string>& logs);
+// `paths`: logs, and folders that hold them. A recording is named by its log's file name, and where several have one,
+// by as many of the folders before it as tell them apart: "monday/insertion.lcm". Throws std::runtime_error for a log
+// that cannot be read or lost too much, for a log given twice, and with what diagnosis::make_case says of the rest.
+ReadCase read_case(const std::vector<std::string>& paths);
 
 // Two groups, of logs and of folders that hold them; a recording's name begins with its group's. As above, and a group
 // with fewer than two recordings.

@@ -8,8 +8,9 @@ int main(int argc, char** argv) {
   bevel::identify::Options o;
   bevel::tools::CommandLine command_line("bevel-identify",
                                          "The needle's parameters from recorded insertions, with their uncertainty.");
-  command_line.arguments("LOG", o.logs, "logs, one insertion each")
+  command_line.arguments("LOG", o.logs, "logs of one insertion each, or folders of them")
       .reads_recordings()
+      .example("bevel-identify --model model.toml --out found rec01.lcm rec02.lcm")
       .option("-m,--model", o.model_path, "model file to start from (TOML); what is not fitted stays", true)
       .option("-o,--out", o.out_folder, "folder for model.toml, figures.json and report.html")
       .choice("--method", o.method, "trajectory (default) or angle-rate, as printed in the paper",

@@ -6,6 +6,7 @@
 #include <ostream>
 #include <stdexcept>
 
+#include "io/find_logs.hpp"
 #include "io/model_file.hpp"
 #include "io/recording.hpp"
 #include "tools/common/exit_status.hpp"
@@ -67,7 +68,8 @@ Identification identify(const Options& options, std::ostream& err) {
   result.start = model.needle;
   result.method = options.method;
   result.prior = options.prior;
-  for (const auto& log : options.logs) result.insertions.push_back(read_insertion(log, err, result.faults));
+  for (const auto& log : io::find_logs(options.logs))
+    result.insertions.push_back(read_insertion(log, err, result.faults));
 
   const FitOptions fit = fit_options(options, model.needle);
   result.fit = fit_from_many_starts(result.insertions, fit);

@@ -3,6 +3,7 @@
 #include <filesystem>
 
 #include "io/csv_export.hpp"
+#include "io/find_logs.hpp"
 #include "tools/common/command_line.hpp"
 #include "tools/common/exit_status.hpp"
 
@@ -10,13 +11,15 @@ int main(int argc, char** argv) {
   using namespace bevel;
   std::vector<std::string> logs;
   std::string out = ".";
-  tools::CommandLine command_line("bevel-export", "Turns LCM logs into CSV files, one a channel.");
+  tools::CommandLine command_line("bevel-export",
+                                  "Turns LCM logs into CSV files, one a channel; bevel-import reads them back.");
   command_line.option("-o,--out", out, "folder; each log gets a folder in it")
-      .arguments("LOG", logs, "LCM logs")
+      .arguments("LOG", logs, "LCM logs, or folders of them")
+      .example("bevel-export -o csv out/insertion.lcm")
       .reads_recordings();
   return command_line.run(argc, argv, [&] {
     bool intact = true;
-    for (const std::string& log : logs) {
+    for (const std::string& log : io::find_logs(logs)) {
       const io::Recording recording = io::read_recording(log);
       std::fprintf(stderr, "%s", recording.remarks(log).c_str());
       intact = intact && recording.intact();

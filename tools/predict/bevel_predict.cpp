@@ -1,6 +1,8 @@
 // bevel-predict: where the model says the tip was, from the axes alone.
 #include <iostream>
+#include <stdexcept>
 
+#include "io/find_logs.hpp"
 #include "tools/common/command_line.hpp"
 #include "tools/predict/predict.hpp"
 
@@ -9,13 +11,18 @@ int main(int argc, char** argv) {
   std::vector<std::string> logs;
   bevel::tools::CommandLine command_line(
       "bevel-predict",
-      "Integrates the model with its effects and discrepancies from ACTUATOR_STATE alone; CSV on stdout, one line per "
+      "Integrates the model with its effects and discrepancies from ACTUATOR_STATE alone.\nCSV on stdout, one line per "
       "TIP_MEASUREMENT, with standard deviations where the model file says what is uncertain, and residuals of "
       "TIP_HEADING (mrad) where the log has any.");
   command_line.option("-m,--model", model_path, "model file (TOML)", true)
-      .arguments("LOG", logs, "the log, one insertion")
+      .arguments("LOG", logs, "the log of one insertion, or a folder with one")
       .reads_recordings()
+      .example("bevel-predict --model model.toml rec01.lcm > predicted.csv")
       .check([&]() -> std::string { return logs.size() > 1 ? "one LOG at a time" : ""; });
-  return command_line.run(argc, argv,
-                          [&] { return bevel::predict::run(model_path, logs.front(), std::cout, std::cerr); });
+  return command_line.run(argc, argv, [&] {
+    const auto found = bevel::io::find_logs(logs);
+    if (found.size() > 1)
+      throw std::runtime_error(logs.front() + ": holds " + std::to_string(found.size()) + " logs; one at a time");
+    return bevel::predict::run(model_path, found.front(), std::cout, std::cerr);
+  });
 }

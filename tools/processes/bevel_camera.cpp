@@ -5,6 +5,7 @@
 int main(int argc, char** argv) {
   using namespace bevel;
   tools::CommandLine command_line("bevel-camera", "Finds the needle tip in pictures and publishes where it is.");
+  command_line.example("bevel-camera --config config/demo.toml");
   std::string source;
   bool print = false;
   command_line.option("--source", source, "path instead of the file's source.path");

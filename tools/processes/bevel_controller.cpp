@@ -6,6 +6,7 @@ int main(int argc, char** argv) {
   using namespace bevel;
   tools::CommandLine command_line(
       "bevel-controller", "Steers the needle to the target on STEERING_TARGET, and stops it when anything is wrong.");
+  command_line.example("bevel-controller --config config/demo.toml");
   const auto name = [](const nodes::SystemConfig&) { return "bevel-controller"; };
   return tools::process_main(command_line, argc, argv, name, [](tools::ProcessContext& context) {
     tools::warn_of_effects_left_out(context.config, "bevel-controller");

@@ -8,6 +8,7 @@ int main(int argc, char** argv) {
   tools::CommandLine command_line(
       "bevel-estimator",
       "Estimates the needle's pose, curvature and lambda from tip measurements, headings and axis positions.");
+  command_line.example("bevel-estimator --config config/demo.toml");
   const auto name = [](const nodes::SystemConfig&) { return "bevel-estimator"; };
   return tools::process_main(command_line, argc, argv, name, [](tools::ProcessContext& context) {
     tools::warn_of_effects_left_out(context.config, "bevel-estimator");

@@ -12,6 +12,7 @@ int main(int argc, char** argv) {
   constexpr double kOutlives_s = 0.5;
   tools::CommandLine command_line("bevel-rig",
                                   "Simulates needle, cameras and drives; the other processes cannot tell.");
+  command_line.example("bevel-rig --config config/demo.toml");
   const auto name = [](const nodes::SystemConfig&) { return "bevel-rig"; };
   return tools::process_main(command_line, argc, argv, name, [](tools::ProcessContext& context) {
     const nodes::SystemConfig& config = context.config;

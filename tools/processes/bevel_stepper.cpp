@@ -7,6 +7,7 @@ int main(int argc, char** argv) {
   using namespace bevel;
   constexpr double kLongestStop_s = 0.5;
   tools::CommandLine command_line("bevel-stepper", "Drives the insertion and rotation axes over CANopen.");
+  command_line.example("bevel-stepper --config config/demo.toml");
   std::string can;
   command_line.option("--can", can, "bus instead of the file's: can0, or unix:/path for the rig's local bus");
   const auto name = [](const nodes::SystemConfig&) { return "bevel-stepper"; };

@@ -11,6 +11,7 @@ int main(int argc, char** argv) {
       "bevel-replay", "Replays logs through the estimator: consistency, parameters, error against the truth.");
   command_line.arguments("LOG", options.paths, "logs, or folders of them; with --cases folders of cases")
       .reads_recordings()
+      .example("bevel-replay --system config/demo.toml --out replayed out/demo/insertion.lcm")
       .option("-m,--model", options.model_path, "model file (TOML); not with --cases")
       .option("-s,--system", options.system_path, "instead of -m and -c: the rig's file, with its estimator's settings")
       .option("-c,--config", options.config_path, "estimator settings (TOML); see docs/estimator.md")

@@ -13,7 +13,8 @@ int main(int argc, char** argv) {
   bevel::tools::CommandLine command_line(
       "bevel-targets",
       "Steers to random targets in simulated time and prints how far from them the needle comes to rest.");
-  command_line.option("-n,--targets", o.targets, "targets in each scenario", 1, 100000)
+  command_line.example("bevel-targets --targets 20 --json targets.json")
+      .option("-n,--targets", o.targets, "targets in each scenario", 1, 100000)
       .option("--seed", seed, "the same seed draws the same targets, needles and noise", 0, 2147483647)
       .option("--scenario", o.scenario, "one of them; without, all")
       .option("--tube-share", o.tube_share, "of the law by arcs; below 0: as the controller has it", -1, 10)

@@ -8,7 +8,7 @@
 int main(int argc, char** argv) {
   std::string out;
   bevel::tools::CommandLine command_line("bevel-table1", "Table I and Figures 5, 7 and 8, beside the paper's.");
-  command_line.option("-o,--out", out, "folder for report.html");
+  command_line.example("bevel-table1 --out table1").option("-o,--out", out, "folder for report.html");
   return command_line.run(argc, argv, [&] {
     const auto study = bevel::table1::run_study();
     bevel::table1::print(std::cout, study);

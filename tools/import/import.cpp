@@ -1,0 +1,99 @@
+#include "tools/import/import.hpp"
+
+#include <algorithm>
+#include <cstdio>
+#include <filesystem>
+#include <map>
+#include <stdexcept>
+
+#include "io/csv_export.hpp"
+#include "io/csv_import.hpp"
+#include "tools/common/exit_status.hpp"
+
+namespace bevel::importing {
+namespace {
+
+namespace fs = std::filesystem;
+
+// Files as they are, folders by the .csv files in them.
+std::vector<std::string> csv_files(const std::vector<std::string>& paths) {
+  std::vector<std::string> files;
+  for (const std::string& path : paths) {
+    if (!fs::is_directory(path)) {
+      files.push_back(path);
+      continue;
+    }
+    std::vector<std::string> inside;
+    for (const auto& entry : fs::directory_iterator(path))
+      if (entry.path().extension() == ".csv") inside.push_back(entry.path().string());
+    if (inside.empty()) throw std::runtime_error(path + ": holds no file that ends in .csv");
+    std::ranges::sort(inside);
+    files.insert(files.end(), inside.begin(), inside.end());
+  }
+  return files;
+}
+
+// OUT/NAME.lcm for each, NAME that of the recording. One must not replace another's.
+std::vector<std::string> log_paths(const std::vector<std::string>& recordings, const std::string& out_folder) {
+  std::map<std::string, std::string> taken;
+  std::vector<std::string> logs;
+  for (const std::string& recording : recordings) {
+    fs::path path = fs::path(recording).lexically_normal();
+    if (!path.has_filename()) path = path.parent_path();  // "csv/rec01/"
+    const std::string name = fs::is_directory(path) ? path.filename().string() : path.stem().string();
+    const auto [other, is_new] = taken.emplace(name, recording);
+    if (!is_new)
+      throw std::runtime_error(other->second + " and " + recording + ": would both become " + name +
+                               ".lcm; import them into different folders");
+    logs.push_back((fs::path(out_folder) / (name + ".lcm")).string());
+  }
+  return logs;
+}
+
+int import_exports(const Options& o) {
+  const auto logs = log_paths(o.inputs, o.out_folder);
+  for (std::size_t i = 0; i < logs.size(); ++i) {
+    if (fs::exists(logs[i]))
+      throw std::runtime_error(logs[i] + ": is there already, and may be the log that was exported, which holds more " +
+                               "than the export; give another folder with --out");
+    const io::Recording recording = io::import_exported(o.inputs[i]);
+    io::write_log(recording, logs[i]);
+    std::printf("%s: %zu TIP_MEASUREMENT, %zu TIP_HEADING, %zu ACTUATOR_STATE, %zu MOTION_COMMAND, %zu NEEDLE_STATE\n",
+                logs[i].c_str(), recording.tips.size(), recording.headings.size(), recording.actuators.size(),
+                recording.commands.size(), recording.estimates.size());
+  }
+  return tools::kOk;
+}
+
+}  // namespace
+
+std::string usage_fault(const Options& o) {
+  if (!o.map_path.empty()) return "";
+  if (!o.base.empty()) return "--base needs --columns, whose [base] says what is in its files";
+  const auto file = std::ranges::find_if(o.inputs, [](const std::string& path) { return fs::is_regular_file(path); });
+  if (file == o.inputs.end()) return "";
+  return *file + ": a CSV file of one's own needs --columns (docs/import.md); without it a folder of bevel-export";
+}
+
+int run(const Options& o) {
+  fs::create_directories(o.out_folder);
+  if (o.map_path.empty()) return import_exports(o);
+  const io::ColumnMap map = io::load_column_map(o.map_path);
+  const auto files = csv_files(o.inputs), base = csv_files(o.base);
+  if (map.base_time.has_value() != !base.empty() || (!base.empty() && base.size() != files.size()))
+    throw std::runtime_error(o.map_path + ": " + (map.base_time ? "has [base]" : "has no [base]") + "; given are " +
+                             std::to_string(files.size()) + " files of the tip and " + std::to_string(base.size()) +
+                             " of the base; allowed: " + (map.base_time ? "as many of each" : "none of the base"));
+  const auto logs = log_paths(files, o.out_folder);
+  int status = tools::kOk;
+  for (std::size_t i = 0; i < files.size(); ++i) {
+    const io::ImportedRecording recording = io::import_csv(files[i], map, base.empty() ? "" : base[i]);
+    io::write_log(recording, logs[i]);
+    std::fprintf(stderr, "%s", recording.remarks(files[i]).c_str());
+    if (!recording.left_out.empty()) status = tools::kDamagedInput;
+    std::printf("%s\n%s", logs[i].c_str(), io::summary(recording).c_str());
+  }
+  return status;
+}
+
+}  // namespace bevel::importing
