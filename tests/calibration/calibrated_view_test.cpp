@@ -85,7 +85,7 @@ TEST(CalibratedView, InformationIsThatOfThePixelAndNothingAlongTheRay) {
       off -= off.dot(along) * along;
       scatter += off * off.transpose() / kDraws;
     }
-    const Matrix3d basis = eigen.eigenvectors();
+    const Matrix3d& basis = eigen.eigenvectors();
     const Eigen::Matrix2d product = (basis.transpose() * W * basis).bottomRightCorner<2, 2>() *
                                     (basis.transpose() * scatter * basis).bottomRightCorner<2, 2>();
     EXPECT_LT((product - Eigen::Matrix2d::Identity()).norm(), 0.06) << product;

@@ -12,7 +12,7 @@ namespace {
 using test::TrueCamera;
 
 constexpr double kNoise_px = 0.1;
-constexpr std::uint64_t kSeed = 20260714;
+constexpr unsigned long long kSeed = 20260714;
 
 const Board& board() {
   static const Board one({BoardKind::charuco, 11, 8, 6.0, 4.5});
@@ -27,7 +27,7 @@ double angle_rad(const cv::Matx33d& a, const cv::Matx33d& b) {
 TEST(Fit, ALensFromBoardsInAir) {
   TrueCamera truth;
   const std::vector<TrueCamera> cameras{truth};
-  std::printf("seed %llu, noise %.2f px each way\n", static_cast<unsigned long long>(kSeed), kNoise_px);
+  std::printf("seed %llu, noise %.2f px each way\n", kSeed, kNoise_px);
   const Calibrated got =
       calibrate(board(), test::input_of(cameras, test::shots_of(cameras, board(), 24, 0, kNoise_px, kSeed)));
   const CalibratedCamera& c = got.calibration.cameras.at(0);
@@ -59,7 +59,7 @@ TEST(Fit, TwoCamerasAndTheirWalls) {
     CalibrationInput in = test::input_of(cameras, test::shots_of(cameras, board(), 20, 16, kNoise_px, kSeed + 1));
     in.options.fit_index = fit_index;
     const Calibrated got = calibrate(board(), in);
-    std::printf("--- index %s; seed %llu\n", fit_index ? "fitted" : "held", static_cast<unsigned long long>(kSeed + 1));
+    std::printf("--- index %s; seed %llu\n", fit_index ? "fitted" : "held", kSeed + 1);
     for (size_t c = 0; c < 2; ++c) {
       const CalibratedCamera& camera = got.calibration.cameras[c];
       ASSERT_TRUE(camera.model.wall);

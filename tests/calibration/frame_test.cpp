@@ -13,7 +13,7 @@ namespace bevel::camera {
 namespace {
 
 constexpr double kNoise_px = 0.1;
-constexpr std::uint64_t kSeed = 99;
+constexpr unsigned long long kSeed = 99;
 
 // {A} of the truth: z down in the pictures, y to the right of the first camera, which looks along x; entry 35 mm above
 // the box's middle.
@@ -86,8 +86,8 @@ TEST(Frame, AFiducialGivesTheFrameAndTwoCamerasTheTip) {
   const FrameFigures figures =
       set_frame_by_fiducial(fitted().board, fiducial, place, fitted().calibrated.rig, calibration);
   const auto [worst_mm, rms_mm] = tip_errors_mm(calibration, kNoise_px);
-  std::printf("seed %llu: fiducial RMS %.3f px; tips by the YAML: RMS %.3f mm, largest %.3f mm\n",
-              static_cast<unsigned long long>(kSeed), figures.rms_px, rms_mm, worst_mm);
+  std::printf("seed %llu: fiducial RMS %.3f px; tips by the YAML: RMS %.3f mm, largest %.3f mm\n", kSeed,
+              figures.rms_px, rms_mm, worst_mm);
   EXPECT_NEAR(figures.rms_px, kNoise_px * std::sqrt(2.0), 0.04);
   EXPECT_LT(rms_mm, 0.15);
   EXPECT_LT(worst_mm, 0.4);
@@ -104,8 +104,9 @@ std::vector<InsertedTip> straight_insertion(const Calibration& calibration, doub
   std::mt19937_64 random(seed);
   std::normal_distribution<double> noise(0, noise_px);
   std::vector<InsertedTip> tips;
-  for (double s = 4; s <= 64; s += 0.5)
+  for (int half_mm = 8; half_mm <= 128; ++half_mm)
     for (size_t c = 0; c < 2; ++c) {
+      const double s = 0.5 * half_mm;
       // The ray and its information as a camera gives them whose frame is that of the first camera: any point of it.
       const cv::Point2d px =
           fitted().cameras[c].pixel(to_world({0, 0, s * slip}), true) + cv::Point2d(noise(random), noise(random));
@@ -120,9 +121,8 @@ TEST(Frame, AStraightInsertionGivesTheFrame) {
   Calibration calibration = fitted().calibrated.calibration;
   const FrameFigures figures =
       set_frame_by_insertion(straight_insertion(calibration, kNoise_px, kSeed + 3), 0.0, calibration);
-  std::printf("seed %llu: line RMS %.3f mm, scale %.5f (sd %.5f), tilt sd %.5f rad\n",
-              static_cast<unsigned long long>(kSeed + 3), figures.rms_mm, figures.scale, figures.scale_sd,
-              figures.tilt_sd_rad);
+  std::printf("seed %llu: line RMS %.3f mm, scale %.5f (sd %.5f), tilt sd %.5f rad\n", kSeed + 3, figures.rms_mm,
+              figures.scale, figures.scale_sd, figures.tilt_sd_rad);
   EXPECT_NEAR(figures.scale, 1.0, 0.005);
   EXPECT_EQ(calibration.frame, FrameKind::insertion);
   // The angle about z is by the first camera's line of sight; the truth's x is turned from it by what the truth says.

@@ -11,7 +11,7 @@ namespace {
 
 using test::TrueCamera;
 
-constexpr std::uint64_t kSeed = 4711;
+constexpr unsigned long long kSeed = 4711;
 
 double detection_rms_px(const TrueCamera& camera, const Board& board, const test::BoardPlace& place, bool immersed,
                         const Sighting& seen) {
@@ -41,8 +41,7 @@ TEST_P(Pictures, CornersAreFoundWhereTheyAre) {
     EXPECT_LT(rms, 0.15) << "roll " << roll << ", or the numbers are others";
   }
   std::printf("%s: corners within %.3f px RMS of the truth, seed %llu\n",
-              GetParam() == BoardKind::charuco ? "charuco" : "chessboard", worst,
-              static_cast<unsigned long long>(kSeed));
+              GetParam() == BoardKind::charuco ? "charuco" : "chessboard", worst, kSeed);
 }
 
 TEST_P(Pictures, ALensFromPictures) {

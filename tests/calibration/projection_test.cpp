@@ -26,10 +26,10 @@ TEST(Projection, ThroughAWallIsThePathOfLeastTime) {
   for (const auto& [index, pane_mm] : {std::pair(1.333, 0.0), {1.333, 6.0}, {1.0, 0.0}, {1.47, 3.0}}) {
     const TrueCamera truth = tilted(index, pane_mm);
     const CameraModel model = truth.model(0);
-    for (double x = -70; x <= 70; x += 20)
-      for (double y = -50; y <= 50; y += 20)
+    for (int x = -70; x <= 70; x += 20)
+      for (int y = -50; y <= 50; y += 20)
         for (const double z : {150.0, 220.0}) {
-          const cv::Vec3d p = truth.in_world({x, y, z});
+          const cv::Vec3d p = truth.in_world({1.0 * x, 1.0 * y, z});
           const cv::Point2d expected = truth.pixel(p, true);
           const auto got = model.pixel(p);
           ASSERT_TRUE(got);
@@ -61,9 +61,9 @@ TEST(Projection, AWallOfAirIsNone) {
 TEST(Projection, UndistortsAsOpenCvDistorts) {
   const TrueCamera truth;
   const CameraModel model = truth.model(0);
-  for (double u = 0; u < 640; u += 53)
-    for (double v = 0; v < 480; v += 47) {
-      const auto xy = undistort(model.lens, {u, v});
+  for (int u = 0; u < 640; u += 53)
+    for (int v = 0; v < 480; v += 47) {
+      const auto xy = undistort(model.lens, cv::Point2d(u, v));
       ASSERT_TRUE(xy) << u << " " << v;
       std::vector<cv::Point2d> back;
       cv::projectPoints(std::vector<cv::Point3d>{{(*xy)[0], (*xy)[1], 1.0}}, cv::Vec3d(), cv::Vec3d(), truth.K(),

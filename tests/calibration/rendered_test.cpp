@@ -31,7 +31,7 @@ class Queue : public FrameSource {
 };
 
 TEST(RenderedNeedles, TwoCamerasThroughTheirWallsFindTheTip) {
-  constexpr std::uint64_t kSeed = 77;
+  constexpr unsigned long long kSeed = 77;
   constexpr int kNeedles = 60;
   auto cameras = test::two_cameras();
   const cv::Matx33d R = test::turned(0.03, 0, 0.02) * cv::Matx33d(0, 1, 0, 0, 0, 1, 1, 0, 0);
@@ -62,7 +62,7 @@ TEST(RenderedNeedles, TwoCamerasThroughTheirWallsFindTheTip) {
       Frame frame;
       frame.camera = static_cast<int32_t>(c);
       frame.seq = n;
-      frame.capture_utime = 1'000'000 * (n + 1);
+      frame.capture_utime = std::int64_t{1'000'000} * (n + 1);
       frame.gray = renderers[c].render(needle.points_mm, roll_rad).gray;
       frames.push_back(std::move(frame));
     }
@@ -85,9 +85,8 @@ TEST(RenderedNeedles, TwoCamerasThroughTheirWallsFindTheTip) {
     squares_mm2 += off_mm * off_mm;
     worst_mm = std::max(worst_mm, off_mm);
   }
-  std::printf("seed %llu: %d of %d needles found by both, RMS %.3f mm, largest %.3f mm; %.2f and %.2f px/mm\n",
-              static_cast<unsigned long long>(kSeed), found, kNeedles, std::sqrt(squares_mm2 / found), worst_mm,
-              views[0]->px_per_mm(), views[1]->px_per_mm());
+  std::printf("seed %llu: %d of %d needles found by both, RMS %.3f mm, largest %.3f mm; %.2f and %.2f px/mm\n", kSeed,
+              found, kNeedles, std::sqrt(squares_mm2 / found), worst_mm, views[0]->px_per_mm(), views[1]->px_per_mm());
   EXPECT_GE(found, kNeedles * 9 / 10);
   EXPECT_LT(std::sqrt(squares_mm2 / found), 0.15);
 }

@@ -24,7 +24,7 @@ using camera::BoardKind;
 using camera::CalibratedView;
 using ::testing::HasSubstr;
 
-constexpr std::uint64_t kSeed = 31;
+constexpr unsigned long long kSeed = 31;
 const camera::BoardSpec kBoard{BoardKind::charuco, 8, 6, 9.0, 6.75};
 const cv::Vec3d kEntry_W = test::kBox_mm + cv::Vec3d(0, -30, 0);
 const cv::Matx33d kR_WA = test::turned(0.03, -0.02, 0.02) * cv::Matx33d(0, 1, 0, 0, 0, 1, 1, 0, 0);  // x ahead, z down
@@ -102,7 +102,7 @@ TEST_F(Tool, PicturesAndAFiducialGiveCamerasThatFindTheTip) {
   o.fiducial_y = "-y";
   o.fiducial_origin_mm = {0, 25, 2};
   EXPECT_EQ(run(o, out_, err_), 0);
-  std::printf("seed %llu\n%s%s", static_cast<unsigned long long>(kSeed), out_.str().c_str(), err_.str().c_str());
+  std::printf("seed %llu\n%s%s", kSeed, out_.str().c_str(), err_.str().c_str());
   EXPECT_THAT(err_.str(), HasSubstr("empty.png: no board found"));
   const double worst_mm = worst_tip_mm(path("out/cameras.yaml"));
   std::printf("largest error of a tip in the gel: %.3f mm\n", worst_mm);

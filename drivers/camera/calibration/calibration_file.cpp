@@ -63,18 +63,19 @@ class Reader {
   }
   cv::Mat matrix(const std::string& key, int rows, int cols) const {
     const cv::FileNode node = need(key);
+    const std::string size = std::to_string(rows) + " x " + std::to_string(cols) + " matrix of finite numbers";
+    // Asked before OpenCV makes room for as many as a damaged file may say.
+    const bool sized = node.isMap() && node["rows"].isInt() && node["cols"].isInt() && node["dt"].isString();
+    if (!sized || static_cast<int>(node["rows"]) != rows || static_cast<int>(node["cols"]) != cols ||
+        node["dt"].string() != "d")
+      refuse(key, "is no matrix of that kind, allowed: a " + size);
     cv::Mat out;
     try {
       out = node.mat();
     } catch (const cv::Exception&) {
       out.release();
     }
-    const std::string size = std::to_string(rows) + " x " + std::to_string(cols) + " matrix of finite numbers";
-    if (out.type() != CV_64F || out.rows != rows || out.cols != cols)
-      refuse(key, "is " +
-                      (out.empty() ? std::string("no matrix")
-                                   : std::to_string(out.rows) + " x " + std::to_string(out.cols)) +
-                      ", allowed: a " + size);
+    if (out.type() != CV_64F || out.rows != rows || out.cols != cols) refuse(key, "cannot be read, allowed: a " + size);
     for (int i = 0; i < rows * cols; ++i)
       if (!std::isfinite(out.at<double>(i / cols, i % cols)))
         refuse(key, "has " + number_text(out.at<double>(i / cols, i % cols)) + ", allowed: a " + size);
