@@ -137,7 +137,7 @@ TEST_F(OwnCsv, WhatATableLeavesOpenIsRefusedWithItsLine) {
            {"t,depth,roll,x,x,z\n" + row, "column 'x' is there twice"},
            {header + row + ",1,0,0,0,1\n", "own.csv:3: column 't' is '', and every row with data needs a time"},
            {header + row + "0.1,1,0,0,0,inf\n", "own.csv:3: column 'z' is 'inf', not a finite number; where nothing"},
-           {std::string("\xFF\xFEt\0,", 6), "is UTF-16"},
+           {std::string("\xFF\xFEt\0,", 5), "is UTF-16"},
            {"time,depth,roll,x,y,z\n0,0,0,0,0,0\n", "no column 't'; the nearest is 'x'; there are 'time', 'depth'"}})
     EXPECT_THAT(refusal(folder.write("own.csv", text), map({})), HasSubstr(said)) << text;
 }
