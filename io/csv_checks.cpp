@@ -77,22 +77,38 @@ std::vector<Base> base_at_tips(const PlacedReadings& readings) {
 
 bool sees(const model::TipMeasurement& tip, Eigen::Index axis) { return tip.information_per_mm2(axis, axis) > 0; }
 
+// Where the tip began: the median, of each axis, of the first few readings while the base had moved by less than 1 mm,
+// since a camera may begin with something else. NaN along an axis that was not seen then.
+Eigen::Vector3d tip_at_start(const PlacedReadings& readings, const std::vector<Base>& base) {
+  constexpr double kAtStart_mm = 1;
+  const std::size_t few = std::min<std::size_t>(readings.tips.size(), 9);
+  Eigen::Vector3d start_mm;
+  for (Eigen::Index axis = 0; axis < 3; ++axis) {
+    std::vector<double> seen_mm;
+    for (std::size_t i = 0; i < few && base[i].range_mm <= kAtStart_mm; ++i)
+      if (sees(readings.tips[i].sample, axis)) seen_mm.push_back(readings.tips[i].sample.position_mm[axis]);
+    std::ranges::sort(seen_mm);
+    start_mm[axis] = seen_mm.empty() ? NAN : seen_mm[seen_mm.size() / 2];
+  }
+  return start_mm;
+}
+
 std::string far_tips(const PlacedReadings& readings, const std::vector<Base>& base, const std::string& path) {
-  const model::TipMeasurement& first = readings.tips.front().sample;
+  const Eigen::Vector3d start_mm = tip_at_start(readings, base);
   std::size_t far = 0;
   std::string where;
   for (std::size_t i = 1; i < readings.tips.size(); ++i) {
     const model::TipMeasurement& tip = readings.tips[i].sample;
     double moved_mm = 0, sigma_mm = 0;
     for (Eigen::Index axis = 0; axis < 3; ++axis) {
-      if (!sees(tip, axis) || !sees(first, axis)) continue;
-      moved_mm = std::hypot(moved_mm, tip.position_mm[axis] - first.position_mm[axis]);
+      if (!sees(tip, axis) || std::isnan(start_mm[axis])) continue;
+      moved_mm = std::hypot(moved_mm, tip.position_mm[axis] - start_mm[axis]);
       sigma_mm = std::max(sigma_mm, 1 / std::sqrt(tip.information_per_mm2(axis, axis)));
     }
     const double allowed_mm = base[i].range_mm * (1 + kSlackShare) + kSlack_mm + kSlackSigmas * sigma_mm;
     if (moved_mm <= allowed_mm || far++ > 0) continue;
     where = path + ":" + std::to_string(readings.tips[i].line) + ": the tip is " + figure(moved_mm) +
-            " mm from where it was first (line " + std::to_string(readings.tips.front().line) +
+            " mm from where it began (line " + std::to_string(readings.tips.front().line) +
             "), and the base had moved by " + figure(base[i].range_mm) + " mm; allowed " + figure(allowed_mm) + " mm";
   }
   if (far == 0) return "";
@@ -104,13 +120,14 @@ std::string far_tips(const PlacedReadings& readings, const std::vector<Base>& ba
 }
 
 void require_inward(const PlacedReadings& readings, const std::vector<Base>& base, const std::string& path) {
-  const model::TipMeasurement& first = readings.tips.front().sample;
+  const double start_mm = tip_at_start(readings, base).z();
+  if (std::isnan(start_mm)) return;
   std::vector<std::pair<double, std::size_t>> shares;
   for (std::size_t i = 1; i < readings.tips.size(); ++i) {
     const double in_mm = base[i].at_mm - base.front().at_mm;
-    if (!sees(first, 2) || !sees(readings.tips[i].sample, 2)) continue;
+    if (!sees(readings.tips[i].sample, 2)) continue;
     if (std::abs(in_mm) < kFollowFrom_mm || std::abs(in_mm) > kFollowTo_mm) continue;
-    shares.emplace_back((readings.tips[i].sample.position_mm.z() - first.position_mm.z()) / in_mm, i);
+    shares.emplace_back((readings.tips[i].sample.position_mm.z() - start_mm) / in_mm, i);
   }
   if (shares.empty()) return;
   std::ranges::sort(shares);
