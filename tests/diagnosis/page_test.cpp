@@ -3,11 +3,13 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <cmath>
 #include <filesystem>
 #include <fstream>
 #include <regex>
 
 #include "tests/diagnosis/made_up_findings.hpp"
+#include "tools/diagnose/figures.hpp"
 #include "tools/diagnose/report.hpp"
 
 namespace bevel::diagnose {
@@ -64,6 +66,31 @@ TEST(Page, unknown_effect_shows_curves_and_no_name) {
   EXPECT_THAT(html, HasSubstr("curvature toward the bevel"));
   EXPECT_THAT(html, HasSubstr("The unknown part, described"));
   EXPECT_THAT(html, HasSubstr("a (1 - exp(-(x - 0) / s))"));
+}
+
+TEST(Page, says_by_how_much_the_tip_is_moved_at_depth) {
+  diagnosis::Findings f;
+  EXPECT_FALSE(moved_at_depth(f));
+  // Two recordings, moved by 5 and by 1 mm where each is deepest, and by more where it is not.
+  const auto trace = [&](double deepest_mm, const Eigen::Vector3d& by_mm) {
+    diagnosis::Trace t;
+    for (const double depth_mm : {0.4 * deepest_mm, deepest_mm, 0.7 * deepest_mm}) {
+      t.covariates.push_back({.depth_mm = depth_mm});
+      const bool at_end = depth_mm == deepest_mm;
+      t.before_mm.push_back(Eigen::Vector3d::Constant(7));
+      t.after_mm.push_back(t.before_mm.back() + (at_end ? by_mm : Eigen::Vector3d(90, 0, 0)));
+      t.model_file_mm.push_back(t.after_mm.back() + Eigen::Vector3d(0, 0, at_end ? 2 : 80));
+    }
+    return t;
+  };
+  f.traces = {trace(60, {3, 4, 0}), trace(90, {0, 0, 1})};
+  const auto moved = moved_at_depth(f);
+  ASSERT_TRUE(moved);
+  EXPECT_NEAR(moved->from_refitted_mm, std::sqrt((25 + 1) / 2.0), 1e-12);
+  EXPECT_NEAR(moved->from_file_mm, 2, 1e-12);
+  EXPECT_EQ(moved->depth_mm[0], 60);
+  EXPECT_EQ(moved->depth_mm[1], 90);
+  EXPECT_THAT(page_of(Verdict::effects_found, "page-effects-found.html"), HasSubstr("at depth the tip is moved by"));
 }
 
 // Figures that the diagnosis may leave empty.

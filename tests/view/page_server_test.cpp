@@ -87,7 +87,7 @@ TEST(PageServer, EventsFollowWhatIsPublished) {
     }
   });
   const std::string text =
-      events(served, [](const std::string& t) { return std::count(t.begin(), t.end(), '{') >= 5; });
+      events(served, [](const std::string& t) { return std::count(t.begin(), t.end(), '{') >= 7; });
   done = true;
   publisher.join();
   int last = -1, count = 0;

@@ -42,5 +42,6 @@ int main(int argc, char** argv) {
         if (moves && o.calibration.empty()) return "--insertion needs --calibration, the YAML it was recorded with";
         return "";
       });
+  command_line.example("bevel-calibrate --columns 8 --rows 6 --square-mm 9 --air air0/ air1/ --out calibration");
   return command_line.run(argc, argv, [&] { return bevel::calibrate::run(o, std::cout, std::cerr); });
 }

@@ -123,6 +123,10 @@ void print_verdict(std::ostream& out, const Findings& f) {
       << refitted << measured(h.before.rmse_mm) << ", " << found << measured(h.after.rmse_mm) << ", noise alone "
       << measured(h.noise_floor.rmse_mm) << " mm; chi2 per reading, " << refitted << measured(h.before.chi2_per_dof)
       << ", " << found << measured(h.after.chi2_per_dof) << '\n';
+  if (const auto moved = moved_at_depth(f); moved && !f.two_groups && f.verdict != Verdict::nothing_missing)
+    out << "  what was found moves the tip at the deepest readings by " << measured(moved->from_refitted_mm, 2)
+        << " mm (rms over recordings) beside the needle refitted, by " << measured(moved->from_file_mm, 2)
+        << " mm from where the model file as it stands has it\n";
   out << "  insertions differ by (standard deviation):";
   for (const auto& v : f.variation) out << (&v == f.variation.data() ? " " : ", ") << variation_in_words(v);
   out << '\n';

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <cstdio>
+#include <limits>
 #include <utility>
 
 namespace bevel::diagnose {
@@ -132,6 +133,25 @@ std::vector<std::string> not_to_be_seen(const diagnosis::Findings& f) {
     names.push_back(d.effect);
   }
   return names;
+}
+
+std::optional<MovedAtDepth> moved_at_depth(const diagnosis::Findings& f) {
+  MovedAtDepth moved{.depth_mm = {std::numeric_limits<double>::infinity(), 0}};
+  double from_file = 0, from_refitted = 0;
+  std::size_t count = 0;
+  for (const auto& trace : f.traces) {
+    if (trace.covariates.empty()) continue;
+    const auto at = std::ranges::max_element(trace.covariates, {}, &diagnosis::Covariates::depth_mm);
+    const auto i = static_cast<std::size_t>(at - trace.covariates.begin());
+    moved.depth_mm = {std::min(moved.depth_mm[0], at->depth_mm), std::max(moved.depth_mm[1], at->depth_mm)};
+    from_file += (trace.after_mm[i] - trace.model_file_mm[i]).squaredNorm();
+    from_refitted += (trace.after_mm[i] - trace.before_mm[i]).squaredNorm();
+    ++count;
+  }
+  if (count == 0) return std::nullopt;
+  moved.from_file_mm = std::sqrt(from_file / static_cast<double>(count));
+  moved.from_refitted_mm = std::sqrt(from_refitted / static_cast<double>(count));
+  return moved;
 }
 
 std::string unit_of(std::string_view name) { return std::string(split(name).second); }

@@ -1,6 +1,8 @@
 // Numbers as the tool prints them, on the page and on the terminal.
 #pragma once
 
+#include <array>
+#include <optional>
 #include <string>
 #include <string_view>
 #include <vector>
@@ -36,6 +38,15 @@ bool is_kind_of(std::string_view tried, std::string_view effect, std::string_vie
 bool was_found(const diagnosis::Findings& findings, std::string_view effect);
 // Effects of which no parameter, at the size that the field reports, would have been seen; none that was found.
 std::vector<std::string> not_to_be_seen(const diagnosis::Findings& findings);
+
+// By how much what was found moves the tip, at the deepest reading of each recording: root mean squares over the
+// recordings of distances in space, of predictions, so without the noise of a reading.
+struct MovedAtDepth {
+  std::array<double, 2> depth_mm{};  // shallowest and deepest of those readings
+  double from_file_mm = 0;           // against the model file as it stands
+  double from_refitted_mm = 0;       // against its needle refitted
+};
+std::optional<MovedAtDepth> moved_at_depth(const diagnosis::Findings& findings);  // none without a recording
 
 std::string headline_of(diagnosis::Verdict verdict, bool two_groups = false);  // "Effects found", ...
 

@@ -78,6 +78,11 @@ std::string span_of(const Location& w) {
   return in_words(w.covariate) + " " + from + (from == to ? "" : " to " + to);
 }
 
+std::string depths_of(const MovedAtDepth& moved) {
+  const std::string from = number(moved.depth_mm[0]), to = number(moved.depth_mm[1]);
+  return from == to ? to : from + " to " + to;
+}
+
 bool has_rivals(const Findings& f) {
   return std::any_of(f.effects.begin(), f.effects.end(), [](const auto& e) { return !e.ambiguous_with.empty(); });
 }
@@ -117,6 +122,14 @@ void add_verdict(io::HtmlReport& page, const Findings& f) {
                    "rms per axis, noise alone " + measured(f.held_out.noise_floor.rmse_mm) + " mm; largest " +
                        measured(last.max_mm) + " mm"});
   facts.push_back({"chi2 per reading", change(&FitFigures::chi2_per_dof), "held out; 1: as sure as it may be"});
+  if (const auto moved = moved_at_depth(f); moved && !f.two_groups)
+    facts.push_back(
+        {"at depth the tip is moved by",
+         measured(f.verdict == Verdict::nothing_missing ? moved->from_file_mm : moved->from_refitted_mm, 2) + " mm",
+         f.verdict == Verdict::nothing_missing
+             ? "by refitting the needle; rms over recordings, " + depths_of(*moved) + " mm deep"
+             : "by what was found, beside the needle refitted; " + measured(moved->from_file_mm, 2) +
+                   " mm from where the model file has it; rms over recordings, " + depths_of(*moved) + " mm deep"});
   if (!f.discrepancies.empty())
     facts.push_back({"unknown part", meaning_of(f.discrepancies.front()),
                      "against " + in_words(model::name_of(f.discrepancies.front().curve.covariate))});

@@ -38,7 +38,8 @@ int main(int argc, char** argv) {
       .option("--lcm-url", lcm_url, "LCM provider; default: LCM_DEFAULT_URL")
       .option("--end-with", parent, "id of the process that started this one: end when it is gone", 0,
               std::numeric_limits<int>::max())
-      .arguments("COMMAND", command, "after --: started with the port open, for a bevel-view that it starts", false);
+      .arguments("COMMAND", command, "after --: started with the port open, for a bevel-view that it starts", false)
+      .example("bevel-view --port 8402");
   return command_line.run(argc, argv, [&] {
     const char* given = std::getenv(kSocket);
     const int socket = given ? std::atoi(given) : view::PageServer::open_port(port);
