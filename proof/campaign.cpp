@@ -95,13 +95,17 @@ void claim_folder(const CampaignOptions& options) {
           options.out.string() +
           (options.population.nulls ? ": holds trials with physics concealed" : ": holds nulls only") +
           "; take another folder");
+    if (before.value("two_groups", false) != options.population.two_groups)
+      throw std::runtime_error(options.out.string() + ": holds trials of " +
+                               (options.population.two_groups ? "one group" : "two groups") +
+                               " of recordings; take another folder");
     return;
   }
   write_atomically(path, json{{"seed", options.seed},
                               {"varied", options.population.varied},
                               {"edition", options.population.edition},
                               {"nulls", options.population.nulls},
-                              {"nulls", options.population.nulls}}
+                              {"two_groups", options.population.two_groups}}
                                  .dump(1) +
                              "\n");
 }
@@ -263,6 +267,7 @@ int run_campaign(const CampaignOptions& options, std::ostream& progress) {
                {"varied", options.population.varied},
                {"edition", options.population.edition},
                {"nulls", options.population.nulls},
+               {"two_groups", options.population.two_groups},
                {"sealed", facts.sealed},
                {"tool_sha256", facts.tool_sha256},
                {"commitments_sha256", facts.commitments_sha256},

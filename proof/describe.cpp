@@ -86,6 +86,13 @@ std::string table(bool listed) {
   return text;
 }
 
+std::string changes_of_the_needle() {
+  std::string text;
+  for (const EffectKind& kind : needle_changes())
+    text += (text.empty() ? "" : "; ") + std::string(kind.name) + " (" + ranges_of(kind) + ")";
+  return text;
+}
+
 }  // namespace
 
 std::string describe_distribution() {
@@ -124,6 +131,12 @@ std::string describe_distribution() {
          "curvature by 2 to 15 %, the heading at the entry by 0.2 to 0.7 degrees about x and y, the registration by "
          "0.05 to 0.4 mm, the bevel's roll by 0.01 to 0.06 rad (standard deviations, log-uniform between trials). "
          "What is visible is then what such variation cannot absorb either.\n\n"
+         "## Two groups\n\n"
+         "With --groups four of the eight kinds of insertion are made twice, by other draws, before and after; what is "
+         "concealed, one thing or nothing (pairs become one), is so in those after. Beside the effects below, the "
+         "needle itself may change: " +
+         changes_of_the_needle() +
+         ". No trial is the beam.\n\n"
          "## Camera\n\n"
          "sigma 0.10 to 0.27 in x and y, 1.3 times that in z; neighbouring frames correlate by 0, 0, 0.6, 0.6, 0.85 or "
          "0.9; of the coloured ones a quarter is AR(2) with a second coefficient of -0.35 to 0.15; in 35 % Student's t "

@@ -109,8 +109,17 @@ const std::vector<EffectKind>& catalogue(int edition) {
   return all.at(static_cast<std::size_t>(edition - 1));
 }
 
+const std::vector<EffectKind>& needle_changes() {
+  static const std::vector<EffectKind> all{
+      {"curvature_per_mm", true, {signed_size("change_relative", &P::curvature_change, 0.1, 0.4)}},
+      {"lambda1_per_rad", true, {size("change_per_rad", &P::lambda1_change_per_rad, 0.1, 0.4)}}};
+  return all;
+}
+
 const EffectKind& kind_of(const ConcealedEffect& effect) {
   const std::string& wanted = effect.kind.empty() ? effect.name : effect.kind;
+  for (const EffectKind& kind : needle_changes())
+    if (kind.name == wanted) return kind;
   for (int edition = kEditions; edition > 0; --edition)
     for (const EffectKind& kind : catalogue(edition))
       if (kind.name == wanted && kind.listed == effect.kind.empty()) return kind;

@@ -48,6 +48,8 @@ struct HiddenPhysics {
   double bias_y_per_mm = 0;
   double entry_about_x_rad = 0;
   double entry_about_y_rad = 0;
+  double curvature_change = 0;  // of the needle itself, between two groups: k times 1 + this
+  double lambda1_change_per_rad = 0;
   double other_slip = 0;  // not 0: slip in the bevel plane although the model file says isotropic
   // Camera
   double latency_s = 0;
@@ -102,6 +104,8 @@ struct EffectKind {
 inline constexpr int kEditions = 3;
 inline constexpr int kBeamIsListed = 3;  // from this edition on
 const std::vector<EffectKind>& catalogue(int edition = kEditions);
+// What else may change between two groups of recordings: the needle's own parameters.
+const std::vector<EffectKind>& needle_changes();
 const EffectKind& kind_of(const ConcealedEffect& effect);  // throws std::out_of_range for a name it does not hold
 
 // Sizes as the field reports them; instants and phases for recordings of these durations.

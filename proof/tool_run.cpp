@@ -41,13 +41,24 @@ class StagingFolder {
 
 std::vector<std::string> command_of(const ToolRun& run) {
   const fs::path given = run.sealed ? fs::path("/case") : run.given;
-  std::vector<std::string> logs;
-  for (const auto& entry : fs::directory_iterator(run.given))
-    if (entry.path().extension() == ".lcm") logs.push_back((given / entry.path().filename()).string());
-  std::ranges::sort(logs);
+  const auto logs_in = [&](const fs::path& folder) {
+    std::vector<std::string> logs;
+    for (const auto& entry : fs::directory_iterator(run.given / folder))
+      if (entry.path().extension() == ".lcm") logs.push_back((given / folder / entry.path().filename()).string());
+    std::ranges::sort(logs);
+    return logs;
+  };
   std::vector<std::string> command{run.program.string(), "--model", (given / "model.toml").string(), "--out",
                                    run.sealed ? "/out" : run.output.string()};
-  command.insert(command.end(), logs.begin(), logs.end());
+  const auto add = [&](const std::vector<std::string>& words) {
+    command.insert(command.end(), words.begin(), words.end());
+  };
+  if (fs::is_directory(run.given / "before")) {
+    add({"--baseline"}), add(logs_in("before"));
+    add({"--changed"}), add(logs_in("after"));
+  } else {
+    add(logs_in(""));
+  }
   return command;
 }
 

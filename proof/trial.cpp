@@ -5,6 +5,7 @@
 #include <array>
 #include <cmath>
 #include <numbers>
+#include <numeric>
 #include <set>
 
 #include "model/needle.hpp"
@@ -54,13 +55,18 @@ bool inseparable(const std::string& a, const std::string& b) {
   return are("camera_rotation", "entry_angle") || are("refraction", "camera_scale") || are("layer", "depth_dependence");
 }
 
-std::vector<ConcealedEffect> draw_effects(TrialClass trial_class, Random& random,
-                                          const std::vector<AxisMotion>& motions, int edition) {
+std::vector<ConcealedEffect> draw_effects(TrialClass trial_class, Random& random, const Setting& setting, int edition) {
   std::vector<const EffectKind*> listed;
   std::vector<const EffectKind*> unlisted;
   for (const EffectKind& kind : catalogue(edition)) (kind.listed ? listed : unlisted).push_back(&kind);
+  if (!setting.changed.empty())
+    for (const EffectKind& kind : needle_changes()) listed.push_back(&kind);
   const auto draw = [&](const std::vector<const EffectKind*>& from) {
-    return draw_effect(*random.pick(from), random, motions);
+    ConcealedEffect effect = draw_effect(*random.pick(from), random, setting.motions);
+    if (const auto at_s = effect.per_recording.find("at_s"); at_s != effect.per_recording.end())
+      for (std::size_t i = 0; i < setting.changed.size(); ++i)
+        if (!setting.changed[i]) at_s->second[i] = 0;
+    return effect;
   };
   switch (trial_class) {
     case TrialClass::nothing:
@@ -79,6 +85,19 @@ std::vector<ConcealedEffect> draw_effects(TrialClass trial_class, Random& random
   ConcealedEffect second = draw(listed);
   while (second.name == first.name || inseparable(first.name, second.name)) second = draw(listed);
   return {first, second};
+}
+
+// Of two groups: the same four kinds of insertion in either, each time by other draws.
+std::vector<Script> draw_two_groups(Random& random, bool rich) {
+  const std::vector<Script> after = draw_scripts(random, rich), before = draw_scripts(random, rich);
+  std::vector<std::size_t> kinds(after.size());
+  std::iota(kinds.begin(), kinds.end(), 0);
+  for (std::size_t i = kinds.size(); i-- > 1;) std::swap(kinds[i], kinds[random.index(i + 1)]);
+  kinds.resize(kinds.size() / 2);
+  std::vector<Script> scripts;
+  for (const auto* group : {&after, &before})
+    for (const std::size_t kind : kinds) scripts.push_back((*group)[kind]);
+  return scripts;
 }
 
 // Scales the effect so that about `target` standard deviations of it are visible, within what is physically sensible.
@@ -141,7 +160,7 @@ void state_nearest(Truth& truth, const Setting& setting, const Views& seen) {
 
 // Kinematic plant: sizes, departure, visibility. Returns what the cameras see.
 Views conceal_in_kinematics(Truth& truth, Setting& setting, Random& random, int edition) {
-  auto effects = draw_effects(truth.trial_class, random, setting.motions, edition);
+  auto effects = draw_effects(truth.trial_class, random, setting, edition);
   limit_ripple(truth, setting);
   const bool unlisted = truth.trial_class == TrialClass::unlisted;
   if (!effects.empty()) {
@@ -237,13 +256,19 @@ Trial draw_trial(std::uint64_t seed, int number, const Population& population) {
   Truth& truth = trial.truth;
   truth.trial = number;
   truth.trial_class = population.nulls ? TrialClass::nothing : class_of(seed, number);
-  truth.beam = truth.trial_class == TrialClass::unlisted && random.chance(kBeamShare);
+  // What changes between two groups is one thing.
+  if (population.two_groups && truth.trial_class == TrialClass::two) truth.trial_class = TrialClass::one;
+  truth.beam = truth.trial_class == TrialClass::unlisted && !population.two_groups && random.chance(kBeamShare);
   truth.rich = !random.chance(kPoorShare);
   truth.needle = draw_needle(random);
   truth.noise = draw_camera_noise(random);
   Setting setting;
   setting.ripple = draw_ripple(random);
-  for (const Script& script : draw_scripts(random, truth.rich)) {
+  const auto scripts = population.two_groups ? draw_two_groups(random, truth.rich) : draw_scripts(random, truth.rich);
+  if (population.two_groups)
+    for (std::size_t i = 0; i < scripts.size(); ++i) truth.changed.push_back(i < scripts.size() / 2);
+  setting.changed = truth.changed;
+  for (const Script& script : scripts) {
     TrialRecording recording{follow(script), script, {}, {}};
     recording.frames = draw_frames(truth.noise, recording.motion.duration_s(), random);
     setting.motions.push_back(recording.motion);

@@ -26,8 +26,9 @@ struct TruthEntry {
 struct Truth {
   int trial = 0;
   TrialClass trial_class = TrialClass::nothing;
-  bool beam = false;  // the beam plant: tip_swing, and "unknown" where the tissue relaxes
-  bool rich = true;   // scripts that excite everything
+  bool beam = false;          // the beam plant: tip_swing, and "unknown" where the tissue relaxes
+  bool rich = true;           // scripts that excite everything
+  std::vector<bool> changed;  // of two groups: the recordings in which something is concealed; empty: one group
   std::vector<TruthEntry> entries;
   double visible_sigmas = 0;    // of all together
   std::vector<Rival> rivals;    // listed effects that imitate the one unlisted, below kVisible_sigmas of difference
@@ -65,6 +66,7 @@ struct Population {
   double varied = 0;        // share of trials whose insertions differ
   int edition = kEditions;  // of the distribution; the first, with none varied: the campaigns up to the ninth
   bool nulls = false;       // nothing is concealed in any of them: what a tool is calibrated on
+  bool two_groups = false;  // recordings before and after: what is concealed, is so in those after
 };
 
 // The same trial for the same seed and number, on any machine.

@@ -126,7 +126,10 @@ json as_json(const TruthEntry& entry) {
   return j;
 }
 
-std::string log_name(std::size_t index) { return "rec0" + std::to_string(index + 1) + ".lcm"; }
+std::string log_name(const Truth& truth, std::size_t index) {
+  const std::string group = truth.changed.empty() ? "" : truth.changed[index] ? "after/" : "before/";
+  return group + "rec0" + std::to_string(index + 1) + ".lcm";
+}
 
 }  // namespace
 
@@ -181,6 +184,7 @@ std::string truth_json(const Truth& truth) {
          {"rivals", json::array()}};
   for (const TruthEntry& entry : truth.entries) j["effects"].push_back(as_json(entry));
   for (const Rival& rival : truth.rivals) j["rivals"].push_back({{"name", rival.name}, {"sigmas", rival.sigmas}});
+  if (!truth.changed.empty()) j["changed"] = truth.changed;
   if (truth.spread.any()) {
     j["variation"] = {{"curvature_share", truth.spread.curvature_share},
                       {"entry_rad", truth.spread.entry_rad},
@@ -220,8 +224,10 @@ void write_trial(const fs::path& out, const Trial& trial) {
   fs::create_directories(unfinished);
   json inputs;
   for (std::size_t i = 0; i < trial.recordings.size(); ++i) {
-    write_log(unfinished / log_name(i), trial.recordings[i], trial.truth.noise);
-    inputs[log_name(i)] = io::sha256_of_file(unfinished / log_name(i));
+    const fs::path log = unfinished / log_name(trial.truth, i);
+    fs::create_directories(log.parent_path());
+    write_log(log, trial.recordings[i], trial.truth.noise);
+    inputs[log_name(trial.truth, i)] = io::sha256_of_file(log);
   }
   write_atomically(unfinished / "model.toml", model_file_text(trial.truth));
   inputs["model.toml"] = io::sha256_of_file(unfinished / "model.toml");

@@ -131,9 +131,16 @@ Verdict parse_verdict(std::string_view text_of_file) {
   if (j.is_discarded() || !j.is_object()) fail("not a JSON object");
   Verdict verdict;
   verdict.kind = text(j, "verdict");
+  // Of two groups the same is said of the change.
+  const std::map<std::string, std::string> of_groups{
+      {"unchanged", "nothing-missing"}, {"changed", "effects-found"}, {"changed-unknown", "unknown-effect"}};
+  if (const auto same = of_groups.find(verdict.kind); same != of_groups.end()) verdict.kind = same->second;
   if (verdict.kind != "nothing-missing" && verdict.kind != "effects-found" && verdict.kind != "unknown-effect")
-    fail("the verdict is \"" + verdict.kind + "\", allowed are nothing-missing, effects-found, unknown-effect");
-  for (const json& effect : list(j, "effects")) verdict.effects.push_back(read_effect(effect));
+    fail("the verdict is \"" + verdict.kind +
+         "\", allowed are nothing-missing, effects-found, unknown-effect; of two groups unchanged, changed, "
+         "changed-unknown");
+  for (const char* key : {"effects", "changes"})
+    for (const json& effect : list(j, key)) verdict.effects.push_back(read_effect(effect));
   if (verdict.kind == "nothing-missing" && !verdict.effects.empty()) fail("nothing-missing, yet effects are named");
   if (verdict.kind == "effects-found" && verdict.effects.empty()) fail("effects-found, yet none is named");
   for (const json& location : list(j, "where")) verdict.where.push_back(read_location(location));

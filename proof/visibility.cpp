@@ -69,9 +69,10 @@ Views views_of(const Setting& setting, const BaseNeedle& needle, const HiddenPhy
   Views views;
   for (std::size_t i = 0; i < setting.motions.size(); ++i) {
     const InsertionVariation own = setting.variation.empty() ? InsertionVariation{} : setting.variation[i];
+    HiddenPhysics here = setting.changed.empty() || setting.changed[i] ? physics : HiddenPhysics{};
     BaseNeedle varied = needle;
-    varied.curvature_per_mm *= 1.0 + own.curvature_share;
-    HiddenPhysics here = physics;
+    varied.curvature_per_mm *= (1.0 + own.curvature_share) * (1.0 + here.curvature_change);
+    varied.lambda1_per_rad += here.lambda1_change_per_rad;
     here.entry_about_x_rad += own.about_x_rad;
     here.entry_about_y_rad += own.about_y_rad;
     here.bevel_offset_rad += own.roll_rad;
@@ -128,7 +129,9 @@ Refit refit_base(const Setting& setting, const Views& seen, const BaseNeedle& st
 std::vector<Rival> find_rivals(const Setting& setting, const Views& seen, const BaseNeedle& start,
                                double limit_sigmas) {
   std::vector<Rival> rivals;
-  for (const EffectKind& kind : catalogue()) {
+  std::vector<EffectKind> kinds = catalogue();
+  if (!setting.changed.empty()) kinds.insert(kinds.end(), needle_changes().begin(), needle_changes().end());
+  for (const EffectKind& kind : kinds) {
     // Instants and phases of single recordings are not searched: neither imitates what lasts through all recordings.
     // Nor are jumps of one length: small steps do not lead to it.
     const std::string name = kind.name;

@@ -21,6 +21,7 @@ struct Setting {
   DriveRipple ripple;
   std::vector<InsertionVariation> variation;  // per recording; empty: none
   std::vector<Absorber> absorbers;            // of such variation; empty: none
+  std::vector<bool> changed;                  // of two groups: where physics act; empty: everywhere
 };
 
 using Views = std::vector<Eigen::Matrix3Xd>;  // one a recording

@@ -23,15 +23,15 @@ constexpr int kZooms = 2;
 // What an instant has to bring in a recording to be taken for one, in chi2: its expected odds.
 double instant_cost(double duration_s) { return 2 * std::log(kHappensNot / kHappens * duration_s / kInstantWidth_s); }
 
-// Every phase and instant at the best of a grid, all else as it is.
+// Every phase and instant of the recordings from first to last at the best of a grid, all else as it is.
 void scan_local(const Likelihood& likelihood, const Layout& layout, const VectorXd& shared,
-                std::vector<VectorXd>& local) {
+                std::vector<VectorXd>& local, std::size_t first, std::size_t last) {
   Residuals residuals;
   for (std::size_t i = 0; i < layout.local().size(); ++i) {
     if (!layout.is_scanned(i)) continue;
     const bool instant = layout.is_instant(i);
     const auto at = static_cast<Index>(i);
-    for (std::size_t r = 0; r < local.size(); ++r) {
+    for (std::size_t r = first; r < last; ++r) {
       const double lower = layout.local()[i].parameter->lower, upper = layout.upper(i, r);
       const double cost = instant ? instant_cost(upper) : 0;
       VectorXd trial = local[r];
@@ -133,7 +133,7 @@ bool has_many_minima(const Parameter& parameter) {
 void scan_locals(const Likelihood& likelihood, const CurveColumns& curve, Fit& fitted) {
   for (int scan = 0; scan < kScans && has_scanned(fitted.layout); ++scan) {
     auto scanned = fitted.local;
-    scan_local(likelihood, fitted.layout, fitted.shared, scanned);
+    scan_local(likelihood, fitted.layout, fitted.shared, scanned, 0, scanned.size());
     if (scanned == fitted.local) return;
     Fit again = fit(likelihood, fitted.layout, fitted.shared, scanned, fitted.scales, curve);
     const bool better = again.valid && again.cost < fitted.cost;
@@ -142,8 +142,8 @@ void scan_locals(const Likelihood& likelihood, const CurveColumns& curve, Fit& f
   }
 }
 
-// Each instant in turn taken out, all else fitted anew: kept out where it is not missed. What a scan finds beside
-// parameters that are still off may hold them there.
+// Each instant in turn taken out, all else fitted anew: kept out, or put elsewhere in its recording, where it is not
+// missed. What a scan finds beside parameters that are still off may hold them there.
 void doubt_instants(const Likelihood& likelihood, const CurveColumns& curve, Fit& fitted) {
   const Layout& layout = fitted.layout;
   for (std::size_t i = 0; i < layout.local().size(); ++i) {
@@ -154,7 +154,7 @@ void doubt_instants(const Likelihood& likelihood, const CurveColumns& curve, Fit
       local[r][static_cast<Index>(i)] = 0;
       Fit without = fit(likelihood, layout, fitted.shared, local, fitted.scales, curve);
       if (!without.valid) continue;
-      scan_local(likelihood, layout, without.shared, without.local);
+      scan_local(likelihood, layout, without.shared, without.local, r, r + 1);
       Fit again = fit(likelihood, layout, without.shared, without.local, fitted.scales, curve);
       const auto happened = [&](const Fit& f) {
         return std::count_if(f.local.begin(), f.local.end(),

@@ -51,6 +51,22 @@ class Campaign : public testing::Test {
   std::string said_;
 };
 
+TEST_F(Campaign, OfTwoGroupsBothAreHandedOverByName) {
+  const std::string asked = (folder_ / "asked").string();
+  CampaignOptions o = options("");
+  o.diagnose = write_tool(folder_.path(),
+                          "echo \"$@\" >> '" + asked + "'\n" + kFindOut +
+                              "echo '{\"verdict\": \"unchanged\", \"changes\": []}' > $out/verdict.json\n",
+                          "two_groups");
+  o.population.two_groups = true;
+  o.trials = 1;
+  ASSERT_EQ(run(o), 0);
+  EXPECT_THAT(read_text(asked), testing::ContainsRegex("--baseline [^ ]*before/rec05.lcm .*before/rec08.lcm --changed "
+                                                       "[^ ]*after/rec01.lcm .*after/rec04.lcm"));
+  o.population.two_groups = false;
+  EXPECT_THAT([&] { run(o); }, ThrowsMessage<std::runtime_error>(HasSubstr("holds trials of two groups")));
+}
+
 TEST_F(Campaign, GoesOnWhereItWas) {
   CampaignOptions o = options(count_call() + kSayNothing);
   o.generate_only = true;

@@ -52,6 +52,19 @@ TEST(Score, ExactSetsOnly) {
   EXPECT_FALSE(score(two, "unknown-effect", {effect("layer"), effect("torsional_windup")}).strict);
 }
 
+TEST(Score, OfTwoGroupsTheChangeIsWhatCounts) {
+  const OpenedTruth one = truth_of({layer()});
+  const auto of_groups = [&](const std::string& kind, const std::vector<json>& changes) {
+    return score_verdict(
+        one, parse_verdict(json{{"verdict", kind}, {"effects", json::array()}, {"changes", changes}}.dump()));
+  };
+  EXPECT_TRUE(of_groups("changed", {effect("layer")}).strict);
+  EXPECT_FALSE(of_groups("changed", {effect("curvature_per_mm")}).strict);
+  EXPECT_FALSE(of_groups("changed-unknown", {effect("layer")}).strict);
+  EXPECT_FALSE(of_groups("unchanged", {}).strict);
+  EXPECT_THROW(of_groups("unchanged", {effect("layer")}), std::runtime_error);
+}
+
 TEST(Score, AmbiguousCountsApart) {
   const OpenedTruth one = truth_of({windup()});
   const TrialScore s = score(one, "effects-found", {effect("rotation_backlash", 0.6, {"torsional_windup"})});

@@ -60,6 +60,22 @@ TEST(Trial, StatesWhatItConceals) {
   EXPECT_EQ(opened.effects[0].visible_sigmas, two.truth.entries[0].visible_sigmas);
 }
 
+TEST(Trial, BetweenTwoGroupsOneThingChangesAtMost) {
+  for (const int number : {first_of(TrialClass::two), first_of(TrialClass::unlisted), first_of(TrialClass::nothing)}) {
+    const Trial trial = draw_trial(4, number, {.varied = 1.0, .two_groups = true});
+    const Truth& truth = trial.truth;
+    EXPECT_FALSE(truth.beam);
+    ASSERT_EQ(truth.changed.size(), 8U);
+    EXPECT_EQ(std::count(truth.changed.begin(), truth.changed.end(), true), 4);
+    for (std::size_t i = 0; i < 4; ++i) {  // the same kinds of insertion, but not the same insertions
+      EXPECT_EQ(truth.script_kinds[i], truth.script_kinds[i + 4]);
+      EXPECT_NE(trial.recordings[i].motion.insertion_mm, trial.recordings[i + 4].motion.insertion_mm);
+    }
+    EXPECT_LE(truth.entries.size(), 1U);
+    EXPECT_EQ(truth.trial_class == TrialClass::nothing, truth.entries.empty());
+  }
+}
+
 TEST(Trial, AStiffShaftIsOnTheListFromTheThirdEditionOn) {
   constexpr int number = 6;  // a beam
   const Truth second = draw_trial(4, number, {.edition = 2}).truth;

@@ -28,6 +28,26 @@ Views shifted(Views views, const Eigen::Vector3d& by_mm) {
   return views;
 }
 
+TEST(Visibility, OfTwoGroupsOnlyOneIsChanged) {
+  Setting setting = straight_setting({});
+  const BaseNeedle needle;
+  const Views bare = views_of(setting, needle, {});
+  setting.changed = {true, false, true};
+  HiddenPhysics stiffer;
+  stiffer.curvature_change = 0.2;
+  const Views seen = views_of(setting, needle, stiffer);
+  BaseNeedle bent = needle;
+  bent.curvature_per_mm *= 1.2;
+  const Views all = views_of(setting, bent, {});
+  EXPECT_EQ(seen[0], all[0]);
+  EXPECT_EQ(seen[1], bare[1]);
+  EXPECT_EQ(seen[2], all[2]);
+  // One needle for both groups cannot be it; one for each could.
+  EXPECT_GT(refit_base(setting, seen, needle, {}).sigmas, 10);
+  setting.changed = {true, true, true};
+  EXPECT_LT(refit_base(setting, views_of(setting, needle, stiffer), needle, {}).sigmas, 1e-2);
+}
+
 TEST(Visibility, AConstantShiftInWhiteAndInColouredNoise) {
   for (const double rho : {0.0, 0.6, 0.9}) {
     CameraNoise noise;

@@ -22,6 +22,8 @@ int main(int argc, char** argv) {
       .option("--edition", o.population.edition,
               "of the distribution; 1, with --varied 0: that of the first nine campaigns", 1, bevel::proof::kEditions)
       .flag("--nulls", o.population.nulls, "nothing is concealed in any trial: to calibrate a tool")
+      .flag("--groups", o.population.two_groups,
+            "recordings before and after a change, or none: --baseline LOG... --changed LOG...")
       .option("--out", out, "folder for trials and results; what is there already is not done again")
       .option("--diagnose", diagnose, "the tool under test: PATH --model M.toml --out DIR LOG...")
       .arguments("--also-readable", o.also_readable, "further folders that the tool may read", false)
