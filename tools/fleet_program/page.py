@@ -9,14 +9,15 @@ from . import drift
 STYLE = """
 :root { --ink: #222; --soft: #666; --line: #ddd; }
 body { font: 16px/1.5 system-ui, "Helvetica Neue", Helvetica, Arial, sans-serif; color: var(--ink);
-       max-width: 64rem; margin: 2.5rem auto; padding: 0 1.2rem; background: #fff; }
+       max-width: 72rem; margin: 2.5rem auto; padding: 0 1.2rem; background: #fff; }
 h1 { font-size: 1.7rem; line-height: 1.25; margin: 0 0 1.2rem; }
 h2 { font-size: 1.25rem; margin: 2.2rem 0 .6rem; padding-bottom: .25rem; border-bottom: 1px solid var(--line); }
 caption, .note { color: var(--soft); font-size: .88rem; text-align: left; }
 caption { caption-side: bottom; padding-top: .4rem; }
 table { border-collapse: collapse; margin: 1rem 0; font-size: .88rem; font-variant-numeric: tabular-nums; }
 th, td { padding: .25rem .7rem; border-bottom: 1px solid var(--line); text-align: left; vertical-align: top; }
-th { border-bottom: 2px solid #999; font-weight: 600; } .number { text-align: right; white-space: nowrap; }
+th { border-bottom: 2px solid #999; font-weight: 600; } .number { text-align: right; }
+.number, .date { white-space: nowrap; }
 .facts { display: flex; flex-wrap: wrap; gap: .7rem; margin: 1.1rem 0; }
 .facts div { flex: 1 1 6.5rem; border: 1px solid var(--line); border-radius: 6px; padding: .55rem .8rem; }
 .facts span { display: block; color: var(--soft); font-size: .82rem; } .facts b { font-size: 1.12rem; font-weight: 600; }
@@ -124,9 +125,9 @@ def drift_table(curves):
 def case_table(rows):
     lines = []
     for row in rows:
-        date = row["date"].strftime("%Y-%m-%d %H:%M")
+        date = row["date"].strftime("%Y-%m-%d %H:%M").removesuffix(" 00:00")
         if row["verdict"] is None:
-            lines.append(f"<tr class=bad><td>{text(row['case'])}<td>{text(row['rig'])}<td>{date}<td colspan=7>"
+            lines.append(f"<tr class=bad><td>{text(row['case'])}<td>{text(row['rig'])}<td class=date>{date}<td colspan=7>"
                          f"{text(row['fault'])}")
             continue
         sizes = "<br>".join(
@@ -135,7 +136,7 @@ def case_table(rows):
         name = f'<a href="results/{row["key"]}/report.html">{text(row["case"])}</a>'
         verdict = row["verdict"] + (" (damaged recordings)" if row["exit_status"] == 3 else "")
         lines.append(
-            f"<tr><td>{name}<td>{text(row['rig'])}<td>{date}<td>{verdict}<td>{sizes}"
+            f"<tr><td>{name}<td>{text(row['rig'])}<td class=date>{date}<td>{verdict}<td>{sizes}"
             f"<td class=number>{figure(row['curvature_per_mm'])} ± {figure(row['curvature_sd_per_mm'], 2)}"
             f"<td class=number>{figure(row['noise_mm'], 3)}<td class=number>{figure(row['held_out_before_mm'], 3)}"
             f"<td class=number>{figure(row['held_out_after_mm'], 3)}<td class=number>{figure(row['seconds'], 3)}")
