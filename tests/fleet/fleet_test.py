@@ -157,7 +157,7 @@ class Figures(unittest.TestCase):
         self.assertEqual(rollup.noise_of({"sigma_mm": [None], "ar1": 0.0}, 400), (None, None))
 
 
-class Whole(InFolder):
+class AsAWhole(InFolder):
     def fleet(self, *arguments, status=0, program=STAND_IN):
         done = subprocess.run([ROOT / "tools/fleet", self.folder / "cases", "--out", self.out, "--program", program,
                                *arguments], capture_output=True, text=True, check=False)
@@ -172,6 +172,8 @@ class Whole(InFolder):
     def rows(self):
         return pyarrow.parquet.read_table(self.out / "fleet.parquet").to_pylist()
 
+
+class Whole(AsAWhole):
     def test_a_fleet_goes_on_and_does_only_what_is_new(self):
         for name, model in (("A/1", ""), ("A/2", "k = 0.005"), ("B/1", "status = 3"), ("B/2", "status = 1")):
             self.case(name, model, (name, "two"))
@@ -261,6 +263,8 @@ class Whole(InFolder):
         self.assertIn("127.0.0.1:9", said)
         self.assertIn("the same command goes on", said)
 
+
+class Slurm(AsAWhole):
     def test_slurm_gets_a_job_a_case_and_what_else_it_was_asked_for(self):
         """Against slurm_stand_in.py: what Snakemake's executor asks of Slurm, not what a real one makes of it."""
         self.case("A/1")
