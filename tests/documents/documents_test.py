@@ -179,6 +179,8 @@ class Documents(unittest.TestCase):
             folder = pathlib.Path(name)
             furnish(folder)
             for page, text in RUN:
+                if text.startswith("tools/fleet") and sys.version_info < (3, 11):
+                    continue
                 with self.subTest(f"{page}: {text}"):
                     done = subprocess.run(["bash", "-ec", text], cwd=folder, capture_output=True, text=True, check=False,
                                           timeout=240, stdin=subprocess.DEVNULL)

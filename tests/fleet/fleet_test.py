@@ -96,6 +96,7 @@ class Table(InFolder):
         self.assertIn("no.csv: is not there", self.fault(self.folder / "no.csv"))
         self.assertIn("allowed: .csv, .toml", self.fault(self.table("", "fleet.txt")))
         for text, word in (("[[case]]\n", "unknown key 'case'"), ("cases = 1\n", "[[cases]]"), ("cases = [", "fleet.toml"),
+                           ('[[cases]]\ncase = "1"\nrig = "A"\nmodel = "m"\nlogs = 5\n', "texts"),
                            ('[[cases]]\ncase = 1\nrig = "A"\nmodel = "m"\nlogs = "l"\n', "texts")):
             self.assertIn(word, self.fault(self.table(text, "fleet.toml")))
 
@@ -177,7 +178,7 @@ class Whole(AsAWhole):
     def test_a_fleet_goes_on_and_does_only_what_is_new(self):
         for name, model in (("A/1", ""), ("A/2", "k = 0.005"), ("B/1", "status = 3"), ("B/2", "status = 1")):
             self.case(name, model, (name, "two"))
-        first = self.fleet("--cores", "2", status=1)
+        first = self.fleet("--jobs", "2", status=1)
         self.assertIn("B/2: stand_in: rec01.lcm: is no recording", first.stderr)
         rows = {row["case"]: row for row in self.rows()}
         self.assertEqual([row["exit_status"] for row in rows.values()], [0, 0, 3, None])
@@ -215,7 +216,7 @@ class Whole(AsAWhole):
             self.case(f"A/{i}", "seconds = 60", (str(i), "two"))
         for engine, word in (("snakemake", signal.SIGINT), ("dask", signal.SIGTERM)):
             fleet = subprocess.Popen([ROOT / "tools/fleet", self.folder / "cases", "--out", self.out, "--program", STAND_IN,
-                                      "--engine", engine, "--cores", "1"], stderr=subprocess.PIPE, text=True)
+                                      "--engine", engine, "--jobs", "1"], stderr=subprocess.PIPE, text=True)
             for _ in range(600):  # until a case is at work
                 time.sleep(0.1)
                 if any((self.out / "work").glob("*-*/")) and self.at_work():
@@ -248,7 +249,7 @@ class Whole(AsAWhole):
 
     def test_bad_usage_is_named_before_anything_is_made(self):
         self.case("A/1")
-        for arguments, word in ((["--cors", "2"], "did you mean --cores?"), (["--cores", "0"], "allowed: 1 to 100000"),
+        for arguments, word in ((["--jbos", "2"], "did you mean --jobs?"), (["--jobs", "0"], "allowed: 1 to 100000"),
                                 (["--engine", "make"], "snakemake"), (["--engine", "dask", "--slurm"], "--engine snakemake"),
                                 (["--scheduler", "tcp://h:1"], "--engine dask")):
             self.assertIn(word, self.fleet(*arguments, status=2).stderr)

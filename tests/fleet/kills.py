@@ -8,11 +8,13 @@ mean; then compares. A fifth of the pauses begin with the run, the others when i
 until then on a loaded machine, and would get nowhere. --stand-in: tests/fleet/stand_in.py in place of bevel-diagnose, with cases it reads.
 Exit status: 0 all held, 1 something did not, and is named, 2 usage.
 
-Of the cores used two shares are printed: of all time of all cores, and of what other processes left of it, since a machine
-may have others at work (from /proc/stat).
+Of the cores used three shares are printed: the CPU time of the cases that were kept of all time of all cores; of what other
+processes left of that (from /proc/stat), since a machine may have others at work; and the time in which a case was at work
+of the time of all that may be at work at once.
 """
 import argparse
 import collections
+import ctypes
 import json
 import os
 import pathlib
@@ -36,6 +38,7 @@ flock -n 9 || echo "together $key" >>"$out/ledger"
 echo "start $key" >>"$out/ledger"
 exec PROGRAM "$@"
 """
+PR_SET_CHILD_SUBREAPER = 36  # linux/prctl.h
 KINDS = {"fleet": "tools/fleet\0", "engine": "snakemake\0", "case": "one_case.py\0", "program": "--model\0"}
 
 
@@ -105,13 +108,26 @@ class CoreUse:
         return used.ru_utime + used.ru_stime
 
     def __exit__(self, *_):
+        while reaped_one():
+            pass
         wall, busy, idle, ours = (now - then for now, then in
                                   zip((time.monotonic(), *machine_s(), self.ours()), self.begun))
         self.wall, self.given = wall, max(os.cpu_count() * wall - (busy - ours), 1e-9)
 
-    def share(self, seconds):
-        return (f"{100 * seconds / (os.cpu_count() * self.wall):.1f} % of {os.cpu_count()} cores x {self.wall:.1f} s, "
-                f"{100 * seconds / self.given:.1f} % of the {self.given:.1f} s that others left")
+    def shares(self, out):
+        kept = [json.loads(file.read_text(encoding="utf-8")) for file in (out / "results").glob("*/case.json")]
+        cpu, at_work = (sum(case[name] for case in kept) for name in ("cpu_s", "seconds"))
+        slots = len(os.sched_getaffinity(0)) * self.wall
+        return (f"{100 * cpu / (os.cpu_count() * self.wall):.1f} % of {os.cpu_count()} cores x {self.wall:.1f} s, "
+                f"{100 * cpu / self.given:.1f} % of the {self.given:.1f} s that others left; at work {100 * at_work / slots:.1f} %")
+
+
+def reaped_one():
+    """What an engine that was killed left behind is our child now, and counts when it is waited for."""
+    try:
+        return os.waitpid(-1, os.WNOHANG)[0] != 0
+    except ChildProcessError:
+        return False
 
 
 def processes(out, kind):
@@ -182,12 +198,9 @@ def verdicts(out):
     return found
 
 
-def cpu_of_results(out):
-    return sum(json.loads(file.read_text(encoding="utf-8"))["cpu_s"] for file in (out / "results").glob("*/case.json"))
-
-
 def main():
     options = arguments()
+    ctypes.CDLL(None).prctl(PR_SET_CHILD_SUBREAPER, 1, 0, 0, 0)
     work = options.out.resolve()
     if work.exists():
         sys.exit(f"kills: {work}: is there already")
@@ -206,13 +219,13 @@ def main():
     quiet, disturbed = work / "undisturbed", work / "disturbed"
     with CoreUse() as use:
         status = run(command(quiet)).wait()
-    print(f"undisturbed: status {status}, {len(verdicts(quiet))} results, CPU time in cases: "
-          f"{use.share(cpu_of_results(quiet))}")
+    print(f"undisturbed: status {status}, {len(verdicts(quiet))} results; CPU time in cases: "
+          f"{use.shares(quiet)}")
     engine = KINDS["engine"] if options.engine == "snakemake" else "dask_engine.py\0"
     with CoreUse() as use:
-        runs, kills = run_with_kills(command(disturbed), work if options.engine == "dask" else disturbed, options, engine)
-    print(f"with kills: {runs} runs, killed {dict(sorted(kills.items()))}, {len(verdicts(disturbed))} results, CPU time in "
-          f"cases that were kept: {use.share(cpu_of_results(disturbed))}")
+        runs, kills = run_with_kills(command(disturbed), disturbed, options, engine)
+    print(f"with kills: {runs} runs, killed {dict(sorted(kills.items()))}, {len(verdicts(disturbed))} results; CPU time in "
+          f"cases that were kept: {use.shares(disturbed)}")
     with CoreUse() as use:
         again = run(command(disturbed)).wait()
     print(f"once more: status {again}, {use.wall:.1f} s")

@@ -71,7 +71,7 @@ def from_csv(path):
         columns = next(lines, [])
         check_columns(columns, f"{path}:1")
         for name in COLUMNS:
-            if columns.count(name) != 1 and name != "date":
+            if columns.count(name) != 1 and not (name == "date" and name not in columns):
                 raise Fault(f"{path}:1: {'no column' if name not in columns else 'twice the column'} '{name}'")
         rows = []
         for cells in lines:
@@ -103,11 +103,10 @@ def from_toml(path):
         for name in COLUMNS:
             if name not in row and name != "date":
                 raise Fault(f"{place}: no '{name}'")
-        if isinstance(row["logs"], str):
-            row["logs"] = [row["logs"]]
-        texts = [row[name] for name in ("case", "rig", "model")] + list(row["logs"])
-        if not isinstance(row["logs"], list) or not all(isinstance(text, str) for text in texts):
+        logs = row["logs"] if isinstance(row["logs"], list) else [row["logs"]]
+        if not all(isinstance(text, str) for text in [row["case"], row["rig"], row["model"], *logs]):
             raise Fault(f"{place}: case, rig and model are texts, logs a list of texts")
+        row["logs"] = logs
     return [(f"{path}: case {number}", row) for number, row in enumerate(rows, 1)]
 
 

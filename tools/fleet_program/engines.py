@@ -11,20 +11,22 @@ import time
 
 HERE = pathlib.Path(__file__).resolve().parent
 RETRIES = 2  # of a case whose process was killed or whose machine was lost; refusals of input are none
+PROGRESS_S = 1.0
 PATIENCE_S = 10.0  # for an engine that was told to end
 
 
 def configuration(out, keys, options):
-    return {"keys": keys, "command": [sys.executable, str(HERE / "one_case.py"), str(out)], "threads": options.threads,
-            "cores": options.cores, "scheduler": options.scheduler, "retries": RETRIES}
+    # -S: it needs the standard library alone, and starts sooner without looking for more.
+    return {"keys": keys, "command": [sys.executable, "-S", str(HERE / "one_case.py"), str(out)],
+            "threads": options.threads, "jobs": options.jobs, "scheduler": options.scheduler, "retries": RETRIES}
 
 
 def command_line(folder, options):
     """Of the engine, for a run whose files are in `folder`."""
     if options.engine == "dask":
         return [sys.executable, str(HERE / "dask_engine.py"), str(folder / "config.json")]
-    where = ["--executor", "slurm", "--jobs", str(options.cores)] if options.slurm else [
-        "--cores", str(options.cores * options.threads)]
+    where = ["--executor", "slurm", "--jobs", str(options.jobs)] if options.slurm else [
+        "--cores", str(options.jobs * options.threads)]
     return [sys.executable, "-m", "snakemake", "--snakefile", str(HERE / "Snakefile"), "--directory", str(folder),
             "--configfile", str(folder / "config.json"), "--runtime-source-cache-path", str(folder / "cache"), *where,
             "--keep-going", "--retries", str(RETRIES), "--scheduler", "greedy", "--nocolor", *options.passed_on]
@@ -48,9 +50,12 @@ def run(root, out, keys, options, progress):
                                       stdin=subprocess.DEVNULL, stdout=log, stderr=log, env=environment(root),
                                       start_new_session=True)
         try:
+            shown_s = 0.0
             while engine.poll() is None:
-                progress()
-                time.sleep(0.2)
+                if time.monotonic() - shown_s > PROGRESS_S:
+                    progress()
+                    shown_s = time.monotonic()
+                time.sleep(0.1)
             progress()
         finally:
             end(engine)

@@ -58,9 +58,11 @@ def fault_of_result(spec, answer, folder):
     if answer["status"] not in DONE:
         return answer["said"] or f"{spec['program']} ended with status {answer['status']} and said nothing"
     try:
-        json.loads((folder / "verdict.json").read_text(encoding="utf-8"))
+        verdict = json.loads((folder / "verdict.json").read_text(encoding="utf-8"))
+        if missing := [name for name in ("verdict", "effects", "noise", "fit") if name not in verdict]:
+            raise ValueError(f"it has no '{missing[0]}'")
     except (OSError, ValueError) as reason:
-        return f"{spec['program']} ended with status {answer['status']} and wrote no verdict.json: {reason}"
+        return f"{spec['program']} ended with status {answer['status']} and wrote no verdict.json of use: {reason}"
     read = cases.digests(pathlib.Path(spec["model_path"]), [pathlib.Path(log) for log in spec["log_paths"]])
     if cases.sha256_of(spec["program"]) != spec["program_sha256"]:
         return f"{spec['program']} changed while it ran; run the fleet again"

@@ -81,11 +81,12 @@ def svg(title, unit, points):
     def y(value):
         return TOP + (high - value) / (high - low) * (HEIGHT - TOP - BOTTOM)
 
+    digits = 3 + max(0, int(math.log10(max(abs(low), abs(high)) / (high - low))))
     marks = []
     for share in (0.1, 0.5, 0.9):
         value = low + share * (high - low)
         marks.append(f'<line x1="{LEFT}" x2="{WIDTH - RIGHT}" y1="{y(value):.1f}" y2="{y(value):.1f}" stroke="#eee"/>'
-                     f'<text x="{LEFT - 5}" y="{y(value) + 3.5:.1f}" text-anchor="end">{figure(value, 3)}</text>')
+                     f'<text x="{LEFT - 5}" y="{y(value) + 3.5:.1f}" text-anchor="end">{figure(value, digits)}</text>')
     for t, anchor in ((first, "start"), (last, "end"))[: 2 if last > first else 1]:
         when = datetime.datetime(1970, 1, 1) + datetime.timedelta(days=t)
         label = when.strftime("%Y-%m-%d" if span > 2 else "%Y-%m-%d %H:%M")
@@ -111,7 +112,7 @@ def drift_table(curves):
     for title, unit, points in curves:
         line = drift.trend(*zip(*points))
         if not line:
-            lines.append(f"<tr><td>{text(title)}<td>{unit}<td class=number>{len(points)}<td><td><td><td>")
+            lines.append(f"<tr><td>{text(title)}<td>{unit}<td class=number>{len(points)}" + 4 * "<td class=number>–")
             continue
         ratio = line.per_day / line.per_day_sd
         marked = " class=drifts" if abs(ratio) > MARKED_SD else ""

@@ -69,7 +69,7 @@ def noise_of(noise, readings):
     if not squares:
         return None, None
     sigma = math.sqrt(sum(squares) / len(squares))
-    r2 = noise["ar1"]**2
+    r2 = (noise.get("ar1") or 0.0)**2
     if not readings or r2 >= 1:
         return sigma, None
     return sigma, sigma * math.sqrt((1 + r2) / (1 - r2) / (2 * readings * len(squares)))

@@ -46,7 +46,7 @@ def options_of(arguments, root):
     parser.add_argument("fleet", nargs="?", type=pathlib.Path)
     parser.add_argument("--out", type=pathlib.Path)
     parser.add_argument("--engine", choices=("snakemake", "dask"), default="snakemake")
-    parser.add_argument("--cores", type=number(1, 100000))
+    parser.add_argument("--jobs", type=number(1, 100000))
     parser.add_argument("--threads", type=number(1, 64), default=1)
     parser.add_argument("--slurm", action="store_true")
     parser.add_argument("--scheduler", default="")
@@ -63,7 +63,8 @@ def options_of(arguments, root):
         parser.error("--slurm and options after -- are for --engine snakemake")
     if options.engine != "dask" and options.scheduler:
         parser.error("--scheduler is for --engine dask")
-    options.cores = options.cores or (SLURM_JOBS if options.slurm else len(os.sched_getaffinity(0)))
+    cores = len(os.sched_getaffinity(0))
+    options.jobs = options.jobs or (SLURM_JOBS if options.slurm else max(1, cores // options.threads))
     return options
 
 
