@@ -35,7 +35,7 @@ if __name__ == "__main__":
         status = main(json.loads(pathlib.Path(sys.argv[1]).read_text(encoding="utf-8")))
     except KeyboardInterrupt:
         status = 130
-    except OSError as reason:  # no scheduler there
+    except (OSError, ValueError) as reason:  # no scheduler there, or no address
         print(f"dask: {reason}", file=sys.stderr)
         status = 1
     sys.stderr.flush()

@@ -8,6 +8,9 @@ FIT = {"as_it_stands": "held_out_as_it_stands_mm", "before": "held_out_before_mm
        "noise_floor": "held_out_noise_mm"}
 
 
+NOT_DONE = "not done yet"
+
+
 def rows(out, found):
     """Of all cases, in the order of rig and date; of those without a result, `fault` says why."""
     return sorted((row_of(out, case) for case in found), key=lambda row: (row["rig"], row["date"], row["case"]))
@@ -43,7 +46,7 @@ def fault_of(out, key):
     try:
         return json.loads((out / "refused" / f"{key}.json").read_text(encoding="utf-8"))["fault"]
     except (OSError, ValueError, KeyError):
-        return "not done yet"
+        return NOT_DONE
 
 
 def effects_of(verdict):

@@ -170,7 +170,8 @@ def conclude(out, found, options, unfinished):
         print(unfinished, file=sys.stderr)
     missing = [row for row in rows if row["verdict"] is None]
     for row in missing:
-        print(f"fleet: {row['case']}: {row['fault']}", file=sys.stderr)
+        if row["fault"] != rollup.NOT_DONE:
+            print(f"fleet: {row['case']}: {row['fault']}", file=sys.stderr)
     damaged = sum(row["exit_status"] == DAMAGED for row in rows)
     print(f"{len(rows)} cases of {len({row['rig'] for row in rows})} rigs: {len(rows) - len(missing)} diagnosed"
           + (f", {damaged} of them from damaged recordings" if damaged else "")
