@@ -5,7 +5,8 @@ Usage: tests/fleet/kills.py --out DIR [--cases N] [--seed S] [--engine E] [--eve
 Generates the cases (two insertions each, by bevel-blindtrial), has tools/fleet do them once undisturbed, and once while
 it, its engine, the process of a case or bevel-diagnose is ended by SIGKILL, K times, after random pauses of T seconds in the
 mean; then compares. A fifth of the pauses begin with the run, the others when it has begun a case: Snakemake needs seconds
-until then on a loaded machine, and would get nowhere. --stand-in: tests/fleet/stand_in.py in place of bevel-diagnose, with cases it reads.
+until then on a loaded machine, and would get nowhere. --stand-in: tests/fleet/stand_in.py in place of bevel-diagnose, with
+cases that it reads.
 Exit status: 0 all held, 1 something did not, and is named, 2 usage.
 
 Of the cores used three shares are printed: the CPU time of the cases that were kept of all time of all cores; of what other
@@ -119,7 +120,8 @@ class CoreUse:
         cpu, at_work = (sum(case[name] for case in kept) for name in ("cpu_s", "seconds"))
         slots = len(os.sched_getaffinity(0)) * self.wall
         return (f"{100 * cpu / (os.cpu_count() * self.wall):.1f} % of {os.cpu_count()} cores x {self.wall:.1f} s, "
-                f"{100 * cpu / self.given:.1f} % of the {self.given:.1f} s that others left; at work {100 * at_work / slots:.1f} %")
+                f"{100 * cpu / self.given:.1f} % of the {self.given:.1f} s that others left; "
+                f"at work {100 * at_work / slots:.1f} %")
 
 
 def reaped_one():
