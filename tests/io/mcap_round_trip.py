@@ -61,4 +61,9 @@ with tempfile.TemporaryDirectory() as name:
     (first / "motion_command.csv").write_text("utime,seq,mode,insertion_rate_mm_s,rotation_rate_rad_s\n1,0,1,nan,0\n")
     assert "motion_command.csv:2" in run(*tool, "export", first, here / "nan.mcap", status=1)
     assert not (here / "nan.mcap").exists()
+    for row, word in (("1,0,1,1", "4 cells"), (",0,1,1,1", "utime is ''"), ("1,0,x,1,1", "no number"),
+                      ("1,0,01,1,1", "no number")):
+        (first / "motion_command.csv").write_text(f"utime,seq,mode,insertion_rate_mm_s,rotation_rate_rad_s\n1,0,1,1,1\n{row}\n")
+        said = run(*tool, "export", first, here / "bad.mcap", status=1)
+        assert "motion_command.csv:3" in said and word in said, said
 print("ok")

@@ -1,0 +1,2 @@
+"""tools/fleet in parts: cases.py reads the table, one_case.py does a case, engines.py runs many of it, rollup.py makes the
+Parquet table of the results, drift.py the trend of a rig, page.py the page; run.py puts them together."""
