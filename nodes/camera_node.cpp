@@ -1,6 +1,7 @@
 #include "nodes/camera_node.hpp"
 
 #include <algorithm>
+#include <cmath>
 #include <stdexcept>
 
 #include "drivers/camera/calibrated_view.hpp"
@@ -42,6 +43,9 @@ tip_heading_t to_heading(const camera::TipObservation& seen, std::int64_t seq) {
 CameraNode::CameraNode(lcm::LCM& lcm, const SystemConfig& config)
     : port_(lcm), status_(port_, camera_process_name(config), 0) {
   if (config.cameras.empty()) throw std::invalid_argument("no [[camera]] in the configuration: at least one is needed");
+  // Stamps of files are their own, and those of recorded frames are right already.
+  const bool live =
+      config.source.kind == camera::SourceKind::device || config.source.kind == camera::SourceKind::stream;
   std::vector<camera::CameraSetup> setups;
   for (const CameraViewConfig& c : config.cameras) {
     if (c.headings) with_headings_.insert(c.camera);
@@ -50,7 +54,7 @@ CameraNode::CameraNode(lcm::LCM& lcm, const SystemConfig& config)
       view = std::make_shared<camera::CalibratedView>(*c.calibrated);
     else
       view = std::make_shared<camera::PlanarView>(c.view);
-    setups.push_back({c.camera, std::move(view), c.tracker, {}});
+    setups.push_back({c.camera, std::move(view), c.tracker, {}, live ? std::llround(1e6 * c.latency_s) : 0});
   }
   pipeline_ = std::make_unique<camera::CameraPipeline>(camera::make_frame_source(config.source), setups);
   port_.subscribe<needle_state_t>(

@@ -23,7 +23,7 @@ CameraPipeline::CameraPipeline(std::unique_ptr<FrameSource> source, const std::v
     if (!setup.view) throw std::invalid_argument(name + ": no view");
     if (eyes_.contains(setup.camera)) throw std::invalid_argument(name + ": set up twice");
     try {
-      Eye eye{setup.view, TipTracker(setup.tracker, setup.view->px_per_mm()), {}, {}};
+      Eye eye{setup.view, TipTracker(setup.tracker, setup.view->px_per_mm()), setup.latency_us, {}, {}};
       if (!setup.background.empty()) eye.tracker.set_background(setup.background);
       eyes_.emplace(setup.camera, std::move(eye));
     } catch (const std::invalid_argument& error) {
@@ -77,7 +77,7 @@ TipObservation CameraPipeline::observe(Eye& eye, const Frame& frame) {
   }
   ++counters_.by_status[static_cast<size_t>(tip.status)];
   TipObservation seen;
-  seen.capture_utime = frame.capture_utime;
+  seen.capture_utime = frame.capture_utime - eye.latency_us;
   seen.seq = frame.seq;
   seen.camera = frame.camera;
   seen.status = tip.status;

@@ -39,7 +39,8 @@ struct CameraSetup {
   int32_t camera = 0;
   std::shared_ptr<const View> view;
   TrackerConfig tracker;
-  cv::Mat background;  ///< optional picture without a needle
+  cv::Mat background;      ///< optional picture without a needle
+  int64_t latency_us = 0;  ///< taken off the stamps of its frames: by how much they are late
 };
 
 struct CameraCounters {
@@ -71,6 +72,7 @@ class CameraPipeline {
   struct Eye {
     std::shared_ptr<const View> view;
     TipTracker tracker;
+    int64_t latency_us = 0;
     std::optional<int64_t> last_seq;
     std::optional<cv::Point2d> predicted_px;
   };
