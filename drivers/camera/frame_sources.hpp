@@ -2,6 +2,8 @@
 // The adapters behind make_frame_source(); include frame_source.hpp instead unless you are a test.
 #include <filesystem>
 #include <opencv2/videoio.hpp>
+#include <optional>
+#include <string>
 #include <vector>
 
 #include "drivers/camera/frame_source.hpp"
@@ -21,15 +23,21 @@ class FolderSource : public FrameSource {
   size_t next_ = 0;
 };
 
+/// Stamped by the container's own times, from its first frame on. A file that ends before the length that it states is
+/// a failure after its last good frame.
 class VideoSource : public FrameSource {
  public:
   explicit VideoSource(const SourceConfig& config);
   FrameResult next(std::chrono::milliseconds timeout) override;
 
  private:
+  std::optional<std::string> missing() const;
+
   SourceConfig config_;
   cv::VideoCapture capture_;
   int64_t seq_ = 0;
+  int64_t last_us_ = 0;  // of the last frame, in the file's time
+  bool ended_ = false;
 };
 
 /// Video4Linux. One buffer, so that a frame is never older than one period when it is read; stamped by the driver.
