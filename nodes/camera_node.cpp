@@ -48,6 +48,7 @@ CameraNode::CameraNode(lcm::LCM& lcm, const SystemConfig& config)
       config.source.kind == camera::SourceKind::device || config.source.kind == camera::SourceKind::stream;
   std::vector<camera::CameraSetup> setups;
   for (const CameraViewConfig& c : config.cameras) {
+    latency_known_ = latency_known_ || c.latency_s != 0;
     if (c.headings) with_headings_.insert(c.camera);
     std::shared_ptr<const camera::View> view;
     if (c.calibrated)
@@ -65,6 +66,16 @@ CameraNode::CameraNode(lcm::LCM& lcm, const SystemConfig& config)
       2);
 }
 
+std::string CameraNode::remark() const {
+  const camera::CameraCounters& c = pipeline_->counters();
+  std::string text;
+  if (c.lost_frames > 0) text = std::to_string(c.lost_frames) + " frames lost";
+  if (c.stamped_on_arrival > 0 && !latency_known_)
+    text += std::string(text.empty() ? "" : "; ") +
+            "the driver tells no capture times, and no latency_s is set (bevel-calibrate --latency)";
+  return text;
+}
+
 CameraNode::Outcome CameraNode::step(const Now& now, int timeout_ms) {
   port_.tell_time(now);
   port_.rethrow();
@@ -73,7 +84,7 @@ CameraNode::Outcome CameraNode::step(const Now& now, int timeout_ms) {
     failure_ = "another process for the same camera is heard on this network";
     return Outcome::failed;
   }
-  status_.report("running", "");
+  status_.report("running", remark());
   if (std::holds_alternative<camera::FrameTimeout>(result)) return Outcome::nothing;
   if (std::holds_alternative<camera::EndOfFrames>(result)) return Outcome::ended;
   if (const auto* failure = std::get_if<camera::SourceFailure>(&result)) {

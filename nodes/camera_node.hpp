@@ -32,12 +32,16 @@ class CameraNode {
   std::function<void(const camera::TipObservation&)> on_observation;
 
  private:
+  // What PROCESS_STATUS says of the frames; empty if there is nothing to say.
+  std::string remark() const;
+
   LcmPort port_;
   std::unique_ptr<camera::CameraPipeline> pipeline_;
   StatusReporter status_;
   std::string failure_;
   std::map<int, std::int64_t> seq_;  // each camera counts for itself
   std::set<int> with_headings_;
+  bool latency_known_ = false;
 };
 
 }  // namespace bevel::nodes

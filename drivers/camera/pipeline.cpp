@@ -66,6 +66,7 @@ TipObservation CameraPipeline::observe(Eye& eye, const Frame& frame) {
   ++counters_.frames;
   if (eye.last_seq && frame.seq > *eye.last_seq + 1) counters_.lost_frames += frame.seq - *eye.last_seq - 1;
   eye.last_seq = frame.seq;
+  counters_.stamped_on_arrival += frame.stamped_on_arrival ? 1 : 0;
   TipResult tip = eye.tracker.track(frame, clock_ ? clock_() : 0, std::exchange(eye.predicted_px, {}));
   Vector3 position_mm{};
   if (tip.status == TipStatus::ok) {

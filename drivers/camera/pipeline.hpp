@@ -45,7 +45,8 @@ struct CameraSetup {
 
 struct CameraCounters {
   int64_t frames = 0;
-  int64_t lost_frames = 0;     ///< gaps in seq
+  int64_t lost_frames = 0;  ///< gaps in seq
+  int64_t stamped_on_arrival = 0;
   int64_t unknown_camera = 0;  ///< frames of cameras that are not set up; dropped
   std::array<int64_t, kTipStatuses> by_status{};
   int64_t headings = 0;  ///< frames with a usable one
