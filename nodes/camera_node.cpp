@@ -66,6 +66,26 @@ CameraNode::CameraNode(lcm::LCM& lcm, const SystemConfig& config)
       2);
 }
 
+void CameraNode::record(const std::string& folder) {
+  recorder_ = std::make_unique<camera::FrameRecorder>(folder);
+  pipeline_->on_tracked = [this](const cv::Mat& gray, const camera::TipObservation& o) {
+    recorder_->offer(gray, {.utime = o.capture_utime,
+                            .seq = o.seq,
+                            .camera = o.camera,
+                            .status = static_cast<std::int32_t>(o.status),
+                            .tip_px = o.tip_px,
+                            .file = {}});
+  };
+}
+
+std::string CameraNode::end_recording() {
+  if (!recorder_) return "";
+  recorder_->finish();
+  const auto counts = recorder_->counts();
+  return std::to_string(counts.written) + " frames recorded, " + std::to_string(counts.dropped) + " dropped" +
+         (counts.failure.empty() ? "" : "; " + counts.failure);
+}
+
 std::string CameraNode::remark() const {
   const camera::CameraCounters& c = pipeline_->counters();
   std::string text;
@@ -73,6 +93,12 @@ std::string CameraNode::remark() const {
   if (c.stamped_on_arrival > 0 && !latency_known_)
     text += std::string(text.empty() ? "" : "; ") +
             "the driver tells no capture times, and no latency_s is set (bevel-calibrate --latency)";
+  if (!recorder_) return text;
+  const auto counts = recorder_->counts();
+  if (!counts.failure.empty())
+    text += (text.empty() ? "" : "; ") + ("recording has ended: " + counts.failure);
+  else if (counts.dropped > 0)
+    text += (text.empty() ? "" : "; ") + (std::to_string(counts.dropped) + " frames not recorded");
   return text;
 }
 

@@ -61,6 +61,12 @@ FolderSource::FolderSource(const SourceConfig& config) : config_(config) {
   std::error_code error;
   if (!std::filesystem::is_directory(config.path, error))
     throw SourceError("source path '" + config.path + "': not a folder");
+  if (std::filesystem::exists(std::filesystem::path(config.path) / kFrameIndex, error)) {
+    recorded_ = read_frame_index(config.path);
+    if (recorded_.empty()) throw SourceError("source path '" + config.path + "': no frame in its " + kFrameIndex);
+    for (const RecordedFrame& f : recorded_) files_.push_back(std::filesystem::path(config.path) / f.file);
+    return;
+  }
   for (const auto& entry : std::filesystem::directory_iterator(config.path))
     if (entry.is_regular_file() && is_image(entry.path())) files_.push_back(entry.path());
   if (files_.empty()) throw SourceError("source path '" + config.path + "': no jpg, png, bmp, pgm, ppm or tif in it");
@@ -71,7 +77,11 @@ FolderSource::FolderSource(const SourceConfig& config) : config_(config) {
 FrameResult FolderSource::next(std::chrono::milliseconds /*timeout*/) {
   if (next_ >= files_.size()) return EndOfFrames{};
   Frame frame;
-  frame.gray = cv::imread(files_[next_].string(), cv::IMREAD_GRAYSCALE);
+  try {
+    frame.gray = cv::imread(files_[next_].string(), cv::IMREAD_GRAYSCALE);
+  } catch (const cv::Exception&) {
+    frame.gray.release();  // larger than OpenCV reads
+  }
   if (frame.gray.empty()) {
     const std::string name = files_[next_].string();
     next_ = files_.size();
@@ -80,6 +90,10 @@ FrameResult FolderSource::next(std::chrono::milliseconds /*timeout*/) {
   frame.seq = static_cast<int64_t>(next_);
   frame.camera = config_.camera;
   frame.capture_utime = config_.start_utime + frame.seq * config_.period_us;
+  if (!recorded_.empty()) {
+    const RecordedFrame& was = recorded_[next_];
+    frame.seq = was.seq, frame.camera = was.camera, frame.capture_utime = was.utime;
+  }
   ++next_;
   return frame;
 }

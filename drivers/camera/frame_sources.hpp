@@ -8,11 +8,13 @@
 #include <vector>
 
 #include "drivers/camera/capture_device.hpp"
+#include "drivers/camera/frame_recorder.hpp"
 #include "drivers/camera/frame_source.hpp"
 
 namespace bevel::camera {
 
-/// Images of a folder in natural order; every readable image extension, nothing else.
+/// Images of a folder in natural order; every readable image extension, nothing else. A folder that was recorded has a
+/// frames.csv (frame_recorder.hpp): its order, stamps, numbers and cameras are those.
 class FolderSource : public FrameSource {
  public:
   explicit FolderSource(const SourceConfig& config);
@@ -22,6 +24,7 @@ class FolderSource : public FrameSource {
  private:
   SourceConfig config_;
   std::vector<std::filesystem::path> files_;
+  std::vector<RecordedFrame> recorded_;  // of the files, or empty
   size_t next_ = 0;
 };
 

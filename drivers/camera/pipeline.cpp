@@ -56,6 +56,7 @@ CameraPipeline::Result CameraPipeline::next(std::chrono::milliseconds timeout) {
       const auto begun = std::chrono::steady_clock::now();
       TipObservation seen = observe(eye->second, frame);
       seen.run_s = std::chrono::duration<double>(std::chrono::steady_clock::now() - begun).count();
+      if (on_tracked) on_tracked(frame.gray, seen);
       return seen;
     }
     ++counters_.unknown_camera;

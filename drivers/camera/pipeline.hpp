@@ -67,6 +67,9 @@ class CameraPipeline {
   /// Where the estimator expects the tip, in {A}; used once, for the next frame of every camera.
   void predict(const Vector3& position_mm);
 
+  /// Called with each frame that was tracked and what it showed, for who keeps frames; empty by default.
+  std::function<void(const cv::Mat& gray, const TipObservation&)> on_tracked;
+
   const CameraCounters& counters() const { return counters_; }
 
  private:
