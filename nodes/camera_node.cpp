@@ -48,7 +48,7 @@ CameraNode::CameraNode(lcm::LCM& lcm, const SystemConfig& config)
       config.source.kind == camera::SourceKind::device || config.source.kind == camera::SourceKind::stream;
   std::vector<camera::CameraSetup> setups;
   for (const CameraViewConfig& c : config.cameras) {
-    latency_known_ = latency_known_ || c.latency_s != 0;
+    if (c.camera == config.source.camera) latency_known_ = c.latency_s != 0;
     if (c.headings) with_headings_.insert(c.camera);
     std::shared_ptr<const camera::View> view;
     if (c.calibrated)

@@ -47,7 +47,7 @@ class CameraNode {
   std::string failure_;
   std::map<int, std::int64_t> seq_;  // each camera counts for itself
   std::set<int> with_headings_;
-  bool latency_known_ = false;
+  bool latency_known_ = false;  // of the device's camera
 };
 
 }  // namespace bevel::nodes
