@@ -1,6 +1,7 @@
 #include "nodes/camera_node.hpp"
 
 #include <algorithm>
+#include <cmath>
 #include <stdexcept>
 
 #include "drivers/camera/calibrated_view.hpp"
@@ -42,15 +43,19 @@ tip_heading_t to_heading(const camera::TipObservation& seen, std::int64_t seq) {
 CameraNode::CameraNode(lcm::LCM& lcm, const SystemConfig& config)
     : port_(lcm), status_(port_, camera_process_name(config), 0) {
   if (config.cameras.empty()) throw std::invalid_argument("no [[camera]] in the configuration: at least one is needed");
+  // Stamps of files are their own, and those of recorded frames are right already.
+  const bool live =
+      config.source.kind == camera::SourceKind::device || config.source.kind == camera::SourceKind::stream;
   std::vector<camera::CameraSetup> setups;
   for (const CameraViewConfig& c : config.cameras) {
+    if (c.camera == config.source.camera) latency_known_ = c.latency_s != 0;
     if (c.headings) with_headings_.insert(c.camera);
     std::shared_ptr<const camera::View> view;
     if (c.calibrated)
       view = std::make_shared<camera::CalibratedView>(*c.calibrated);
     else
       view = std::make_shared<camera::PlanarView>(c.view);
-    setups.push_back({c.camera, std::move(view), c.tracker, {}});
+    setups.push_back({c.camera, std::move(view), c.tracker, {}, live ? std::llround(1e6 * c.latency_s) : 0});
   }
   pipeline_ = std::make_unique<camera::CameraPipeline>(camera::make_frame_source(config.source), setups);
   port_.subscribe<needle_state_t>(
@@ -61,6 +66,42 @@ CameraNode::CameraNode(lcm::LCM& lcm, const SystemConfig& config)
       2);
 }
 
+void CameraNode::record(const std::string& folder) {
+  recorder_ = std::make_unique<camera::FrameRecorder>(folder);
+  pipeline_->on_tracked = [this](const cv::Mat& gray, const camera::TipObservation& o) {
+    recorder_->offer(gray, {.utime = o.capture_utime,
+                            .seq = o.seq,
+                            .camera = o.camera,
+                            .status = static_cast<std::int32_t>(o.status),
+                            .tip_px = o.tip_px,
+                            .file = {}});
+  };
+}
+
+std::string CameraNode::end_recording() {
+  if (!recorder_) return "";
+  recorder_->finish();
+  const auto counts = recorder_->counts();
+  return std::to_string(counts.written) + " frames recorded, " + std::to_string(counts.dropped) + " dropped" +
+         (counts.failure.empty() ? "" : "; " + counts.failure);
+}
+
+std::string CameraNode::remark() const {
+  const camera::CameraCounters& c = pipeline_->counters();
+  std::string text;
+  if (c.lost_frames > 0) text = std::to_string(c.lost_frames) + " frames lost";
+  if (c.stamped_on_arrival > 0 && !latency_known_)
+    text += std::string(text.empty() ? "" : "; ") +
+            "the driver tells no capture times, and no latency_s is set (bevel-calibrate --latency)";
+  if (!recorder_) return text;
+  const auto counts = recorder_->counts();
+  if (!counts.failure.empty())
+    text += (text.empty() ? "" : "; ") + ("recording has ended: " + counts.failure);
+  else if (counts.dropped > 0)
+    text += (text.empty() ? "" : "; ") + (std::to_string(counts.dropped) + " frames not recorded");
+  return text;
+}
+
 CameraNode::Outcome CameraNode::step(const Now& now, int timeout_ms) {
   port_.tell_time(now);
   port_.rethrow();
@@ -69,7 +110,7 @@ CameraNode::Outcome CameraNode::step(const Now& now, int timeout_ms) {
     failure_ = "another process for the same camera is heard on this network";
     return Outcome::failed;
   }
-  status_.report("running", "");
+  status_.report("running", remark());
   if (std::holds_alternative<camera::FrameTimeout>(result)) return Outcome::nothing;
   if (std::holds_alternative<camera::EndOfFrames>(result)) return Outcome::ended;
   if (const auto* failure = std::get_if<camera::SourceFailure>(&result)) {

@@ -4,6 +4,7 @@
 #include <map>
 #include <set>
 
+#include "drivers/camera/frame_recorder.hpp"
 #include "drivers/camera/pipeline.hpp"
 #include "nodes/status_reporter.hpp"
 #include "nodes/system_config.hpp"
@@ -26,18 +27,27 @@ class CameraNode {
   // Waits at most timeout_ms for a frame and publishes what it shows.
   Outcome step(const Now& now, int timeout_ms);
   LcmPort& port() { return port_; }
+  // Keeps the frames from here on (frame_recorder.hpp). Throws std::runtime_error.
+  void record(const std::string& folder);
+  // Waits for the disk; then how many were kept and how many not. Empty if nothing is recorded.
+  std::string end_recording();
   const std::string& failure() const { return failure_; }
   const camera::CameraCounters& counters() const { return pipeline_->counters(); }
   // Called with each observation, for programs that print them.
   std::function<void(const camera::TipObservation&)> on_observation;
 
  private:
+  // What PROCESS_STATUS says of the frames; empty if there is nothing to say.
+  std::string remark() const;
+
   LcmPort port_;
   std::unique_ptr<camera::CameraPipeline> pipeline_;
+  std::unique_ptr<camera::FrameRecorder> recorder_;
   StatusReporter status_;
   std::string failure_;
   std::map<int, std::int64_t> seq_;  // each camera counts for itself
   std::set<int> with_headings_;
+  bool latency_known_ = false;  // of the device's camera
 };
 
 }  // namespace bevel::nodes

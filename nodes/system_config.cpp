@@ -208,6 +208,7 @@ CameraViewConfig read_camera(Section s, const std::filesystem::path& folder) {
   s.read("min_length_mm", t.min_length_mm, optional, in_range(0.5, 1000));
   s.read("floor_across_mm", t.floor_across_mm, optional, in_range(1e-4, 100));
   s.read("floor_along_mm", t.floor_along_mm, optional, in_range(1e-4, 100));
+  s.read("latency_s", c.latency_s, optional, in_range(-0.2, 1));
   s.read("headings", c.headings, optional);
   s.read("floor_heading_rad", t.floor_heading_rad, optional, in_range(1e-5, 1));
   s.read("max_heading_sd_rad", t.max_heading_sd_rad, optional, in_range(1e-3, 1));

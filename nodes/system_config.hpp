@@ -28,6 +28,9 @@ struct CameraViewConfig {
   // frames it brings the estimate next to nothing (docs/estimator.md), and to who does not know that it is the shaft's
   // it is a wrong heading, by the slip angle. On where the estimate may have to start deep in the tissue.
   bool headings = false;
+  // By how much the stamps of its frames are late, as bevel-calibrate --latency finds it; taken off by bevel-camera
+  // where frames are live (source.kind device or stream).
+  double latency_s = 0;
   int width_px = 640;  // of the rig's rendered picture; of a calibrated camera those of its calibration
   int height_px = 480;
 };

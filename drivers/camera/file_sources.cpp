@@ -61,6 +61,12 @@ FolderSource::FolderSource(const SourceConfig& config) : config_(config) {
   std::error_code error;
   if (!std::filesystem::is_directory(config.path, error))
     throw SourceError("source path '" + config.path + "': not a folder");
+  if (std::filesystem::exists(std::filesystem::path(config.path) / kFrameIndex, error)) {
+    recorded_ = read_frame_index(config.path);
+    if (recorded_.empty()) throw SourceError("source path '" + config.path + "': no frame in its " + kFrameIndex);
+    for (const RecordedFrame& f : recorded_) files_.push_back(std::filesystem::path(config.path) / f.file);
+    return;
+  }
   for (const auto& entry : std::filesystem::directory_iterator(config.path))
     if (entry.is_regular_file() && is_image(entry.path())) files_.push_back(entry.path());
   if (files_.empty()) throw SourceError("source path '" + config.path + "': no jpg, png, bmp, pgm, ppm or tif in it");
@@ -71,7 +77,11 @@ FolderSource::FolderSource(const SourceConfig& config) : config_(config) {
 FrameResult FolderSource::next(std::chrono::milliseconds /*timeout*/) {
   if (next_ >= files_.size()) return EndOfFrames{};
   Frame frame;
-  frame.gray = cv::imread(files_[next_].string(), cv::IMREAD_GRAYSCALE);
+  try {
+    frame.gray = cv::imread(files_[next_].string(), cv::IMREAD_GRAYSCALE);
+  } catch (const cv::Exception&) {
+    frame.gray.release();  // larger than OpenCV reads
+  }
   if (frame.gray.empty()) {
     const std::string name = files_[next_].string();
     next_ = files_.size();
@@ -80,6 +90,10 @@ FrameResult FolderSource::next(std::chrono::milliseconds /*timeout*/) {
   frame.seq = static_cast<int64_t>(next_);
   frame.camera = config_.camera;
   frame.capture_utime = config_.start_utime + frame.seq * config_.period_us;
+  if (!recorded_.empty()) {
+    const RecordedFrame& was = recorded_[next_];
+    frame.seq = was.seq, frame.camera = was.camera, frame.capture_utime = was.utime;
+  }
   ++next_;
   return frame;
 }
@@ -94,17 +108,48 @@ VideoSource::VideoSource(const SourceConfig& config) : config_(config) {
     config_.period_us = static_cast<int64_t>(std::llround(1e6 / rate_hz));
 }
 
+// OpenCV's FFmpeg reader ends alike at the end of the file and at the first packet that it cannot decode; what tells
+// them apart is what the container says of its length. The number of frames of some containers is their length times a
+// rate that need not be even, so that fewer frames alone prove nothing.
+std::optional<std::string> VideoSource::missing() const {
+  const double count = capture_.get(cv::CAP_PROP_FRAME_COUNT);
+  if (!std::isfinite(count) || count < 1.0 || count > 1e9 || static_cast<double>(seq_) >= count) return std::nullopt;
+  const double length_us = count * static_cast<double>(config_.period_us);
+  if (static_cast<double>(last_us_) + 1.5 * static_cast<double>(config_.period_us) >= length_us) return std::nullopt;
+  return "'" + config_.path + "': " + std::to_string(seq_) + " frames could be read, its header says " +
+         std::to_string(std::llround(count)) + ": it is cut off or damaged";
+}
+
 FrameResult VideoSource::next(std::chrono::milliseconds /*timeout*/) {
+  if (ended_) return EndOfFrames{};
   cv::Mat picture;
-  if (!capture_.read(picture) || picture.empty()) return EndOfFrames{};
+  bool got = false;
+  try {
+    got = capture_.read(picture) && !picture.empty();
+  } catch (const cv::Exception& error) {
+    ended_ = true;
+    return SourceFailure{"'" + config_.path + "': " + error.what()};
+  }
+  if (!got) {
+    ended_ = true;
+    if (auto text = missing()) return SourceFailure{std::move(*text)};
+    return EndOfFrames{};
+  }
   Frame frame;
   if (picture.channels() == 1)
     frame.gray = picture.clone();
   else
     cv::cvtColor(picture, frame.gray, cv::COLOR_BGR2GRAY);
+  // Of the last frames that a decoder held back OpenCV says 0; so do containers without times.
+  const double at_ms = capture_.get(cv::CAP_PROP_POS_MSEC);
+  const int64_t at_us = std::isfinite(at_ms) ? std::llround(1000.0 * at_ms) : 0;
+  if (seq_ == 0)
+    last_us_ = std::max<int64_t>(0, at_us);
+  else
+    last_us_ = at_us > last_us_ ? at_us : last_us_ + config_.period_us;
   frame.seq = seq_++;
   frame.camera = config_.camera;
-  frame.capture_utime = config_.start_utime + frame.seq * config_.period_us;
+  frame.capture_utime = config_.start_utime + last_us_;
   return frame;
 }
 

@@ -44,7 +44,7 @@ struct SourceConfig {
   std::string path;            ///< folder; video file; /dev/videoN; Unix socket of the rig's frame server
   int32_t camera = 0;          ///< number given to the frames; ignored by `stream`, whose frames carry it
   int64_t start_utime = 0;     ///< folder and video: stamp of the first frame
-  int64_t period_us = 33'333;  ///< folder: time between frames; video: where the file states no frame rate
+  int64_t period_us = 33'333;  ///< folder: time between frames; video: where the file states neither times nor a rate
   int width_px = 640;          ///< device only: requested size and rate; the driver may refuse
   int height_px = 480;
   double rate_hz = 30.0;

@@ -1,14 +1,20 @@
 #pragma once
 // The adapters behind make_frame_source(); include frame_source.hpp instead unless you are a test.
 #include <filesystem>
+#include <functional>
 #include <opencv2/videoio.hpp>
+#include <optional>
+#include <string>
 #include <vector>
 
+#include "drivers/camera/capture_device.hpp"
+#include "drivers/camera/frame_recorder.hpp"
 #include "drivers/camera/frame_source.hpp"
 
 namespace bevel::camera {
 
-/// Images of a folder in natural order; every readable image extension, nothing else.
+/// Images of a folder in natural order; every readable image extension, nothing else. A folder that was recorded has a
+/// frames.csv (frame_recorder.hpp): its order, stamps, numbers and cameras are those.
 class FolderSource : public FrameSource {
  public:
   explicit FolderSource(const SourceConfig& config);
@@ -18,34 +24,42 @@ class FolderSource : public FrameSource {
  private:
   SourceConfig config_;
   std::vector<std::filesystem::path> files_;
+  std::vector<RecordedFrame> recorded_;  // of the files, or empty
   size_t next_ = 0;
 };
 
+/// Stamped by the container's own times, from its first frame on. A file that ends before the length that it states is
+/// a failure after its last good frame.
 class VideoSource : public FrameSource {
  public:
   explicit VideoSource(const SourceConfig& config);
   FrameResult next(std::chrono::milliseconds timeout) override;
 
  private:
+  std::optional<std::string> missing() const;
+
   SourceConfig config_;
   cv::VideoCapture capture_;
   int64_t seq_ = 0;
+  int64_t last_us_ = 0;  // of the last frame, in the file's time
+  bool ended_ = false;
 };
 
-/// Video4Linux. One buffer, so that a frame is never older than one period when it is read; stamped by the driver.
+/// Video4Linux: the newest frame that the driver calls whole, by its own number and capture time.
 class DeviceSource : public FrameSource {
  public:
   explicit DeviceSource(const SourceConfig& config);
+  DeviceSource(const SourceConfig& config, std::unique_ptr<CaptureDevice> device, std::function<ClockPair()> clocks);
   FrameResult next(std::chrono::milliseconds timeout) override;
 
  private:
-  int64_t count_lost(int64_t stamp_utime);
+  std::optional<FrameResult> newest();
 
   SourceConfig config_;
-  std::vector<cv::VideoCapture> capture_;  // one element: cv::VideoCapture::waitAny wants a vector
-  int64_t period_us_ = 0;
-  int64_t seq_ = 0;
-  int64_t last_utime_ = 0;
+  std::unique_ptr<CaptureDevice> device_;
+  std::function<ClockPair()> clocks_;
+  BufferCount count_;
+  bool failed_ = false;
 };
 
 /// Raw frames of frame_stream.hpp over a Unix socket.

@@ -23,7 +23,7 @@ CameraPipeline::CameraPipeline(std::unique_ptr<FrameSource> source, const std::v
     if (!setup.view) throw std::invalid_argument(name + ": no view");
     if (eyes_.contains(setup.camera)) throw std::invalid_argument(name + ": set up twice");
     try {
-      Eye eye{setup.view, TipTracker(setup.tracker, setup.view->px_per_mm()), {}, {}};
+      Eye eye{setup.view, TipTracker(setup.tracker, setup.view->px_per_mm()), setup.latency_us, {}, {}};
       if (!setup.background.empty()) eye.tracker.set_background(setup.background);
       eyes_.emplace(setup.camera, std::move(eye));
     } catch (const std::invalid_argument& error) {
@@ -56,6 +56,7 @@ CameraPipeline::Result CameraPipeline::next(std::chrono::milliseconds timeout) {
       const auto begun = std::chrono::steady_clock::now();
       TipObservation seen = observe(eye->second, frame);
       seen.run_s = std::chrono::duration<double>(std::chrono::steady_clock::now() - begun).count();
+      if (on_tracked) on_tracked(frame.gray, seen);
       return seen;
     }
     ++counters_.unknown_camera;
@@ -66,6 +67,7 @@ TipObservation CameraPipeline::observe(Eye& eye, const Frame& frame) {
   ++counters_.frames;
   if (eye.last_seq && frame.seq > *eye.last_seq + 1) counters_.lost_frames += frame.seq - *eye.last_seq - 1;
   eye.last_seq = frame.seq;
+  counters_.stamped_on_arrival += frame.stamped_on_arrival ? 1 : 0;
   TipResult tip = eye.tracker.track(frame, clock_ ? clock_() : 0, std::exchange(eye.predicted_px, {}));
   Vector3 position_mm{};
   if (tip.status == TipStatus::ok) {
@@ -77,7 +79,7 @@ TipObservation CameraPipeline::observe(Eye& eye, const Frame& frame) {
   }
   ++counters_.by_status[static_cast<size_t>(tip.status)];
   TipObservation seen;
-  seen.capture_utime = frame.capture_utime;
+  seen.capture_utime = frame.capture_utime - eye.latency_us;
   seen.seq = frame.seq;
   seen.camera = frame.camera;
   seen.status = tip.status;

@@ -39,12 +39,14 @@ struct CameraSetup {
   int32_t camera = 0;
   std::shared_ptr<const View> view;
   TrackerConfig tracker;
-  cv::Mat background;  ///< optional picture without a needle
+  cv::Mat background;      ///< optional picture without a needle
+  int64_t latency_us = 0;  ///< taken off the stamps of its frames: by how much they are late
 };
 
 struct CameraCounters {
   int64_t frames = 0;
-  int64_t lost_frames = 0;     ///< gaps in seq
+  int64_t lost_frames = 0;  ///< gaps in seq
+  int64_t stamped_on_arrival = 0;
   int64_t unknown_camera = 0;  ///< frames of cameras that are not set up; dropped
   std::array<int64_t, kTipStatuses> by_status{};
   int64_t headings = 0;  ///< frames with a usable one
@@ -65,12 +67,16 @@ class CameraPipeline {
   /// Where the estimator expects the tip, in {A}; used once, for the next frame of every camera.
   void predict(const Vector3& position_mm);
 
+  /// Called with each frame that was tracked and what it showed, for who keeps frames; empty by default.
+  std::function<void(const cv::Mat& gray, const TipObservation&)> on_tracked;
+
   const CameraCounters& counters() const { return counters_; }
 
  private:
   struct Eye {
     std::shared_ptr<const View> view;
     TipTracker tracker;
+    int64_t latency_us = 0;
     std::optional<int64_t> last_seq;
     std::optional<cv::Point2d> predicted_px;
   };

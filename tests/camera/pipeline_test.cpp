@@ -35,6 +35,21 @@ PlanarViewConfig top_view() {
   return view;
 }
 
+TEST(CameraPipeline, TakesTheLatencyOffTheStamps) {
+  rig::NeedleRenderer side({}, PlanarView(test::side_view()));
+  const auto gray = side.render(test::arc(40.0, 0.004, 0.0), 0.4).gray;
+  CameraSetup late = setup(0, test::side_view()), prompt = setup(1, test::side_view());
+  late.latency_us = 100'000;
+  CameraPipeline pipeline(
+      std::make_unique<ScriptedSource>(std::deque<FrameResult>{Frame{900'000, 0, 0, gray}, Frame{900'000, 0, 1, gray}}),
+      {late, prompt});
+  for (const int64_t utime : {800'000, 900'000}) {
+    const auto result = pipeline.next(milliseconds(100));
+    ASSERT_TRUE(std::holds_alternative<TipObservation>(result));
+    EXPECT_EQ(std::get<TipObservation>(result).capture_utime, utime);
+  }
+}
+
 TEST(CameraPipeline, TwoCamerasGiveThreeAxes) {
   const std::vector<Vector3> path = [] {
     std::vector<Vector3> p = test::arc(40.0, 0.004, 0.0);

@@ -1,4 +1,4 @@
-// bevel-calibrate: cameras from pictures of a board.
+// bevel-calibrate: cameras from pictures of a board, how late they are from an insertion.
 #include <iostream>
 
 #include "tools/calibrate/calibrate_tool.hpp"
@@ -7,7 +7,9 @@
 int main(int argc, char** argv) {
   bevel::calibrate::Options o;
   bevel::tools::CommandLine command_line(
-      "bevel-calibrate", "Lenses, poses and walls of one or two cameras from pictures of a board: a YAML and a page.");
+      "bevel-calibrate",
+      "Lenses, poses and walls of one or two cameras from pictures of a board: a YAML and a page. Or how late their\n"
+      "stamps are, from the log of an insertion that stops and goes.");
   command_line.option("--board", o.print_board, "draw the board into this file (.svg in true size, or .png) and stop")
       .choice("--pattern", o.pattern, "of the board: charuco (default) or chessboard", {"charuco", "chessboard"})
       .option("--columns", o.board.columns, "squares across", 4, 60)
@@ -32,14 +34,20 @@ int main(int argc, char** argv) {
       .option("--insertion", o.insertion, "log of a straight insertion recorded with it: gives the frame")
       .option("--roll-deg", o.roll_deg, "with --insertion: x of {A} is turned by this from where camera one looks",
               -180, 180)
+      .option("--latency", o.latency, "log of an insertion that stops and goes: how late the stamps of its cameras are")
+      .option("-m,--model", o.model, "with --latency: model file (TOML) of its needle")
       .numbers("--numbers", o.numbers, "of the cameras, in the order of the folders", -1)
       .option("-o,--out", o.out_folder, "folder for cameras.yaml, report.html and figures.json")
       .reads_recordings()
       .check([&o]() -> std::string {
-        const bool fits = !o.air.empty(), moves = !o.insertion.empty();
-        if (static_cast<int>(fits) + static_cast<int>(moves) + static_cast<int>(!o.print_board.empty()) != 1)
-          return "one of --air, --insertion, --board is needed, and only one";
+        const bool fits = !o.air.empty(), moves = !o.insertion.empty(), late = !o.latency.empty();
+        if (static_cast<int>(fits) + static_cast<int>(moves) + static_cast<int>(late) +
+                static_cast<int>(!o.print_board.empty()) !=
+            1)
+          return "one of --air, --insertion, --latency, --board is needed, and only one";
         if (moves && o.calibration.empty()) return "--insertion needs --calibration, the YAML it was recorded with";
+        if (late == o.model.empty())
+          return late ? "--latency needs --model, the needle of that insertion" : "--model is for --latency only";
         return "";
       });
   command_line.example("bevel-calibrate --columns 8 --rows 6 --square-mm 9 --air air0/ air1/ --out calibration");

@@ -164,6 +164,7 @@ int fit_insertion(const Options& o, std::ostream& out, std::ostream& err) {
 }  // namespace
 
 int run(const Options& options, std::ostream& out, std::ostream& err) {
+  if (!options.latency.empty()) return fit_latency(options, out, err);
   if (!options.insertion.empty()) return fit_insertion(options, out, err);
   Options o = options;
   o.board.kind = o.pattern == "chessboard" ? camera::BoardKind::chessboard : camera::BoardKind::charuco;

@@ -1,6 +1,6 @@
 #pragma once
 // bevel-calibrate: pictures of a board to a YAML of cameras and a page that says how good they are; the frame {A} from
-// a fiducial or from the log of a straight insertion; a board to print.
+// a fiducial or from the log of a straight insertion; a board to print; how late the stamps of cameras are.
 #include <iosfwd>
 #include <string>
 #include <vector>
@@ -27,11 +27,17 @@ struct Options {
   std::string insertion;    // ... by this log
   double roll_deg = 0;
 
+  std::string latency;  // log of an insertion that stops and goes: how late its cameras are ...
+  std::string model;    // ... by the needle of this model file
+
   std::string out_folder = "calibration";
 };
 
 // What there is to do, by the options; the exit status. Throws with a message that names what is wrong.
 int run(const Options& options, std::ostream& out, std::ostream& err);
+
+// Of --latency; the exit status, kFailed where nothing can be said of a camera.
+int fit_latency(const Options& options, std::ostream& out, std::ostream& err);
 
 // The pictures of all folders, found boards and what was left out already.
 struct Pictures {

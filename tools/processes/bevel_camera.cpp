@@ -6,9 +6,10 @@ int main(int argc, char** argv) {
   using namespace bevel;
   tools::CommandLine command_line("bevel-camera", "Finds the needle tip in pictures and publishes where it is.");
   command_line.example("bevel-camera --config config/demo.toml");
-  std::string source;
+  std::string source, record;
   bool print = false;
   command_line.option("--source", source, "path instead of the file's source.path");
+  command_line.option("--record", record, "folder to keep the frames in, a source of the kind folder then");
   command_line.flag("--print", print, "print each observation as CSV");
   return tools::process_main(command_line, argc, argv, nodes::camera_process_name, [&](tools::ProcessContext& context) {
     nodes::SystemConfig& config = context.config;
@@ -17,6 +18,7 @@ int main(int argc, char** argv) {
       config.source.start_utime = nodes::now().utime;
     nodes::CameraNode node(context.lcm, config);
     tools::inject(context, node.port());
+    if (!record.empty()) node.record(record);
     if (print) {
       std::puts("utime,seq,camera,status,x_mm,y_mm,z_mm,u_px,v_px,reason");
       node.on_observation = [](const camera::TipObservation& o) {
@@ -31,6 +33,8 @@ int main(int argc, char** argv) {
       if (outcome == nodes::CameraNode::Outcome::failed) throw std::runtime_error(node.failure());
       if (outcome == nodes::CameraNode::Outcome::ended) break;
     }
+    if (const std::string said = node.end_recording(); !said.empty())
+      std::fprintf(stderr, "bevel-camera: %s\n", said.c_str());
     return 0;
   });
 }
