@@ -26,6 +26,14 @@ function nearest(keys, key) {
   return best;
 }
 
+// Decades, and within few of them 2 and 5 as well: uPlot counts from the lower end, which need not be a round number.
+function logSplits(low, high) {
+  const steps = Math.log10(high / low) > 2 ? [1] : [1, 2, 5], at = [];
+  for (let power = Math.floor(Math.log10(low)); power <= Math.log10(high); ++power)
+    for (const step of steps) if (step * 10 ** power >= low && step * 10 ** power <= high) at.push(step * 10 ** power);
+  return at;
+}
+
 // Names, colours and values, in one row; a click on a name hides what it names.
 class Legend {
   constructor(parent, of, redraw) {
@@ -90,14 +98,15 @@ class Chart {
     const axis = { stroke: soft, grid: { stroke: grid, width: 1 }, ticks: { stroke: grid, size: 4 }, font: '11px system-ui, sans-serif',
       labelFont: '11px system-ui, sans-serif', labelGap: 0, values: (_, at) => at.map(v => v === null ? '' : said(v)) };
     const chart = this;
+    const logarithmic = { splits: (_, index, low, high) => logSplits(low, high), filter: (_, at) => at };
     this.plot = new uPlot({
       width: this.box.clientWidth || 600, height: this.height, legend: { show: false },
       cursor: { x: false, y: false, points: { show: false }, drag: { x: true, y: true, uni: 24, setScale: false },
         bind: { dblclick: () => () => { chart.zoom(null, null, true); return null; } } },
       scales: { x: { time: false, distr: spec.log_x ? 3 : 1, range: () => chart.x },
                 y: { distr: spec.log_y ? 3 : 1, range: () => chart.y } },
-      axes: [{ ...axis, label: spec.x || null, labelSize: spec.x ? 18 : 0, size: 26, space: 55 },
-             { ...axis, label: spec.y, labelSize: 18, space: 26,
+      axes: [{ ...axis, ...(spec.log_x ? logarithmic : {}), label: spec.x || null, labelSize: spec.x ? 18 : 0, size: 26, space: 55 },
+             { ...axis, ...(spec.log_y ? logarithmic : {}), label: spec.y, labelSize: 18, space: 26,
                // Panels below each other line up: all of one width unless a number needs more.
                size: (_, values) => Math.max(this.box.clientWidth > 500 ? 54 : 30, 12 + 6.4 * Math.max(2, ...(values || []).map(v => v.length))) }],
       series: [{}, { show: true, paths: () => null, points: { show: false } }],
