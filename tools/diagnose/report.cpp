@@ -97,12 +97,14 @@ std::vector<report::Fact> figures_of_verdict(const Findings& f) {
   };
   const auto as_sure = [](const FitFigures& figures) { return "chi2 per reading " + measured(figures.chi2_per_dof); };
   if (!f.two_groups) add_error("error as it stands", h.as_it_stands, "model file as given; rms per axis, held out");
-  add_error(f.two_groups ? "by what both groups share" : "its needle refitted", h.before, as_sure(h.before));
+  const auto largest = [](const FitFigures& figures) { return "; largest " + measured(figures.max_mm) + " mm"; };
+  add_error(f.two_groups ? "by what both groups share" : "its needle refitted", h.before,
+            as_sure(h.before) + (one_model ? largest(h.before) : ""));
   if (!one_model)
     add_error(f.two_groups              ? "with the change"
               : f.discrepancies.empty() ? "with what was found"
                                         : "with the discrepancy",
-              h.after, as_sure(h.after) + "; largest " + measured(h.after.max_mm) + " mm");
+              h.after, as_sure(h.after) + largest(h.after));
   add_error("noise alone", h.noise_floor, "the least that can be left");
   if (const auto moved = moved_at_depth(f); moved && !f.two_groups)
     facts.push_back({"tip at the target's depth moved by",
