@@ -5,6 +5,7 @@
 #include <stdexcept>
 
 #include "drivers/camera/calibrated_view.hpp"
+#include "io/camera_picture.hpp"
 
 namespace bevel::nodes {
 
@@ -40,7 +41,7 @@ tip_heading_t to_heading(const camera::TipObservation& seen, std::int64_t seq) {
   return m;
 }
 
-CameraNode::CameraNode(lcm::LCM& lcm, const SystemConfig& config)
+CameraNode::CameraNode(lcm::LCM& lcm, const SystemConfig& config, double pictures_hz)
     : port_(lcm), status_(port_, camera_process_name(config), 0) {
   if (config.cameras.empty()) throw std::invalid_argument("no [[camera]] in the configuration: at least one is needed");
   // Stamps of files are their own, and those of recorded frames are right already.
@@ -57,7 +58,14 @@ CameraNode::CameraNode(lcm::LCM& lcm, const SystemConfig& config)
       view = std::make_shared<camera::PlanarView>(c.view);
     setups.push_back({c.camera, std::move(view), c.tracker, {}, live ? std::llround(1e6 * c.latency_s) : 0});
   }
-  pipeline_ = std::make_unique<camera::CameraPipeline>(camera::make_frame_source(config.source), setups);
+  std::unique_ptr<camera::FrameSource> source = camera::make_frame_source(config.source);
+  if (pictures_hz != 0) {
+    picture_clock_.emplace(pictures_hz);
+    auto kept = std::make_unique<KeptFrame>(std::move(source));
+    kept_ = kept.get();
+    source = std::move(kept);
+  }
+  pipeline_ = std::make_unique<camera::CameraPipeline>(std::move(source), setups);
   port_.subscribe<needle_state_t>(
       io::channel::kNeedleState,
       [this](const needle_state_t& m) {
@@ -122,6 +130,9 @@ CameraNode::Outcome CameraNode::step(const Now& now, int timeout_ms) {
   const std::int64_t seq = seq_[seen.camera]++;
   port_.publish(io::channel::kTipMeasurement, to_tip(seen, seq));
   if (with_headings_.contains(seen.camera)) port_.publish(io::channel::kTipHeading, to_heading(seen, seq));
+  // After what the loop waits for.
+  if (picture_clock_ && picture_clock_->due(seen.camera, now.ns))
+    port_.publish(io::channel::kCameraPicture, make_picture(kept_->frame(), seen, seq));
   if (on_observation) on_observation(seen);
   return Outcome::frame;
 }

@@ -6,6 +6,7 @@
 
 #include "drivers/camera/frame_recorder.hpp"
 #include "drivers/camera/pipeline.hpp"
+#include "nodes/camera_pictures.hpp"
 #include "nodes/status_reporter.hpp"
 #include "nodes/system_config.hpp"
 
@@ -21,7 +22,8 @@ tip_heading_t to_heading(const camera::TipObservation& seen, std::int64_t seq);
 class CameraNode {
  public:
   // Throws camera::SourceError or std::invalid_argument, naming what is wrong.
-  CameraNode(lcm::LCM& lcm, const SystemConfig& config);
+  // `pictures_hz`: how often a camera's picture goes out on CAMERA_PICTURE, at most kMostPictures_hz; 0: never.
+  CameraNode(lcm::LCM& lcm, const SystemConfig& config, double pictures_hz = 0);
   enum class Outcome { frame, nothing, ended, failed };
   void tell_time(const Now& now) { port_.tell_time(now); }
   // Waits at most timeout_ms for a frame and publishes what it shows.
@@ -48,6 +50,8 @@ class CameraNode {
   std::map<int, std::int64_t> seq_;  // each camera counts for itself
   std::set<int> with_headings_;
   bool latency_known_ = false;  // of the device's camera
+  std::optional<PictureClock> picture_clock_;  // none: no pictures
+  const KeptFrame* kept_ = nullptr;            // the pipeline's source; set with picture_clock_
 };
 
 }  // namespace bevel::nodes

@@ -6,15 +6,16 @@
 #include <cstdio>
 #include <numbers>
 
-#include "io/html_report.hpp"
 #include "proof/page_figures.hpp"
 #include "proof/trial.hpp"
 #include "proof/trial_files.hpp"
+#include "report/numbers.hpp"
+#include "report/page.hpp"
 
 namespace bevel::proof {
 namespace {
 
-std::string digits(double value, int count = 3) { return io::format_significant(value, count); }
+std::string digits(double value, int count = 3) { return report::format_significant(value, count); }
 
 std::string percent(double share) { return digits(100 * share, 3) + " %"; }
 
@@ -29,11 +30,11 @@ Share at(const std::map<std::string, Share>& shares, const std::string& name) {
   return found == shares.end() ? Share{} : found->second;
 }
 
-void headline(io::HtmlReport& page, const Tally& t, const CampaignFacts& facts) {
+void headline(report::Page& page, const Tally& t, const CampaignFacts& facts) {
   const Share visible = at(t.strict, "visible");
   const Interval w = wilson95(visible);
   const bool good = visible.of > 0 && visible.value() >= 0.9 && t.false_alarms.hits == 0;
-  page.callout(good ? io::Tone::good : io::Tone::warning,
+  page.verdict(good ? report::Tone::good : report::Tone::warning,
                "Exactly the right physics in " + std::to_string(visible.hits) + " of " + std::to_string(visible.of) +
                    " trials in which all of it could be seen (" + percent(visible.value()) + ", 95 % interval " +
                    percent(w.low) + " to " + percent(w.high) + ")",
@@ -51,7 +52,7 @@ void headline(io::HtmlReport& page, const Tally& t, const CampaignFacts& facts) 
                  "; the verdicts were hashed before the truths were opened.");
 }
 
-void shares(io::HtmlReport& page, const Tally& t) {
+void shares(report::Page& page, const Tally& t) {
   page.heading("Verdicts");
   std::vector<ShareLine> lines{{"exact set, all of it visible", at(t.strict, "visible"), 0.9},
                                {"the same, counting ambiguous ones", at(t.lenient, "visible"), -1},
@@ -65,12 +66,12 @@ void shares(io::HtmlReport& page, const Tally& t) {
                                {"nearest plain form within them", t.covers_nearest, 0.95},
                                {"place within 0.2 s or 3 mm", t.located, -1},
                                {"held-out chi-square within 10 % of 1", t.chi2_at_floor, -1}};
-  page.figure_svg(share_figure(lines),
-                  "Shares with 95 % Wilson intervals; red ticks are goals. The right answer names "
-                  "what could be seen: an effect of which less than 5 standard deviations remain "
-                  "beyond k, lambda1 and lambda2 is to go unnamed. Abstentions count as wrong. Ambiguous: the truth "
-                  "stands in ambiguous_with, or "
-                  "an effect on no list is imitated below the limit by the listed one that was named.");
+  page.picture(share_figure(lines),
+               "Shares with 95 % Wilson intervals; red ticks are goals. The right answer names "
+               "what could be seen: an effect of which less than 5 standard deviations remain "
+               "beyond k, lambda1 and lambda2 is to go unnamed. Abstentions count as wrong. Ambiguous: the truth "
+               "stands in ambiguous_with, or "
+               "an effect on no list is imitated below the limit by the listed one that was named.");
   std::vector<std::vector<std::string>> rows;
   for (const auto& [name, share] : t.strict_by_class) {
     const Interval w = wilson95(share);
@@ -87,7 +88,7 @@ void shares(io::HtmlReport& page, const Tally& t) {
 }
 
 // Is a verdict right as often as the tool says that it is?
-void reliability(io::HtmlReport& page, const Tally& t) {
+void reliability(report::Page& page, const Tally& t) {
   std::vector<std::vector<std::string>> rows;
   for (std::size_t i = 0; i < t.reliability.size(); ++i) {
     const ReliabilityBin& bin = t.reliability[i];
@@ -106,14 +107,13 @@ void reliability(io::HtmlReport& page, const Tally& t) {
                  std::to_string(t.truth_improbable.of) + ".");
 }
 
-void sensitivity(io::HtmlReport& page, const Tally& t) {
-  io::Plot plot;
-  plot.x_label = "visible size (standard deviations of the coloured noise)";
-  plot.y_label = "share";
-  plot.log_x = true;
-  plot.y_range = {{0.0, 1.15}};
-  plot.legend = io::Plot::Legend::bottom_right;
-  plot.references.push_back({io::ReferenceLine::Axis::vertical, kVisible_sigmas, "visible from here"});
+void sensitivity(report::Page& page, const Tally& t) {
+  report::Figure figure;
+  figure.x_label = "visible size (standard deviations of the coloured noise)";
+  figure.y_label = "share";
+  figure.log_x = true;
+  figure.y_range = {{0.0, 1.05}};
+  figure.references.push_back({report::Reference::Axis::vertical, kVisible_sigmas, "visible from here"});
   std::vector<double> x, named, low, high, alarmed_x, alarmed;
   for (const SensitivityBin& bin : t.sensitivity) {
     const double middle = std::isfinite(bin.high_sigmas) ? std::sqrt(std::max(bin.low_sigmas, 1.0) * bin.high_sigmas)
@@ -132,21 +132,34 @@ void sensitivity(io::HtmlReport& page, const Tally& t) {
   }
   if (x.empty()) return;
   page.heading("Sensitivity");
-  plot.band("95 %", x, low, high, 0).line("effect named", x, named, 0);
-  if (!alarmed_x.empty()) plot.dashed("anything said", alarmed_x, alarmed, 1);
-  page.figure(plot, "Effects named, against how much of them could be seen at all. Binned; the band is Wilson's.");
+  figure.bars("95 %", x, low, high, report::Colour::blue).line("effect named", x, named, report::Colour::blue);
+  figure.points("", x, named, report::Colour::blue);
+  if (!alarmed_x.empty()) figure.dashed("anything said", alarmed_x, alarmed, report::Colour::orange);
+  page.figure(figure, "Effects named, against how much of them could be seen at all. Binned; the bars are Wilson's.");
 }
 
-void confusion(io::HtmlReport& page, const Tally& t) {
+void confusion(report::Page& page, const Tally& t) {
   if (t.confusion.empty()) return;
   page.heading("What was taken for what");
-  page.figure_svg(confusion_figure(t.confusion),
-                  "Each effect that could be seen against what was named for it. Blue is right. The row \"none\" holds "
-                  "what was named beyond the truth; the column \"none\" what was missed. Depth of colour: share of the "
-                  "row.");
+  const auto none = t.confusion.find("none");
+  int unseen = 0, silent = 0;
+  if (none != t.confusion.end())
+    for (const auto& [named, count] : none->second) {
+      unseen += count;
+      if (named == "none") silent += count;
+    }
+  page.picture(confusion_figure(t.confusion),
+               "Each effect that could be seen against what was named for it. Blue is right. Row \"none\": trials in "
+               "which nothing could be seen, with nothing concealed (" +
+                   std::to_string(t.false_alarms.of) + " trials, " + std::to_string(t.false_alarms.hits) +
+                   " false alarms) or too little of it; of " + std::to_string(unseen) + " entries " +
+                   std::to_string(silent) +
+                   " are silence, the others were named without being there or without being visible. Row \"" +
+                   std::string(kBeyond) +
+                   "\": named beside what was there. Column \"none\": missed. Depth of colour: share of the row.");
 }
 
-void parameters(io::HtmlReport& page, const Tally& t) {
+void parameters(report::Page& page, const Tally& t) {
   if (t.z.empty()) return;
   page.heading("Parameters");
   constexpr int kBins = 24;
@@ -170,13 +183,14 @@ void parameters(io::HtmlReport& page, const Tally& t) {
     edges.insert(edges.end(), {x[i] - 0.5 * width, x[i] + 0.5 * width});
     heights.insert(heights.end(), {count[i], count[i]});
   }
-  io::Plot plot;
-  plot.x_label = "(value - truth) / std_error";
-  plot.y_label = "parameters";
-  plot.y_range = {{0.0, 1.4 * std::max(*std::ranges::max_element(count), *std::ranges::max_element(bell))}};  // legend
-  plot.band("", edges, std::vector<double>(edges.size(), 0.0), heights, 0);
-  plot.line("parameters named rightly", edges, heights, 0).dashed("standard normal", x, bell, 1);
-  page.figure(plot,
+  report::Figure figure;
+  figure.x_label = "(value - truth) / std_error";
+  figure.y_label = "parameters";
+  figure.y_range = {{0.0, 1.1 * std::max(*std::ranges::max_element(count), *std::ranges::max_element(bell))}};
+  figure.band("", edges, std::vector<double>(edges.size(), 0.0), heights, report::Colour::blue);
+  figure.line("parameters named rightly", edges, heights, report::Colour::blue)
+      .dashed("standard normal", x, bell, report::Colour::orange);
+  page.figure(figure,
               "Errors of the parameters of effects named rightly, in their own standard errors. The outermost "
               "columns hold everything beyond.");
   const Interval w = wilson95(t.covered);
@@ -194,7 +208,7 @@ void parameters(io::HtmlReport& page, const Tally& t) {
       "the noise.");
 }
 
-void fits(io::HtmlReport& page, const Tally& t, const std::vector<TrialScore>& scores) {
+void fits(report::Page& page, const Tally& t, const std::vector<TrialScore>& scores) {
   std::vector<double> x, before, after_x, after;
   for (const TrialScore& s : scores) {
     const double place = std::max(s.visible_sigmas, 0.5);
@@ -209,18 +223,17 @@ void fits(io::HtmlReport& page, const Tally& t, const std::vector<TrialScore>& s
   }
   if (after.empty() || x.empty()) return;
   page.heading("Held-out fit");
-  io::Plot plot;
-  plot.x_label = "visible size of what was concealed (standard deviations; nulls at 0.5)";
-  plot.y_label = "held-out chi-square per measurement";
-  plot.log_x = plot.log_y = true;
-  plot.legend = io::Plot::Legend::top_left;
-  plot.references.push_back({io::ReferenceLine::Axis::horizontal, 1.0, "noise floor"});
-  plot.points("before", x, before, 1).points("after", after_x, after, 0);
-  page.figure(plot, "As the tool reports it, leaving out one recording at a time. Median before " +
-                        digits(median(t.chi2_before)) + ", after " + digits(median(t.chi2_after)) + ".");
+  report::Figure figure;
+  figure.x_label = "visible size of what was concealed (standard deviations; nulls at 0.5)";
+  figure.y_label = "held-out chi-square per measurement";
+  figure.log_x = figure.log_y = true;
+  figure.references.push_back({report::Reference::Axis::horizontal, 1.0, "noise floor"});
+  figure.points("before", x, before, report::Colour::orange).points("after", after_x, after, report::Colour::blue);
+  page.figure(figure, "As the tool reports it, leaving out one recording at a time. Median before " +
+                          digits(median(t.chi2_before)) + ", after " + digits(median(t.chi2_after)) + ".");
 }
 
-void failures(io::HtmlReport& page, const std::vector<TrialScore>& scores) {
+void failures(report::Page& page, const std::vector<TrialScore>& scores) {
   std::vector<std::vector<std::string>> wrong;
   std::vector<std::vector<std::string>> all;
   for (const TrialScore& s : scores) {
@@ -249,7 +262,7 @@ void failures(io::HtmlReport& page, const std::vector<TrialScore>& scores) {
 }  // namespace
 
 std::string results_page(const CampaignFacts& facts, const Tally& t, const std::vector<TrialScore>& scores) {
-  io::HtmlReport page("Blind trial of the mismatch tool");
+  report::Page page("Blind trial of the mismatch tool");
   headline(page, t, facts);
   shares(page, t);
   reliability(page, t);

@@ -13,7 +13,8 @@ bool holds(const std::vector<std::string>& names, const std::string& name) {
 }
 
 // Each expected id against what was named for it: itself, something else that was not expected, or nothing. What was
-// named beyond that stands in the row of "none".
+// named beyond that stands in a row of its own, since it is no alarm where there was nothing; where nothing was
+// expected, in the row of "none".
 void confuse(const TrialScore& score, Tally& tally) {
   std::vector<std::string> extra;
   std::vector<std::string> missed;
@@ -26,7 +27,8 @@ void confuse(const TrialScore& score, Tally& tally) {
       missed.push_back(name);
   }
   for (std::size_t i = 0; i < missed.size(); ++i) ++tally.confusion[missed[i]][i < extra.size() ? extra[i] : "none"];
-  for (std::size_t i = missed.size(); i < extra.size(); ++i) ++tally.confusion["none"][extra[i]];
+  for (std::size_t i = missed.size(); i < extra.size(); ++i)
+    ++tally.confusion[score.expected.empty() ? "none" : kBeyond][extra[i]];
   if (score.expected.empty() && extra.empty()) ++tally.confusion["none"]["none"];
 }
 

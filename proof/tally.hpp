@@ -23,6 +23,8 @@ struct ReliabilityBin {
   Share right;
 };
 
+inline constexpr const char* kBeyond = "in addition";
+
 struct Tally {
   int trials = 0;
   int abstentions = 0;
@@ -38,7 +40,9 @@ struct Tally {
   std::vector<ReliabilityBin> reliability;
   double expected_calibration_error = 0;  // mean distance of the bins' shares from their probabilities, by trials
   std::vector<SensitivityBin> sensitivity;
-  std::map<std::string, std::map<std::string, int>> confusion;  // [truth][named]; "none" on either side
+  // [truth][named]; truth "none": nothing could be seen; named "none": missed; truth kBeyond: named beside what was
+  // there.
+  std::map<std::string, std::map<std::string, int>> confusion;
   std::vector<double> z;
   double z_mean = 0;
   double z_spread = 0;

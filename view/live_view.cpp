@@ -22,6 +22,7 @@ constexpr std::int64_t kPlayedBack_us = 5'000'000;
 // Twenty rows a second for ten minutes; after that every second row of the older half goes.
 constexpr std::size_t kMostRows = 12'000;
 constexpr std::size_t kMostOfPath = 4'000;
+constexpr std::size_t kMostPictures = 16;  // cameras of a rig; a stranger's numbers shall not fill the memory
 
 // JSON has no NaN.
 json figure(double value) { return std::isfinite(value) ? json(value) : json(nullptr); }
@@ -152,6 +153,18 @@ void LiveView::on(const process_status_t& message, const Moment& now) {
   take(processes_, message.process, message, now);
 }
 
+void LiveView::on(const camera_picture_t& message, const Moment& now) {
+  if (pictures_.size() < kMostPictures || pictures_.contains(message.camera))
+    take(pictures_, message.camera, message, now);
+}
+
+std::string LiveView::picture(std::int32_t camera, std::int64_t count) const {
+  const auto found = pictures_.find(camera);
+  if (found == pictures_.end() || found->second.count != count) return "";
+  const auto& jpeg = found->second.message.jpeg;
+  return {jpeg.begin(), jpeg.end()};
+}
+
 void LiveView::on_truth(const needle_state_t& message, const Moment& now) { take(truth_, message, now); }
 
 LiveView::Row LiveView::row_now() const {
@@ -228,6 +241,16 @@ std::string LiveView::snapshot(const Moment& now) {
                     {"count", tip.count},
                     {"age_s", age_s(tip.arrived, now)},
                     {"test_ratio", ratio == test_ratio_.end() ? json(nullptr) : figure(ratio->second)}});
+  }
+  json& pictures = j["pictures"] = json::array();
+  for (const auto& [camera, picture] : pictures_) {
+    const auto& m = picture.message;
+    pictures.push_back({{"camera", camera},
+                        {"count", picture.count},
+                        {"width_px", m.width_px},
+                        {"height_px", m.height_px},
+                        {"tip_px", m.status == 0 ? json(m.tip_px) : json(nullptr)},
+                        {"age_s", age_s(picture.arrived, now)}});
   }
   json& processes = j["processes"] = json::array();
   for (const auto& [name, status] : processes_) {

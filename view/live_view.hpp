@@ -4,6 +4,7 @@
 
 #include <array>
 #include <bevel/actuator_state_t.hpp>
+#include <bevel/camera_picture_t.hpp>
 #include <bevel/motion_command_t.hpp>
 #include <bevel/needle_state_t.hpp>
 #include <bevel/process_status_t.hpp>
@@ -32,6 +33,7 @@ class LiveView {
   void on(const needle_state_t& message, const Moment& now);
   void on(const steering_target_t& message, const Moment& now);
   void on(const process_status_t& message, const Moment& now);
+  void on(const camera_picture_t& message, const Moment& now);
   void on_truth(const needle_state_t& message, const Moment& now);  // of a simulated rig
 
   // What is so now, as JSON: the newest of every kind with its age, and one row of the charts. Adds that row to the
@@ -40,6 +42,9 @@ class LiveView {
   // Rows of the charts and the path since the beginning of this insertion, as JSON: what a page that is opened late
   // starts from.
   std::string history() const;
+  // A camera's picture of that count, as JPEG; "" unless it is the newest: what a snapshot says of one belongs to no
+  // other.
+  std::string picture(std::int32_t camera, std::int64_t count) const;
 
  private:
   // The newest message of a channel, or of one camera or process on it.
@@ -63,8 +68,9 @@ class LiveView {
   void begin_anew_if(std::int64_t utime);
   void extend_path(const needle_state_t& state);
 
-  std::map<std::int32_t, Newest<tip_measurement_t>> tips_;  // by camera
-  std::map<std::int32_t, double> test_ratio_;               // by camera, of its newest position that was used
+  std::map<std::int32_t, Newest<tip_measurement_t>> tips_;     // by camera
+  std::map<std::int32_t, Newest<camera_picture_t>> pictures_;  // by camera
+  std::map<std::int32_t, double> test_ratio_;                  // by camera, of its newest position that was used
   std::map<std::string, Newest<process_status_t>> processes_;
   std::optional<Newest<actuator_state_t>> axes_;
   std::optional<Newest<motion_command_t>> command_;

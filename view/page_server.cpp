@@ -46,10 +46,12 @@ class OpenServer : public httplib::Server {
 }  // namespace
 
 struct PageServer::Impl {
-  Impl(int socket, std::function<std::string()> h) : server(socket), history(std::move(h)) {}
+  Impl(int socket, std::function<std::string()> h, PageServer::Picture p)
+      : server(socket), history(std::move(h)), picture(std::move(p)) {}
 
   OpenServer server;
   std::function<std::string()> history;
+  PageServer::Picture picture;
   int port = 0;
   std::mutex mutex;
   std::condition_variable changed;
@@ -100,6 +102,14 @@ struct PageServer::Impl {
     server.Get("/history", [this](const httplib::Request&, httplib::Response& response) {
       response.set_content(history(), "application/json");
     });
+    server.Get(R"(/picture/(\d{1,9})/(\d{1,18}))",
+               [this](const httplib::Request& request, httplib::Response& response) {
+                 std::string jpeg = picture(std::stoi(request.matches[1]), std::stoll(request.matches[2]));
+                 if (jpeg.empty())
+                   response.status = 404;
+                 else
+                   response.set_content(std::move(jpeg), "image/jpeg");
+               });
     server.Get("/events", [this](const httplib::Request&, httplib::Response& response) {
       if (pages.fetch_add(1) >= kMostPages) {
         --pages;
@@ -130,8 +140,8 @@ int PageServer::open_port(int port) {
                            "; choose another, or 0 for one that is free");
 }
 
-PageServer::PageServer(int socket, std::function<std::string()> history)
-    : impl_(std::make_unique<Impl>(socket, std::move(history))) {
+PageServer::PageServer(int socket, std::function<std::string()> history, Picture picture)
+    : impl_(std::make_unique<Impl>(socket, std::move(history), std::move(picture))) {
   sockaddr_in address{};
   socklen_t size = sizeof address;
   int listens = 0;

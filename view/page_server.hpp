@@ -3,6 +3,7 @@
 // snapshot, not a queue of old ones.
 #pragma once
 
+#include <cstdint>
 #include <functional>
 #include <memory>
 #include <string>
@@ -11,13 +12,18 @@ namespace bevel::view {
 
 class PageServer {
  public:
+  using Picture = std::function<std::string(std::int32_t camera, std::int64_t count)>;
+
   // A port that is open before anything is served; 0 takes one that is free. Throws std::runtime_error naming the port
   // and why it cannot be had.
   static int open_port(int port);
 
   // Takes over what open_port() returned, in this process or in the one that started it, and serves from threads of
-  // its own, which call `history` too.
-  PageServer(int socket, std::function<std::string()> history);
+  // its own, which call `history` too, and `picture` for the JPEG of a camera and count ("": there
+  // is none).
+  PageServer(
+      int socket, std::function<std::string()> history,
+      Picture picture = [](std::int32_t, std::int64_t) { return std::string(); });
   ~PageServer();  // ends the pages' connections
   PageServer(const PageServer&) = delete;
   PageServer& operator=(const PageServer&) = delete;

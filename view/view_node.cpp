@@ -1,18 +1,28 @@
 #include "view/view_node.hpp"
 
+#include "io/camera_picture.hpp"
+
 namespace bevel::view {
 
 ViewNode::ViewNode(lcm::LCM& lcm, int socket)
-    : port_(lcm), server_(socket, [this] {
-        const std::lock_guard lock(mutex_);
-        return picture_.history();
-      }) {
+    : port_(lcm),
+      server_(
+          socket,
+          [this] {
+            const std::lock_guard lock(mutex_);
+            return picture_.history();
+          },
+          [this](std::int32_t camera, std::int64_t count) {
+            const std::lock_guard lock(mutex_);
+            return picture_.picture(camera, count);
+          }) {
   watch<tip_measurement_t>(io::channel::kTipMeasurement);
   watch<actuator_state_t>(io::channel::kActuatorState);
   watch<motion_command_t>(io::channel::kMotionCommand);
   watch<needle_state_t>(io::channel::kNeedleState);
   watch<steering_target_t>(io::channel::kSteeringTarget);
   watch<process_status_t>(io::channel::kProcessStatus);
+  watch<camera_picture_t>(io::channel::kCameraPicture);
   port_.subscribe<needle_state_t>(io::channel::kNeedleTruth, [this](const needle_state_t& message) {
     const std::lock_guard lock(mutex_);
     picture_.on_truth(message, moment());

@@ -1,4 +1,4 @@
-# gnuplot figures.gp: the pictures of docs/real-tissue.md, from the figures in its tables.
+# gnuplot figures.gp (Debian: gnuplot-nox): the pictures of docs/real-tissue.md, from the figures in its tables.
 set terminal svg size 760,300 font "sans,12" background "white"
 set grid ytics lc rgb "#dddddd"
 set border 3

@@ -100,7 +100,7 @@ TEST_F(CloseTheLoop, InsertionScaleFoundMakesAllThreeBetterAndTheFilesSaySo) {
   EXPECT_EQ(json["controller"]["live"]["augmented"]["insertions"], 192);
   const std::string page = text_of(folder / "out/close-the-loop.html");
   std::size_t pictures = 0;
-  for (std::size_t at = page.find("<svg"); at != std::string::npos; at = page.find("<svg", at + 1)) ++pictures;
+  for (std::size_t at = page.find("data-figure="); at != std::string::npos; at = page.find("data-figure=", at + 1)) ++pictures;
   EXPECT_EQ(pictures, 3U);
   for (const char* name : {"verdict.json", "report.html", "model.toml"}) EXPECT_TRUE(fs::exists(folder / "out" / name));
 }

@@ -27,11 +27,19 @@ std::string page_of(Verdict verdict, const std::string& name) {
 }
 
 void expect_sound(const std::string& html) {
-  EXPECT_FALSE(std::regex_search(html, std::regex("(src|href)=[\"'](https?:)?//|url\\(http|@import|<script")));
+  EXPECT_FALSE(std::regex_search(html, std::regex("(src|href)=[\"'](https?:)?//|url\\(http|@import|<script src")));
   EXPECT_FALSE(std::regex_search(html, std::regex("[\" >M]-?(nan|inf)[\" <,]")));
   EXPECT_LT(html.size(), 1'500'000U);
-  for (const char* heading : {"What to do", "Parameters", "What is left over", "Paths", "Every effect", "predicted",
-                              "could have shown", "next experiment", "Noise and checks", "How this was made"})
+  // One box that says it all: the model as it stands, refitted, what noise alone would leave, and what is at the
+  // target.
+  const std::string box =
+      html.substr(html.find("<section class=\"verdict"), html.find("</section>") - html.find("<section"));
+  for (const char* figure : {"<span>error as it stands</span><b>", "<span>its needle refitted</span><b>",
+                             "<span>noise alone</span><b>", "<span>tip at the target&#39;s depth moved by</span><b>"})
+    EXPECT_THAT(box, HasSubstr(figure));
+  for (const char* heading :
+       {"What to do", "Parameters", "What is left over", "Recording by recording", "Paths", "Every effect", "predicted",
+        "could have shown", "next experiment", "Noise and checks", "How this was made"})
     EXPECT_THAT(html, HasSubstr(heading));
 }
 
@@ -40,7 +48,8 @@ TEST(Page, effects_found_names_them_with_sizes_and_rivals) {
   expect_sound(html);
   EXPECT_THAT(html, HasSubstr("torsional_windup: lag at 100mm 0.823 ± 0.031 rad"));
   EXPECT_THAT(html, HasSubstr("or rotation_backlash"));
-  EXPECT_THAT(html, HasSubstr("1.21 → 0.264 mm"));
+  EXPECT_THAT(html, HasSubstr("<span>its needle refitted</span><b>1.21 mm</b>"));
+  EXPECT_THAT(html, HasSubstr("<span>with what was found</span><b>0.264 mm</b>"));
   EXPECT_THAT(html, HasSubstr("at (s), rec03.lcm"));
   EXPECT_THAT(html, Not(HasSubstr("The unknown part")));
   // What each insertion has of its own, and both ways of predicting one.
@@ -90,7 +99,8 @@ TEST(Page, says_by_how_much_the_tip_is_moved_at_depth) {
   EXPECT_NEAR(moved->from_file_mm, 2, 1e-12);
   EXPECT_EQ(moved->depth_mm[0], 60);
   EXPECT_EQ(moved->depth_mm[1], 90);
-  EXPECT_THAT(page_of(Verdict::effects_found, "page-effects-found.html"), HasSubstr("at depth the tip is moved by"));
+  EXPECT_THAT(page_of(Verdict::effects_found, "page-effects-found.html"),
+              HasSubstr("tip at the target&#39;s depth moved by"));
 }
 
 // Figures that the diagnosis may leave empty.

@@ -4,7 +4,7 @@
 #include <cstdio>
 #include <cstdlib>
 
-#include "io/html_report.hpp"
+#include "report/page.hpp"
 #include "tests/identification/coverage_study.hpp"
 
 int main(int argc, char** argv) {
@@ -13,7 +13,7 @@ int main(int argc, char** argv) {
   constexpr std::uint64_t kSeed = 20150928;
   const int sets = argc > 2 ? std::atoi(argv[2]) : 200;
   bool good = true;
-  io::HtmlReport page("Coverage of the 95 % intervals");
+  report::Page page("Coverage of the 95 % intervals");
   std::printf("seed %llu, %d data sets of 6 trials, 195 measurements each, 0.2 mm\n",
               static_cast<unsigned long long>(kSeed), sets);
   struct Case {
@@ -51,18 +51,17 @@ int main(int argc, char** argv) {
         const double q = t - (2.30753 + 0.27061 * t) / (1 + 0.99229 * t + 0.04481 * t * t);
         expected.push_back(u < 0.5 ? -q : q);
       }
-      io::Plot plot;
-      plot.x_label = "quantile of the standard normal";
-      plot.y_label = "(estimate - truth) / standard error";
-      plot.points("data sets", expected, z).line("as it should be", {-3, 3}, {-3, 3});
-      plot.references = {{io::ReferenceLine::Axis::horizontal, 1.96, "95 %"},
-                         {io::ReferenceLine::Axis::horizontal, -1.96, ""}};
-      plot.legend = io::Plot::Legend::top_left;
+      report::Figure figure;
+      figure.x_label = "quantile of the standard normal";
+      figure.y_label = "(estimate - truth) / standard error";
+      figure.points("data sets", expected, z).line("as it should be", {-3, 3}, {-3, 3});
+      figure.references = {{report::Reference::Axis::horizontal, 1.96, "95 %"},
+                           {report::Reference::Axis::horizontal, -1.96, ""}};
       char caption[160];
       std::snprintf(caption, sizeof caption,
                     "%s: %d of %d intervals contain the truth (Wilson 95 %%: %.1f to %.1f %%).",
                     kParameterNames[p.parameter], p.inside.hits, p.inside.of, 100 * band.low, 100 * band.high);
-      page.figure(plot, caption);
+      page.figure(figure, caption);
     }
   }
   if (argc > 1) page.save(argv[1]);

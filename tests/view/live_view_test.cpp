@@ -74,6 +74,34 @@ TEST(LiveView, AnAxisThatACameraDoesNotSeeIsNull) {
   EXPECT_EQ(json::parse(view.snapshot(at(1.1)))["tips"][0]["position_mm"], json::parse("[null, null, null]"));
 }
 
+TEST(LiveView, APictureIsGivenWithTheTipThatBelongsToIt) {
+  LiveView view;
+  EXPECT_EQ(json::parse(view.snapshot(at(0)))["pictures"], json::array());
+  camera_picture_t m{};
+  m.utime = at(1).utime;
+  m.camera = 3;
+  m.width_px = 320;
+  m.height_px = 240;
+  m.tip_px[0] = 12;
+  m.jpeg = {1, 2, 3};
+  view.on(m, at(1));
+  json p = json::parse(view.snapshot(at(1.5)))["pictures"][0];
+  EXPECT_EQ(p["tip_px"], json::parse("[12.0, 0.0]"));
+  EXPECT_NEAR(p["age_s"], 0.5, 1e-9);
+  EXPECT_EQ(view.picture(3, p["count"]), std::string("\1\2\3"));
+  EXPECT_EQ(view.picture(0, p["count"]), "");
+  m.status = 2;  // lost: no tip is marked
+  m.jpeg = {4};
+  view.on(m, at(2));
+  EXPECT_EQ(view.picture(3, p["count"]), "");  // what the page knows of that one is not of this one
+  p = json::parse(view.snapshot(at(2)))["pictures"][0];
+  EXPECT_TRUE(p["tip_px"].is_null());
+  EXPECT_EQ(view.picture(3, p["count"]), "\4");
+  for (m.camera = 100; m.camera < 200; ++m.camera) view.on(m, at(3));  // a stranger's
+  EXPECT_LE(json::parse(view.snapshot(at(3)))["pictures"].size(), 16U);
+  EXPECT_NE(view.picture(3, p["count"]), "");
+}
+
 // The message has the covariance in the body's frame; a quarter turn about x makes y of {B} z of {A}.
 TEST(LiveView, TheCovarianceIsThatOfTheFrameInWhichItIsDrawn) {
   LiveView view;

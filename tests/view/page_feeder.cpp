@@ -7,6 +7,7 @@
 #include <cmath>
 #include <cstdio>
 #include <mutex>
+#include <opencv2/imgcodecs.hpp>
 #include <thread>
 
 #include "view/live_view.hpp"
@@ -22,10 +23,16 @@ int main() {
   };
   std::mutex mutex;
   view::LiveView picture;
-  view::PageServer server(view::PageServer::open_port(0), [&] {
-    const std::lock_guard lock(mutex);
-    return picture.history();
-  });
+  view::PageServer server(
+      view::PageServer::open_port(0),
+      [&] {
+        const std::lock_guard lock(mutex);
+        return picture.history();
+      },
+      [&](std::int32_t camera, std::int64_t count) {
+        const std::lock_guard lock(mutex);
+        return picture.picture(camera, count);
+      });
   const view::Moment start = now();
   const auto step = [&](const view::Moment& at, double s) {  // s seconds into it
     const std::lock_guard lock(mutex);
@@ -55,6 +62,17 @@ int main() {
       tip.information_per_mm2[camera == 0 ? 4 : 0] = tip.information_per_mm2[8] = 25;
       picture.on(tip, at);
     }
+    camera_picture_t seen{};  // black but for a white square, on whose middle the tip is
+    seen.utime = at.utime;
+    seen.width_px = 160;
+    seen.height_px = 120;
+    seen.tip_px[0] = 100;
+    seen.tip_px[1] = 40;
+    cv::Mat gray(120, 160, CV_8UC1, cv::Scalar(0));
+    gray(cv::Rect(96, 36, 9, 9)) = 255;
+    cv::imencode(".jpg", gray, seen.jpeg);
+    seen.jpeg_size = static_cast<std::int32_t>(seen.jpeg.size());
+    if (s < 8) picture.on(seen, at);  // and no more of them: it grows old
     process_status_t status{};
     status.utime = at.utime;
     status.process = "bevel-controller";

@@ -18,7 +18,12 @@ namespace {
 using testing::HasSubstr;
 
 struct Served {
-  Served() : server(PageServer::open_port(0), [] { return std::string("{\"rows\":[]}"); }) {
+  Served()
+      : server(
+            PageServer::open_port(0), [] { return std::string("{\"rows\":[]}"); },
+            [](std::int32_t camera, std::int64_t count) {
+              return camera == 1 && count == 7 ? std::string("\xff\xd8picture") : "";
+            }) {
     const std::string address = server.address();
     port = std::stoi(address.substr(address.rfind(':') + 1));
   }
@@ -42,6 +47,21 @@ TEST(PageServer, ServesThePageStateAndHistory) {
   EXPECT_EQ(client.Get("/state")->body, "{\"a\":1}");
   EXPECT_EQ(client.Get("/history")->body, "{\"rows\":[]}");
   EXPECT_EQ(client.Get("/nothing")->status, 404);
+}
+
+TEST(PageServer, GivesThePictureThatIsAskedForOrNone) {
+  Served served;
+  auto client = served.client();
+  const auto picture = client.Get("/picture/1/7");
+  ASSERT_TRUE(picture);
+  EXPECT_EQ(picture->body, "\xff\xd8picture");
+  EXPECT_EQ(picture->get_header_value("Content-Type"), "image/jpeg");
+  for (const char* path : {"/picture/1/8", "/picture/0/7", "/picture/1", "/picture/-1/7", "/picture/x/7",
+                           "/picture/1/99999999999999999999"}) {
+    const auto none = client.Get(path);
+    ASSERT_TRUE(none) << path;
+    EXPECT_EQ(none->status, 404) << path;
+  }
 }
 
 TEST(PageServer, ThePageNeedsNoNetworkAndIsWhole) {

@@ -24,5 +24,6 @@ expect '<b>4.70 ± 1.00</b><span>k · 1e-3/mm, radius 213 mm'
 expect '<tr><td>0</td><td class="good">ok</td><td>–</td>'             # camera 0 does not see x
 expect '<tr class="stale"><td>1</td>'                                 # camera 1 fell silent
 expect 'class="u-title">insertion rate \(mm/s\)'
+expect '<figure class="old" data-shown="160 x 120"><canvas aria-label="Picture of camera 0" width="160" height="120"></canvas><figcaption>camera 0 · tip at 100, 40 px · [0-9.]+ s old<'
 expect 'id="mode" class="badge quiet">live<'
 echo "ok: $(wc -c <"$work/page.html") bytes of page"

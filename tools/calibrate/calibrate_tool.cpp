@@ -8,15 +8,15 @@
 #include <ostream>
 #include <sstream>
 
-#include "io/html_report.hpp"
 #include "io/recording.hpp"
+#include "report/numbers.hpp"
 #include "tools/common/exit_status.hpp"
 
 namespace bevel::calibrate {
 namespace {
 
 namespace fs = std::filesystem;
-using io::format_significant;
+using report::format_significant;
 
 std::string utc_now() {
   const std::time_t now = std::chrono::system_clock::to_time_t(std::chrono::system_clock::now());

@@ -5,7 +5,8 @@
 #include <nlohmann/json.hpp>
 #include <sstream>
 
-#include "io/html_report.hpp"
+#include "report/numbers.hpp"
+#include "report/page.hpp"
 #include "tools/calibrate/calibrate_tool.hpp"
 
 namespace bevel::calibrate {
@@ -13,8 +14,8 @@ namespace {
 
 using camera::Calibrated;
 using camera::Residual;
-using io::format_significant;
-using io::HtmlReport;
+using report::format_significant;
+using report::Page;
 
 constexpr int kCellsAcross = 8, kCellsDown = 6, kCells = kCellsAcross * kCellsDown;
 constexpr double kGood_px = 0.3, kFair_px = 1.0;
@@ -57,34 +58,34 @@ std::string residual_map(const Calibrated& got, size_t camera) {
   svg << "<svg xmlns=\"http://www.w3.org/2000/svg\" viewBox=\"" << -6 * unit << ' ' << -6 * unit << ' '
       << size.width + 12 * unit << ' ' << size.height + 30 * unit << "\" font-family=\"sans-serif\" font-size=\""
       << 12 * unit << "\">\n<rect width=\"" << size.width << "\" height=\"" << size.height
-      << "\" fill=\"#fafafa\" stroke=\"#999\" stroke-width=\"" << unit << "\"/>\n";
+      << "\" fill=\"var(--panel)\" stroke=\"var(--faint)\" stroke-width=\"" << unit << "\"/>\n";
   for (int i = 1; i < kCellsAcross; ++i)
     svg << "<path d=\"M" << 1.0 * i * size.width / kCellsAcross << " 0V" << size.height
-        << "\" stroke=\"#e4e4e4\" stroke-width=\"" << unit << "\"/>";
+        << "\" stroke=\"var(--grid)\" stroke-width=\"" << unit << "\"/>";
   for (int i = 1; i < kCellsDown; ++i)
     svg << "<path d=\"M0 " << 1.0 * i * size.height / kCellsDown << 'H' << size.width
-        << "\" stroke=\"#e4e4e4\" stroke-width=\"" << unit << "\"/>";
+        << "\" stroke=\"var(--grid)\" stroke-width=\"" << unit << "\"/>";
   for (const bool immersed : {false, true}) {
-    svg << "\n<path fill=\"none\" stroke=\"" << (immersed ? "#b8912a" : "#6f9cc8") << "\" stroke-width=\"" << 0.8 * unit
-        << "\" d=\"";
+    svg << "\n<path fill=\"none\" stroke=\"" << (immersed ? "var(--ochre)" : "var(--likely)") << "\" stroke-width=\""
+        << 0.8 * unit << "\" d=\"";
     for (const Residual& r : got.residuals)
       if (r.camera == camera && got.shots[r.shot].immersed == immersed)
         svg << 'M' << r.at_px.x << ' ' << r.at_px.y << 'l' << scale * r.seen_less_fitted_px.x << ' '
             << scale * r.seen_less_fitted_px.y;
     svg << "\"/>";
   }
-  svg << "\n<path fill=\"none\" stroke=\"#b23a2e\" stroke-width=\"" << 3 * unit << "\" d=\"";
+  svg << "\n<path fill=\"none\" stroke=\"var(--red)\" stroke-width=\"" << 3 * unit << "\" d=\"";
   std::ostringstream dots;
   for (const Cell& cell : cells_of(got, camera)) {
     if (cell.count < 3) continue;
     const cv::Point2d at = cell.place_px / cell.count, mean = cell.sum_px / cell.count;
     svg << 'M' << at.x << ' ' << at.y << 'l' << scale * mean.x << ' ' << scale * mean.y;
-    dots << "<circle cx=\"" << at.x << "\" cy=\"" << at.y << "\" r=\"" << 2.2 * unit << "\" fill=\"#b23a2e\"/>";
+    dots << "<circle cx=\"" << at.x << "\" cy=\"" << at.y << "\" r=\"" << 2.2 * unit << "\" fill=\"var(--red)\"/>";
   }
   svg << "\"/>\n"
       << dots.str() << "\n<path d=\"M0 " << size.height + 14 * unit << 'h' << scale * rms_px
-      << "\" stroke=\"#222\" stroke-width=\"" << 2 * unit << "\"/><text x=\"" << scale * rms_px + 6 * unit << "\" y=\""
-      << size.height + 18 * unit << "\">" << format_significant(rms_px, 2)
+      << "\" stroke=\"var(--ink)\" stroke-width=\"" << 2 * unit << "\"/><text fill=\"var(--ink)\" x=\""
+      << scale * rms_px + 6 * unit << "\" y=\"" << size.height + 18 * unit << "\">" << format_significant(rms_px, 2)
       << " px; in air blue, immersed ochre, mean of each cell red</text>\n</svg>";
   return svg.str();
 }
@@ -97,7 +98,7 @@ std::string with_sd(double value, double sd, const std::string& unit) {
   return out.str();
 }
 
-void tell_parameters(const Calibrated& got, HtmlReport& page) {
+void tell_parameters(const Calibrated& got, Page& page) {
   std::vector<std::string> header{"parameter"};
   for (const int number : got.numbers) header.push_back("camera " + std::to_string(number));
   static constexpr const char* names[] = {"fx", "fy", "cx", "cy", "k1", "k2", "p1", "p2", "k3"};
@@ -123,7 +124,7 @@ void tell_parameters(const Calibrated& got, HtmlReport& page) {
   page.table(header, rows, "Standard deviations by the residuals' scatter; without one: held, not fitted.");
 }
 
-void tell_pictures(const Calibrated& got, HtmlReport& page) {
+void tell_pictures(const Calibrated& got, Page& page) {
   std::vector<std::vector<std::string>> rows;
   for (const camera::PictureFigures& p : got.pictures)
     rows.push_back({p.name, std::to_string(got.numbers[p.camera]), std::to_string(p.corners),
@@ -139,7 +140,7 @@ double worst_held_out_px(const Calibrated& got) {
   return worst;
 }
 
-void tell_verdict(const Calibrated& got, HtmlReport& page) {
+void tell_verdict(const Calibrated& got, Page& page, const std::vector<report::Fact>& facts) {
   const double worst_px = worst_held_out_px(got);
   double ratio = 0, seen = 1;
   for (size_t c = 0; c < got.numbers.size(); ++c) {
@@ -147,24 +148,28 @@ void tell_verdict(const Calibrated& got, HtmlReport& page) {
     seen = std::min(seen, 1.0 * covered(cells_of(got, c)) / kCells);
   }
   if (worst_px > kFair_px)
-    page.callout(
-        io::Tone::bad, "Do not use it",
+    page.verdict(
+        report::Tone::bad, "Do not use it",
         "Pictures held out are missed by more than a pixel. Is the board flat, are its squares as long as was said, "
-        "did focus or zoom change between pictures?");
+        "did focus or zoom change between pictures?",
+        facts);
   else if (worst_px > kGood_px || ratio > 3)
-    page.callout(
-        io::Tone::warning, "To be improved",
+    page.verdict(
+        report::Tone::warning, "To be improved",
         worst_px > kGood_px
             ? "Pictures held out are missed by more than 0.3 px: sharper pictures, a flatter board, more of them."
             : "Residuals are alike over parts of the picture, more than chance would have them: the red lines "
-              "below. A board that is not flat, or a lens that needs --k3.");
+              "below. A board that is not flat, or a lens that needs --k3.",
+        facts);
   else if (seen < kSeenShare)
-    page.callout(io::Tone::warning, "Good where the board was",
+    page.verdict(report::Tone::warning, "Good where the board was",
                  "Pictures that were not fitted are met as well as the corners can be found, but the board was seen in "
                  "less than half of "
-                 "a picture. If the needle goes where the maps below are empty, take pictures with the board there.");
+                 "a picture. If the needle goes where the maps below are empty, take pictures with the board there.",
+                 facts);
   else
-    page.callout(io::Tone::good, "Good", "Pictures that were not fitted are met as well as the corners can be found.");
+    page.verdict(report::Tone::good, "Good",
+                 "Pictures that were not fitted are met as well as the corners can be found.", facts);
 }
 
 }  // namespace
@@ -183,9 +188,8 @@ double systematic_ratio(const Calibrated& got, std::size_t camera) {
 }
 
 void write_report(const Calibrated& got, const Told& told, const std::string& folder) {
-  HtmlReport page("Calibration of " + std::string(got.numbers.size() > 1 ? "two cameras" : "one camera"));
-  tell_verdict(got, page);
-  std::vector<io::Fact> facts;
+  Page page("Calibration of " + std::string(got.numbers.size() > 1 ? "two cameras" : "one camera"));
+  std::vector<report::Fact> facts;
   for (size_t c = 0; c < got.numbers.size(); ++c) {
     const auto& fit = got.calibration.cameras[c].fit;
     facts.push_back({"camera " + std::to_string(got.numbers[c]) + ", held out",
@@ -199,7 +203,7 @@ void write_report(const Calibrated& got, const Told& told, const std::string& fo
     if (t.immersed)
       facts.push_back({"if refraction were ignored", format_significant(t.misplaced_without_wall_mm) + " mm",
                        "beside where they are"});
-  page.facts(facts);
+  tell_verdict(got, page, facts);
   page.paragraph("Board: " + told.board + ". Made " + got.calibration.made_utc + ".");
   page.heading("The frame {A}").paragraph(told.frame);
 
@@ -209,10 +213,10 @@ void write_report(const Calibrated& got, const Told& told, const std::string& fo
       "model "
       "does not fit there. Where there are no lines nothing was seen, and the lens is a guess.");
   for (size_t c = 0; c < got.numbers.size(); ++c)
-    page.figure_svg(residual_map(got, c),
-                    "Camera " + std::to_string(got.numbers[c]) + ": corners in " +
-                        std::to_string(covered(cells_of(got, c))) + " of " + std::to_string(kCells) + " cells; means " +
-                        format_significant(systematic_ratio(got, c), 2) + " times what chance leaves.");
+    page.picture(residual_map(got, c), "Camera " + std::to_string(got.numbers[c]) + ": corners in " +
+                                           std::to_string(covered(cells_of(got, c))) + " of " + std::to_string(kCells) +
+                                           " cells; means " + format_significant(systematic_ratio(got, c), 2) +
+                                           " times what chance leaves.");
   page.heading("What was fitted");
   tell_parameters(got, page);
   page.heading("What was left out");

@@ -6,7 +6,7 @@
 #include <nlohmann/json.hpp>
 #include <numeric>
 
-#include "io/html_report.hpp"
+#include "report/page.hpp"
 #include "tools/diagnose/figures.hpp"
 
 namespace bevel::close_loop {
@@ -197,10 +197,10 @@ std::string page_html(const ClosedLoop& loop) {
   const auto& rig = loop.rig;
   const auto& nis = loop.estimator.known;
   const auto& miss = loop.targeting.live;
-  io::HtmlReport page("The loop closed: " + loop.case_name);
+  report::Page page("The loop closed: " + loop.case_name);
   const bool better = loop.targeting.gain_mm.low > 0;
-  page.callout(better ? io::Tone::good : io::Tone::plain, "Found: " + found_in_words(loop), loop.findings.sentence);
-  page.facts(
+  page.verdict(
+      better ? report::Tone::good : report::Tone::plain, "Found: " + found_in_words(loop), loop.findings.sentence,
       {{"rig against recordings", text("%.2f to %.2f mm", rig[kRefitted].rmse_mm, rig[kAugmented].rmse_mm),
         text("chi2 per reading %.2f to %.2f", rig[kRefitted].chi2_per_reading, rig[kAugmented].chi2_per_reading)},
        {"estimator's NIS", text("%.2f to %.2f", nis[kRefitted].nis.mean(), nis[kAugmented].nis.mean()),

@@ -4,7 +4,7 @@
 #include <string>
 #include <vector>
 
-#include "io/plot.hpp"
+#include "report/figure.hpp"
 #include "tools/close_loop/close_loop.hpp"
 
 namespace bevel::close_loop {
@@ -18,8 +18,8 @@ std::vector<std::string> conclusions(const ClosedLoop& loop);
 std::string found_in_words(const ClosedLoop& loop);  // "torsional_windup (lag_at_100mm_rad 0.823)", "nothing"
 
 // One picture a figure.
-io::Plot rig_picture(const ClosedLoop& loop);
-io::Plot estimator_picture(const ClosedLoop& loop);
-io::Plot targeting_picture(const ClosedLoop& loop);
+report::Figure rig_picture(const ClosedLoop& loop);
+report::Figure estimator_picture(const ClosedLoop& loop);
+report::Figure targeting_picture(const ClosedLoop& loop);
 
 }  // namespace bevel::close_loop

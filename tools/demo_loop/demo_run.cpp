@@ -124,6 +124,8 @@ int run_demo(const DemoOptions& options) {
       std::vector<std::string> command{options.programs + "/" + program, "--config", options.config_path};
       if (!options.fault.empty() && program_of(nodes::parse_fault(options.fault)) == program)
         command.insert(command.end(), {"--fault", options.fault});
+      if (options.view && std::string_view(program) == "bevel-camera")
+        command.insert(command.end(), {"--picture-hz", "4"});
       processes.start(program, command, options.out + "/" + program + ".txt");
     }
     end = steer(session, processes, lcm, options);

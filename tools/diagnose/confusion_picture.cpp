@@ -1,30 +1,20 @@
 #include <algorithm>
 #include <cmath>
-#include <cstdio>
 #include <limits>
 
-#include "tools/diagnose/drawing.hpp"
 #include "tools/diagnose/figures.hpp"
 #include "tools/diagnose/pictures.hpp"
 
 namespace bevel::diagnose {
 
 using namespace bevel::diagnosis;  // NOLINT(google-build-using-namespace)
+using namespace bevel::report;     // NOLINT(google-build-using-namespace)
 
 namespace {
 
 constexpr double kNames = 150;
 constexpr double kLeaning = 72;  // how far the last column's name leans to the right
 constexpr double kWorthANumber = 0.5;
-
-// White to dark blue.
-std::string shade(double share) {
-  const double s = std::clamp(share, 0.0, 1.0);
-  const auto mix = [s](int light, int dark) { return light + static_cast<int>(std::lround(s * s * (dark - light))); };
-  char text[8];
-  std::snprintf(text, sizeof text, "#%02x%02x%02x", mix(246, 24), mix(248, 84), mix(250, 148));
-  return text;
-}
 
 // The least absorbed of an effect's parameters: that by which it can be seen. NaN if nothing is known of it.
 double absorbed_share(const Findings& findings, const std::string& name) {
@@ -40,12 +30,14 @@ void draw_cell(Drawing& drawing, const Box& cell, double value, const std::strin
                  {.anchor = Lettering::Anchor::middle, .colour = ink::kFaint});
     return;
   }
-  drawing.rectangle({cell.left + 0.5, cell.top + 0.5, cell.width - 1, cell.height - 1}, shade(value), 1, hint);
+  const double share = std::clamp(value, 0.0, 1.0);
+  drawing.rectangle({cell.left + 0.5, cell.top + 0.5, cell.width - 1, cell.height - 1}, kAfterInk,
+                    0.04 + 0.96 * share * share, hint);
   if (value < kWorthANumber) return;
   const int hundredths = static_cast<int>(std::lround(100 * value));  // ".97": the zero would not fit
   const std::string text = hundredths >= 100 ? "1" : "." + std::to_string(hundredths);
   drawing.text({cell.left + cell.width / 2, cell.top + cell.height / 2 + 4}, text,
-               {.anchor = Lettering::Anchor::middle, .size = 10, .colour = value > 0.65 ? "#ffffff" : ink::kText});
+               {.anchor = Lettering::Anchor::middle, .size = 10, .colour = value > 0.65 ? ink::kGround : ink::kText});
 }
 
 }  // namespace

@@ -3,18 +3,19 @@
 
 #include "diagnosis/inference/search.hpp"
 #include "model/effects/effect.hpp"
-#include "tools/diagnose/drawing.hpp"
 #include "tools/diagnose/figures.hpp"
 #include "tools/diagnose/pictures.hpp"
 
 namespace bevel::diagnose {
 
 using namespace bevel::diagnosis;  // NOLINT(google-build-using-namespace)
+using namespace bevel::report;     // NOLINT(google-build-using-namespace)
 
 namespace {
 
 constexpr double kNames = 164;  // room for names on the left
 constexpr double kNameSize = 12.5;
+constexpr const char* kLikelyInk = "var(--likely)";
 
 Lettering name_lettering(bool bold = false) {
   return {.anchor = Lettering::Anchor::end, .size = kNameSize, .bold = bold};
@@ -45,11 +46,11 @@ std::string ranking_picture(const Findings& findings, std::vector<TriedEffect> t
   const double height = kRow * static_cast<double>(tried.size());
   Drawing drawing(832, 34 + height + 40);
   draw_keys(drawing, {kNames, 14},
-            {{ink::kAfter, "found"},
-             {"#8db8dc",
+            {{kAfterInk, "found"},
+             {kLikelyInk,
               findings.verdict == Verdict::unknown_effect ? "likely, not enough" : "likely, another explains more"},
-             {"#c9c9c9", "not likely"},
-             {"#111111", "mark: likelier than not"}});
+             {ink::kFaint, "not likely"},
+             {ink::kText, "mark: likelier than not"}});
   const Box box{kNames, 30, 580, height};
   Axis upward{0, 1, ""};
   upward.ruled = false;
@@ -60,12 +61,12 @@ std::string ranking_picture(const Findings& findings, std::vector<TriedEffect> t
     const bool found = was_found(findings, t.name);
     const double right = panel.at(shown(t.log_bayes_factor), 0).x;
     drawing.rectangle({box.left, top + 4, std::max(right - box.left, 1.0), kRow - 8},
-                      found        ? ink::kAfter
-                      : t.likelier ? "#8db8dc"
-                                   : "#c9c9c9",
+                      found        ? kAfterInk
+                      : t.likelier ? kLikelyInk
+                                   : ink::kFaint,
                       1, t.name + ": log Bayes factor " + log_factor(t.log_bayes_factor));
     const double mark = panel.at(kMark, 0).x;
-    drawing.line({mark, top + 2}, {mark, top + kRow - 2}, {.colour = "#111111", .width = 2});
+    drawing.line({mark, top + 2}, {mark, top + kRow - 2}, {.colour = ink::kText, .width = 2});
     drawing.text({box.left - 8, top + 16}, t.name, name_lettering(found));
     drawing.text({box.right() + 10, top + 16}, log_factor(t.log_bayes_factor), {.size = 11, .colour = ink::kSoft});
   }
@@ -98,17 +99,19 @@ void draw_pairs(Drawing& drawing, const Box& box, const HeldOut& held_out, doubl
     const double y = box.top + (static_cast<double>(i) + 0.5) * row;
     const Point before{panel.at(r.before.*figure, 0).x, y};
     const Point after{panel.at(r.after.*figure, 0).x, y};
-    if (!one_model) drawing.line(before, after, {.colour = "#bbbbbb", .width = 2.5}).dots({before}, 5, ink::kBefore);
-    drawing.dots({after}, 5, ink::kAfter);
+    if (!one_model)
+      drawing.line(before, after, {.colour = ink::kFaint, .width = 2.5})
+          .mark(before, 5, kBeforeInk, r.log + ", before: " + measured(r.before.*figure));
+    drawing.mark(after, 5, kAfterInk, r.log + (one_model ? ": " : ", after: ") + measured(r.after.*figure));
     if (names) drawing.text({box.left - 10, y + 4}, r.log, name_lettering());
   }
   if (figure != &FitFigures::chi2_per_dof) return;
   const double one = panel.at(1, 0).x;
-  drawing.line({one, box.top}, {one, box.bottom()}, {.colour = ink::kGood, .width = 1.2, .dashes = "4,3"});
+  drawing.line({one, box.top}, {one, box.bottom()}, {.colour = ink::kGreen, .width = 1.2, .dashes = "4,3"});
   const bool on_the_left = one > box.left + box.width / 2;  // where there is room
   drawing.text(
       {one + (on_the_left ? 4 : -4), box.top - 5}, "as sure as it may be",
-      {.anchor = on_the_left ? Lettering::Anchor::end : Lettering::Anchor::start, .size = 11, .colour = ink::kGood});
+      {.anchor = on_the_left ? Lettering::Anchor::end : Lettering::Anchor::start, .size = 11, .colour = ink::kGreen});
 }
 
 }  // namespace
@@ -123,9 +126,9 @@ std::string held_out_picture(const Findings& findings) {
   names = std::min(names, 240.0);
   Drawing drawing(832, 44 + height + 38);
   std::vector<Key> keys;
-  if (!one_model) keys.push_back({ink::kBefore, "before: needle refitted without this recording"});
-  keys.push_back({ink::kAfter, one_model ? "needle refitted without this recording"
-                                         : "after: with what was found, from the others"});
+  if (!one_model) keys.push_back({kBeforeInk, "before: needle refitted without this recording"});
+  keys.push_back({kAfterInk, one_model ? "needle refitted without this recording"
+                                       : "after: with what was found, from the others"});
   draw_keys(drawing, {names, 14}, keys);
   const double width = (832 - names - 60) / 2;
   draw_pairs(drawing, {names, 44, width, height}, held_out, &FitFigures::rmse_mm, "rms error (mm)", true, one_model);
@@ -198,40 +201,37 @@ std::string interval_picture(const Findings& findings) {
       drawing.area({{x_of(none) - 5, y}, {x_of(none), y - 6}, {x_of(none) + 5, y}, {x_of(none), y + 6}}, ink::kFaint);
     const double low = std::isfinite(p.ci95[0]) ? p.ci95[0] : axis.low;
     const double high = std::isfinite(p.ci95[1]) ? p.ci95[1] : axis.high;
-    drawing.line({x_of(low), y}, {x_of(high), y}, {.colour = ink::kAfter, .width = 3, .opacity = 0.55});
+    drawing.line({x_of(low), y}, {x_of(high), y}, {.colour = kAfterInk, .width = 3, .opacity = 0.55});
     for (const double end : {low, high})
-      drawing.line({x_of(end), y - 5}, {x_of(end), y + 5}, {.colour = ink::kAfter, .width = 1.5});
-    drawing.dots({{x_of(p.value), y}}, 4.5, ink::kAfter);
+      drawing.line({x_of(end), y - 5}, {x_of(end), y + 5}, {.colour = kAfterInk, .width = 1.5});
+    drawing.dots({{x_of(p.value), y}}, 4.5, kAfterInk);
     drawing.text({kLeft + kWide + 16, y}, with_error(p.value, p.std_error) + (p.at_bound ? "  at its bound" : ""));
     drawing.text({kLeft + kWide + 16, y + 15}, "95 %: " + interval(p.ci95), {.size = 11, .colour = ink::kSoft});
   }
   return drawing.svg();
 }
 
-std::string discrepancy_picture(const std::vector<Discrepancy>& discrepancies) {
-  if (discrepancies.empty()) return "";
-  const std::size_t rows = (discrepancies.size() + 1) / 2;
-  constexpr double kRow = 220;
-  Drawing drawing(832, 8 + kRow * static_cast<double>(rows));
-  for (std::size_t i = 0; i < discrepancies.size(); ++i) {
-    const model::DiscrepancyCurve& c = discrepancies[i].curve;
-    std::vector<double> low;
-    std::vector<double> high;
-    std::vector<double> all{0};
+std::vector<Figure> discrepancy_panels(const std::vector<Discrepancy>& discrepancies) {
+  std::vector<Figure> panels;
+  for (const Discrepancy& d : discrepancies) {
+    const model::DiscrepancyCurve& c = d.curve;
+    std::vector<double> low, high;
     for (std::size_t k = 0; k < c.at.size(); ++k) {
       const double error = k < c.std_errors.size() && std::isfinite(c.std_errors[k]) ? 2 * c.std_errors[k] : 0;
       low.push_back(c.values[k] - error);
       high.push_back(c.values[k] + error);
-      all.insert(all.end(), {low.back(), high.back()});
     }
-    const std::size_t row = i / 2;
-    const Box box{62 + static_cast<double>(i % 2) * 425, 26 + static_cast<double>(row) * kRow, 335, kRow - 76};
-    Panel panel(drawing, box, axis_around(c.at, in_words(model::name_of(c.covariate))),
-                axis_around(all, std::string(info_of(c.component).unit)), std::string(info_of(c.component).meaning));
-    panel.level(0, {.colour = ink::kSoft}).band(c.at, low, high, ink::kAfter);
-    panel.curve(c.at, c.values, {.colour = ink::kAfter, .width = 2}).points(c.at, c.values, ink::kAfter, 1, 3);
+    Figure panel;
+    panel.title = std::string(info_of(c.component).meaning);
+    panel.x_label = in_words(model::name_of(c.covariate));
+    panel.y_label = std::string(info_of(c.component).unit);
+    panel.height_px = 170;
+    panel.references.push_back({Reference::Axis::horizontal, 0, ""});
+    panel.band("two standard errors", c.at, low, high, kAfter).line("discrepancy", c.at, c.values, kAfter);
+    panel.points("", c.at, c.values, kAfter);
+    panels.push_back(std::move(panel));
   }
-  return drawing.svg();
+  return panels;
 }
 
 }  // namespace bevel::diagnose

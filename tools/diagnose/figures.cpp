@@ -2,28 +2,14 @@
 
 #include <algorithm>
 #include <cmath>
-#include <cstdio>
 #include <limits>
 #include <utility>
 
 namespace bevel::diagnose {
 namespace {
 
-std::string fixed(double value, int decimals) {
-  char text[64];
-  std::snprintf(text, sizeof text, "%.*f", decimals, value);
-  // "-0.00" says nothing that "0.00" does not.
-  if (text[0] == '-' && std::string_view(text).find_first_not_of("-0.") == std::string_view::npos) return text + 1;
-  return text;
-}
-
-int decimals_for(double size, int digits) {
-  if (!(std::abs(size) > 0)) return 0;
-  const auto above = [&](double of) { return static_cast<int>(std::floor(std::log10(std::abs(of)) + 1e-9)); };
-  const double unit = std::pow(10.0, above(size) - digits + 1);
-  const double rounded = std::round(size / unit) * unit;  // 0.9998 is 1.00, not 1.000
-  return std::clamp(digits - 1 - above(rounded), 0, 9);
-}
+using report::decimals_for;
+using report::fixed;
 
 constexpr std::pair<std::string_view, std::string_view> kUnits[] = {{"_mm_per_rad", "mm/rad"},
                                                                     {"_mm_per_mm", "mm/mm"},
@@ -47,21 +33,6 @@ std::pair<std::string_view, std::string_view> split(std::string_view name) {
 }
 
 }  // namespace
-
-std::string number(double value, int digits) {
-  if (!std::isfinite(value)) return "-";
-  if (value == 0) return "0";
-  std::string text = fixed(value, decimals_for(value, digits));
-  if (text.find('.') != std::string::npos) {
-    text.erase(text.find_last_not_of('0') + 1);
-    if (text.ends_with('.')) text.pop_back();
-  }
-  return text;
-}
-
-std::string measured(double value, int digits) {
-  return std::isfinite(value) ? fixed(value, decimals_for(value, digits)) : "-";
-}
 
 std::string with_error(double value, double std_error) {
   if (!std::isfinite(value)) return "-";

@@ -8,13 +8,12 @@
 #include <vector>
 
 #include "diagnosis/mismatch/findings.hpp"
+#include "report/numbers.hpp"
 
 namespace bevel::diagnose {
 
-// So many significant digits, never an exponent; "-" where there is no finite value.
-std::string number(double value, int digits = 3);
-// The same for what was measured: zeros at the end stay, "1.00".
-std::string measured(double value, int digits = 3);
+using report::measured;
+using report::number;
 // Rounded to two digits of its error: "0.823 ± 0.031".
 std::string with_error(double value, double std_error);
 // Both ends rounded alike: "0.76 to 0.89".

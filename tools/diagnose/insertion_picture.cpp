@@ -1,13 +1,13 @@
 #include <algorithm>
 #include <cmath>
 
-#include "tools/diagnose/drawing.hpp"
 #include "tools/diagnose/figures.hpp"
 #include "tools/diagnose/pictures.hpp"
 
 namespace bevel::diagnose {
 
 using namespace bevel::diagnosis;  // NOLINT(google-build-using-namespace)
+using namespace bevel::report;     // NOLINT(google-build-using-namespace)
 
 namespace {
 
@@ -41,8 +41,8 @@ void draw_quantity(Drawing& drawing, const Box& box, const Findings& findings, s
     const double y = box.top + (static_cast<double>(i) + 0.5) * kRow;
     const InsertionValue& v = insertions[i].values[quantity];
     drawing.line({x_of(scale * v.ci95[0]), y}, {x_of(scale * v.ci95[1]), y},
-                 {.colour = ink::kAfter, .width = 3, .opacity = 0.55});
-    drawing.dots({{x_of(scale * v.value), y}}, 4, ink::kAfter);
+                 {.colour = kAfterInk, .width = 3, .opacity = 0.55});
+    drawing.mark({x_of(scale * v.value), y}, 4, kAfterInk, insertions[i].log + ": " + number(scale * v.value));
     if (names)
       drawing.text({box.left - 10, y + 4}, insertions[i].log, {.anchor = Lettering::Anchor::end, .size = kNameSize});
   }
@@ -68,7 +68,7 @@ std::string insertion_picture(const Findings& findings) {
                   findings, q, q % kInARow == 0);
   }
   draw_keys(drawing, {names, 12},
-            {{ink::kAfter, "its value, with 95 %"}, {ink::kSpan, "one standard deviation between insertions"}});
+            {{kAfterInk, "its value, with 95 %"}, {ink::kSpan, "one standard deviation between insertions"}});
   return drawing.svg();
 }
 

@@ -3,18 +3,37 @@
 #include <limits>
 #include <numeric>
 
-#include "tools/diagnose/drawing.hpp"
+#include "report/thinned.hpp"
 #include "tools/diagnose/figures.hpp"
 #include "tools/diagnose/pictures.hpp"
 
 namespace bevel::diagnose {
 
 using namespace bevel::diagnosis;  // NOLINT(google-build-using-namespace)
+using report::Colour;
+using report::Figure;
 
 namespace {
 
-constexpr std::size_t kMostPoints = 220;  // of one path
-constexpr double kRow = 160;
+constexpr std::size_t kMostReadings = 260;  // of one path
+
+// Readings that are drawn: no outliers, and of many those that show the same.
+std::vector<std::size_t> readings_of(const Trace& trace) {
+  std::vector<std::size_t> sound;
+  for (std::size_t i = 0; i < trace.time_s.size(); ++i)
+    if (i >= trace.outlier.size() || trace.outlier[i] == 0) sound.push_back(i);
+  std::vector<std::size_t> kept;
+  for (const int axis : {0, 1}) {
+    std::vector<double> values;
+    values.reserve(sound.size());
+    for (const std::size_t i : sound) values.push_back(trace.measured_mm[i][axis]);
+    kept = report::joined(kept, report::thinned(values, kMostReadings / 2));
+  }
+  std::vector<std::size_t> use;
+  use.reserve(kept.size());
+  for (const std::size_t k : kept) use.push_back(sound[k]);
+  return use;
+}
 
 std::vector<double> along(const std::vector<Eigen::Vector3d>& path_mm, int axis, const std::vector<std::size_t>& use) {
   std::vector<double> values;
@@ -23,29 +42,55 @@ std::vector<double> along(const std::vector<Eigen::Vector3d>& path_mm, int axis,
   return values;
 }
 
-void draw_plane(Drawing& drawing, const Box& box, const Trace& trace, int axis, bool last, bool one_model) {
-  const std::size_t step = trace.time_s.size() / kMostPoints + 1;
-  std::vector<std::size_t> use;
-  for (std::size_t i = 0; i < trace.time_s.size(); ++i)
-    if (i % step == 0 && (i >= trace.outlier.size() || trace.outlier[i] == 0)) use.push_back(i);
-  std::vector<double> all_z;
-  std::vector<double> all_lateral;
-  for (const auto* path : {&trace.measured_mm, &trace.before_mm, &trace.after_mm, &trace.model_file_mm}) {
-    const auto z = along(*path, 2, use);
-    const auto lateral = along(*path, axis, use);
-    all_z.insert(all_z.end(), z.begin(), z.end());
-    all_lateral.insert(all_lateral.end(), lateral.begin(), lateral.end());
+std::vector<double> times_of(const Trace& trace, const std::vector<std::size_t>& use) {
+  std::vector<double> times_s;
+  for (const std::size_t i : use) times_s.push_back(trace.time_s[i]);
+  return times_s;
+}
+
+struct Model {
+  const char* name;
+  std::vector<Eigen::Vector3d> Trace::*path_mm;
+  Colour colour;
+  bool dashed;
+};
+
+std::vector<Model> models_of(const Findings& findings) {
+  std::vector<Model> models{{"model file as given", &Trace::model_file_mm, Colour::purple, true}};
+  if (findings.verdict == Verdict::nothing_missing) {  // before is after
+    models.push_back({"needle refitted", &Trace::after_mm, kAfter, false});
+  } else {
+    models.push_back({"before", &Trace::before_mm, kBefore, true});
+    models.push_back({"after", &Trace::after_mm, kAfter, false});
   }
-  const std::string name = axis == 0 ? "x" : "y";
-  Panel panel(drawing, box, axis_around(all_z, last ? "z (mm)" : ""), axis_around(all_lateral, name + " (mm)"),
-              axis == 0 ? trace.log : "");
-  panel.points(along(trace.measured_mm, 2, use), along(trace.measured_mm, axis, use), "#8a8a8a", 0.7, 1.6);
-  const auto draw = [&](const std::vector<Eigen::Vector3d>& path, const Stroke& stroke) {
-    panel.curve(along(path, 2, use), along(path, axis, use), stroke);
-  };
-  draw(trace.model_file_mm, {.colour = "#4d4d4d", .width = 1.2, .dashes = "2,3"});
-  if (!one_model) draw(trace.before_mm, {.colour = ink::kBefore, .width = 1.6, .dashes = "6,3"});
-  draw(trace.after_mm, {.colour = ink::kAfter, .width = 1.6});
+  return models;
+}
+
+std::string link_of(const Trace& trace) { return "path of " + trace.log; }
+
+Figure plane(const Findings& findings, const Trace& trace, int axis) {
+  const std::vector<std::size_t> use = readings_of(trace);
+  Figure figure;
+  figure.title = trace.log;
+  figure.x_label = "z (mm)";
+  figure.y_label = axis == 0 ? "x (mm)" : "y (mm)";
+  figure.height_px = 150;
+  figure.link = link_of(trace);
+  figure.points("measured", along(trace.measured_mm, 2, use), along(trace.measured_mm, axis, use), Colour::grey);
+  for (const Model& m : models_of(findings)) {
+    auto z = along(trace.*m.path_mm, 2, use), lateral = along(trace.*m.path_mm, axis, use);
+    if (m.dashed)
+      figure.dashed(m.name, std::move(z), std::move(lateral), m.colour);
+    else
+      figure.line(m.name, std::move(z), std::move(lateral), m.colour);
+  }
+  for (report::Series& s : figure.series) s.key = times_of(trace, use);
+  return figure;
+}
+
+bool can_be_drawn(const Trace& trace) {
+  return std::any_of(trace.measured_mm.begin(), trace.measured_mm.end(),
+                     [](const Eigen::Vector3d& p) { return p.allFinite(); });
 }
 
 }  // namespace
@@ -70,22 +115,33 @@ std::vector<std::size_t> worst_first(const Findings& findings) {
   return order;
 }
 
-std::string path_picture(const Findings& findings, const std::vector<std::size_t>& traces) {
-  if (traces.empty()) return "";
-  const auto rows = static_cast<double>(traces.size());
-  Drawing drawing(832, 32 + rows * kRow + 22);
-  const bool one_model = findings.verdict == Verdict::nothing_missing;  // before is after
-  std::vector<Key> keys{{"#8a8a8a", "measured"}, {"#4d4d4d", "model file as given", true}};
-  if (!one_model) keys.push_back({ink::kBefore, "before: needle refitted", true});
-  keys.push_back({ink::kAfter, one_model ? "needle refitted" : "after: with what was found"});
-  draw_keys(drawing, {50, 14}, keys);
-  for (std::size_t i = 0; i < traces.size(); ++i) {
-    const double top = 50 + static_cast<double>(i) * kRow;
-    for (const int axis : {0, 1})
-      draw_plane(drawing, {50 + axis * 422.0, top, 340, kRow - 50}, findings.traces[traces[i]], axis,
-                 i + 1 == traces.size(), one_model);
+std::vector<Figure> path_panels(const Findings& findings, const std::vector<std::size_t>& traces) {
+  std::vector<Figure> panels;
+  for (const std::size_t t : traces) {
+    if (!can_be_drawn(findings.traces[t])) continue;
+    for (const int axis : {0, 1}) panels.push_back(plane(findings, findings.traces[t], axis));
   }
-  return drawing.svg();
+  return panels;
+}
+
+report::Space path_in_space(const Findings& findings, std::size_t which) {
+  const Trace& trace = findings.traces[which];
+  const std::vector<std::size_t> use = readings_of(trace);
+  report::Space space;
+  space.link = link_of(trace);
+  const auto add = [&](const char* name, const std::vector<Eigen::Vector3d>& path_mm, report::SpacePath::Kind kind,
+                       Colour colour) {
+    report::SpacePath path{.kind = kind, .label = name, .points_mm = {}, .colour = colour, .key = times_of(trace, use)};
+    for (const std::size_t i : use) {
+      const Eigen::Vector3d at = i < path_mm.size() ? path_mm[i] : Eigen::Vector3d::Constant(std::nan(""));
+      path.points_mm.push_back({at.x(), at.y(), at.z()});
+    }
+    space.paths.push_back(std::move(path));
+  };
+  add("measured", trace.measured_mm, report::SpacePath::Kind::points, Colour::grey);
+  for (const Model& m : models_of(findings))
+    add(m.name, trace.*m.path_mm, m.dashed ? report::SpacePath::Kind::dashed : report::SpacePath::Kind::line, m.colour);
+  return space;
 }
 
 }  // namespace bevel::diagnose

@@ -1,13 +1,20 @@
-// The page's pictures, each an <svg> element; "" where there is nothing to show. Where nothing is missing, before and
-// after are one model, and it is drawn once.
+// The page's figures and pictures; none where there is nothing to show. A picture is an <svg> element. Where nothing is
+// missing, before and after are one model, and it is drawn once.
 #pragma once
 
 #include <string>
 #include <vector>
 
 #include "diagnosis/mismatch/findings.hpp"
+#include "report/drawing.hpp"
+#include "report/figure.hpp"
 
 namespace bevel::diagnose {
+
+// Before and after keep their colours through the whole page.
+inline constexpr auto kBefore = report::Colour::orange, kAfter = report::Colour::blue;
+inline constexpr const char* kBeforeInk = report::ink::kOrange;
+inline constexpr const char* kAfterInk = report::ink::kBlue;
 
 // measured - model per reading of one channel; NaN where it has none, and at outliers. In mm where the channel is one
 // of x, y, z, else in standard deviations of the noise.
@@ -17,13 +24,18 @@ struct Residuals {
 Residuals residuals_of(const diagnosis::Findings& findings, const diagnosis::Trace& trace, std::size_t channel);
 std::string residual_unit(const diagnosis::Findings& findings, std::size_t channel);
 
-// One channel against time, depth, speed, roll, time since stop, since reversal; all recordings together.
-std::string residual_picture(const diagnosis::Findings& findings, std::size_t channel);
-// The worst spans, each in its recording, with what the base did then.
-std::string located_picture(const diagnosis::Findings& findings, std::size_t most);
+// One channel against time, depth, speed, roll, time since stop, since reversal; all recordings together. Panels in
+// which a reading is known by its number: pointing at it in one shows it in all.
+std::vector<report::Figure> residual_panels(const diagnosis::Findings& findings, std::size_t channel);
+// One recording over time: every channel's residuals, below them what the base did.
+std::vector<report::Figure> recording_panels(const diagnosis::Findings& findings, std::size_t trace);
+// The worst spans, each in its recording, with what the base did then: panels for two columns.
+std::vector<report::Figure> located_panels(const diagnosis::Findings& findings, std::size_t most);
 
-// x-z and y-z of recordings: measured, and by the models.
-std::string path_picture(const diagnosis::Findings& findings, const std::vector<std::size_t>& traces);
+// x over z and y over z of recordings, panels for two columns: measured, and by the models.
+std::vector<report::Figure> path_panels(const diagnosis::Findings& findings, const std::vector<std::size_t>& traces);
+// The same of one recording, in space.
+report::Space path_in_space(const diagnosis::Findings& findings, std::size_t trace);
 // Indices of traces, those that the model before gets worst first.
 std::vector<std::size_t> worst_first(const diagnosis::Findings& findings);
 
@@ -38,6 +50,6 @@ std::string insertion_picture(const diagnosis::Findings& findings);
 
 // |cosine| between what effects show, and what the needle's own parameters take of each.
 std::string confusion_picture(const diagnosis::Findings& findings);
-std::string discrepancy_picture(const std::vector<diagnosis::Discrepancy>& discrepancies);
+std::vector<report::Figure> discrepancy_panels(const std::vector<diagnosis::Discrepancy>& discrepancies);
 
 }  // namespace bevel::diagnose

@@ -58,16 +58,16 @@ std::string held_out_sentence(const Findings& f) {
          " to " + measured(h.after.chi2_per_dof) + " (1: as far off as the model says it may be).";
 }
 
-io::Tone tone_of(Verdict verdict) {
+report::Tone tone_of(Verdict verdict) {
   switch (verdict) {
     case Verdict::nothing_missing:
-      return io::Tone::good;
+      return report::Tone::good;
     case Verdict::effects_found:
-      return io::Tone::plain;
+      return report::Tone::plain;
     case Verdict::unknown_effect:
-      return io::Tone::warning;
+      return report::Tone::warning;
   }
-  return io::Tone::plain;
+  return report::Tone::plain;
 }
 
 std::string meaning_of(const Discrepancy& d) { return std::string(info_of(d.curve.component).meaning); }
@@ -87,9 +87,47 @@ bool has_rivals(const Findings& f) {
   return std::any_of(f.effects.begin(), f.effects.end(), [](const auto& e) { return !e.ambiguous_with.empty(); });
 }
 
+// The numbers of the verdict's box: how far off the model is, what that is at the target, and how sure the finding is.
+std::vector<report::Fact> figures_of_verdict(const Findings& f) {
+  std::vector<report::Fact> facts;
+  const HeldOut& h = f.held_out;
+  const bool one_model = f.verdict == Verdict::nothing_missing;
+  const auto add_error = [&](const char* label, const FitFigures& figures, const std::string& note) {
+    facts.push_back({label, measured(figures.rmse_mm) + " mm", note});
+  };
+  const auto as_sure = [](const FitFigures& figures) { return "chi2 per reading " + measured(figures.chi2_per_dof); };
+  if (!f.two_groups) add_error("error as it stands", h.as_it_stands, "model file as given; rms per axis, held out");
+  const auto largest = [](const FitFigures& figures) { return "; largest " + measured(figures.max_mm) + " mm"; };
+  add_error(f.two_groups ? "by what both groups share" : "its needle refitted", h.before,
+            as_sure(h.before) + (one_model ? largest(h.before) : ""));
+  if (!one_model)
+    add_error(f.two_groups              ? "with the change"
+              : f.discrepancies.empty() ? "with what was found"
+                                        : "with the discrepancy",
+              h.after, as_sure(h.after) + largest(h.after));
+  add_error("noise alone", h.noise_floor, "the least that can be left");
+  if (const auto moved = moved_at_depth(f); moved && !f.two_groups)
+    facts.push_back({"tip at the target's depth moved by",
+                     measured(one_model ? moved->from_file_mm : moved->from_refitted_mm, 2) + " mm",
+                     (one_model ? "by refitting the needle"
+                                : measured(moved->from_file_mm, 2) + " mm from where the model file has it") +
+                         std::string("; rms, ") + depths_of(*moved) + " mm deep"});
+  for (const auto& effect : f.effects)
+    facts.push_back({effect.name, probability(effect.probability),
+                     effect.ambiguous_with.empty() ? "probability; no rival"
+                                                   : "probability; or " + listed(effect.ambiguous_with, " or ")});
+  if (!f.discrepancies.empty())
+    facts.push_back({"unknown part", meaning_of(f.discrepancies.front()),
+                     "against " + in_words(model::name_of(f.discrepancies.front().curve.covariate))});
+  facts.push_back(
+      {"readings", std::to_string(f.readings),
+       "in " + std::to_string(f.traces.size()) + " recordings; " + std::to_string(f.outliers) + " outliers"});
+  return facts;
+}
+
 }  // namespace
 
-void add_verdict(io::HtmlReport& page, const Findings& f) {
+void add_verdict(report::Page& page, const Findings& f) {
   std::string consequences;
   for (const auto& effect : f.effects) consequences += sizes_of(effect) + ". ";
   if (f.verdict == Verdict::nothing_missing && f.two_groups)
@@ -106,40 +144,11 @@ void add_verdict(io::HtmlReport& page, const Findings& f) {
                     "recordings could have shown\".";
   else
     consequences += held_out_sentence(f);
-  page.callout(tone_of(f.verdict), headline_of(f.verdict, f.two_groups) + ". " + f.sentence, consequences);
-
-  std::vector<io::Fact> facts;
-  for (const auto& effect : f.effects)
-    facts.push_back({effect.name, probability(effect.probability),
-                     effect.ambiguous_with.empty() ? "probability; no rival"
-                                                   : "probability; or " + listed(effect.ambiguous_with, " or ")});
-  const auto change = [&](double FitFigures::*figure) {
-    const std::string before = measured(f.held_out.before.*figure);
-    return f.verdict == Verdict::nothing_missing ? before : before + " → " + measured(f.held_out.after.*figure);
-  };
-  const FitFigures& last = f.verdict == Verdict::nothing_missing ? f.held_out.before : f.held_out.after;
-  facts.push_back({"held-out error", change(&FitFigures::rmse_mm) + " mm",
-                   "rms per axis, noise alone " + measured(f.held_out.noise_floor.rmse_mm) + " mm; largest " +
-                       measured(last.max_mm) + " mm"});
-  facts.push_back({"chi2 per reading", change(&FitFigures::chi2_per_dof), "held out; 1: as sure as it may be"});
-  if (const auto moved = moved_at_depth(f); moved && !f.two_groups)
-    facts.push_back(
-        {"at depth the tip is moved by",
-         measured(f.verdict == Verdict::nothing_missing ? moved->from_file_mm : moved->from_refitted_mm, 2) + " mm",
-         f.verdict == Verdict::nothing_missing
-             ? "by refitting the needle; rms over recordings, " + depths_of(*moved) + " mm deep"
-             : "by what was found, beside the needle refitted; " + measured(moved->from_file_mm, 2) +
-                   " mm from where the model file has it; rms over recordings, " + depths_of(*moved) + " mm deep"});
-  if (!f.discrepancies.empty())
-    facts.push_back({"unknown part", meaning_of(f.discrepancies.front()),
-                     "against " + in_words(model::name_of(f.discrepancies.front().curve.covariate))});
-  facts.push_back(
-      {"readings", std::to_string(f.readings),
-       "in " + std::to_string(f.traces.size()) + " recordings; " + std::to_string(f.outliers) + " outliers"});
-  page.facts(facts);
+  page.verdict(tone_of(f.verdict), headline_of(f.verdict, f.two_groups) + ". " + f.sentence, consequences,
+               figures_of_verdict(f));
 }
 
-void add_what_to_do(io::HtmlReport& page, const Findings& f) {
+void add_what_to_do(report::Page& page, const Findings& f) {
   std::vector<std::string> todo;
   for (const auto& effect : f.effects)
     if (!effect.meaning.empty()) todo.push_back(effect.name + " means: " + effect.meaning + ".");
@@ -183,14 +192,13 @@ void add_what_to_do(io::HtmlReport& page, const Findings& f) {
   page.heading("What to do").list(todo);
 }
 
-void add_parameters(io::HtmlReport& page, const Findings& f) {
+void add_parameters(report::Page& page, const Findings& f) {
   page.heading("Parameters");
   const std::string picture = interval_picture(f);
   if (!picture.empty())
-    page.figure_svg(
-        picture,
-        "What was found, with 95 % intervals over all explanations that hold the effect, with and without a "
-        "discrepancy beside it. An interval that reaches the diamond would be no evidence of an effect.");
+    page.picture(picture,
+                 "What was found, with 95 % intervals over all explanations that hold the effect, with and without a "
+                 "discrepancy beside it. An interval that reaches the diamond would be no evidence of an effect.");
   if (f.two_groups) {
     page.paragraph(
         "The needle itself is not measured between two groups: what all recordings get wrong alike, against depth, is "
@@ -218,7 +226,7 @@ void add_parameters(io::HtmlReport& page, const Findings& f) {
              "anything is named.");
 }
 
-void add_variation(io::HtmlReport& page, const Findings& f) {
+void add_variation(report::Page& page, const Findings& f) {
   if (f.variation.empty()) return;
   page.subheading("How much insertions differ");
   std::vector<std::vector<std::string>> rows;
@@ -235,13 +243,13 @@ void add_variation(io::HtmlReport& page, const Findings& f) {
              "Of the values that were tried. A recording more makes the needle no surer than this allows.");
   const std::string picture = insertion_picture(f);
   if (!picture.empty())
-    page.figure_svg(picture,
-                    "What each insertion has of its own, beside what all share: its curvature as a share of the "
-                    "needle's, the heading about x and y and the bevel's roll at the entry, and where it entered. An "
-                    "insertion far outside the band is one to look at.");
+    page.picture(picture,
+                 "What each insertion has of its own, beside what all share: its curvature as a share of the "
+                 "needle's, the heading about x and y and the bevel's roll at the entry, and where it entered. An "
+                 "insertion far outside the band is one to look at.");
 }
 
-void add_location(io::HtmlReport& page, const Findings& f) {
+void add_location(report::Page& page, const Findings& f) {
   if (f.where.empty()) return;
   page.heading("Where it goes wrong");
   page.paragraph(
@@ -252,21 +260,21 @@ void add_location(io::HtmlReport& page, const Findings& f) {
     rows.push_back({w.log, w.channel, number(w.from_s) + " to " + number(w.to_s),
                     w.covariate.empty() ? "-" : span_of(w), percent(w.share)});
   page.table({"recording", "channel", "time (s)", "there", "share of the mismatch"}, rows);
-  const std::string picture = located_picture(f, 2);
-  if (!picture.empty())
-    page.figure_svg(picture,
-                    "The worst spans in their recordings: what was measured less what was predicted, and below it what "
-                    "the base did at that time.");
+  const auto panels = located_panels(f, 2);
+  if (!panels.empty())
+    page.figures(panels, static_cast<int>(panels.size() / 3),
+                 "The worst spans, shaded, in their recordings: what was measured less what was predicted, and below "
+                 "it what the base did at that time.");
 }
 
-void add_unknown_part(io::HtmlReport& page, const Findings& f) {
+void add_unknown_part(report::Page& page, const Findings& f) {
   if (f.discrepancies.empty()) return;
   page.heading("The unknown part, described");
   page.paragraph(
       "No effect on the list explains this. The discrepancy says by how much a quantity of the motion would have to be "
       "off, and against what it varies, for the model to fit: zero is the model as it is. It is a description, not a "
       "cause.");
-  page.figure_svg(discrepancy_picture(f.discrepancies), "The discrepancy with a band of two standard errors.");
+  page.figures(discrepancy_panels(f.discrepancies), 2, "The discrepancy with a band of two standard errors.");
   std::vector<std::vector<std::string>> rows;
   for (const auto& c : f.discrepancies) {
     double largest = 0;
@@ -295,7 +303,7 @@ void add_unknown_part(io::HtmlReport& page, const Findings& f) {
                    proposed->name + ", ready to be added to the library (docs/adding-an-effect.md).");
 }
 
-void add_residuals(io::HtmlReport& page, const Findings& f) {
+void add_residuals(report::Page& page, const Findings& f) {
   std::vector<std::pair<double, std::size_t>> order;
   for (std::size_t c = 0; c < f.channels.size(); ++c) {
     double sum = 0;
@@ -311,43 +319,72 @@ void add_residuals(io::HtmlReport& page, const Findings& f) {
                                   ? " The line should lie at zero in every panel, within what its band lets it waver."
                                   : " Where the orange line leaves zero and the blue one does not, what was found "
                                     "explains it.";
-  const auto add = [&](io::HtmlReport& to, std::size_t c) {
-    const std::string picture = residual_picture(f, c);
-    if (!picture.empty())
-      to.figure_svg(picture, "Channel " + f.channels[c] +
-                                 ", measured less predicted, all recordings; outliers left out." + reading);
+  const auto add = [&](report::Page& to, std::size_t c) {
+    const auto panels = residual_panels(f, c);
+    if (panels.empty()) return;
+    to.figures(panels, 3,
+               "Channel " + f.channels[c] +
+                   ", measured less predicted, all recordings; outliers left out. Dots: readings; line: median; band: "
+                   "half of the readings; shaded: where it goes wrong." +
+                   reading);
   };
   if (order.empty() || f.traces.empty()) return;
   page.heading(one_model ? "What is left over" : "What is left over, before and after");
   page.paragraph(
-      "Residuals against seven quantities. Missing physics shows as a line that leaves zero in an orderly way against "
+      "Residuals against up to seven quantities; point at a reading in one panel to see it in all. Missing physics "
+      "shows as a line that leaves zero in an orderly way against "
       "one of them; noise has no order. With a complete model the blue line stays at zero in every panel.");
   add(page, order.front().second);
   if (order.size() > 1) add(page, order[1].second);
   if (order.size() > 2)
-    page.folded("the other channels", [&](io::HtmlReport& inside) {
+    page.folded("the other channels", [&](report::Page& inside) {
       for (std::size_t i = 2; i < order.size(); ++i) add(inside, order[i].second);
     });
 }
 
-void add_paths(io::HtmlReport& page, const Findings& f) {
+void add_recordings(report::Page& page, const Findings& f) {
+  constexpr std::size_t kShown = 2;
+  const auto order = worst_first(f);
+  std::vector<std::vector<report::Figure>> all;
+  for (const std::size_t t : order) all.push_back(recording_panels(f, t));
+  std::erase_if(all, [](const auto& panels) { return panels.empty(); });
+  if (all.empty()) return;
+  std::size_t at = 0;
+  const auto add = [&](report::Page& to, std::size_t until) {
+    for (; at < std::min(until, all.size()); ++at)
+      to.figures(all[at], 1, all[at].front().link.substr(std::string_view("time of ").size()) + ", over time.");
+  };
+  page.heading("Recording by recording");
+  page.paragraph(
+      "What was measured less what was predicted, worst first, and what the base did at that time. The panels of a "
+      "recording are linked: pointing at one shows the instant in all, and dragging across one shows its stretch of "
+      "time in all.");
+  add(page, kShown);
+  if (at < all.size()) page.folded("the other recordings", [&](report::Page& inside) { add(inside, all.size()); });
+}
+
+void add_paths(report::Page& page, const Findings& f) {
   constexpr std::size_t kShown = 3;
   const auto order = worst_first(f);
-  if (order.empty()) return;
   const auto middle = order.begin() + static_cast<std::ptrdiff_t>(std::min(kShown, order.size()));
+  const auto panels = path_panels(f, {order.begin(), middle});
+  if (panels.empty()) return;
   page.heading("Paths, measured and predicted");
-  page.figure_svg(
-      path_picture(f, {order.begin(), middle}),
-      "The recordings that the refitted needle alone gets worst, seen from two sides: x over z on the left, y over "
-      "z on the right. Lateral axes are stretched. The blue line should run through the grey dots.");
-  if (middle != order.end())
-    page.folded("the other recordings", [&](io::HtmlReport& inside) {
-      inside.figure_svg(path_picture(f, {middle, order.end()}), "The other recordings.");
-    });
+  page.space(path_in_space(f, order.front()),
+             "The path in space of the recording that the refitted needle alone gets "
+             "worst.");
+  page.figures(panels, 2,
+               "The recordings that the refitted needle alone gets worst, seen from two sides: x over z on the left, y "
+               "over z on the right. Lateral axes are stretched. Before: the needle refitted; after: with what was "
+               "found. The blue line should run through the grey dots.");
+  const auto others = path_panels(f, {middle, order.end()});
+  if (!others.empty())
+    page.folded("the other recordings",
+                [&](report::Page& inside) { inside.figures(others, 2, "The other recordings."); });
 }
 
 std::string report_html(const Findings& findings, const Provenance& made_of) {
-  io::HtmlReport page(findings.two_groups ? "What changed" : "What the model leaves out");
+  report::Page page(findings.two_groups ? "What changed" : "What the model leaves out");
   add_verdict(page, findings);
   add_what_to_do(page, findings);
   add_parameters(page, findings);
@@ -355,6 +392,7 @@ std::string report_html(const Findings& findings, const Provenance& made_of) {
   add_location(page, findings);
   add_unknown_part(page, findings);
   add_residuals(page, findings);
+  add_recordings(page, findings);
   add_paths(page, findings);
   add_evidence(page, findings);
   add_held_out(page, findings);

@@ -4,7 +4,7 @@
 #include <string>
 
 #include "diagnosis/mismatch/findings.hpp"
-#include "io/html_report.hpp"
+#include "report/page.hpp"
 #include "tools/diagnose/provenance.hpp"
 
 namespace bevel::diagnose {
@@ -12,19 +12,20 @@ namespace bevel::diagnose {
 std::string report_html(const diagnosis::Findings& findings, const Provenance& made_of);
 
 // Its sections, in order. One with nothing to say adds nothing.
-void add_verdict(io::HtmlReport& page, const diagnosis::Findings& findings);
-void add_what_to_do(io::HtmlReport& page, const diagnosis::Findings& findings);
-void add_parameters(io::HtmlReport& page, const diagnosis::Findings& findings);
-void add_variation(io::HtmlReport& page, const diagnosis::Findings& findings);
-void add_location(io::HtmlReport& page, const diagnosis::Findings& findings);
-void add_unknown_part(io::HtmlReport& page, const diagnosis::Findings& findings);
-void add_residuals(io::HtmlReport& page, const diagnosis::Findings& findings);
-void add_paths(io::HtmlReport& page, const diagnosis::Findings& findings);
-void add_evidence(io::HtmlReport& page, const diagnosis::Findings& findings);
-void add_held_out(io::HtmlReport& page, const diagnosis::Findings& findings);
-void add_reach(io::HtmlReport& page, const diagnosis::Findings& findings);  // what the recordings could have shown
-void add_next_experiment(io::HtmlReport& page, const diagnosis::Findings& findings);
-void add_noise_and_checks(io::HtmlReport& page, const diagnosis::Findings& findings);
-void add_making(io::HtmlReport& page, const diagnosis::Findings& findings, const Provenance& made_of);
+void add_verdict(report::Page& page, const diagnosis::Findings& findings);
+void add_what_to_do(report::Page& page, const diagnosis::Findings& findings);
+void add_parameters(report::Page& page, const diagnosis::Findings& findings);
+void add_variation(report::Page& page, const diagnosis::Findings& findings);
+void add_location(report::Page& page, const diagnosis::Findings& findings);
+void add_unknown_part(report::Page& page, const diagnosis::Findings& findings);
+void add_residuals(report::Page& page, const diagnosis::Findings& findings);
+void add_recordings(report::Page& page, const diagnosis::Findings& findings);
+void add_paths(report::Page& page, const diagnosis::Findings& findings);
+void add_evidence(report::Page& page, const diagnosis::Findings& findings);
+void add_held_out(report::Page& page, const diagnosis::Findings& findings);
+void add_reach(report::Page& page, const diagnosis::Findings& findings);  // what the recordings could have shown
+void add_next_experiment(report::Page& page, const diagnosis::Findings& findings);
+void add_noise_and_checks(report::Page& page, const diagnosis::Findings& findings);
+void add_making(report::Page& page, const diagnosis::Findings& findings, const Provenance& made_of);
 
 }  // namespace bevel::diagnose

@@ -52,7 +52,7 @@ std::vector<std::string> experiments_of(const Findings& f) {
 
 }  // namespace
 
-void add_evidence(io::HtmlReport& page, const Findings& f) {
+void add_evidence(report::Page& page, const Findings& f) {
   if (f.tried.empty()) return;
   page.heading("Which explanations are likely");
   std::vector<std::vector<std::string>> shares;
@@ -77,13 +77,13 @@ void add_evidence(io::HtmlReport& page, const Findings& f) {
             "whole, above."
           : "Effects alone, best first. Many may pass, because anything that bends the path a little explains some of "
             "it; a discrepancy without a name explains more.";
-  page.figure_svg(ranking_picture(f, f.tried), caption);
+  page.picture(ranking_picture(f, f.tried), caption);
   if (!f.beside.empty()) {
     const std::string beside = f.beside.front().beside;
     const auto shown = static_cast<std::ptrdiff_t>(std::min<std::size_t>(f.beside.size(), 8));
-    page.figure_svg(ranking_picture(f, {f.beside.begin(), f.beside.begin() + shown}),
-                    "The best of the others, tried beside what was found" +
-                        (beside.empty() ? std::string() : " (" + beside + ")") + ".");
+    page.picture(ranking_picture(f, {f.beside.begin(), f.beside.begin() + shown}),
+                 "The best of the others, tried beside what was found" +
+                     (beside.empty() ? std::string() : " (" + beside + ")") + ".");
   }
   std::vector<std::vector<std::string>> rows;
   for (const auto& t : f.tried) {
@@ -92,7 +92,7 @@ void add_evidence(io::HtmlReport& page, const Findings& f) {
       sizes += (sizes.empty() ? "" : ", ") + in_words(name) + " " + number(value);
     rows.push_back({t.name, log_factor(t.log_bayes_factor), t.fitted ? "fitted" : "linear estimate", sizes});
   }
-  page.folded("the figures", [&](io::HtmlReport& inside) {
+  page.folded("the figures", [&](report::Page& inside) {
     inside.table({"effect, alone", "log Bayes factor", "by", "size"}, rows);
   });
 }
@@ -100,7 +100,7 @@ void add_evidence(io::HtmlReport& page, const Findings& f) {
 namespace {
 
 // As a new insertion and continued, on the same readings.
-void add_two_ways(io::HtmlReport& page, const Findings& f) {
+void add_two_ways(report::Page& page, const Findings& f) {
   const HeldOut& h = f.held_out;
   std::vector<std::pair<std::string, const InsertionPredicted*>> models;
   if (f.verdict == Verdict::nothing_missing) {
@@ -137,7 +137,7 @@ void add_two_ways(io::HtmlReport& page, const Findings& f) {
 
 }  // namespace
 
-void add_held_out(io::HtmlReport& page, const Findings& f) {
+void add_held_out(report::Page& page, const Findings& f) {
   if (f.held_out.recordings.empty()) return;
   page.heading("Recordings predicted");
   page.paragraph(
@@ -145,17 +145,16 @@ void add_held_out(io::HtmlReport& page, const Findings& f) {
       "parameters "
       "fitted, and the one put aside is predicted as a new insertion. An effect of the wrong name fits what it has "
       "seen and gets the rest wrong.");
-  page.figure_svg(
-      held_out_picture(f),
-      f.verdict == Verdict::nothing_missing
-          ? "Each recording predicted from the others. On the right they should lie near the line, "
-            "none far off."
-          : "Each recording predicted from the others, before and after. Blue should lie left of orange, and "
-            "on the right picture near the line.");
+  page.picture(held_out_picture(f),
+               f.verdict == Verdict::nothing_missing
+                   ? "Each recording predicted from the others. On the right they should lie near the line, "
+                     "none far off."
+                   : "Each recording predicted from the others, before and after. Blue should lie left of orange, and "
+                     "on the right picture near the line.");
   add_two_ways(page, f);
 }
 
-void add_reach(io::HtmlReport& page, const Findings& f) {
+void add_reach(report::Page& page, const Findings& f) {
   if (f.detectable.empty() && f.confusion_names.empty()) return;
   page.heading("What these recordings could have shown");
   if (!f.detectable.empty()) {
@@ -176,14 +175,14 @@ void add_reach(io::HtmlReport& page, const Findings& f) {
   const std::string picture = confusion_picture(f);
   if (picture.empty()) return;
   page.subheading("Which effects look alike here");
-  page.figure_svg(picture,
-                  "How alike two effects look in these recordings once the needle and the variation between insertions "
-                  "have absorbed what they can: 0 altogether different, 1 the same. Above 0.95 only their forms and "
-                  "their usual sizes tell them apart; a rival at odds of less than 20 to 1 is named beside what was "
-                  "found. The first column is what is absorbed.");
+  page.picture(picture,
+               "How alike two effects look in these recordings once the needle and the variation between insertions "
+               "have absorbed what they can: 0 altogether different, 1 the same. Above 0.95 only their forms and "
+               "their usual sizes tell them apart; a rival at odds of less than 20 to 1 is named beside what was "
+               "found. The first column is what is absorbed.");
 }
 
-void add_next_experiment(io::HtmlReport& page, const Findings& f) {
+void add_next_experiment(report::Page& page, const Findings& f) {
   page.heading("The next experiment");
   if (!f.next_experiment) {
     page.paragraph(
@@ -198,7 +197,7 @@ void add_next_experiment(io::HtmlReport& page, const Findings& f) {
                  " in chi2 (10 is convincing, 25 settles it).");
 }
 
-void add_noise_and_checks(io::HtmlReport& page, const Findings& f) {
+void add_noise_and_checks(report::Page& page, const Findings& f) {
   page.heading("Noise and checks");
   std::vector<std::vector<std::string>> rows;
   for (std::size_t c = 0; c < f.channels.size() && c < f.noise.sigma.size(); ++c)
@@ -219,7 +218,7 @@ void add_noise_and_checks(io::HtmlReport& page, const Findings& f) {
   if (!f.remarks.empty()) page.subheading("Remarks").list(f.remarks);
 }
 
-void add_making(io::HtmlReport& page, const Findings& f, const Provenance& made_of) {
+void add_making(report::Page& page, const Findings& f, const Provenance& made_of) {
   page.heading("How this was made");
   std::vector<std::vector<std::string>> files{{"model in use", made_of.model.name, made_of.model.sha256}};
   for (const auto& file : made_of.recordings) files.push_back({"recording", file.name, file.sha256});

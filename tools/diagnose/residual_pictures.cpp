@@ -2,20 +2,23 @@
 #include <cmath>
 #include <limits>
 
-#include "tools/diagnose/drawing.hpp"
+#include "report/thinned.hpp"
 #include "tools/diagnose/figures.hpp"
 #include "tools/diagnose/pictures.hpp"
 
 namespace bevel::diagnose {
 
 using namespace bevel::diagnosis;  // NOLINT(google-build-using-namespace)
+using report::Colour;
+using report::Figure;
 
 namespace {
 
 constexpr double kNone = std::numeric_limits<double>::quiet_NaN();
 constexpr int kBins = 16;
-constexpr std::size_t kFewest = 8;         // readings that make a median worth drawing
-constexpr std::size_t kMostPoints = 1200;  // in one panel, of each model
+constexpr std::size_t kFewest = 8;          // readings that make a median worth drawing
+constexpr std::size_t kMostReadings = 700;  // of one channel, in panels with a reading as a dot
+constexpr std::size_t kMostOfOne = 300;     // the same, of one recording
 
 // Index of the coordinate that a channel sees, or -1.
 int coordinate_of(const std::string& channel) {
@@ -56,31 +59,6 @@ Binned bin(const std::vector<double>& x, const std::vector<double>& y, double lo
   return result;
 }
 
-// A band with gaps: one area for each unbroken stretch, and a bar where a bin stands alone.
-void draw_binned(Drawing& drawing, Panel& panel, const Binned& b, std::string_view colour) {
-  Binned stretch;
-  for (std::size_t i = 0; i <= b.x.size(); ++i) {
-    if (i < b.x.size() && std::isfinite(b.median[i])) {
-      stretch.x.push_back(b.x[i]);
-      stretch.low.push_back(b.low[i]);
-      stretch.high.push_back(b.high[i]);
-      continue;
-    }
-    if (stretch.x.size() > 1) panel.band(stretch.x, stretch.low, stretch.high, colour);
-    if (stretch.x.size() == 1)
-      drawing.line(panel.at(stretch.x[0], stretch.low[0]), panel.at(stretch.x[0], stretch.high[0]),
-                   {.colour = colour, .width = 5, .opacity = 0.3});
-    stretch = {};
-  }
-  panel.curve(b.x, b.median, {.colour = colour, .width = 2}).points(b.x, b.median, colour, 1, 2.2);
-}
-
-std::vector<double> every(const std::vector<double>& values, std::size_t step) {
-  std::vector<double> some;
-  for (std::size_t i = 0; i < values.size(); i += step) some.push_back(values[i]);
-  return some;
-}
-
 struct Against {
   model::Covariate covariate;
   const char* title;
@@ -94,14 +72,9 @@ constexpr Against kAgainst[] = {{model::Covariate::time_s, "time in the recordin
                                 {model::Covariate::roll_rad, "roll of the base", "rad"},
                                 {model::Covariate::since_stop_s, "time since stop, at rest", "s", true},
                                 {model::Covariate::since_reversal_mm, "insertion since last turn", "mm"}};
-constexpr int kColumns = 4;
-constexpr double kLeft = 52;
-constexpr double kPanelWidth = 179;
-constexpr double kPitch = 197;
-constexpr double kPanelHeight = 120;
 
-// So that the picture tells of the bulk, and zero is in it; a point outside is cut off.
-Axis residual_axis(const std::vector<double>& before, const std::vector<double>& after, std::string label) {
+// So that the panel tells of the bulk, and zero is in it; a point outside is cut off.
+std::pair<double, double> residual_range(const std::vector<double>& before, const std::vector<double>& after) {
   std::vector<double> all;
   for (const auto* list : {&before, &after})
     for (const double v : *list)
@@ -109,7 +82,82 @@ Axis residual_axis(const std::vector<double>& before, const std::vector<double>&
   const double low = std::min(quantile(all, 0.005), 0.0);
   const double high = std::max(quantile(all, 0.995), 0.0);
   const double room = high > low ? 0.08 * (high - low) : 1;
-  return {low - room, high + room, std::move(label)};
+  return {low - room, high + room};
+}
+
+// Of the readings that a channel has those that show the same: the extremes of either model, in order.
+std::vector<std::size_t> shown_of(const std::vector<double>& before, const std::vector<double>& after,
+                                  std::size_t most) {
+  std::vector<std::size_t> there;
+  std::vector<double> one, other;
+  for (std::size_t i = 0; i < before.size(); ++i) {
+    if (!std::isfinite(before[i]) || !std::isfinite(after[i])) continue;
+    there.push_back(i);
+    one.push_back(before[i]);
+    other.push_back(after[i]);
+  }
+  std::vector<std::size_t> kept;
+  for (const std::size_t k : report::joined(report::thinned(one, most / 2), report::thinned(other, most / 2)))
+    kept.push_back(there[k]);
+  return kept;
+}
+
+std::vector<double> at(const std::vector<double>& values, const std::vector<std::size_t>& use) {
+  std::vector<double> some;
+  some.reserve(use.size());
+  for (const std::size_t i : use) some.push_back(values[i]);
+  return some;
+}
+
+std::string residual_label(const Findings& findings, std::size_t channel) {
+  return "residual (" + residual_unit(findings, channel) + ")";
+}
+
+bool has_any(const std::vector<double>& values) {
+  return std::any_of(values.begin(), values.end(), [](double v) { return std::isfinite(v); });
+}
+
+const char* name_of_after(const Findings& findings) {
+  return findings.verdict == Verdict::nothing_missing ? "needle refitted" : "after";
+}
+
+// Over time: residuals as dots.
+Figure over_time(const Findings& findings, const Trace& trace, std::size_t channel, const Residuals& r) {
+  const std::vector<std::size_t> use = shown_of(r.before, r.after, kMostOfOne);
+  Figure figure;
+  figure.title = findings.channels[channel];
+  figure.y_label = residual_label(findings, channel);
+  figure.height_px = 110;
+  figure.references.push_back({report::Reference::Axis::horizontal, 0, ""});
+  const std::vector<double> time_s = at(trace.time_s, use);
+  if (findings.verdict != Verdict::nothing_missing) figure.points("before", time_s, at(r.before, use), kBefore);
+  figure.points(name_of_after(findings), time_s, at(r.after, use), kAfter);
+  for (const auto& where : findings.where)
+    if (where.log == trace.log && where.channel == findings.channels[channel])
+      figure.spans.push_back({where.from_s, where.to_s});
+  return figure;
+}
+
+Figure of_the_base(const Trace& trace, const char* name, const char* label, double Covariates::*quantity) {
+  Figure figure;
+  std::vector<double> values;
+  for (const auto& taken : trace.covariates) values.push_back(taken.*quantity);
+  const std::vector<std::size_t> use = report::thinned(values, kMostOfOne);
+  figure.y_label = label;
+  figure.height_px = 70;
+  figure.line(name, at(trace.time_s, use), at(values, use), Colour::grey);
+  return figure;
+}
+
+// All over one stretch of time, so that they line up, and linked.
+void set_time(std::vector<Figure>& panels, const Trace& trace, const std::string& link) {
+  const double last_s = trace.time_s.back(), first_s = trace.time_s.front();
+  const double room_s = last_s > first_s ? 0.02 * (last_s - first_s) : 1;
+  for (Figure& panel : panels) {
+    panel.x_range = {first_s - room_s, last_s + room_s};
+    panel.link = link;
+  }
+  if (!panels.empty()) panels.back().x_label = "time (s)";
 }
 
 }  // namespace
@@ -133,9 +181,8 @@ std::string residual_unit(const Findings& findings, std::size_t channel) {
   return coordinate_of(findings.channels[channel]) < 0 ? "standard deviations" : "mm";
 }
 
-std::string residual_picture(const Findings& findings, std::size_t channel) {
-  std::vector<double> before;
-  std::vector<double> after;
+std::vector<Figure> residual_panels(const Findings& findings, std::size_t channel) {
+  std::vector<double> before, after;
   std::vector<Covariates> taken_at;
   for (const auto& trace : findings.traces) {
     const Residuals r = residuals_of(findings, trace, channel);
@@ -143,103 +190,97 @@ std::string residual_picture(const Findings& findings, std::size_t channel) {
     after.insert(after.end(), r.after.begin(), r.after.end());
     taken_at.insert(taken_at.end(), trace.covariates.begin(), trace.covariates.end());
   }
-  if (std::none_of(before.begin(), before.end(), [](double v) { return std::isfinite(v); })) return "";
+  std::vector<Figure> panels;
+  if (!has_any(before)) return panels;
   const bool one_model = findings.verdict == Verdict::nothing_missing;  // before is after
-  Drawing drawing(832, 390);
-  int place = 0;
+  const std::vector<std::size_t> shown = shown_of(before, after, kMostReadings);
+  const auto y_range = residual_range(before, after);
   for (const Against& against : kAgainst) {
-    const int column = place % kColumns;
-    const int row = place++ / kColumns;
-    const Box box{kLeft + column * kPitch, 24 + row * 195.0, kPanelWidth, kPanelHeight};
-    const bool leftmost = column == 0;
-    std::vector<double> x;
-    std::vector<double> y_before;
-    std::vector<double> y_after;
+    const auto stays = [&](std::size_t i) { return !against.at_rest_only || taken_at[i][against.covariate] > 0; };
+    std::vector<double> x, y_before, y_after, dot_x, dot_before, dot_after, reading;
     for (std::size_t i = 0; i < taken_at.size(); ++i) {
-      const double at = taken_at[i][against.covariate];
-      if (against.at_rest_only && at <= 0) continue;
-      x.push_back(at);
+      if (!stays(i)) continue;
+      x.push_back(taken_at[i][against.covariate]);
       y_before.push_back(before[i]);
       y_after.push_back(after[i]);
     }
-    if (x.size() < kFewest) {
-      drawing.text({box.left, box.top - 7}, against.title, {.bold = true});
-      drawing.text({box.left + box.width / 2, box.top + box.height / 2}, "no such readings",
-                   {.anchor = Lettering::Anchor::middle, .colour = ink::kSoft});
-      continue;
+    if (x.size() < kFewest) continue;
+    for (const std::size_t i : shown) {
+      dot_x.push_back(stays(i) ? taken_at[i][against.covariate]
+                               : kNone);  // known in every panel, seen where it belongs
+      dot_before.push_back(before[i]);
+      dot_after.push_back(after[i]);
+      reading.push_back(static_cast<double>(i));
     }
-    const Axis across = axis_around(x, against.label);
-    Axis upward = residual_axis(before, after, leftmost ? "residual (" + residual_unit(findings, channel) + ")" : "");
-    upward.numbered = leftmost;
-    Panel panel(drawing, box, across, upward, against.title);
+    if (!has_any(dot_x)) continue;
+    Figure panel;
+    panel.title = against.title;
+    panel.x_label = against.label;
+    panel.y_label = residual_label(findings, channel);
+    panel.height_px = 130;
+    panel.y_range = y_range;
+    panel.link = "residuals of " + findings.channels[channel];
+    panel.references.push_back({report::Reference::Axis::horizontal, 0, ""});
     for (const auto& where : findings.where)
       if (where.channel == findings.channels[channel] && where.covariate == model::name_of(against.covariate))
-        panel.span(where.range[0], where.range[1]);
-    panel.level(0, {.colour = ink::kSoft});
-    const std::size_t step = x.size() / kMostPoints + 1;
-    if (!one_model) panel.points(every(x, step), every(y_before, step), ink::kBefore, 0.22);
-    panel.points(every(x, step), every(y_after, step), ink::kAfter, 0.22);
-    if (!one_model) draw_binned(drawing, panel, bin(x, y_before, across.low, across.high), ink::kBefore);
-    draw_binned(drawing, panel, bin(x, y_after, across.low, across.high), ink::kAfter);
+        panel.spans.push_back({where.range[0], where.range[1]});
+    const auto [low, high] = std::minmax_element(x.begin(), x.end());
+    const double room = *high > *low ? 0.04 * (*high - *low) : 1;
+    panel.x_range = {*low - room, *high + room};
+    const auto add = [&](const char* name, const std::vector<double>& dots, const std::vector<double>& all,
+                         Colour colour) {
+      panel.points(name, dot_x, dots, colour);
+      panel.series.back().faint = true;
+      panel.series.back().key = reading;
+      const Binned b = bin(x, all, panel.x_range->first, panel.x_range->second);
+      if (!has_any(b.median)) return;
+      panel.band("", b.x, b.low, b.high, colour).line("", b.x, b.median, colour).points("", b.x, b.median, colour);
+    };
+    if (!one_model) add("before", dot_before, y_before, kBefore);
+    add(name_of_after(findings), dot_after, y_after, kAfter);
+    panels.push_back(std::move(panel));
   }
-  const double left = kLeft + 3 * kPitch;
-  double top = 24 + 195 + 20;
-  const std::vector<Key> keys = one_model ? std::vector<Key>{{ink::kAfter, "needle refitted"}}
-                                          : std::vector<Key>{{ink::kBefore, "before: needle refitted"},
-                                                             {ink::kAfter, "after: as found"},
-                                                             {ink::kSpan, "where it goes wrong"}};
-  for (const Key& key : keys) {
-    draw_keys(drawing, {left, top}, {key});
-    top += 22;
-  }
-  drawing.text({left, top + 6}, "line: median; band: half of", {.size = 11, .colour = ink::kSoft});
-  drawing.text({left, top + 21}, "the readings; dots: readings", {.size = 11, .colour = ink::kSoft});
-  return drawing.svg();
+  return panels;
 }
 
-namespace {
-
-void draw_location(Drawing& drawing, double left, const Findings& findings, const Location& where) {
-  const auto trace =
-      std::find_if(findings.traces.begin(), findings.traces.end(), [&](const Trace& t) { return t.log == where.log; });
-  const auto channel = std::find(findings.channels.begin(), findings.channels.end(), where.channel);
-  if (trace == findings.traces.end() || channel == findings.channels.end()) return;
-  const auto c = static_cast<std::size_t>(channel - findings.channels.begin());
-  const Residuals r = residuals_of(findings, *trace, c);
-  const Axis time = axis_around(trace->time_s, "");
-  const auto draw_strip = [&](double top, double height, const std::string& label, double Covariates::*quantity,
-                              const std::string& below) {
-    std::vector<double> values;
-    for (const auto& at : trace->covariates) values.push_back(at.*quantity);
-    Axis across = time;
-    across.label = below;
-    Panel panel(drawing, {left, top, 335, height}, across, axis_around(values, label));
-    panel.span(where.from_s, where.to_s).curve(trace->time_s, values, {.colour = "#4d4d4d", .width = 1.5});
-  };
-  {
-    Panel panel(drawing, {left, 50, 335, 150}, time,
-                residual_axis(r.before, r.after, "residual (" + residual_unit(findings, c) + ")"),
-                where.log + ", " + where.channel + ": " + number(where.from_s) + " to " + number(where.to_s) + " s");
-    panel.span(where.from_s, where.to_s).level(0, {.colour = ink::kSoft});
-    panel.points(trace->time_s, r.before, ink::kBefore, 0.75, 1.5);
-    panel.points(trace->time_s, r.after, ink::kAfter, 0.75, 1.5);
+std::vector<Figure> recording_panels(const Findings& findings, std::size_t which) {
+  const Trace& trace = findings.traces[which];
+  std::vector<Figure> panels;
+  for (std::size_t c = 0; c < findings.channels.size(); ++c) {
+    const Residuals r = residuals_of(findings, trace, c);
+    if (has_any(r.before)) panels.push_back(over_time(findings, trace, c, r));
   }
-  draw_strip(232, 62, "depth (mm)", &Covariates::depth_mm, "");
-  draw_strip(326, 62, "roll (rad)", &Covariates::roll_rad, "time (s)");
+  if (panels.empty() || trace.covariates.size() != trace.time_s.size()) return {};
+  panels.push_back(of_the_base(trace, "inserted", "depth (mm)", &Covariates::depth_mm));
+  panels.push_back(of_the_base(trace, "turned", "roll (rad)", &Covariates::roll_rad));
+  set_time(panels, trace, "time of " + trace.log);
+  return panels;
 }
 
-}  // namespace
-
-std::string located_picture(const Findings& findings, std::size_t most) {
-  if (findings.where.empty() || findings.traces.empty()) return "";
-  Drawing drawing(832, 424);
-  draw_keys(drawing, {50, 14},
-            {{ink::kBefore, "before: needle refitted"},
-             {ink::kAfter, "after: with what was found"},
-             {ink::kSpan, "where it goes wrong"}});
-  for (std::size_t i = 0; i < std::min(most, findings.where.size()); ++i)
-    draw_location(drawing, 50 + 425 * static_cast<double>(i), findings, findings.where[i]);
-  return drawing.svg();
+std::vector<Figure> located_panels(const Findings& findings, std::size_t most) {
+  std::vector<std::vector<Figure>> columns;
+  for (std::size_t i = 0; i < std::min(most, findings.where.size()); ++i) {
+    const Location& where = findings.where[i];
+    const auto trace = std::find_if(findings.traces.begin(), findings.traces.end(),
+                                    [&](const Trace& t) { return t.log == where.log; });
+    const auto channel = std::find(findings.channels.begin(), findings.channels.end(), where.channel);
+    if (trace == findings.traces.end() || channel == findings.channels.end()) continue;
+    const auto c = static_cast<std::size_t>(channel - findings.channels.begin());
+    const Residuals r = residuals_of(findings, *trace, c);
+    if (!has_any(r.before) || trace->covariates.size() != trace->time_s.size()) continue;
+    std::vector<Figure> column{over_time(findings, *trace, c, r),
+                               of_the_base(*trace, "inserted", "depth (mm)", &Covariates::depth_mm),
+                               of_the_base(*trace, "turned", "roll (rad)", &Covariates::roll_rad)};
+    column.front().title =
+        where.log + ", " + where.channel + ": " + number(where.from_s) + " to " + number(where.to_s) + " s";
+    for (Figure& panel : column) panel.spans = {{where.from_s, where.to_s}};
+    set_time(column, *trace, "worst span " + std::to_string(i + 1));
+    columns.push_back(std::move(column));
+  }
+  std::vector<Figure> panels;  // row by row
+  for (std::size_t row = 0; row < 3; ++row)
+    for (const auto& column : columns) panels.push_back(column[row]);
+  return panels;
 }
 
 }  // namespace bevel::diagnose

@@ -3,7 +3,8 @@
 #include <nlohmann/json.hpp>
 #include <ostream>
 
-#include "io/html_report.hpp"
+#include "report/numbers.hpp"
+#include "report/page.hpp"
 #include "tools/identify/identify.hpp"
 
 namespace bevel::identify {
@@ -13,7 +14,7 @@ using nlohmann::json;
 
 namespace {
 
-std::string number(double value, int digits = 4) { return io::format_significant(value, digits); }
+std::string number(double value, int digits = 4) { return report::format_significant(value, digits); }
 
 // "0.41 k - 0.91 lambda2 (in their plausible units)"
 std::string describe(const Direction& direction, const std::vector<FittedParameter>& parameters) {
@@ -115,11 +116,10 @@ json as_json(const ErrorFigures& f) {
   return {{"rms_mm", f.rms_mm}, {"largest_mm", f.largest_mm}, {"largest_at_mm", f.largest_at_mm}, {"count", f.count}};
 }
 
-io::Plot path_plot(const Identification& r, int axis, const char* label) {
-  io::Plot plot;
-  plot.x_label = "insertion (mm)";
-  plot.y_label = std::string(label) + " (mm)";
-  plot.legend = io::Plot::Legend::bottom_left;
+report::Figure path_figure(const Identification& r, int axis, const char* label) {
+  report::Figure figure;
+  figure.x_label = "insertion (mm)";
+  figure.y_label = std::string(label) + " (mm)";
   std::vector<double> s, seen, fitted_s, fitted, bicycle;
   for (std::size_t i = 0; i < r.insertions.size(); ++i) {
     const auto& insertion = r.insertions[i];
@@ -140,17 +140,16 @@ io::Plot path_plot(const Identification& r, int axis, const char* label) {
     fitted.push_back(NAN);
     bicycle.push_back(NAN);
   }
-  plot.points("seen", s, seen, 0);
-  plot.dashed("bicycle", fitted_s, bicycle, 1);
-  plot.line("fitted", fitted_s, fitted, 2);
-  return plot;
+  figure.points("seen", s, seen, report::Colour::blue);
+  figure.dashed("bicycle", fitted_s, bicycle, report::Colour::orange);
+  figure.line("fitted", fitted_s, fitted, report::Colour::green);
+  return figure;
 }
 
-io::Plot error_plot(const Identification& r) {
-  io::Plot plot;
-  plot.x_label = "insertion (mm)";
-  plot.y_label = "distance, model to seen (mm)";
-  plot.legend = io::Plot::Legend::top_left;
+report::Figure error_figure(const Identification& r) {
+  report::Figure figure;
+  figure.x_label = "insertion (mm)";
+  figure.y_label = "distance, model to seen (mm)";
   std::vector<double> s, bicycle, fitted;
   for (std::size_t i = 0; i < r.insertions.size(); ++i) {
     const auto& b = r.candidates.front();
@@ -163,9 +162,9 @@ io::Plot error_plot(const Identification& r) {
       bicycle.push_back(e_b[k]);
     }
   }
-  plot.points("bicycle", s, bicycle, 1);
-  plot.points("fitted", s, fitted, 2);
-  return plot;
+  figure.points("bicycle", s, bicycle, report::Colour::orange);
+  figure.points("fitted", s, fitted, report::Colour::green);
+  return figure;
 }
 
 }  // namespace
@@ -238,11 +237,11 @@ std::string figures_json(const Identification& r) {
 }
 
 void save_report(const Identification& r, const std::string& path) {
-  io::HtmlReport page("Identification of the needle");
+  report::Page page("Identification of the needle");
   const bool open = r.fit.unfixed_directions() > 0;
   bool bound = false;
   for (const auto& p : r.fit.parameters) bound |= p.at_bound;
-  page.callout(open || bound ? io::Tone::warning : io::Tone::good,
+  page.verdict(open || bound ? report::Tone::warning : report::Tone::good,
                bound  ? "A parameter ran to the bound of the model's domain"
                : open ? "The recordings leave a direction open"
                       : "Every fitted parameter is fixed by the recordings",
@@ -267,12 +266,12 @@ void save_report(const Identification& r, const std::string& path) {
              "BIC differences above 10 are strong evidence; without rotation the two "
              "slips are the same model.");
   page.heading("Paths");
-  page.figure(path_plot(r, 1, "y"), "Lateral position in the bevel's plane: seen, and by the models.");
+  page.figure(path_figure(r, 1, "y"), "Lateral position in the bevel's plane: seen, and by the models.");
   bool sees_x = false;
   for (const auto& i : r.insertions)
     for (const auto& o : i.observations) sees_x |= o.rank == 3;
-  if (sees_x) page.figure(path_plot(r, 0, "x"), "Lateral position out of the bevel's plane at entry.");
-  page.figure(error_plot(r), "Distance between model and measurement at the same inserted length, on the seen axes.");
+  if (sees_x) page.figure(path_figure(r, 0, "x"), "Lateral position out of the bevel's plane at entry.");
+  page.figure(error_figure(r), "Distance between model and measurement at the same inserted length, on the seen axes.");
   page.save(path);
 }
 

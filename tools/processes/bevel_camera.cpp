@@ -8,15 +8,19 @@ int main(int argc, char** argv) {
   command_line.example("bevel-camera --config config/demo.toml");
   std::string source, record;
   bool print = false;
+  double pictures_hz = 0;
   command_line.option("--source", source, "path instead of the file's source.path");
   command_line.option("--record", record, "folder to keep the frames in, a source of the kind folder then");
+  command_line.option("--picture-hz", pictures_hz,
+                      "send each camera's picture, made small, so often, for bevel-view; 0: never", 0.0,
+                      nodes::kMostPictures_hz);
   command_line.flag("--print", print, "print each observation as CSV");
   return tools::process_main(command_line, argc, argv, nodes::camera_process_name, [&](tools::ProcessContext& context) {
     nodes::SystemConfig& config = context.config;
     if (!source.empty()) config.source.path = source;
     if (config.source.kind == camera::SourceKind::folder || config.source.kind == camera::SourceKind::video)
       config.source.start_utime = nodes::now().utime;
-    nodes::CameraNode node(context.lcm, config);
+    nodes::CameraNode node(context.lcm, config, pictures_hz);
     tools::inject(context, node.port());
     if (!record.empty()) node.record(record);
     if (print) {

@@ -4,13 +4,14 @@
 #include <cmath>
 #include <cstdio>
 #include <filesystem>
+#include <map>
 #include <memory>
 #include <ostream>
 #include <sstream>
 #include <stdexcept>
 
 #include "estimator/health.hpp"
-#include "io/html_report.hpp"
+#include "report/page.hpp"
 
 namespace bevel::replay {
 namespace {
@@ -96,59 +97,89 @@ void write_csv(const Replay& replay, const std::string& stem) {
   headings.close();
 }
 
-// A state over insertion with its 2-sigma band; `thin` keeps the page small.
+double seconds(const Replay& replay, std::int64_t utime) {
+  return static_cast<double>(utime - replay.states.front().utime) * 1e-6;
+}
+
+// A state over time with its 2-sigma band.
 template <class Value, class Spread>
-io::Plot band_plot(const Replay& replay, const std::string& label, Value value, Spread spread) {
-  std::vector<double> x, y, low, high;
-  const std::size_t thin = std::max<std::size_t>(1, replay.states.size() / 400);
-  for (std::size_t i = 0; i < replay.states.size(); i += thin) {
-    const StateRow& row = replay.states[i];
-    x.push_back(static_cast<double>(row.utime - replay.states.front().utime) * 1e-6);
+report::Figure band_figure(const Replay& replay, const std::string& label, Value value, Spread spread) {
+  std::vector<double> t_s, y, low, high;
+  for (const StateRow& row : replay.states) {
     const estimator::FilterState state = row.state.unpacked();
+    t_s.push_back(seconds(replay, row.utime));
     y.push_back(value(state));
     low.push_back(y.back() - 2 * spread(state));
     high.push_back(y.back() + 2 * spread(state));
   }
-  io::Plot plot;
-  plot.x_label = "time (s)";
-  plot.y_label = label;
-  plot.height_px = 220;
-  plot.legend = io::Plot::Legend::none;  // it would lie on the end of the curves, which matters most
-  plot.band("2 sigma", x, low, high, 0).line("estimate", x, y, 0);
-  return plot;
+  report::Figure figure;
+  figure.y_label = label;
+  figure.height_px = 150;
+  figure.link = "time";
+  figure.band("2 sigma", t_s, low, high, report::Colour::blue).line("estimate", t_s, y, report::Colour::blue);
+  return figure;
 }
 
-void add_state_plots(io::HtmlReport& page, const Replay& replay) {
-  for (const Eigen::Index i : {0, 1, 2}) {
-    io::Plot plot = band_plot(
-        replay, std::string(kAxisName[i]) + " (mm)", [i](const estimator::FilterState& s) { return s.pose.p_mm[i]; },
-        [i](const estimator::FilterState& s) { return position_sd_mm(s)[i]; });
-    std::vector<double> t, p;
-    const std::size_t thin = std::max<std::size_t>(1, replay.innovations.size() / 400);
-    for (std::size_t k = 0; k < replay.innovations.size(); k += thin) {
-      const InnovationRow& row = replay.innovations[k];
-      if (!row.sees[static_cast<std::size_t>(i)]) continue;
-      t.push_back(static_cast<double>(row.utime - replay.states.front().utime) * 1e-6);
-      p.push_back(row.position_mm[i]);
-    }
-    if (!t.empty()) plot.points("measured", t, p, 1);
-    page.figure(plot, "");
+// Of each camera by itself: cameras take turns in the log.
+void add_measured(report::Figure& figure, const Replay& replay, Eigen::Index axis) {
+  std::map<int, std::pair<std::vector<double>, std::vector<double>>> by_camera;
+  for (const InnovationRow& row : replay.innovations) {
+    if (!row.sees[static_cast<std::size_t>(axis)]) continue;
+    auto& [t_s, position_mm] = by_camera[row.camera];
+    t_s.push_back(seconds(replay, row.utime));
+    position_mm.push_back(row.position_mm[axis]);
   }
-  page.figure(band_plot(
-                  replay, "k (1/mm)", [](const estimator::FilterState& s) { return s.curvature_per_mm; },
-                  [](const estimator::FilterState& s) { return sd(s, 6); }),
-              "Curvature. A band as wide as the prior's says that the path so far does not show it.");
-  page.figure(band_plot(
-                  replay, "lambda1 (1/rad)", [](const estimator::FilterState& s) { return s.lambda1_per_rad; },
-                  [](const estimator::FilterState& s) { return sd(s, 7); }),
-              "");
-  page.figure(band_plot(
-                  replay, "lambda2", [](const estimator::FilterState& s) { return s.lambda2; },
-                  [](const estimator::FilterState& s) { return sd(s, 8); }),
-              "");
-  page.figure(band_plot(
-                  replay, "roll sd (rad)", [](const estimator::FilterState& s) { return sd(s, 5); },
-                  [](const estimator::FilterState&) { return 0.0; }),
+  auto colour = static_cast<int>(report::Colour::orange);
+  for (auto& [camera, of_camera] : by_camera)
+    figure.points("camera " + std::to_string(camera), std::move(of_camera.first), std::move(of_camera.second),
+                  static_cast<report::Colour>(colour++ % report::kColours));
+}
+
+report::Space path_in_space(const Replay& replay) {
+  report::SpacePath path{.label = "estimate", .points_mm = {}};
+  for (const StateRow& row : replay.states) {
+    const Eigen::Vector3d p_mm = row.state.unpacked().pose.p_mm;
+    path.points_mm.push_back({p_mm.x(), p_mm.y(), p_mm.z()});
+    path.key.push_back(seconds(replay, row.utime));
+  }
+  return {.paths = {std::move(path)}, .link = "time"};
+}
+
+void add_state_figures(report::Page& page, const Replay& replay) {
+  page.space(path_in_space(replay), "The estimated tip in {A}.");
+  std::vector<report::Figure> position;
+  for (const Eigen::Index i : {0, 1, 2}) {
+    position.push_back(band_figure(
+        replay, std::string(kAxisName[i]) + " (mm)", [i](const estimator::FilterState& s) { return s.pose.p_mm[i]; },
+        [i](const estimator::FilterState& s) { return position_sd_mm(s)[i]; }));
+    add_measured(position.back(), replay, i);
+  }
+  position.back().x_label = "time (s)";
+  page.figures(position, 1, "The tip: its estimate, and what the cameras measured.");
+  std::vector<report::Figure> needle{
+      band_figure(
+          replay, "k (1/mm)", [](const estimator::FilterState& s) { return s.curvature_per_mm; },
+          [](const estimator::FilterState& s) { return sd(s, 6); }),
+      band_figure(
+          replay, "lambda1 (1/rad)", [](const estimator::FilterState& s) { return s.lambda1_per_rad; },
+          [](const estimator::FilterState& s) { return sd(s, 7); }),
+      band_figure(
+          replay, "lambda2", [](const estimator::FilterState& s) { return s.lambda2; },
+          [](const estimator::FilterState& s) { return sd(s, 8); })};
+  needle.back().x_label = "time (s)";
+  page.figures(needle, 1,
+               "Curvature and slip. A band as wide as the prior's says that the path so far does not show it.");
+  std::vector<double> t_s, roll_sd_rad;
+  for (const StateRow& row : replay.states) {
+    t_s.push_back(seconds(replay, row.utime));
+    roll_sd_rad.push_back(sd(row.state.unpacked(), 5));
+  }
+  report::Figure roll;
+  roll.x_label = "time (s)";
+  roll.y_label = "roll sd (rad)";
+  roll.height_px = 150;
+  roll.link = "time";
+  page.figure(roll.line("standard deviation", t_s, roll_sd_rad),
               "Roll is never measured itself: this is what the filter admits not to know of it.");
 }
 
@@ -287,14 +318,16 @@ void write_files(const Replay& replay, const std::string& folder, double ahead_m
   const std::string stem = (std::filesystem::path(folder) / replay.name).string();
   write_csv(replay, stem);
   if (replay.states.size() < 2) return;
-  io::HtmlReport page("Replay of " + replay.name);
+  report::Page page("Replay of " + replay.name);
   std::ostringstream summary;
   print(summary, replay, ahead_mm);
   page.heading("Figures")
       .code(summary.str())
       .heading("States with 2-sigma bands")
-      .paragraph("Blue: the estimate, its band two standard deviations wide to either side. Dots: measured.");
-  add_state_plots(page, replay);
+      .paragraph(
+          "Blue: the estimate, its band two standard deviations wide to either side. Dots: measured. All figures are "
+          "linked in time: point at one to read all of them, drag across one to look closer, double-click to go back.");
+  add_state_figures(page, replay);
   page.save(stem + ".html");
 }
 

@@ -5,7 +5,7 @@
 #include <cstdio>
 #include <ostream>
 
-#include "io/html_report.hpp"
+#include "report/page.hpp"
 
 namespace bevel::table1 {
 
@@ -101,51 +101,48 @@ std::vector<std::vector<std::string>> reach_rows(const Study& study) {
 const std::vector<std::string> kReachHeader = {"tissue", "modulus kPa", "bicycle error at 1 N, mm",
                                                "force for the paper's error, N", "deflection then, mm"};
 
-io::Plot tissue_plot(const Tissue& t) {
-  io::Plot plot;
-  plot.title = t.path.tissue + ": " + t.path.description;
-  plot.x_label = "depth (mm)";
-  plot.y_label = "deflection (mm)";
-  plot.legend = io::Plot::Legend::bottom_left;
+report::Figure tissue_figure(const Tissue& t) {
+  report::Figure figure;
+  figure.title = t.path.tissue + ": " + t.path.description;
+  figure.x_label = "depth (mm)";
+  figure.y_label = "deflection (mm)";
   std::vector<double> z, y;
   for (const auto& o : t.rows[0].mean.observations) {
     z.push_back(o.position_mm.z());
     y.push_back(o.position_mm.y());
   }
-  plot.points("mean of three trials", z, y, 0);
-  const auto add = [&](const model::NeedleParameters& n, const char* label, int colour, bool dashed) {
+  figure.points("mean of three trials", z, y, report::Colour::blue);
+  const auto add = [&](const model::NeedleParameters& n, const char* label, report::Colour colour, bool dashed) {
     std::vector<double> zs, ys;
     for (const auto& p : straight_insertion(n, 200)) {
       if (p.z() > kDepth_mm) break;
       zs.push_back(p.z());
       ys.push_back(p.y());
     }
-    dashed ? plot.dashed(label, zs, ys, colour) : plot.line(label, zs, ys, colour);
+    dashed ? figure.dashed(label, zs, ys, colour) : figure.line(label, zs, ys, colour);
   };
-  add(t.rows[0].circle, "bicycle", 1, true);
-  add(t.rows[0].extended, "extended", 2, false);
-  return plot;
+  add(t.rows[0].circle, "bicycle", report::Colour::orange, true);
+  add(t.rows[0].extended, "extended", report::Colour::green, false);
+  return figure;
 }
 
-io::Plot error_plot(const Tissue& t) {
-  io::Plot plot;
-  plot.x_label = "depth (mm)";
-  plot.y_label = "error of deflection (mm)";
-  plot.legend = io::Plot::Legend::bottom_left;
+report::Figure error_figure(const Tissue& t) {
+  report::Figure figure;
+  figure.x_label = "depth (mm)";
+  figure.y_label = "error of deflection (mm)";
   const auto& r = t.rows[0];
   std::vector<double> z;
   for (const auto& o : r.mean.observations) z.push_back(o.position_mm.z());
-  plot.points("bicycle", z, path_errors_mm(r.mean, r.circle, Compare::same_depth), 1);
-  plot.points("extended", z, path_errors_mm(r.mean, r.extended, Compare::same_depth), 2);
-  return plot;
+  figure.points("bicycle", z, path_errors_mm(r.mean, r.circle, Compare::same_depth), report::Colour::orange);
+  figure.points("extended", z, path_errors_mm(r.mean, r.extended, Compare::same_depth), report::Colour::green);
+  return figure;
 }
 
-io::Plot figure5() {
-  io::Plot plot;
-  plot.title = "Paths for several lambdas, one needle";
-  plot.x_label = "depth (mm)";
-  plot.y_label = "deflection (mm)";
-  plot.legend = io::Plot::Legend::bottom_left;
+report::Figure figure5() {
+  report::Figure figure;
+  figure.title = "Paths for several lambdas, one needle";
+  figure.x_label = "depth (mm)";
+  figure.y_label = "deflection (mm)";
   for (const auto& [l1, l2] : std::vector<std::pair<double, double>>{
            {0, 0}, {0.144, 0.032}, {0.3, 0.1}, {0.49, 0.22}, {0.49, 0.0}, {0.8, 0.22}, {0.49, -0.2}}) {
     model::NeedleParameters n;
@@ -158,9 +155,9 @@ io::Plot figure5() {
     }
     char label[48];
     std::snprintf(label, sizeof label, "%.3g, %.3g", l1, l2);
-    plot.line(label, z, y);
+    figure.line(label, z, y);
   }
-  return plot;
+  return figure;
 }
 
 }  // namespace
@@ -220,7 +217,7 @@ void print(std::ostream& out, const Study& study) {
 }
 
 void save_report(const Study& study, const std::string& path) {
-  io::HtmlReport page("Table I, reproduced");
+  report::Page page("Table I, reproduced");
   page.paragraph(
       "130 mm of depth, three trials, 30 Hz camera above, tip noise 0.2 mm; errors of the mean of three trials "
       "against the model at the same depth. Wheelbase 20 mm and curvature 0.0047 /mm are inferred, the paper "
@@ -234,8 +231,8 @@ void save_report(const Study& study, const std::string& path) {
     for (std::size_t i = 2; i-- > 0;) {
       const auto& t = (*tissues)[i];
       page.heading(i == 1 ? "Figure 7: plastisol" : "Figure 8: agar");
-      page.figure(tissue_plot(t), "Mean of three trials, the bicycle's circle and the extended model.");
-      page.figure(error_plot(t), "Their errors at the same depth.");
+      page.figure(tissue_figure(t), "Mean of three trials, the bicycle's circle and the extended model.");
+      page.figure(error_figure(t), "Their errors at the same depth.");
     }
   page.save(path);
 }

@@ -2,7 +2,7 @@
 // Draws what /events says: the newest state, a row of the charts each time, and the path, of which the page keeps its
 // own copy. Every age goes on counting here between events, so that what is old looks old when nothing arrives at all.
 
-const kStale_s = { needle: 0.5, axes: 0.5, command: 0.5, truth: 0.5, camera: 0.5, process: 3 };
+const kStale_s = { needle: 0.5, axes: 0.5, command: 0.5, truth: 0.5, camera: 0.5, picture: 1.5, process: 3 };
 const kCut_s = 2.5;               // no event, not even the server's pulse of a second
 const kChi2_3_95 = 7.815;         // 95 % of a normal density in three dimensions, and in two
 const kChi2_2_95 = 5.991;
@@ -321,6 +321,60 @@ function row(cells, old) {
   return tr;
 }
 
+// ---- what the cameras see
+
+const pictures = new Map();  // by camera: its figure, and which picture is on it
+function captionPicture(shown, p) {
+  shown.caption.textContent = `camera ${p.camera} · ${shown.tip || 'tip not found'} · ${fixed(age(p.age_s), 1)} s old`;
+}
+
+function drawPictures() {
+  for (const p of state.pictures) {
+    let shown = pictures.get(p.camera);
+    if (!shown) {
+      const figure = document.createElement('figure'), canvas = document.createElement('canvas'), caption = document.createElement('figcaption');
+      canvas.setAttribute('aria-label', `Picture of camera ${p.camera}`);
+      figure.append(canvas, caption);
+      byId('pictures').append(figure);
+      pictures.set(p.camera, shown = { figure, canvas, caption, count: 0, asking: false });
+    }
+    shown.figure.className = age(p.age_s) > kStale_s.picture ? 'old' : '';
+    captionPicture(shown, p);
+    if (shown.count !== p.count && !shown.asking) showPicture(shown, p);
+  }
+}
+
+async function showPicture(shown, p) {
+  shown.asking = true;
+  try {
+    const answer = await fetch(`/picture/${p.camera}/${p.count}`);
+    if (!answer.ok) return;  // there is a newer one by now
+    const picture = await createImageBitmap(await answer.blob());
+    const { canvas } = shown, context = canvas.getContext('2d');
+    [canvas.width, canvas.height] = [picture.width, picture.height];
+    context.drawImage(picture, 0, 0);
+    shown.count = p.count;
+    shown.tip = p.tip_px ? `tip at ${p.tip_px.map(v => fixed(v, 0)).join(', ')} px` : '';
+    captionPicture(shown, p);
+    shown.figure.dataset.shown = `${picture.width} x ${picture.height}`;
+    if (!p.tip_px) return;
+    const [x, y] = p.tip_px.map(v => v + 0.5);  // a pixel's middle is at a half on a canvas
+    context.strokeStyle = style('--target');
+    context.lineWidth = 2;
+    context.beginPath();
+    context.arc(x, y, 9, 0, 7);
+    for (const [dx, dy] of [[1, 0], [-1, 0], [0, 1], [0, -1]]) {
+      context.moveTo(x + 9 * dx, y + 9 * dy);
+      context.lineTo(x + 15 * dx, y + 15 * dy);
+    }
+    context.stroke();
+  } catch (error) {
+    console.warn(`picture of camera ${p.camera}: ${error}`);  // the next one may do
+  } finally {
+    shown.asking = false;
+  }
+}
+
 const kBadStates = ['stopped', 'fault', 'lost'];
 function drawTables() {
   document.querySelector('#cameras tbody').replaceChildren(...state.tips.map(t => {
@@ -373,6 +427,7 @@ function draw() {
   drawPlane('plane-y', 1);
   drawFacts();
   drawTables();
+  drawPictures();
   if (frames % 12 === 0) charts.forEach(chart => chart.draw());
 }
 draw();

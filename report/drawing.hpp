@@ -1,23 +1,27 @@
-// Pictures of several panels as inline SVG, drawn straight: small multiples, bars and heat maps with thousands of
-// points take a tenth of the bytes and none of the processes that a general plotting program needs for them.
+// Pictures as inline SVG, drawn straight: figures on paper and where no script runs, and whatever is no plot of y over
+// x (bars with names, heat maps). They take a tenth of the bytes of a general plotting program's, and no process.
 #pragma once
 
 #include <string>
 #include <string_view>
 #include <vector>
 
-namespace bevel::diagnose {
+namespace bevel::report {
 
-// The page's colours. Before and after keep theirs through the whole page.
+// The page's colours, by name: its style sheet has them for light and for dark ground.
 namespace ink {
-inline constexpr const char* kBefore = "#d1622b";
-inline constexpr const char* kAfter = "#1f6fb2";
-inline constexpr const char* kGood = "#2a8c6b";
-inline constexpr const char* kText = "#333333";
-inline constexpr const char* kSoft = "#6b6b6b";
-inline constexpr const char* kFaint = "#b5b5b5";
-inline constexpr const char* kGrid = "#e6e6e6";
-inline constexpr const char* kSpan = "#f6e3a8";
+inline constexpr const char* kText = "var(--ink)";
+inline constexpr const char* kSoft = "var(--soft)";
+inline constexpr const char* kFaint = "var(--faint)";
+inline constexpr const char* kGrid = "var(--grid)";
+inline constexpr const char* kGround = "var(--ground)";
+inline constexpr const char* kSpan = "var(--span)";
+inline constexpr const char* kBlue = "var(--blue)";
+inline constexpr const char* kOrange = "var(--orange)";
+inline constexpr const char* kGreen = "var(--green)";
+inline constexpr const char* kOchre = "var(--ochre)";
+inline constexpr const char* kGrey = "var(--grey)";
+inline constexpr const char* kRed = "var(--red)";
 }  // namespace ink
 
 struct Point {
@@ -56,7 +60,12 @@ class Drawing {
   Drawing& area(const std::vector<Point>& outline, std::string_view colour, double opacity = 1);
   Drawing& dots(const std::vector<Point>& points, double radius, std::string_view colour, double opacity = 1);
   Drawing& rectangle(const Box& box, std::string_view colour, double opacity = 1, std::string_view hint = "");
+  // A dot that tells its value when the pointer rests on it.
+  Drawing& mark(Point at, double radius, std::string_view colour, std::string_view hint);
   Drawing& text(Point at, std::string_view words, const Lettering& lettering = {});
+  // What is drawn between these two is cut off at the edges of the box.
+  Drawing& clip(const Box& box);
+  Drawing& unclip();
 
   double width() const { return width_; }
   std::string svg() const;
@@ -113,4 +122,4 @@ struct Key {
 };
 void draw_keys(Drawing& drawing, Point at, const std::vector<Key>& keys);
 
-}  // namespace bevel::diagnose
+}  // namespace bevel::report

@@ -1,14 +1,14 @@
-#include "tools/diagnose/drawing.hpp"
+#include "report/drawing.hpp"
 
 #include <algorithm>
 #include <cmath>
 #include <cstdio>
 #include <utility>
 
-#include "io/html_report.hpp"
-#include "tools/diagnose/figures.hpp"
+#include "report/html_text.hpp"
+#include "report/numbers.hpp"
 
-namespace bevel::diagnose {
+namespace bevel::report {
 namespace {
 
 // A tenth of a pixel is as fine as anything is seen.
@@ -80,7 +80,7 @@ Drawing& Drawing::rectangle(const Box& box, std::string_view colour, double opac
   body_ += "<rect" + attribute("x", px(box.left)) + attribute("y", px(box.top)) + attribute("width", px(box.width)) +
            attribute("height", px(box.height)) + attribute("fill", colour);
   if (opacity < 1) body_ += attribute("fill-opacity", number(opacity, 2));
-  body_ += hint.empty() ? "/>\n" : "><title>" + io::escape_html(hint) + "</title></rect>\n";
+  body_ += hint.empty() ? "/>\n" : "><title>" + escape_html(hint) + "</title></rect>\n";
   return *this;
 }
 
@@ -93,7 +93,27 @@ Drawing& Drawing::text(Point at, std::string_view words, const Lettering& letter
   if (lettering.bold) body_ += attribute("font-weight", "600");
   if (lettering.turned_deg != 0)
     body_ += attribute("transform", "rotate(" + px(lettering.turned_deg) + " " + px(at.x) + " " + px(at.y) + ")");
-  body_ += ">" + io::escape_html(words) + "</text>\n";
+  body_ += ">" + escape_html(words) + "</text>\n";
+  return *this;
+}
+
+Drawing& Drawing::mark(Point at, double radius, std::string_view colour, std::string_view hint) {
+  if (!drawable(at)) return *this;
+  body_ += "<circle" + attribute("cx", px(at.x)) + attribute("cy", px(at.y)) + attribute("r", px(radius)) +
+           attribute("fill", colour) + "><title>" + escape_html(hint) + "</title></circle>\n";
+  return *this;
+}
+
+// An inner <svg> cuts off what leaves it, and needs no name that would have to be unique in the page.
+Drawing& Drawing::clip(const Box& box) {
+  const std::string corner = px(box.left) + " " + px(box.top), size = px(box.width) + " " + px(box.height);
+  body_ += "<svg" + attribute("x", px(box.left)) + attribute("y", px(box.top)) + attribute("width", px(box.width)) +
+           attribute("height", px(box.height)) + attribute("viewBox", corner + " " + size) + ">\n";
+  return *this;
+}
+
+Drawing& Drawing::unclip() {
+  body_ += "</svg>\n";
   return *this;
 }
 
@@ -229,4 +249,4 @@ void draw_keys(Drawing& drawing, Point at, const std::vector<Key>& keys) {
   }
 }
 
-}  // namespace bevel::diagnose
+}  // namespace bevel::report
