@@ -3,17 +3,17 @@
 #include <stdexcept>
 
 #include "diagnosis/latency/latency_fit.hpp"
-#include "io/html_report.hpp"
 #include "io/model_file.hpp"
 #include "io/recording.hpp"
 #include "io/recording_clock.hpp"
+#include "report/numbers.hpp"
 #include "tools/calibrate/calibrate_tool.hpp"
 #include "tools/common/exit_status.hpp"
 
 namespace bevel::calibrate {
 namespace {
 
-using io::format_significant;
+using report::format_significant;
 
 // What bevel-camera took off the stamps of each camera already when the log was recorded, as its CONFIG says.
 std::map<int, double> latencies_in(const std::string& config) {
