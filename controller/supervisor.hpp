@@ -11,37 +11,12 @@
 #include "controller/axis_model.hpp"
 #include "controller/command_watch.hpp"
 #include "controller/reach.hpp"
+#include "controller/reason.hpp"
 #include "controller/rendezvous.hpp"
+#include "controller/route.hpp"
 #include "model/samples.hpp"
 
 namespace bevel::controller {
-
-enum class State { off, armed, steering, hold, stopped, fault };
-
-enum class Reason {
-  none,
-  operator_stop,
-  state_stale,      // NEEDLE_STATE too old, or none
-  state_unhealthy,  // its health word is not zero
-  state_uncertain,  // position variance above its bound
-  state_reset,      // the estimator declared a reset during motion
-  state_not_finite,
-  actuator_stale,
-  axes_not_enabled,    // quick stop, fault or off during motion
-  insertion_tracking,  // an axis does not do what is commanded
-  rotation_tracking,
-  workspace,           // the tip left the allowed space
-  target_unreachable,  // refused before insertion, with the predicted miss
-  outside_model,       // the pose left the model's domain
-  overrun,             // the loop could not keep its period
-  resting_axes_moved,  // axes that were told to rest did not
-  resting_tip_moved,   // the estimate moved while the axes rested
-  off_the_axes,        // the tip is said to be farther from the entry than the needle was inserted
-  input_refused,       // what comes in cannot be trusted: two senders, motion that cannot be, the clock was set
-  ending,              // the process was told to end
-};
-const char* to_string(State state);
-const char* to_string(Reason reason);
 
 enum class Request : std::int32_t { stop = 0, arm = 1, start = 2, hold = 3, follow = 6 };
 
@@ -119,7 +94,10 @@ class Supervisor {
   bool check_tracking();
   bool check_rest(std::int64_t now_utime);
   Rates steer(std::int64_t now_utime);
-  bool see_geometry(std::int64_t now_utime);
+  bool see_path();
+  void stop_without_path();
+  PathStart path_start() const;
+  bool see_geometry();
   double to_go_mm() const;
   bool by_arcs() const { return config_.law != Law::spin; }
   double predicted_miss_mm(const Eigen::Vector3d& target_mm) const;
@@ -137,6 +115,9 @@ class Supervisor {
   std::optional<Target> target_;
   Status status_;
   Rendezvous rendezvous_;
+  Route route_;
+  bool pauses_for_path_ = false;
+  Eigen::Vector3d aim_mm_ = Eigen::Vector3d::Zero();  // the target, or where the path to it is a look-ahead later
   ArcLaw arcs_;
   Rates rates_;
   std::int64_t seq_ = 0;

@@ -48,6 +48,20 @@ model::NeedleParameters agar() {
   return needle;
 }
 
+// A sphere or a capsule beside the straight line to the target, or across it; a quarter of the way at least from either
+// end.
+controller::Obstacle draw_obstacle(Draw& draw, const Eigen::Vector3d& target_mm) {
+  constexpr double kFarthest_mm = 8;  // from the line
+  const auto across = [&draw](double length_mm) {
+    const double angle = draw.uniform(0, 2 * std::numbers::pi);
+    return Eigen::Vector3d(length_mm * std::cos(angle), length_mm * std::sin(angle), 0);
+  };
+  const Eigen::Vector3d centre_mm =
+      draw.uniform(0.25, 0.75) * target_mm + across(kFarthest_mm * std::sqrt(draw.uniform(0, 1)));
+  const Eigen::Vector3d half_mm = draw.uniform(0, 1) < 0.5 ? Eigen::Vector3d::Zero().eval() : across(15);
+  return {centre_mm - half_mm, centre_mm + half_mm, draw.uniform(2, 5), 1.0};
+}
+
 struct Kinematic {
   double parameters_off = 0;  // uniform, relative, of k, lambda1, lambda2
   double roll_sd_rad = 0;
@@ -58,6 +72,7 @@ struct Kinematic {
   double drift_mm = 0;      // of the target in 20 s, in a drawn direction across
   double breathing_mm = 0;  // of the target, amplitude at 0.25 Hz along x, phase drawn
   bool gated = false;
+  bool obstacle = false;
   double camera_turned_rad = 0;  // of both, about a drawn axis across the needle
 };
 Trial kinematic(const Kinematic& kind, std::uint64_t seed) {
@@ -92,6 +107,7 @@ Trial kinematic(const Kinematic& kind, std::uint64_t seed) {
       return target +
              kind.breathing_mm * std::sin(2 * std::numbers::pi * 0.25 * time_s + angle) * Eigen::Vector3d::UnitX();
     };
+  if (kind.obstacle) trial.believed.controller.obstacles = {draw_obstacle(draw, target)};
   trial.believed.controller.follow.gate_breathing = kind.gated;
   trial.rig.cameras = cameras(kind.cameras);
   trial.rig.cameras.outlier_share = kind.outlier_share;
@@ -106,6 +122,7 @@ struct Beam {
   double modulus_kPa = 0, force_N = 0;  // 0: drawn, 2 to 100 kPa, 0.2 to 1 N
   double windup_at_100mm_rad = 0;
   double relaxing_fraction = 0;
+  bool obstacle = false;
 };
 // The software is told a curvature and a bending length, each off by up to 30 %, and a bicycle's slip of none.
 Trial beam(const Beam& kind, std::uint64_t seed) {
@@ -130,6 +147,7 @@ Trial beam(const Beam& kind, std::uint64_t seed) {
   prior.guide_mm = config.guide_gap_mm;
   trial.believed.controller.shaft = {prior.bending_mm, prior.guide_mm};
   trial.target_mm = draw_target(draw, deep.curvature_per_mm);
+  if (kind.obstacle) trial.believed.controller.obstacles = {draw_obstacle(draw, trial.target_mm)};
   trial.rig.cameras = cameras(2);
   trial.rig.make_plant = [config] { return std::make_unique<rig::BeamNeedle>(config); };
   return trial;
@@ -137,7 +155,7 @@ Trial beam(const Beam& kind, std::uint64_t seed) {
 
 template <class Kind>
 Scenario scenario(const char* name, const char* what, const Kind& kind, Trial (*draw)(const Kind&, std::uint64_t)) {
-  return {name, what, [=](std::uint64_t seed) { return draw(kind, seed); }, std::is_same_v<Kind, Beam>};
+  return {name, what, [=](std::uint64_t seed) { return draw(kind, seed); }, kind.obstacle, std::is_same_v<Kind, Beam>};
 }
 
 }  // namespace
@@ -169,6 +187,10 @@ const std::vector<Scenario>& scenarios() {
       scenario<Kinematic>("one-camera", "one camera, along x", {.cameras = 1}, kinematic),
       scenario<Kinematic>("camera-turned", "both cameras' frame turned by 2 degrees about an axis across the needle",
                           {.camera_turned_rad = 2 * std::numbers::pi / 180}, kinematic),
+      scenario<Kinematic>("obstacle", "a sphere or capsule of 2 to 5 mm radius within 8 mm of the line to the target",
+                          {.obstacle = true}, kinematic),
+      scenario<Beam>("obstacle-beam", "the same, beam, 50 kPa, 1 N",
+                     {.modulus_kPa = 50, .force_N = 1, .obstacle = true}, beam),
       scenario<Kinematic>("outliers", "a tenth of the messages off by 3 to 10 mm", {.outlier_share = 0.1}, kinematic),
   };
   return all;

@@ -20,6 +20,7 @@ struct Scenario {
   std::string what;  // in a sentence
   // The same trial for the same seed.
   std::function<Trial(std::uint64_t seed)> draw;
+  bool avoids = false;  // there are obstacles, which one law alone goes round
   bool swings = false;  // a stiff shaft, whose tip turning moves
 };
 

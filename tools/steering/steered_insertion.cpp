@@ -131,7 +131,11 @@ Insertion steer(const SteeredRig& rig, const Believed& believed, const Eigen::Ve
     const std::int64_t utime = kStart_utime + us;
     if (us > 0) {
       const double insertion_mm = axes.insertion_rate_mm_s * tick_s, rotation_rad = axes.rotation_rate_rad_s * tick_s;
+      const Eigen::Vector3d before_mm = plant->tip().p_mm;
       plant->advance(insertion_mm, rotation_rad, tick_s);
+      for (const controller::Obstacle& obstacle : config.obstacles)
+        result.nearest_mm =
+            std::min(result.nearest_mm, controller::distance_mm(obstacle, before_mm, plant->tip().p_mm));
       axes.insertion_mm += insertion_mm, axes.rotation_rad += rotation_rad;
       result.turned_rad += std::abs(rotation_rad);
       if (started) result.duration_s += tick_s;

@@ -5,6 +5,7 @@
 #include <Eigen/Core>
 #include <cstdint>
 #include <functional>
+#include <limits>
 #include <memory>
 #include <vector>
 
@@ -53,7 +54,9 @@ struct Insertion {
   double turned_frame_said_mm = 0;                       // of insertion; 0: it was not
   double estimate_error_mm = 0;                          // estimate to true tip, at the end
   double turned_rad = 0;                                 // of the base, both ways together
-  double inserted_mm = 0, duration_s = 0;                // from the word to go until it stopped
+  // Least distance of the true tip from any obstacle's surface, negative inside; infinite where there is none.
+  double nearest_mm = std::numeric_limits<double>::infinity();
+  double inserted_mm = 0, duration_s = 0;  // from the word to go until it stopped
 };
 
 // told_the_tip: the controller sees the true tip instead of the estimate's, its parameters as they are estimated: what
