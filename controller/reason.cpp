@@ -68,6 +68,8 @@ const char* to_string(Reason reason) {
       return "way-point missed";
     case Reason::way_point_unreachable:
       return "way-points and target out of reach one after the other";
+    case Reason::way_points_too_many:
+      return "too many way-points";
     case Reason::law_without_path:
       return "only the law by arcs goes round obstacles and through way-points";
     case Reason::ending:

@@ -30,7 +30,8 @@ enum class Reason {
   obstacle_near,       // the tip is within an obstacle's clearance; its distance from the surface
   way_point_missed,
   way_point_unreachable,  // refused before insertion, or found on the way; by how much the reach falls short
-  law_without_path,       // way-points or obstacles with a law that does not follow a path
+  way_points_too_many,
+  law_without_path,  // way-points or obstacles with a law that does not follow a path
 };
 const char* to_string(State state);
 const char* to_string(Reason reason);

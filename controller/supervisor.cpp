@@ -8,7 +8,8 @@
 
 namespace bevel::controller {
 namespace {
-constexpr double kDeviations = 4;        // of the estimate's own standard deviation
+constexpr double kDeviations = 4;  // of the estimate's own standard deviation
+constexpr double kWayPointTolerance_mm = 1;
 constexpr double kTargetDeviations = 2;  // of where a target that moves will be
 }  // namespace
 
@@ -32,6 +33,7 @@ void Supervisor::stop(Reason reason, double value, const char* unit) {
 void Supervisor::request(Request request, const std::optional<Target>& target, std::int64_t now_utime) {
   switch (request) {
     case Request::stop:
+      way_points_ = {};
       stop(Reason::operator_stop, 0, "");
       return;
     case Request::hold:
@@ -52,12 +54,20 @@ void Supervisor::request(Request request, const std::optional<Target>& target, s
       if (!in_motion_states() || !target || !target->position_mm.allFinite() || !check_inputs(now_utime)) return;
       rendezvous_.observe(target->utime_or(now_utime), target->position_mm);
       rendezvous_.plan(now_utime, to_go_mm(), config_.limits.insertion_rate_mm_s);
+      if (route_.is_needed()) return;  // which looks at the whole path, in the next period
       // A prediction that is hardly one yet is no reason.
       const double miss_mm = predicted_miss_mm(rendezvous_.target_mm());
       if (!(miss_mm - kTargetDeviations * rendezvous_.target_sd_mm() <= config_.safety.target_miss_max_mm))
         stop(Reason::target_unreachable, miss_mm, "mm predicted miss");
       return;
     }
+    case Request::way_point:
+      if (!target || !target->position_mm.allFinite()) return;
+      if (way_points_.count == kMostWayPoints)
+        return stop(Reason::way_points_too_many, static_cast<double>(kMostWayPoints), "at most");
+      way_points_.add(
+          {target->position_mm, target->tolerance_mm > 0 ? target->tolerance_mm : kWayPointTolerance_mm, true});
+      return;
     case Request::arm:
       break;
   }
@@ -69,11 +79,11 @@ void Supervisor::request(Request request, const std::optional<Target>& target, s
   rates_ = {};
   if (!check_inputs(now_utime)) return;
   aim_mm_ = target->position_mm;
-  PathPoints told;
+  PathPoints told = std::exchange(way_points_, {});
   told.add({target->position_mm, config_.safety.target_miss_max_mm, true});
   route_.restart(told);
   status_.predicted_miss_mm = predicted_miss_mm(target->position_mm);
-  if (!(status_.predicted_miss_mm <= config_.safety.target_miss_max_mm))
+  if (told.count == 1 && !(status_.predicted_miss_mm <= config_.safety.target_miss_max_mm))
     return stop(Reason::target_unreachable, status_.predicted_miss_mm, "mm predicted miss");
   if (route_.is_needed()) {
     if (config_.law != Law::arcs) return stop(Reason::law_without_path, 0, "");

@@ -18,7 +18,7 @@
 
 namespace bevel::controller {
 
-enum class Request : std::int32_t { stop = 0, arm = 1, start = 2, hold = 3, follow = 6 };
+enum class Request : std::int32_t { stop = 0, arm = 1, start = 2, hold = 3, follow = 6, way_point = 7 };
 
 // What the controller needs of NEEDLE_STATE.
 struct NeedleView {
@@ -68,7 +68,8 @@ class Supervisor {
   // An operator's word. arm: takes the target and leaves off, hold or stopped; refused (reason latched) when out of
   // reach. start: from armed or hold to steering, once both axes are enabled. hold: comes to rest within the limits of
   // acceleration, may go on. stop: latched. follow: where the target is now, in motion too; it is aimed at
-  // where it will be (rendezvous.hpp), and stops the needle when that is out of reach.
+  // where it will be (rendezvous.hpp), and stops the needle when that is out of reach. way_point: to be passed on the
+  // way to the target of the next arm, in the order told, within its tolerance (0: 1 mm); a stop forgets them.
   void request(Request request, const std::optional<Target>& target, std::int64_t now_utime);
   // Latches what others found: overrun, input_refused, ending.
   void report(Reason reason) { stop(reason, 0, ""); }
@@ -116,6 +117,7 @@ class Supervisor {
   Status status_;
   Rendezvous rendezvous_;
   Route route_;
+  PathPoints way_points_;  // for the next arm
   bool pauses_for_path_ = false;
   Eigen::Vector3d aim_mm_ = Eigen::Vector3d::Zero();  // the target, or where the path to it is a look-ahead later
   ArcLaw arcs_;

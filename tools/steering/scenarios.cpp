@@ -62,6 +62,21 @@ controller::Obstacle draw_obstacle(Draw& draw, const Eigen::Vector3d& target_mm)
   return {centre_mm - half_mm, centre_mm + half_mm, draw.uniform(2, 5), 1.0};
 }
 
+// A way-point half way and a target beyond that the needle can go to one after the other: each at the end of an
+// arc of half the needle's curvature, in a drawn direction, from where the one before it ends.
+void draw_way(Draw& draw, const model::NeedleParameters& needle, Trial& trial) {
+  model::Pose tip;
+  for (Eigen::Vector3d* point_mm : {&trial.believed.way_points_mm.emplace_back(), &trial.target_mm}) {
+    const double depth_mm = draw.uniform(40, 60);
+    const double angle = draw.uniform(0, 2 * std::numbers::pi);
+    model::Pose arc = tip;
+    arc.R = tip.R * model::exp_so3({0, 0, angle});
+    model::advance(arc, {depth_mm, 0, {0.5 * needle.curvature_per_mm, 0}}, model::slip_parameters(needle));
+    *point_mm = arc.p_mm;
+    tip = arc;
+  }
+}
+
 struct Kinematic {
   double parameters_off = 0;  // uniform, relative, of k, lambda1, lambda2
   double roll_sd_rad = 0;
@@ -73,6 +88,7 @@ struct Kinematic {
   double breathing_mm = 0;  // of the target, amplitude at 0.25 Hz along x, phase drawn
   bool gated = false;
   bool obstacle = false;
+  bool way_point = false;
   double camera_turned_rad = 0;  // of both, about a drawn axis across the needle
 };
 Trial kinematic(const Kinematic& kind, std::uint64_t seed) {
@@ -108,6 +124,7 @@ Trial kinematic(const Kinematic& kind, std::uint64_t seed) {
              kind.breathing_mm * std::sin(2 * std::numbers::pi * 0.25 * time_s + angle) * Eigen::Vector3d::UnitX();
     };
   if (kind.obstacle) trial.believed.controller.obstacles = {draw_obstacle(draw, target)};
+  if (kind.way_point) draw_way(draw, believed, trial);
   trial.believed.controller.follow.gate_breathing = kind.gated;
   trial.rig.cameras = cameras(kind.cameras);
   trial.rig.cameras.outlier_share = kind.outlier_share;
@@ -155,7 +172,9 @@ Trial beam(const Beam& kind, std::uint64_t seed) {
 
 template <class Kind>
 Scenario scenario(const char* name, const char* what, const Kind& kind, Trial (*draw)(const Kind&, std::uint64_t)) {
-  return {name, what, [=](std::uint64_t seed) { return draw(kind, seed); }, kind.obstacle, std::is_same_v<Kind, Beam>};
+  bool along_path = kind.obstacle;
+  if constexpr (std::is_same_v<Kind, Kinematic>) along_path = along_path || kind.way_point;
+  return {name, what, [=](std::uint64_t seed) { return draw(kind, seed); }, along_path, std::is_same_v<Kind, Beam>};
 }
 
 }  // namespace
@@ -191,6 +210,9 @@ const std::vector<Scenario>& scenarios() {
                           {.obstacle = true}, kinematic),
       scenario<Beam>("obstacle-beam", "the same, beam, 50 kPa, 1 N",
                      {.modulus_kPa = 50, .force_N = 1, .obstacle = true}, beam),
+      scenario<Kinematic>(
+          "way-point", "a way-point of 1 mm tolerance half way, which it reaches by one arc and the target by another",
+          {.way_point = true}, kinematic),
       scenario<Kinematic>("outliers", "a tenth of the messages off by 3 to 10 mm", {.outlier_share = 0.1}, kinematic),
   };
   return all;

@@ -45,6 +45,7 @@ struct Believed {
   controller::ControllerConfig controller{};
   // Effects between base and tip that the controller undoes; those of the estimator it follows in any case.
   std::vector<model::ActiveEffect> undone{};
+  std::vector<Eigen::Vector3d> way_points_mm{};  // told before the target
 };
 
 struct Insertion {
@@ -56,6 +57,7 @@ struct Insertion {
   double turned_rad = 0;                                 // of the base, both ways together
   // Least distance of the true tip from any obstacle's surface, negative inside; infinite where there is none.
   double nearest_mm = std::numeric_limits<double>::infinity();
+  double way_point_miss_mm = 0;            // the farthest of them, true tip to point where it was nearest
   double inserted_mm = 0, duration_s = 0;  // from the word to go until it stopped
 };
 

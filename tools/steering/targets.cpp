@@ -34,6 +34,7 @@ struct Figures {
   double median_mm = 0, mean_mm = 0, sd_mm = 0, at_95_mm = 0, worst_mm = 0;
   double turns_per_100mm = 0, feed_mm_s = 0, estimate_error_mm = 0;
   int turned_frame_said = 0;                                    // of all targets
+  double way_point_miss_mm = 0;                                 // the worst, of those that arrived
   int touched = 0;                                              // an obstacle, of all targets
   double nearest_mm = std::numeric_limits<double>::infinity();  // to one
   std::map<std::string, int> stopped;                           // by reason
@@ -50,13 +51,15 @@ Figures figures_of(const std::vector<Insertion>& all) {
     f.nearest_mm = std::min(f.nearest_mm, one.nearest_mm);
     if (!one.arrived) {
       using controller::Reason;
-      if ((one.reason == Reason::target_unreachable || one.reason == Reason::path_blocked) && one.inserted_mm == 0)
+      if (one.inserted_mm == 0 && (one.reason == Reason::target_unreachable || one.reason == Reason::path_blocked ||
+                                   one.reason == Reason::way_point_unreachable))
         ++f.refused;
       else
         ++f.stopped[one.reason == controller::Reason::none ? "not there in time" : to_string(one.reason)];
       continue;
     }
     ++f.arrived;
+    f.way_point_miss_mm = std::max(f.way_point_miss_mm, one.way_point_miss_mm);
     miss_mm.push_back(one.miss_mm);
     turned_rad += one.turned_rad, inserted_mm += one.inserted_mm, duration_s += one.duration_s;
     f.estimate_error_mm += one.estimate_error_mm;
@@ -84,6 +87,10 @@ std::string row_of(const std::string& scenario, const char* law, const Figures& 
   std::string row = text.data();
   for (const auto& [reason, count] : f.stopped) row += " " + std::to_string(count) + " " + reason + ";";
   if (f.turned_frame_said > 0) row += " frame said to be turned: " + std::to_string(f.turned_frame_said) + ";";
+  if (f.way_point_miss_mm > 0) {
+    std::snprintf(text.data(), text.size(), " way-point missed by at most %.2f;", f.way_point_miss_mm);
+    row += text.data();
+  }
   if (std::isfinite(f.nearest_mm)) {
     std::snprintf(text.data(), text.size(), " obstacle touched: %d, nearest %.2f;", f.touched, f.nearest_mm);
     row += text.data();
@@ -101,6 +108,7 @@ nlohmann::json json_of(const Scenario& scenario, const char* law, const Figures&
           {"stopped", f.stopped},
           {"turned_frame_said", f.turned_frame_said},
           {"touched", f.touched},
+          {"way_point_miss_mm", f.way_point_miss_mm},
           {"nearest_mm", std::isfinite(f.nearest_mm) ? nlohmann::json(f.nearest_mm) : nlohmann::json()},
           {"median_mm", f.median_mm},
           {"mean_mm", f.mean_mm},
@@ -136,7 +144,7 @@ int run_targets(const TargetsOptions& options, std::ostream& out) {
   for (const Scenario* scenario : wanted)
     for (const LawTried& law : kLaws) {
       if (law.told_the_tip && !scenario->swings) continue;
-      if (scenario->avoids && law.law != controller::Law::arcs) continue;
+      if (scenario->along_path && law.law != controller::Law::arcs) continue;
       std::vector<Insertion> insertions(static_cast<std::size_t>(options.targets));
       parallel_for(insertions.size(), options.threads, [&](std::size_t i) {
         const std::uint64_t seed = 1'000'003 * options.seed + i;
