@@ -48,6 +48,7 @@ void Supervisor::request(Request request, const std::optional<Target>& target, s
       if (!check_axes()) return;
       reset_count_ = needle_state_->reset_count;
       arcs_.restart();
+      way_points_ = {};
       status_.state = State::steering;
       return;
     case Request::follow: {
@@ -79,7 +80,7 @@ void Supervisor::request(Request request, const std::optional<Target>& target, s
   rates_ = {};
   if (!check_inputs(now_utime)) return;
   aim_mm_ = target->position_mm;
-  PathPoints told = std::exchange(way_points_, {});
+  PathPoints told = way_points_;
   told.add({target->position_mm, config_.safety.target_miss_max_mm, true});
   route_.restart(told);
   status_.predicted_miss_mm = predicted_miss_mm(target->position_mm);

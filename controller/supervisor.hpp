@@ -69,7 +69,8 @@ class Supervisor {
   // reach. start: from armed or hold to steering, once both axes are enabled. hold: comes to rest within the limits of
   // acceleration, may go on. stop: latched. follow: where the target is now, in motion too; it is aimed at
   // where it will be (rendezvous.hpp), and stops the needle when that is out of reach. way_point: to be passed on the
-  // way to the target of the next arm, in the order told, within its tolerance (0: 1 mm); a stop forgets them.
+  // way to the target that is armed next, in the order told, within its tolerance (0: 1 mm); a start and a stop forget
+  // those told so far.
   void request(Request request, const std::optional<Target>& target, std::int64_t now_utime);
   // Latches what others found: overrun, input_refused, ending.
   void report(Reason reason) { stop(reason, 0, ""); }
@@ -117,7 +118,7 @@ class Supervisor {
   Status status_;
   Rendezvous rendezvous_;
   Route route_;
-  PathPoints way_points_;  // for the next arm
+  PathPoints way_points_;  // until it starts
   bool pauses_for_path_ = false;
   Eigen::Vector3d aim_mm_ = Eigen::Vector3d::Zero();  // the target, or where the path to it is a look-ahead later
   ArcLaw arcs_;

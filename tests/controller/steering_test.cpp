@@ -383,7 +383,9 @@ TEST_F(SupervisorTest, WayPointsThatCannotFollowOneAnotherAreRefused) {
   supervisor.request(Request::arm, Target{{2, -8, 100}, 0}, now);
   EXPECT_EQ(supervisor.status().reason, Reason::way_point_unreachable);
   EXPECT_GT(supervisor.status().value, 5);
-  // Told once, they are of that arm only.
+  supervisor.request(Request::arm, Target{{2, -8, 100}, 0}, now);
+  EXPECT_EQ(supervisor.status().reason, Reason::way_point_unreachable) << "armed again they are still to be passed";
+  supervisor.request(Request::stop, std::nullopt, now);
   supervisor.request(Request::arm, Target{{2, -8, 100}, 0}, now);
   EXPECT_EQ(supervisor.status().state, State::armed);
   supervisor.request(Request::hold, std::nullopt, now);
