@@ -12,10 +12,12 @@ constexpr double kLeastLeg_mm = 1;  // anything nearer is passed as it comes
 // A point of the planner's own is a direction to go in; what counts is how clear the path is.
 constexpr double kOwnMiss_mm = 2;
 
-// The grid: first legs and second ones.
-constexpr std::array<int, 2> kDirections{12, 8}, kShares{3, 2};
-constexpr std::array<double, 2> kRatios{1.0, 0.5};
-constexpr std::array<double, 2> kEarly{1.0, 0.0};
+// The grid of one leg and that of two, whose every number counts several times over.
+struct Grid {
+  std::size_t directions, shares, ratios, early;
+};
+constexpr std::array<Grid, 3> kGrids{{{1, 1, 1, 2}, {12, 3, 2, 2}, {8, 2, 1, 1}}};
+constexpr std::array<double, 2> kRatios{1.0, 0.5}, kEarly{1.0, 0.0};
 // Of the pattern search: its first steps, each time halved, in turn, r and share of each leg, and in early.
 constexpr std::array<double, 3> kLegStep{0.3, 0.25, 0.15};
 constexpr double kEarlyStep = 0.4;
@@ -26,6 +28,10 @@ bool is_better(const PathOutlook& one, const PathOutlook& other) {
   if (one.clear() != other.clear()) return one.clear();
   return one.spare_mm() > other.spare_mm();
 }
+
+constexpr double kAny_mm = -1e9;
+// The room without which no path is better than that one.
+double enough_mm(const PathOutlook& than) { return std::min(0.0, than.spare_mm()); }
 
 struct Node {  // where a path has come to
   model::Pose middle;
@@ -145,7 +151,7 @@ PathOutlook PathPlanner::outlook(const PathStart& start, const PathPoints& point
   return node.so_far;
 }
 
-PathOutlook PathPlanner::walk(const Candidate& candidate, PathPoints* points) const {
+PathOutlook PathPlanner::walk(const Candidate& candidate, double enough_mm, PathPoints* points) const {
   const Legs legs(start_, obstacles_);
   Node node = legs.begin_at(start_.tip);
   if (points) points->count = 0, points->early = candidate.early;
@@ -154,6 +160,10 @@ PathOutlook PathPlanner::walk(const Candidate& candidate, PathPoints* points) co
     const double ahead_mm = node.middle.R.col(2).dot(told_.points[0].at_mm - node.tip_mm);
     legs.free(node, leg.turn_rad, leg.ratio, leg.share * std::max(ahead_mm, kLeastLeg_mm));
     if (points) points->add({node.tip_mm, kOwnMiss_mm, false});
+    if (node.so_far.room_mm < enough_mm) {  // as it goes on it only falls
+      node.so_far.reachable = false;
+      return node.so_far;
+    }
   }
   for (const PathPoint& point : told_.all()) {
     if (node.in_domain) legs.to(node, point, candidate.early);
@@ -166,7 +176,7 @@ void PathPlanner::begin(const PathStart& start, const PathPoints& told) {
   start_ = start;
   told_ = path_ = told;
   Candidate direct;
-  best_ = walk(direct, nullptr);
+  best_ = walk(direct, kAny_mm);
   slack_needed_mm_ = std::min(best_.slack_mm, 0.0);
   legs_ = 0, next_ = 0;
   kept_.fill({});
@@ -179,26 +189,29 @@ bool PathPlanner::search(int candidates) {
 }
 
 int PathPlanner::grid_size(std::size_t legs) {
-  int size = static_cast<int>(kEarly.size());
-  for (std::size_t i = 0; i < legs; ++i) size *= kDirections.at(i) * kShares.at(i) * static_cast<int>(kRatios.size());
-  return size;
+  const Grid& grid = kGrids.at(legs);
+  std::size_t size = grid.early;
+  for (std::size_t i = 0; i < legs; ++i) size *= grid.directions * grid.shares * grid.ratios;
+  return static_cast<int>(size);
 }
 
 PathPlanner::Candidate PathPlanner::on_grid(std::size_t legs, int index) {
+  const Grid& grid = kGrids.at(legs);
   Candidate candidate;
   candidate.count = legs;
-  const auto digit = [&index](int base) {
-    const int value = index % base;
-    index /= base;
+  auto rest = static_cast<std::size_t>(index);
+  const auto digit = [&rest](std::size_t base) {
+    const std::size_t value = rest % base;
+    rest /= base;
     return value;
   };
-  candidate.early = kEarly.at(static_cast<std::size_t>(digit(static_cast<int>(kEarly.size()))));
+  candidate.early = kEarly.at(digit(grid.early));
   for (std::size_t i = 0; i < legs; ++i) {
-    const int directions = kDirections.at(i), shares = kShares.at(i);
     FreeLeg& leg = candidate.legs.at(i);
-    leg.turn_rad = 2 * std::numbers::pi * digit(directions) / directions;
-    leg.share = (1.0 + digit(shares)) / (1 + shares);
-    leg.ratio = kRatios.at(static_cast<std::size_t>(digit(static_cast<int>(kRatios.size()))));
+    leg.turn_rad =
+        2 * std::numbers::pi * static_cast<double>(digit(grid.directions)) / static_cast<double>(grid.directions);
+    leg.share = static_cast<double>(1 + digit(grid.shares)) / static_cast<double>(1 + grid.shares);
+    leg.ratio = kRatios.at(digit(grid.ratios));
   }
   return candidate;
 }
@@ -228,7 +241,7 @@ void PathPlanner::keep(const Candidate& candidate) {
 void PathPlanner::try_next() {
   if (phase_ == Phase::grid) {
     Candidate candidate = on_grid(legs_, next_);
-    candidate.outlook = walk(candidate, nullptr);
+    candidate.outlook = walk(candidate, enough_mm(kept_.back().outlook));
     keep(candidate);
     if (++next_ == grid_size(legs_)) phase_ = Phase::improve, next_ = 0;
     return;
@@ -239,7 +252,7 @@ void PathPlanner::try_next() {
   Candidate tried = kept;
   const double way = std::pow(0.5, next_ % each / (2 * numbers));
   change(tried, next_ / 2 % numbers, next_ % 2 == 0 ? way : -way);
-  tried.outlook = walk(tried, nullptr);
+  tried.outlook = walk(tried, enough_mm(kept.outlook));
   if (is_better(tried.outlook, kept.outlook)) kept = tried;
   if (++next_ == each * static_cast<int>(kKept)) end_improving();
 }
@@ -247,7 +260,7 @@ void PathPlanner::try_next() {
 void PathPlanner::end_improving() {
   const Candidate& best = *std::ranges::max_element(
       kept_, [](const Candidate& a, const Candidate& b) { return is_better(b.outlook, a.outlook); });
-  if (is_better(best.outlook, best_)) best_ = walk(best, &path_);
+  if (is_better(best.outlook, best_)) best_ = walk(best, kAny_mm, &path_);
   if (found() || legs_ == kMostLegs) {
     phase_ = Phase::done;
     return;

@@ -105,7 +105,8 @@ class PathPlanner {
   static Candidate on_grid(std::size_t legs, int index);
   static int grid_size(std::size_t legs);
   static void change(Candidate& candidate, int number, double way);
-  PathOutlook walk(const Candidate& candidate, PathPoints* points) const;
+  // Given up where the room falls below enough_mm.
+  PathOutlook walk(const Candidate& candidate, double enough_mm, PathPoints* points = nullptr) const;
   void try_next();
   void keep(const Candidate& candidate);
   void end_improving();

@@ -6,8 +6,8 @@
 namespace bevel::controller {
 namespace {
 
-// A period has room for these: some 25 us each.
-constexpr int kPerPeriod = 32;
+// A period has room for these: some 30 us each.
+constexpr int kPerPeriod = 16;
 constexpr int kAll = 1'000'000;
 
 void drop_first(PathPoints& points) {
