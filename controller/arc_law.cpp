@@ -5,12 +5,11 @@
 #include <limits>
 #include <numbers>
 
-#include "model/shaft_end.hpp"
+#include "controller/arc_walk.hpp"
 
 namespace bevel::controller {
 namespace {
 
-constexpr double kStep_mm = 4.0;  // of the prediction
 constexpr double kDeviations = 1;
 // Where it turns and where it has turned enough; between the two it rests. Facing: what the miss is across, of the
 // tube's width. Away: half a plane is away, so that coarsely will do.
@@ -22,34 +21,6 @@ constexpr double kConvergence_per_s = 8;                   // at the end of a tu
 constexpr double kOutside_mm = 1;                          // up to here the needle may be turned by any angle
 constexpr double kTurned_rad = 0.02;                       // a half turn is at its end
 constexpr double kNearly_rad = 0.3;                        // from here on the feed is not slowed for a turn
-
-// What a stiff shaft does at a depth, for the needle's k; of a slack one only the curvature.
-struct End {
-  double curvature_per_mm = 0, cut_rad = 0, swing_mm = 0;
-};
-End end_at(double depth_mm, const model::NeedleParameters& needle, const ShaftConfig& shaft) {
-  const double k = needle.curvature_per_mm, b = shaft.bending_mm;
-  if (!(b > 0)) return {k, 0, 0};
-  const model::ShaftEnd end = model::shaft_end((depth_mm + shaft.guide_mm) / b);
-  return {k * end.g * end.h, k * b * end.h, 0.5 * k * b * b * end.g};
-}
-
-// Where the tip passes the plane through the target across `along`, from the middle of its swing, with the bevel kept
-// and this share of the bend.
-bool landing(model::Pose middle, const model::NeedleParameters& needle, const ShaftConfig& shaft,
-             const Eigen::Vector3d& target_mm, const Eigen::Vector3d& along, double share, Eigen::Vector3d& at_mm) {
-  const model::SlipParameters slip = model::slip_parameters(needle);
-  for (int i = 0; i < 100; ++i) {
-    const double ahead_mm = along.dot(target_mm - middle.p_mm);
-    if (ahead_mm <= 1e-3) break;
-    const double step_mm = std::min(kStep_mm, ahead_mm / std::max(0.2, along.dot(middle.R.col(2))));
-    const End end = end_at(middle.p_mm.z() + 0.5 * step_mm, needle, shaft);
-    middle.p_mm -= middle.R.col(1) * (share * end.cut_rad * step_mm);
-    if (!model::step(middle, {step_mm, 0, {share * end.curvature_per_mm, 0}}, slip)) return false;
-  }
-  at_mm = middle.p_mm - middle.R.col(1) * (share * end_at(middle.p_mm.z(), needle, shaft).swing_mm);
-  return true;
-}
 
 double turn_feed_mm_s(const SteeringLimits& limits) {
   return limits.insertion_rate_mm_s * limits.insertion_rate_min_share;
@@ -76,10 +47,8 @@ double wrapped(double angle_rad) { return std::remainder(angle_rad, 2 * std::num
 ArcGeometry arc_geometry(const model::Pose& tip, const model::NeedleParameters& needle, const ShaftConfig& shaft,
                          const Eigen::Vector3d& target_mm, const BendUncertainty& uncertain) {
   ArcGeometry g;
-  const End now = end_at(tip.p_mm.z(), needle, shaft);
-  model::Pose middle = tip;
-  middle.R = tip.R * model::exp_so3({-0.5 * now.cut_rad, 0, 0});
-  middle.p_mm += middle.R.col(1) * now.swing_mm;
+  const ArcWalk walk(needle, shaft);
+  const model::Pose middle = walk.middle_of(tip);
   const Eigen::Matrix3d R = middle.R;
   const Eigen::Vector3d along = R.col(2);
   g.ahead_mm = along.dot(target_mm - tip.p_mm);
@@ -88,8 +57,7 @@ ArcGeometry arc_geometry(const model::Pose& tip, const model::NeedleParameters& 
     return g;
   }
   Eigen::Vector3d straight_mm, kept_mm, facing_mm;
-  if (!landing(middle, needle, shaft, target_mm, along, 0, straight_mm) ||
-      !landing(middle, needle, shaft, target_mm, along, 1, kept_mm))
+  if (!walk.to_plane(middle, target_mm, along, 0, straight_mm) || !walk.to_plane(middle, target_mm, along, 1, kept_mm))
     return g;
   const auto across = [&](const Eigen::Vector3d& v) -> Eigen::Vector2d { return (R.transpose() * v).head<2>(); };
   g.aim_mm = across(target_mm - straight_mm);
@@ -99,9 +67,9 @@ ArcGeometry arc_geometry(const model::Pose& tip, const model::NeedleParameters& 
   // The reach is that of the side on which it is wanted: slip makes it differ by the side.
   model::Pose turned = middle;
   turned.R = R * model::exp_so3({0, 0, g.facing_rad});
-  if (!landing(turned, needle, shaft, target_mm, along, 1, facing_mm)) return g;
+  if (!walk.to_plane(turned, target_mm, along, 1, facing_mm)) return g;
   g.reach_mm = across(facing_mm - straight_mm).norm();
-  const End there = end_at(tip.p_mm.z() + 0.5 * g.ahead_mm, needle, shaft);
+  const ArcWalk::End there = walk.end_at(tip.p_mm.z() + 0.5 * g.ahead_mm);
   g.reach_per_mm = std::abs(there.cut_rad) + std::abs(there.curvature_per_mm) * g.ahead_mm;
   // Of k (b^2 / 2 + b q + q^2 / 2), the reach deep in the tissue. Where the tip is is known: of the swing, b^2 / 2,
   // only what it goes through until the bevel faces W is not.

@@ -1,5 +1,8 @@
 #pragma once
 // What the controller may do and when it stops. One plain structure, filled from a file elsewhere.
+#include <vector>
+
+#include "controller/obstacle.hpp"
 #include "controller/rendezvous.hpp"
 
 namespace bevel::controller {
@@ -61,6 +64,7 @@ struct ControllerConfig {
   SteeringGains gains;
   FollowConfig follow;
   SafetyLimits safety;
+  std::vector<Obstacle> obstacles;  // which Law::arcs goes round (path_plan.hpp), and no other
 };
 
 }  // namespace bevel::controller

@@ -8,91 +8,18 @@
 
 namespace bevel::controller {
 namespace {
-constexpr double kDeviations = 4;        // of the estimate's own standard deviation
+constexpr double kDeviations = 4;  // of the estimate's own standard deviation
+constexpr double kWayPointTolerance_mm = 1;
 constexpr double kTargetDeviations = 2;  // of where a target that moves will be
 }  // namespace
 
-const char* to_string(State state) {
-  switch (state) {
-    case State::off:
-      return "off";
-    case State::armed:
-      return "armed";
-    case State::steering:
-      return "steering";
-    case State::hold:
-      return "hold";
-    case State::stopped:
-      return "stopped";
-    case State::fault:
-      return "fault";
-  }
-  return "?";
-}
-
-const char* to_string(Reason reason) {
-  switch (reason) {
-    case Reason::none:
-      return "";
-    case Reason::operator_stop:
-      return "stopped by the operator";
-    case Reason::state_stale:
-      return "needle state stale or missing";
-    case Reason::state_unhealthy:
-      return "needle state unhealthy";
-    case Reason::state_uncertain:
-      return "needle position too uncertain";
-    case Reason::state_reset:
-      return "the estimator declared a reset";
-    case Reason::state_not_finite:
-      return "needle state not finite";
-    case Reason::actuator_stale:
-      return "actuator state stale or missing";
-    case Reason::axes_not_enabled:
-      return "axes not enabled";
-    case Reason::insertion_tracking:
-      return "insertion does not follow the command";
-    case Reason::rotation_tracking:
-      return "rotation does not follow the command";
-    case Reason::workspace:
-      return "tip outside the workspace";
-    case Reason::target_unreachable:
-      return "target out of reach";
-    case Reason::outside_model:
-      return "tip outside the model's domain";
-    case Reason::overrun:
-      return "control loop too late";
-    case Reason::resting_axes_moved:
-      return "axes moved though told to rest";
-    case Reason::resting_tip_moved:
-      return "needle state moved though the axes rest";
-    case Reason::off_the_axes:
-      return "needle state farther from the entry than the needle was inserted";
-    case Reason::input_refused:
-      return "input cannot be trusted";
-    case Reason::ending:
-      return "told to end";
-  }
-  return "?";
-}
-
 Supervisor::Supervisor(const ControllerConfig& config, const model::NeedleParameters& needle,
                        std::vector<model::ActiveEffect> effects)
-    : config_(config), needle_(needle), axes_(std::move(effects)), rendezvous_(config.follow) {}
-
-model::NeedleParameters Supervisor::needle_now() const {
-  model::NeedleParameters needle = needle_;
-  needle.curvature_per_mm = needle_state_->curvature_per_mm;
-  needle.lambda1_per_rad = needle_state_->lambda1_per_rad;
-  needle.lambda2 = needle_state_->lambda2;
-  return needle;
-}
-
-ShaftConfig Supervisor::shaft_now() const {
-  ShaftConfig shaft = config_.shaft;
-  if (needle_state_->bending_mm > 0) shaft.bending_mm = needle_state_->bending_mm;
-  return shaft;
-}
+    : config_(config),
+      needle_(needle),
+      axes_(std::move(effects)),
+      rendezvous_(config.follow),
+      route_(config.obstacles) {}
 
 void Supervisor::stop(Reason reason, double value, const char* unit) {
   rates_ = {};
@@ -106,6 +33,7 @@ void Supervisor::stop(Reason reason, double value, const char* unit) {
 void Supervisor::request(Request request, const std::optional<Target>& target, std::int64_t now_utime) {
   switch (request) {
     case Request::stop:
+      way_points_ = {};
       stop(Reason::operator_stop, 0, "");
       return;
     case Request::hold:
@@ -120,18 +48,27 @@ void Supervisor::request(Request request, const std::optional<Target>& target, s
       if (!check_axes()) return;
       reset_count_ = needle_state_->reset_count;
       arcs_.restart();
+      way_points_ = {};
       status_.state = State::steering;
       return;
     case Request::follow: {
       if (!in_motion_states() || !target || !target->position_mm.allFinite() || !check_inputs(now_utime)) return;
       rendezvous_.observe(target->utime_or(now_utime), target->position_mm);
       rendezvous_.plan(now_utime, to_go_mm(), config_.limits.insertion_rate_mm_s);
+      if (route_.is_needed()) return;  // which looks at the whole path, in the next period
       // A prediction that is hardly one yet is no reason.
       const double miss_mm = predicted_miss_mm(rendezvous_.target_mm());
       if (!(miss_mm - kTargetDeviations * rendezvous_.target_sd_mm() <= config_.safety.target_miss_max_mm))
         stop(Reason::target_unreachable, miss_mm, "mm predicted miss");
       return;
     }
+    case Request::way_point:
+      if (!target || !target->position_mm.allFinite()) return;
+      if (way_points_.count == kMostWayPoints)
+        return stop(Reason::way_points_too_many, static_cast<double>(kMostWayPoints), "at most");
+      way_points_.add(
+          {target->position_mm, target->tolerance_mm > 0 ? target->tolerance_mm : kWayPointTolerance_mm, true});
+      return;
     case Request::arm:
       break;
   }
@@ -142,9 +79,17 @@ void Supervisor::request(Request request, const std::optional<Target>& target, s
   status_.unit = "";
   rates_ = {};
   if (!check_inputs(now_utime)) return;
+  aim_mm_ = target->position_mm;
+  PathPoints told = way_points_;
+  told.add({target->position_mm, config_.safety.target_miss_max_mm, true});
+  route_.restart(told);
   status_.predicted_miss_mm = predicted_miss_mm(target->position_mm);
-  if (!(status_.predicted_miss_mm <= config_.safety.target_miss_max_mm))
+  if (told.count == 1 && !(status_.predicted_miss_mm <= config_.safety.target_miss_max_mm))
     return stop(Reason::target_unreachable, status_.predicted_miss_mm, "mm predicted miss");
+  if (route_.is_needed()) {
+    if (config_.law != Law::arcs) return stop(Reason::law_without_path, 0, "");
+    if (route_.plan(path_start()) == Route::Way::blocked) return stop_without_path();
+  }
   target_ = target;
   rendezvous_.restart(target->utime_or(now_utime), target->position_mm);
   status_.state = State::armed;
@@ -153,15 +98,6 @@ void Supervisor::request(Request request, const std::optional<Target>& target, s
   followed_utime_.reset();
   commands_.restart();
   resting_.reset();
-}
-
-double Supervisor::predicted_miss_mm(const Eigen::Vector3d& target_mm) const {
-  const model::Pose& tip = needle_state_->pose;
-  if (shaft_now().bending_mm > 0) {
-    const ArcGeometry arc = arc_geometry(tip, needle_now(), shaft_now(), target_mm);
-    return arc.in_domain && arc.ahead_mm <= 0 ? (target_mm - tip.p_mm).norm() : arc_miss_mm(arc);
-  }
-  return predict_reach(tip, needle_now(), target_mm, config_.safety.target_miss_max_mm).miss_mm;
 }
 
 // Everything that must hold for motion; latches the first thing that does not.
@@ -188,6 +124,8 @@ bool Supervisor::check_inputs(std::int64_t now_utime) {
   const double depth = n.pose.p_mm.z();
   if (!(depth >= safety.depth_min_mm && depth <= safety.depth_max_mm))
     return refuse(Reason::workspace, depth, "mm deep");
+  if (const double left_mm = route_.clearance_left_mm(n.pose.p_mm); left_mm < 0)
+    return refuse(Reason::obstacle_near, left_mm, "mm of its clearance left");
   const double lateral = n.pose.p_mm.head<2>().norm();
   if (!(lateral <= safety.lateral_max_mm)) return refuse(Reason::workspace, lateral, "mm lateral");
   // Tissue that moves with its camera, and an entry point that was not quite met, are within the bound on the error.
@@ -292,70 +230,32 @@ model::MotionCommand Supervisor::step(std::int64_t now_utime, double elapsed_s) 
     stop(Reason::state_reset, needle_state_->reset_count, "resets");
     return command;
   }
-  if (!see_geometry(now_utime)) {
+  rendezvous_.plan(now_utime, to_go_mm(), config_.limits.insertion_rate_mm_s);
+  if (!see_path()) return command;
+  if (!see_geometry()) {
     stop(Reason::outside_model, model::tilt_rad(needle_state_->pose), "rad tilt");
     return command;
   }
   const bool arcs = by_arcs();
   const double ahead_mm = arcs ? status_.arc.ahead_mm : status_.geometry.ahead_mm;
   Rates wanted;
-  if (ahead_mm <= 0) {  // closest approach: what still turns comes to rest by the ramp
+  if (pauses_for_path_) {
+    // Nothing is inserted until there is one.
+  } else if (ahead_mm <= 0) {  // closest approach: what still turns comes to rest by the ramp
     status_.state = State::hold;
   } else {
     wanted = steer(now_utime);
   }
   rates_ = ramp(rates_, wanted, dt_s, config_.limits);
   commands_.remember(now_utime, rates_);
-  if (ahead_mm > 0) status_.predicted_miss_mm = arcs ? arc_miss_mm(status_.arc) : status_.geometry.aim_mm.norm();
+  if (ahead_mm > 0)
+    status_.predicted_miss_mm = route_.is_needed() ? std::max(0.0, -route_.outlook().slack_mm)
+                                : arcs             ? arc_miss_mm(status_.arc)
+                                                   : status_.geometry.aim_mm.norm();
   command.mode = 1;
   command.insertion_rate_mm_s = rates_.insertion_mm_s;
   command.rotation_rate_rad_s = rates_.rotation_rad_s;
   return command;
-}
-
-// To the plane through the target across the needle.
-double Supervisor::to_go_mm() const {
-  const model::Pose& tip = needle_state_->pose;
-  return tip.R.col(2).dot(rendezvous_.target_mm() - tip.p_mm);
-}
-
-bool Supervisor::see_geometry(std::int64_t now_utime) {
-  const model::Pose& tip = needle_state_->pose;
-  rendezvous_.plan(now_utime, to_go_mm(), config_.limits.insertion_rate_mm_s);
-  const Eigen::Vector3d& target_mm = rendezvous_.target_mm();
-  if (by_arcs()) {
-    status_.arc = arc_geometry(tip, needle_now(), shaft_now(), target_mm, needle_state_->uncertain);
-    return status_.arc.in_domain;
-  }
-  status_.geometry = steering_geometry(tip, needle_now(), target_mm, config_.limits.insertion_rate_mm_s,
-                                       config_.gains.parameter_uncertainty, shaft_now());
-  return status_.geometry.in_domain;
-}
-
-// What the law wants at this instant, without ramps.
-Rates Supervisor::steer(std::int64_t now_utime) {
-  const double tolerance_mm = target_->tolerance_mm > 0 ? target_->tolerance_mm : config_.gains.tolerance_mm;
-  const double rotation_rad = actuator_->rotation_rad;
-  Rates wanted;
-  double ahead_mm = 0, off_rad = 0;
-  if (by_arcs()) {
-    wanted = arcs_.step(status_.arc, rotation_rad, actuator_->insertion_mm, tolerance_mm, config_);
-    ahead_mm = status_.arc.ahead_mm;
-    off_rad = status_.arc.facing_rad;
-  } else {
-    wanted = steering_rates(status_.geometry, rotation_rad, tolerance_mm, config_);
-    ahead_mm = status_.geometry.ahead_mm;
-    off_rad = status_.geometry.sigma_rad;
-  }
-  if (axes_.turns_late()) {
-    const double share = std::min(1.0, std::abs(off_rad) / config_.gains.boundary_layer_rad);
-    wanted.rotation_rad_s =
-        base_rate_rad_s(wanted.rotation_rad_s, axes_.take_up_rad(wanted.rotation_rad_s), share, config_.limits);
-  }
-  // Come to rest at the closest approach: never faster than the ramp can stop within what is left.
-  const double braking = std::sqrt(2 * 0.5 * config_.limits.insertion_acceleration_mm_s2 * ahead_mm);
-  wanted.insertion_mm_s = std::min({wanted.insertion_mm_s, braking, rendezvous_.rate_limit_mm_s(now_utime, ahead_mm)});
-  return wanted;
 }
 
 }  // namespace bevel::controller

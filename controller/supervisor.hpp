@@ -11,39 +11,14 @@
 #include "controller/axis_model.hpp"
 #include "controller/command_watch.hpp"
 #include "controller/reach.hpp"
+#include "controller/reason.hpp"
 #include "controller/rendezvous.hpp"
+#include "controller/route.hpp"
 #include "model/samples.hpp"
 
 namespace bevel::controller {
 
-enum class State { off, armed, steering, hold, stopped, fault };
-
-enum class Reason {
-  none,
-  operator_stop,
-  state_stale,      // NEEDLE_STATE too old, or none
-  state_unhealthy,  // its health word is not zero
-  state_uncertain,  // position variance above its bound
-  state_reset,      // the estimator declared a reset during motion
-  state_not_finite,
-  actuator_stale,
-  axes_not_enabled,    // quick stop, fault or off during motion
-  insertion_tracking,  // an axis does not do what is commanded
-  rotation_tracking,
-  workspace,           // the tip left the allowed space
-  target_unreachable,  // refused before insertion, with the predicted miss
-  outside_model,       // the pose left the model's domain
-  overrun,             // the loop could not keep its period
-  resting_axes_moved,  // axes that were told to rest did not
-  resting_tip_moved,   // the estimate moved while the axes rested
-  off_the_axes,        // the tip is said to be farther from the entry than the needle was inserted
-  input_refused,       // what comes in cannot be trusted: two senders, motion that cannot be, the clock was set
-  ending,              // the process was told to end
-};
-const char* to_string(State state);
-const char* to_string(Reason reason);
-
-enum class Request : std::int32_t { stop = 0, arm = 1, start = 2, hold = 3, follow = 6 };
+enum class Request : std::int32_t { stop = 0, arm = 1, start = 2, hold = 3, follow = 6, way_point = 7 };
 
 // What the controller needs of NEEDLE_STATE.
 struct NeedleView {
@@ -93,7 +68,9 @@ class Supervisor {
   // An operator's word. arm: takes the target and leaves off, hold or stopped; refused (reason latched) when out of
   // reach. start: from armed or hold to steering, once both axes are enabled. hold: comes to rest within the limits of
   // acceleration, may go on. stop: latched. follow: where the target is now, in motion too; it is aimed at
-  // where it will be (rendezvous.hpp), and stops the needle when that is out of reach.
+  // where it will be (rendezvous.hpp), and stops the needle when that is out of reach. way_point: to be passed on the
+  // way to the target that is armed next, in the order told, within its tolerance (0: 1 mm); a start and a stop forget
+  // those told so far.
   void request(Request request, const std::optional<Target>& target, std::int64_t now_utime);
   // Latches what others found: overrun, input_refused, ending.
   void report(Reason reason) { stop(reason, 0, ""); }
@@ -119,7 +96,10 @@ class Supervisor {
   bool check_tracking();
   bool check_rest(std::int64_t now_utime);
   Rates steer(std::int64_t now_utime);
-  bool see_geometry(std::int64_t now_utime);
+  bool see_path();
+  void stop_without_path();
+  PathStart path_start() const;
+  bool see_geometry();
   double to_go_mm() const;
   bool by_arcs() const { return config_.law != Law::spin; }
   double predicted_miss_mm(const Eigen::Vector3d& target_mm) const;
@@ -137,6 +117,10 @@ class Supervisor {
   std::optional<Target> target_;
   Status status_;
   Rendezvous rendezvous_;
+  Route route_;
+  PathPoints way_points_;  // until it starts
+  bool pauses_for_path_ = false;
+  Eigen::Vector3d aim_mm_ = Eigen::Vector3d::Zero();  // the target, or where the path to it is a look-ahead later
   ArcLaw arcs_;
   Rates rates_;
   std::int64_t seq_ = 0;

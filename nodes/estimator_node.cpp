@@ -169,6 +169,7 @@ void EstimatorNode::on_word(Word word) {
     case Word::start:
     case Word::hold:
     case Word::follow:
+    case Word::way_point:
       return;  // of motion
   }
   port_.forget_senders();

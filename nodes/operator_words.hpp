@@ -8,7 +8,16 @@
 
 namespace bevel::nodes {
 
-enum class Word : std::int32_t { stop = 0, arm = 1, start = 2, hold = 3, entry = 4, confirm = 5, follow = 6 };
+enum class Word : std::int32_t {
+  stop = 0,
+  arm = 1,
+  start = 2,
+  hold = 3,
+  entry = 4,
+  confirm = 5,
+  follow = 6,
+  way_point = 7
+};
 // Place of a receiver's session in steering_target_t.session.
 enum class Receiver : std::size_t { controller = 0, stepper = 1, estimator = 2 };
 

@@ -78,6 +78,7 @@ void StepperNode::on_word(Word word) {
     case Word::start:
     case Word::hold:
     case Word::follow:
+    case Word::way_point:
       break;  // the controller's
   }
 }

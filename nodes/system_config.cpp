@@ -22,6 +22,33 @@ using io::Section;
 // One link of the chain from a fault to rest; docs/hazards.md has the sum.
 constexpr io::Range kShareOfStop = in_range(0.01, 0.12).because("the needle must rest within 200 ms of a fault");
 
+constexpr std::size_t kMostObstacles = 16;
+
+// A sphere has `centre_mm`, a capsule `from_mm` and `to_mm`.
+controller::Obstacle read_obstacle(Section s) {
+  controller::Obstacle obstacle;
+  const auto read_point = [&s](const char* key, Eigen::Vector3d& point) {
+    std::array<double, 3> mm{};
+    s.read(key, mm, required, in_range(-500, 500));
+    point = Eigen::Vector3d(mm[0], mm[1], mm[2]);
+  };
+  if (s.has("centre_mm")) {
+    for (const char* key : {"from_mm", "to_mm"})
+      if (s.has(key)) s.fail(key, "stands beside centre_mm, which makes it a sphere; one or the other");
+    read_point("centre_mm", obstacle.from_mm);
+    obstacle.to_mm = obstacle.from_mm;
+  } else if (s.has("from_mm") || s.has("to_mm")) {
+    read_point("from_mm", obstacle.from_mm);
+    read_point("to_mm", obstacle.to_mm);
+  } else {
+    s.fail("", "says not where it is; allowed: centre_mm of a sphere, or from_mm and to_mm of a capsule");
+  }
+  s.read("radius_mm", obstacle.radius_mm, required, in_range(0.01, 200));
+  s.read("clearance_mm", obstacle.clearance_mm, required,
+         in_range(0.1, 50).because("the estimate of the tip is not exact"));
+  return obstacle;
+}
+
 void read_controller(Section s, controller::ControllerConfig& c) {
   s.read("period_s", c.period_s, optional,
          in_range(0.002, 0.03).because("set-points must be renewed before the driver takes them for old"));
@@ -66,6 +93,13 @@ void read_controller(Section s, controller::ControllerConfig& c) {
   f.read("resting_motion_rad", safety.resting_motion_rad, optional, in_range(0.02, 1));
   f.read("enabling_s", safety.enabling_s, optional, in_range(0.1, 30));
   f.read("target_miss_max_mm", safety.target_miss_max_mm, optional, in_range(0.05, 20));
+  for (const Section& one : s.sections("obstacle", optional)) {
+    c.obstacles.push_back(read_obstacle(one));
+    if (c.law != controller::Law::arcs) s.fail("obstacle", "needs law = \"arcs\": no other goes round obstacles");
+  }
+  if (c.obstacles.size() > kMostObstacles)
+    s.fail("obstacle", "occurs " + std::to_string(c.obstacles.size()) + " times, allowed: up to " +
+                           std::to_string(kMostObstacles) + ", for which a period has time");
 }
 
 void read_axis(Section s, stepper::AxisConfig& axis) {

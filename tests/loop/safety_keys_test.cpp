@@ -74,5 +74,28 @@ TEST(SafetyKeysTogether, TheMessageSaysWhy) {
   }
 }
 
+std::string refusal_of(const std::string& controller) {
+  const test::TemporaryFolder folder;
+  try {
+    load_system_config(folder.write("rig.toml", std::string(kNeedle) + controller));
+  } catch (const io::ConfigError& e) {
+    return e.what();
+  }
+  return "";
+}
+
+TEST(Obstacles, AreSpheresAndCapsulesAndNothingHalf) {
+  const std::string head = "[[controller.obstacle]]\nclearance_mm = 1.0\nradius_mm = 3.0\n";
+  EXPECT_EQ(refusal_of(head + "centre_mm = [0, 5, 50]\n"), "");
+  EXPECT_EQ(refusal_of(head + "from_mm = [0, 5, 50]\nto_mm = [10, 5, 50]\n"), "");
+  EXPECT_THAT(refusal_of(head), HasSubstr("centre_mm"));
+  EXPECT_THAT(refusal_of(head + "from_mm = [0, 5, 50]\n"), HasSubstr("to_mm"));
+  EXPECT_THAT(refusal_of(head + "centre_mm = [0, 5]\n"), HasSubstr("centre_mm"));
+  EXPECT_THAT(refusal_of(head + "centre_mm = [0, 5, 50]\nto_mm = [0, 5, 50]\n"), HasSubstr("one or the other"));
+  EXPECT_THAT(refusal_of("[[controller.obstacle]]\ncentre_mm = [0, 5, 50]\nradius_mm = 3.0\nclearance_mm = 0.0\n"),
+              HasSubstr("the estimate of the tip is not exact"));
+  EXPECT_THAT(refusal_of("[controller]\nlaw = \"spin\"\n" + head + "centre_mm = [0, 5, 50]\n"), HasSubstr("arcs"));
+}
+
 }  // namespace
 }  // namespace bevel::nodes

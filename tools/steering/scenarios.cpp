@@ -48,6 +48,35 @@ model::NeedleParameters agar() {
   return needle;
 }
 
+// A sphere or a capsule beside the straight line to the target, or across it; a quarter of the way at least from either
+// end.
+controller::Obstacle draw_obstacle(Draw& draw, const Eigen::Vector3d& target_mm) {
+  constexpr double kFarthest_mm = 8;  // from the line
+  const auto across = [&draw](double length_mm) {
+    const double angle = draw.uniform(0, 2 * std::numbers::pi);
+    return Eigen::Vector3d(length_mm * std::cos(angle), length_mm * std::sin(angle), 0);
+  };
+  const Eigen::Vector3d centre_mm =
+      draw.uniform(0.25, 0.75) * target_mm + across(kFarthest_mm * std::sqrt(draw.uniform(0, 1)));
+  const Eigen::Vector3d half_mm = draw.uniform(0, 1) < 0.5 ? Eigen::Vector3d::Zero().eval() : across(15);
+  return {centre_mm - half_mm, centre_mm + half_mm, draw.uniform(2, 5), 1.0};
+}
+
+// A way-point half way and a target beyond that the needle can go to one after the other: each at the end of an
+// arc of half the needle's curvature, in a drawn direction, from where the one before it ends.
+void draw_way(Draw& draw, const model::NeedleParameters& needle, Trial& trial) {
+  model::Pose tip;
+  for (Eigen::Vector3d* point_mm : {&trial.believed.way_points_mm.emplace_back(), &trial.target_mm}) {
+    const double depth_mm = draw.uniform(40, 60);
+    const double angle = draw.uniform(0, 2 * std::numbers::pi);
+    model::Pose arc = tip;
+    arc.R = tip.R * model::exp_so3({0, 0, angle});
+    model::advance(arc, {depth_mm, 0, {0.5 * needle.curvature_per_mm, 0}}, model::slip_parameters(needle));
+    *point_mm = arc.p_mm;
+    tip = arc;
+  }
+}
+
 struct Kinematic {
   double parameters_off = 0;  // uniform, relative, of k, lambda1, lambda2
   double roll_sd_rad = 0;
@@ -58,6 +87,8 @@ struct Kinematic {
   double drift_mm = 0;      // of the target in 20 s, in a drawn direction across
   double breathing_mm = 0;  // of the target, amplitude at 0.25 Hz along x, phase drawn
   bool gated = false;
+  bool obstacle = false;
+  bool way_point = false;
   double camera_turned_rad = 0;  // of both, about a drawn axis across the needle
 };
 Trial kinematic(const Kinematic& kind, std::uint64_t seed) {
@@ -92,6 +123,8 @@ Trial kinematic(const Kinematic& kind, std::uint64_t seed) {
       return target +
              kind.breathing_mm * std::sin(2 * std::numbers::pi * 0.25 * time_s + angle) * Eigen::Vector3d::UnitX();
     };
+  if (kind.obstacle) trial.believed.controller.obstacles = {draw_obstacle(draw, target)};
+  if (kind.way_point) draw_way(draw, believed, trial);
   trial.believed.controller.follow.gate_breathing = kind.gated;
   trial.rig.cameras = cameras(kind.cameras);
   trial.rig.cameras.outlier_share = kind.outlier_share;
@@ -106,6 +139,7 @@ struct Beam {
   double modulus_kPa = 0, force_N = 0;  // 0: drawn, 2 to 100 kPa, 0.2 to 1 N
   double windup_at_100mm_rad = 0;
   double relaxing_fraction = 0;
+  bool obstacle = false;
 };
 // The software is told a curvature and a bending length, each off by up to 30 %, and a bicycle's slip of none.
 Trial beam(const Beam& kind, std::uint64_t seed) {
@@ -130,6 +164,7 @@ Trial beam(const Beam& kind, std::uint64_t seed) {
   prior.guide_mm = config.guide_gap_mm;
   trial.believed.controller.shaft = {prior.bending_mm, prior.guide_mm};
   trial.target_mm = draw_target(draw, deep.curvature_per_mm);
+  if (kind.obstacle) trial.believed.controller.obstacles = {draw_obstacle(draw, trial.target_mm)};
   trial.rig.cameras = cameras(2);
   trial.rig.make_plant = [config] { return std::make_unique<rig::BeamNeedle>(config); };
   return trial;
@@ -137,7 +172,9 @@ Trial beam(const Beam& kind, std::uint64_t seed) {
 
 template <class Kind>
 Scenario scenario(const char* name, const char* what, const Kind& kind, Trial (*draw)(const Kind&, std::uint64_t)) {
-  return {name, what, [=](std::uint64_t seed) { return draw(kind, seed); }, std::is_same_v<Kind, Beam>};
+  bool along_path = kind.obstacle;
+  if constexpr (std::is_same_v<Kind, Kinematic>) along_path = along_path || kind.way_point;
+  return {name, what, [=](std::uint64_t seed) { return draw(kind, seed); }, along_path, std::is_same_v<Kind, Beam>};
 }
 
 }  // namespace
@@ -169,6 +206,13 @@ const std::vector<Scenario>& scenarios() {
       scenario<Kinematic>("one-camera", "one camera, along x", {.cameras = 1}, kinematic),
       scenario<Kinematic>("camera-turned", "both cameras' frame turned by 2 degrees about an axis across the needle",
                           {.camera_turned_rad = 2 * std::numbers::pi / 180}, kinematic),
+      scenario<Kinematic>("obstacle", "a sphere or capsule of 2 to 5 mm radius within 8 mm of the line to the target",
+                          {.obstacle = true}, kinematic),
+      scenario<Beam>("obstacle-beam", "the same, beam, 50 kPa, 1 N",
+                     {.modulus_kPa = 50, .force_N = 1, .obstacle = true}, beam),
+      scenario<Kinematic>(
+          "way-point", "a way-point of 1 mm tolerance half way, which it reaches by one arc and the target by another",
+          {.way_point = true}, kinematic),
       scenario<Kinematic>("outliers", "a tenth of the messages off by 3 to 10 mm", {.outlier_share = 0.1}, kinematic),
   };
   return all;

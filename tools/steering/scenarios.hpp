@@ -20,7 +20,8 @@ struct Scenario {
   std::string what;  // in a sentence
   // The same trial for the same seed.
   std::function<Trial(std::uint64_t seed)> draw;
-  bool swings = false;  // a stiff shaft, whose tip turning moves
+  bool along_path = false;  // with obstacles or way-points, which the law by arcs alone knows
+  bool swings = false;      // a stiff shaft, whose tip turning moves
 };
 
 // 5 mm/s, targets 80 to 120 mm deep within 0.6 of the needle's reach, two cameras of 0.2 mm noise where nothing else is

@@ -126,12 +126,19 @@ Insertion steer(const SteeredRig& rig, const Believed& believed, const Eigen::Ve
                       static_cast<std::int32_t>(model::AxisStatus::enabled)};
   std::int64_t next_frame_us = 0;
   bool started = false;
+  std::vector<double> way_point_miss_mm(believed.way_points_mm.size(), std::numeric_limits<double>::infinity());
   const auto target_now = [&] { return rig.target_mm ? rig.target_mm(result.duration_s) : target_mm; };
   for (std::int64_t us = 0; us < kTimeLimit_us; us += kTick_us) {
     const std::int64_t utime = kStart_utime + us;
     if (us > 0) {
       const double insertion_mm = axes.insertion_rate_mm_s * tick_s, rotation_rad = axes.rotation_rate_rad_s * tick_s;
+      const Eigen::Vector3d before_mm = plant->tip().p_mm;
       plant->advance(insertion_mm, rotation_rad, tick_s);
+      for (std::size_t i = 0; i < way_point_miss_mm.size(); ++i)
+        way_point_miss_mm[i] = std::min(way_point_miss_mm[i], (plant->tip().p_mm - believed.way_points_mm[i]).norm());
+      for (const controller::Obstacle& obstacle : config.obstacles)
+        result.nearest_mm =
+            std::min(result.nearest_mm, controller::distance_mm(obstacle, before_mm, plant->tip().p_mm));
       axes.insertion_mm += insertion_mm, axes.rotation_rad += rotation_rad;
       result.turned_rad += std::abs(rotation_rad);
       if (started) result.duration_s += tick_s;
@@ -155,6 +162,8 @@ Insertion steer(const SteeredRig& rig, const Believed& believed, const Eigen::Ve
     supervisor.set_needle(view);
     if (!started) {
       const controller::Target target{target_mm, 0};
+      for (const Eigen::Vector3d& point_mm : believed.way_points_mm)
+        supervisor.request(controller::Request::way_point, controller::Target{point_mm, 0}, utime);
       supervisor.request(controller::Request::arm, target, utime);
       supervisor.request(controller::Request::start, target, utime);
       started = true;
@@ -169,6 +178,7 @@ Insertion steer(const SteeredRig& rig, const Believed& believed, const Eigen::Ve
   result.inserted_mm = axes.insertion_mm;
   result.arrived = supervisor.status().state == controller::State::hold;
   result.reason = supervisor.status().reason;
+  if (!way_point_miss_mm.empty()) result.way_point_miss_mm = std::ranges::max(way_point_miss_mm);
   result.miss_mm = (plant->tip().p_mm - target_now()).norm();
   result.estimate_error_mm = (estimator.estimate(axes.utime).tip.p_mm - plant->tip().p_mm).norm();
   return result;

@@ -5,6 +5,7 @@
 #include <Eigen/Core>
 #include <cstdint>
 #include <functional>
+#include <limits>
 #include <memory>
 #include <vector>
 
@@ -44,6 +45,7 @@ struct Believed {
   controller::ControllerConfig controller{};
   // Effects between base and tip that the controller undoes; those of the estimator it follows in any case.
   std::vector<model::ActiveEffect> undone{};
+  std::vector<Eigen::Vector3d> way_points_mm{};  // told before the target
 };
 
 struct Insertion {
@@ -53,7 +55,10 @@ struct Insertion {
   double turned_frame_said_mm = 0;                       // of insertion; 0: it was not
   double estimate_error_mm = 0;                          // estimate to true tip, at the end
   double turned_rad = 0;                                 // of the base, both ways together
-  double inserted_mm = 0, duration_s = 0;                // from the word to go until it stopped
+  // Least distance of the true tip from any obstacle's surface, negative inside; infinite where there is none.
+  double nearest_mm = std::numeric_limits<double>::infinity();
+  double way_point_miss_mm = 0;            // the farthest of them, true tip to point where it was nearest
+  double inserted_mm = 0, duration_s = 0;  // from the word to go until it stopped
 };
 
 // told_the_tip: the controller sees the true tip instead of the estimate's, its parameters as they are estimated: what

@@ -5,6 +5,7 @@
 #include <cmath>
 #include <cstdio>
 #include <fstream>
+#include <limits>
 #include <map>
 #include <nlohmann/json.hpp>
 #include <numbers>
@@ -32,8 +33,11 @@ struct Figures {
   int targets = 0, arrived = 0, refused = 0;
   double median_mm = 0, mean_mm = 0, sd_mm = 0, at_95_mm = 0, worst_mm = 0;
   double turns_per_100mm = 0, feed_mm_s = 0, estimate_error_mm = 0;
-  int turned_frame_said = 0;           // of all targets
-  std::map<std::string, int> stopped;  // by reason
+  int turned_frame_said = 0;                                    // of all targets
+  double way_point_miss_mm = 0;                                 // the worst, of those that arrived
+  int touched = 0;                                              // an obstacle, of all targets
+  double nearest_mm = std::numeric_limits<double>::infinity();  // to one
+  std::map<std::string, int> stopped;                           // by reason
 };
 
 Figures figures_of(const std::vector<Insertion>& all) {
@@ -43,14 +47,19 @@ Figures figures_of(const std::vector<Insertion>& all) {
   for (const Insertion& one : all) {
     ++f.targets;
     if (one.turned_frame_said_mm > 0) ++f.turned_frame_said;
+    if (one.nearest_mm < 0) ++f.touched;
+    f.nearest_mm = std::min(f.nearest_mm, one.nearest_mm);
     if (!one.arrived) {
-      if (one.reason == controller::Reason::target_unreachable && one.inserted_mm == 0)
+      using controller::Reason;
+      if (one.inserted_mm == 0 && (one.reason == Reason::target_unreachable || one.reason == Reason::path_blocked ||
+                                   one.reason == Reason::way_point_unreachable))
         ++f.refused;
       else
         ++f.stopped[one.reason == controller::Reason::none ? "not there in time" : to_string(one.reason)];
       continue;
     }
     ++f.arrived;
+    f.way_point_miss_mm = std::max(f.way_point_miss_mm, one.way_point_miss_mm);
     miss_mm.push_back(one.miss_mm);
     turned_rad += one.turned_rad, inserted_mm += one.inserted_mm, duration_s += one.duration_s;
     f.estimate_error_mm += one.estimate_error_mm;
@@ -78,6 +87,14 @@ std::string row_of(const std::string& scenario, const char* law, const Figures& 
   std::string row = text.data();
   for (const auto& [reason, count] : f.stopped) row += " " + std::to_string(count) + " " + reason + ";";
   if (f.turned_frame_said > 0) row += " frame said to be turned: " + std::to_string(f.turned_frame_said) + ";";
+  if (f.way_point_miss_mm > 0) {
+    std::snprintf(text.data(), text.size(), " way-point missed by at most %.2f;", f.way_point_miss_mm);
+    row += text.data();
+  }
+  if (std::isfinite(f.nearest_mm)) {
+    std::snprintf(text.data(), text.size(), " obstacle touched: %d, nearest %.2f;", f.touched, f.nearest_mm);
+    row += text.data();
+  }
   return row + " |";
 }
 
@@ -90,6 +107,9 @@ nlohmann::json json_of(const Scenario& scenario, const char* law, const Figures&
           {"refused", f.refused},
           {"stopped", f.stopped},
           {"turned_frame_said", f.turned_frame_said},
+          {"touched", f.touched},
+          {"way_point_miss_mm", f.way_point_miss_mm},
+          {"nearest_mm", std::isfinite(f.nearest_mm) ? nlohmann::json(f.nearest_mm) : nlohmann::json()},
           {"median_mm", f.median_mm},
           {"mean_mm", f.mean_mm},
           {"sd_mm", f.sd_mm},
@@ -124,6 +144,7 @@ int run_targets(const TargetsOptions& options, std::ostream& out) {
   for (const Scenario* scenario : wanted)
     for (const LawTried& law : kLaws) {
       if (law.told_the_tip && !scenario->swings) continue;
+      if (scenario->along_path && law.law != controller::Law::arcs) continue;
       std::vector<Insertion> insertions(static_cast<std::size_t>(options.targets));
       parallel_for(insertions.size(), options.threads, [&](std::size_t i) {
         const std::uint64_t seed = 1'000'003 * options.seed + i;

@@ -1,0 +1,41 @@
+#pragma once
+// Steps along an arc that the needle makes with the bevel kept, or turned all the time so that only a share of the bend
+// is left. With a stiff shaft (model/shaft_end.hpp) turning swings the tip about the middle of a circle: the walk is
+// that of the middle, which does not depend on how the bevel stands.
+#include "controller/config.hpp"
+#include "model/kinematics.hpp"
+
+namespace bevel::controller {
+
+class ArcWalk {
+ public:
+  ArcWalk(const model::NeedleParameters& needle, const ShaftConfig& shaft)
+      : needle_(needle), slip_(model::slip_parameters(needle)), shaft_(shaft) {}
+
+  // The middle of the swing of a tip, both in {A}.
+  model::Pose middle_of(const model::Pose& tip) const;
+  // Where the tip is, with this share of the bend.
+  Eigen::Vector3d tip_mm(const model::Pose& middle, double share) const;
+
+  // By step_mm of insertion; false outside the model's domain.
+  bool step(model::Pose& middle, double share, double step_mm) const;
+  // To the plane through point_mm across `along`, by steps of 4 mm, with this share of the bend; at_mm: the tip there.
+  bool to_plane(model::Pose middle, const Eigen::Vector3d& point_mm, const Eigen::Vector3d& along, double share,
+                Eigen::Vector3d& at_mm) const;
+  // What is to be inserted until the plane, but no more than a step; nothing where it is passed.
+  static double step_to_plane_mm(const model::Pose& middle, const Eigen::Vector3d& point_mm,
+                                 const Eigen::Vector3d& along);
+
+  // What a stiff shaft does at a depth; of a slack one only the curvature, the needle's.
+  struct End {
+    double curvature_per_mm = 0, cut_rad = 0, swing_mm = 0;
+  };
+  End end_at(double depth_mm) const;
+
+ private:
+  model::NeedleParameters needle_;
+  model::SlipParameters slip_;
+  ShaftConfig shaft_;
+};
+
+}  // namespace bevel::controller

@@ -1,0 +1,116 @@
+// What the supervisor steers by, and the rates that the law wants.
+#include <algorithm>
+#include <cmath>
+
+#include "controller/supervisor.hpp"
+
+namespace bevel::controller {
+namespace {
+constexpr double kPathDeviations = 2;  // of the tip's estimate, kept from the obstacles
+}  // namespace
+
+model::NeedleParameters Supervisor::needle_now() const {
+  model::NeedleParameters needle = needle_;
+  needle.curvature_per_mm = needle_state_->curvature_per_mm;
+  needle.lambda1_per_rad = needle_state_->lambda1_per_rad;
+  needle.lambda2 = needle_state_->lambda2;
+  return needle;
+}
+
+ShaftConfig Supervisor::shaft_now() const {
+  ShaftConfig shaft = config_.shaft;
+  if (needle_state_->bending_mm > 0) shaft.bending_mm = needle_state_->bending_mm;
+  return shaft;
+}
+
+double Supervisor::predicted_miss_mm(const Eigen::Vector3d& target_mm) const {
+  const model::Pose& tip = needle_state_->pose;
+  if (shaft_now().bending_mm > 0) {
+    const ArcGeometry arc = arc_geometry(tip, needle_now(), shaft_now(), target_mm);
+    return arc.in_domain && arc.ahead_mm <= 0 ? (target_mm - tip.p_mm).norm() : arc_miss_mm(arc);
+  }
+  return predict_reach(tip, needle_now(), target_mm, config_.safety.target_miss_max_mm).miss_mm;
+}
+
+// To the plane through the target across the needle.
+double Supervisor::to_go_mm() const {
+  const model::Pose& tip = needle_state_->pose;
+  return tip.R.col(2).dot(rendezvous_.target_mm() - tip.p_mm);
+}
+
+PathStart Supervisor::path_start() const {
+  PathStart start{needle_state_->pose, needle_now(), shaft_now()};
+  start.margin_mm = kPathDeviations * std::sqrt(needle_state_->position_variance_mm2) +
+                    kLeaves * std::abs(needle_state_->curvature_per_mm) * kLookahead_mm * kLookahead_mm;
+  return start;
+}
+
+void Supervisor::stop_without_path() {
+  const PathOutlook& best = route_.outlook();
+  if (best.reachable)
+    stop(Reason::path_blocked, best.nearest_mm, "mm from an obstacle at best");
+  else
+    stop(Reason::way_point_unreachable, -best.slack_mm, "mm short");
+}
+
+// Where the law is to aim. False: latched, there is no way.
+bool Supervisor::see_path() {
+  pauses_for_path_ = false;
+  aim_mm_ = rendezvous_.target_mm();
+  if (!route_.is_needed()) return true;
+  switch (route_.look(path_start(), rendezvous_.target_mm())) {
+    case Route::Way::clear:
+      aim_mm_ = route_.aim_mm();
+      return true;
+    case Route::Way::searching:
+      pauses_for_path_ = true;
+      return true;
+    case Route::Way::blocked:
+      stop_without_path();
+      return false;
+    case Route::Way::missed:
+      stop(Reason::way_point_missed, route_.missed_mm(), "mm off");
+      return false;
+  }
+  return false;
+}
+
+bool Supervisor::see_geometry() {
+  const model::Pose& tip = needle_state_->pose;
+  if (by_arcs()) {
+    status_.arc = arc_geometry(tip, needle_now(), shaft_now(), aim_mm_, needle_state_->uncertain);
+    return status_.arc.in_domain;
+  }
+  status_.geometry = steering_geometry(tip, needle_now(), aim_mm_, config_.limits.insertion_rate_mm_s,
+                                       config_.gains.parameter_uncertainty, shaft_now());
+  return status_.geometry.in_domain;
+}
+
+// What the law wants at this instant, without ramps.
+Rates Supervisor::steer(std::int64_t now_utime) {
+  const double tolerance_mm = target_->tolerance_mm > 0 ? target_->tolerance_mm : config_.gains.tolerance_mm;
+  const double rotation_rad = actuator_->rotation_rad;
+  Rates wanted;
+  double ahead_mm = 0, off_rad = 0;
+  if (by_arcs()) {
+    wanted = arcs_.step(status_.arc, rotation_rad, actuator_->insertion_mm, tolerance_mm, config_);
+    ahead_mm = status_.arc.ahead_mm;
+    off_rad = status_.arc.facing_rad;
+  } else {
+    wanted = steering_rates(status_.geometry, rotation_rad, tolerance_mm, config_);
+    ahead_mm = status_.geometry.ahead_mm;
+    off_rad = status_.geometry.sigma_rad;
+  }
+  if (axes_.turns_late()) {
+    const double share = std::min(1.0, std::abs(off_rad) / config_.gains.boundary_layer_rad);
+    wanted.rotation_rad_s =
+        base_rate_rad_s(wanted.rotation_rad_s, axes_.take_up_rad(wanted.rotation_rad_s), share, config_.limits);
+  }
+  // Come to rest at the target's closest approach: never faster than the ramp can stop within what is left.
+  if (route_.is_needed() && !route_.aims_at_target()) ahead_mm = to_go_mm();
+  const double braking = std::sqrt(2 * 0.5 * config_.limits.insertion_acceleration_mm_s2 * ahead_mm);
+  wanted.insertion_mm_s = std::min({wanted.insertion_mm_s, braking, rendezvous_.rate_limit_mm_s(now_utime, ahead_mm)});
+  return wanted;
+}
+
+}  // namespace bevel::controller
