@@ -28,7 +28,8 @@ inline constexpr std::size_t kMostWayPoints = 8;  // of the operator
 inline constexpr std::size_t kMostPoints = kMostWayPoints + 3;
 
 // So far ahead the law is aimed: nearer it would turn more often, farther it would cut corners. What it leaves the path
-// by, alternating, is under kLeaves of the bend over that length, k kLookahead_mm^2 (tests/controller/path_plan_test.cpp).
+// by, alternating, is under kLeaves of the bend over that length, k kLookahead_mm^2
+// (tests/controller/path_plan_test.cpp).
 inline constexpr double kLookahead_mm = 30, kLeaves = 0.1;
 
 struct PathPoint {

@@ -20,7 +20,7 @@ struct Dual {
   Slope slope = kNoSlope;
 
   // Not defaulted: values of a class whose constructor is defaulted are set to zero first.
-  Dual() {}  // NOLINT(modernize-use-equals-default)
+  Dual() {}                     // NOLINT(modernize-use-equals-default)
   Dual(double v) : value(v) {}  // NOLINT(google-explicit-constructor): a constant is a number without slope
   Dual(double v, const Slope& s) : value(v), slope(s) {}
   // The unknown of one column; a negative column makes a constant.
