@@ -17,6 +17,8 @@ namespace {
 
 constexpr double kLambda2Max = 0.9;                             // (24) with room: 1 - lambda2 stays away from zero
 constexpr double kWheelbaseMin_mm = 2, kWheelbaseMax_mm = 990;  // of the model's (1, 1000), with room
+constexpr double kStraight_per_mm = 1e-5;                       // radius 100 m: less is no bend over any insertion
+constexpr double kSureOfSide = 3;  // standard deviations: then a bevel mounted wrong is the likelier
 constexpr double kBendingMin_mm = 5, kBendingMax_mm = 200;
 constexpr double kVarianceFloor = 1e-14;
 constexpr double kAtEntry_mm = 1.0;  // not inserted yet: within what an entry point is met by
@@ -210,6 +212,11 @@ Update NeedleFilter::update_sized(FilterState& state, const model::TipMeasuremen
     state.rejects_in_row = 0;
     camera_rejects = 0;
     keep_in_domain<kSize>(state);
+    if (bends_to_the_other_side(state)) {
+      declare_reset(state, result.innovation.norm());
+      apply();
+      result.reset = true;
+    }
     return result;
   }
   if (camera_rejects < std::numeric_limits<std::uint8_t>::max()) ++camera_rejects;
@@ -219,6 +226,19 @@ Update NeedleFilter::update_sized(FilterState& state, const model::TipMeasuremen
   result.reset = true;
   if (reached.accepted) state.measurement_utime = measurement.utime;
   return result;
+}
+
+// Readings that take k to straight, so far from what the prior has, say that the bevel is on the other side; where the
+// prior is wider than that, they say that the needle hardly bends.
+bool NeedleFilter::bends_to_the_other_side(const FilterState& state) const {
+  const double side = side_of_bend();
+  return side != 0 && side * state.curvature_per_mm <= kStraight_per_mm &&
+         std::abs(config_.prior.needle.curvature_per_mm) > kSureOfSide * insertion_curvature_sd_per_mm(config_.prior);
+}
+
+double NeedleFilter::side_of_bend() const {
+  const double k = config_.prior.needle.curvature_per_mm;
+  return k == 0 ? 0 : std::copysign(1.0, k);
 }
 
 // Moves the parameters back into the valid set of Section III.A along the covariance, so that what is correlated with
@@ -239,6 +259,14 @@ void NeedleFilter::keep_in_domain(FilterState& state) const {
     const double inside_mm = std::clamp(state.wheelbase_mm, kWheelbaseMin_mm, kWheelbaseMax_mm);
     if (state.wheelbase_mm != inside_mm) move_by(Error<kSize>::Unit(9), state.wheelbase_mm - inside_mm);
   }
+  // The side that the needle bends to is the bevel's, which the pose has: k keeps the prior's sign.
+  const double side = side_of_bend();
+  const auto keep_side = [&] {
+    if (side != 0) state.curvature_per_mm = side * std::max(side * state.curvature_per_mm, kStraight_per_mm);
+  };
+  if (side * state.curvature_per_mm < kStraight_per_mm && side != 0)
+    move_by(side * Error<kSize>::Unit(6), side * state.curvature_per_mm - kStraight_per_mm);
+  keep_side();
   if (state.lambda1_per_rad == 0 && state.lambda2 == 0) return;
   if (state.lambda2 > kLambda2Max) move_by(Error<kSize>::Unit(8), state.lambda2 - kLambda2Max);
   // (26), linearised at the present lambda2; the set is convex, so twice is enough for small excesses.
@@ -251,6 +279,7 @@ void NeedleFilter::keep_in_domain(FilterState& state) const {
     move_by(normal, state.lambda1_per_rad - bound);
   }
   // Whatever the covariance allowed, the state ends inside.
+  keep_side();
   state.lambda2 = std::min(state.lambda2, kLambda2Max);
   state.lambda1_per_rad = std::max(state.lambda1_per_rad, square(state.lambda2) / (2 * std::numbers::pi) + 1e-9);
   if (kSize == 10 && !stiff_) state.wheelbase_mm = std::clamp(state.wheelbase_mm, kWheelbaseMin_mm, kWheelbaseMax_mm);
@@ -264,6 +293,10 @@ void NeedleFilter::declare_reset(FilterState& state, double reach_mm) const {
   // The pose is believed no more; the parameters are, but less: their prior widths come back, correlations go.
   const FilterState prior = initial();
   const Gate& gate = config_.gate;
+  if (bends_to_the_other_side(state)) {
+    state.pose.R = state.pose.R * Eigen::Vector3d(-1, -1, 1).asDiagonal();
+    state.curvature_per_mm = prior.curvature_per_mm;
+  }
   state.covariance = prior.covariance;
   state.tenth_covariance.setZero();
   state.tenth_variance = prior.tenth_variance;

@@ -193,6 +193,8 @@ class NeedleFilter {
                                                    double insertion_mm, double rotation_rad) const;
   template <int kSize>
   void keep_in_domain(FilterState& state) const;
+  bool bends_to_the_other_side(const FilterState& state) const;
+  double side_of_bend() const;  // the prior's sign of k; 0 of a prior that has none
   model::SlipParameters slip_of(const FilterState& state) const;
   model::AugmentedState augmented(const FilterState& state) const;
   // blur_mm2: what the effects do not know of it, along the axes of {A}.

@@ -6,6 +6,7 @@
 #include <algorithm>
 #include <boost/math/distributions/chi_squared.hpp>
 #include <iostream>
+#include <numbers>
 
 #include "estimator/health.hpp"
 #include "tests/estimator/batch_map.hpp"
@@ -172,6 +173,43 @@ TEST(NeedleEstimator, AJumpOfThreeFramesIsRejectedAndOneForEverIsADeclaredReset)
     const Eigen::Vector3d seen = data.final_pose.p_mm + Eigen::Vector3d(for_ever ? 5 : 0, 0, 0);
     EXPECT_LT((estimate.state.pose.p_mm - seen).norm(), 0.4);
   }
+}
+
+// A bevel that was mounted the wrong way round. Of a k that is known the side is what is wrong, and a declared reset
+// puts it right; of one that is hardly known, k is held at straight.
+TEST(NeedleEstimator, TheCurvatureNeverChangesItsSideWithoutADeclaredReset) {
+  for (const double side : {1.0, -1.0})
+    for (const bool known : {true, false}) {
+      std::mt19937_64 rng(13);
+      EstimatorConfig config = agar_config();
+      config.prior.needle.curvature_per_mm *= side;
+      config.prior.curvature_sd_per_mm = known ? 0.001 : 0.003;
+      model::NeedleParameters truth = config.prior.needle;
+      truth.curvature_per_mm *= -1;
+      InsertionPlan plan;
+      plan.rotation_rate_rad_s = 0.2;
+      const Insertion data = testing::insert(truth, {}, plan, rng);
+      NeedleEstimator estimator(config);
+      std::size_t next = 0;
+      for (const auto& actuator : data.actuators) {
+        while (next < data.measurements.size() && data.measurements[next].utime < actuator.utime)
+          estimator.add(data.measurements[next++]);
+        estimator.add(actuator);
+        ASSERT_GT(side * estimator.estimate(actuator.utime).state.curvature_per_mm, 0);
+      }
+      const Estimate end = estimator.estimate(data.actuators.back().utime);
+      EXPECT_EQ(end.state.reset_count, known ? 1 : 0);
+      EXPECT_LT((end.state.pose.p_mm - data.final_pose.p_mm).norm(), 0.3);
+      if (!known) {
+        EXPECT_LT(std::abs(end.state.curvature_per_mm), 0.2 * std::abs(truth.curvature_per_mm));
+        continue;
+      }
+      EXPECT_EQ(end.health, kHealthy) << describe_health(end.health);
+      EXPECT_NEAR(end.state.curvature_per_mm, -truth.curvature_per_mm, 3 * std::sqrt(end.state.covariance(6, 6)));
+      // The bevel is where it is: half a turn from where it was thought to be.
+      const Eigen::Matrix3d between = data.final_pose.R.transpose() * end.state.pose.R;
+      EXPECT_NEAR(std::abs(std::atan2(between(1, 0), between(0, 0))), std::numbers::pi, 0.1);
+    }
 }
 
 TEST(NeedleEstimator, ASingleCameraLeavesItsOpticalAxisToTheModel) {
