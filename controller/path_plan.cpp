@@ -73,8 +73,9 @@ class PathPlanner::Legs {
  private:
   void to_plane_of(Node& node, const PathPoint& point, double early) const {
     const Eigen::Vector3d along = node.middle.R.col(2);
-    if (along.dot(point.at_mm - node.tip_mm) < kLeastLeg_mm) {
-      const double miss_mm = (point.at_mm - node.tip_mm).norm();
+    const Eigen::Vector3d left_mm = point.at_mm - node.tip_mm;
+    if (const double ahead_mm = along.dot(left_mm); ahead_mm < kLeastLeg_mm) {
+      const double miss_mm = (left_mm - std::max(ahead_mm, 0.0) * along).norm();
       node.so_far.slack_mm = std::min(node.so_far.slack_mm, -miss_mm);
       if (!(miss_mm <= std::max(point.miss_max_mm, kLeastLeg_mm))) node.so_far.reachable = false;
       return;
@@ -118,6 +119,7 @@ class PathPlanner::Legs {
       if (!walk_.step(node.middle, bends, step_mm)) return lose(node);
       pass(node, bends);
     }
+    lose(node);  // farther than a needle is long
   }
 
   void pass(Node& node, double share) const {
@@ -126,6 +128,7 @@ class PathPlanner::Legs {
     const double swing_mm = (1 - share) * std::abs(walk_.end_at(to_mm.z()).swing_mm);
     for (const Obstacle& obstacle : obstacles_) {
       const double away_mm = distance_mm(obstacle, node.tip_mm, to_mm) - swing_mm;
+      if (!std::isfinite(away_mm)) return lose(node);
       node.so_far.nearest_mm = std::min(node.so_far.nearest_mm, away_mm);
       node.so_far.room_mm = std::min(node.so_far.room_mm, away_mm - obstacle.clearance_mm - margin_mm_);
     }

@@ -27,7 +27,7 @@ enum class Reason {
   input_refused,       // what comes in cannot be trusted: two senders, motion that cannot be, the clock was set
   ending,              // the process was told to end
   path_blocked,        // no path to the target keeps clear of the obstacles; how near the best one comes
-  obstacle_near,       // the tip is within an obstacle's clearance; its distance from the surface
+  obstacle_near,       // the tip is within an obstacle's clearance; what is left of that, negative
   way_point_missed,
   way_point_unreachable,  // refused before insertion, or found on the way; by how much the reach falls short
   way_points_too_many,

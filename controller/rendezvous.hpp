@@ -10,6 +10,8 @@
 
 namespace bevel::controller {
 
+inline constexpr double kTargetDeviations = 2;  // of where a target that moves will be
+
 struct FollowConfig {
   TargetMotion motion;
   bool gate_breathing = false;

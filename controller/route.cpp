@@ -7,7 +7,7 @@ namespace bevel::controller {
 namespace {
 
 // A period has room for these: some 30 us each.
-constexpr int kPerPeriod = 16;
+constexpr double kPerPeriod = 16;
 constexpr int kAll = 1'000'000;
 
 void drop_first(PathPoints& points) {
@@ -51,15 +51,20 @@ Route::Way Route::plan(const PathStart& start) {
   return Way::clear;
 }
 
-Route::Way Route::look(const PathStart& start, const Eigen::Vector3d& target_mm) {
-  points_.points.at(points_.count - 1).at_mm = target_mm;
-  const auto is_passed = [&start](const PathPoint& point) {
-    return start.tip.R.col(2).dot(point.at_mm - start.tip.p_mm) <= 0;
+Route::Way Route::look(const PathStart& start, const PathPoint& target, double periods) {
+  points_.points.at(points_.count - 1) = target;
+  room_for_ = std::min(room_for_ + kPerPeriod * std::max(periods, 0.0), kPerPeriod);
+  // By the plane that arc_geometry() measures by.
+  const Eigen::Vector3d along = ArcWalk(start.needle, start.shaft).middle_of(start.tip).R.col(2);
+  const auto is_passed = [&](const PathPoint& point) { return along.dot(point.at_mm - start.tip.p_mm) <= 0; };
+  const auto is_left_behind = [&] {  // a point of the planner's own, by one that is told
+    return !points_.points[0].told && points_.points[1].told && is_passed(points_.points[1]);
   };
-  while (points_.count > 1 && is_passed(points_.points[0])) {
-    const PathPoint& passed = points_.points[0];
+  while (points_.count > 1 && (is_passed(points_.points[0]) || is_left_behind())) {
+    const PathPoint passed = points_.points[0];
     missed_mm_ = (passed.at_mm - start.tip.p_mm).norm();
     if (passed.told && !(missed_mm_ <= passed.miss_max_mm)) return Way::missed;
+    if (passed.told) searching_ = false;  // what is sought leads through it
     drop_first(points_);
   }
   // The planner's own points are there for obstacles: once these are clear without the next one, it has done its part.
@@ -75,7 +80,9 @@ Route::Way Route::look(const PathStart& start, const Eigen::Vector3d& target_mm)
   const auto keeps_clearance = [&] { return outlook_.reachable && outlook_.room_mm > -start.margin_mm; };
   if (!searching_ && !(outlook_.clear() && outlook_.slack_mm > 0)) begin_search(start);
   if (!searching_) return Way::clear;
-  searching_ = !planner_.search(kPerPeriod);
+  const int now = static_cast<int>(room_for_);
+  room_for_ -= now;
+  searching_ = !planner_.search(now);
   if (searching_) return keeps_clearance() ? Way::clear : Way::searching;
   const PathOutlook other = planner_.outlook(start, planner_.path());
   if (other.reachable && (!outlook_.reachable || other.spare_mm() > outlook_.spare_mm())) {

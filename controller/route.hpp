@@ -1,8 +1,9 @@
 #pragma once
-// The path while it is followed. Each period it is drawn anew from where the tip is through the points that are left,
-// and the law is aimed at where it is a look-ahead later (pure pursuit: Coulter, CMU-RI-TR-92-01). It is planned with
-// twice the margin (PathStart); under one margin another is looked for on the way; where it would come within an
-// obstacle's own clearance nothing is inserted until there is another, and it is blocked if there is none.
+// The path while it is followed. With each estimate it is drawn anew from where the tip is through the points that are
+// left, and the law is aimed at where it is a look-ahead later (pure pursuit: Coulter, CMU-RI-TR-92-01). It is planned
+// with twice the margin (PathStart); under one margin, or where the reach no longer suffices, another is looked for on
+// the way; where it would come within an obstacle's own clearance nothing is inserted until there is another, and it is
+// blocked if there is none.
 #include "controller/path_plan.hpp"
 
 namespace bevel::controller {
@@ -20,8 +21,9 @@ class Route {
   enum class Way { clear, searching, blocked, missed };
   // The whole search at once, before anything moves: clear or blocked.
   Way plan(const PathStart& start);
-  // One period: takes points that are passed off, and looks at or for a path. missed: a way-point, by missed_mm.
-  Way look(const PathStart& start, const Eigen::Vector3d& target_mm);
+  // Takes points that are passed off, and looks at the path, or for one by as many candidates as these periods have
+  // room for. missed: a way-point, by missed_mm.
+  Way look(const PathStart& start, const PathPoint& target, double periods);
 
   const Eigen::Vector3d& aim_mm() const { return outlook_.lookahead_mm; }
   bool aims_at_target() const { return points_.count == 1 && aim_mm() == points_.points[0].at_mm; }
@@ -39,6 +41,7 @@ class Route {
   PathOutlook outlook_;
   bool searching_ = false;
   double missed_mm_ = 0;
+  double room_for_ = 0;  // candidates
 };
 
 }  // namespace bevel::controller

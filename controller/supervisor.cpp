@@ -10,7 +10,6 @@ namespace bevel::controller {
 namespace {
 constexpr double kDeviations = 4;  // of the estimate's own standard deviation
 constexpr double kWayPointTolerance_mm = 1;
-constexpr double kTargetDeviations = 2;  // of where a target that moves will be
 }  // namespace
 
 Supervisor::Supervisor(const ControllerConfig& config, const model::NeedleParameters& needle,
@@ -33,7 +32,7 @@ void Supervisor::stop(Reason reason, double value, const char* unit) {
 void Supervisor::request(Request request, const std::optional<Target>& target, std::int64_t now_utime) {
   switch (request) {
     case Request::stop:
-      way_points_ = {};
+      forget_way_points();
       stop(Reason::operator_stop, 0, "");
       return;
     case Request::hold:
@@ -48,7 +47,7 @@ void Supervisor::request(Request request, const std::optional<Target>& target, s
       if (!check_axes()) return;
       reset_count_ = needle_state_->reset_count;
       arcs_.restart();
-      way_points_ = {};
+      forget_way_points();
       status_.state = State::steering;
       return;
     case Request::follow: {
@@ -64,8 +63,10 @@ void Supervisor::request(Request request, const std::optional<Target>& target, s
     }
     case Request::way_point:
       if (!target || !target->position_mm.allFinite()) return;
-      if (way_points_.count == kMostWayPoints)
+      if (way_points_.count == kMostWayPoints) {
+        way_points_lost_ = true;
         return stop(Reason::way_points_too_many, static_cast<double>(kMostWayPoints), "at most");
+      }
       way_points_.add(
           {target->position_mm, target->tolerance_mm > 0 ? target->tolerance_mm : kWayPointTolerance_mm, true});
       return;
@@ -78,10 +79,16 @@ void Supervisor::request(Request request, const std::optional<Target>& target, s
   status_.value = 0;
   status_.unit = "";
   rates_ = {};
+  if (way_points_lost_) return stop(Reason::way_points_too_many, static_cast<double>(kMostWayPoints), "at most");
   if (!check_inputs(now_utime)) return;
   aim_mm_ = target->position_mm;
   PathPoints told = way_points_;
   told.add({target->position_mm, config_.safety.target_miss_max_mm, true});
+  if (told.count > 1)  // one by itself is judged by its predicted miss
+    for (const PathPoint& point : told.all())
+      if (!(point.at_mm.z() <= config_.safety.depth_max_mm &&
+            point.at_mm.head<2>().norm() <= config_.safety.lateral_max_mm))
+        return stop(Reason::workspace, point.at_mm.norm(), "mm from the entry, of a point that was told");
   route_.restart(told);
   status_.predicted_miss_mm = predicted_miss_mm(target->position_mm);
   if (told.count == 1 && !(status_.predicted_miss_mm <= config_.safety.target_miss_max_mm))
@@ -231,7 +238,7 @@ model::MotionCommand Supervisor::step(std::int64_t now_utime, double elapsed_s) 
     return command;
   }
   rendezvous_.plan(now_utime, to_go_mm(), config_.limits.insertion_rate_mm_s);
-  if (!see_path()) return command;
+  if (!see_path(elapsed_s)) return command;
   if (!see_geometry()) {
     stop(Reason::outside_model, model::tilt_rad(needle_state_->pose), "rad tilt");
     return command;

@@ -96,7 +96,7 @@ class Supervisor {
   bool check_tracking();
   bool check_rest(std::int64_t now_utime);
   Rates steer(std::int64_t now_utime);
-  bool see_path();
+  bool see_path(double elapsed_s);
   void stop_without_path();
   PathStart path_start() const;
   bool see_geometry();
@@ -118,7 +118,9 @@ class Supervisor {
   Status status_;
   Rendezvous rendezvous_;
   Route route_;
-  PathPoints way_points_;  // until it starts
+  PathPoints way_points_;         // until it starts
+  bool way_points_lost_ = false;  // more than there is room for
+  void forget_way_points() { way_points_ = {}, way_points_lost_ = false; }
   bool pauses_for_path_ = false;
   Eigen::Vector3d aim_mm_ = Eigen::Vector3d::Zero();  // the target, or where the path to it is a look-ahead later
   ArcLaw arcs_;

@@ -6,7 +6,8 @@
 
 namespace bevel::controller {
 namespace {
-constexpr double kPathDeviations = 2;  // of the tip's estimate, kept from the obstacles
+constexpr double kOutsideModel_mm = -1e8;  // a slack that stands for none (path_plan.cpp)
+constexpr double kPathDeviations = 2;      // of the tip's estimate, kept from the obstacles
 }  // namespace
 
 model::NeedleParameters Supervisor::needle_now() const {
@@ -49,16 +50,19 @@ void Supervisor::stop_without_path() {
   const PathOutlook& best = route_.outlook();
   if (best.reachable)
     stop(Reason::path_blocked, best.nearest_mm, "mm from an obstacle at best");
+  else if (!std::isfinite(best.slack_mm) || best.slack_mm <= kOutsideModel_mm)
+    stop(Reason::outside_model, model::tilt_rad(needle_state_->pose), "rad tilt");
   else
     stop(Reason::way_point_unreachable, -best.slack_mm, "mm short");
 }
 
 // Where the law is to aim. False: latched, there is no way.
-bool Supervisor::see_path() {
+bool Supervisor::see_path(double elapsed_s) {
   pauses_for_path_ = false;
   aim_mm_ = rendezvous_.target_mm();
   if (!route_.is_needed()) return true;
-  switch (route_.look(path_start(), rendezvous_.target_mm())) {
+  const double miss_max_mm = config_.safety.target_miss_max_mm + kTargetDeviations * rendezvous_.target_sd_mm();
+  switch (route_.look(path_start(), {rendezvous_.target_mm(), miss_max_mm, true}, elapsed_s / config_.period_s)) {
     case Route::Way::clear:
       aim_mm_ = route_.aim_mm();
       return true;
@@ -107,7 +111,8 @@ Rates Supervisor::steer(std::int64_t now_utime) {
         base_rate_rad_s(wanted.rotation_rad_s, axes_.take_up_rad(wanted.rotation_rad_s), share, config_.limits);
   }
   // Come to rest at the target's closest approach: never faster than the ramp can stop within what is left.
-  if (route_.is_needed() && !route_.aims_at_target()) ahead_mm = to_go_mm();
+  // At a way-point it does not, but nothing brakes where the target is nearer than that.
+  if (route_.is_needed() && !route_.aims_at_target()) ahead_mm = std::max(ahead_mm, to_go_mm());
   const double braking = std::sqrt(2 * 0.5 * config_.limits.insertion_acceleration_mm_s2 * ahead_mm);
   wanted.insertion_mm_s = std::min({wanted.insertion_mm_s, braking, rendezvous_.rate_limit_mm_s(now_utime, ahead_mm)});
   return wanted;

@@ -214,7 +214,8 @@ Update NeedleFilter::update_sized(FilterState& state, const model::TipMeasuremen
     keep_in_domain<kSize>(state);
     if (bends_to_the_other_side(state)) {
       declare_reset(state, result.innovation.norm());
-      apply();
+      if (apply().accepted) state.measurement_utime = measurement.utime;
+      keep_in_domain<kSize>(state);
       result.reset = true;
     }
     return result;
@@ -229,10 +230,10 @@ Update NeedleFilter::update_sized(FilterState& state, const model::TipMeasuremen
 }
 
 // Readings that take k to straight, so far from what the prior has, say that the bevel is on the other side; where the
-// prior is wider than that, they say that the needle hardly bends.
+// prior is wider than that, or once the bevel was turned over, they say that the needle hardly bends.
 bool NeedleFilter::bends_to_the_other_side(const FilterState& state) const {
   const double side = side_of_bend();
-  return side != 0 && side * state.curvature_per_mm <= kStraight_per_mm &&
+  return side != 0 && !state.turned_over && side * state.curvature_per_mm <= kStraight_per_mm &&
          std::abs(config_.prior.needle.curvature_per_mm) > kSureOfSide * insertion_curvature_sd_per_mm(config_.prior);
 }
 
@@ -296,6 +297,7 @@ void NeedleFilter::declare_reset(FilterState& state, double reach_mm) const {
   if (bends_to_the_other_side(state)) {
     state.pose.R = state.pose.R * Eigen::Vector3d(-1, -1, 1).asDiagonal();
     state.curvature_per_mm = prior.curvature_per_mm;
+    state.turned_over = true;
   }
   state.covariance = prior.covariance;
   state.tenth_covariance.setZero();

@@ -47,6 +47,7 @@ struct FilterState {
   std::array<std::uint8_t, 4> camera_rejects_in_row{};  // cameras 0 to 3; higher numbers share the last
   std::int32_t heading_rejects_in_row = 0;              // of any camera; they bring no reset
   std::int32_t reset_count = 0;
+  bool turned_over = false;  // a reset put the bevel on the other side; it does so once
   bool outside_model = false;
   EffectState effects;
 };

@@ -46,10 +46,11 @@ class CameraNode {
   std::unique_ptr<camera::CameraPipeline> pipeline_;
   std::unique_ptr<camera::FrameRecorder> recorder_;
   StatusReporter status_;
-  std::string failure_;
+  std::string failure_, remark_;
+  std::int64_t remarked_ns_ = 0;
   std::map<int, std::int64_t> seq_;  // each camera counts for itself
   std::set<int> with_headings_;
-  bool latency_known_ = false;  // of the device's camera
+  bool latency_known_ = false;                 // of the device's camera
   std::optional<PictureClock> picture_clock_;  // none: no pictures
   const KeptFrame* kept_ = nullptr;            // the pipeline's source; set with picture_clock_
 };

@@ -151,6 +151,7 @@ std::string space_svg(const Space& whole, double width_px) {
   };
   std::vector<Key> keys;
   std::vector<std::string> inks;
+  inks.reserve(space.paths.size());  // keys look into them
   for (std::size_t i = 0; i < space.paths.size(); ++i) {
     inks.push_back(ink_of(space.paths[i].colour, i));
     if (!space.paths[i].label.empty())

@@ -35,7 +35,9 @@ bool is_number(const std::string& text) {
   if (text.empty()) return false;
   char* end = nullptr;
   const bool bounded = text.starts_with("< ") || text.starts_with("> ");
-  std::strtod(text.c_str() + (bounded ? 2 : 0), &end);
+  const char* begin = text.c_str() + (bounded ? 2 : 0);
+  std::strtod(begin, &end);
+  if (end == begin) return false;
   return *end == '\0' || std::strcmp(end, " %") == 0;
 }
 

@@ -145,7 +145,7 @@ void LiveView::on(const needle_state_t& message, const Moment& now) {
 
 void LiveView::on(const steering_target_t& message, const Moment& now) {
   constexpr std::int32_t kSetTarget = 1;
-  // Only that word carries a place; a stop does not move the target.
+  // As armed: a way-point and a target that moves carry places of their own, a stop has none.
   if (message.request == kSetTarget) take(target_, message, now);
 }
 

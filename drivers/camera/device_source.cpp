@@ -1,6 +1,8 @@
 // Frames from a Video4Linux device.
 #include <linux/videodev2.h>
 
+#include <thread>
+
 #include "drivers/camera/frame_sources.hpp"
 
 namespace bevel::camera {
@@ -52,6 +54,7 @@ FrameResult DeviceSource::next(std::chrono::milliseconds timeout) {
     if (!device_->wait(std::max(left, std::chrono::milliseconds(0)))) return FrameTimeout{};
     if (auto frame = newest()) return std::move(*frame);
     if (std::chrono::steady_clock::now() >= deadline) return FrameTimeout{};
+    std::this_thread::sleep_for(std::chrono::milliseconds(1));  // a device in error is ready at once, with nothing
   }
 }
 

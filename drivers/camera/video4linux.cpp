@@ -125,7 +125,8 @@ class Video4Linux final : public CaptureDevice {
     wanted.count = kBuffers;
     wanted.type = V4L2_BUF_TYPE_VIDEO_CAPTURE;
     wanted.memory = V4L2_MEMORY_MMAP;
-    if (request(file_, VIDIOC_REQBUFS, &wanted) < 0 || wanted.count < 2) fail_errno("gives no buffers (in use?)");
+    if (request(file_, VIDIOC_REQBUFS, &wanted) < 0) fail_errno("gives no buffers (in use?)");
+    if (wanted.count < 2) errno = ENOMEM, fail_errno("gives fewer than two buffers");
     for (uint32_t i = 0; i < wanted.count; ++i) {
       v4l2_buffer buffer = blank();
       buffer.index = i;

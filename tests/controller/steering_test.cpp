@@ -391,6 +391,17 @@ TEST_F(SupervisorTest, WayPointsThatCannotFollowOneAnotherAreRefused) {
   supervisor.request(Request::hold, std::nullopt, now);
   for (int i = 0; i < 9; ++i) supervisor.request(Request::way_point, Target{{0, 0, 10.0 * i}, 1.0}, now);
   EXPECT_EQ(supervisor.status().reason, Reason::way_points_too_many);
+  // None of them is left out without a word, not by one that is told while it is stopped either.
+  supervisor.request(Request::arm, Target{{2, -8, 100}, 0}, now);
+  EXPECT_EQ(supervisor.status().reason, Reason::way_points_too_many);
+  supervisor.request(Request::stop, std::nullopt, now);
+  for (int i = 0; i < 9; ++i) supervisor.request(Request::way_point, Target{{0, 0, 10.0 * i}, 1.0}, now);
+  supervisor.request(Request::arm, Target{{2, -8, 100}, 0}, now);
+  EXPECT_EQ(supervisor.status().reason, Reason::way_points_too_many);
+  supervisor.request(Request::stop, std::nullopt, now);
+  supervisor.request(Request::way_point, Target{{0, 0, 1e4}, 1.0}, now);
+  supervisor.request(Request::arm, Target{{2, -8, 100}, 0}, now);
+  EXPECT_EQ(supervisor.status().reason, Reason::workspace);
 }
 
 TEST_F(SupervisorTest, FollowsATargetThatMovesAndStopsWhereItGoesOutOfReach) {

@@ -82,7 +82,8 @@ TEST(ReportPage, text_from_a_log_stays_text_in_markup_drawing_and_data) {
   Figure figure = Figure{}.line(evil, {0, 1}, {0, 1});
   figure.title = figure.x_label = figure.y_label = figure.link = evil;
   figure.references.push_back({Reference::Axis::horizontal, 0.5, evil});
-  const Space space{.paths = {{.label = evil, .points_mm = {{0, 0, 0}, {0, 1, 9}}}}};
+  Space space{.paths = {{.label = evil, .points_mm = {{0, 0, 0}, {0, 1, 9}}}}};
+  for (int i = 0; i < 3; ++i) space.paths.push_back(space.paths.front());
   Page page(evil);
   page.verdict(Tone::bad, evil, evil, {{evil, evil, evil}}).heading(evil).subheading(evil).paragraph(evil);
   page.list({evil}).code(evil).folded(evil, [](Page&) {}).table({evil}, {{evil}}, evil);
@@ -90,6 +91,9 @@ TEST(ReportPage, text_from_a_log_stays_text_in_markup_drawing_and_data) {
   const std::string html = page.html();
   EXPECT_THAT(html, Not(HasSubstr("<img")));
   EXPECT_THAT(html, Not(HasSubstr(evil)));
+  EXPECT_EQ(html.find('\0'), std::string::npos);
+  for (std::size_t at = html.find("stroke=\""); at != std::string::npos; at = html.find("stroke=\"", at + 1))
+    EXPECT_TRUE(html.compare(at + 8, 4, "var(") == 0 || html.compare(at + 8, 4, "none") == 0) << html.substr(at, 40);
   // Two scripts and no more: the data, in which nothing ends it early, and the page's own.
   std::size_t ends = 0;
   for (std::size_t at = html.find("</script"); at != std::string::npos; at = html.find("</script", at + 1)) ++ends;

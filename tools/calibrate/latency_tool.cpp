@@ -20,6 +20,9 @@ std::map<int, double> latencies_in(const std::string& config) {
   std::map<int, double> latency_s;
   try {
     io::ConfigFile file = io::ConfigFile::parse(config, "CONFIG");
+    std::string kind;
+    file.section("source", io::optional).read("kind", kind, io::optional);
+    if (kind == "video" || kind == "folder") return {};  // whose stamps are their own: nothing was taken off
     for (io::Section s : file.sections("camera", io::optional)) {
       int camera = 0;
       double value_s = 0;

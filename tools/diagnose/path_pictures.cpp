@@ -89,8 +89,8 @@ Figure plane(const Findings& findings, const Trace& trace, int axis) {
 }
 
 bool can_be_drawn(const Trace& trace) {
-  return std::any_of(trace.measured_mm.begin(), trace.measured_mm.end(),
-                     [](const Eigen::Vector3d& p) { return p.allFinite(); });
+  const std::vector<std::size_t> use = readings_of(trace);
+  return std::any_of(use.begin(), use.end(), [&](std::size_t i) { return trace.measured_mm[i].allFinite(); });
 }
 
 }  // namespace

@@ -248,7 +248,7 @@ std::vector<Figure> recording_panels(const Findings& findings, std::size_t which
   std::vector<Figure> panels;
   for (std::size_t c = 0; c < findings.channels.size(); ++c) {
     const Residuals r = residuals_of(findings, trace, c);
-    if (has_any(r.before)) panels.push_back(over_time(findings, trace, c, r));
+    if (!shown_of(r.before, r.after, kMostOfOne).empty()) panels.push_back(over_time(findings, trace, c, r));
   }
   if (panels.empty() || trace.covariates.size() != trace.time_s.size()) return {};
   panels.push_back(of_the_base(trace, "inserted", "depth (mm)", &Covariates::depth_mm));
@@ -267,7 +267,7 @@ std::vector<Figure> located_panels(const Findings& findings, std::size_t most) {
     if (trace == findings.traces.end() || channel == findings.channels.end()) continue;
     const auto c = static_cast<std::size_t>(channel - findings.channels.begin());
     const Residuals r = residuals_of(findings, *trace, c);
-    if (!has_any(r.before) || trace->covariates.size() != trace->time_s.size()) continue;
+    if (shown_of(r.before, r.after, kMostOfOne).empty() || trace->covariates.size() != trace->time_s.size()) continue;
     std::vector<Figure> column{over_time(findings, *trace, c, r),
                                of_the_base(*trace, "inserted", "depth (mm)", &Covariates::depth_mm),
                                of_the_base(*trace, "turned", "roll (rad)", &Covariates::roll_rad)};

@@ -4,7 +4,7 @@ Usage: python3 one_case.py OUT KEY; OUT/cases/KEY.json says what to do. It is wh
 Exit status: 0 the case has its answer, a result or a refusal of its input (OUT/refused/KEY.json); else worth another try.
 
 A lock a case: where an engine was killed and its case goes on by itself, the same case of the next engine waits for it
-and then finds it done. The program dies with this process, so nobody writes where the lock is free.
+and then finds it done. The program dies with this process, and holds the lock as well until it has.
 """
 import fcntl
 import json
@@ -41,13 +41,13 @@ def on_disk(paths):
         os.close(handle)
 
 
-def diagnose(spec, folder):
+def diagnose(spec, folder, lock):
     """Runs the program into `folder`; its status, what it said and what it took."""
     command = [spec["program"], "--model", spec["model_path"], "--out", str(folder), *spec["options"], *spec["log_paths"]]
     started = time.monotonic()
     # setpriv: the program ends with this process even where that is killed.
     ran = subprocess.run(["setpriv", "--pdeathsig", "KILL", "--", *command], stdin=subprocess.DEVNULL, capture_output=True,
-                         text=True, errors="replace", check=False)
+                         text=True, errors="replace", check=False, pass_fds=(lock.fileno(),))
     used = resource.getrusage(resource.RUSAGE_CHILDREN)
     return {"status": ran.returncode, "said": ran.stderr.strip()[-4000:], "seconds": round(time.monotonic() - started, 3),
             "cpu_s": round(used.ru_utime + used.ru_stime, 3), "machine": os.uname().nodename}
@@ -85,7 +85,7 @@ def run(out, key):
         folder = pathlib.Path(tempfile.mkdtemp(prefix=f"{key}-", dir=out / "work"))
         try:
             os.chmod(folder, 0o755)
-            answer = diagnose(spec, folder)
+            answer = diagnose(spec, folder, held)
             if answer["status"] < 0 or answer["status"] >= ENDED_BY_SIGNAL:  # which says nothing of the case
                 print(f"{key}: {spec['program']} was ended by a signal, status {answer['status']}", file=sys.stderr)
                 return 1

@@ -56,7 +56,7 @@ def curves_of(rows):
     found = collections.defaultdict(list)
     for row in done:
         for line in row["effects"]:
-            if line.get("parameter"):
+            if line.get("parameter") and line["value"] is not None:
                 found[line["effect"], line["parameter"]].append((days_of(row), line["value"], line["std_error"]))
     for (effect, parameter), points in sorted(found.items()):
         unit = next((unit for unit in UNITS if parameter.endswith("_" + unit)), "")
@@ -137,7 +137,7 @@ def case_table(rows):
         name = f'<a href="results/{row["key"]}/report.html">{text(row["case"])}</a>'
         verdict = row["verdict"] + (" (damaged recordings)" if row["exit_status"] == 3 else "")
         lines.append(
-            f"<tr><td>{name}<td>{text(row['rig'])}<td class=date>{date}<td>{verdict}<td>{sizes}"
+            f"<tr><td>{name}<td>{text(row['rig'])}<td class=date>{date}<td>{text(verdict)}<td>{sizes}"
             f"<td class=number>{figure(row['curvature_per_mm'])} ± {figure(row['curvature_sd_per_mm'], 2)}"
             f"<td class=number>{figure(row['noise_mm'], 3)}<td class=number>{figure(row['held_out_before_mm'], 3)}"
             f"<td class=number>{figure(row['held_out_after_mm'], 3)}<td class=number>{figure(row['seconds'], 3)}")

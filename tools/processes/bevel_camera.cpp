@@ -31,14 +31,20 @@ int main(int argc, char** argv) {
                     o.position_mm[1], o.position_mm[2], o.tip_px.x, o.tip_px.y, std::string(o.reason).c_str());
       };
     }
+    const auto end_recording = [&node] {
+      if (const std::string said = node.end_recording(); !said.empty())
+        std::fprintf(stderr, "bevel-camera: %s\n", said.c_str());
+    };
     while (!nodes::stop_requested()) {
       nodes::pump(context.lcm);
       const auto outcome = node.step(nodes::now(), 50);
-      if (outcome == nodes::CameraNode::Outcome::failed) throw std::runtime_error(node.failure());
+      if (outcome == nodes::CameraNode::Outcome::failed) {
+        end_recording();
+        throw std::runtime_error(node.failure());
+      }
       if (outcome == nodes::CameraNode::Outcome::ended) break;
     }
-    if (const std::string said = node.end_recording(); !said.empty())
-      std::fprintf(stderr, "bevel-camera: %s\n", said.c_str());
+    end_recording();
     return 0;
   });
 }

@@ -140,6 +140,7 @@ struct Beam {
   double windup_at_100mm_rad = 0;
   double relaxing_fraction = 0;
   bool obstacle = false;
+  bool way_point = false;
 };
 // The software is told a curvature and a bending length, each off by up to 30 %, and a bicycle's slip of none.
 Trial beam(const Beam& kind, std::uint64_t seed) {
@@ -165,6 +166,7 @@ Trial beam(const Beam& kind, std::uint64_t seed) {
   trial.believed.controller.shaft = {prior.bending_mm, prior.guide_mm};
   trial.target_mm = draw_target(draw, deep.curvature_per_mm);
   if (kind.obstacle) trial.believed.controller.obstacles = {draw_obstacle(draw, trial.target_mm)};
+  if (kind.way_point) draw_way(draw, deep, trial);
   trial.rig.cameras = cameras(2);
   trial.rig.make_plant = [config] { return std::make_unique<rig::BeamNeedle>(config); };
   return trial;
@@ -172,9 +174,8 @@ Trial beam(const Beam& kind, std::uint64_t seed) {
 
 template <class Kind>
 Scenario scenario(const char* name, const char* what, const Kind& kind, Trial (*draw)(const Kind&, std::uint64_t)) {
-  bool along_path = kind.obstacle;
-  if constexpr (std::is_same_v<Kind, Kinematic>) along_path = along_path || kind.way_point;
-  return {name, what, [=](std::uint64_t seed) { return draw(kind, seed); }, along_path, std::is_same_v<Kind, Beam>};
+  return {name, what, [=](std::uint64_t seed) { return draw(kind, seed); }, kind.obstacle || kind.way_point,
+          std::is_same_v<Kind, Beam>};
 }
 
 }  // namespace
@@ -213,6 +214,8 @@ const std::vector<Scenario>& scenarios() {
       scenario<Kinematic>(
           "way-point", "a way-point of 1 mm tolerance half way, which it reaches by one arc and the target by another",
           {.way_point = true}, kinematic),
+      scenario<Beam>("way-point-beam", "the same, beam, 50 kPa, 1 N",
+                     {.modulus_kPa = 50, .force_N = 1, .way_point = true}, beam),
       scenario<Kinematic>("outliers", "a tenth of the messages off by 3 to 10 mm", {.outlier_share = 0.1}, kinematic),
   };
   return all;

@@ -329,6 +329,8 @@ function captionPicture(shown, p) {
 }
 
 function drawPictures() {
+  for (const [camera, shown] of pictures)
+    if (!state.pictures.some(p => p.camera === camera)) { shown.figure.remove(); pictures.delete(camera); }
   for (const p of state.pictures) {
     let shown = pictures.get(p.camera);
     if (!shown) {
@@ -348,7 +350,7 @@ async function showPicture(shown, p) {
   shown.asking = true;
   try {
     const answer = await fetch(`/picture/${p.camera}/${p.count}`);
-    if (!answer.ok) return;  // there is a newer one by now
+    if (!answer.ok) { shown.count = p.count; return; }  // there is a newer one by now
     const picture = await createImageBitmap(await answer.blob());
     const { canvas } = shown, context = canvas.getContext('2d');
     [canvas.width, canvas.height] = [picture.width, picture.height];
