@@ -19,7 +19,7 @@ Dual3 to_dual(const Eigen::Vector3d& vector, const PointColumns& D) {
   for (int i = 0; i < 3; ++i) {
     auto& x = out[static_cast<std::size_t>(i)];
     x.value = vector[i];
-    x.slope.head(D.cols()) = D.row(i).transpose().array();
+    if (D.cols() > 0) x.slopes().head(D.cols()) = D.row(i).transpose().array();
   }
   return out;
 }
@@ -28,7 +28,7 @@ void from_dual(const Dual3& dual, Eigen::Vector3d& vector, PointColumns& D) {
   for (int i = 0; i < 3; ++i) {
     const auto& x = dual[static_cast<std::size_t>(i)];
     vector[i] = x.value;
-    D.row(i) = x.slope.head(D.cols()).matrix().transpose();
+    if (D.cols() > 0) D.row(i) = x.slope().head(D.cols()).matrix().transpose();
   }
 }
 
@@ -76,17 +76,17 @@ AugmentedState AugmentedNeedle::entry(const BaseMotion& base) const {
   EntryPose pose;
   for (const auto& active : effects_) active.effect->enter(parameters(active), pose);
   const NeedleColumns& own = needle_columns_;
-  if (own.tilt_x >= 0) pose.tilt_x_rad.slope[own.tilt_x] += 1;
-  if (own.tilt_y >= 0) pose.tilt_y_rad.slope[own.tilt_y] += 1;
-  if (own.roll >= 0) pose.roll_rad.slope[own.roll] += 1;
+  if (own.tilt_x >= 0) pose.tilt_x_rad.slopes()[own.tilt_x] += 1;
+  if (own.tilt_y >= 0) pose.tilt_y_rad.slopes()[own.tilt_y] += 1;
+  if (own.roll >= 0) pose.roll_rad.slopes()[own.roll] += 1;
   const Eigen::Vector3d tilt(pose.tilt_x_rad.value, pose.tilt_y_rad.value, 0);
   if (!effects_.empty() || own.tilt_x >= 0 || own.tilt_y >= 0 || own.roll >= 0) {
     const Eigen::Matrix3d unroll = exp_so3({0, 0, -pose.roll_rad.value});
     state.pose.R = exp_so3(tilt) * unroll.transpose();
     const Eigen::Matrix<double, 3, 2> by_tilt = (unroll * right_jacobian_so3(tilt)).leftCols<2>();
-    state.D.bottomRows<3>() = by_tilt.col(0) * pose.tilt_x_rad.slope.head(columns_).matrix().transpose() +
-                              by_tilt.col(1) * pose.tilt_y_rad.slope.head(columns_).matrix().transpose();
-    state.D.row(5) += pose.roll_rad.slope.head(columns_).matrix().transpose();
+    state.D.bottomRows<3>() = by_tilt.col(0) * pose.tilt_x_rad.slope().head(columns_).matrix().transpose() +
+                              by_tilt.col(1) * pose.tilt_y_rad.slope().head(columns_).matrix().transpose();
+    state.D.row(5) += pose.roll_rad.slope().head(columns_).matrix().transpose();
   }
   if (own.entry_x >= 0) state.D.col(own.entry_x).head<3>() += state.pose.R.row(0).transpose();
   if (own.entry_y >= 0) state.D.col(own.entry_y).head<3>() += state.pose.R.row(1).transpose();
@@ -134,14 +134,16 @@ bool AugmentedNeedle::advance_with_effects(AugmentedState& state, const BaseMoti
   leg.from = state.base;
   leg.to = to;
   leg.R = state.pose.R;
-  for (int i = 0; i < 3; ++i) leg.R_body.row(i) = kNoSlope.matrix().transpose();
+  leg.R_moves = columns_ > 0;
   leg.tip_depth_mm.value = state.pose.p_mm.z();
   leg.heading_z.value = state.pose.R(2, 2);
-  if (columns_ > 0) {
+  if (leg.R_moves) {
+    for (int i = 0; i < 3; ++i) leg.R_body.row(i) = kNoSlope.matrix().transpose();
     leg.R_body.leftCols(columns_) = state.D.bottomRows<3>();
-    leg.tip_depth_mm.slope.head(columns_) = state.pose.R.row(2).lazyProduct(state.D.topRows<3>()).transpose().array();
+    leg.tip_depth_mm.slopes().head(columns_) =
+        state.pose.R.row(2).lazyProduct(state.D.topRows<3>()).transpose().array();
     // n = R^T z_A; its z moves by (n x delta)_z.
-    leg.heading_z.slope =
+    leg.heading_z.slopes() =
         (state.pose.R(2, 0) * leg.R_body.row(1) - state.pose.R(2, 1) * leg.R_body.row(0)).transpose().array();
   }
   leg.curvature_per_mm = Dual::unknown(needle_.curvature_per_mm, needle_columns_.curvature);
@@ -162,10 +164,10 @@ bool AugmentedNeedle::advance_with_effects(AugmentedState& state, const BaseMoti
     return false;
   if (columns_ > 0) {
     Eigen::Matrix<double, 4, Eigen::Dynamic, Eigen::RowMajor, 4, kMaxColumns> inputs(4, columns_);
-    inputs.row(0) = leg.insertion_mm.slope.head(columns_).matrix().transpose();
-    inputs.row(1) = leg.rotation_rad.slope.head(columns_).matrix().transpose();
-    inputs.row(2) = kappa[0].slope.head(columns_).matrix().transpose();
-    inputs.row(3) = kappa[1].slope.head(columns_).matrix().transpose();
+    inputs.row(0) = leg.insertion_mm.slope().head(columns_).matrix().transpose();
+    inputs.row(1) = leg.rotation_rad.slope().head(columns_).matrix().transpose();
+    inputs.row(2) = kappa[0].slope().head(columns_).matrix().transpose();
+    inputs.row(3) = kappa[1].slope().head(columns_).matrix().transpose();
     state.D.noalias() += J.input.lazyProduct(inputs);
   }
   for (std::size_t i = 0; i < effects_.size(); ++i) effects_[i].effect->settle(parameters(effects_[i]), leg, memory[i]);
@@ -206,7 +208,7 @@ void AugmentedNeedle::heading(const AugmentedState& state, HeadingReading& readi
   if (columns_ == 0) return;
   PointColumns moved(3, columns_);
   for (int i = 0; i < 3; ++i)
-    moved.row(i) = in_body[static_cast<std::size_t>(i)].slope.head(columns_).matrix().transpose();
+    moved.row(i) = in_body[static_cast<std::size_t>(i)].slope().head(columns_).matrix().transpose();
   moved.noalias() -= hat(body).lazyProduct(state.D.bottomRows<3>());
   reading.D.noalias() = state.pose.R.lazyProduct(moved);
 }

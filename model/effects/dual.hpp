@@ -1,7 +1,8 @@
 #pragma once
 // A number with its derivatives by up to kMaxColumns unknowns (forward mode, dual numbers): an effect states its
 // equation once, its sensitivities follow. Fixed size, no allocation; the compiler makes vector code of the slopes.
-// Columns mean what the caller seeded them for (see augmented_needle.hpp); those not in use stay zero.
+// Columns mean what the caller seeded them for (see augmented_needle.hpp); those not in use stay zero. A number that no
+// unknown moves carries no slopes and costs as a number does: most passes of a search ask for no derivatives.
 #include <Eigen/Core>
 #include <array>
 #include <cmath>
@@ -15,69 +16,100 @@ using Slope = Eigen::Array<double, kMaxColumns, 1>;
 // effects.
 inline const Slope kNoSlope = Slope::Zero();
 
-struct Dual {
+class Dual {
+ public:
   double value = 0;
-  Slope slope = kNoSlope;
 
-  // Not defaulted: values of a class whose constructor is defaulted are set to zero first.
+  // Not defaulted: values of a class whose constructor is defaulted are set to zero first, slopes and all.
   Dual() {}                     // NOLINT(modernize-use-equals-default)
   Dual(double v) : value(v) {}  // NOLINT(google-explicit-constructor): a constant is a number without slope
-  Dual(double v, const Slope& s) : value(v), slope(s) {}
+  template <class Derived>
+  Dual(double v, const Eigen::ArrayBase<Derived>& s) : value(v), slope_(s), moves_(true) {}
+  Dual(const Dual& b) : value(b.value), moves_(b.moves_) {
+    if (moves_) slope_ = b.slope_;
+  }
+  Dual& operator=(const Dual& b) {
+    value = b.value;
+    moves_ = b.moves_;
+    if (moves_) slope_ = b.slope_;
+    return *this;
+  }
   // The unknown of one column; a negative column makes a constant.
   static Dual unknown(double v, int column) {
     Dual x(v);
-    if (column >= 0) x.slope[column] = 1;
+    if (column >= 0) x.slopes()[column] = 1;
     return x;
+  }
+
+  bool moves() const { return moves_; }  // with an unknown
+  const Slope& slope() const { return moves_ ? slope_ : kNoSlope; }
+  Slope& slopes() {  // to be changed
+    if (!moves_) slope_ = kNoSlope;
+    moves_ = true;
+    return slope_;
   }
 
   Dual& operator+=(const Dual& b) {
     value += b.value;
-    slope += b.slope;
+    if (b.moves_) slopes() += b.slope_;
     return *this;
   }
   Dual& operator-=(const Dual& b) {
     value -= b.value;
-    slope -= b.slope;
+    if (b.moves_) slopes() -= b.slope_;
     return *this;
   }
+
+ private:
+  Slope slope_;  // of a number that moves
+  bool moves_ = false;
 };
 
-inline Dual operator-(const Dual& a) { return {-a.value, -a.slope}; }
-inline Dual operator+(const Dual& a, const Dual& b) { return {a.value + b.value, a.slope + b.slope}; }
-inline Dual operator-(const Dual& a, const Dual& b) { return {a.value - b.value, a.slope - b.slope}; }
-inline Dual operator+(const Dual& a, double b) { return {a.value + b, a.slope}; }
-inline Dual operator-(const Dual& a, double b) { return {a.value - b, a.slope}; }
-inline Dual operator+(double a, const Dual& b) { return {a + b.value, b.slope}; }
-inline Dual operator-(double a, const Dual& b) { return {a - b.value, -b.slope}; }
-inline Dual operator*(const Dual& a, double b) { return {a.value * b, a.slope * b}; }
-inline Dual operator*(double a, const Dual& b) { return b * a; }
-inline Dual operator*(const Dual& a, const Dual& b) {
-  return {a.value * b.value, a.slope * b.value + b.slope * a.value};
+// A function's value, and its slope by that of its argument.
+inline Dual chain(double value, double by_argument, const Dual& argument) {
+  if (!argument.moves()) return {value};
+  return {value, argument.slope() * by_argument};
 }
+inline Dual chain(double value, double by_a, const Dual& a, double by_b, const Dual& b) {
+  if (!b.moves()) return chain(value, by_a, a);
+  if (!a.moves()) return chain(value, by_b, b);
+  return {value, a.slope() * by_a + b.slope() * by_b};
+}
+
+inline Dual operator-(const Dual& a) { return chain(-a.value, -1, a); }
+inline Dual operator+(const Dual& a, const Dual& b) { return chain(a.value + b.value, 1, a, 1, b); }
+inline Dual operator-(const Dual& a, const Dual& b) { return chain(a.value - b.value, 1, a, -1, b); }
+inline Dual operator+(const Dual& a, double b) { return chain(a.value + b, 1, a); }
+inline Dual operator-(const Dual& a, double b) { return chain(a.value - b, 1, a); }
+inline Dual operator+(double a, const Dual& b) { return chain(a + b.value, 1, b); }
+inline Dual operator-(double a, const Dual& b) { return chain(a - b.value, -1, b); }
+inline Dual operator*(const Dual& a, double b) { return chain(a.value * b, b, a); }
+inline Dual operator*(double a, const Dual& b) { return b * a; }
+inline Dual operator*(const Dual& a, const Dual& b) { return chain(a.value * b.value, b.value, a, a.value, b); }
 inline Dual operator/(const Dual& a, double b) { return a * (1 / b); }
 inline Dual operator/(const Dual& a, const Dual& b) {
   const double q = a.value / b.value;
-  return {q, (a.slope - b.slope * q) / b.value};
+  return chain(q, 1 / b.value, a, -q / b.value, b);
 }
 inline Dual operator/(double a, const Dual& b) {
   const double q = a / b.value;
-  return {q, b.slope * (-q / b.value)};
+  return chain(q, -q / b.value, b);
 }
 inline Dual exp(const Dual& a) {
   const double e = std::exp(a.value);
-  return {e, a.slope * e};
+  return chain(e, e, a);
 }
 inline Dual sqrt(const Dual& a) {
   const double root = std::sqrt(a.value);
-  return {root, a.slope * (0.5 / root)};
+  return chain(root, 0.5 / root, a);
 }
-inline Dual sin(const Dual& a) { return {std::sin(a.value), a.slope * std::cos(a.value)}; }
-inline Dual cos(const Dual& a) { return {std::cos(a.value), a.slope * -std::sin(a.value)}; }
+inline Dual sin(const Dual& a) { return chain(std::sin(a.value), a.moves() ? std::cos(a.value) : 0, a); }
+inline Dual cos(const Dual& a) { return chain(std::cos(a.value), a.moves() ? -std::sin(a.value) : 0, a); }
 
 // Of a base that is a number and not negative. At zero nothing depends on a positive exponent.
 inline Dual pow(double base, const Dual& exponent) {
   const double power = std::pow(base, exponent.value);
-  return {power, exponent.slope * (base > 0 ? power * std::log(base) : 0.0)};
+  return chain(power, base > 0 && exponent.moves() ? power * std::log(base) : 0.0, exponent);
 }
 
 // Held between bounds; outside them it no longer moves with its unknowns.

@@ -61,10 +61,13 @@ Dual2 LegView::lateral_in_body(const Dual2& world) const {
   for (int i = 0; i < 2; ++i) {
     auto& out = body[static_cast<std::size_t>(i)];
     out.value = v[i];
-    out.slope = R(0, i) * world[0].slope + R(1, i) * world[1].slope;
+    if (R_moves || world[0].moves() || world[1].moves())
+      out.slopes() = R(0, i) * world[0].slope() + R(1, i) * world[1].slope();
   }
-  body[0].slope += (v.y() * R_body.row(2) - v.z() * R_body.row(1)).array().transpose();
-  body[1].slope += (v.z() * R_body.row(0) - v.x() * R_body.row(2)).array().transpose();
+  if (R_moves) {
+    body[0].slopes() += (v.y() * R_body.row(2) - v.z() * R_body.row(1)).array().transpose();
+    body[1].slopes() += (v.z() * R_body.row(0) - v.x() * R_body.row(2)).array().transpose();
+  }
   return turned(body, rotation_rad * -0.5);
 }
 
@@ -83,14 +86,15 @@ Dual3 LegView::in_world(const Dual2& body) const {
   // R u moves by R (delta x u).
   const Eigen::Vector3d u(body[0].value, body[1].value, 0);
   Dual3 world;
+  for (int i = 0; i < 3; ++i) world[static_cast<std::size_t>(i)].value = R.row(i).dot(u);
+  if (!R_moves && !body[0].moves() && !body[1].moves()) return world;
   const Eigen::Matrix<double, 3, kMaxColumns> du =
       (Eigen::Matrix<double, 3, kMaxColumns>() << -R_body.row(2) * u.y(), R_body.row(2) * u.x(),
        R_body.row(0) * u.y() - R_body.row(1) * u.x())
           .finished();
   for (int i = 0; i < 3; ++i) {
-    auto& out = world[static_cast<std::size_t>(i)];
-    out.value = R.row(i).dot(u);
-    out.slope = R(i, 0) * body[0].slope + R(i, 1) * body[1].slope + (R.row(i) * du).array().transpose();
+    world[static_cast<std::size_t>(i)].slopes() =
+        R(i, 0) * body[0].slope() + R(i, 1) * body[1].slope() + (R.row(i) * du).array().transpose();
   }
   return world;
 }

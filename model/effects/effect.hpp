@@ -89,6 +89,7 @@ struct LegView {
   Dual tip_depth_mm;           // z of the tip at the start of the leg
   Dual heading_z;              // cosine of the tilt there
   Eigen::Matrix3d R;           // orientation of {B} at the start, and its derivatives as body rotations:
+  bool R_moves = false;        // with an unknown: then
   Eigen::Matrix<double, 3, kMaxColumns> R_body;  // d(rotation vector in {B})/d(column)
   Dual curvature_per_mm;                         // the needle's own k, whatever effects make of it
   // Known from `axes` on:

@@ -109,7 +109,7 @@ void look(const Place& place, const std::vector<Eigen::Vector3d>& nodes, const E
   value = nodes[place.from] + place.share * step;
   if (D.cols() == 0) return;
   D = (1 - place.share) * D_of(place.from) + place.share * D_of(place.to);
-  if (place.moves) D -= step / place.span_s * latency_s.slope.head(D.cols()).matrix().transpose();
+  if (place.moves) D -= step / place.span_s * latency_s.slope().head(D.cols()).matrix().transpose();
 }
 
 }  // namespace
@@ -136,7 +136,7 @@ bool predict(const AugmentedNeedle& needle, const Motion& motion, OpenLoop& out,
   }
 
   const Dual latency_s = needle.latency_s();
-  const bool late = latency_s.value != 0 || (latency_s.slope != 0).any();
+  const bool late = latency_s.value != 0 || (latency_s.slope() != 0).any();
   const std::size_t readings = motion.at.size();
   out.position_mm.resize(readings);
   out.jacobian.resize(static_cast<Eigen::Index>(3 * readings), columns);

@@ -129,8 +129,9 @@ TEST_P(Jacobians, AgreeWithPerturbationOnRandomStates) {
     // Trial 1 begins exactly along z_A, where the direction of the tilt is undefined.
     if (trial != 1) start.R = exp_so3({0.5 * unit(rng), 0.5 * unit(rng), 3 * unit(rng)});
     start.p_mm = 50 * Eigen::Vector3d(unit(rng), unit(rng), unit(rng));
-    // Some of these are cut into several steps.
-    const StepInput input{4 * unit(rng), 1.2 * unit(rng), {0.008 * unit(rng), 0.004 * unit(rng)}};
+    // Some of these are cut into several steps; every third is a short one.
+    const double size_mm = trial % 3 == 2 ? 0.2 : 4, size_rad = trial % 3 == 2 ? 0.004 : 1.2;
+    const StepInput input{size_mm * unit(rng), size_rad * unit(rng), {0.008 * unit(rng), 0.004 * unit(rng)}};
     const SlipParameters slip = slip_parameters(needle);
     Pose end = start;
     StepJacobian jacobian;
@@ -203,6 +204,29 @@ TEST(Kinematics, HalvingTheStepMovesTheTipByLessThanATenthOfAMicrometre) {
   for (int i = 0; i < 26; ++i) ASSERT_TRUE(advance(coarse, input_for(agar(), 5.0, 1.0), slip_parameters(agar())));
   for (int i = 0; i < 260; ++i) ASSERT_TRUE(advance(fine, input_for(agar(), 0.5, 0.1), slip_parameters(agar())));
   EXPECT_LT((coarse.p_mm - fine.p_mm).norm(), 1e-4);
+  // And at the largest that it takes by the midpoint rule.
+  for (const double turn_rad : {0.0, 0.002, 0.006}) {
+    Pose midpoint, fourth_order;
+    const double step_mm = (0.01 - turn_rad) / 0.0201;
+    for (int i = 0; i < static_cast<int>(130 / step_mm); ++i) {
+      ASSERT_TRUE(advance(midpoint, input_for(agar(), step_mm, turn_rad), slip_parameters(agar())));
+      ASSERT_TRUE(step(fourth_order, input_for(agar(), step_mm, turn_rad), slip_parameters(agar())));
+    }
+    EXPECT_LT((midpoint.p_mm - fourth_order.p_mm).norm(), 1e-4) << turn_rad;
+    EXPECT_NE(midpoint.p_mm, fourth_order.p_mm);
+  }
+}
+
+TEST(Kinematics, AtRestNothingMoves) {
+  Pose pose;
+  pose.R = exp_so3({0.3, 0.1, 0.7});
+  const Pose before = pose;
+  StepJacobian jacobian;
+  ASSERT_TRUE(advance(pose, input_for(agar(), 0, 0), slip_parameters(agar())));
+  ASSERT_TRUE(advance(pose, input_for(agar(), 0, 0), slip_parameters(agar()), jacobian));
+  EXPECT_EQ(pose.p_mm, before.p_mm);
+  EXPECT_EQ(pose.R, before.R);
+  EXPECT_EQ(jacobian.pose, Matrix6d::Identity());
 }
 
 TEST(Kinematics, IsotropicSlipDoesNotKnowTheRollAndBevelPlaneDoes) {
