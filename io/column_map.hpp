@@ -23,7 +23,8 @@
 // Stepwise insertions: a person pushes the needle by a step, and the insertion column takes its new value when the step
 // is done. In between nobody knows how deep the base was, so with settled = true only the first row of each new value
 // is used: one ACTUATOR_STATE and one TIP_MEASUREMENT each, and one TIP_HEADING where it has columns. A row with depth
-// 0 at the entry point begins the log.
+// 0 at the entry point begins the log. With a [rotation] the needle may be turned between: a row of a new insertion or
+// rotation whose tip was not seen is a place that the base went through.
 // With stops = true the column is the depth commanded, and all rows of one depth are one stop: its reading is their
 // median, without the rows in which the needle was moving (csv_stops.hpp), and with the information of a median.
 // sigma_mm and heading_sd_rad are of one row. Either way the log says that it has no clock (recording_clock.hpp).

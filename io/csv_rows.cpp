@@ -172,13 +172,16 @@ std::vector<CsvRow> stops_of(const std::vector<CsvRow>& rows, const ColumnMap& m
 }
 
 // A stepwise insertion needs all of a row: which axes it sees must not change from stop to stop.
+// Of a stepwise insertion: what a row has to have. A needle that is turned on the way may have rows of the base alone.
 bool complete(const CsvRow& row, const ColumnMap& map) {
-  if (!row.insertion_mm || !row.tip || (map.has_heading() && !row.heading)) return false;
+  if (!row.insertion_mm || (!map.rotation.empty() && !row.rotation_rad)) return false;
+  if (map.settled && !map.rotation.empty() && !row.tip && !row.heading) return true;
+  if (!row.tip || (map.has_heading() && !row.heading)) return false;
   for (std::size_t i = 0; i < 3; ++i) {
     const auto axis = static_cast<Eigen::Index>(i);
     if (map.sigma_mm[i] > 0 && !(row.tip->information_per_mm2(axis, axis) > 0)) return false;
   }
-  return map.rotation.empty() || row.rotation_rad;
+  return true;
 }
 
 // Refuses a row that is not later than the one before it that read the same.
@@ -223,7 +226,10 @@ CsvRows read_rows(CsvTable& table, const ColumnMap& map, const TimeColumn& time,
   RowReader reader(table, map, time);
   Clock clock;
   CsvRows out;
-  double last_insertion_mm = 0;
+  const auto stays = [&](const CsvRow& row) {
+    const CsvRow& last = out.rows.back();
+    return row.insertion_mm == last.insertion_mm && row.rotation_rad == last.rotation_rad && (last.tip || !row.tip);
+  };
   while (table.next()) {
     const int index = out.read++;
     if (parts.tip && reader.says_it_has_no_data()) {
@@ -243,13 +249,12 @@ CsvRows read_rows(CsvTable& table, const ColumnMap& map, const TimeColumn& time,
       ++out.without_data;
       continue;
     }
-    if (map.settled && !out.rows.empty() && row.insertion_mm == last_insertion_mm) {
+    if (map.settled && !out.rows.empty() && stays(row)) {
       ++out.unsettled;
       continue;
     }
     row.utime = map.stops ? kOwnEpoch_us + index : reader.utime(index);
     clock.require_later(table, time, row);
-    last_insertion_mm = row.insertion_mm.value_or(0);
     out.rows.push_back(std::move(row));
   }
   if (out.rows.empty()) throw std::runtime_error(table.path() + ": no row with data by this column map");

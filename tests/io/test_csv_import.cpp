@@ -93,6 +93,31 @@ TEST_F(CsvImport, RowsOfOneStopAreOneReadingWithoutAClock) {
   EXPECT_EQ(back.headings.size(), 3u);
 }
 
+// A needle that is turned over between two stops: rows of the base alone are the way there.
+TEST_F(CsvImport, SettledStepsMayTurnOnTheWay) {
+  const std::string turned =
+      file("turned.toml",
+           "[time]\nrate_hz = 1.0\n[tip]\naxes = [\"x\", \"y\", \"z\"]\nunit = \"mm\"\nsigma_mm = [0.1, 0.1, 0.1]\n"
+           "[insertion]\ncolumn = \"depth\"\nunit = \"mm\"\nsettled = true\n[rotation]\ncolumn = \"roll\"\nunit = "
+           "\"deg\"\n");
+  const std::string csv = file("turned.csv",
+                               "depth,roll,x,y,z\n"
+                               "0,0,0,0,0\n"
+                               "3,0,,,\n3,180,,,\n4,180,,,\n4,180,,,\n4,0,,,\n"  // one row says nothing new
+                               "4,0,0.1,0.2,3.9\n"                               // the same place, and now the tip
+                               "4,0,0.1,0.2,4.9\n");                             // being pushed
+  const ImportedRecording r = import_csv(csv, load_column_map(turned));
+  EXPECT_FALSE(r.has_clock);
+  EXPECT_EQ(r.rows_unsettled, 2);
+  ASSERT_EQ(r.tips.size(), 2u);
+  EXPECT_EQ(r.tips[1].position_mm.z(), 3.9);
+  ASSERT_EQ(r.actuators.size(), 6u);
+  EXPECT_NEAR(r.actuators[2].rotation_rad, EIGEN_PI, 1e-12);
+  EXPECT_EQ(r.actuators[2].insertion_mm, 3);
+  EXPECT_NEAR(r.actuators[3].rotation_rad, EIGEN_PI, 1e-12);
+  EXPECT_EQ(r.actuators[5].insertion_mm, 4);
+}
+
 TEST_F(CsvImport, ALogHasAClockUnlessItsConfigSaysNo) {
   Recording recording;
   EXPECT_TRUE(has_clock(recording));
