@@ -246,8 +246,8 @@ model::MotionCommand Supervisor::step(std::int64_t now_utime, double elapsed_s) 
   const bool arcs = by_arcs();
   const double ahead_mm = arcs ? status_.arc.ahead_mm : status_.geometry.ahead_mm;
   Rates wanted;
-  if (pauses_for_path_) {
-    // Nothing is inserted until there is one.
+  if (pauses_for_path_ || needle_state_->unsure) {
+    // Nothing is inserted until there is a path, and readings are believed.
   } else if (ahead_mm <= 0) {  // closest approach: what still turns comes to rest by the ramp
     status_.state = State::hold;
   } else {

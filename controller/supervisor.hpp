@@ -30,7 +30,8 @@ struct NeedleView {
   double bending_mm = 0;  // of a stiff shaft; 0: as configured
   BendUncertainty uncertain;
   double position_variance_mm2 = 0;  // largest along any axis
-  std::int32_t health = 0;
+  std::int32_t health = 0;           // not zero: it must not be steered by
+  bool unsure = false;  // it doubts its newest readings: come to rest, and go on when they are believed again
   std::int32_t reset_count = 0;
 };
 

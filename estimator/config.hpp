@@ -44,10 +44,13 @@ struct ProcessNoise {
 };
 
 struct Gate {
-  double probability = 0.9999;              // share of good measurements that pass
-  int rejects_before_unhealthy = 5;         // in a row
-  int camera_rejects_before_unhealthy = 4;  // in a row, of one camera: another's good ones do not outweigh it
-  int rejects_before_reset = 20;            // in a row: then a declared reset
+  double probability = 0.9999;  // share of good measurements that pass
+  // Refused in a row, of one camera (another's good ones do not outweigh it), of all, or of headings. Unsure is slow: a
+  // tenth of outliers brings it each second and it passes with the next frame. Unhealthy is a stop: of a tenth of
+  // outliers one reading in a million is the sixth in a row.
+  int rejects_before_unsure = 2;
+  int rejects_before_unhealthy = 6;
+  int rejects_before_reset = 20;  // in a row: then a declared reset
   // Covariance of the pose after a reset, at least: as far as the measurement that brought it, and what the needle can
   // have bent, are within it in any case.
   double reset_position_sd_mm = 5.0;

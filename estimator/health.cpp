@@ -14,6 +14,7 @@ std::string describe_health(std::int32_t health) {
       {kCameraSilent, "a camera fell silent"},
       {kCameraFrozen, "a camera is frozen"},
       {kInputRefused, "input cannot be trusted"},
+      {kUnsure, "unsure, newest measurements refused"},
   };
   std::string text;
   for (const auto& [bit, word] : kWords)

@@ -176,6 +176,7 @@ void NeedleEstimator::shift_time(std::int64_t by_us) {
     n.measurement.utime += by_us;
     n.heading.utime += by_us;
     if (n.state.measurement_utime != 0) n.state.measurement_utime += by_us;
+    if (n.state.reading_utime != 0) n.state.reading_utime += by_us;
     ++n.state.reset_count;
   }
   newest_update_utime_ += by_us;
@@ -285,16 +286,17 @@ Estimate NeedleEstimator::describe(const FilterState& state, std::int64_t utime,
   if (older_than(node(processed_ - 1).utime, limits.actuator_age_s)) result.health |= kActuatorStale;
   if (state.measurement_utime == 0) {
     result.health |= kNoMeasurement;
-  } else if (older_than(state.measurement_utime, limits.measurement_age_s)) {
+  } else if (older_than(state.reading_utime, limits.measurement_age_s)) {
     result.health |= kMeasurementStale;
   }
   const double largest_variance = state.covariance.diagonal().head<3>().maxCoeff();
   if (!(largest_variance < limits.position_sd_mm * limits.position_sd_mm)) result.health |= kUncertain;
   const Gate& gate = filter_.config().gate;
-  if (std::max(state.rejects_in_row, state.heading_rejects_in_row) >= gate.rejects_before_unhealthy ||
-      std::ranges::any_of(state.camera_rejects_in_row,
-                          [&gate](int rejects) { return rejects >= gate.camera_rejects_before_unhealthy; }))
+  const int camera_rejects = std::ranges::max(state.camera_rejects_in_row);
+  if (std::max({state.rejects_in_row, state.heading_rejects_in_row, camera_rejects}) >= gate.rejects_before_unhealthy)
     result.health |= kRejecting;
+  else if (std::max(state.heading_rejects_in_row, camera_rejects) >= gate.rejects_before_unsure)
+    result.health |= kUnsure;
   if (state.outside_model) result.health |= kOutsideModel;
   return result;
 }

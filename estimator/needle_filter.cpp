@@ -196,6 +196,7 @@ template <int kSize>
 Update NeedleFilter::update_sized(FilterState& state, const model::TipMeasurement& measurement) const {
   SeenAxes seen = seen_axes(measurement.information_per_mm2);
   if (seen.rank == 0) return {};  // sees nothing: no rejection either
+  state.reading_utime = std::max(state.reading_utime, measurement.utime);
   const auto apply = [&]() -> Update {
     if (config_.effects.empty())
       return update_seen<kSize, 3>(state, state.pose.R, seen, measurement.position_mm - state.pose.p_mm, gate_);

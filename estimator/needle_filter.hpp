@@ -43,6 +43,7 @@ struct FilterState {
   Vector9d tenth_covariance = Vector9d::Zero();
   double tenth_variance = 0;
   std::int64_t measurement_utime = 0;  // newest position accepted; 0 before the first
+  std::int64_t reading_utime = 0;      // newest that saw anything, accepted or not
   std::int32_t rejects_in_row = 0;
   std::array<std::uint8_t, 4> camera_rejects_in_row{};  // cameras 0 to 3; higher numbers share the last
   std::int32_t heading_rejects_in_row = 0;              // of any camera; they bring no reset

@@ -34,8 +34,8 @@ void read_estimator_config(Section section, estimator::EstimatorConfig& config) 
 
   Section gate = section.section("gate", optional);
   gate.read("probability", config.gate.probability, optional, in_range(0.5, 0.9999999));
+  gate.read("rejects_before_unsure", config.gate.rejects_before_unsure, optional, in_range(1, 20));
   gate.read("rejects_before_unhealthy", config.gate.rejects_before_unhealthy, optional, in_range(1, 20));
-  gate.read("camera_rejects_before_unhealthy", config.gate.camera_rejects_before_unhealthy, optional, in_range(1, 20));
   gate.read("rejects_before_reset", config.gate.rejects_before_reset, optional, in_range(1, 10000));
   gate.read("reset_position_sd_mm", config.gate.reset_position_sd_mm, optional, in_range(0.01, 1000));
   gate.read("reset_tilt_sd_rad", config.gate.reset_tilt_sd_rad, optional, in_range(1e-4, 3));

@@ -47,7 +47,8 @@ controller::NeedleView to_view(const needle_state_t& m) {
   Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> eigen;
   eigen.computeDirect(position, Eigen::EigenvaluesOnly);
   v.position_variance_mm2 = eigen.eigenvalues()[2];
-  v.health = m.health;
+  v.health = estimator::lost(m.health);
+  v.unsure = (m.health & estimator::kUnsure) != 0;
   v.reset_count = m.reset_count;
   return v;
 }

@@ -72,7 +72,7 @@ json needle_json(const needle_state_t& m) {
           {"test_ratio", m.test_ratio},
           {"rank", m.rank},
           {"health", m.health == 0 ? "healthy" : estimator::describe_health(m.health)},
-          {"healthy", m.health == 0},
+          {"healthy", estimator::lost(m.health) == 0},
           {"resets", m.reset_count}};
 }
 

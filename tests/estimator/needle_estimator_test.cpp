@@ -175,6 +175,32 @@ TEST(NeedleEstimator, AJumpOfThreeFramesIsRejectedAndOneForEverIsADeclaredReset)
   }
 }
 
+// Two outliers in a row are a doubt that the next good reading takes away; six are no outliers.
+TEST(NeedleEstimator, DoubtsBeforeItIsLost) {
+  for (const int spoiled : {1, 2, 5, 6}) {
+    std::mt19937_64 rng(12);
+    EstimatorConfig config = agar_config();
+    Insertion data = testing::insert(config.prior.needle, {}, {}, rng);
+    const std::size_t from = data.measurements.size() / 2;
+    for (int i = 0; i < spoiled; ++i)
+      data.measurements[from + static_cast<std::size_t>(i)].position_mm += Eigen::Vector3d(5, -3, 0);
+    NeedleEstimator estimator(config);
+    std::size_t next = 0;
+    std::int32_t said = kHealthy, last = kHealthy;
+    for (const auto& actuator : data.actuators) {
+      for (; next < data.measurements.size() && data.measurements[next].utime < actuator.utime; ++next)
+        estimator.add(data.measurements[next]);
+      estimator.add(actuator);
+      if (next <= from) continue;
+      last = estimator.estimate(actuator.utime).health;
+      said |= last;
+    }
+    EXPECT_EQ(said & kUnsure, spoiled >= 2 ? kUnsure : 0) << spoiled;
+    EXPECT_EQ(lost(said), spoiled >= 6 ? kRejecting : 0) << spoiled << ": " << describe_health(said);
+    EXPECT_EQ(last, kHealthy) << spoiled << ": " << describe_health(last);
+  }
+}
+
 // A bevel that was mounted the wrong way round. Of a k that is known the side is what is wrong, and a declared reset
 // puts it right; of one that is hardly known, k is held at straight.
 TEST(NeedleEstimator, TheCurvatureNeverChangesItsSideWithoutADeclaredReset) {

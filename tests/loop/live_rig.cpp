@@ -7,6 +7,7 @@
 #include <stdexcept>
 #include <thread>
 
+#include "estimator/health.hpp"
 #include "nodes/needle_pose.hpp"
 
 namespace bevel::test {
@@ -154,7 +155,7 @@ bool LiveRig::arm(double within_s) {
     const std::string& axes = said("bevel-stepper").state;
     if (controller == "armed" && axes == "enabled") return true;
     const std::int64_t now_ns = nodes::now().ns;
-    const bool seen = estimate && estimate->health == 0;
+    const bool seen = estimate && estimator::lost(estimate->health) == 0;
     // Who lost sight of the axes for a while asks; counters and needle are where they were, and the operator knows.
     const auto asks_to_confirm = [this](const char* process) {
       return said(process).reason.find("or confirm") != std::string::npos;

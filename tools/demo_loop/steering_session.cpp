@@ -4,6 +4,7 @@
 #include <stdexcept>
 
 #include "controller/supervisor.hpp"
+#include "estimator/health.hpp"
 
 namespace bevel::tools {
 namespace {
@@ -89,7 +90,7 @@ SteeringSession::Progress SteeringSession::step(const nodes::Now& now) {
   // The operator's words, repeated until they take effect.
   next_word_ns_ = now.ns + kWordPeriod_ns;
   const std::string stepper = state_of("bevel-stepper");
-  const bool seen = estimate_ && estimate_->health == 0;
+  const bool seen = estimate_ && estimator::lost(estimate_->health) == 0;
   if (controller == "armed" && stepper == "enabled") {
     say(nodes::Word::start);
   } else if (seen && controller != "armed" && (stepper == "ready" || stepper == "enabled")) {

@@ -10,6 +10,7 @@ KeptState::KeptState(const estimator::FilterState& state)
       wheelbase_mm(state.wheelbase_mm),
       bending_mm(state.bending_mm),
       measurement_utime(state.measurement_utime),
+      reading_utime(state.reading_utime),
       rejects_in_row(state.rejects_in_row),
       reset_count(state.reset_count),
       outside_model(state.outside_model) {
@@ -29,6 +30,7 @@ estimator::FilterState KeptState::unpacked() const {
   state.wheelbase_mm = wheelbase_mm;
   state.bending_mm = bending_mm;
   state.measurement_utime = measurement_utime;
+  state.reading_utime = reading_utime;
   state.rejects_in_row = rejects_in_row;
   state.reset_count = reset_count;
   state.outside_model = outside_model;

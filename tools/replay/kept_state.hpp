@@ -23,6 +23,7 @@ class KeptState {
   double wheelbase_mm = 0;
   double bending_mm = 0;
   std::int64_t measurement_utime = 0;
+  std::int64_t reading_utime = 0;
   std::int32_t rejects_in_row = 0;
   std::int32_t reset_count = 0;
   bool outside_model = false;

@@ -7,6 +7,7 @@
 #include <random>
 
 #include "estimator/entry_line.hpp"
+#include "estimator/health.hpp"
 #include "estimator/needle_estimator.hpp"
 
 namespace bevel::steering {
@@ -98,7 +99,8 @@ controller::NeedleView view_of(const estimator::Estimate& estimate) {
   view.uncertain = {std::sqrt(estimate.state.covariance(6, 6)),
                     estimate.state.bending_mm > 0 ? std::sqrt(estimate.state.tenth_variance) : 0};
   view.position_variance_mm2 = estimate.state.covariance.diagonal().head<3>().maxCoeff();
-  view.health = estimate.health;
+  view.health = estimator::lost(estimate.health);
+  view.unsure = (estimate.health & estimator::kUnsure) != 0;
   view.reset_count = estimate.state.reset_count;
   return view;
 }

@@ -299,7 +299,8 @@ function drawFacts() {
       '1e-3/mm' + (curvature ? `, radius ${fixed(1 / curvature, 0)} mm` : ''), needleOld));
     all.push(fact('lambda1', `${fixed(n.lambda1_per_rad, 2)} ± ${fixed(n.lambda1_sd_per_rad, 2)}`, '1/rad', needleOld));
     all.push(fact('lambda2', `${fixed(n.lambda2, 3)} ± ${fixed(n.lambda2_sd, 3)}`, '', needleOld));
-    all.push(fact('estimate', n.healthy ? 'healthy' : 'unhealthy', n.healthy ? `${n.resets} resets` : n.health, needleOld));
+    const well = n.health === 'healthy';
+    all.push(fact('estimate', well ? 'healthy' : n.healthy ? 'unsure' : 'unhealthy', well ? `${n.resets} resets` : n.health, needleOld));
   }
   if (state.axes) {
     const a = state.axes;
