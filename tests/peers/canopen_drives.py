@@ -22,7 +22,8 @@ from local_can import LocalHub
 
 COUNTS_PER_MM = 2000.0
 COUNTS_PER_RAD = 51200 / (2 * math.pi)
-LIMITS = """
+# Not in a guest, whose time has no room for their transfers beside the PDOs that are watched.
+LIMITS = "" if support.INTERFACE else """
 [stepper.insertion]
 drive_position_min_unit = -2.5
 drive_position_max_unit = 150.0
@@ -144,7 +145,8 @@ class Insertion(Rig):
             self.assertEqual(drive.value(0x1016, 1) >> 16, 127)
             self.assertLessEqual(drive.value(0x1016, 1) & 0xFFFF, 120)
         self.assertEqual([d.value(0x6007) for d in self.drives], [3, 3])
-        self.assertEqual([insertion.value(0x607D, sub) for sub in (1, 2)], [-5000, 300000])
+        if LIMITS:
+            self.assertEqual([insertion.value(0x607D, sub) for sub in (1, 2)], [-5000, 300000])
         self.controller.rates = (5.0, 1.0)
         time.sleep(0.2)
         self.assertEqual((insertion.position, rotation.position), (0.0, 0.0), "moved before it was armed")
