@@ -1,10 +1,13 @@
 #include "nodes/rig_node.hpp"
 
 #include <Eigen/Geometry>
+#include <algorithm>
 #include <cmath>
+#include <limits>
 #include <stdexcept>
 
 #include "drivers/camera/calibrated_view.hpp"
+#include "model/lie.hpp"
 #include "nodes/needle_pose.hpp"
 
 namespace bevel::nodes {
@@ -12,11 +15,26 @@ namespace {
 
 constexpr std::int64_t kTruthPeriod_ns = 10'000'000;
 
-rig::SimulatedDriveConfig drive_config(const stepper::AxisConfig& axis) {
+rig::SimulatedDriveConfig drive_config(const stepper::AxisConfig& axis, const LimitSwitchConfig& switches) {
   rig::SimulatedDriveConfig config;
   config.node_id = axis.node_id;
   config.counts_per_unit = axis.counts_per_unit;
+  const auto [low, high] =
+      std::minmax({axis.counts_per_unit * switches.min_unit, axis.counts_per_unit * switches.max_unit});
+  config.switches = {low, high};
   return config;
+}
+
+// Information W of a heading that is as uncertain to all sides, per rad^2; v: heading over standard deviation. W =
+// [v]x' [v]x is zero along v, where rounding makes it negative as often as not. No entry is rounded by more than a
+// share of sqrt(W_ii W_jj), so that a few such shares more on the diagonal keep every eigenvalue from falling below
+// zero.
+Eigen::Matrix3d information_across(const Eigen::Vector3d& v) {
+  constexpr double kRounding = 4 * std::numeric_limits<double>::epsilon();
+  const Eigen::Matrix3d cross = model::hat(v);
+  Eigen::Matrix3d information = cross.transpose() * cross;
+  information.diagonal() *= 1 + kRounding;
+  return information;
 }
 
 }  // namespace
@@ -30,8 +48,10 @@ RigNode::RigNode(lcm::LCM& lcm, can::Bus& insertion_bus, can::Bus& rotation_bus,
              FaultyBus(rotation_bus, config.stepper.axes[1].node_id)},
       frames_(frames),
       heading_noise_(static_cast<std::uint64_t>(config.rig.seed)) {
-  drives_[0] = std::make_unique<rig::SimulatedDrive>(buses_[0], drive_config(config.stepper.axes[0]));
-  drives_[1] = std::make_unique<rig::SimulatedDrive>(buses_[1], drive_config(config.stepper.axes[1]));
+  drives_[0] = std::make_unique<rig::SimulatedDrive>(
+      buses_[0], drive_config(config.stepper.axes[0], config.rig.limit_switches[0]));
+  drives_[1] = std::make_unique<rig::SimulatedDrive>(
+      buses_[1], drive_config(config.stepper.axes[1], config.rig.limit_switches[1]));
   own_values_ = model::draw(config.rig.variation, static_cast<std::uint64_t>(config.rig.seed));
   const auto effects = io::active_effects(config.rig.effects, config.rig.discrepancies, "");
   if (config.rig.beam)
@@ -136,7 +156,7 @@ void RigNode::take_heading(const Now& now) {
   m.seq = heading_seq_++;
   m.camera = config_.rig.heading.camera;
   m.heading = (ahead + right_rad * aside + up_rad * ahead.cross(aside)).normalized();
-  m.information_per_rad2 = (Eigen::Matrix3d::Identity() - m.heading * m.heading.transpose()) / (sd_rad * sd_rad);
+  m.information_per_rad2 = information_across(m.heading / sd_rad);
   felt_.push_back({now.ns + 1000 * late_us, io::to_message(m)});
 }
 

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <filesystem>
+#include <limits>
 #include <utility>
 
 #include "drivers/camera/calibrated_view.hpp"
@@ -122,6 +123,13 @@ void read_axis(Section s, stepper::AxisConfig& axis) {
   s.read("following_error_unit", axis.following_error_unit, optional, io::at_least(0));
   s.read("position_min_unit", axis.position_min_unit, optional, io::any_finite());
   s.read("position_max_unit", axis.position_max_unit, optional, io::any_finite());
+  const auto read_drive_limit = [&s](const char* key, std::optional<double>& limit) {
+    double value = std::numeric_limits<double>::quiet_NaN();
+    s.read(key, value, optional, io::any_finite());
+    if (!std::isnan(value)) limit = value;
+  };
+  read_drive_limit("drive_position_min_unit", axis.drive_position_min_unit);
+  read_drive_limit("drive_position_max_unit", axis.drive_position_max_unit);
 }
 
 void read_stepper(Section s, stepper::StepperConfig& c) {
@@ -306,6 +314,13 @@ void read_rig(Section s, const std::filesystem::path& folder, RigConfig& c) {
   h.read("sd_rad", c.heading.sd_rad, h.present() ? required : optional, in_range(1e-4, 1));
   h.read("rate_hz", c.heading.rate_hz, optional, in_range(0.1, 500));
   h.read("camera", c.heading.camera, optional, in_range(0, 15));
+  Section l = s.section("limit_switches", optional);
+  const auto below = in_range(-1e4, -0.01).because("the axis stands at 0 between them when the rig starts");
+  const auto beyond = in_range(0.01, 1e4).because(below.reason);
+  l.read("insertion_min_mm", c.limit_switches[stepper::kInsertion].min_unit, optional, below);
+  l.read("insertion_max_mm", c.limit_switches[stepper::kInsertion].max_unit, optional, beyond);
+  l.read("rotation_min_rad", c.limit_switches[stepper::kRotation].min_unit, optional, below);
+  l.read("rotation_max_rad", c.limit_switches[stepper::kRotation].max_unit, optional, beyond);
 }
 
 }  // namespace

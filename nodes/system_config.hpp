@@ -2,6 +2,7 @@
 // One file for a whole rig: every process reads all of it, so that a wrong key is found by whichever starts first, and
 // uses its own part. Keys, ranges and defaults stand in system_config.cpp and in the structures named here.
 #include <array>
+#include <limits>
 #include <optional>
 #include <string>
 #include <vector>
@@ -42,6 +43,13 @@ struct HeadingSensorConfig {
   int camera = 15;  // the number that it goes by in TIP_HEADING
 };
 
+// Limit switches of a simulated drive, closed at and beyond; mm or rad from where the axis stands at the start, in its
+// direction. Infinite: none.
+struct LimitSwitchConfig {
+  double min_unit = -std::numeric_limits<double>::infinity();
+  double max_unit = std::numeric_limits<double>::infinity();
+};
+
 struct RigConfig {
   // Of the simulated needle: [rig.needle], [[rig.effect]]s, [[rig.discrepancy]]s and [rig.variation], or the model file
   // `model`; unlike [needle] and the rest at the top, which are what the software believes. Without [rig.needle] it is
@@ -57,6 +65,7 @@ struct RigConfig {
   std::string frames_socket = "/tmp/bevel-rig-frames.sock";
   double frame_rate_hz = 30;
   HeadingSensorConfig heading;
+  std::array<LimitSwitchConfig, stepper::kAxes> limit_switches;
   double noise_gray = 2;
   double blur_px = 0.8;
   std::int64_t seed = 1;

@@ -219,11 +219,6 @@ Panel& Panel::band(const std::vector<double>& x, const std::vector<double>& low,
   return *this;
 }
 
-Panel& Panel::level(double y, const Stroke& stroke) {
-  if (y >= y_.low && y <= y_.high) drawing_.line(at(x_.low, y), at(x_.high, y), stroke);
-  return *this;
-}
-
 Panel& Panel::points(const std::vector<double>& x, const std::vector<double>& y, std::string_view colour,
                      double opacity, double radius) {
   std::vector<Point> inside;

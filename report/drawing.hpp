@@ -19,8 +19,6 @@ inline constexpr const char* kSpan = "var(--span)";
 inline constexpr const char* kBlue = "var(--blue)";
 inline constexpr const char* kOrange = "var(--orange)";
 inline constexpr const char* kGreen = "var(--green)";
-inline constexpr const char* kOchre = "var(--ochre)";
-inline constexpr const char* kGrey = "var(--grey)";
 inline constexpr const char* kRed = "var(--red)";
 }  // namespace ink
 
@@ -100,7 +98,6 @@ class Panel {
   Panel& span(double from, double to);
   Panel& band(const std::vector<double>& x, const std::vector<double>& low, const std::vector<double>& high,
               std::string_view colour);
-  Panel& level(double y, const Stroke& stroke);
   Panel& points(const std::vector<double>& x, const std::vector<double>& y, std::string_view colour, double opacity,
                 double radius = 1.1);
   Panel& curve(const std::vector<double>& x, const std::vector<double>& y, const Stroke& stroke);

@@ -1,7 +1,9 @@
 #include "drivers/stepper/configuration_script.hpp"
 
+#include <algorithm>
 #include <cmath>
 #include <initializer_list>
+#include <limits>
 
 namespace bevel::stepper {
 namespace {
@@ -69,7 +71,27 @@ std::uint32_t counts(double units, double counts_per_unit) {
   return static_cast<std::uint32_t>(std::lround(units * std::abs(counts_per_unit)));
 }
 
+constexpr double kFirstPosition = std::numeric_limits<std::int32_t>::min();
+constexpr double kLastPosition = std::numeric_limits<std::int32_t>::max();
+
 }  // namespace
+
+std::array<SdoJob, kLimitJobs> limit_jobs(const AxisConfig& axis, const DriveLimits& limits, std::int64_t zero_counts) {
+  constexpr ObjectAddress kMin{0x607D, 1}, kMax{0x607D, 2};
+  const auto position = [&](double unit) {
+    const double counts = std::round(static_cast<double>(zero_counts) + unit * axis.counts_per_unit);
+    return static_cast<std::uint32_t>(static_cast<std::int32_t>(std::clamp(counts, kFirstPosition, kLastPosition)));
+  };
+  const bool turned = axis.counts_per_unit < 0.0;
+  const std::uint32_t low = position(turned ? limits.max_unit : limits.min_unit);
+  const std::uint32_t high = position(turned ? limits.min_unit : limits.max_unit);
+  const bool asked_for = axis.drive_position_min_unit || axis.drive_position_max_unit;
+  const Kind write = asked_for ? Kind::write : Kind::write_if_present;
+  const Kind expect = asked_for ? Kind::expect : Kind::expect_if_present;
+  return {SdoJob{Kind::write_if_present, kMax, 4, static_cast<std::uint32_t>(kLastPosition)},  // room for the lower one
+          SdoJob{write, kMin, 4, low}, SdoJob{write, kMax, 4, high}, SdoJob{expect, kMin, 4, low},
+          SdoJob{expect, kMax, 4, high}};
+}
 
 std::vector<SdoJob> configuration_script(const StepperConfig& config, std::size_t index) {
   const AxisConfig& axis = config.axes.at(index);

@@ -2,6 +2,7 @@
 // limits.
 #pragma once
 
+#include <array>
 #include <cstdint>
 #include <vector>
 
@@ -32,6 +33,13 @@ struct SdoJob {
 constexpr std::uint32_t code_of(cia301::ObjectAddress object) {
   return static_cast<std::uint32_t>(object.index) << 8 | object.sub;
 }
+
+// The drive's software limits (0x607D) in its position units, which are those of counts_per_unit; zero_counts: where
+// the entry is in them. Whichever way the limits move, the lower one stays below the upper one, as drives demand. A
+// limit set for the drive must be there and read back as written; of one that follows from the workspace a drive that
+// has no 0x607D is let off, as the driver keeps the workspace by itself.
+inline constexpr std::size_t kLimitJobs = 5;
+std::array<SdoJob, kLimitJobs> limit_jobs(const AxisConfig& axis, const DriveLimits& limits, std::int64_t zero_counts);
 
 // In the order of CiA 301 section 7.5.2.36 for the mapping: switched off, emptied, filled, counted, typed, switched on.
 std::vector<SdoJob> configuration_script(const StepperConfig& config, std::size_t axis);

@@ -22,8 +22,18 @@ DriveNode::DriveNode(const StepperConfig& config, std::size_t axis)
     : config_(config),
       axis_(axis),
       node_(config.axes.at(axis).node_id),
+      limits_(drive_limits_of(config.axes.at(axis), config.period_ns)),
       script_(configuration_script(config, axis)),
-      sdo_(node_, config.sdo_timeout_ns) {}
+      sdo_(node_, config.sdo_timeout_ns) {
+  if (has_limits()) script_.resize(script_.size() + kLimitJobs);
+  place_limits();
+}
+
+void DriveNode::place_limits() {
+  if (!has_limits()) return;
+  std::ranges::copy(limit_jobs(config_.axes.at(axis_), limits_, zero_counts_),
+                    script_.end() - static_cast<std::ptrdiff_t>(kLimitJobs));
+}
 
 void DriveNode::restart() {
   phase_ = Phase::absent;
@@ -184,8 +194,13 @@ void DriveNode::configure(std::int64_t now_ns, Transmitter& out) {
       }
       break;
     case Phase::operational:
+      renew_limits(now_ns, out);
       break;
   }
+}
+
+void DriveNode::renew_limits(std::int64_t now_ns, Transmitter& out) {
+  if (phase_ == Phase::operational && !configured()) transfer(now_ns, out);
 }
 
 void DriveNode::begin_job() {
@@ -202,6 +217,7 @@ void DriveNode::next_job(std::int64_t now_ns) {
   retries_ = 0;
   job_since_ns_ = now_ns;
   if (++job_ < script_.size()) return begin_job();
+  if (phase_ != Phase::configuring) return;  // the limits, anew
   phase_ = Phase::starting;
   phase_since_ns_ = now_ns;
   next_nmt_ns_ = now_ns;
@@ -282,6 +298,13 @@ double DriveNode::rate_unit_s() const {
 void DriveNode::set_zero() {
   zero_counts_ = position_counts_;
   position_trusted_ = true;
+  if (!has_limits()) return;
+  place_limits();
+  const std::size_t first = script_.size() - kLimitJobs;
+  if (job_ <= first) return;  // not written yet
+  if (job_ < script_.size()) sdo_.cancel();
+  retries_ = 0;
+  job_ = first;
 }
 
 }  // namespace bevel::stepper

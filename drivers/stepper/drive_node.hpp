@@ -1,6 +1,7 @@
 // One drive as its master sees it: presence, configuration, state, position.
 #pragma once
 
+#include <cmath>
 #include <cstdint>
 #include <vector>
 
@@ -33,6 +34,8 @@ class DriveNode {
   void on_frame(const can::Frame& frame, std::int64_t now_ns);  // ignores frames of others
   void on_sync(std::int64_t now_ns);                            // our SYNC was sent
   void configure(std::int64_t now_ns, Transmitter& out);        // one cycle of work towards operational
+  // Once operational: writes the drive's software limits anew after set_zero() has moved them.
+  void renew_limits(std::int64_t now_ns, Transmitter& out);
   void supervise(std::int64_t now_ns);                          // time-outs
   void read_error_code(std::int64_t now_ns, Transmitter& out);  // in fault: 0x603F, once
   // rate: in counts of the drive, by sign of counts_per_unit.
@@ -41,8 +44,10 @@ class DriveNode {
   Stop take_trouble();  // the oldest trouble since the last call
 
   Phase phase() const { return phase_; }
+  bool configured() const { return phase_ == Phase::operational && job_ == script_.size(); }
   cia402::State state() const { return cia402::decode(statusword_); }
   std::uint16_t statusword() const { return statusword_; }
+  bool says_limit() const { return (statusword_ & cia402::kInternalLimit) != 0; }  // a switch's, or its own
   std::uint16_t error_code() const { return error_code_; }
   double position_unit() const;
   double rate_unit_s() const;
@@ -61,6 +66,8 @@ class DriveNode {
   void out_of_sight();
   void trouble(StopReason reason, std::uint32_t code = 0);
   void transfer(std::int64_t now_ns, Transmitter& out);
+  bool has_limits() const { return std::isfinite(limits_.min_unit) || std::isfinite(limits_.max_unit); }
+  void place_limits();
   void begin_job();
   void finish_job(std::int64_t now_ns);
   void next_job(std::int64_t now_ns);
@@ -68,7 +75,8 @@ class DriveNode {
   const StepperConfig& config_;
   std::size_t axis_;
   std::uint8_t node_;
-  std::vector<SdoJob> script_;
+  DriveLimits limits_;
+  std::vector<SdoJob> script_;  // ends with kLimitJobs, if there are limits
   cia301::SdoClient sdo_;
 
   Phase phase_ = Phase::absent;

@@ -2,6 +2,7 @@
 
 #include <cmath>
 #include <sstream>
+#include <utility>
 
 namespace bevel::stepper {
 namespace {
@@ -29,7 +30,7 @@ class Checker {
   std::vector<std::string> problems_;
 };
 
-void check_axis(Checker& check, const AxisConfig& axis, const std::string& name) {
+void check_axis(Checker& check, const AxisConfig& axis, std::int64_t period_ns, const std::string& name) {
   const int node = axis.node_id;
   check.require(node >= 1 && node <= 127, name + ".node_id", node, "1 to 127");
   const double counts = std::abs(axis.counts_per_unit);
@@ -47,14 +48,27 @@ void check_axis(Checker& check, const AxisConfig& axis, const std::string& name)
                 name + ".following_error_unit", window, "0 (the drive's own), or positive and below 1e9 counts");
   check.require(axis.position_min_unit < axis.position_max_unit, name + ".position_min_unit", axis.position_min_unit,
                 "below position_max_unit");
+  for (const auto& [limit, key] : {std::pair{axis.drive_position_min_unit, ".drive_position_min_unit"},
+                                   std::pair{axis.drive_position_max_unit, ".drive_position_max_unit"}})
+    if (limit)
+      check.require(std::abs(*limit) * counts < kLargestCounts, name + key, *limit, "finite, and below 1e9 counts");
+  if (const DriveLimits limits = drive_limits_of(axis, period_ns); limits.min_unit >= limits.max_unit)
+    check.require(false, name + ".drive_position_min_unit", limits.min_unit, "below drive_position_max_unit");
 }
 
 }  // namespace
 
+DriveLimits drive_limits_of(const AxisConfig& axis, std::int64_t period_ns) {
+  const double rate = axis.rate_limit_unit_s;
+  const double margin = rate * 2e-9 * static_cast<double>(period_ns) + 0.5 * rate * rate / axis.quick_stop_unit_s2;
+  return {axis.drive_position_min_unit.value_or(axis.position_min_unit - margin),
+          axis.drive_position_max_unit.value_or(axis.position_max_unit + margin)};
+}
+
 std::vector<std::string> problems_of(const StepperConfig& config) {
   Checker check;
-  check_axis(check, config.axes[kInsertion], "insertion");
-  check_axis(check, config.axes[kRotation], "rotation");
+  check_axis(check, config.axes[kInsertion], config.period_ns, "insertion");
+  check_axis(check, config.axes[kRotation], config.period_ns, "rotation");
   const int master = config.master_id;
   check.require(config.axes[0].node_id != config.axes[1].node_id, "rotation.node_id",
                 static_cast<int>(config.axes[1].node_id), "different from insertion.node_id");

@@ -5,6 +5,7 @@
 #include <cstdint>
 #include <limits>
 #include <numbers>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -24,6 +25,9 @@ struct AxisConfig {
   // Workspace, applied while the position is trusted: the rate falls so that the axis comes to rest at the limit.
   double position_min_unit = -std::numeric_limits<double>::infinity();
   double position_max_unit = std::numeric_limits<double>::infinity();
+  // The drive's own software limits (0x607D), from the entry too: beyond them it holds the axis by itself, which is a
+  // latched stop. See drive_limits_of() for one that is not set.
+  std::optional<double> drive_position_min_unit{}, drive_position_max_unit{};
   // The drive's own supervision of its motor (0x6065, 0x6066): by how much it may lag before it faults. 0 leaves the
   // drive's setting.
   double following_error_unit = 0.0;
@@ -33,6 +37,14 @@ struct AxisConfig {
   std::uint32_t revision = 0;
   std::uint32_t serial = 0;
 };
+
+struct DriveLimits {
+  double min_unit, max_unit;  // from the entry; infinite: none
+};
+// The drive's own limits: as set, else the workspace widened by what an axis goes at its rate limit in two cycles,
+// which pass from a command to its effect, and in a quick stop. The driver brakes for the workspace, the drive only for
+// what the driver lets through.
+DriveLimits drive_limits_of(const AxisConfig& axis, std::int64_t period_ns);
 
 inline constexpr std::int64_t kMs = 1'000'000;  // ns
 

@@ -1,7 +1,6 @@
 #include "drivers/stepper/stepper_driver.hpp"
 
 #include <algorithm>
-#include <cmath>
 #include <stdexcept>
 #include <string>
 
@@ -10,9 +9,6 @@
 namespace bevel::stepper {
 namespace {
 
-constexpr double kHeldBack_unit = 0.04;  // mm or rad that an axis may jump by when it comes free
-constexpr double kResting_unit_s = 0.05;
-constexpr double kTold_s = 0.03;  // from a command to its effect: two cycles and the drive's own
 constexpr std::int64_t kPurgePause_ns = 500 * kMs;
 constexpr std::uint64_t kFaultResetSteps =
     4;  // half a period of the fault reset bit, long enough to survive a lost PDO
@@ -23,8 +19,6 @@ StepperConfig checked(const StepperConfig& config) {
   if (!text.empty()) throw std::invalid_argument(text);
   return config;
 }
-
-bool says_limit(const DriveNode& node) { return (node.statusword() & cia402::kInternalLimit) != 0; }
 
 }  // namespace
 
@@ -59,6 +53,7 @@ EnableAnswer StepperDriver::enable() {
   if (state_ != DriverState::ready) return EnableAnswer::not_ready;
   for (const auto& node : nodes_)
     if (!node.position_trusted()) return EnableAnswer::position_not_trusted;
+  if (!std::ranges::all_of(nodes_, &DriveNode::configured)) return EnableAnswer::not_ready;
   if (!enable_wanted_) enable_since_ns_ = last_step_ns_;
   enable_wanted_ = true;
   return EnableAnswer::accepted;
@@ -285,6 +280,7 @@ void StepperDriver::run_configuring(std::int64_t now_ns) {
 }
 
 void StepperDriver::run_ready(std::int64_t now_ns) {
+  for (auto& node : nodes_) node.renew_limits(now_ns, out_);
   for (std::size_t axis = 0; axis < kAxes; ++axis) {
     const auto state = nodes_.at(axis).state();
     if (state == cia402::State::fault || state == cia402::State::fault_reaction)
@@ -297,115 +293,10 @@ void StepperDriver::run_ready(std::int64_t now_ns) {
     refusing_setpoints_ = false;
     for (std::size_t axis = 0; axis < kAxes; ++axis) {
       follows_.at(axis).begin(now_ns, nodes_.at(axis).position_unit());
-      at_limit_.at(axis) = says_limit(nodes_.at(axis));
+      at_limit_.at(axis) = nodes_.at(axis).says_limit();
     }
   } else if (now_ns - enable_since_ns_ > config_.transition_timeout_ns) {
     latch({StopReason::enable_timeout, -1, 0});
-  }
-}
-
-bool StepperDriver::moving() const {
-  return std::any_of(shapers_.begin(), shapers_.end(), [](const RateShaper& s) { return s.rate_unit_s() != 0; });
-}
-
-std::array<double, kAxes> StepperDriver::wanted_rates(std::int64_t now_ns,
-                                                      const std::optional<MotionSetpoint>& setpoint) {
-  std::array<double, kAxes> rates{};
-  if (setpoint) {
-    const bool usable = std::isfinite(setpoint->insertion_rate_mm_s) && std::isfinite(setpoint->rotation_rate_rad_s) &&
-                        setpoint->age_ns >= -config_.period_ns;
-    refusing_setpoints_ = !usable;
-    if (!usable) {
-      ++counters_.setpoints_refused;
-    } else {
-      fresh_setpoint_ns_ = std::max(fresh_setpoint_ns_, now_ns - std::max<std::int64_t>(setpoint->age_ns, 0));
-      // By its own age: one of before a stop must not run in the time that axes just enabled give for the first.
-      if (setpoint->run && setpoint->age_ns <= config_.setpoint_zero_age_ns)
-        rates = {setpoint->insertion_rate_mm_s, setpoint->rotation_rate_rad_s};
-      if (!setpoint->run && moving()) latch({StopReason::controller_stop, -1, 0});
-    }
-  }
-  const std::int64_t age_ns = now_ns - fresh_setpoint_ns_;
-  if (age_ns > config_.setpoint_zero_age_ns) {
-    ++counters_.setpoints_stale;
-    rates = {};
-  }
-  if (age_ns > config_.setpoint_stop_age_ns)
-    latch({refusing_setpoints_ ? StopReason::setpoint_invalid : StopReason::setpoint_stale, -1, 0});
-  return rates;
-}
-
-void StepperDriver::run_enabled(std::int64_t now_ns, const std::optional<MotionSetpoint>& setpoint) {
-  supervise_motion(now_ns);
-  if (state_ != DriverState::enabled) return;
-  const auto rates = wanted_rates(now_ns, setpoint);
-  if (state_ != DriverState::enabled) return;
-  shape(now_ns, rates);
-}
-
-void StepperDriver::take(std::int64_t now_ns, const MotionSetpoint& setpoint) {
-  if (state_ != DriverState::enabled || config_.mode != VelocityMode::profile) return;
-  receive(now_ns);  // echoes, so that nothing holds the command back
-  if (state_ != DriverState::enabled) return;
-  const auto rates = wanted_rates(now_ns, setpoint);
-  if (state_ == DriverState::enabled) {
-    for (std::size_t axis = 0; axis < kAxes; ++axis) follows_.at(axis).advance(now_ns, shapers_.at(axis).rate_unit_s());
-    shape(now_ns, rates);
-  }
-  if (bus_.is_open() && !silent_) send_commands(now_ns);
-}
-
-void StepperDriver::shape(std::int64_t now_ns, const std::array<double, kAxes>& rates) {
-  // A late step does not buy a larger change of rate.
-  const double dt_s =
-      static_cast<double>(std::clamp<std::int64_t>(now_ns - shaped_ns_, 0, 2 * config_.period_ns)) * 1e-9;
-  shaped_ns_ = now_ns;
-  bool clamped = false;
-  for (std::size_t axis = 0; axis < kAxes; ++axis) {
-    // Where the axis will be when this command takes effect: the position is a cycle old, the drive lags by another.
-    const DriveNode& node = nodes_.at(axis);
-    const double delay_s = static_cast<double>(now_ns - node.sampled_ns() + config_.period_ns) * 1e-9;
-    const double ahead_unit = node.position_unit() + shapers_.at(axis).rate_unit_s() * delay_s;
-    shapers_.at(axis).step(rates.at(axis), dt_s, ahead_unit);
-    clamped = clamped || shapers_.at(axis).clamped();
-  }
-  if (clamped) ++counters_.setpoints_clamped;
-}
-
-void StepperDriver::supervise_motion(std::int64_t now_ns) {
-  for (std::size_t axis = 0; axis < kAxes; ++axis) {
-    const DriveNode& node = nodes_.at(axis);
-    switch (node.state()) {
-      case cia402::State::operation_enabled:
-        break;
-      case cia402::State::fault:
-      case cia402::State::fault_reaction:
-        return latch({StopReason::drive_fault, static_cast<int>(axis), node.error_code()});
-      default:
-        return latch({StopReason::drive_left_operation, static_cast<int>(axis), node.statusword()});
-    }
-    // One that was enabled there may leave it again.
-    const bool came_to_limit = says_limit(node) && !at_limit_.at(axis);
-    at_limit_.at(axis) = says_limit(node);
-    if (came_to_limit) return latch({StopReason::travel_limit, static_cast<int>(axis), 0});
-    if (!follows_.at(axis).follows(now_ns, shapers_.at(axis).rate_unit_s(), node.position_unit()))
-      return latch({StopReason::not_following, static_cast<int>(axis), 0});
-  }
-}
-
-// Once an axis rests after a stop: is it where it should be, or was it held back?
-void StepperDriver::judge_rest(std::int64_t now_ns) {
-  for (std::size_t axis = 0; axis < kAxes; ++axis) {
-    const DriveNode& node = nodes_.at(axis);
-    if (judged_.at(axis) || std::abs(node.rate_unit_s()) > kResting_unit_s) continue;
-    judged_.at(axis) = true;
-    FollowWatch& follow = follows_.at(axis);
-    follow.follows(now_ns, 0, node.position_unit());
-    // What moved went on by the way of the quick stop, and by what it moved before it was told.
-    const double rate = stopped_from_unit_s_.at(axis);
-    const double stopping = 0.5 * rate * std::abs(rate) / config_.axes.at(axis).quick_stop_unit_s2;
-    const double behind = std::abs(follow.behind_unit() + stopping);
-    held_back_.at(axis) = behind > kHeldBack_unit + kTold_s * std::abs(rate);
   }
 }
 

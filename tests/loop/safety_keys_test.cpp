@@ -60,6 +60,7 @@ INSTANTIATE_TEST_SUITE_P(
                       Refused{"stepper", "master_heartbeat_timeout_ms", "1000"},
                       Refused{"stepper", "drive_heartbeat_timeout_ms", "1000"}, Refused{"stepper", "period_ms", "50"},
                       Refused{"stepper.insertion", "quick_stop_unit_s2", "1e-6"},
+                      Refused{"stepper.insertion", "drive_position_max_unit", "1e7"},
                       Refused{"stepper.rotation", "quick_stop_unit_s2", "1.0"}));
 
 TEST(SafetyKeysTogether, TheMessageSaysWhy) {

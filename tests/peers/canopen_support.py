@@ -55,8 +55,8 @@ def open_network(bus):
     return network
 
 
-def system_file(name, can_address=None):
-    """config/demo.toml with the bus and sockets of this test; its path."""
+def system_file(name, can_address=None, more=""):
+    """config/demo.toml with the bus and sockets of this test, and what more is wanted; its path."""
     with open(os.path.join(SOURCE, "config/demo.toml"), encoding="utf-8") as file:
         text = file.read()
     text = text.replace("unix:/tmp/bevel-demo-can.sock", can_address or ADDRESS)
@@ -65,6 +65,7 @@ def system_file(name, can_address=None):
         text += ("\n[stepper]\nperiod_ms = 20\nmaster_heartbeat_ms = 40\nmaster_heartbeat_timeout_ms = 120\n"
                  "drive_heartbeat_ms = 40\ndrive_heartbeat_timeout_ms = 120\nsetpoint_zero_age_ms = 110\n"
                  "setpoint_stop_age_ms = 120\n")
+    text += more
     path = os.path.join(FOLDER.name, name)
     with open(path, "w", encoding="utf-8") as file:
         file.write(text)
