@@ -37,7 +37,9 @@ StepperNode::StepperNode(lcm::LCM& lcm, can::Bus& bus, const stepper::StepperCon
   // A second way for a stop, should the first be what is broken.
   port_.subscribe<process_status_t>(io::channel::kProcessStatus, [this](const process_status_t& m) {
     const bool stopped = m.state == "stopped" || m.state == "fault";
-    if (m.process == "bevel-controller" && stopped && driver_.moving()) stop(stepper::StopReason::controller_stop);
+    // One that came to rest before it was told is stopped too; a status of before the arm is none.
+    if (m.process == "bevel-controller" && stopped && (driver_.moving() || ran_since_armed_))
+      stop(stepper::StopReason::controller_stop);
   });
 }
 
@@ -46,6 +48,7 @@ void StepperNode::on_command(const motion_command_t& m) {
   const std::int64_t age_us = std::max<std::int64_t>(model::age_us(port_.now().utime, m.utime), 0);
   setpoint_made_ns_ = port_.now().ns - age_us * 1000;  // the watch has bounded the age
   const bool ran = setpoint_ && setpoint_->run;
+  ran_since_armed_ = ran_since_armed_ || m.mode == 1;
   setpoint_ = stepper::MotionSetpoint{0, m.mode == 1, m.insertion_rate_mm_s, m.rotation_rate_rad_s};
   // A stop does not wait for the next cycle.
   if (ran && !setpoint_->run && driver_.moving()) return stop(stepper::StopReason::controller_stop);
@@ -63,6 +66,7 @@ void StepperNode::on_word(Word word) {
     case Word::arm:
       port_.forget_senders();
       driver_.rearm();
+      ran_since_armed_ = false;
       enable_wanted_ = true;
       refusal_.clear();
       break;
