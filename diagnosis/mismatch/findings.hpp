@@ -1,6 +1,7 @@
 #pragma once
 // What the mismatch tool found, as plain data: verdict.json, report.html and model.toml are made from this alone.
 #include <array>
+#include <cstdint>
 #include <optional>
 #include <string>
 #include <vector>
@@ -40,6 +41,9 @@ struct FoundEffect {
   std::vector<FoundInRecording> recordings{};
   double log_bayes_factor = 0;  // natural: beside the others, against its absence
   double visible_sigmas = 0;    // root of the fall of chi2 that it brings beside the others
+  // By how much it moves the tip where the cameras see it: the model without it against the model that was found, at
+  // the deepest reading of each recording, root mean square over recordings. NaN: without it the tip cannot follow.
+  double moved_at_depth_mm = 0;
 };
 
 // Where the model in use (its needle refitted) goes wrong most.
@@ -124,8 +128,9 @@ struct DetectableSize {
 // What remains unexplained, described: which quantity of the motion is off by how much, against what.
 struct Discrepancy {
   model::DiscrepancyCurve curve;
-  double log_bayes_factor = 0;  // natural, against none
-  double visible_size = 0;      // root mean square over the readings, in standard deviations of the noise
+  double log_bayes_factor = 0;   // natural, against none
+  double visible_size = 0;       // root mean square over the readings, in standard deviations of the noise
+  double moved_at_depth_mm = 0;  // as of an effect
 };
 
 // The simplest equation that does for a discrepancy what its curve does: a proposal for an effect, not a cause.
@@ -175,6 +180,22 @@ struct NeedleEstimate {
   double curvature_sd_per_mm = 0, lambda1_sd_per_rad = 0, lambda2_sd = 0;
 };
 
+// Insertions steered in simulated time with one model in the software: true tip to target where the needle came to
+// rest, of those that arrived; NaN where none did.
+struct SteeredFigures {
+  std::size_t arrived = 0;
+  double median_mm = 0, worst_mm = 0;  // the upper of the middle two, of an even count
+  std::string stopped_by{};            // the commonest reason of those that did not arrive; "": all did
+};
+// To the same targets on a rig that is the model that was found, with the recordings' noise.
+struct SteeredToTargets {
+  std::size_t targets = 0;
+  std::uint64_t seed = 0;
+  double depth_mm = 0;  // of the targets, along z
+  SteeredFigures as_it_stands{}, found{};
+  std::vector<std::string> not_known_live{};  // effects that no software knows of an insertion beforehand
+};
+
 // For pictures: one recording against time.
 struct Trace {
   std::string log;
@@ -222,6 +243,8 @@ struct Findings {
   std::vector<Discrepancy> discrepancies;  // unknown-effect only
   std::vector<ProposedForm> proposals;     // beside it, the likeliest first
   std::optional<NextExperiment> next_experiment;
+  std::optional<SteeredToTargets> steered;  // by whoever has a controller: diagnose() leaves it empty
+  std::string not_steered;                  // why, in a clause, where something found might matter to steering
   std::vector<std::string> confusion_names;
   Eigen::MatrixXd confusion;  // |cosine| between visible parts
   Checks checks;

@@ -6,6 +6,7 @@
 #include <set>
 
 #include "diagnosis/inference/nuisances.hpp"
+#include "diagnosis/mismatch/moved_tip.hpp"
 
 namespace bevel::diagnosis {
 
@@ -83,6 +84,16 @@ std::vector<std::string> rivals_of(const Search& search, const ModelSet& set, st
 
 }  // namespace
 
+namespace {
+
+// Borrows `discrepancy`, which may be null.
+ModelledTip tip_of(const ChosenModel& model, const DiscrepancyValues* discrepancy) {
+  const Fit& fit = *model.fit;
+  return {.layout = &fit.layout, .shared = &fit.shared, .local = &fit.local, .discrepancy = discrepancy};
+}
+
+}  // namespace
+
 std::vector<FoundEffect> found_effects(const NeedleSystem& system, const Search& search,
                                        const inference::Posterior& posterior, const inference::Unknowns& unknowns,
                                        const ChosenModel& model) {
@@ -90,6 +101,8 @@ std::vector<FoundEffect> found_effects(const NeedleSystem& system, const Search&
   const Fit& fit = *model.fit;
   const ModelSet& set = fit.layout.set();
   const auto solution = solve_about(fit, model.blocks, model.curve);
+  const auto discrepancy = fit.scales.curve ? model.discrepancy() : DiscrepancyValues{};
+  const ModelledTip tip = tip_of(model, fit.scales.curve ? &discrepancy : nullptr);
   for (std::size_t m = 0; m < set.size(); ++m) {
     const inference::Effect& effect = system.effects()[set[m]];
     FoundEffect found{.name = effect.name,
@@ -119,6 +132,7 @@ std::vector<FoundEffect> found_effects(const NeedleSystem& system, const Search&
     if (const auto at = search.visited().find(rest); at != search.visited().end())
       found.log_bayes_factor =
           search.visited().at(set).log_posterior() - at->second.log_posterior() - search.rules().log_prior_odds_effect;
+    found.moved_at_depth_mm = moved_by_member_mm(system, tip, m);
     out.push_back(std::move(found));
   }
   return out;
@@ -212,10 +226,12 @@ std::vector<Discrepancy> discrepancies_of(const NeedleSystem& system, const Sear
   std::vector<double> std_errors;
   for (Index i = 0; i < fit.curve_values.size(); ++i)
     std_errors.push_back(std::sqrt(std::max(0.0, covariance(fit.shared.size() + i, fit.shared.size() + i))));
+  const DiscrepancyValues values = model.discrepancy();
   return {{.curve = system.model_curve(fit.scales.curve->curve, {fit.curve_values.begin(), fit.curve_values.end()},
                                        std::move(std_errors)),
            .log_bayes_factor = search.visited().at(fit.layout.set()).at->log_bayes_factor_curve,
-           .visible_size = search.discrepancy().visible_size(*fit.scales.curve, fit.curve_values)}};
+           .visible_size = search.discrepancy().visible_size(*fit.scales.curve, fit.curve_values),
+           .moved_at_depth_mm = apart_at_depth_mm(system, tip_of(model, &values), tip_of(model, nullptr))}};
 }
 
 }  // namespace bevel::diagnosis

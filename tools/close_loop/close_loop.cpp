@@ -36,6 +36,7 @@ ClosedLoop close_the_loop(const Options& options, std::ostream& err) {
   diagnosis.logs = files.logs;
   diagnosis.threads = options.threads;
   diagnosis.quiet = options.quiet;
+  diagnosis.targets = 0;  // many more are steered to below
   diagnose::Found found = diagnose::find(diagnosis, err);
   loop.findings = std::move(found.findings);
   loop.made_of = std::move(found.made_of);

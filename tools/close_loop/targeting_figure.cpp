@@ -9,13 +9,11 @@
 #include <stdexcept>
 
 #include "diagnosis/parallel.hpp"
-#include "io/live_effects.hpp"
+#include "tools/steering/model_rig.hpp"
 
 namespace bevel::close_loop {
 namespace {
 
-constexpr double kLongest_mm = 110;    // the controller's workspace with room
-constexpr double kShareOfReach = 0.6;  // of the farthest that the needle bends to the side
 constexpr int kDirections = 6;
 constexpr std::array<double, 2> kDepthShares = {0.7, 1.0};
 constexpr std::uint64_t kBootstrapSeed = 20'260'101;
@@ -47,40 +45,13 @@ WithInterval mean_difference(const TargetingFigure& before, const TargetingFigur
   return bootstrap(falls, draws, mean);
 }
 
-// Unknowns of one recording, as another insertion might have them: angles anywhere, instants while the needle goes in.
-std::vector<model::ActiveEffect> for_one_insertion(const io::ModelFile& model, double duration_s, std::uint64_t seed) {
-  std::mt19937_64 random(seed ^ 0x9e3779b97f4a7c15ULL);
-  std::vector<model::ActiveEffect> effects = io::active_effects(model, "");
-  for (auto& active : effects) {
-    const auto& parameters = active.effect->parameters();
-    for (std::size_t i = 0; i < parameters.size(); ++i) {
-      if (parameters[i].scope != model::Scope::recording) continue;
-      const double low = parameters[i].periodic ? parameters[i].lower : 0.2 * duration_s;
-      const double high = parameters[i].periodic ? parameters[i].upper : 0.8 * duration_s;
-      active.parameters[i] = std::uniform_real_distribution<double>(low, high)(random);
-    }
-  }
-  return effects;
-}
-
 steering::Believed believed(const io::ModelFile& model, double forgiveness) {
-  steering::Believed out;
-  out.estimator.prior.needle = model.needle;
-  out.estimator.prior.variation = model.variation.value_or(model::Variation{});
-  out.estimator.effects = out.undone = io::live_effects(model.effects, model.discrepancies).active;
+  steering::Believed out = steering::believed_of(model);
   auto& process = out.estimator.process;
   for (double* noise : {&process.position_mm, &process.tilt_rad, &process.roll_rad, &process.roll_per_sqrt_rad,
                         &process.curvature_per_mm, &process.lambda1_per_rad, &process.lambda2})
     *noise *= forgiveness;
   return out;
-}
-
-steering::Cameras cameras_of(const diagnosis::RecordedCase& recorded, const inference::Noise& noise) {
-  steering::Cameras cameras;
-  cameras.ar1 = noise.ar1, cameras.frame_s = noise.frame_s;
-  for (std::size_t c = 0; c < recorded.channels.size(); ++c)
-    cameras.axes.push_back({recorded.channels[c].camera, recorded.channels[c].axis, noise.sigma[c]});
-  return cameras;
 }
 
 TargetingFigure summarised(const std::vector<steering::Insertion>& insertions, double inserted_mm, int draws) {
@@ -108,12 +79,8 @@ TargetingFigure summarised(const std::vector<steering::Insertion>& insertions, d
 std::vector<Eigen::Vector3d> choose_targets(const model::NeedleParameters& needle, double deepest_mm) {
   std::vector<Eigen::Vector3d> targets;
   for (const double share : kDepthShares) {
-    const double depth_mm = share * std::min(deepest_mm, kLongest_mm);
-    model::Pose tip;
-    while (tip.p_mm.z() < depth_mm &&
-           model::advance(tip, {1, 0, {needle.curvature_per_mm, 0}}, model::slip_parameters(needle))) {
-    }
-    const double radius_mm = kShareOfReach * tip.p_mm.head<2>().norm();
+    const double depth_mm = share * std::min(deepest_mm, steering::kDeepestTarget_mm);
+    const double radius_mm = steering::kShareOfFarthestAside * steering::farthest_aside_mm(needle, depth_mm);
     for (int i = 0; i < kDirections; ++i) {
       const double angle = 2 * std::numbers::pi * (i + 0.25) / kDirections;
       const Eigen::Vector3d target(radius_mm * std::cos(angle), radius_mm * std::sin(angle), depth_mm);
@@ -128,7 +95,7 @@ std::vector<Eigen::Vector3d> choose_targets(const model::NeedleParameters& needl
 
 TargetingFigures steer_all(const Models& models, const diagnosis::RecordedCase& recorded, const inference::Noise& noise,
                            const TargetingOptions& options) {
-  const steering::Cameras cameras = cameras_of(recorded, noise);
+  const steering::Cameras cameras = steering::cameras_of(recorded, noise);
   double deepest_mm = 0;
   for (const auto& recording : recorded.recordings)
     for (const auto& node : recording.motion.nodes)
@@ -158,7 +125,7 @@ TargetingFigures steer_all(const Models& models, const diagnosis::RecordedCase& 
     const steering::SteeredRig rig{.make_plant =
                                        [&] {
                                          return std::make_unique<rig::KinematicPlant>(
-                                             truth.needle, for_one_insertion(truth, nominal_s, seed), 0, own);
+                                             truth.needle, steering::for_one_insertion(truth, nominal_s, seed), 0, own);
                                        },
                                    .cameras = cameras};
     insertions[belief][i] = steering::steer(rig, beliefs[belief], figures.targets_mm[target], seed);

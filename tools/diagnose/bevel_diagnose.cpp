@@ -21,6 +21,7 @@ int main(int argc, char** argv) {
       .option("-m,--model", o.model_path, "the model in use (TOML)", true)
       .option("-o,--out", o.out_folder, "folder for verdict.json, report.html, model.toml and a proposed effect", true)
       .option("--threads", o.threads, "at work at once; the verdict does not depend on it", 1, 64)
+      .option("--targets", o.targets, "steered to in simulated time, before and after; 0: none", 0, 1000)
       .flag("-q,--quiet", o.quiet, "no progress on stderr");
   bevel::diagnose::end_on_signals("bevel-diagnose");
   return command_line.run(argc, argv, [&] { return bevel::diagnose::run(o, std::cout, std::cerr); });

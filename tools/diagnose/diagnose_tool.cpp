@@ -18,6 +18,7 @@
 #include "tools/diagnose/read_case.hpp"
 #include "tools/diagnose/report.hpp"
 #include "tools/diagnose/result_files.hpp"
+#include "tools/diagnose/steered.hpp"
 #include "tools/diagnose/verdict_json.hpp"
 
 namespace bevel::diagnose {
@@ -29,12 +30,6 @@ namespace {
 void print_parameter(std::ostream& out, const FoundParameter& p, const std::string& log) {
   out << "    " << in_words(p.name) << (log.empty() ? "" : " in " + log) << ": " << with_error(p.value, p.std_error)
       << ", 95 % " << interval(p.ci95) << (p.at_bound ? ", at its bound" : "") << '\n';
-}
-
-std::string listed(const std::vector<std::string>& names) {
-  std::string text;
-  for (const auto& name : names) text += (text.empty() ? "" : ", ") + name;
-  return text;
 }
 
 // What a fitted needle says of itself that nobody should take on trust.
@@ -81,6 +76,10 @@ Found find(const Options& options, std::ostream& err) {
     how.known.in_recording.push_back(io::active_effects(model, recording.name));
   how.progress = [&](const std::string& text) { progress.say(text); };
   Findings findings = diagnosis::diagnose(input.recorded, model.needle, how);
+  const double diagnosed_s = progress.seconds();
+  if (options.targets > 0 && findings.verdict != Verdict::nothing_missing) progress.say("steering to targets");
+  steer_to_targets(input.recorded, model, model_of(findings, model), {options.targets, options.threads}, findings);
+  if (findings.steered) findings.times.push_back({"steering to targets", progress.seconds() - diagnosed_s});
   findings.remarks.insert(findings.remarks.begin(), input.remarks.begin(), input.remarks.end());
   const auto on_needle = remarks_on_needle(findings);
   findings.remarks.insert(findings.remarks.end(), on_needle.begin(), on_needle.end());
@@ -96,7 +95,8 @@ void print_verdict(std::ostream& out, const Findings& f) {
   out << headline_of(f.verdict, f.two_groups) << ": " << f.sentence << "\n\n";
   for (const auto& effect : f.effects) {
     out << "  " << effect.name << "  probability " << probability(effect.probability)
-        << (effect.ambiguous_with.empty() ? "" : ", or " + listed(effect.ambiguous_with)) << '\n';
+        << (effect.ambiguous_with.empty() ? "" : ", or " + listed(effect.ambiguous_with, ", "))
+        << "; moves the tip at the deepest readings by " << measured(effect.moved_at_depth_mm, 2) << " mm\n";
     for (const auto& p : effect.parameters) print_parameter(out, p, "");
     for (const auto& r : effect.recordings)
       for (const auto& p : r.parameters) print_parameter(out, p, r.log);
@@ -127,6 +127,17 @@ void print_verdict(std::ostream& out, const Findings& f) {
     out << "  what was found moves the tip at the deepest readings by " << measured(moved->from_refitted_mm, 2)
         << " mm (rms over recordings) beside the needle refitted, by " << measured(moved->from_file_mm, 2)
         << " mm from where the model file as it stands has it\n";
+  for (const auto& one : f.discrepancies)
+    out << "  the discrepancy moves the tip at the deepest readings by " << measured(one.moved_at_depth_mm, 2)
+        << " mm\n";
+  if (f.steered)
+    out << "  steered in simulation to targets " << number(f.steered->depth_mm, 3) << " mm deep: as it stands "
+        << steered_in_words(f.steered->as_it_stands, f.steered->targets) << "; with what was found "
+        << steered_in_words(f.steered->found, f.steered->targets)
+        << (f.steered->not_known_live.empty() ? ""
+                                              : "; neither knows beforehand of " + listed(f.steered->not_known_live))
+        << '\n';
+  if (!f.not_steered.empty()) out << "  not steered to a target in simulation: " << f.not_steered << '\n';
   out << "  insertions differ by (standard deviation):";
   for (const auto& v : f.variation) out << (&v == f.variation.data() ? " " : ", ") << variation_in_words(v);
   out << '\n';
@@ -134,7 +145,7 @@ void print_verdict(std::ostream& out, const Findings& f) {
     out << "  " << (i == 0 ? "worst: " : "       ") << f.where[i].log << " " << f.where[i].channel << ", "
         << number(f.where[i].from_s) << " to " << number(f.where[i].to_s) << " s\n";
   if (const auto unseen = not_to_be_seen(f); !unseen.empty())
-    out << "  not to be seen in these recordings at its usual size: " << listed(unseen)
+    out << "  not to be seen in these recordings at its usual size: " << listed(unseen, ", ")
         << "; the page says which motions would show it\n";
   for (const auto& remark : f.remarks) out << "  - " << remark << '\n';
 }

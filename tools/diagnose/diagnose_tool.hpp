@@ -18,6 +18,7 @@ struct Options {
   std::vector<std::string> logs;               // or
   std::vector<std::string> baseline, changed;  // two groups, files and folders: what changed?
   int threads = 2;
+  int targets = 8;     // steered to in simulated time (steered.hpp); 0: none
   bool quiet = false;  // no progress on stderr
 };
 

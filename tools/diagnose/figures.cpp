@@ -67,6 +67,12 @@ std::string log_factor(double log_bayes_factor) {
   return fixed(log_bayes_factor, std::abs(log_bayes_factor) < 100 ? 1 : 0);
 }
 
+std::string listed(const std::vector<std::string>& names, const std::string& last) {
+  std::string text;
+  for (std::size_t i = 0; i < names.size(); ++i) text += (i == 0 ? "" : i + 1 == names.size() ? last : ", ") + names[i];
+  return text;
+}
+
 std::string variation_in_words(const diagnosis::VariationEstimate& v) {
   const bool relative = v.unit == "relative";
   const double scale = relative ? 100 : 1;
@@ -123,6 +129,13 @@ std::optional<MovedAtDepth> moved_at_depth(const diagnosis::Findings& f) {
   moved.from_file_mm = std::sqrt(from_file / static_cast<double>(count));
   moved.from_refitted_mm = std::sqrt(from_refitted / static_cast<double>(count));
   return moved;
+}
+
+std::string steered_in_words(const diagnosis::SteeredFigures& s, std::size_t targets) {
+  const std::string miss =
+      s.arrived == 0 ? "" : "median " + measured(s.median_mm, 2) + " mm, worst " + measured(s.worst_mm, 2) + " mm, ";
+  return miss + std::to_string(s.arrived) + " of " + std::to_string(targets) + " arrived" +
+         (s.stopped_by.empty() ? "" : " (else: " + s.stopped_by + ")");
 }
 
 std::string unit_of(std::string_view name) { return std::string(split(name).second); }

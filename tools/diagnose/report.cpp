@@ -15,12 +15,6 @@ using namespace bevel::diagnosis;  // NOLINT(google-build-using-namespace)
 
 namespace {
 
-std::string listed(const std::vector<std::string>& names, const std::string& last = " and ") {
-  std::string text;
-  for (std::size_t i = 0; i < names.size(); ++i) text += (i == 0 ? "" : i + 1 == names.size() ? last : ", ") + names[i];
-  return text;
-}
-
 std::vector<std::string> names_of(const std::vector<FoundEffect>& effects) {
   std::vector<std::string> names;
   for (const auto& effect : effects) names.push_back(effect.name);
@@ -112,10 +106,23 @@ std::vector<report::Fact> figures_of_verdict(const Findings& f) {
                      (one_model ? "by refitting the needle"
                                 : measured(moved->from_file_mm, 2) + " mm from where the model file has it") +
                          std::string("; rms, ") + depths_of(*moved) + " mm deep"});
+  if (f.steered) {
+    const SteeredToTargets& s = *f.steered;
+    const auto miss = [](const SteeredFigures& figures) {
+      return figures.arrived == 0 ? std::string("none") : measured(figures.median_mm, 2);
+    };
+    const bool all = s.as_it_stands.arrived == s.targets && s.found.arrived == s.targets;
+    facts.push_back({"steered to a target, off by", miss(s.as_it_stands) + " → " + miss(s.found) + " mm",
+                     "as it stands, and with what was found; median of " + std::to_string(s.targets) +
+                         (all ? ""
+                              : ", of which " + std::to_string(s.as_it_stands.arrived) + " and " +
+                                    std::to_string(s.found.arrived) + " arrived")});
+  }
   for (const auto& effect : f.effects)
     facts.push_back({effect.name, probability(effect.probability),
-                     effect.ambiguous_with.empty() ? "probability; no rival"
-                                                   : "probability; or " + listed(effect.ambiguous_with, " or ")});
+                     (effect.ambiguous_with.empty() ? "probability; no rival"
+                                                    : "probability; or " + listed(effect.ambiguous_with, " or ")) +
+                         std::string("; moves the tip by ") + measured(effect.moved_at_depth_mm, 2) + " mm"});
   if (!f.discrepancies.empty())
     facts.push_back({"unknown part", meaning_of(f.discrepancies.front()),
                      "against " + in_words(model::name_of(f.discrepancies.front().curve.covariate))});
@@ -389,6 +396,7 @@ std::string report_html(const Findings& findings, const Provenance& made_of) {
   add_what_to_do(page, findings);
   add_parameters(page, findings);
   add_variation(page, findings);
+  add_at_target(page, findings);
   add_location(page, findings);
   add_unknown_part(page, findings);
   add_residuals(page, findings);

@@ -16,6 +16,7 @@ void add_verdict(report::Page& page, const diagnosis::Findings& findings);
 void add_what_to_do(report::Page& page, const diagnosis::Findings& findings);
 void add_parameters(report::Page& page, const diagnosis::Findings& findings);
 void add_variation(report::Page& page, const diagnosis::Findings& findings);
+void add_at_target(report::Page& page, const diagnosis::Findings& findings);  // in millimetres there
 void add_location(report::Page& page, const diagnosis::Findings& findings);
 void add_unknown_part(report::Page& page, const diagnosis::Findings& findings);
 void add_residuals(report::Page& page, const diagnosis::Findings& findings);

@@ -41,6 +41,7 @@ json as_json(const FoundEffect& effect) {
   one["meaning"] = effect.meaning;
   one["log_bayes_factor"] = figure(effect.log_bayes_factor);
   one["visible_sigmas"] = figure(effect.visible_sigmas);
+  one["moved_at_depth_mm"] = figure(effect.moved_at_depth_mm);
   return one;
 }
 
@@ -145,7 +146,8 @@ json as_json(const std::vector<Discrepancy>& discrepancies) {
                    {"values", figures(d.curve.values)},
                    {"std_errors", figures(d.curve.std_errors)},
                    {"log_bayes_factor", figure(d.log_bayes_factor)},
-                   {"visible_size", figure(d.visible_size)}});
+                   {"visible_size", figure(d.visible_size)},
+                   {"moved_at_depth_mm", figure(d.moved_at_depth_mm)}});
   return all;
 }
 
@@ -206,6 +208,21 @@ json experiment_json(const std::optional<NextExperiment>& next) {
           {"expected_gain", figure(next->expected_gain)}};
 }
 
+json as_json(const SteeredFigures& s) {
+  return {{"arrived", s.arrived},
+          {"median_mm", figure(s.median_mm)},
+          {"worst_mm", figure(s.worst_mm)},
+          {"stopped_by", s.stopped_by}};
+}
+
+json steered_json(const Findings& f) {
+  if (!f.not_steered.empty()) return {{"why_not", f.not_steered}};
+  if (!f.steered) return nullptr;
+  return {{"targets", f.steered->targets},           {"seed", f.steered->seed},
+          {"depth_mm", figure(f.steered->depth_mm)}, {"as_it_stands", as_json(f.steered->as_it_stands)},
+          {"found", as_json(f.steered->found)},      {"not_known_live", f.steered->not_known_live}};
+}
+
 json confusion_json(const Findings& f) {
   json rows = json::array();
   for (Eigen::Index i = 0; i < f.confusion.rows(); ++i)
@@ -240,6 +257,7 @@ std::string verdict_json(const Findings& f, const Provenance& made_of) {
   j["next_experiment"] = experiment_json(f.next_experiment);
   if (!f.two_groups)  // else it is held by the common errors, not measured
     j["needle"] = {{"before", as_json(f.base)}, {"after", as_json(f.needle)}};
+  j["steered"] = steered_json(f);
   j["posterior"] = {{"nothing_missing", figure(f.nothing_probability)},
                     {"discrepancy", figure(f.discrepancy_probability)},
                     {"not_fitted", figure(f.not_visited)},

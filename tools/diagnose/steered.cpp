@@ -1,0 +1,131 @@
+#include "tools/diagnose/steered.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <map>
+#include <numbers>
+#include <random>
+#include <stdexcept>
+
+#include "diagnosis/parallel.hpp"
+#include "diagnosis/statistics/median.hpp"
+#include "io/live_effects.hpp"
+#include "tools/diagnose/figures.hpp"
+#include "tools/steering/model_rig.hpp"
+
+namespace bevel::diagnose {
+
+using namespace bevel::diagnosis;  // NOLINT(google-build-using-namespace): the tool speaks of nothing else
+
+namespace {
+
+constexpr std::uint64_t kSeed = 20'260'102;
+constexpr double kShallowest_mm = 30;  // a target nearer leaves no way to steer on
+constexpr double k95 = 1.96;
+
+bool moves_the_tip(const Findings& f) {
+  const auto moves = [](const auto& part) { return !(part.moved_at_depth_mm <= 0); };  // NaN: more than can be said
+  return std::ranges::any_of(f.effects, moves) || std::ranges::any_of(f.discrepancies, moves);
+}
+
+// Why nobody could steer by this, in a clause; "" if nothing is in the way.
+std::string obstacle_to_steering(const RecordedCase& recorded, const Findings& f, const io::ModelFile& in_use,
+                                 double depth_mm) {
+  const auto k = [](double value) { return number(value) + " 1/mm"; };
+  if (!recorded.has_clock) return "the recordings have no clock";
+  if (f.needle.value.curvature_per_mm <= k95 * f.needle.curvature_sd_per_mm)
+    return "k " + with_error(f.needle.value.curvature_per_mm, f.needle.curvature_sd_per_mm) +
+           " 1/mm is not above zero with 95 %";
+  if (in_use.needle.curvature_per_mm <= 0)
+    return "k of the model file, " + k(in_use.needle.curvature_per_mm) + ", is not above zero";
+  if (depth_mm < kShallowest_mm)
+    return "the recordings reach " + number(depth_mm) + " mm, and " + number(kShallowest_mm) + " are needed";
+  return "";
+}
+
+// Uniform over a disc at this depth.
+std::vector<Eigen::Vector3d> draw_targets(int count, double depth_mm, const model::NeedleParameters& one,
+                                          const model::NeedleParameters& other) {
+  constexpr int kTries = 20;  // for each
+  constexpr double kTolerance_mm = 1;
+  const double widest_mm = steering::kShareOfFarthestAside * std::min(steering::farthest_aside_mm(one, depth_mm),
+                                                                      steering::farthest_aside_mm(other, depth_mm));
+  std::mt19937_64 random(kSeed);
+  std::uniform_real_distribution<double> share(0, 1);
+  std::vector<Eigen::Vector3d> targets;
+  for (int tried = 0; tried < kTries * count && std::ssize(targets) < count; ++tried) {
+    const double aside_mm = widest_mm * std::sqrt(share(random));
+    const double angle_rad = 2 * std::numbers::pi * share(random);
+    const Eigen::Vector3d target_mm(aside_mm * std::cos(angle_rad), aside_mm * std::sin(angle_rad), depth_mm);
+    if (controller::predict_reach({}, one, target_mm, kTolerance_mm).reachable &&
+        controller::predict_reach({}, other, target_mm, kTolerance_mm).reachable)
+      targets.push_back(target_mm);
+  }
+  return targets;
+}
+
+SteeredFigures figures_of(const std::vector<steering::Insertion>& insertions) {
+  std::vector<double> miss_mm;
+  std::map<std::string, int> reasons;
+  for (const auto& one : insertions) {
+    if (one.arrived)
+      miss_mm.push_back(one.miss_mm);
+    else
+      ++reasons[one.reason == controller::Reason::none ? "not there in time" : controller::to_string(one.reason)];
+  }
+  SteeredFigures out{.arrived = miss_mm.size()};
+  out.median_mm = out.worst_mm = std::numeric_limits<double>::quiet_NaN();
+  if (!miss_mm.empty()) out.median_mm = median(miss_mm), out.worst_mm = std::ranges::max(miss_mm);
+  if (!reasons.empty()) out.stopped_by = std::ranges::max_element(reasons, {}, [](auto& r) { return r.second; })->first;
+  return out;
+}
+
+SteeredToTargets steer(const RecordedCase& recorded, const io::ModelFile& in_use, const io::ModelFile& found,
+                       const inference::Noise& noise, const std::vector<Eigen::Vector3d>& targets_mm, int threads) {
+  SteeredToTargets out{.targets = targets_mm.size(), .seed = kSeed, .depth_mm = targets_mm.front().z()};
+  const steering::Cameras cameras = steering::cameras_of(recorded, noise);
+  const std::array<steering::Believed, 2> believed = {steering::believed_of(in_use), steering::believed_of(found)};
+  const double duration_s = out.depth_mm / controller::SteeringLimits{}.insertion_rate_mm_s;
+  std::array<std::vector<steering::Insertion>, 2> insertions;
+  for (auto& all : insertions) all.resize(out.targets);
+  parallel_for(2 * out.targets, threads, [&](std::size_t job) {
+    const std::size_t belief = job % 2, target = job / 2;
+    const std::uint64_t seed = kSeed + target;
+    const steering::SteeredRig rig{.make_plant =
+                                       [&] {
+                                         return std::make_unique<rig::KinematicPlant>(
+                                             found.needle, steering::for_one_insertion(found, duration_s, seed));
+                                       },
+                                   .cameras = cameras};
+    insertions[belief][target] = steering::steer(rig, believed[belief], targets_mm[target], seed);
+  });
+  out.as_it_stands = figures_of(insertions[0]);
+  out.found = figures_of(insertions[1]);
+  for (const auto& entry : found.effects)
+    if (!io::unknown_beforehand(entry).empty()) out.not_known_live.push_back(entry.name);
+  return out;
+}
+
+}  // namespace
+
+void steer_to_targets(const RecordedCase& recorded, const io::ModelFile& in_use, const io::ModelFile& found,
+                      const SteeringOptions& options, Findings& f) {
+  const auto moved = moved_at_depth(f);
+  if (options.targets < 1 || f.two_groups || !moved || !moves_the_tip(f)) return;
+  const double depth_mm = std::min(moved->depth_mm[1], steering::kDeepestTarget_mm);
+  f.not_steered = obstacle_to_steering(recorded, f, in_use, depth_mm);
+  if (!f.not_steered.empty()) return;
+  const auto targets_mm = draw_targets(options.targets, depth_mm, in_use.needle, found.needle);
+  if (targets_mm.empty()) {
+    f.not_steered = "no target " + number(depth_mm) + " mm deep is within the needle's reach";
+    return;
+  }
+  try {
+    f.steered = steer(recorded, in_use, found, f.noise, targets_mm, options.threads);
+  } catch (const std::logic_error& e) {  // a model that estimator or controller refuses is no reason to lose the rest
+    f.not_steered = e.what();
+  }
+}
+
+}  // namespace bevel::diagnose
