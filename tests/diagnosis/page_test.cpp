@@ -103,6 +103,31 @@ TEST(Page, says_by_how_much_the_tip_is_moved_at_depth) {
               HasSubstr("tip at the target&#39;s depth moved by"));
 }
 
+TEST(Page, says_what_a_target_is_missed_by) {
+  diagnosis::Findings f;
+  f.sentence = "A play.";
+  f.effects.emplace_back();
+  f.effects.back().name = "rotation_backlash";
+  f.effects.back().probability = 0.98;
+  f.effects.back().moved_at_depth_mm = 1.7;
+  EXPECT_THAT(report_html(f, {}), Not(HasSubstr("estimator and controller believe")));
+  f.steered = diagnosis::SteeredToTargets{
+      .targets = 8,
+      .seed = 5,
+      .depth_mm = {81, 90},
+      .as_it_stands = {.arrived = 7, .median_mm = 1.86, .worst_mm = 4.4, .stopped_by = "needle state unhealthy"},
+      .found = {.arrived = 8, .median_mm = 0.06, .worst_mm = 0.11}};
+  const std::string html = report_html(f, {});
+  EXPECT_THAT(html, HasSubstr("moves the tip by 1.7 mm"));
+  EXPECT_THAT(html, HasSubstr("1.9 → 0.060 mm"));
+  EXPECT_THAT(html, HasSubstr("7 of 8"));
+  EXPECT_THAT(html, HasSubstr("needle state unhealthy"));
+  EXPECT_THAT(html, HasSubstr("81 to 90 mm deep"));
+  f.steered.reset();
+  f.not_steered = "the recordings have no clock";
+  EXPECT_THAT(report_html(f, {}), HasSubstr("the recordings have no clock"));
+}
+
 // Figures that the diagnosis may leave empty.
 TEST(Page, holds_when_findings_are_bare) {
   diagnosis::Findings bare;
