@@ -191,7 +191,7 @@ struct SteeredFigures {
 struct SteeredToTargets {
   std::size_t targets = 0;
   std::uint64_t seed = 0;
-  double depth_mm = 0;  // of the targets, along z
+  std::array<double, 2> depth_mm{};  // of the targets, along z: from, to
   SteeredFigures as_it_stands{}, found{};
   std::vector<std::string> not_known_live{};  // effects that no software knows of an insertion beforehand
 };

@@ -131,7 +131,7 @@ void print_verdict(std::ostream& out, const Findings& f) {
     out << "  the discrepancy moves the tip at the deepest readings by " << measured(one.moved_at_depth_mm, 2)
         << " mm\n";
   if (f.steered)
-    out << "  steered in simulation to targets " << number(f.steered->depth_mm, 3) << " mm deep: as it stands "
+    out << "  steered in simulation to targets " << span_mm(*f.steered) << " deep: as it stands "
         << steered_in_words(f.steered->as_it_stands, f.steered->targets) << "; with what was found "
         << steered_in_words(f.steered->found, f.steered->targets)
         << (f.steered->not_known_live.empty() ? ""

@@ -138,6 +138,10 @@ std::string steered_in_words(const diagnosis::SteeredFigures& s, std::size_t tar
          (s.stopped_by.empty() ? "" : " (else: " + s.stopped_by + ")");
 }
 
+std::string span_mm(const diagnosis::SteeredToTargets& s) {
+  return number(s.depth_mm[0], 2) + " to " + number(s.depth_mm[1], 2) + " mm";
+}
+
 std::string unit_of(std::string_view name) { return std::string(split(name).second); }
 
 std::string in_words(std::string_view name) {

@@ -31,8 +31,7 @@ void add_steered(report::Page& page, const Findings& f) {
   };
   page.table({"estimator and controller believe", "median miss (mm)", "worst (mm)", "arrived", "stopped by"},
              {row("the model file as it stands", s.as_it_stands), row("the model that was found", s.found)},
-             "Steered in simulated time to targets drawn " + number(s.depth_mm, 3) + " mm deep (seed " +
-                 std::to_string(s.seed) +
+             "Steered in simulated time to targets drawn " + span_mm(s) + " deep (seed " + std::to_string(s.seed) +
                  "), the rig being the model that was found, with the noise of these recordings: from the true tip to "
                  "the target, where the needle came to rest, of those that arrived.");
   if (!s.not_known_live.empty())

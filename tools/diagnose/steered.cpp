@@ -21,7 +21,8 @@ using namespace bevel::diagnosis;  // NOLINT(google-build-using-namespace): the 
 namespace {
 
 constexpr std::uint64_t kSeed = 20'260'102;
-constexpr double kShallowest_mm = 30;  // a target nearer leaves no way to steer on
+constexpr double kShallowest_mm = 30;     // a target nearer leaves no way to steer on
+constexpr double kShallowestShare = 0.9;  // of the recordings' depth
 constexpr double k95 = 1.96;
 
 bool moves_the_tip(const Findings& f) {
@@ -44,20 +45,22 @@ std::string obstacle_to_steering(const RecordedCase& recorded, const Findings& f
   return "";
 }
 
-// Uniform over a disc at this depth.
-std::vector<Eigen::Vector3d> draw_targets(int count, double depth_mm, const model::NeedleParameters& one,
-                                          const model::NeedleParameters& other) {
+// Uniform over a disc of what both needles reach at the shallowest, and over the depths: at one depth alone, a tip that
+// moves in jumps would meet all targets between the same two.
+std::vector<Eigen::Vector3d> draw_targets(int count, const std::array<double, 2>& depth_mm,
+                                          const model::NeedleParameters& one, const model::NeedleParameters& other) {
   constexpr int kTries = 20;  // for each
   constexpr double kTolerance_mm = 1;
-  const double widest_mm = steering::kShareOfFarthestAside * std::min(steering::farthest_aside_mm(one, depth_mm),
-                                                                      steering::farthest_aside_mm(other, depth_mm));
+  const double widest_mm = steering::kShareOfFarthestAside * std::min(steering::farthest_aside_mm(one, depth_mm[0]),
+                                                                      steering::farthest_aside_mm(other, depth_mm[0]));
   std::mt19937_64 random(kSeed);
   std::uniform_real_distribution<double> share(0, 1);
   std::vector<Eigen::Vector3d> targets;
   for (int tried = 0; tried < kTries * count && std::ssize(targets) < count; ++tried) {
     const double aside_mm = widest_mm * std::sqrt(share(random));
     const double angle_rad = 2 * std::numbers::pi * share(random);
-    const Eigen::Vector3d target_mm(aside_mm * std::cos(angle_rad), aside_mm * std::sin(angle_rad), depth_mm);
+    const double z_mm = std::lerp(depth_mm[0], depth_mm[1], share(random));
+    const Eigen::Vector3d target_mm(aside_mm * std::cos(angle_rad), aside_mm * std::sin(angle_rad), z_mm);
     if (controller::predict_reach({}, one, target_mm, kTolerance_mm).reachable &&
         controller::predict_reach({}, other, target_mm, kTolerance_mm).reachable)
       targets.push_back(target_mm);
@@ -82,11 +85,12 @@ SteeredFigures figures_of(const std::vector<steering::Insertion>& insertions) {
 }
 
 SteeredToTargets steer(const RecordedCase& recorded, const io::ModelFile& in_use, const io::ModelFile& found,
-                       const inference::Noise& noise, const std::vector<Eigen::Vector3d>& targets_mm, int threads) {
-  SteeredToTargets out{.targets = targets_mm.size(), .seed = kSeed, .depth_mm = targets_mm.front().z()};
+                       const inference::Noise& noise, const std::array<double, 2>& depth_mm,
+                       const std::vector<Eigen::Vector3d>& targets_mm, int threads) {
+  SteeredToTargets out{.targets = targets_mm.size(), .seed = kSeed, .depth_mm = depth_mm};
   const steering::Cameras cameras = steering::cameras_of(recorded, noise);
   const std::array<steering::Believed, 2> believed = {steering::believed_of(in_use), steering::believed_of(found)};
-  const double duration_s = out.depth_mm / controller::SteeringLimits{}.insertion_rate_mm_s;
+  const double duration_s = depth_mm[1] / controller::SteeringLimits{}.insertion_rate_mm_s;
   std::array<std::vector<steering::Insertion>, 2> insertions;
   for (auto& all : insertions) all.resize(out.targets);
   parallel_for(2 * out.targets, threads, [&](std::size_t job) {
@@ -113,16 +117,17 @@ void steer_to_targets(const RecordedCase& recorded, const io::ModelFile& in_use,
                       const SteeringOptions& options, Findings& f) {
   const auto moved = moved_at_depth(f);
   if (options.targets < 1 || f.two_groups || !moved || !moves_the_tip(f)) return;
-  const double depth_mm = std::min(moved->depth_mm[1], steering::kDeepestTarget_mm);
-  f.not_steered = obstacle_to_steering(recorded, f, in_use, depth_mm);
+  const double deepest_mm = std::min(moved->depth_mm[1], steering::kDeepestTarget_mm);
+  f.not_steered = obstacle_to_steering(recorded, f, in_use, deepest_mm);
   if (!f.not_steered.empty()) return;
+  const std::array<double, 2> depth_mm{kShallowestShare * deepest_mm, deepest_mm};
   const auto targets_mm = draw_targets(options.targets, depth_mm, in_use.needle, found.needle);
   if (targets_mm.empty()) {
-    f.not_steered = "no target " + number(depth_mm) + " mm deep is within the needle's reach";
+    f.not_steered = "no target " + number(deepest_mm) + " mm deep is within the needle's reach";
     return;
   }
   try {
-    f.steered = steer(recorded, in_use, found, f.noise, targets_mm, options.threads);
+    f.steered = steer(recorded, in_use, found, f.noise, depth_mm, targets_mm, options.threads);
   } catch (const std::logic_error& e) {  // a model that estimator or controller refuses is no reason to lose the rest
     f.not_steered = e.what();
   }

@@ -218,9 +218,12 @@ json as_json(const SteeredFigures& s) {
 json steered_json(const Findings& f) {
   if (!f.not_steered.empty()) return {{"why_not", f.not_steered}};
   if (!f.steered) return nullptr;
-  return {{"targets", f.steered->targets},           {"seed", f.steered->seed},
-          {"depth_mm", figure(f.steered->depth_mm)}, {"as_it_stands", as_json(f.steered->as_it_stands)},
-          {"found", as_json(f.steered->found)},      {"not_known_live", f.steered->not_known_live}};
+  return {{"targets", f.steered->targets},
+          {"seed", f.steered->seed},
+          {"depth_mm", {figure(f.steered->depth_mm[0]), figure(f.steered->depth_mm[1])}},
+          {"as_it_stands", as_json(f.steered->as_it_stands)},
+          {"found", as_json(f.steered->found)},
+          {"not_known_live", f.steered->not_known_live}};
 }
 
 json confusion_json(const Findings& f) {
