@@ -69,6 +69,7 @@ FoundEffect windup() {
   effect.parameters = {{"lag_at_100mm_rad", 0.8234, 0.031, {0.763, 0.889}, false}};
   effect.log_bayes_factor = 148;
   effect.visible_sigmas = 17;
+  effect.moved_at_depth_mm = 1.83;
   return effect;
 }
 
@@ -82,6 +83,7 @@ FoundEffect lost_steps() {
                        {"rec04.lcm", {{"at_s", 2.411, 0.03, {2.36, 2.47}, false}}}};
   effect.log_bayes_factor = 1080;
   effect.visible_sigmas = 47;
+  effect.moved_at_depth_mm = kNone;
   return effect;
 }
 
@@ -214,6 +216,12 @@ Findings made_up(Verdict verdict) {
   f.sentence =
       "The tip lags behind the base when it turns, by more the deeper the needle, and rotation steps were lost.";
   f.effects = {windup(), lost_steps()};
+  f.steered = {.targets = 8,
+               .seed = 20'260'102,
+               .depth_mm = {55.8, 62},
+               .as_it_stands = {.arrived = 7, .median_mm = 1.94, .worst_mm = 3.1, .stopped_by = "workspace"},
+               .found = {.arrived = 8, .median_mm = 0.052, .worst_mm = 0.11},
+               .not_known_live = {"lost_steps"}};
   f.where = {{"rec03.lcm", "tip.y", 3.1, 5.0, "depth_mm", {30, 52}, 0.42},
              {"rec07.lcm", "tip.x", 7.1, 8.3, "since_reversal_mm", {2, 9}, 0.13},
              {"rec05.lcm", "tip.y", 9.0, 10.4, "depth_mm", {52, 60}, 0.08}};
@@ -223,6 +231,7 @@ Findings made_up(Verdict verdict) {
   if (verdict == Verdict::nothing_missing) {
     f.sentence = "These recordings show no missing physics.";
     f.effects.clear();
+    f.steered.reset();
     f.where.clear();
     f.next_experiment.reset();
     f.held_out.before = f.held_out.after = figures(0.249, 0.88, 1.008);
@@ -230,6 +239,8 @@ Findings made_up(Verdict verdict) {
   if (verdict == Verdict::unknown_effect) {
     f.sentence = "Something is missing that no listed effect explains: the curvature depends on time.";
     f.effects.pop_back();
+    f.steered.reset();
+    f.not_steered = "the recordings have no clock";
     f.held_out.after = figures(0.82, 2.71, 9.4);
     f.checks = {7.4, {0.965, 1.036}, 1e-14, false};
     f.discrepancies = {{.curve = {.component = model::DiscrepancyComponent::curvature_bevel,
@@ -238,7 +249,8 @@ Findings made_up(Verdict verdict) {
                                   .values = {0, 1e-4, 3e-4, 4e-4, 6e-4, 8e-4, 9e-4},
                                   .std_errors = {4e-5, 3e-5, 3e-5, 3e-5, 4e-5, 6e-5, 9e-5}},
                         .log_bayes_factor = 1150,
-                        .visible_size = 3.1}};
+                        .visible_size = 3.1,
+                        .moved_at_depth_mm = 0.74}};
   }
   if (verdict == Verdict::unknown_effect)
     f.proposals = {{.component = model::DiscrepancyComponent::curvature_bevel,

@@ -51,6 +51,13 @@ TEST(Page, effects_found_names_them_with_sizes_and_rivals) {
   EXPECT_THAT(html, HasSubstr("<span>its needle refitted</span><b>1.21 mm</b>"));
   EXPECT_THAT(html, HasSubstr("<span>with what was found</span><b>0.264 mm</b>"));
   EXPECT_THAT(html, HasSubstr("at (s), rec03.lcm"));
+  // In millimetres at the target: by each part, and by closed loop.
+  EXPECT_THAT(html, HasSubstr("<span>steered to a target, off by</span><b>1.9 → 0.052 mm</b>"));
+  EXPECT_THAT(html, HasSubstr("median of 8, of which 7 and 8 arrived"));
+  EXPECT_THAT(html, HasSubstr("no rival; by how far it moves the tip is not known"));
+  EXPECT_THAT(html, HasSubstr("or rotation_backlash; moves the tip by 1.8 mm"));
+  EXPECT_THAT(html, HasSubstr("7 of 8"));
+  EXPECT_THAT(html, HasSubstr("differs from one to the next: lost_steps."));
   EXPECT_THAT(html, Not(HasSubstr("The unknown part")));
   // What each insertion has of its own, and both ways of predicting one.
   EXPECT_THAT(html, HasSubstr("one standard deviation between insertions"));

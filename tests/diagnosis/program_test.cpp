@@ -97,6 +97,21 @@ TEST_F(Program, FindsAConcealedEffectAndWritesAllThreeFiles) {
   EXPECT_DOUBLE_EQ(model.effects[0].parameters.at("ratio"), ratio["value"].get<double>());
   EXPECT_GT(fs::file_size(folder / "out/report.html"), 50'000U);
 
+  // Eight hundredths of the way, 60 mm and more: the tip is moved by millimetres, and nobody who does not know of it
+  // comes as near to a target.
+  EXPECT_GT(verdict["effects"][0]["moved_at_depth_mm"].get<double>(), 3);
+  EXPECT_LT(verdict["effects"][0]["moved_at_depth_mm"].get<double>(), 8);
+  const auto& steered = verdict["steered"];
+  EXPECT_EQ(steered["targets"], 8);
+  EXPECT_EQ(steered["found"]["arrived"], 8);
+  EXPECT_LT(steered["found"]["worst_mm"].get<double>(), 0.5);
+  EXPECT_GE(steered["found"]["worst_mm"].get<double>(), steered["found"]["median_mm"].get<double>());
+  EXPECT_TRUE(steered["as_it_stands"]["arrived"] == 0 ||
+              steered["as_it_stands"]["median_mm"].get<double>() > steered["found"]["median_mm"].get<double>())
+      << steered;
+  EXPECT_EQ(steered["as_it_stands"]["arrived"] == 8, steered["as_it_stands"]["stopped_by"] == "");
+  EXPECT_THAT(said.out, HasSubstr("steered in simulation to targets"));
+
   // The same input: the same verdict, whatever the number of threads.
   ASSERT_EQ(run(usual("again", {"--threads", "1", "--quiet"})).status, 0);
   EXPECT_EQ(text_of(folder / "again/verdict.json"), text_of(folder / "out/verdict.json"));
@@ -123,6 +138,7 @@ TEST_F(Program, SaysWhatChangedBetweenTwoGroups) {
   EXPECT_EQ(verdict["verdict"], "unchanged");
   EXPECT_TRUE(verdict["effects"].empty());
   EXPECT_TRUE(verdict["changes"].empty());
+  EXPECT_TRUE(verdict["steered"].is_null());
   EXPECT_FALSE(verdict["detectable"].empty());
   EXPECT_FALSE(verdict.contains("needle"));
   EXPECT_TRUE(verdict["fit"]["recordings"].contains("changed/rec01.lcm"));
@@ -233,7 +249,7 @@ TEST_F(Program, UsageErrorsAreStatusTwo) {
                                                 {"--model", model_path, "--out", "x"},
                                                 {"--out", "x", "a.lcm"},
                                                 usual("out", {"--threads", "0", "a.lcm"}),
-                                                usual("out", {"--threads", "0", "a.lcm"})}) {
+                                                usual("out", {"--targets", "-1", "a.lcm"})}) {
     const Said said = run(words);
     EXPECT_EQ(said.status, 2) << said.err;
     EXPECT_THAT(said.err, Not(IsEmpty()));

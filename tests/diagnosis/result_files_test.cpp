@@ -65,6 +65,10 @@ TEST_F(Results, VerdictsFollowTheSchema) {
   std::ofstream(folder / "broken.json") << broken;
   EXPECT_NE(std::system((check + (folder / "broken.json").string() + " 2>/dev/null").c_str()), 0);
   broken = nlohmann::json::parse(text_of(folder / "found.json"));
+  broken["steered"]["found"].erase("arrived");
+  std::ofstream(folder / "broken.json") << broken;
+  EXPECT_NE(std::system((check + (folder / "broken.json").string() + " 2>/dev/null").c_str()), 0);
+  broken = nlohmann::json::parse(text_of(folder / "found.json"));
   broken["proposed_effect"] = {{"name", "of"}, {"file", "another verdict"}};
   std::ofstream(folder / "broken.json") << broken;
   EXPECT_NE(std::system((check + (folder / "broken.json").string() + " 2>/dev/null").c_str()), 0);
@@ -79,6 +83,13 @@ TEST_F(Results, TheVerdictSaysWhatWasFound) {
   EXPECT_DOUBLE_EQ(j["effects"][1]["recordings"]["rec03.lcm"]["at_s"]["value"], 3.309);
   EXPECT_EQ(j["where"][0]["range"][1], 52);
   EXPECT_EQ(j["fit"]["held_out"], "leave-one-recording-out");
+  EXPECT_DOUBLE_EQ(j["effects"][0]["moved_at_depth_mm"], 1.83);
+  EXPECT_TRUE(j["effects"][1]["moved_at_depth_mm"].is_null());
+  EXPECT_EQ(j["steered"]["as_it_stands"]["arrived"], 7);
+  EXPECT_DOUBLE_EQ(j["steered"]["found"]["median_mm"], 0.052);
+  EXPECT_TRUE(nlohmann::json::parse(verdict_json(made_up(Verdict::nothing_missing)))["steered"].is_null());
+  EXPECT_EQ(nlohmann::json::parse(verdict_json(made_up(Verdict::unknown_effect)))["steered"]["why_not"],
+            "the recordings have no clock");
   EXPECT_DOUBLE_EQ(j["fit"]["after"]["chi2_per_dof"], 1.012);
   const auto& after = j["fit"]["predicted"]["after"];
   EXPECT_DOUBLE_EQ(after["new_insertion"]["share_in_95"], 0.951);

@@ -26,9 +26,13 @@ concealed = float(re.search(r"([\d.]+) mm was\s+concealed", page).group(1))
 assert jump["ci95"][0] - 5e-5 <= concealed <= jump["ci95"][1] + 5e-5, (jump, concealed)  # the page rounds
 before, after = (verdict["fit"][w]["chi2_per_dof"] for w in ("before", "after"))
 assert (f"{before:.1f}", f"{after:.1f}") == ("2.2", "1.0"), (before, after)
-moved = verdict["effects"][0]["moved_at_depth_mm"]
-assert 0 < moved < 0.8725, moved  # nowhere by more than a jump
-assert verdict["steered"]["targets"] == 8 and verdict["steered"]["found"]["arrived"] == 8, verdict["steered"]
+# By a jump at most, all else as found; and steered, where it rests within a jump of the target.
+assert 0 < verdict["effects"][0]["moved_at_depth_mm"] <= 0.88, verdict["effects"]
+steered = verdict["steered"]
+for believed in ("as_it_stands", "found"):
+    figures = steered[believed]
+    assert figures["arrived"] == steered["targets"] == 8, steered
+    assert 0 < figures["median_mm"] <= figures["worst_mm"] < 1, steered
 assert "stick_slip" in open(sys.argv[1] + "/examples/stick_slip/report.html").read()
 EOF
 echo "ok: $count commands"

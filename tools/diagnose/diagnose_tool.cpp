@@ -95,8 +95,8 @@ void print_verdict(std::ostream& out, const Findings& f) {
   out << headline_of(f.verdict, f.two_groups) << ": " << f.sentence << "\n\n";
   for (const auto& effect : f.effects) {
     out << "  " << effect.name << "  probability " << probability(effect.probability)
-        << (effect.ambiguous_with.empty() ? "" : ", or " + listed(effect.ambiguous_with, ", "))
-        << "; moves the tip at the deepest readings by " << measured(effect.moved_at_depth_mm, 2) << " mm\n";
+        << (effect.ambiguous_with.empty() ? "" : ", or " + listed(effect.ambiguous_with, ", ")) << "; "
+        << moved_in_words(effect.moved_at_depth_mm) << " at the deepest readings\n";
     for (const auto& p : effect.parameters) print_parameter(out, p, "");
     for (const auto& r : effect.recordings)
       for (const auto& p : r.parameters) print_parameter(out, p, r.log);

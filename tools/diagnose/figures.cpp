@@ -131,6 +131,11 @@ std::optional<MovedAtDepth> moved_at_depth(const diagnosis::Findings& f) {
   return moved;
 }
 
+std::string moved_in_words(double moved_at_depth_mm) {
+  return std::isfinite(moved_at_depth_mm) ? "moves the tip by " + measured(moved_at_depth_mm, 2) + " mm"
+                                          : "by how far it moves the tip is not known";
+}
+
 std::string steered_in_words(const diagnosis::SteeredFigures& s, std::size_t targets) {
   const std::string miss =
       s.arrived == 0 ? "" : "median " + measured(s.median_mm, 2) + " mm, worst " + measured(s.worst_mm, 2) + " mm, ";

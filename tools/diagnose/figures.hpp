@@ -48,6 +48,8 @@ struct MovedAtDepth {
 };
 std::optional<MovedAtDepth> moved_at_depth(const diagnosis::Findings& findings);  // none without a recording
 
+// "moves the tip by 1.8 mm", at the deepest readings.
+std::string moved_in_words(double moved_at_depth_mm);
 // "median 0.31 mm, worst 0.8 mm, 7 of 8 arrived (the tip left the workspace)"
 std::string steered_in_words(const diagnosis::SteeredFigures& figures, std::size_t targets);
 

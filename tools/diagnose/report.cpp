@@ -119,10 +119,11 @@ std::vector<report::Fact> figures_of_verdict(const Findings& f) {
                                     std::to_string(s.found.arrived) + " arrived")});
   }
   for (const auto& effect : f.effects)
-    facts.push_back({effect.name, probability(effect.probability),
-                     (effect.ambiguous_with.empty() ? "probability; no rival"
-                                                    : "probability; or " + listed(effect.ambiguous_with, " or ")) +
-                         std::string("; moves the tip by ") + measured(effect.moved_at_depth_mm, 2) + " mm"});
+    facts.push_back(
+        {effect.name, probability(effect.probability),
+         (effect.ambiguous_with.empty() ? "probability; no rival; "
+                                        : "probability; or " + listed(effect.ambiguous_with, " or ") + "; ") +
+             moved_in_words(effect.moved_at_depth_mm)});
   if (!f.discrepancies.empty())
     facts.push_back({"unknown part", meaning_of(f.discrepancies.front()),
                      "against " + in_words(model::name_of(f.discrepancies.front().curve.covariate))});
