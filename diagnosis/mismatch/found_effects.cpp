@@ -82,10 +82,6 @@ std::vector<std::string> rivals_of(const Search& search, const ModelSet& set, st
   return {names.begin(), names.end()};
 }
 
-}  // namespace
-
-namespace {
-
 // Borrows `discrepancy`, which may be null.
 ModelledTip tip_of(const ChosenModel& model, const DiscrepancyValues* discrepancy) {
   const Fit& fit = *model.fit;

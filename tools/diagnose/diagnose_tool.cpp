@@ -77,7 +77,8 @@ Found find(const Options& options, std::ostream& err) {
   how.progress = [&](const std::string& text) { progress.say(text); };
   Findings findings = diagnosis::diagnose(input.recorded, model.needle, how);
   const double diagnosed_s = progress.seconds();
-  if (options.targets > 0 && findings.verdict != Verdict::nothing_missing) progress.say("steering to targets");
+  if (options.targets > 0 && !findings.two_groups && findings.verdict != Verdict::nothing_missing)
+    progress.say("steering to targets");
   steer_to_targets(input.recorded, model, model_of(findings, model), {options.targets, options.threads}, findings);
   if (findings.steered) findings.times.push_back({"steering to targets", progress.seconds() - diagnosed_s});
   findings.remarks.insert(findings.remarks.begin(), input.remarks.begin(), input.remarks.end());

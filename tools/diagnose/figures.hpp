@@ -50,9 +50,8 @@ std::optional<MovedAtDepth> moved_at_depth(const diagnosis::Findings& findings);
 
 // "moves the tip by 1.8 mm", at the deepest readings.
 std::string moved_in_words(double moved_at_depth_mm);
-// "median 0.31 mm, worst 0.8 mm, 7 of 8 arrived (the tip left the workspace)"
+// "median 0.31 mm, worst 0.8 mm, 7 of 8 arrived (else: workspace)"
 std::string steered_in_words(const diagnosis::SteeredFigures& figures, std::size_t targets);
-
 std::string span_mm(const diagnosis::SteeredToTargets& steered);  // "74 to 82 mm", of the targets' depths
 
 std::string headline_of(diagnosis::Verdict verdict, bool two_groups = false);  // "Effects found", ...
