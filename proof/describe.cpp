@@ -176,8 +176,8 @@ std::string describe_distribution() {
          "the "
          "sum of squares. An effect is visible from " +
          number(kVisible_sigmas) +
-         " on. The right answer names exactly the visible effects, \"unknown\" for those on no list, and nothing where "
-         "none is visible.\n\n"
+         " on. The right answer names the visible effects, \"unknown\" for those on no list, and beside them nothing "
+         "but what is concealed below that.\n\n"
          "`nearest`: the parameters at which the plain forms of all visible listed effects, with k, lambda1 and "
          "lambda2, "
          "come closest to the noise-free readings. An estimate by the plain forms is about these; what was drawn "

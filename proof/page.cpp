@@ -56,8 +56,8 @@ void shares(report::Page& page, const Tally& t) {
   page.heading("Verdicts");
   std::vector<ShareLine> lines{{"exact set, all of it visible", at(t.strict, "visible"), 0.9},
                                {"the same, counting ambiguous ones", at(t.lenient, "visible"), -1},
-                               {"one of two visible: that one", at(t.strict, "partly"), -1},
-                               {"nothing visible: silence", at(t.strict, "invisible"), -1},
+                               {"one of two visible: that one, or both", at(t.strict, "partly"), -1},
+                               {"nothing visible: silence, or what is concealed", at(t.strict, "invisible"), -1},
                                {"nothing concealed: silence", at(t.strict, "null"), 1.0},
                                {"all trials", at(t.strict, "all"), -1},
                                {"on no list: called unknown", t.unknown_called_unknown, 0.8},
@@ -68,8 +68,8 @@ void shares(report::Page& page, const Tally& t) {
                                {"held-out chi-square within 10 % of 1", t.chi2_at_floor, -1}};
   page.picture(share_figure(lines),
                "Shares with 95 % Wilson intervals; red ticks are goals. The right answer names "
-               "what could be seen: an effect of which less than 5 standard deviations remain "
-               "beyond k, lambda1 and lambda2 is to go unnamed. Abstentions count as wrong. Ambiguous: the truth "
+               "what could be seen; an effect of which less than 5 standard deviations remain "
+               "beyond k, lambda1 and lambda2 may be named or not. Abstentions count as wrong. Ambiguous: the truth "
                "stands in ambiguous_with, or "
                "an effect on no list is imitated below the limit by the listed one that was named.");
   std::vector<std::vector<std::string>> rows;

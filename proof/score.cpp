@@ -51,6 +51,22 @@ double probability_by(const PosteriorGiven& posterior, Names expected) {
   return std::clamp(p, 0.0, 1.0);
 }
 
+// What is right to say: all that is visible, and of what is concealed below that, any of it or nothing.
+std::vector<Names> right_answers(const OpenedTruth& truth) {
+  std::vector<Names> out{truth.expected};
+  std::ranges::sort(out.front());
+  std::set<std::string> faint;
+  for (const OpenedEffect& effect : truth.effects)
+    if (!holds(truth.expected, effect.name)) faint.insert(effect.name);
+  for (const std::string& name : faint)
+    for (std::size_t i = 0, known = out.size(); i < known; ++i) {
+      Names more = out[i];
+      more.insert(std::ranges::upper_bound(more, name), name);
+      out.push_back(std::move(more));
+    }
+  return out;
+}
+
 double probability_of(const Names& expected, const Verdict& verdict) {
   if (verdict.posterior) return probability_by(*verdict.posterior, expected);
   if (holds(expected, "unknown") != (verdict.kind == "unknown-effect")) return 0.0;
@@ -190,10 +206,14 @@ OpenedTruth parse_truth(std::string_view text) {
 TrialScore score_verdict(const OpenedTruth& truth, const Verdict& verdict) {
   TrialScore score = begin(truth);
   score.named = verdict.named();
-  score.strict = score.named == truth.expected;
   const bool imitated = score.named.size() == 1 && holds(truth.rivals, score.named[0]);
-  score.lenient = score.strict || imitated || matches_leniently(truth.expected, verdict);
-  score.probability_of_truth = probability_of(truth.expected, verdict);
+  score.lenient = imitated;
+  for (const Names& right : right_answers(truth)) {
+    score.strict = score.strict || score.named == right;
+    score.lenient = score.lenient || matches_leniently(right, verdict);
+    score.probability_of_truth += probability_of(right, verdict);
+  }
+  score.lenient = score.lenient || score.strict;
   score.probability_of_said = probability_of(score.named, verdict);
   for (FoundEffect& found : score.found) found.named = holds(score.named, found.name);
   for (const OpenedEffect& effect : truth.effects) {

@@ -74,9 +74,10 @@ struct TrialScore {
   std::vector<std::string> rivals;
   bool abstained = false;
   std::string abstention;  // why there is no verdict
-  bool strict = false;     // named is exactly what was expected
-  bool lenient = false;    // so it is, with names out of ambiguous_with, or of a rival
-  double probability_of_truth = 0, probability_of_said = 0;
+  bool strict = false;   // named is what was expected, and beside it nothing but what is concealed too faintly for that
+  bool lenient = false;  // so it is, with names out of ambiguous_with, or of a rival
+  double probability_of_truth = 0;  // of all that is right to say
+  double probability_of_said = 0;
   std::vector<FoundEffect> found;
   std::vector<ParameterScore> parameters;
   std::vector<LocationScore> locations;

@@ -14,12 +14,15 @@ bool holds(const std::vector<std::string>& names, const std::string& name) {
 
 // Each expected id against what was named for it: itself, something else that was not expected, or nothing. What was
 // named beyond that stands in a row of its own, since it is no alarm where there was nothing; where nothing was
-// expected, in the row of "none".
+// expected, in the row of "none". What is concealed too faintly to be expected is no row, named or not.
 void confuse(const TrialScore& score, Tally& tally) {
   std::vector<std::string> extra;
   std::vector<std::string> missed;
+  const auto concealed = [&](const std::string& name) {
+    return std::ranges::any_of(score.found, [&](const FoundEffect& found) { return found.name == name; });
+  };
   for (const auto& name : score.named)
-    if (!holds(score.expected, name)) extra.push_back(name);
+    if (!concealed(name)) extra.push_back(name);
   for (const auto& name : score.expected) {
     if (holds(score.named, name))
       ++tally.confusion[name][name];

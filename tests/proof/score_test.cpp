@@ -83,14 +83,23 @@ TEST(Score, AmbiguousCountsApart) {
           .lenient);
 }
 
-TEST(Score, BelowTheLimitSilenceIsRight) {
+// "Below that nothing-missing counts as right too": so does the name of what is concealed, and nothing else.
+TEST(Score, BelowTheLimitSilenceIsRightToo) {
   const OpenedTruth small = truth_of({windup(3)});
   EXPECT_EQ(score(small, "nothing-missing", {}).visibility, Visibility::invisible);
   EXPECT_TRUE(score(small, "nothing-missing", {}).strict);
-  EXPECT_FALSE(score(small, "effects-found", {effect("torsional_windup")}).strict);
+  EXPECT_TRUE(score(small, "effects-found", {effect("torsional_windup")}).strict);
+  EXPECT_FALSE(score(small, "effects-found", {effect("rotation_backlash")}).strict);
+  EXPECT_FALSE(score(small, "effects-found", {effect("torsional_windup"), effect("layer")}).strict);
+  EXPECT_FALSE(score(small, "unknown-effect", {effect("torsional_windup")}).strict);
   const OpenedTruth one_of_two = truth_of({windup(3), layer(30)});
   EXPECT_EQ(score(one_of_two, "effects-found", {effect("layer")}).visibility, Visibility::partly);
   EXPECT_TRUE(score(one_of_two, "effects-found", {effect("layer")}).strict);
+  EXPECT_TRUE(score(one_of_two, "effects-found", {effect("layer"), effect("torsional_windup")}).strict);
+  EXPECT_FALSE(score(one_of_two, "effects-found", {effect("torsional_windup")}).strict);
+  EXPECT_EQ(tally({score(one_of_two, "effects-found", {effect("layer"), effect("torsional_windup")})})
+                .confusion.count(kBeyond),
+            0U);
 }
 
 TEST(Score, UnknownEffects) {
