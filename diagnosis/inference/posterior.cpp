@@ -1,5 +1,7 @@
 #include "diagnosis/inference/posterior.hpp"
 
+#include <Eigen/Cholesky>
+#include <Eigen/LU>
 #include <algorithm>
 #include <boost/math/distributions/normal.hpp>
 #include <cmath>
@@ -11,6 +13,7 @@
 namespace bevel::inference {
 
 using Eigen::Index;
+using Eigen::MatrixXd;
 using Eigen::VectorXd;
 
 namespace {
@@ -31,7 +34,19 @@ ArrowSolution solve_without(const Fit& fit, const std::vector<ArrowBlock>& block
 
 }  // namespace
 
-Posterior posterior_of(const Search& search, double discrepancy_size) {
+double visible_sigmas_of_curve(const Search& search, const Fit& fit) {
+  const CurveColumns curve = curve_of(search, fit);
+  const auto blocks = linearise(*fit.likelihood, fit, curve);
+  if (blocks.empty()) return 0;
+  const MatrixXd information = solve_about(fit, blocks, curve, std::vector<Index>{}).information;
+  const Index shared = fit.shared.size(), values = fit.curve_values.size();
+  const MatrixXd across = information.topRightCorner(shared, values);
+  const MatrixXd visible = information.bottomRightCorner(values, values) - curve.covariance.inverse() -
+                           across.transpose() * information.topLeftCorner(shared, shared).ldlt().solve(across);
+  return std::sqrt(std::max(0.0, fit.curve_values.dot(visible * fit.curve_values)));
+}
+
+Posterior posterior_of(const Search& search, double visible_sigmas) {
   Posterior out;
   std::vector<double> logs;
   for (const auto& [set, one] : search.visited()) logs.push_back(one.log_posterior());
@@ -45,11 +60,9 @@ Posterior posterior_of(const Search& search, double discrepancy_size) {
     for (const std::size_t e : set) names.insert(effects[e].name);
     for (const auto& name : names) out.inclusion[name] += share.probability;
     double large = 0;
-    if (one.at->fit_with_curve) {
-      const Fit& fit = *one.at->fit_with_curve;
-      if (search.discrepancy().visible_size(*fit.scales.curve, fit.curve_values) > discrepancy_size)
-        large = share.with_discrepancy;
-    }
+    if (one.at->fit_with_curve && share.with_discrepancy > 0 &&
+        visible_sigmas_of_curve(search, *one.at->fit_with_curve) > visible_sigmas)
+      large = share.with_discrepancy;
     out.discrepancy += large;
     if (set.empty()) out.nothing += share.probability - large;
     out.sets.push_back(share);

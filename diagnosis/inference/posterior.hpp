@@ -17,13 +17,17 @@ struct Posterior {
   std::vector<SetShare> sets;               // the likeliest first
   double not_visited = 0;                   // the share of sets that were not fitted, by the linear model's estimate
   std::map<std::string, double> inclusion;  // of each effect by name: the sum over the sets that hold it
-  double discrepancy = 0;                   // probability of one whose visible part exceeds the size asked for
+  double discrepancy = 0;                   // probability of one as visible as was asked for
   double nothing = 0;                       // of neither an effect nor such a discrepancy
 };
 
-// discrepancy_size: root mean square of its visible part, in standard deviations of the noise; smaller ones are errors
-// of form, which widen intervals and are not called missing physics.
-Posterior posterior_of(const Search& search, double discrepancy_size);
+// visible_sigmas: from which a discrepancy counts; smaller ones are errors of form, which widen intervals and are not
+// called missing physics.
+Posterior posterior_of(const Search& search, double visible_sigmas);
+
+// Of a fit with a curve: its values, as far as the set's own unknowns and what the recordings have of their own do not
+// take their place, in standard deviations of the autocorrelated noise, root of the sum of squares over all readings.
+double visible_sigmas_of_curve(const Search& search, const Fit& fit);
 
 // The curve of a fit with one, whitened by the fit's own noise; none for a fit without.
 CurveColumns curve_of(const Search& search, const Fit& fit);

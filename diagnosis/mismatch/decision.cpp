@@ -29,40 +29,34 @@ ChosenModel model_of(const Search& search, const Fit& fit, double log_posterior)
 }
 
 Decision decide(const Search& search, const Posterior& posterior) {
-  Decision out;
   const double something = 1 - posterior.nothing;
   std::set<std::string> names;
-  bool unknown = false;
-  if (something > 0.5) {
+  if (something > 0.5)
     for (const auto& [name, probability] : posterior.inclusion)
       if (probability > 0.5 * something) names.insert(name);
-    unknown = posterior.discrepancy > 0.5 * something;
-    if (names.empty() && !unknown) {
-      // No name and no discrepancy by itself: the likeliest set, by its share without one.
-      double most = 0;
-      for (const auto& share : posterior.sets)
-        if (const double plain = share.probability - share.with_discrepancy; !share.set.empty() && plain > most)
-          names = names_of(search, share.set), most = plain;
-      unknown = names.empty() && posterior.discrepancy > 0;
+  // The likeliest of the sets that hold these names, or as many of them as any: it has another effect where that there
+  // is one is likelier than not, and rivals share it. By their shares with a discrepancy, or by those without.
+  const auto likeliest = [&](bool with_discrepancy) {
+    const inference::Visited* best = nullptr;
+    std::ptrdiff_t most = 0;
+    double highest = 0;
+    for (const auto& share : posterior.sets) {
+      const auto& one = search.visited().at(share.set);
+      if (with_discrepancy ? !one.at->fit_with_curve : share.set.empty()) continue;
+      const auto held = names_of(search, share.set);
+      const auto count =
+          std::count_if(names.begin(), names.end(), [&](const auto& name) { return held.contains(name); });
+      const double probability = with_discrepancy ? share.with_discrepancy : share.probability - share.with_discrepancy;
+      if (!best || count > most || (count == most && probability > highest))
+        best = &one, most = count, highest = probability;
     }
-  }
-  // The likeliest set of just these names; if none was visited, of those with as many of them as any.
-  const inference::Visited* best = nullptr;
-  std::size_t best_shared = 0;
-  const auto log = [&](const inference::Visited& v) { return unknown ? v.log_with_curve : v.log_without_curve; };
-  for (const auto& [set, one] : search.visited()) {
-    if (unknown && !one.at->fit_with_curve) continue;
-    const auto held = names_of(search, set);
-    const auto shared = static_cast<std::size_t>(
-        std::count_if(names.begin(), names.end(), [&](const auto& name) { return held.contains(name); }));
-    const std::size_t score = 2 * shared + (held == names ? 1 : 0);
-    if (!best || score > best_shared || (score == best_shared && log(one) > log(*best)))
-      best = &one, best_shared = score;
-  }
-  if (!best) {  // a discrepancy that no mode shows
-    unknown = false;
-    best = &search.visited().at({});
-  }
+    return best;
+  };
+  bool unknown = something > 0.5 && posterior.discrepancy > 0.5 * something;
+  const inference::Visited* best = something > 0.5 ? likeliest(unknown) : nullptr;
+  if (!best && something > 0.5 && posterior.discrepancy > 0) unknown = true, best = likeliest(true);
+  if (!best) unknown = false, best = &search.visited().at({});  // a discrepancy that no mode shows
+  Decision out;
   out.verdict = unknown             ? Verdict::unknown_effect
                 : best->set.empty() ? Verdict::nothing_missing
                                     : Verdict::effects_found;

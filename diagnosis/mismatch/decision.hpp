@@ -2,18 +2,18 @@
 // What the posterior says, as a verdict, and the model that stands for it.
 //
 //   nothing missing   neither an effect nor a discrepancy of any consequence is likelier than not
-//   otherwise, given that something is missing: an effect is named where it is likelier than not, and it is unknown
-//   where a discrepancy of consequence is. Where neither is (rivals share the probability), the likeliest set is named,
-//   and its rivals beside it.
+//   otherwise, given that something is missing: it is unknown where a discrepancy of consequence is likelier than not,
+//   and what is named is the likeliest of the sets that hold every effect which is likelier than not. Where rivals
+//   share the probability of one effect more, the likeliest of them is named, the others beside it.
 #include "diagnosis/inference/posterior.hpp"
 #include "diagnosis/mismatch/findings.hpp"
 #include "diagnosis/needle/needle_system.hpp"
 
 namespace bevel::diagnosis {
 
-// Root mean square over the readings, in standard deviations of one reading's noise, from which a discrepancy is of
-// consequence. Below it is an error of form that the intervals carry.
-inline constexpr double kDiscrepancySize = 0.5;
+// From so many standard deviations of the noise, summed over the recordings, an effect or a discrepancy counts as
+// visible. A smaller discrepancy is an error of form that the intervals carry, and of no consequence.
+inline constexpr double kVisibleSigmas = 5.0;
 
 // A model to write, to draw and to compare with: one mode of the posterior. Lives as long as the search.
 struct ChosenModel {

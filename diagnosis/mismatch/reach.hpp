@@ -5,9 +5,6 @@
 
 namespace bevel::diagnosis {
 
-// A size counts as visible from so many standard deviations of what the base cannot absorb, summed over the recordings.
-inline constexpr double kVisibleSigmas = 5.0;
-
 // base: the needle alone.
 void find_reach(const NeedleSystem& system, const inference::Search& search, const ChosenModel& base,
                 const Experiments& experiments, Findings& findings);

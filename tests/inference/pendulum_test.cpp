@@ -99,7 +99,7 @@ TEST(PendulumTest, ProbabilitiesAddUpAndHeldOutIsBetterWithWhatWasFound) {
   const Pendulum system(truth, 6, 21);
   Search search(system, {});
   search.run(Readings(6), white());
-  const Posterior posterior = posterior_of(search, 0.5);
+  const Posterior posterior = posterior_of(search, 5);
   double sum = posterior.not_visited;
   for (const auto& one : posterior.sets) {
     sum += one.probability;

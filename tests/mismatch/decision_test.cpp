@@ -33,7 +33,7 @@ struct Decide : ::testing::Test {
 };
 
 TEST_F(Decide, NamesWhatIsThere) {
-  const Decision decision = decide(search, posterior_of(search, kDiscrepancySize));
+  const Decision decision = decide(search, posterior_of(search, kVisibleSigmas));
   EXPECT_EQ(decision.verdict, Verdict::effects_found);
   EXPECT_EQ(set_of(decision), ModelSet{Pendulum::kDryFriction});
 }
@@ -58,10 +58,24 @@ TEST_F(Decide, OfRivalsOfWhichNoneIsLikelierThanNotTheLikeliest) {
   EXPECT_EQ(set_of(decision), ModelSet{Pendulum::kSensorScale});
 }
 
+// That there is a second effect is certain, which of two is not: leaving it out would say what is known to be wrong.
+TEST_F(Decide, ASecondEffectThatRivalsShareIsNamed) {
+  const ModelSet with_scale{Pendulum::kDryFriction, Pendulum::kSensorScale};
+  ASSERT_TRUE(search.visited().contains(with_scale));
+  Posterior posterior;
+  posterior.inclusion = {{"dry_friction", 1.0}, {"sensor_scale", 0.48}, {"another", 0.45}};
+  posterior.sets = {{with_scale, 0.48, 0.0}, {{Pendulum::kDryFriction}, 0.07, 0.0}};
+  EXPECT_EQ(set_of(decide(search, posterior)), with_scale);
+  // Where one effect is the likeliest explanation, there is one.
+  posterior.sets = {{{Pendulum::kDryFriction}, 0.55, 0.0}, {with_scale, 0.45, 0.0}};
+  EXPECT_EQ(set_of(decide(search, posterior)), ModelSet{Pendulum::kDryFriction});
+}
+
 TEST_F(Decide, UnknownCarriesACurveAndTheNamesThatStandBesideIt) {
   Posterior posterior;
   posterior.nothing = 0.05;
   posterior.discrepancy = 0.8;
+  posterior.sets = {{{}, 0.95, 0.9}, {{Pendulum::kDryFriction}, 0.05, 0.0}};
   const Decision decision = decide(search, posterior);
   EXPECT_EQ(decision.verdict, Verdict::unknown_effect);
   EXPECT_TRUE(decision.model.fit->scales.curve.has_value());
@@ -74,6 +88,7 @@ TEST_F(Decide, NamesThatNoVisitedSetHoldsTogetherAreNotClaimed) {
   Posterior posterior;
   posterior.nothing = 0.0;
   posterior.inclusion = {{"dry_friction", 0.9}, {"an effect of no set", 0.8}};
+  posterior.sets = {{{Pendulum::kDryFriction}, 0.4, 0.0}, {{Pendulum::kSensorScale}, 0.5, 0.0}};
   const Decision decision = decide(search, posterior);
   EXPECT_EQ(decision.verdict, Verdict::effects_found);
   EXPECT_TRUE(inference::contains(set_of(decision), Pendulum::kDryFriction));
