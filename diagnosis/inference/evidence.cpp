@@ -4,6 +4,7 @@
 #include <boost/math/special_functions/beta.hpp>
 #include <cmath>
 #include <limits>
+#include <set>
 
 #include "diagnosis/inference/local_minima.hpp"
 #include "diagnosis/inference/log_sum.hpp"
@@ -181,16 +182,17 @@ std::vector<LessSpread> with_less_spread(const Likelihood& likelihood, const Fit
   const auto& groups = likelihood.system().nuisance_groups();
   for (std::size_t g = 0; g < groups.size(); ++g) {
     const auto& values = groups[g].standard_deviations;
-    double& now = out.emplace_back(LessSpread{.fit = fit}).fit.scales.nuisance_sd[static_cast<Index>(g)];
+    const double now = fit.scales.nuisance_sd[static_cast<Index>(g)];
     const auto at = std::find(values.begin(), values.end(), now);
-    if (at == values.end() || at == values.begin()) {
-      out.pop_back();
-      continue;
+    if (at == values.end() || at == values.begin()) continue;
+    for (const double less : std::set<double>{*std::prev(at), values.front()}) {
+      LessSpread one{.fit = fit};
+      one.fit.scales.nuisance_sd[static_cast<Index>(g)] = less;
+      // Of the grid's prior: none as likely as all others together.
+      const double to_none = less == values.front() ? std::log(static_cast<double>(values.size() - 1)) : 0.0;
+      one.log_change = log_of(one.fit) - here + to_none;
+      out.push_back(std::move(one));
     }
-    now = *std::prev(at);
-    // Of the grid's prior: none as likely as all others together.
-    const double to_none = now == values.front() ? std::log(static_cast<double>(values.size() - 1)) : 0.0;
-    out.back().log_change = log_of(out.back().fit) - here + to_none;
   }
   return out;
 }

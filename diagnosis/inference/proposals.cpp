@@ -22,9 +22,6 @@ constexpr double kFarthest = 4.0;  // sizes promised reach to so many times thei
 constexpr double kSmall = 0.1;     // of a start
 constexpr double kNever = -1e3;
 
-// Readings are about as far from those without the effect as the parameter is from where it vanishes.
-bool is_amplitude(const Parameter& p) { return !std::isnan(p.none) && !p.shape; }
-
 // Every combination of starts of the shared parameters; with one shape only, a small size too: what an effect does to
 // the readings is not in proportion to its size beside another that comes in jumps.
 std::vector<VectorXd> starts_of(const Effect& effect) {
@@ -44,7 +41,7 @@ std::vector<VectorXd> starts_of(const Effect& effect) {
   if (out.size() == 1) {
     VectorXd small = out.front();
     for (std::size_t p = 0; p < effect.parameters.size(); ++p)
-      if (const Parameter& one = effect.parameters[p]; one.scope == Scope::shared && is_amplitude(one))
+      if (const Parameter& one = effect.parameters[p]; one.scope == Scope::shared && is_size(one))
         small[static_cast<Index>(p)] = one.none + kSmall * (small[static_cast<Index>(p)] - one.none);
     out.push_back(small);
   }
@@ -130,7 +127,7 @@ Proposals::Candidate Proposals::make_candidate(const Likelihood& likelihood, std
     const Parameter& parameter = effect.parameters[p];
     if (parameter.scope != Scope::shared)
       out.local = static_cast<int>(p), out.instant = parameter.scope == Scope::instant;
-    else if (is_amplitude(parameter))
+    else if (is_size(parameter))
       out.amplitudes.push_back(p);
   }
   if (!system_->allows({e})) return out;
@@ -407,7 +404,7 @@ std::size_t Proposals::nearest_signature(const Proposal& proposal) const {
     VectorXd apart = shared_part(effect, signatures[s].values) - proposal.starts.front().shared;
     Index i = 0;
     for (const Parameter& p : effect.parameters)
-      if (p.scope == Scope::shared) apart[i] = is_amplitude(p) ? 0 : apart[i], ++i;
+      if (p.scope == Scope::shared) apart[i] = is_size(p) ? 0 : apart[i], ++i;
     if (apart.norm() < nearest) nearest = apart.norm(), best = s;
   }
   return best;

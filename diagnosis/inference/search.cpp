@@ -1,5 +1,6 @@
 #include "diagnosis/inference/search.hpp"
 
+#include <Eigen/Cholesky>
 #include <algorithm>
 #include <cmath>
 #include <limits>
@@ -20,10 +21,30 @@ bool near(const Noise& a, const Noise& b) {
   return std::abs(a.ar1 - b.ar1) < kCorrelation;
 }
 
-}  // namespace
-
 using Eigen::Index;
 using Eigen::VectorXd;
+
+// By the linear model: by how much the log likelihood falls where an effect's sizes are none. Infinite for one that has
+// no size to be none.
+double log_cost_of_dropping(const Fit& fit, std::size_t effect) {
+  const auto& set = fit.layout.set();
+  const auto member = static_cast<std::size_t>(std::find(set.begin(), set.end(), effect) - set.begin());
+  const auto& parameters = fit.likelihood->system().effects()[effect].parameters;
+  std::vector<Index> sizes;
+  std::vector<double> apart;
+  for (std::size_t p = 0; p < parameters.size(); ++p) {
+    if (parameters[p].scope != Scope::shared || !is_size(parameters[p])) continue;
+    sizes.push_back(fit.layout.find_shared(member, p));
+    apart.push_back(fit.shared[sizes.back()] - parameters[p].none);
+  }
+  const auto blocks = linearise(*fit.likelihood, fit, {});
+  if (sizes.empty() || blocks.empty()) return std::numeric_limits<double>::infinity();
+  const Eigen::MatrixXd covariance = solve_about(fit, blocks, {}, sizes).covariance(sizes, sizes);
+  const auto d = Eigen::Map<const VectorXd>(apart.data(), static_cast<Index>(apart.size()));
+  return 0.5 * d.dot(covariance.ldlt().solve(d));
+}
+
+}  // namespace
 
 double Visited::log_posterior() const {
   const double both[] = {log_without_curve, log_with_curve};
@@ -152,11 +173,15 @@ void Search::expand(const ModelSet& set) {
       add(less.fit, proposals_->beside(Marginal(*likelihood_, less.fit, {}), rules_.starts),
           here.log_without_curve + change + less.log_change, Beside::less_spread);
   }
-  // Smaller sets, from which swaps come.
+  // Smaller sets, from which swaps come. One that was visited already once more, if by the linear model it is likelier
+  // from here: then it was in a local minimum.
   for (const std::size_t effect : set) {
     const ModelSet smaller = without(set, effect);
-    if (is_visited(smaller)) continue;
     const Fit& fit = here.at->fit;
+    if (const auto known = visited_.find(smaller); known != visited_.end()) {
+      const double promised = here.log_without_curve - log_cost_of_dropping(fit, effect) - rules_.log_prior_odds_effect;
+      if (known->second.log_posterior() > promised - rules_.optimism || !refitted_.insert(smaller).second) continue;
+    }
     Job job{.set = smaller,
             .layout = Layout(system_, smaller),
             .shared = {},

@@ -2,6 +2,7 @@
 // What the engine sees of a model: readings with their derivatives by shared parameters and by each recording's own
 // unknowns, a discrepancy's components, and effects with their priors. It knows nothing else of what it judges; a
 // needle is one client (diagnosis/needle), a pendulum another (tests/inference).
+#include <cmath>
 #include <memory>
 #include <string>
 #include <vector>
@@ -28,6 +29,9 @@ struct Parameter {
   bool shape = false;   // readings at one start are no multiple of those at another: starts are taken as they stand
   int half_turns = -1;  // periodic: the parameter of this effect that turns by half a period when this one turns by one
 };
+
+// Readings are about as far from those without the effect as the parameter is from where it vanishes.
+inline bool is_size(const Parameter& p) { return !std::isnan(p.none) && !p.shape; }
 
 // One effect that may be missing. Two may have one name (an effect that comes in kinds): at most one of them is in a
 // set.
