@@ -291,7 +291,7 @@ function drawFacts() {
     const n = state.needle, p = n.position_mm;
     if (state.target) {
       const t = state.target.position_mm;
-      all.push(fact('to the target', fixed(Math.hypot(...p.map((v, i) => v - t[i])), 2) + ' mm', `tolerance ${fixed(state.target.tolerance_mm, 2)} mm`, needleOld));
+      all.push(fact('to the target', fixed(Math.hypot(...p.map((v, i) => v - t[i])), 2) + ' mm', state.target.tolerance_mm > 0 ? `tolerance ${fixed(state.target.tolerance_mm, 2)} mm` : '', needleOld));
     }
     all.push(fact('tip x, y, z', p.map(v => fixed(v, 1)).join(', '), 'mm', needleOld));
     const curvature = n.curvature_per_mm;
