@@ -135,7 +135,7 @@ TEST_F(McapFile, EachFlippedByteIsTold) {
       lost_nothing += got.messages.size() == 4 ? 1 : 0;
       ++cases;
     }
-  // One chunk of two, or nothing, but never all of it for a flip behind the magic.
+  // Half of so small a file is indices and summary, of which nothing is needed.
   EXPECT_GT(lost_nothing, cases / 3);
 }
 
@@ -186,6 +186,21 @@ TEST_F(McapFile, ADamagedChunkCostsItselfAndIsCounted) {
   EXPECT_GT(some.recording.actuators.size(), 2000U);
   EXPECT_LT(some.recording.actuators.size(), 5000U);
   for (const auto& a : some.recording.actuators) ASSERT_EQ(a.insertion_mm, 1e-3 * static_cast<double>(a.seq));
+}
+
+// By the summary, which is sound: without it whatever is behind such a length would be lost.
+TEST_F(McapFile, BehindALengthThatLeadsNowhereTheNextChunkIsFound) {
+  const std::string file = small_file(path("small.mcap"));
+  const std::size_t first_chunk = mcap::kMagic.size() + mcap::kRecordHead + 4 + 4 + std::string_view("bevel").size();
+  ASSERT_EQ(file[first_chunk], static_cast<char>(mcap::Op::chunk));
+  std::string wrong = file;
+  mcap::put(wrong.data() + first_chunk + 1, std::uint64_t{1} << 63U);
+  const Got got = read_all(wrong);
+  const Got whole = read_all(file);
+  EXPECT_EQ(got.attachments, whole.attachments);
+  EXPECT_EQ(got.messages, decltype(got.messages)(whole.messages.begin() + 2, whole.messages.end()));
+  EXPECT_THAT(got.damage.describe(), HasSubstr("a record that leads beyond the file"));
+  EXPECT_THAT(got.damage.describe(), HasSubstr("2 messages were read of 4"));
 }
 
 // Messages as other writers put them: spaces, another order, null, text where a number should be.
