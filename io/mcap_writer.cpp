@@ -11,7 +11,7 @@
 namespace bevel::io::mcap {
 namespace {
 
-constexpr std::size_t kChunk_bytes = std::size_t{256} << 10U;  // what one flipped byte of a file costs
+constexpr std::size_t kChunk_bytes = std::size_t{32} << 10U;  // what one flipped byte costs: a second of a recording
 
 // A record's content, field by field.
 class Content {

@@ -25,6 +25,7 @@ void write_mcap(const io::Recording& recording, const std::string& log, const st
   const std::size_t messages = recording.arrivals.size() + recording.commands.size() + recording.estimates.size() +
                                recording.truths.size();
   if (messages == 0) throw std::runtime_error(log + ": " + recording.refusal());
+  fs::create_directories(fs::path(path).parent_path());
   io::export_mcap(recording, path);
   std::printf("%s: %zu messages\n", path.c_str(), messages);
 }
@@ -42,7 +43,6 @@ int run(const Options& o) {
       throw std::runtime_error(other->second + " and " + log + ": would both become " + name +
                                "; export them into different folders");
   }
-  fs::create_directories(o.out_folder);
   for (const std::string& log : logs) {
     const io::Recording recording = io::read_recording(log);
     std::fprintf(stderr, "%s", recording.remarks(log).c_str());
