@@ -31,6 +31,8 @@ RUN = [
      "build/bin/bevel-diagnose --model model.toml --out result --baseline monday/*.lcm --changed tuesday/*.lcm"),
     ("docs/import.md", "build/bin/bevel-import --columns map.toml --out logs tip --base base"),
     ("docs/import.md", "build/bin/bevel-diagnose --model model.toml --out verdict logs"),
+    ("docs/import.md", "build/bin/bevel-export --format mcap --out mcap rec01.lcm"),
+    ("docs/import.md", "build/bin/bevel-import --out again mcap/rec01.mcap"),
     ("docs/fleet.md", "tools/fleet cases.csv --out fleet --dry-run"),
 ]
 # Why the programs of the other commands are not run here: their options and files are checked.
