@@ -4,10 +4,10 @@
 #include <charconv>
 #include <filesystem>
 #include <fstream>
-#include <map>
 #include <stdexcept>
 
 #include "io/csv_columns.hpp"
+#include "io/log_order.hpp"
 #include "io/messages.hpp"
 
 namespace bevel::io {
@@ -58,17 +58,6 @@ void write_text(const std::string& path, const std::string& text) {
   if (!file) throw std::runtime_error(path + ": cannot be written");
 }
 
-// The number of each sample's arrival, by channel and index.
-std::map<Arrival::Channel, std::vector<std::size_t>> arrival_numbers(const Recording& recording) {
-  std::map<Arrival::Channel, std::vector<std::size_t>> numbers;
-  numbers[Arrival::Channel::tip].resize(recording.tips.size());
-  numbers[Arrival::Channel::heading].resize(recording.headings.size());
-  numbers[Arrival::Channel::actuator].resize(recording.actuators.size());
-  for (std::size_t i = 0; i < recording.arrivals.size(); ++i)
-    numbers.at(recording.arrivals[i].channel).at(recording.arrivals[i].index) = i;
-  return numbers;
-}
-
 }  // namespace
 
 std::vector<std::pair<std::string, std::int64_t>> export_csv(const Recording& recording, const std::string& folder) {
@@ -93,10 +82,10 @@ std::vector<std::pair<std::string, std::int64_t>> export_csv(const Recording& re
     write_text(path, text);
     done.emplace_back(path, static_cast<std::int64_t>(rows.size()));
   };
-  const auto numbers = arrival_numbers(recording);
-  write_file(exported::kTips, recording.tips, &numbers.at(Arrival::Channel::tip));
-  write_file(exported::kHeadings, recording.headings, &numbers.at(Arrival::Channel::heading));
-  write_file(exported::kAxes, recording.actuators, &numbers.at(Arrival::Channel::actuator));
+  const ArrivalNumbers numbers(recording);
+  write_file(exported::kTips, recording.tips, &numbers.tips);
+  write_file(exported::kHeadings, recording.headings, &numbers.headings);
+  write_file(exported::kAxes, recording.actuators, &numbers.actuators);
   write_file(exported::kCommands, recording.commands, nullptr);
   write_file(exported::kEstimates, recording.estimates, nullptr);
   write_file(exported::kTruths, recording.truths, nullptr);

@@ -234,15 +234,29 @@ int run_campaign(const CampaignOptions& options, std::ostream& progress) {
   std::mutex mutex;
   const auto say = [&](const std::string& line) {
     const std::scoped_lock lock(mutex);
+    if (options.watch.make_room) options.watch.make_room();
     progress << line << std::endl;
   };
   const auto stopped = [&] {
     if (interrupted != 0) say("interrupted; the same command goes on from here");
     return interrupted != 0;
   };
+  const CampaignWatch& watch = options.watch;
+  // What is on disk from an earlier run is no piece of this one's, or it would be taken for quick work.
+  const auto begin = [&](const std::string& what, const auto& is_to_do) {
+    std::size_t pieces = 0;
+    for (int i = 0; i < options.trials; ++i) pieces += is_to_do(i) ? 1 : 0;
+    if (watch.begin) watch.begin(what, pieces, static_cast<std::size_t>(options.jobs));
+  };
+  const auto one_done = [&](const std::string& line) {
+    say(line);
+    if (watch.one_done) watch.one_done();
+  };
+  begin("trials drawn", [&](int i) { return !fs::exists(TrialFolders(options.out, i).commitment); });
   in_parallel(options.trials, options.jobs, [&](int i) {
-    if (prepare_trial(options.out, options.seed, i, options.population)) say(trial_name(i) + " drawn and sealed");
+    if (prepare_trial(options.out, options.seed, i, options.population)) one_done(trial_name(i) + " drawn and sealed");
   });
+  if (watch.end) watch.end();
   if (stopped()) return 130;
   write_commitments(options);
   if (options.generate_only) return 0;
@@ -252,10 +266,12 @@ int run_campaign(const CampaignOptions& options, std::ostream& progress) {
   facts.commitments_sha256 = io::sha256_of_file((options.out / "commitments.json").string());
   facts.tool_sha256 = claim_tool(options);
   const fs::path program = fs::canonical(options.diagnose);
+  begin("trials examined", [&](int i) { return !fs::exists(TrialFolders(options.out, i).run); });
   in_parallel(options.trials, options.jobs, [&](int i) {
     if (fs::exists(TrialFolders(options.out, i).run)) return;
-    if (examine(options, program, i, facts.tool_sha256)) say(trial_name(i) + " examined");
+    if (examine(options, program, i, facts.tool_sha256)) one_done(trial_name(i) + " examined");
   });
+  if (watch.end) watch.end();
   if (stopped()) return 130;
 
   facts.verdicts_sha256 = write_verdicts(options);

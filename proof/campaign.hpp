@@ -3,6 +3,7 @@
 // score. Each step of each trial that is on disk already is skipped, so an interrupted campaign goes on where it was.
 #include <cstdint>
 #include <filesystem>
+#include <functional>
 #include <iosfwd>
 #include <string>
 #include <vector>
@@ -10,6 +11,14 @@
 #include "proof/trial.hpp"
 
 namespace bevel::proof {
+
+// Who is told how far it is, from several threads; what is empty is not called.
+struct CampaignWatch {
+  std::function<void(const std::string& what, std::size_t pieces, std::size_t at_a_time)> begin;
+  std::function<void()> one_done;
+  std::function<void()> make_room;  // before a line of progress is printed
+  std::function<void()> end;
+};
 
 struct CampaignOptions {
   int trials = 100;
@@ -22,6 +31,7 @@ struct CampaignOptions {
   double limit_s = 600;                    // a trial that takes longer is an abstention
   bool generate_only = false;
   bool unsealed = false;  // without namespaces, where the kernel has none; the result says so
+  CampaignWatch watch;
 };
 
 // Exit status: 0 finished, 130 interrupted. Throws std::runtime_error with a message for the user.

@@ -129,7 +129,9 @@ void Search::evaluate_all(std::vector<Job> jobs) {
 void Search::expand(const ModelSet& set) {
   expanded_.insert(set);
   const Visited here = visited_.at(set);
-  if (progress_) progress_(describe(system_, set));
+  if (progress_)
+    progress_(describe(system_, set) + "; " + std::to_string(fits_) + " fits done, nothing is begun after " +
+              std::to_string(rules_.most_fits));
   std::vector<Job> jobs;
   if (set.size() < rules_.largest) {
     // What is promised is relative to this set by the reference's noise.

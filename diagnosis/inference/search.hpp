@@ -40,7 +40,7 @@ class Search {
  public:
   Search(const System& system, const SearchRules& rules) : system_(system), rules_(rules) {}
 
-  // Told what is looked around next; may throw to stop.
+  // Told what is looked around next, and how many fits are done of how many; may throw to stop.
   using Progress = std::function<void(const std::string&)>;
   // From readings without those outliers, and a noise to begin with. What the linear model promises depends on the
   // noise, and on what else the tip does: it is asked again about the likeliest set, until that is the same. Throws

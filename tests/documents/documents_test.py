@@ -31,6 +31,8 @@ RUN = [
      "build/bin/bevel-diagnose --model model.toml --out result --baseline monday/*.lcm --changed tuesday/*.lcm"),
     ("docs/import.md", "build/bin/bevel-import --columns map.toml --out logs tip --base base"),
     ("docs/import.md", "build/bin/bevel-diagnose --model model.toml --out verdict logs"),
+    ("docs/import.md", "build/bin/bevel-export --format mcap --out mcap rec01.lcm"),
+    ("docs/import.md", "build/bin/bevel-import --out again mcap/rec01.mcap"),
     ("docs/fleet.md", "tools/fleet cases.csv --out fleet --dry-run"),
 ]
 # Why the programs of the other commands are not run here: their options and files are checked.
@@ -39,7 +41,7 @@ ONLY_CHECKED = {
     "tools/test": "runs this test", ".ci/run": "runs this test", "ctest": "runs this test", "cmake": "is building this",
     "tools/setup": "installs", "tools/fuzz": "needs another build", "tools/in-vm": "boots a machine",
     "tools/table1": "has tests of its own", "tools/practice-table": "takes minutes, on recordings from elsewhere",
-    "tools/fleet": "has tests of its own", "tools/close-the-loop": "takes minutes", "tools/bevel-mcap": "has a test of its own",
+    "tools/fleet": "has tests of its own", "tools/close-the-loop": "takes minutes",
     "tools/bevel-spy": "needs a display", "tests/peers/compare": "takes an hour", "tests/fleet/kills.py": "takes half an hour",
     "tests/loop/processes_test.sh": "measures, in real time",
     "sudo": "changes this machine's network",

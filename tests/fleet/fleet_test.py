@@ -4,6 +4,7 @@
 Usage: fleet_test.py [unittest OPTION...]. Status 77 where Snakemake, Dask and pyarrow are not there (tools/setup --fleet).
 """
 import datetime
+import io
 import math
 import os
 import pathlib
@@ -27,7 +28,7 @@ try:
 except ModuleNotFoundError as missing:
     print(f"skipped: no Python package {missing.name}; tools/setup --fleet gets it")
     sys.exit(77)
-from fleet_program import cases, drift, page, rollup  # noqa: E402
+from fleet_program import cases, drift, page, progress, rollup  # noqa: E402
 
 
 class InFolder(unittest.TestCase):
@@ -303,6 +304,51 @@ class Page(unittest.TestCase):
         self.assertEqual(shown.count("<circle"), 6)
         still = page.html([{**row, "curvature_per_mm": 0.004} for row in rows], "f")
         self.assertNotIn("class=drifts", still)
+
+
+class Progress(unittest.TestCase):
+    """As tests/help/progress_line_test.cpp, by the same figures."""
+
+    class Screen(io.StringIO):
+        def isatty(self):
+            return True
+
+    def test_nothing_remains_without_evidence(self):
+        for done, at_a_time, elapsed_s, left_s in ((0, 1, 5, None), (3, 1, 5, None), (7, 8, 5, None), (4, 1, 0, None),
+                                                   (4, 1, 8, 192), (8, 8, 8, 92), (100, 1, 8, 0)):
+            self.assertEqual(progress.remaining_s(done, 100, at_a_time, elapsed_s), left_s)
+
+    def test_words(self):
+        for seconds, words in ((-1, "0 s"), (59.4, "59 s"), (59.6, "1 min 00 s"), (185, "3 min 05 s"), (3599.7, "1 h 00 min"),
+                               (90061, "25 h 01 min")):
+            self.assertEqual(progress.in_words(seconds), words)
+        self.assertEqual(progress.text(12, 100, 2, 185),
+                         "12 of 100 cases done, 3 min 05 s so far, about 23 min left")
+        self.assertEqual(progress.text(2, 100, 1, 30), "2 of 100 cases done, 30 s so far")
+
+    def lines(self, out, pieces, each_s):
+        now_s = [100.0]
+        line = progress.Line(pieces, 2, out, lambda: now_s[0])
+        for done in range(1, pieces + 1):
+            now_s[0] += each_s
+            line.show(done)
+        line.show(pieces, last=True)
+        return out.getvalue()
+
+    def test_in_a_file_few_lines(self):
+        self.assertEqual(self.lines(io.StringIO(), 100, 0.09), "")
+        self.assertEqual(self.lines(io.StringIO(), 100, 0.35).splitlines(), [
+            "fleet: 29 of 100 cases done, 10 s so far, about 25 s left",
+            "fleet: 58 of 100 cases done, 20 s so far, about 15 s left",
+            "fleet: 87 of 100 cases done, 30 s so far, about 5 s left",
+            "fleet: 100 of 100 cases done, 35 s so far"])
+
+    def test_on_a_terminal_one_line_that_leaves_nothing_of_the_one_before(self):
+        said = self.lines(self.Screen(), 6, 10).split("\r")
+        self.assertEqual(said[4], "fleet: 4 of 6 cases done, 40 s so far, about 20 s left")
+        self.assertEqual(said[6].rstrip(), "fleet: 6 of 6 cases done, 1 min 00 s so far")
+        self.assertEqual(len(said[6]), len(said[5]))
+        self.assertTrue(said[-1].endswith("\n"))
 
 
 if __name__ == "__main__":

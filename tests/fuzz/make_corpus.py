@@ -102,6 +102,56 @@ def logs():
         "tip_measurement_t", position_mm=[0, 0, float("nan")])))
 
 
+def mcap():
+    """Small MCAP files without CRC-32 (0: none), so that what is mutated is looked at and not refused at once."""
+    def record(op, content):
+        return bytes([op]) + struct.pack("<Q", len(content)) + content
+
+    def text(value):
+        return struct.pack("<I", len(value)) + value
+
+    def channel(number, topic):
+        return record(4, struct.pack("<HH", number, 0) + text(topic) + text(b"json") + text(b""))
+
+    def one(number, sequence, data):
+        return record(5, struct.pack("<HIQQ", number, sequence, 1000 * UTIME, 1000 * UTIME) + data)
+
+    def chunk(records, compression=b"", crc=0, size=None):
+        return record(6, struct.pack("<QQQI", 0, 0, len(records) if size is None else size, crc) + text(compression)
+                      + struct.pack("<Q", len(records)) + records)
+
+    def whole(*records, summary=b""):
+        front = magic + record(1, text(b"") + text(b"")) + b"".join(records) + record(15, struct.pack("<I", 0))
+        start = len(front) if summary else 0
+        return front + summary + record(2, struct.pack("<QQI", start, 0, 0)) + magic
+
+    magic = b"\x89MCAP0\r\n"
+    command = b'{"utime":5,"seq":0,"mode":1,"insertion_rate_mm_s":0.1,"rotation_rate_rad_s":-0.0}'
+    tip = (b'{"utime":5,"seq":0,"camera":0,"status":0,"x_mm":1.5,"unseen_y_mm":2,"ixx_per_mm2":44,"ixy_per_mm2":0,'
+           b'"ixz_per_mm2":0,"iyx_per_mm2":0,"iyy_per_mm2":0,"iyz_per_mm2":0,"izx_per_mm2":0,"izy_per_mm2":0,'
+           b'"izz_per_mm2":0,"arrival":3}')
+    commands, tips = channel(1, b"MOTION_COMMAND"), channel(2, b"TIP_MEASUREMENT")
+    config = struct.pack("<QQ", 0, 0) + text(b"config.toml") + text(b"") + struct.pack("<Q", 5) + b"a = 1" + bytes(4)
+    statistics = record(11, struct.pack("<QHIIIIQQI", 3, 0, 2, 1, 0, 1, 0, 0, 0))
+    keep("mcap", "whole", whole(chunk(commands + tips + one(1, 0, command) + one(2, 0, tip)), one(1, 1, command),
+                                record(9, config), summary=commands + tips + statistics))
+    keep("mcap", "empty", b"")
+    keep("mcap", "magic_alone", magic)
+    keep("mcap", "no_records", whole())
+    keep("mcap", "channel_not_said", whole(one(7, 0, command)))
+    keep("mcap", "other_order", whole(commands, one(1, 0, b'{ "seq": 0, "utime": 5, "rotation_rate_rad_s": 0, '
+                                                          b'"insertion_rate_mm_s": 1e-1, "mode": 1 }')))
+    keep("mcap", "of_before", whole(tips, one(2, 0, tip.replace(b"unseen_y_mm\":2", b"y_mm\":null"))))
+    keep("mcap", "not_finite", whole(commands, one(1, 0, command.replace(b"0.1", b"nan"))))
+    keep("mcap", "deep", whole(commands, one(1, 0, b"[" * 2000)))
+    keep("mcap", "compressed", whole(chunk(commands + one(1, 0, command), b"zstd")))
+    keep("mcap", "chunk_of_2_63", whole(chunk(commands, size=2**63)))
+    keep("mcap", "wrong_crc", whole(chunk(commands + one(1, 0, command), crc=1), one(1, 1, command)))
+    keep("mcap", "length_of_2_63", magic + bytes([5]) + struct.pack("<Q", 2**63) + command)
+    keep("mcap", "cut", whole(commands, one(1, 0, command))[:-20])
+    keep("mcap", "sequences_turned", whole(commands, one(1, 9, command), one(1, 3, command)))
+
+
 def frame(identifier, *data):  # operation 3 of fuzz_can_frames: inject
     return bytes([3]) + struct.pack("<H", identifier) + bytes([len(data), *data])
 
@@ -175,5 +225,6 @@ def sdo():
 if __name__ == "__main__":
     decode()
     logs()
+    mcap()
     can()
     sdo()

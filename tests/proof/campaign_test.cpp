@@ -4,6 +4,7 @@
 #include <gmock/gmock.h>
 
 #include <csignal>
+#include <mutex>
 #include <nlohmann/json.hpp>
 #include <sstream>
 
@@ -50,6 +51,30 @@ class Campaign : public testing::Test {
   test::TemporaryFolder folder_;
   std::string said_;
 };
+
+// What was there before is no piece of a run: it would be taken for quick work.
+TEST_F(Campaign, WhoWatchesIsToldOfEachPieceThatThisRunDoes) {
+  CampaignOptions o = options(kSayNothing, 3);
+  std::mutex mutex;
+  std::vector<std::string> told;
+  const auto tell = [&](const std::string& text) {
+    const std::scoped_lock lock(mutex);
+    told.push_back(text);
+  };
+  o.jobs = 1;
+  o.watch = {.begin = [&](const auto& what, auto of, auto) { tell(what + " " + std::to_string(of)); },
+             .one_done = [&] { tell("one"); },
+             .make_room = {},
+             .end = [&] { tell("end"); }};
+  o.trials = 1;
+  run(o);
+  EXPECT_THAT(told, testing::ElementsAre("trials drawn 1", "one", "end", "trials examined 1", "one", "end"));
+  told.clear();
+  o.trials = 3;
+  run(o);
+  EXPECT_THAT(told,
+              testing::ElementsAre("trials drawn 2", "one", "one", "end", "trials examined 2", "one", "one", "end"));
+}
 
 TEST_F(Campaign, OfTwoGroupsBothAreHandedOverByName) {
   const std::string asked = (folder_ / "asked").string();

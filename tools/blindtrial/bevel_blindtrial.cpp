@@ -5,6 +5,7 @@
 #include "proof/campaign.hpp"
 #include "proof/trial.hpp"
 #include "tools/common/command_line.hpp"
+#include "tools/common/progress_line.hpp"
 
 int main(int argc, char** argv) {
   bevel::proof::CampaignOptions o;
@@ -45,6 +46,11 @@ int main(int argc, char** argv) {
     o.out = out;
     o.diagnose = diagnose;
     o.seed = static_cast<std::uint64_t>(seed);
+    bevel::tools::ProgressLine line(bevel::tools::ProgressLine::as_stderr_is());
+    o.watch = {.begin = [&](const auto& what, auto pieces, auto jobs) { line.begin(what, pieces, jobs); },
+               .one_done = [&] { line.one_done(); },
+               .make_room = [&] { line.make_room(); },
+               .end = [&] { line.end(); }};
     return bevel::proof::run_campaign(o, std::cout);
   });
 }

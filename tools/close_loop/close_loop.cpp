@@ -63,6 +63,8 @@ ClosedLoop close_the_loop(const Options& options, std::ostream& err) {
   progress.say("steering to targets with each model");
   TargetingOptions targeting = options.targeting;
   targeting.threads = options.threads;
+  tools::ProgressLine line(tools::ProgressLine::as_stderr_is(options.quiet));
+  targeting.progress = &line;
   loop.targeting = steer_all(loop.models, recorded, findings.noise, targeting);
   progress.say("done");
   return loop;

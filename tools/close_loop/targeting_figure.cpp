@@ -118,6 +118,8 @@ TargetingFigures steer_all(const Models& models, const diagnosis::RecordedCase& 
   const std::size_t count = figures.targets_mm.size() * figures.seeds.size();
   std::vector<std::vector<steering::Insertion>> insertions(beliefs.size(), std::vector<steering::Insertion>(count));
   const double nominal_s = deepest_mm / controller::SteeringLimits{}.insertion_rate_mm_s;
+  if (options.progress != nullptr)
+    options.progress->begin("insertions", beliefs.size() * count, static_cast<std::size_t>(options.threads));
   parallel_for(beliefs.size() * count, options.threads, [&](std::size_t job) {
     const std::size_t belief = job / count, i = job % count, target = i / figures.seeds.size();
     const std::uint64_t seed = 1000 * figures.seeds[i % figures.seeds.size()] + target;
@@ -129,7 +131,9 @@ TargetingFigures steer_all(const Models& models, const diagnosis::RecordedCase& 
                                        },
                                    .cameras = cameras};
     insertions[belief][i] = steering::steer(rig, beliefs[belief], figures.targets_mm[target], seed);
+    if (options.progress != nullptr) options.progress->one_done();
   });
+  if (options.progress != nullptr) options.progress->end();
   double inserted_mm = 0;
   for (const auto& target : figures.targets_mm) inserted_mm += target.z() * static_cast<double>(figures.seeds.size());
   const auto summary = [&](std::size_t belief) {

@@ -6,6 +6,7 @@
 
 #include "diagnosis/needle/recorded_case.hpp"
 #include "tools/close_loop/models.hpp"
+#include "tools/common/progress_line.hpp"
 #include "tools/steering/steered_insertion.hpp"
 
 namespace bevel::close_loop {
@@ -45,6 +46,7 @@ struct TargetingOptions {
   int seeds = 6;
   int bootstrap_draws = 4000;
   int threads = 2;
+  tools::ProgressLine* progress = nullptr;  // told of each insertion
 };
 
 // The rig is the augmented model, its unknowns of single recordings (a phase, an instant) drawn anew for each

@@ -11,7 +11,7 @@ import shutil
 import signal
 import sys
 
-from . import cases, engines, one_case
+from . import cases, engines, one_case, progress
 
 OK, FAILED, USAGE, DAMAGED, INTERRUPTED = 0, 1, 2, 3, 130
 SLURM_JOBS = 100
@@ -141,19 +141,18 @@ def do(root, out, pending, specifications, options):
     """Runs the engine; why it did not finish, "" if it did."""
     for key in pending:
         one_case.write_whole(out / "cases" / f"{key}.json", json.dumps(specifications[key]))
-    live = sys.stderr.isatty() and not options.quiet
+    line = progress.Line(len(pending), options.jobs)
 
-    def progress(end=""):
-        done = sum((out / "results" / key).exists() for key in pending)
-        print(f"\rfleet: {done} of {len(pending)} cases done", end=end, file=sys.stderr, flush=True)
+    def show(last=False):
+        if not options.quiet:
+            line.show(sum((out / "results" / key).exists() for key in pending), last)
 
     if not options.quiet:
         print(f"fleet: {len(pending)} cases to be done", file=sys.stderr)
     try:
-        status, words = engines.run(root, out, pending, options, progress if live else lambda: None)
+        status, words = engines.run(root, out, pending, options, show)
     finally:
-        if live:
-            progress("\n")
+        show(last=True)
     if status == 0:
         return ""
     how = f"was ended by signal {-status}" if status < 0 else f"ended with status {status}"

@@ -1,33 +1,16 @@
-// bevel-export: what an LCM log holds, as one CSV file a channel.
-#include <cstdio>
-#include <filesystem>
-
-#include "io/csv_export.hpp"
-#include "io/find_logs.hpp"
+// bevel-export: what an LCM log holds, as one CSV file a channel, or as one MCAP file.
 #include "tools/common/command_line.hpp"
-#include "tools/common/exit_status.hpp"
+#include "tools/import/export.hpp"
 
 int main(int argc, char** argv) {
   using namespace bevel;
-  std::vector<std::string> logs;
-  std::string out = ".";
-  tools::CommandLine command_line("bevel-export",
-                                  "Turns LCM logs into CSV files, one a channel; bevel-import reads them back.");
-  command_line.option("-o,--out", out, "folder; each log gets a folder in it")
-      .arguments("LOG", logs, "LCM logs, or folders of them")
-      .example("bevel-export -o csv out/insertion.lcm")
+  exporting::Options o;
+  tools::CommandLine command_line(
+      "bevel-export", "Turns LCM logs into CSV files, one a channel, or into MCAP; bevel-import reads both.");
+  command_line.option("-o,--out", o.out_folder, "folder; each log gets a folder in it, or a file LOG.mcap")
+      .choice("-f,--format", o.format, "csv if not said, or mcap", {"csv", "mcap"})
+      .arguments("LOG", o.logs, "LCM logs, or folders of them")
+      .example("bevel-export --format mcap -o mcap out/insertion.lcm")
       .reads_recordings();
-  return command_line.run(argc, argv, [&] {
-    bool intact = true;
-    for (const std::string& log : io::find_logs(logs)) {
-      const io::Recording recording = io::read_recording(log);
-      std::fprintf(stderr, "%s", recording.remarks(log).c_str());
-      intact = intact && recording.intact();
-      const auto folder = std::filesystem::path(out) / std::filesystem::path(log).stem();
-      const auto files = io::export_csv(recording, folder.string());
-      if (files.empty()) throw std::runtime_error(log + ": " + recording.refusal());
-      for (const auto& [file, rows] : files) std::printf("%s: %lld rows\n", file.c_str(), static_cast<long long>(rows));
-    }
-    return intact ? tools::kOk : tools::kDamagedInput;
-  });
+  return command_line.run(argc, argv, [&] { return exporting::run(o); });
 }

@@ -1,8 +1,4 @@
 // bevel-import: CSV recordings to LCM logs, by a column map, or what bevel-export wrote.
-#include <algorithm>
-#include <cstdio>
-#include <filesystem>
-
 #include "tools/common/command_line.hpp"
 #include "tools/import/import.hpp"
 
@@ -14,7 +10,8 @@ int main(int argc, char** argv) {
   command_line.option("-c,--columns", o.map_path, "column map (TOML) of CSV files of one's own; see docs/import.md")
       .option("-o,--out", o.out_folder, "folder for the logs, one a recording")
       .paths("--base", o.base, "the base's files, in the order of CSV, where the map has [base]")
-      .arguments("CSV", o.inputs, "recordings, or folders of them; without --columns folders of bevel-export")
+      .arguments("CSV", o.inputs,
+                 "recordings, or folders of them; without --columns folders or .mcap files of bevel-export")
       .example("bevel-import -c map.toml -o logs tip1.csv tip2.csv")
       .check([&] { return importing::usage_fault(o); })
       .reads_recordings();

@@ -8,6 +8,7 @@
 
 #include "io/csv_export.hpp"
 #include "io/csv_import.hpp"
+#include "io/mcap_export.hpp"
 #include "tools/common/exit_status.hpp"
 
 namespace bevel::importing {
@@ -50,19 +51,29 @@ std::vector<std::string> log_paths(const std::vector<std::string>& recordings, c
   return logs;
 }
 
+// Prints what is odd. `intact` becomes false if that is damage.
+io::Recording read_export(const std::string& path, bool& intact) {
+  if (!io::is_mcap(path)) return io::import_exported(path);
+  io::ImportedMcap mcap = io::import_mcap_file(path);
+  std::fprintf(stderr, "%s", mcap.remarks(path).c_str());
+  intact = intact && mcap.intact();
+  return std::move(mcap.recording);
+}
+
 int import_exports(const Options& o) {
   const auto logs = log_paths(o.inputs, o.out_folder);
+  bool intact = true;
   for (std::size_t i = 0; i < logs.size(); ++i) {
     if (fs::exists(logs[i]))
       throw std::runtime_error(logs[i] + ": is there already, and may be the log that was exported, which holds more " +
                                "than the export; give another folder with --out");
-    const io::Recording recording = io::import_exported(o.inputs[i]);
+    const io::Recording recording = read_export(o.inputs[i], intact);
     io::write_log(recording, logs[i]);
     std::printf("%s: %zu TIP_MEASUREMENT, %zu TIP_HEADING, %zu ACTUATOR_STATE, %zu MOTION_COMMAND, %zu NEEDLE_STATE\n",
                 logs[i].c_str(), recording.tips.size(), recording.headings.size(), recording.actuators.size(),
                 recording.commands.size(), recording.estimates.size());
   }
-  return tools::kOk;
+  return intact ? tools::kOk : tools::kDamagedInput;
 }
 
 }  // namespace
@@ -70,9 +81,11 @@ int import_exports(const Options& o) {
 std::string usage_fault(const Options& o) {
   if (!o.map_path.empty()) return "";
   if (!o.base.empty()) return "--base needs --columns, whose [base] says what is in its files";
-  const auto file = std::ranges::find_if(o.inputs, [](const std::string& path) { return fs::is_regular_file(path); });
+  const auto file = std::ranges::find_if(
+      o.inputs, [](const std::string& path) { return fs::is_regular_file(path) && !io::is_mcap(path); });
   if (file == o.inputs.end()) return "";
-  return *file + ": a CSV file of one's own needs --columns (docs/import.md); without it a folder of bevel-export";
+  return *file + ": a CSV file of one's own needs --columns (docs/import.md); without it a folder or a .mcap file of " +
+         "bevel-export";
 }
 
 int run(const Options& o) {

@@ -13,6 +13,7 @@
 #include <stdexcept>
 
 #include "diagnosis/parallel.hpp"
+#include "tools/common/progress_line.hpp"
 #include "tools/steering/scenarios.hpp"
 
 namespace bevel::steering {
@@ -141,10 +142,19 @@ int run_targets(const TargetsOptions& options, std::ostream& out) {
          "| "
          "--- |\n";
   nlohmann::json all = nlohmann::json::array();
+  const auto is_tried = [](const Scenario& scenario, const LawTried& law) {
+    if (law.told_the_tip && !scenario.swings) return false;
+    return !scenario.along_path || law.law == controller::Law::arcs;
+  };
+  std::size_t rows = 0;
+  for (const Scenario* scenario : wanted)
+    for (const LawTried& law : kLaws) rows += is_tried(*scenario, law) ? 1 : 0;
+  tools::ProgressLine progress(tools::ProgressLine::as_stderr_is());
+  progress.begin("insertions", rows * static_cast<std::size_t>(options.targets),
+                 static_cast<std::size_t>(options.threads));
   for (const Scenario* scenario : wanted)
     for (const LawTried& law : kLaws) {
-      if (law.told_the_tip && !scenario->swings) continue;
-      if (scenario->along_path && law.law != controller::Law::arcs) continue;
+      if (!is_tried(*scenario, law)) continue;
       std::vector<Insertion> insertions(static_cast<std::size_t>(options.targets));
       parallel_for(insertions.size(), options.threads, [&](std::size_t i) {
         const std::uint64_t seed = 1'000'003 * options.seed + i;
@@ -152,11 +162,14 @@ int run_targets(const TargetsOptions& options, std::ostream& out) {
         trial.believed.controller.law = law.law;
         if (options.tube_share >= 0) trial.believed.controller.gains.tube_share = options.tube_share;
         insertions[i] = steer(trial.rig, trial.believed, trial.target_mm, seed, law.told_the_tip);
+        progress.one_done();
       });
       const Figures figures = figures_of(insertions);
+      progress.make_room();
       out << row_of(scenario->name, law.name, figures) << std::endl;
       all.push_back(json_of(*scenario, law.name, figures));
     }
+  progress.end();
   out << "\n";
   for (const Scenario* scenario : wanted) out << "- " << scenario->name << ": " << scenario->what << "\n";
   if (file.is_open()) file << nlohmann::json{{"seed", options.seed}, {"rows", all}}.dump(1) << "\n";

@@ -10,7 +10,8 @@ int main(int argc, char** argv) {
   bevel::tools::CommandLine command_line("bevel-table1", "Table I and Figures 5, 7 and 8, beside the paper's.");
   command_line.example("bevel-table1 --out table1").option("-o,--out", out, "folder for report.html");
   return command_line.run(argc, argv, [&] {
-    const auto study = bevel::table1::run_study();
+    bevel::tools::ProgressLine progress(bevel::tools::ProgressLine::as_stderr_is());
+    const auto study = bevel::table1::run_study(progress);
     bevel::table1::print(std::cout, study);
     if (out.empty()) return 0;
     std::filesystem::create_directories(out);

@@ -162,25 +162,29 @@ report::Figure figure5() {
 
 }  // namespace
 
-Study run_study() {
+Study run_study(tools::ProgressLine& progress) {
+  constexpr std::array kModuli_kPa{2.0, 5.0, 10.0, 20.0, 50.0, 100.0};
   Study study;
+  progress.begin("parts of the study", 2 * (kModuli_kPa.size() + 2));
   for (std::size_t i = 0; i < 2; ++i) {
     const auto published = kinematic_path(kTissues[i], table_needle(i, model::FrontWheel::published));
     study.kinematic.push_back(identify_tissue(published, kSeed + 100 * i));
     study.sign_mm[i] = {
         largest_circle_error_mm(published),
         largest_circle_error_mm(kinematic_path(kTissues[i], table_needle(i, model::FrontWheel::nonslip)))};
+    progress.one_done();
 
     // The beam: at each modulus the force that gives the paper's bicycle error; of these the least force.
     const double wanted_mm = paper_mean_bicycle_mm(kTissues[i]);
     double best_modulus_kPa = 0;
     double best_force_N = 1e9;
     double best_off_mm = 1e9;
-    for (const double modulus_kPa : {2.0, 5.0, 10.0, 20.0, 50.0, 100.0}) {
+    for (const double modulus_kPa : kModuli_kPa) {
       const double force_N = force_for_error_N(modulus_kPa, wanted_mm, kForceLimit_N);
       const auto path = beam_path(kTissues[i], modulus_kPa, force_N);
       study.reach[i].push_back(
           {modulus_kPa, largest_circle_error_mm(beam_path("", modulus_kPa, 1.0)), force_N, -path.tip_mm.back().y()});
+      progress.one_done();
       const double off_mm = std::max(std::abs(largest_circle_error_mm(path) - wanted_mm) - 0.05, 0.0);
       if (off_mm > best_off_mm || (off_mm == best_off_mm && force_N >= best_force_N)) continue;
       best_off_mm = off_mm;
@@ -188,7 +192,9 @@ Study run_study() {
       best_modulus_kPa = modulus_kPa;
     }
     study.beam.push_back(identify_tissue(beam_path(kTissues[i], best_modulus_kPa, best_force_N), kSeed + 100 * i + 50));
+    progress.one_done();
   }
+  progress.end();
   return study;
 }
 

@@ -3,6 +3,7 @@
 #include <array>
 #include <iosfwd>
 
+#include "tools/common/progress_line.hpp"
 #include "tools/table1_program/protocol.hpp"
 
 namespace bevel::table1 {
@@ -21,7 +22,8 @@ struct Study {
   std::array<std::array<double, 2>, 2> sign_mm{};
 };
 
-Study run_study();
+// Tells how far it is.
+Study run_study(tools::ProgressLine& progress);
 void print(std::ostream& out, const Study& study);
 void save_report(const Study& study, const std::string& path);
 
