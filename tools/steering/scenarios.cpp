@@ -130,7 +130,7 @@ Trial kinematic(const Kinematic& kind, std::uint64_t seed) {
   trial.rig.cameras.outlier_share = kind.outlier_share;
   trial.rig.cameras.turned_rad = kind.camera_turned_rad * Eigen::Vector3d(std::cos(angle), std::sin(angle), 0);
   trial.rig.make_plant = [truth, effects, roll_rad] {
-    return std::make_unique<rig::KinematicPlant>(truth, effects, roll_rad);
+    return std::make_unique<rig::KinematicPlant>(truth, effects, roll_rad, model::OwnValues{}, rig::Cut::kept);
   };
   return trial;
 }
