@@ -67,7 +67,7 @@ struct ControllerConfig {
   SafetyLimits safety;
   // As EstimatorConfig::through_channel: a needle that was drawn back comes out where its channel ends, and is steered
   // from there.
-  bool through_channel = true;
+  bool through_channel = false;
   std::vector<Obstacle> obstacles;  // which Law::arcs goes round (path_plan.hpp), and no other
 };
 

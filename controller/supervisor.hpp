@@ -1,7 +1,7 @@
 #pragma once
-// When the needle may move. States: off, armed, steering, retracting, hold, stopped (latched, with its reason), fault. Motion fails
-// safe: whatever is missing, stale, unhealthy or out of bounds stops within one period, and only an operator's word
-// starts it again.
+// When the needle may move. States: off, armed, steering, retracting, hold, stopped (latched, with its reason), fault.
+// Motion fails safe: whatever is missing, stale, unhealthy or out of bounds stops within one period, and only an
+// operator's word starts it again.
 #include <array>
 #include <cstdint>
 #include <optional>
@@ -18,7 +18,15 @@
 
 namespace bevel::controller {
 
-enum class Request : std::int32_t { stop = 0, arm = 1, start = 2, hold = 3, follow = 6, way_point = 7, retract = 8 };
+enum class Request : std::int32_t {
+  stop = 0,
+  arm = 1,
+  start = 2,
+  hold = 3,
+  follow = 6,
+  way_point = 7,
+  retract = 8
+};
 
 // What the controller needs of NEEDLE_STATE.
 struct NeedleView {
@@ -72,8 +80,9 @@ class Supervisor {
   // where it will be (rendezvous.hpp), and stops the needle when that is out of reach. way_point: to be passed on the
   // way to the target that is armed next, in the order told, within its tolerance (0: 1 mm); a start and a stop forget
   // those told so far. retract: draws the needle back until no more of it is inserted than target's z says (mm, by the
-  // axis; 0: to the entry), then holds; from hold, armed or steering, once what moves has come to rest by the ramp, at its own
-  // rate, with the bevel at rest: the cable is not unwound. A depth that is not behind the tip is a latched stop.
+  // axis; 0: to the entry), then holds; from hold, armed or steering, once what moves has come to rest by the ramp, at
+  // its own rate, with the bevel at rest: the cable is not unwound. A depth that is not behind the tip is a latched
+  // stop.
   void request(Request request, const std::optional<Target>& target, std::int64_t now_utime);
   // Latches what others found: overrun, input_refused, ending.
   void report(Reason reason) { stop(reason, 0, ""); }

@@ -114,7 +114,8 @@ Rates Supervisor::steer(std::int64_t now_utime) {
   // At a way-point it does not, but nothing brakes where the target is nearer than that.
   if (route_.is_needed() && !route_.aims_at_target()) ahead_mm = std::max(ahead_mm, to_go_mm());
   const double braking = std::sqrt(2 * 0.5 * config_.limits.insertion_acceleration_mm_s2 * ahead_mm);
-  wanted.insertion_mm_s = std::min({wanted.insertion_mm_s, braking, rendezvous_.rate_limit_mm_s(now_utime, ahead_mm + drawn_back_mm())});
+  const double in_time = rendezvous_.rate_limit_mm_s(now_utime, ahead_mm + drawn_back_mm());
+  wanted.insertion_mm_s = std::min({wanted.insertion_mm_s, braking, in_time});
   return wanted;
 }
 

@@ -37,7 +37,7 @@ void Channel::cut(double to_mm, double rotation_rad) {
     if (c < kCells && part_mm > 0) {
       if (front_mm_ <= kCell_mm * static_cast<double>(c)) cells_[c].setZero();
       const double roll_rad = rolled_rad_ + rotation_rad * (0.5 * (front_mm_ + end_mm) - from_mm) / length_mm;
-      cells_[c] += Eigen::Vector2f(Eigen::Vector2d(part_mm * std::cos(roll_rad), part_mm * std::sin(roll_rad)).cast<float>());
+      cells_[c] += (part_mm * Eigen::Vector2d(std::cos(roll_rad), std::sin(roll_rad))).cast<float>();
     }
     front_mm_ = std::max(front_mm_, end_mm);
   }

@@ -43,7 +43,7 @@ class Channel {
   void cut(double to_mm, double rotation_rad);
 
   double inserted_mm_ = 0, rolled_rad_ = 0, front_mm_ = 0;
-  std::array<Eigen::Vector2f, kCells> cells_{};  // direction of the bevel times length, mm; set where the front has been
+  std::array<Eigen::Vector2f, kCells> cells_{};  // direction of the bevel times length, mm
 };
 
 }  // namespace bevel::estimator

@@ -89,10 +89,11 @@ struct EstimatorConfig {
   // passed, so that is the way the tip moves, gamma; the others' are of what the needle's tip points along, e3 of {B}.
   // Taken for one another they are wrong by alpha, more than hundreds of headings are uncertain by.
   std::vector<int> shaft_cameras;
-  // A needle that is drawn back, and inserted again, goes through the channel that it has cut (channel.hpp), to its
-  // front, and cuts on from there. False: it cuts anew wherever it is, which drawn back is the bicycle run backwards
-  // with the bevel as it stands: what the model of the recordings does. With effects always false.
-  bool through_channel = true;
+  // Live: a needle that is drawn back, and inserted again, goes through the channel that it has cut (channel.hpp), to
+  // its front, and cuts on from there. False: it cuts anew wherever it is, which drawn back is the bicycle run
+  // backwards with the bevel as it stands: what the integrator of the diagnosis does, and simulated recordings made
+  // elsewhere. With effects always so.
+  bool through_channel = false;
   // Live: the axes count from the entry point, so the first actuator state says how deep the needle is and how it is
   // turned. False: wherever the axes stand at first is the entry, as in recordings made elsewhere.
   bool start_at_axes = false;

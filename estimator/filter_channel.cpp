@@ -6,10 +6,10 @@
 // the path and not in the model: it is met again, and is the same process noise (without it, in tissue as uneven as the
 // filter takes it, the squared error is 2.4 of its variance after 30 mm, with it 0.8; Channel.OfTissue).
 //
-// A stiff shaft (stiff_shaft.cpp) is pushed aside by the bevel's force by r = K b^2 / 2 g and inclined by K b / 2 h, and
-// drawn back is not: what lies in the channel is the middle of the swing, whichever way the bevel points (the beam is
-// linear, and its cut as far as it reaches the same as when the tip was there first). Its pose here stays that of the
-// tip as if it was pressed; what is seen is aside of that, toward the middle, by r for what is left of the force.
+// A stiff shaft (stiff_shaft.cpp) is pushed aside by the bevel's force by r = K b^2 / 2 g and inclined by K b / 2 h,
+// and drawn back is not: what lies in the channel is the middle of the swing, whichever way the bevel points (the beam
+// is linear, and its cut as far as it reaches the same as when the tip was there first). Its pose here stays that of
+// the tip as if it was pressed; what is seen is aside of that, toward the middle, by r for what is left of the force.
 #include <algorithm>
 
 #include "estimator/error_state.hpp"

@@ -339,6 +339,7 @@ SystemConfig load_system_config(const std::string& path) {
   io::ModelFile believed = read_model(root, folder, required, c.needle);
   c.needle = c.estimator.prior.needle = believed.needle;
   c.estimator.prior.variation = believed.variation.value_or(model::Variation{});
+  c.estimator.through_channel = true;  // a needle in tissue; recordings of a model are replayed without a system file
   io::read_estimator_config(file.section("estimator", optional), c.estimator);
   c.controller.shaft = {c.estimator.prior.bending_mm, c.estimator.prior.guide_mm};
   read_controller(file.section("controller", optional), c.controller);

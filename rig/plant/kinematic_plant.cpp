@@ -25,11 +25,12 @@ void KinematicPlant::advance(double insertion_mm, double rotation_rad, double dt
   const model::BaseMotion& base = state_.base;
   const model::BaseMotion to{base.time_s + dt_s, base.insertion_mm + insertion_mm, base.rotation_rad + rotation_rad};
   const double front_mm = keeps_cut_ ? cut_.back().insertion_mm : base.insertion_mm;
-  const bool in_cut = keeps_cut_ && to.insertion_mm >= 0 && (to.insertion_mm < front_mm || base.insertion_mm < front_mm);
+  const bool behind = to.insertion_mm < front_mm || base.insertion_mm < front_mm;
+  const bool in_cut = keeps_cut_ && to.insertion_mm >= 0 && behind;
   if (in_cut) {
     const double through_mm = std::min(to.insertion_mm, front_mm) - base.insertion_mm;
     const double share = insertion_mm == 0 ? 1 : through_mm / insertion_mm;
-    follow_cut({base.time_s + share * dt_s, std::min(to.insertion_mm, front_mm), base.rotation_rad + share * rotation_rad});
+    follow_cut({base.time_s + share * dt_s, base.insertion_mm + through_mm, base.rotation_rad + share * rotation_rad});
   }
   if (!in_cut || to.insertion_mm > front_mm) cut_to(to);
   follow_path();

@@ -22,8 +22,8 @@ class Plant {
 };
 
 // What a kinematic needle finds where it was before. kept: the channel that it has cut; drawn back, and inserted again,
-// it goes through that, to its front. forgotten: uncut tissue; drawn back it is the model run backwards with the bevel as
-// it stands, which is another path once the shaft was turned, and inserted again it cuts anew.
+// it goes through that, to its front. forgotten: uncut tissue; drawn back it is the model run backwards with the bevel
+// as it stands, which is another path once the shaft was turned, and inserted again it cuts anew.
 enum class Cut { kept, forgotten };
 
 // The extended bicycle itself, with what a model file's effects make of it: the shaft lies where the tip has passed.

@@ -12,11 +12,16 @@
 namespace bevel::estimator {
 namespace {
 
-using testing::agar_config;
 using testing::Insertion;
 using testing::kAgain;
 using testing::kBack;
 using testing::kIn;
+
+EstimatorConfig agar_config() {
+  EstimatorConfig config = testing::agar_config();
+  config.through_channel = true;
+  return config;
+}
 
 // Of a needle that turns from the start: one that goes in straight for 35 mm and is then turned over at rest is taken
 // for known too well by the past that is run again, drawn back or not.
@@ -73,6 +78,7 @@ model::BeamPlantConfig beam_of(double modulus_kPa, double force_N) {
 
 EstimatorConfig config_for(const model::BeamPlantConfig& beam) {
   EstimatorConfig config;
+  config.through_channel = true;
   config.prior.needle = rig::bicycle_of(beam);
   config.prior.curvature_sd_per_mm = 0.2 * config.prior.needle.curvature_per_mm;
   config.prior.lambda1_sd_per_rad = config.prior.lambda2_sd = 0;
@@ -180,8 +186,8 @@ TEST(Channel, AllocatesNothing) {
   }
 }
 
-// A needle in tissue that is what the filter's process noise says it is: at each tenth of a millimetre that it cuts, pose
-// and parameters take a random step. The channel is where it was.
+// A needle in tissue that is what the filter's process noise says it is: at each tenth of a millimetre that it cuts,
+// pose and parameters take a random step. The channel is where it was.
 class WanderingNeedle : public rig::Plant {
  public:
   WanderingNeedle(const model::NeedleParameters& needle, const model::Pose& start, const ProcessNoise& noise,
@@ -192,11 +198,13 @@ class WanderingNeedle : public rig::Plant {
     const auto turned = [&](const model::Pose& pose) {
       return model::Pose{pose.R * model::exp_so3({0, 0, rolled_rad_}), pose.p_mm};
     };
-    while (inserted_mm_ >= kStep_mm * static_cast<double>(cut_.size()) - 1e-9) cut_.push_back(cut_on(turned(cut_.back())));
+    while (inserted_mm_ >= kStep_mm * static_cast<double>(cut_.size()) - 1e-9)
+      cut_.push_back(cut_on(turned(cut_.back())));
     const double at = std::max(inserted_mm_ / kStep_mm, 0.0);
     const auto i = std::min(static_cast<std::size_t>(at), cut_.size() - 1);
     if (i + 1 < cut_.size()) {
-      tip_ = turned(cut_[i] * model::exp_se3((at - static_cast<double>(i)) * model::log_se3(cut_[i].inverse() * cut_[i + 1])));
+      const model::Vector6d to_next = model::log_se3(cut_[i].inverse() * cut_[i + 1]);
+      tip_ = turned(cut_[i] * model::exp_se3((at - static_cast<double>(i)) * to_next));
       return;
     }
     tip_ = turned(cut_[i]);
@@ -258,11 +266,12 @@ TEST(Channel, OfTissueThatIsAsUnevenAsTheFilterTakesIt) {
       }
       const FilterState state = estimator.estimate(data.actuators.back().utime).state;
       const Error<9> error = testing::error_of(state, data.final_pose, truth);
-      nees.at(part) += error.head<6>().dot(state.covariance.topLeftCorner<6, 6>().ldlt().solve(error.head<6>())) / (6.0 * kRuns);
+      const model::Vector6d pose = error.head<6>();
+      nees.at(part) += pose.dot(state.covariance.topLeftCorner<6, 6>().ldlt().solve(pose)) / (6.0 * kRuns);
     }
   }
-  std::cout << "seed " << kSeed << ", " << kRuns << " needles in uneven tissue: pose NEES/6 in " << nees[0] << ", drawn back 15 mm "
-            << nees[1] << ", 30 mm " << nees[2] << ", again and beyond " << nees[3] << "\n";
+  std::cout << "seed " << kSeed << ", " << kRuns << " needles in uneven tissue: pose NEES/6 in " << nees[0]
+            << ", drawn back 15 mm " << nees[1] << ", 30 mm " << nees[2] << ", again and beyond " << nees[3] << "\n";
   // One walk in and another back are taken for independent, where the second is the first: wide, and never narrow.
   const double high = boost::math::quantile(boost::math::chi_squared(6.0 * kRuns), 0.975) / (6.0 * kRuns);
   for (const double one : nees) {

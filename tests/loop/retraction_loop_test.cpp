@@ -60,7 +60,7 @@ class RetractionLoop : public testing::Test {
   std::vector<Passed> way_;
 };
 
-const Eigen::Vector3d kTarget(4, -6, 70), kSecond(-2, -10, 110);
+const Eigen::Vector3d kTarget(4, -6, 70), kSecond(9, -10, 110);
 
 TEST_F(RetractionLoop, BackByFortyMillimetresAndOnToAnotherTarget) {
   // A workspace that ends at the entry, and with it the drive's own limit (0x607D), is not run into.
@@ -71,8 +71,8 @@ TEST_F(RetractionLoop, BackByFortyMillimetresAndOnToAnotherTarget) {
   double off_the_path_mm = 0, estimate_mm = 0;
   const double to_mm = insertion_mm() - 40;
   ASSERT_NO_FATAL_FAILURE(draw_back(to_mm, off_the_path_mm, estimate_mm));
-  std::cout << "drawn back 40 mm: tip off the way in by " << off_the_path_mm << " mm at most, estimate beside the tip by "
-            << estimate_mm << " mm, inserted " << insertion_mm() - to_mm << " mm more than asked for\n";
+  std::cout << "drawn back 40 mm: tip off the way in by " << off_the_path_mm
+            << " mm at most, estimate beside the tip by " << estimate_mm << " mm, inserted " << insertion_mm() - to_mm << " mm more than asked for\n";
   EXPECT_LT(off_the_path_mm, 0.02);
   EXPECT_LT(estimate_mm, 0.3);
   ASSERT_NO_FATAL_FAILURE(arrive(kSecond));

@@ -110,6 +110,7 @@ Trial kinematic(const Kinematic& kind, std::uint64_t seed) {
   const double roll_rad = kind.roll_sd_rad * draw.normal();
   estimator::Prior& prior = trial.believed.estimator.prior;
   prior.needle = believed;
+  trial.believed.estimator.through_channel = true;
   prior.curvature_sd_per_mm = std::max(prior.curvature_sd_per_mm, 0.3 * believed.curvature_per_mm);
   if (kind.roll_sd_rad > 0) prior.roll_sd_rad = kind.roll_sd_rad;
   std::vector<model::ActiveEffect> effects;
@@ -167,6 +168,7 @@ Trial beam(const Beam& kind, std::uint64_t seed) {
   const double bending_mm = std::pow(4 * config.bending_stiffness_N_mm2 / (1e-3 * config.foundation_modulus_kPa), 0.25);
   estimator::Prior& prior = trial.believed.estimator.prior;
   prior.needle = deep;
+  trial.believed.estimator.through_channel = true;
   prior.needle.curvature_per_mm *= draw.uniform(0.7, 1.3);
   prior.curvature_sd_per_mm = 0.2 * prior.needle.curvature_per_mm;
   prior.lambda1_sd_per_rad = prior.lambda2_sd = 0;

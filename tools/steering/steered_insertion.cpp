@@ -136,7 +136,8 @@ Insertion steer(const SteeredRig& rig, const Believed& believed, const Eigen::Ve
   settings.limits.measurement_age_s += plant->model().latency_s().value;
   estimator::NeedleEstimator estimator(settings);
   estimator::EntryLine entry(settings);
-  const controller::ControllerConfig& config = believed.controller;
+  controller::ControllerConfig config = believed.controller;
+  config.through_channel = settings.through_channel && settings.effects.empty();
   const model::NeedleParameters needle = model::AugmentedNeedle(settings.prior.needle, settings.effects).needle();
   controller::Supervisor supervisor(config, needle, believed.undone);
   const auto frame_us = std::llround(1e6 * rig.cameras.frame_s);

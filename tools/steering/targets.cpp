@@ -98,8 +98,8 @@ std::string row_of(const std::string& scenario, const char* law, const Figures& 
   }
   if (f.off_the_path_mm > 0) {
     std::snprintf(text.data(), text.size(),
-                  " drawn back: off the way in by at most %.2f, estimate off by at most %.2f, target before missed by at "
-                  "most %.2f;",
+                  " drawn back: off the way in by at most %.2f, estimate off by at most %.2f, target before missed by "
+                  "at most %.2f;",
                   f.off_the_path_mm, f.drawn_back_error_mm, f.before_miss_mm);
     row += text.data();
   }
