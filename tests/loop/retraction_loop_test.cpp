@@ -72,7 +72,8 @@ TEST_F(RetractionLoop, BackByFortyMillimetresAndOnToAnotherTarget) {
   const double to_mm = insertion_mm() - 40;
   ASSERT_NO_FATAL_FAILURE(draw_back(to_mm, off_the_path_mm, estimate_mm));
   std::cout << "drawn back 40 mm: tip off the way in by " << off_the_path_mm
-            << " mm at most, estimate beside the tip by " << estimate_mm << " mm, inserted " << insertion_mm() - to_mm << " mm more than asked for\n";
+            << " mm at most, estimate beside the tip by " << estimate_mm << " mm, inserted " << insertion_mm() - to_mm
+            << " mm more than asked for\n";
   EXPECT_LT(off_the_path_mm, 0.02);
   EXPECT_LT(estimate_mm, 0.3);
   ASSERT_NO_FATAL_FAILURE(arrive(kSecond));
