@@ -25,6 +25,11 @@ model::Pose ArcWalk::middle_of(const model::Pose& tip) const {
   return middle;
 }
 
+model::Pose ArcWalk::tip_of(const model::Pose& middle) const {
+  const double cut_rad = end_at(middle.p_mm.z()).cut_rad;
+  return {middle.R * model::exp_so3({0.5 * cut_rad, 0, 0}), tip_mm(middle, 1)};
+}
+
 Eigen::Vector3d ArcWalk::tip_mm(const model::Pose& middle, double share) const {
   return middle.p_mm - middle.R.col(1) * (share * end_at(middle.p_mm.z()).swing_mm);
 }

@@ -14,6 +14,7 @@ class ArcWalk {
 
   // The middle of the swing of a tip, both in {A}.
   model::Pose middle_of(const model::Pose& tip) const;
+  model::Pose tip_of(const model::Pose& middle) const;  // the same back
   // Where the tip is, with this share of the bend.
   Eigen::Vector3d tip_mm(const model::Pose& middle, double share) const;
 

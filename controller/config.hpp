@@ -13,6 +13,7 @@ struct SteeringLimits {
   double rotation_rate_rad_s = 8.0;        // largest
   double rotation_acceleration_rad_s2 = 40.0;
   double insertion_acceleration_mm_s2 = 40.0;
+  double retraction_rate_mm_s = 5.0;
   double total_rotation_rad = 62.8;  // cable wrap, either way from the zero of the axis
 };
 
@@ -64,6 +65,9 @@ struct ControllerConfig {
   SteeringGains gains;
   FollowConfig follow;
   SafetyLimits safety;
+  // As EstimatorConfig::through_channel: a needle that was drawn back comes out where its channel ends, and is steered
+  // from there.
+  bool through_channel = false;
   std::vector<Obstacle> obstacles;  // which Law::arcs goes round (path_plan.hpp), and no other
 };
 

@@ -10,6 +10,8 @@ const char* to_string(State state) {
       return "armed";
     case State::steering:
       return "steering";
+    case State::retracting:
+      return "retracting";
     case State::hold:
       return "hold";
     case State::stopped:
@@ -72,6 +74,8 @@ const char* to_string(Reason reason) {
       return "too many way-points";
     case Reason::law_without_path:
       return "only the law by arcs goes round obstacles and through way-points";
+    case Reason::retraction_refused:
+      return "there is no such depth behind the tip to retract to";
     case Reason::ending:
       return "told to end";
   }

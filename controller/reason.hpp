@@ -3,7 +3,7 @@
 
 namespace bevel::controller {
 
-enum class State { off, armed, steering, hold, stopped, fault };
+enum class State { off, armed, steering, retracting, hold, stopped, fault };
 
 enum class Reason {
   none,
@@ -31,7 +31,8 @@ enum class Reason {
   way_point_missed,
   way_point_unreachable,  // refused before insertion, or found on the way; by how much the reach falls short
   way_points_too_many,
-  law_without_path,  // way-points or obstacles with a law that does not follow a path
+  retraction_refused,  // the depth that was told is none behind the tip
+  law_without_path,    // way-points or obstacles with a law that does not follow a path
 };
 const char* to_string(State state);
 const char* to_string(Reason reason);

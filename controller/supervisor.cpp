@@ -36,7 +36,7 @@ void Supervisor::request(Request request, const std::optional<Target>& target, s
       stop(Reason::operator_stop, 0, "");
       return;
     case Request::hold:
-      if (status_.state == State::steering) status_.state = State::hold;
+      if (moves()) status_.state = State::hold;
       resting_.reset();
       return;
     case Request::start:
@@ -54,6 +54,7 @@ void Supervisor::request(Request request, const std::optional<Target>& target, s
       if (!in_motion_states() || !target || !target->position_mm.allFinite() || !check_inputs(now_utime)) return;
       rendezvous_.observe(target->utime_or(now_utime), target->position_mm);
       rendezvous_.plan(now_utime, to_go_mm(), config_.limits.insertion_rate_mm_s);
+      if (status_.state == State::retracting) return;  // it goes nowhere now; seen again when it is steered
       if (route_.is_needed()) return;  // which looks at the whole path, in the next period
       // A prediction that is hardly one yet is no reason.
       const double miss_mm = predicted_miss_mm(rendezvous_.target_mm());
@@ -70,10 +71,12 @@ void Supervisor::request(Request request, const std::optional<Target>& target, s
       way_points_.add(
           {target->position_mm, target->tolerance_mm > 0 ? target->tolerance_mm : kWayPointTolerance_mm, true});
       return;
+    case Request::retract:
+      return start_retraction(target, now_utime);
     case Request::arm:
       break;
   }
-  if (status_.state == State::steering || !target || !target->position_mm.allFinite()) return;
+  if (moves() || !target || !target->position_mm.allFinite()) return;
   status_.state = State::off;  // re-arming is this explicit word, and it clears a latched reason
   status_.reason = Reason::none;
   status_.value = 0;
@@ -223,7 +226,8 @@ model::MotionCommand Supervisor::step(std::int64_t now_utime, double elapsed_s) 
   }
   if (waits_for_axes(now_utime, elapsed_s)) return command;
   if (!check_inputs(now_utime) || !check_axes() || !check_tracking()) return command;
-  if (status_.state != State::steering) {
+  note_front();
+  if (!moves()) {
     rates_ = ramp(rates_, {}, dt_s, config_.limits);
     if (!check_rest(now_utime)) return command;
     commands_.remember(now_utime, rates_);
@@ -233,10 +237,8 @@ model::MotionCommand Supervisor::step(std::int64_t now_utime, double elapsed_s) 
     return command;
   }
   resting_.reset();
-  if (needle_state_->reset_count != reset_count_) {
-    stop(Reason::state_reset, needle_state_->reset_count, "resets");
-    return command;
-  }
+  if (!check_reset()) return command;
+  if (status_.state == State::retracting) return retract(command, dt_s);
   rendezvous_.plan(now_utime, to_go_mm(), config_.limits.insertion_rate_mm_s);
   if (!see_path(elapsed_s)) return command;
   if (!see_geometry()) {
@@ -253,16 +255,27 @@ model::MotionCommand Supervisor::step(std::int64_t now_utime, double elapsed_s) 
   } else {
     wanted = steer(now_utime);
   }
-  rates_ = ramp(rates_, wanted, dt_s, config_.limits);
-  commands_.remember(now_utime, rates_);
   if (ahead_mm > 0)
     status_.predicted_miss_mm = route_.is_needed() ? std::max(0.0, -route_.outlook().slack_mm)
                                 : arcs             ? arc_miss_mm(status_.arc)
                                                    : status_.geometry.aim_mm.norm();
+  return run(command, wanted, dt_s);
+}
+
+// By the ramps, toward what is wanted.
+model::MotionCommand Supervisor::run(model::MotionCommand command, const Rates& wanted, double dt_s) {
+  rates_ = ramp(rates_, wanted, dt_s, config_.limits);
+  commands_.remember(command.utime, rates_);
   command.mode = 1;
   command.insertion_rate_mm_s = rates_.insertion_mm_s;
   command.rotation_rate_rad_s = rates_.rotation_rad_s;
   return command;
+}
+
+bool Supervisor::check_reset() {
+  if (needle_state_->reset_count == reset_count_) return true;
+  stop(Reason::state_reset, needle_state_->reset_count, "resets");
+  return false;
 }
 
 }  // namespace bevel::controller

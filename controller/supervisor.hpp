@@ -1,7 +1,7 @@
 #pragma once
-// When the needle may move. States: off, armed, steering, hold, stopped (latched, with its reason), fault. Motion fails
-// safe: whatever is missing, stale, unhealthy or out of bounds stops within one period, and only an operator's word
-// starts it again.
+// When the needle may move. States: off, armed, steering, retracting, hold, stopped (latched, with its reason), fault.
+// Motion fails safe: whatever is missing, stale, unhealthy or out of bounds stops within one period, and only an
+// operator's word starts it again.
 #include <array>
 #include <cstdint>
 #include <optional>
@@ -18,7 +18,15 @@
 
 namespace bevel::controller {
 
-enum class Request : std::int32_t { stop = 0, arm = 1, start = 2, hold = 3, follow = 6, way_point = 7 };
+enum class Request : std::int32_t {
+  stop = 0,
+  arm = 1,
+  start = 2,
+  hold = 3,
+  follow = 6,
+  way_point = 7,
+  retract = 8
+};
 
 // What the controller needs of NEEDLE_STATE.
 struct NeedleView {
@@ -71,10 +79,16 @@ class Supervisor {
   // acceleration, may go on. stop: latched. follow: where the target is now, in motion too; it is aimed at
   // where it will be (rendezvous.hpp), and stops the needle when that is out of reach. way_point: to be passed on the
   // way to the target that is armed next, in the order told, within its tolerance (0: 1 mm); a start and a stop forget
-  // those told so far.
+  // those told so far. retract: draws the needle back until no more of it is inserted than target's z says (mm, by the
+  // axis; 0: to the entry), then holds; from hold, armed or steering, once what moves has come to rest by the ramp, at
+  // its own rate, with the bevel at rest: the cable is not unwound. A depth that is not behind the tip is a latched
+  // stop.
   void request(Request request, const std::optional<Target>& target, std::int64_t now_utime);
   // Latches what others found: overrun, input_refused, ending.
   void report(Reason reason) { stop(reason, 0, ""); }
+
+  // It was told to move, and is not at rest of itself.
+  bool moves() const { return status_.state == State::steering || status_.state == State::retracting; }
 
   // Between periods, when something has come in: whether motion may go on. False once: it was latched just now.
   bool watch(std::int64_t now_utime);
@@ -97,6 +111,13 @@ class Supervisor {
   bool check_tracking();
   bool check_rest(std::int64_t now_utime);
   Rates steer(std::int64_t now_utime);
+  void start_retraction(const std::optional<Target>& target, std::int64_t now_utime);
+  model::MotionCommand retract(model::MotionCommand command, double dt_s);
+  void note_front();
+  double drawn_back_mm() const;
+  model::Pose cutting_tip() const;
+  bool check_reset();
+  model::MotionCommand run(model::MotionCommand command, const Rates& wanted, double dt_s);
   bool see_path(double elapsed_s);
   void stop_without_path();
   PathStart path_start() const;
@@ -107,7 +128,7 @@ class Supervisor {
   model::NeedleParameters needle_now() const;
   ShaftConfig shaft_now() const;
   bool in_motion_states() const {
-    return status_.state == State::armed || status_.state == State::steering || status_.state == State::hold;
+    return status_.state == State::armed || status_.state == State::hold || moves();
   }
 
   ControllerConfig config_;
@@ -126,6 +147,14 @@ class Supervisor {
   Eigen::Vector3d aim_mm_ = Eigen::Vector3d::Zero();  // the target, or where the path to it is a look-ahead later
   ArcLaw arcs_;
   Rates rates_;
+  double retract_to_mm_ = 0;
+  // Where it was inserted deepest: there it cuts on, however far it was drawn back.
+  struct Front {
+    double insertion_mm, rotation_rad;
+    model::Pose tip;
+    std::int32_t reset_count;
+  };
+  std::optional<Front> front_;
   std::int64_t seq_ = 0;
   std::int32_t reset_count_ = 0;
   std::optional<std::int64_t> followed_utime_;  // of the last report that was as told

@@ -25,7 +25,7 @@ ShaftConfig Supervisor::shaft_now() const {
 }
 
 double Supervisor::predicted_miss_mm(const Eigen::Vector3d& target_mm) const {
-  const model::Pose& tip = needle_state_->pose;
+  const model::Pose tip = cutting_tip();
   if (shaft_now().bending_mm > 0) {
     const ArcGeometry arc = arc_geometry(tip, needle_now(), shaft_now(), target_mm);
     return arc.in_domain && arc.ahead_mm <= 0 ? (target_mm - tip.p_mm).norm() : arc_miss_mm(arc);
@@ -35,12 +35,12 @@ double Supervisor::predicted_miss_mm(const Eigen::Vector3d& target_mm) const {
 
 // To the plane through the target across the needle.
 double Supervisor::to_go_mm() const {
-  const model::Pose& tip = needle_state_->pose;
-  return tip.R.col(2).dot(rendezvous_.target_mm() - tip.p_mm);
+  const model::Pose tip = cutting_tip();
+  return drawn_back_mm() + tip.R.col(2).dot(rendezvous_.target_mm() - tip.p_mm);
 }
 
 PathStart Supervisor::path_start() const {
-  PathStart start{needle_state_->pose, needle_now(), shaft_now()};
+  PathStart start{cutting_tip(), needle_now(), shaft_now()};
   start.margin_mm = kPathDeviations * std::sqrt(needle_state_->position_variance_mm2) +
                     kLeaves * std::abs(needle_state_->curvature_per_mm) * kLookahead_mm * kLookahead_mm;
   return start;
@@ -80,7 +80,7 @@ bool Supervisor::see_path(double elapsed_s) {
 }
 
 bool Supervisor::see_geometry() {
-  const model::Pose& tip = needle_state_->pose;
+  const model::Pose tip = cutting_tip();
   if (by_arcs()) {
     status_.arc = arc_geometry(tip, needle_now(), shaft_now(), aim_mm_, needle_state_->uncertain);
     return status_.arc.in_domain;
@@ -114,7 +114,8 @@ Rates Supervisor::steer(std::int64_t now_utime) {
   // At a way-point it does not, but nothing brakes where the target is nearer than that.
   if (route_.is_needed() && !route_.aims_at_target()) ahead_mm = std::max(ahead_mm, to_go_mm());
   const double braking = std::sqrt(2 * 0.5 * config_.limits.insertion_acceleration_mm_s2 * ahead_mm);
-  wanted.insertion_mm_s = std::min({wanted.insertion_mm_s, braking, rendezvous_.rate_limit_mm_s(now_utime, ahead_mm)});
+  const double in_time = rendezvous_.rate_limit_mm_s(now_utime, ahead_mm + drawn_back_mm());
+  wanted.insertion_mm_s = std::min({wanted.insertion_mm_s, braking, in_time});
   return wanted;
 }
 

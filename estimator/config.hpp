@@ -20,6 +20,7 @@ struct Prior {
   double bending_mm = 0;
   double bending_sd_mm = 0;
   double guide_mm = 0;
+  double bevel_mm = 3.5;  // length of the bevel: drawn back by this, it is out of what it cuts and pushes no more
   double position_sd_mm = 0.3;  // tip at the entry point
   double tilt_sd_rad = 0.02;    // heading about body x and y
   double roll_sd_rad = 0.05;    // bevel about the heading
@@ -88,6 +89,11 @@ struct EstimatorConfig {
   // passed, so that is the way the tip moves, gamma; the others' are of what the needle's tip points along, e3 of {B}.
   // Taken for one another they are wrong by alpha, more than hundreds of headings are uncertain by.
   std::vector<int> shaft_cameras;
+  // Live: a needle that is drawn back, and inserted again, goes through the channel that it has cut (channel.hpp), to
+  // its front, and cuts on from there. False: it cuts anew wherever it is, which drawn back is the bicycle run
+  // backwards with the bevel as it stands: what the integrator of the diagnosis does, and simulated recordings made
+  // elsewhere. With effects always so.
+  bool through_channel = false;
   // Live: the axes count from the entry point, so the first actuator state says how deep the needle is and how it is
   // turned. False: wherever the axes stand at first is the entry, as in recordings made elsewhere.
   bool start_at_axes = false;

@@ -24,7 +24,7 @@ EntryLine::EntryLine(const EstimatorConfig& config) : filter_(config), expected_
 
 void EntryLine::restart() {
   began_ = false;
-  inserted_mm_ = 0;
+  inserted_mm_ = deepest_mm_ = 0;
   passed_ = 0;
   readings_ = 0;
   const Prior& prior = filter_.config().prior;
@@ -47,15 +47,17 @@ void EntryLine::add(const model::ActuatorState& axes) {
     needles_[1].lambda2 += prior.lambda2_sd;
     needles_[2].bending_mm += prior.bending_sd_mm;
     began_ = true;
-  } else if (inserted_mm_ <= kTo_mm) {
+  } else if (deepest_mm_ <= kTo_mm) {
     const double by_mm = axes.insertion_mm - from_mm_ - inserted_mm_, by_rad = axes.rotation_rad - rotation_rad_;
     filter_.predict_mean(nominal_, by_mm, by_rad);
     for (FilterState& needle : needles_) filter_.predict_mean(needle, by_mm, by_rad);
   }
   inserted_mm_ = axes.insertion_mm - from_mm_;
+  deepest_mm_ = std::max(deepest_mm_, inserted_mm_);
   rotation_rad_ = axes.rotation_rad;
   Passed& passed = past_[passed_++ % kPast];
-  passed = {axes.utime, inserted_mm_, filter_.tip_pose(nominal_).p_mm};
+  // Beyond, nothing is followed any more: one that is drawn back from there is not looked at again.
+  passed = {axes.utime, deepest_mm_ <= kTo_mm ? inserted_mm_ : deepest_mm_, filter_.tip_pose(nominal_).p_mm};
   for (int i = 0; i < kNeedles; ++i)
     passed.beside_mm.col(i) = (filter_.tip_pose(needles_[i]).p_mm - passed.p_mm).head<2>();
 }

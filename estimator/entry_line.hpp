@@ -32,7 +32,7 @@ class EntryLine {
   // Late or in any order, up to as long ago as a hundred actuator states.
   void add(const model::TipMeasurement& measurement);
 
-  bool knows() const { return began_ && inserted_mm_ >= kFrom_mm && readings_ > 0; }
+  bool knows() const { return began_ && deepest_mm_ >= kFrom_mm && readings_ > 0; }
   // (a, b): mm along x and y of {A} for each that is inserted. Its standard deviation is the larger of the two.
   Eigen::Vector2d slope() const { return mean_.segment<2>(2); }
   double slope_sd() const;
@@ -60,6 +60,7 @@ class EntryLine {
   FilterState nominal_;
   std::array<FilterState, kNeedles> needles_;
   bool began_ = false;
+  double deepest_mm_ = 0;
   double inserted_mm_ = 0, from_mm_ = 0, rotation_rad_ = 0;
   std::array<Passed, kPast> past_{};
   std::size_t passed_ = 0;

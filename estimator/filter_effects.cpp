@@ -64,7 +64,7 @@ model::TipReading NeedleFilter::reading(const FilterState& state, Eigen::Vector3
 }
 
 Eigen::Vector3d NeedleFilter::seen_position_mm(const FilterState& state) const {
-  return config_.effects.empty() ? state.pose.p_mm : reading(state).position_mm;
+  return config_.effects.empty() ? tip_pose(state).p_mm : reading(state).position_mm;
 }
 
 std::int64_t NeedleFilter::latency_us() const {

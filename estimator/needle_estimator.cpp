@@ -61,19 +61,39 @@ void NeedleEstimator::drop_oldest() {
   order_.erase(order_.begin() + which);
 }
 
+void NeedleEstimator::restart_past(const FilterState& start) {
+  past_.restart(start);
+  past_mm_ = 0;
+  past_due_mm_ = kFirstRelinearisation_mm;
+  past_started_ = true;
+  past_waits_ = false;
+}
+
 void NeedleEstimator::remember(const Node& before, const Node& node) {
-  if (!past_started_ || node.state.reset_count != before.state.reset_count) {
-    const bool first = !past_started_;
-    past_.restart(first ? before.state : node.state);
-    past_mm_ = 0;
-    past_due_mm_ = kFirstRelinearisation_mm;
-    past_started_ = true;
-    if (!first) return;
+  const bool first = !past_started_, reset = node.state.reset_count != before.state.reset_count;
+  if (first || reset) restart_past(first ? before.state : node.state);
+  // Drawn back it is where it has been: the past goes on where it goes on, and what is seen meanwhile is the filter's
+  // alone.
+  if (node.state.channel.drawn_back_mm() > kDrawnBack_mm) {
+    if (!past_waits_) past_.close(before.state, filter_);
+    if (!past_waits_) left_ = {before.insertion_mm, before.rotation_rad};
+    past_begins_anew_ = reset || (past_waits_ && past_begins_anew_);
+    past_waits_ = true;
+    return;
   }
+  if (past_waits_ && past_begins_anew_) return restart_past(node.state);
+  if (reset && !first) return;
   if (!past_.complete()) return;
   PastStep step;
   step.insertion_mm = node.insertion_mm - before.insertion_mm;
   step.rotation_rad = node.rotation_rad - before.rotation_rad;
+  if (past_waits_) {
+    // The bevel was turned at the front, as far as the path is concerned.
+    past_waits_ = false;
+    past_.add(before.state, {.rotation_rad = before.rotation_rad - left_.rotation_rad}, node.state, {}, filter_);
+    past_.close(node.state, filter_);
+    step.insertion_mm = node.insertion_mm - left_.insertion_mm;
+  }
   step.measured = node.kind == Kind::position && node.update.accepted;
   if (step.measured) {
     step.position_mm = node.measurement.position_mm;
@@ -87,7 +107,7 @@ void NeedleEstimator::remember(const Node& before, const Node& node) {
 }
 
 void NeedleEstimator::relinearise_if_due() {
-  if (!past_.complete() || past_mm_ < past_due_mm_) return;
+  if (!past_.complete() || past_waits_ || past_mm_ < past_due_mm_) return;
   FilterState& anchor = node(0).state;
   past_.close(anchor, filter_);
   if (!past_.complete()) return;

@@ -80,6 +80,8 @@ class NeedleEstimator {
   // Insertion after which the past is run again; what has come since is linear.
   static constexpr double kFirstRelinearisation_mm = 30;
   static constexpr double kRelinearisedEvery_mm = 15;
+  // Less is how far an axis at rest is read differently.
+  static constexpr double kDrawnBack_mm = 0.01;
   enum class Kind : std::uint8_t { actuator, position, heading };
   struct Node {
     std::int64_t utime = 0;
@@ -105,6 +107,7 @@ class NeedleEstimator {
   void process_from(std::size_t index);
   void drop_oldest();
   void remember(const Node& before, const Node& node);
+  void restart_past(const FilterState& start);
   void relinearise_if_due();
   void interpolate(std::size_t index);
   Estimate describe(const FilterState& state, std::int64_t utime, const Update& newest_update,
@@ -118,6 +121,11 @@ class NeedleEstimator {
   Past past_;                             // what has left the history, from its start or the last reset
   std::unique_ptr<WalkedStep[]> walked_;  // room to run it again in: sized once, memory comes as it is used
   bool past_started_ = false;
+  bool past_waits_ = false;        // for a needle that was drawn back
+  bool past_begins_anew_ = false;  // then: the pose was reset meanwhile
+  struct {
+    double insertion_mm, rotation_rad;
+  } left_{};  // where the axes stood when it was
   double past_mm_ = 0;  // insertion and retraction in it
   double past_due_mm_ = kFirstRelinearisation_mm;
   Counters counters_;

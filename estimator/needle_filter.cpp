@@ -131,6 +131,11 @@ void NeedleFilter::predict(FilterState& state, double insertion_mm, double rotat
                                                  : predict_with_effects<9>(state, increment));
     return;
   }
+  follow(state, insertion_mm, rotation_rad, true,
+         [&](double by_mm, double by_rad) { predict_cutting(state, by_mm, by_rad); });
+}
+
+void NeedleFilter::predict_cutting(FilterState& state, double insertion_mm, double rotation_rad) const {
   if (insertion_mm == 0 && rotation_rad == 0) return;
   if (stiff_) return predict_stiff(state, insertion_mm, rotation_rad);
   wheelbase_estimated_ ? predict_plain<10>(state, insertion_mm, rotation_rad)
@@ -139,13 +144,44 @@ void NeedleFilter::predict(FilterState& state, double insertion_mm, double rotat
 
 void NeedleFilter::predict_mean(FilterState& state, double insertion_mm, double rotation_rad, double duration_s) const {
   if (!config_.effects.empty()) return predict(state, insertion_mm, rotation_rad, duration_s);
-  if (insertion_mm == 0 && rotation_rad == 0) return;
-  if (stiff_) {
-    state.outside_model = !move_stiff(state, insertion_mm, rotation_rad);
-    return;
-  }
+  follow(state, insertion_mm, rotation_rad, false, [&](double by_mm, double by_rad) {
+    state.outside_model = !mean_cutting(state, by_mm, by_rad);
+  });
+}
+
+bool NeedleFilter::mean_cutting(FilterState& state, double insertion_mm, double rotation_rad) const {
+  if (stiff_) return move_stiff(state, insertion_mm, rotation_rad);
   const model::StepInput input{insertion_mm, rotation_rad, {state.curvature_per_mm, 0}};
-  state.outside_model = !model::advance(state.pose, input, slip_of(state));
+  return model::advance(state.pose, input, slip_of(state));
+}
+
+// Part by part: what was cut before is passed through, and the rest is cut. Turning in the channel turns the bevel
+// alone, so that it does not matter when.
+template <class Cutting>
+void NeedleFilter::follow(FilterState& state, double insertion_mm, double rotation_rad, bool with_covariance,
+                          const Cutting& cutting) const {
+  if (insertion_mm == 0 && rotation_rad == 0) return;
+  if (!config_.through_channel) return cutting(insertion_mm, rotation_rad);
+  Channel& channel = state.channel;
+  const double target_mm = channel.inserted_mm() + insertion_mm;
+  bool outside = false, first = true;
+  while (first || channel.inserted_mm() < target_mm || channel.inserted_mm() > target_mm) {
+    const Channel::Part part = channel.next(target_mm);
+    // Of new tissue all at once, and by the increment itself: no sum of it has been rounded.
+    const bool all = first && part.to_mm == target_mm;
+    const double by_mm = all ? insertion_mm : part.insertion_mm;
+    const double by_rad = all || insertion_mm == 0 ? rotation_rad : rotation_rad * (part.insertion_mm / insertion_mm);
+    if (!part.cut_before) {
+      cutting(by_mm, by_rad);
+      outside = outside || state.outside_model;
+    } else {
+      if (by_rad != 0) cutting(0, by_rad);
+      outside = !draw_through(state, part, with_covariance) || outside;
+    }
+    channel.pass(part, by_rad);
+    first = false;
+  }
+  state.outside_model = outside;
 }
 
 template <int kSize>
@@ -198,6 +234,11 @@ Update NeedleFilter::update_sized(FilterState& state, const model::TipMeasuremen
   if (seen.rank == 0) return {};  // sees nothing: no rejection either
   state.reading_utime = std::max(state.reading_utime, measurement.utime);
   const auto apply = [&]() -> Update {
+    if (kSize == 10 && stiff_ && pressing(state) < 1) {
+      Eigen::Matrix<double, 3, kSize> by_state;
+      const Eigen::Vector3d at_mm = drawn_back_tip(state, by_state);
+      return update_seen<kSize, kSize>(state, by_state, seen, measurement.position_mm - at_mm, gate_);
+    }
     if (config_.effects.empty())
       return update_seen<kSize, 3>(state, state.pose.R, seen, measurement.position_mm - state.pose.p_mm, gate_);
     Eigen::Vector3d blur_mm2;

@@ -13,7 +13,9 @@
 #include <optional>
 #include <span>
 
+#include "estimator/channel.hpp"
 #include "estimator/config.hpp"
+#include "estimator/end_motion.hpp"
 #include "model/kinematics.hpp"
 #include "model/samples.hpp"
 
@@ -50,6 +52,7 @@ struct FilterState {
   std::int32_t reset_count = 0;
   bool turned_over = false;  // a reset put the bevel on the other side; it does so once
   bool outside_model = false;
+  Channel channel;
   EffectState effects;
 };
 
@@ -122,12 +125,16 @@ class NeedleFilter {
   // as uncertain as it can have bent on the way. Without depth it is initial(), turned.
   FilterState inserted(double insertion_mm, double rotation_rad) const;
 
-  // Moves the state by increments of the two axes in so much time (which only effects ask for). Where the model has no
-  // answer the pose stays, and outside_model is set.
+  // Moves the state by increments of the two axes in so much time (which only effects ask for): through the channel
+  // that was cut where there is one (EstimatorConfig::through_channel, filter_channel.cpp), cutting beyond. Where the
+  // model has no answer the pose stays, and outside_model is set.
   void predict(FilterState& state, double insertion_mm, double rotation_rad, double duration_s = 0) const;
 
   // The same without the covariance, for what is only predicted.
   void predict_mean(FilterState& state, double insertion_mm, double rotation_rad, double duration_s = 0) const;
+
+  // As predict() without effects, of a tip that cuts where it is, whatever has been cut before; back too.
+  void predict_cutting(FilterState& state, double insertion_mm, double rotation_rad) const;
 
   // The tip in {A} and the shaft's end there: the state's own pose, but for what effects or a stiff shaft make of it.
   model::Pose tip_pose(const FilterState& state) const;
@@ -173,6 +180,16 @@ class NeedleFilter {
   // kSize: 9, or 10 with ell.
   template <int kSize>
   void predict_plain(FilterState& state, double insertion_mm, double rotation_rad) const;
+  bool mean_cutting(FilterState& state, double insertion_mm, double rotation_rad) const;
+  template <class Cutting>
+  void follow(FilterState& state, double insertion_mm, double rotation_rad, bool with_covariance,
+              const Cutting& cutting) const;
+  bool draw_through(FilterState& state, const Channel::Part& part, bool with_covariance) const;
+  // How much of the bevel's force is left: less than all of it where the tip was drawn back from what it has cut.
+  double pressing(const FilterState& state) const;
+  Shaft shaft_of(const FilterState& state) const;
+  template <int kSize>
+  Eigen::Vector3d drawn_back_tip(const FilterState& state, Eigen::Matrix<double, 3, kSize>& by_state) const;
   bool move_stiff(FilterState& state, double insertion_mm, double rotation_rad) const;
   void predict_stiff(FilterState& state, double insertion_mm, double rotation_rad) const;
   template <int kSize>

@@ -140,7 +140,7 @@ void Past::close(const FilterState& end, const NeedleFilter& filter) {
   append(share * open_.insertion_mm, share * open_.rotation_rad);
   if (steps_.empty() || steps_.back().has_reading()) steps_.emplace_back();
   FilterState there = end;
-  filter.predict(there, (share - 1) * open_.insertion_mm, (share - 1) * open_.rotation_rad);
+  filter.predict_cutting(there, (share - 1) * open_.insertion_mm, (share - 1) * open_.rotation_rad);
   PastStep& step = steps_.back();
   step.measured = open_.measured;
   step.position_mm = open_.position_mm;

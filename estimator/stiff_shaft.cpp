@@ -9,25 +9,17 @@
 // R of the state is that of the shaft without the bend at its end: the shaft's end is inclined toward the bevel by
 // K b h / 2 against its e3 (tip_pose). This is tip_swing of the library (model/effects/tip_swing.cpp, derived there)
 // with the tip itself as the state instead of an offset to be remembered, so that b can be estimated: turning shows it.
+#include "estimator/end_motion.hpp"
+
 #include <cmath>
 
 #include "estimator/error_state.hpp"
 #include "estimator/propagate.hpp"
-#include "model/shaft_end.hpp"
 
 namespace bevel::estimator {
-namespace {
 
-struct EndMotion {
-  Eigen::Vector3d moved_mm;  // in {B} before the step
-  Eigen::Vector3d by_curvature, by_bending;
-  double share = 1;             // of k that bends the path
-  double share_by_bending = 0;  // 1/mm
-};
-
-EndMotion end_motion(const FilterState& state, double guide_mm, double insertion_mm, double rotation_rad) {
-  const double k = state.curvature_per_mm, b = state.bending_mm;
-  const double x = (state.pose.p_mm.z() + guide_mm) / b;
+EndMotion end_motion(const Shaft& shaft, double insertion_mm, double rotation_rad) {
+  const double k = shaft.curvature_per_mm, b = shaft.bending_mm, x = shaft.bending_lengths;
   const model::ShaftEnd end = model::shaft_end(x);
   const double g_by_b = -end.g_by_x * x / b, h_by_b = -end.h_by_x * x / b;
   const double chord = 2 * std::sin(rotation_rad / 2), slope = 0.5 * k * b * end.h;
@@ -48,10 +40,15 @@ EndMotion end_motion(const FilterState& state, double guide_mm, double insertion
   return out;
 }
 
-}  // namespace
-
+Swing swing_of(const Shaft& shaft) {
+  const double k = shaft.curvature_per_mm, b = shaft.bending_mm, x = shaft.bending_lengths;
+  const model::ShaftEnd end = model::shaft_end(x);
+  return {{0, 0.5 * k * b * b * end.g, 0},
+          {0, 0.5 * b * b * end.g, 0},
+          {0, k * b * end.g - 0.5 * k * b * x * end.g_by_x, 0}};
+}
 bool NeedleFilter::move_stiff(FilterState& state, double insertion_mm, double rotation_rad) const {
-  const EndMotion end = end_motion(state, config_.prior.guide_mm, insertion_mm, rotation_rad);
+  const EndMotion end = end_motion(shaft_of(state), insertion_mm, rotation_rad);
   model::Pose pose{state.pose.R, state.pose.p_mm + state.pose.R * end.moved_mm};
   const model::StepInput input{insertion_mm, rotation_rad, {end.share * state.curvature_per_mm, 0}};
   if (!model::advance(pose, input, slip_of(state))) return false;
@@ -61,7 +58,7 @@ bool NeedleFilter::move_stiff(FilterState& state, double insertion_mm, double ro
 
 void NeedleFilter::predict_stiff(FilterState& state, double insertion_mm, double rotation_rad) const {
   const double k = state.curvature_per_mm;
-  const EndMotion end = end_motion(state, config_.prior.guide_mm, insertion_mm, rotation_rad);
+  const EndMotion end = end_motion(shaft_of(state), insertion_mm, rotation_rad);
   model::Pose pose{state.pose.R, state.pose.p_mm + state.pose.R * end.moved_mm};
   model::NeedleJacobian J;
   state.outside_model = !model::advance(pose, {insertion_mm, rotation_rad, {end.share * k, 0}}, slip_of(state), J);
@@ -86,9 +83,15 @@ model::Pose NeedleFilter::tip_pose(const FilterState& state) const {
     needle_.point(augmented(state), at);
     return {state.pose.R, at.position_mm};
   }
-  const model::ShaftEnd end = model::shaft_end((state.pose.p_mm.z() + config_.prior.guide_mm) / state.bending_mm);
-  const double slope_rad = 0.5 * state.curvature_per_mm * state.bending_mm * end.h;
-  return {state.pose.R * model::exp_so3({slope_rad, 0, 0}), state.pose.p_mm};
+  const Shaft shaft = shaft_of(state);
+  const double slope_rad = 0.5 * shaft.curvature_per_mm * shaft.bending_mm * model::shaft_end(shaft.bending_lengths).h;
+  const double pushed = pressing(state);
+  return {state.pose.R * model::exp_so3({pushed * slope_rad, 0, 0}),
+          state.pose.p_mm + state.pose.R * ((1 - pushed) * swing_of(shaft).to_middle_mm)};
+}
+
+Shaft NeedleFilter::shaft_of(const FilterState& state) const {
+  return {state.curvature_per_mm, state.bending_mm, (state.pose.p_mm.z() + config_.prior.guide_mm) / state.bending_mm};
 }
 
 }  // namespace bevel::estimator

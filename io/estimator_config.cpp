@@ -15,6 +15,7 @@ void read_estimator_config(Section section, estimator::EstimatorConfig& config) 
   prior.read("bending_mm", config.prior.bending_mm, optional, in_range(0, 200));
   prior.read("bending_sd_mm", config.prior.bending_sd_mm, optional, in_range(0, 100));
   prior.read("guide_mm", config.prior.guide_mm, optional, in_range(0, 500));
+  prior.read("bevel_mm", config.prior.bevel_mm, optional, in_range(0.1, 20));
   if (config.prior.bending_mm > 0 && config.prior.bending_mm < 5)
     prior.fail("bending_mm", "is " + std::to_string(config.prior.bending_mm) + "; allowed: 0, or 5 to 200");
   if (config.prior.bending_mm > 0 && config.prior.wheelbase_sd_mm > 0)
@@ -50,6 +51,7 @@ void read_estimator_config(Section section, estimator::EstimatorConfig& config) 
   }
 
   section.read("entry_slope_sd_rad", config.entry_slope_sd_rad, optional, in_range(1e-4, 1));
+  section.read("through_channel", config.through_channel, optional);
   section.read("relinearised_steps", config.relinearised_steps, optional, in_range(0, 100000));
 
   Section limits = section.section("limits", optional);

@@ -107,7 +107,7 @@ template <MessageOf<steering_target_t> Message, class Visitor>
 void visit_fields(Message& m, Visitor&& v) {
   v.time("utime", m.utime);
   v.count("seq", m.seq);
-  v.code("request", m.request, 0, 7);
+  v.code("request", m.request, 0, 8);
   for (auto& session : m.session) v.count("session", session);
   v.number("position_mm", m.position_mm, 3, kLargestLength_mm);
   v.number("tolerance_mm", &m.tolerance_mm, 1, kLargestLength_mm);

@@ -74,7 +74,7 @@ ControllerNode::ControllerNode(lcm::LCM& lcm, const SystemConfig& config)
         supervisor_.set_needle(view);
         if (!supervisor_.watch(port_.now().utime))
           command(0);
-        else if (supervisor_.status().state == controller::State::steering)
+        else if (supervisor_.moves())
           command_now();
       },
       [bounds](const needle_state_t& before, const needle_state_t& next) {
@@ -154,14 +154,14 @@ void ControllerNode::command_now() {
 void ControllerNode::step(const Now& now, double late_s) {
   port_.tell_time(now);
   port_.rethrow();
-  if (late_s > kLateStop_s && supervisor_.status().state == controller::State::steering) {
+  if (late_s > kLateStop_s && supervisor_.moves()) {
     status_.note_overrun();
     stop(controller::Reason::overrun);
   }
   if (status_.name_taken())
     stop(controller::Reason::input_refused, "another bevel-controller is heard on this network");
-  // While it steers each estimate is a step of its own, and the period only fills the gaps.
-  const bool stepped = supervisor_.status().state == controller::State::steering && stepped_ns_ != 0 &&
+  // While it moves each estimate is a step of its own, and the period only fills the gaps.
+  const bool stepped = supervisor_.moves() && stepped_ns_ != 0 &&
                        static_cast<double>(now.ns - stepped_ns_) * 1e-9 < 0.5 * config_.period_s;
   if (!stepped) command_now();
   report();

@@ -170,6 +170,7 @@ void EstimatorNode::on_word(Word word) {
     case Word::hold:
     case Word::follow:
     case Word::way_point:
+    case Word::retract:
       return;  // of motion
   }
   port_.forget_senders();

@@ -16,7 +16,8 @@ enum class Word : std::int32_t {
   entry = 4,
   confirm = 5,
   follow = 6,
-  way_point = 7
+  way_point = 7,
+  retract = 8
 };
 // Place of a receiver's session in steering_target_t.session.
 enum class Receiver : std::size_t { controller = 0, stepper = 1, estimator = 2 };

@@ -57,7 +57,8 @@ RigNode::RigNode(lcm::LCM& lcm, can::Bus& insertion_bus, can::Bus& rotation_bus,
   if (config.rig.beam)
     plant_ = std::make_unique<rig::BeamNeedle>(*config.rig.beam, effects, config.rig.roll_error_rad, own_values_);
   else
-    plant_ = std::make_unique<rig::KinematicPlant>(config.rig.truth, effects, config.rig.roll_error_rad, own_values_);
+    plant_ = std::make_unique<rig::KinematicPlant>(config.rig.truth, effects, config.rig.roll_error_rad, own_values_,
+                                                   rig::Cut::kept);
   for (const CameraViewConfig& c : config.cameras) {
     rig::SceneConfig scene;
     scene.size_px = {c.width_px, c.height_px};

@@ -83,6 +83,7 @@ void StepperNode::on_word(Word word) {
     case Word::hold:
     case Word::follow:
     case Word::way_point:
+    case Word::retract:
       break;  // the controller's
   }
 }

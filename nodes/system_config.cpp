@@ -58,6 +58,7 @@ void read_controller(Section s, controller::ControllerConfig& c) {
              {"arcs", controller::Law::arcs}, {"flip", controller::Law::flip}, {"spin", controller::Law::spin}});
   Section l = s.section("limits", optional);
   l.read("insertion_rate_mm_s", c.limits.insertion_rate_mm_s, optional, in_range(0.01, 100));
+  l.read("retraction_rate_mm_s", c.limits.retraction_rate_mm_s, optional, in_range(0.01, 100));
   l.read("insertion_rate_min_share", c.limits.insertion_rate_min_share, optional, in_range(0.01, 1));
   l.read("rotation_rate_rad_s", c.limits.rotation_rate_rad_s, optional, in_range(0.01, 100));
   l.read("rotation_acceleration_rad_s2", c.limits.rotation_acceleration_rad_s2, optional, in_range(1, 10000));
@@ -338,6 +339,7 @@ SystemConfig load_system_config(const std::string& path) {
   io::ModelFile believed = read_model(root, folder, required, c.needle);
   c.needle = c.estimator.prior.needle = believed.needle;
   c.estimator.prior.variation = believed.variation.value_or(model::Variation{});
+  c.estimator.through_channel = true;  // a needle in tissue; recordings of a model are replayed without a system file
   io::read_estimator_config(file.section("estimator", optional), c.estimator);
   c.controller.shaft = {c.estimator.prior.bending_mm, c.estimator.prior.guide_mm};
   read_controller(file.section("controller", optional), c.controller);
@@ -367,6 +369,7 @@ SystemConfig load_system_config(const std::string& path) {
   c.effects = std::move(believed.effects);
   c.discrepancies = std::move(believed.discrepancies);
   c.estimator.effects = c.live_effects.active;
+  c.controller.through_channel = c.estimator.through_channel && c.estimator.effects.empty();
   if (c.estimator.prior.bending_mm > 0 && !c.estimator.effects.empty())
     throw io::ConfigError({path + ": [estimator.prior] bending_mm: a stiff shaft is estimated without [[effect]]s; " +
                            std::string(c.estimator.effects.front().effect->name()) + " is one"});

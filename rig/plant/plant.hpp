@@ -21,24 +21,40 @@ class Plant {
   virtual const model::AugmentedNeedle& model() const = 0;
 };
 
+// What a kinematic needle finds where it was before. kept: the channel that it has cut; drawn back, and inserted again,
+// it goes through that, to its front. forgotten: uncut tissue; drawn back it is the model run backwards with the bevel
+// as it stands, which is another path once the shaft was turned, and inserted again it cuts anew.
+enum class Cut { kept, forgotten };
+
 // The extended bicycle itself, with what a model file's effects make of it: the shaft lies where the tip has passed.
-// Retraction draws the tip back along that path. What a camera makes of it is not in here.
+// What a camera makes of it is not in here.
 class KinematicPlant : public Plant {
  public:
-  // roll_rad: of the bevel at the start; own: what this insertion has of its own. Throws std::invalid_argument for more
-  // effects than a model holds.
+  // roll_rad: of the bevel at the start; own: what this insertion has of its own. The cut is kept without effects only:
+  // theirs are defined for tips that cut wherever they are. Throws std::invalid_argument for more effects than a model
+  // holds.
   explicit KinematicPlant(const model::NeedleParameters& needle, std::vector<model::ActiveEffect> effects = {},
-                          double roll_rad = 0, const model::OwnValues& own = {});
+                          double roll_rad = 0, const model::OwnValues& own = {}, Cut cut = Cut::forgotten);
   void advance(double insertion_mm, double rotation_rad, double dt_s) override;
   model::Pose tip() const override { return tip_; }
   const std::vector<Eigen::Vector3d>& shaft_mm() const override { return shaft_mm_; }
   const model::AugmentedNeedle& model() const override { return needle_; }
 
  private:
+  void cut_to(const model::BaseMotion& to);
+  void follow_cut(const model::BaseMotion& to);
+  void keep();
   void follow_path();
 
   model::AugmentedNeedle needle_;
   model::AugmentedState state_;
+  // Where the tip has cut, the last at the front: by inserted length, a tenth of a millimetre apart at least.
+  struct Passed {
+    double insertion_mm, rotation_rad;
+    model::Pose pose;
+  };
+  std::vector<Passed> cut_;
+  bool keeps_cut_;
   model::Pose tip_;                       // with its elastic offset
   std::vector<Eigen::Vector3d> path_mm_;  // where the tip has passed; last point is the tip, without offset
   std::vector<double> path_depth_mm_;     // inserted length at each point

@@ -56,7 +56,7 @@ TEST_F(SupervisorWithObstacle, WithinItsClearanceTheNeedleStops) {
 
 TEST_F(SupervisorTest, WayPointsArePassedWithinTheirToleranceOrItStops) {
   for (const double off_mm : {0.5, 1.5}) {
-    supervisor.request(Request::stop, std::nullopt, now);
+    supervisor = Supervisor(config, agar());  // another needle: this one would have been drawn back by 52 mm
     supervisor.request(Request::way_point, Target{{1, -2, 50}, 1.0}, now);
     start();
     EXPECT_EQ(good_step().mode, 1);

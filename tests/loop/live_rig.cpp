@@ -115,7 +115,8 @@ void LiveRig::judge(std::int64_t now_ns) {
     started_ = false;
   }
   const std::string& controller = said("bevel-controller").state;
-  const bool contradiction = (controller == "armed" || controller == "steering" || controller == "hold") &&
+  const bool contradiction = (controller == "armed" || controller == "steering" ||
+                              controller == "retracting" || controller == "hold") &&
                              latched(said("bevel-stepper").state);
   if (!contradiction) contradiction_ns_ = now_ns;
   watch_.armed_with_fault_ns = std::max(watch_.armed_with_fault_ns, now_ns - contradiction_ns_);

@@ -12,6 +12,7 @@ nodes::SystemConfig loop_config() {
   config.needle.lambda1_per_rad = 0.49;
   config.needle.lambda2 = 0.22;
   config.estimator.prior.needle = config.needle;
+  config.estimator.through_channel = config.controller.through_channel = true;  // as a system file has it
   config.rig.truth = config.needle;
   config.rig.truth.curvature_per_mm *= 1.15;
   config.rig.truth.lambda1_per_rad *= 0.8;

@@ -20,6 +20,8 @@ int main(int argc, char** argv) {
       .option("-c,--config", config, "system file; without, config/demo.toml or config/beam.toml by the plant")
       .numbers("--target", options.target_mm, "target in {A}, mm: x,y,z", 3)
       .option("--out", options.out, "folder for log, report and the processes' output")
+      .option("--retract-to", options.retract_to_mm,
+              "draw it back along its path once it has arrived, until so much is inserted, mm; below 0: not", -1, 400)
       .option("--tolerance", options.tolerance_mm, "largest miss that counts as success, mm", 0.01, 100)
       .option("--time-limit", options.time_limit_s, "give up after, s", 1, 3600)
       .flag("--view", options.view, "show it on a live page while it runs")

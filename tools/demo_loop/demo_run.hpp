@@ -10,6 +10,7 @@ struct DemoOptions {
   std::string out = "out/demo";
   std::string programs;  // folder of the five programs
   std::vector<double> target_mm{6, -9, 100};
+  double retract_to_mm = -1;  // once it has arrived, until so much is inserted; below 0: not
   double tolerance_mm = 2;
   double time_limit_s = 55;
   bool view = false;  // bevel-view beside the five; whatever becomes of it, the insertion goes on

@@ -85,7 +85,10 @@ LoopFigures loop_figures(const std::string& log_path) {
     if (target.request == 1)
       f.target_mm = Eigen::Vector3d(target.position_mm[0], target.position_mm[1], target.position_mm[2]);
   f.truth = log.truths.back();
-  f.targeting_error_mm = (position(log.truths.back()) - f.target_mm).norm();
+  // Where it came to rest, from which it may have been drawn back.
+  const auto drawn_back = std::ranges::find(log.targets, 8, &steering_target_t::request);
+  const auto rested = drawn_back != log.targets.end() ? truth_at(log.truths, drawn_back->utime) : std::nullopt;
+  f.targeting_error_mm = (rested.value_or(position(log.truths.back())) - f.target_mm).norm();
 
   double sum2 = 0;
   std::size_t count = 0;

@@ -13,8 +13,9 @@ constexpr std::int64_t kPrintPeriod_ns = 2'000'000'000;
 constexpr std::int64_t kSettle_ns = 500'000'000;
 }  // namespace
 
-SteeringSession::SteeringSession(lcm::LCM& lcm, const std::string& log_path, const Eigen::Vector3d& target_mm)
-    : lcm_(lcm), port_(lcm), log_(log_path), target_mm_(target_mm) {
+SteeringSession::SteeringSession(lcm::LCM& lcm, const std::string& log_path, const Eigen::Vector3d& target_mm,
+                                 std::optional<double> retract_to_mm)
+    : lcm_(lcm), port_(lcm), log_(log_path), target_mm_(target_mm), retract_to_mm_(retract_to_mm) {
   everything_ = lcm_.subscribe(".*", &SteeringSession::on_any, this);
   everything_->setQueueCapacity(2000);
   port_.subscribe<process_status_t>(io::channel::kProcessStatus,
@@ -34,12 +35,14 @@ void SteeringSession::on_any(const lcm::ReceiveBuffer* buffer, const std::string
   }
 }
 
-void SteeringSession::say(nodes::Word word) {
+void SteeringSession::say(nodes::Word word) { say(word, target_mm_); }
+
+void SteeringSession::say(nodes::Word word, const Eigen::Vector3d& position_mm) {
   steering_target_t m{};
   m.utime = nodes::now().utime;
   m.seq = seq_++;
   m.request = static_cast<std::int32_t>(word);
-  for (int i = 0; i < 3; ++i) m.position_mm[i] = target_mm_[i];
+  for (int i = 0; i < 3; ++i) m.position_mm[i] = position_mm[i];
   const char* const receivers[] = {"bevel-controller", "bevel-stepper", "bevel-estimator"};  // as nodes::Receiver
   for (int i = 0; i < 3; ++i) m.session[i] = session_of(receivers[i]);
   port_.publish(io::channel::kSteeringTarget, m);
@@ -77,7 +80,12 @@ SteeringSession::Progress SteeringSession::step(const nodes::Now& now) {
   const std::string controller = state_of("bevel-controller");
   if (steering_seen_ && controller == "hold") {
     if (arrived_ns_ == 0) arrived_ns_ = now.ns;
-    return now.ns - arrived_ns_ > kSettle_ns ? Progress::arrived : Progress::going_on;
+    if (now.ns - arrived_ns_ <= kSettle_ns) return Progress::going_on;
+    return retract_to_mm_ ? draw_back(now) : Progress::arrived;
+  }
+  if (controller == "retracting" && !retracting_seen_) {
+    retracting_seen_ = true;
+    arrived_ns_ = 0;  // it is told anew when it holds again
   }
   if (controller == "steering") steering_seen_ = true;
   if (controller == "stopped" || controller == "fault") {
@@ -96,6 +104,15 @@ SteeringSession::Progress SteeringSession::step(const nodes::Now& now) {
   } else if (seen && controller != "armed" && (stepper == "ready" || stepper == "enabled")) {
     say(nodes::Word::arm);
   }
+  return Progress::going_on;
+}
+
+// It holds: at the target, or where it was to be drawn back to.
+SteeringSession::Progress SteeringSession::draw_back(const nodes::Now& now) {
+  if (retracting_seen_) return Progress::arrived;
+  if (now.ns < next_word_ns_) return Progress::going_on;
+  next_word_ns_ = now.ns + kWordPeriod_ns;
+  say(nodes::Word::retract, {0, 0, *retract_to_mm_});
   return Progress::going_on;
 }
 

@@ -14,7 +14,9 @@ namespace bevel::tools {
 
 class SteeringSession {
  public:
-  SteeringSession(lcm::LCM& lcm, const std::string& log_path, const Eigen::Vector3d& target_mm);
+  // retract_to_mm: where it has arrived it is drawn back until so much is inserted.
+  SteeringSession(lcm::LCM& lcm, const std::string& log_path, const Eigen::Vector3d& target_mm,
+                  std::optional<double> retract_to_mm = {});
   ~SteeringSession();
 
   enum class Progress { going_on, arrived, stopped };
@@ -32,6 +34,8 @@ class SteeringSession {
  private:
   void on_any(const lcm::ReceiveBuffer* buffer, const std::string& channel);
   void say(nodes::Word word);
+  void say(nodes::Word word, const Eigen::Vector3d& position_mm);
+  Progress draw_back(const nodes::Now& now);
   void print_progress(const nodes::Now& now);
   std::string state_of(const std::string& process) const;
   std::int64_t session_of(const std::string& process) const;
@@ -41,6 +45,8 @@ class SteeringSession {
   io::LogWriter log_;
   lcm::Subscription* everything_;
   Eigen::Vector3d target_mm_;
+  std::optional<double> retract_to_mm_;
+  bool retracting_seen_ = false;
   std::map<std::string, process_status_t> processes_;
   std::optional<needle_state_t> estimate_;
   std::optional<needle_state_t> truth_;

@@ -77,6 +77,13 @@ void draw_way(Draw& draw, const model::NeedleParameters& needle, Trial& trial) {
   }
 }
 
+// The same for one that is drawn back by 30 mm from the first of them.
+void draw_before(Draw& draw, const model::NeedleParameters& needle, Trial& trial) {
+  draw_way(draw, needle, trial);
+  trial.believed.before = {trial.believed.way_points_mm.front(), 30};
+  trial.believed.way_points_mm.clear();
+}
+
 struct Kinematic {
   double parameters_off = 0;  // uniform, relative, of k, lambda1, lambda2
   double roll_sd_rad = 0;
@@ -89,6 +96,7 @@ struct Kinematic {
   bool gated = false;
   bool obstacle = false;
   bool way_point = false;
+  bool retract = false;
   double camera_turned_rad = 0;  // of both, about a drawn axis across the needle
 };
 Trial kinematic(const Kinematic& kind, std::uint64_t seed) {
@@ -102,6 +110,7 @@ Trial kinematic(const Kinematic& kind, std::uint64_t seed) {
   const double roll_rad = kind.roll_sd_rad * draw.normal();
   estimator::Prior& prior = trial.believed.estimator.prior;
   prior.needle = believed;
+  trial.believed.estimator.through_channel = true;
   prior.curvature_sd_per_mm = std::max(prior.curvature_sd_per_mm, 0.3 * believed.curvature_per_mm);
   if (kind.roll_sd_rad > 0) prior.roll_sd_rad = kind.roll_sd_rad;
   std::vector<model::ActiveEffect> effects;
@@ -125,12 +134,13 @@ Trial kinematic(const Kinematic& kind, std::uint64_t seed) {
     };
   if (kind.obstacle) trial.believed.controller.obstacles = {draw_obstacle(draw, target)};
   if (kind.way_point) draw_way(draw, believed, trial);
+  if (kind.retract) draw_before(draw, believed, trial);
   trial.believed.controller.follow.gate_breathing = kind.gated;
   trial.rig.cameras = cameras(kind.cameras);
   trial.rig.cameras.outlier_share = kind.outlier_share;
   trial.rig.cameras.turned_rad = kind.camera_turned_rad * Eigen::Vector3d(std::cos(angle), std::sin(angle), 0);
   trial.rig.make_plant = [truth, effects, roll_rad] {
-    return std::make_unique<rig::KinematicPlant>(truth, effects, roll_rad);
+    return std::make_unique<rig::KinematicPlant>(truth, effects, roll_rad, model::OwnValues{}, rig::Cut::kept);
   };
   return trial;
 }
@@ -141,6 +151,7 @@ struct Beam {
   double relaxing_fraction = 0;
   bool obstacle = false;
   bool way_point = false;
+  bool retract = false;
 };
 // The software is told a curvature and a bending length, each off by up to 30 %, and a bicycle's slip of none.
 Trial beam(const Beam& kind, std::uint64_t seed) {
@@ -157,6 +168,7 @@ Trial beam(const Beam& kind, std::uint64_t seed) {
   const double bending_mm = std::pow(4 * config.bending_stiffness_N_mm2 / (1e-3 * config.foundation_modulus_kPa), 0.25);
   estimator::Prior& prior = trial.believed.estimator.prior;
   prior.needle = deep;
+  trial.believed.estimator.through_channel = true;
   prior.needle.curvature_per_mm *= draw.uniform(0.7, 1.3);
   prior.curvature_sd_per_mm = 0.2 * prior.needle.curvature_per_mm;
   prior.lambda1_sd_per_rad = prior.lambda2_sd = 0;
@@ -167,6 +179,7 @@ Trial beam(const Beam& kind, std::uint64_t seed) {
   trial.target_mm = draw_target(draw, deep.curvature_per_mm);
   if (kind.obstacle) trial.believed.controller.obstacles = {draw_obstacle(draw, trial.target_mm)};
   if (kind.way_point) draw_way(draw, deep, trial);
+  if (kind.retract) draw_before(draw, deep, trial);
   trial.rig.cameras = cameras(2);
   trial.rig.make_plant = [config] { return std::make_unique<rig::BeamNeedle>(config); };
   return trial;
@@ -216,6 +229,12 @@ const std::vector<Scenario>& scenarios() {
           {.way_point = true}, kinematic),
       scenario<Beam>("way-point-beam", "the same, beam, 50 kPa, 1 N",
                      {.modulus_kPa = 50, .force_N = 1, .way_point = true}, beam),
+      scenario<Kinematic>("retract", "at a target 40 to 60 mm deep drawn back by 30 mm, then to another 40 to 60 mm on",
+                          {.retract = true}, kinematic),
+      scenario<Kinematic>("retract-30", "the same, k, lambda1, lambda2 off by up to 30 %",
+                          {.parameters_off = 0.3, .retract = true}, kinematic),
+      scenario<Beam>("retract-beam", "the same, beam, 50 kPa, 1 N",
+                     {.modulus_kPa = 50, .force_N = 1, .retract = true}, beam),
       scenario<Kinematic>("outliers", "a tenth of the messages off by 3 to 10 mm", {.outlier_share = 0.1}, kinematic),
   };
   return all;

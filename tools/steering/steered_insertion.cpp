@@ -5,6 +5,8 @@
 #include <deque>
 #include <map>
 #include <random>
+#include <utility>
+#include <vector>
 
 #include "estimator/entry_line.hpp"
 #include "estimator/health.hpp"
@@ -105,6 +107,24 @@ controller::NeedleView view_of(const estimator::Estimate& estimate) {
   return view;
 }
 
+// Where the tip was at each inserted length on the way in.
+class WayIn {
+ public:
+  void pass(double insertion_mm, const Eigen::Vector3d& tip_mm) { way_.emplace_back(insertion_mm, tip_mm); }
+  double distance_mm(double insertion_mm, const Eigen::Vector3d& tip_mm) const {
+    if (way_.size() < 2) return 0;
+    const auto after = std::ranges::lower_bound(way_.begin() + 1, way_.end() - 1, insertion_mm, {},
+                                                [](const auto& passed) { return passed.first; });
+    const auto &a = *(after - 1), &b = *after;
+    const double length_mm = b.first - a.first;
+    const double share = length_mm > 0 ? (insertion_mm - a.first) / length_mm : 1;
+    return (a.second + share * (b.second - a.second) - tip_mm).norm();
+  }
+
+ private:
+  std::vector<std::pair<double, Eigen::Vector3d>> way_;
+};
+
 }  // namespace
 
 Insertion steer(const SteeredRig& rig, const Believed& believed, const Eigen::Vector3d& target_mm, std::uint64_t seed,
@@ -116,7 +136,8 @@ Insertion steer(const SteeredRig& rig, const Believed& believed, const Eigen::Ve
   settings.limits.measurement_age_s += plant->model().latency_s().value;
   estimator::NeedleEstimator estimator(settings);
   estimator::EntryLine entry(settings);
-  const controller::ControllerConfig& config = believed.controller;
+  controller::ControllerConfig config = believed.controller;
+  config.through_channel = settings.through_channel && settings.effects.empty();
   const model::NeedleParameters needle = model::AugmentedNeedle(settings.prior.needle, settings.effects).needle();
   controller::Supervisor supervisor(config, needle, believed.undone);
   const auto frame_us = std::llround(1e6 * rig.cameras.frame_s);
@@ -128,6 +149,9 @@ Insertion steer(const SteeredRig& rig, const Believed& believed, const Eigen::Ve
                       static_cast<std::int32_t>(model::AxisStatus::enabled)};
   std::int64_t next_frame_us = 0;
   bool started = false;
+  // To the target before, drawn back from it, to the target itself.
+  enum class Leg { before, back, last } leg = believed.before ? Leg::before : Leg::last;
+  WayIn way;
   std::vector<double> way_point_miss_mm(believed.way_points_mm.size(), std::numeric_limits<double>::infinity());
   const auto target_now = [&] { return rig.target_mm ? rig.target_mm(result.duration_s) : target_mm; };
   for (std::int64_t us = 0; us < kTimeLimit_us; us += kTick_us) {
@@ -143,6 +167,10 @@ Insertion steer(const SteeredRig& rig, const Believed& believed, const Eigen::Ve
             std::min(result.nearest_mm, controller::distance_mm(obstacle, before_mm, plant->tip().p_mm));
       axes.insertion_mm += insertion_mm, axes.rotation_rad += rotation_rad;
       result.turned_rad += std::abs(rotation_rad);
+      const Eigen::Vector3d tip_mm = plant->tip().p_mm;
+      if (leg == Leg::before) way.pass(axes.insertion_mm, tip_mm);
+      if (leg == Leg::back)
+        result.off_the_path_mm = std::max(result.off_the_path_mm, way.distance_mm(axes.insertion_mm, tip_mm));
       if (started) result.duration_s += tick_s;
     }
     if (us % kActuatorPeriod_us == 0) {
@@ -160,25 +188,38 @@ Insertion steer(const SteeredRig& rig, const Believed& believed, const Eigen::Ve
     if (result.turned_frame_said_mm == 0 && entry.is_turned()) result.turned_frame_said_mm = axes.insertion_mm;
     if (us % control_us != 0 || us < kSettle_us) continue;
     controller::NeedleView view = view_of(estimator.estimate(utime));
+    if (leg == Leg::back)
+      result.drawn_back_error_mm = std::max(result.drawn_back_error_mm, (view.pose.p_mm - plant->tip().p_mm).norm());
     if (told_the_tip) view.pose = plant->tip();
     supervisor.set_needle(view);
-    if (!started) {
-      const controller::Target target{target_mm, 0};
+    const auto go = [&](const Eigen::Vector3d& to_mm) {
+      const controller::Target target{to_mm, 0};
       for (const Eigen::Vector3d& point_mm : believed.way_points_mm)
         supervisor.request(controller::Request::way_point, controller::Target{point_mm, 0}, utime);
       supervisor.request(controller::Request::arm, target, utime);
       supervisor.request(controller::Request::start, target, utime);
       started = true;
-    }
+    };
+    if (!started) go(leg == Leg::before ? believed.before->target_mm : target_mm);
     if (rig.target_mm && us % kFollow_us == 0)
       supervisor.request(controller::Request::follow, controller::Target{target_now(), 0}, utime);
     const model::MotionCommand command = supervisor.step(utime, config.period_s);
     axes.insertion_rate_mm_s = command.insertion_rate_mm_s;
     axes.rotation_rate_rad_s = command.rotation_rate_rad_s;
-    if (supervisor.status().state != controller::State::steering) break;
+    if (supervisor.moves()) continue;
+    if (leg == Leg::last || supervisor.status().state != controller::State::hold) break;
+    if (leg == Leg::before) {
+      leg = Leg::back;
+      result.before_miss_mm = (plant->tip().p_mm - believed.before->target_mm).norm();
+      const double to_mm = axes.insertion_mm - believed.before->drawn_back_mm;
+      supervisor.request(controller::Request::retract, controller::Target{{0, 0, to_mm}, 0}, utime);
+    } else if (command.insertion_rate_mm_s == 0) {
+      leg = Leg::last;
+      go(target_mm);
+    }
   }
   result.inserted_mm = axes.insertion_mm;
-  result.arrived = supervisor.status().state == controller::State::hold;
+  result.arrived = leg == Leg::last && supervisor.status().state == controller::State::hold;
   result.reason = supervisor.status().reason;
   if (!way_point_miss_mm.empty()) result.way_point_miss_mm = std::ranges::max(way_point_miss_mm);
   result.miss_mm = (plant->tip().p_mm - target_now()).norm();

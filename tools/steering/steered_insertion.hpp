@@ -7,6 +7,7 @@
 #include <functional>
 #include <limits>
 #include <memory>
+#include <optional>
 #include <vector>
 
 #include "controller/supervisor.hpp"
@@ -46,6 +47,12 @@ struct Believed {
   // Effects between base and tip that the controller undoes; those of the estimator it follows in any case.
   std::vector<model::ActiveEffect> undone{};
   std::vector<Eigen::Vector3d> way_points_mm{};  // told before the target
+  // Before the target another, and drawn back by so much there.
+  struct Before {
+    Eigen::Vector3d target_mm;
+    double drawn_back_mm = 0;
+  };
+  std::optional<Before> before{};
 };
 
 struct Insertion {
@@ -58,6 +65,9 @@ struct Insertion {
   // Least distance of the true tip from any obstacle's surface, negative inside; infinite where there is none.
   double nearest_mm = std::numeric_limits<double>::infinity();
   double way_point_miss_mm = 0;            // the farthest of them, true tip to point where it was nearest
+  // Of one that went to a target before and was drawn back: there, and the farthest on the way back of the true tip
+  // from where it was on the way in, and of the estimate from the true tip.
+  double before_miss_mm = 0, off_the_path_mm = 0, drawn_back_error_mm = 0;
   double inserted_mm = 0, duration_s = 0;  // from the word to go until it stopped
 };
 

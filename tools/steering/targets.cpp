@@ -36,6 +36,8 @@ struct Figures {
   double turns_per_100mm = 0, feed_mm_s = 0, estimate_error_mm = 0;
   int turned_frame_said = 0;                                    // of all targets
   double way_point_miss_mm = 0;                                 // the worst, of those that arrived
+  // The same of those that were drawn back: of the tip off the way in, of the estimate, and of the target before.
+  double off_the_path_mm = 0, drawn_back_error_mm = 0, before_miss_mm = 0;
   int touched = 0;                                              // an obstacle, of all targets
   double nearest_mm = std::numeric_limits<double>::infinity();  // to one
   std::map<std::string, int> stopped;                           // by reason
@@ -61,6 +63,9 @@ Figures figures_of(const std::vector<Insertion>& all) {
     }
     ++f.arrived;
     f.way_point_miss_mm = std::max(f.way_point_miss_mm, one.way_point_miss_mm);
+    f.off_the_path_mm = std::max(f.off_the_path_mm, one.off_the_path_mm);
+    f.drawn_back_error_mm = std::max(f.drawn_back_error_mm, one.drawn_back_error_mm);
+    f.before_miss_mm = std::max(f.before_miss_mm, one.before_miss_mm);
     miss_mm.push_back(one.miss_mm);
     turned_rad += one.turned_rad, inserted_mm += one.inserted_mm, duration_s += one.duration_s;
     f.estimate_error_mm += one.estimate_error_mm;
@@ -92,6 +97,13 @@ std::string row_of(const std::string& scenario, const char* law, const Figures& 
     std::snprintf(text.data(), text.size(), " way-point missed by at most %.2f;", f.way_point_miss_mm);
     row += text.data();
   }
+  if (f.off_the_path_mm > 0) {
+    std::snprintf(text.data(), text.size(),
+                  " drawn back: off the way in by at most %.2f, estimate off by at most %.2f, target before missed by "
+                  "at most %.2f;",
+                  f.off_the_path_mm, f.drawn_back_error_mm, f.before_miss_mm);
+    row += text.data();
+  }
   if (std::isfinite(f.nearest_mm)) {
     std::snprintf(text.data(), text.size(), " obstacle touched: %d, nearest %.2f;", f.touched, f.nearest_mm);
     row += text.data();
@@ -110,6 +122,9 @@ nlohmann::json json_of(const Scenario& scenario, const char* law, const Figures&
           {"turned_frame_said", f.turned_frame_said},
           {"touched", f.touched},
           {"way_point_miss_mm", f.way_point_miss_mm},
+          {"off_the_path_mm", f.off_the_path_mm},
+          {"drawn_back_error_mm", f.drawn_back_error_mm},
+          {"before_miss_mm", f.before_miss_mm},
           {"nearest_mm", std::isfinite(f.nearest_mm) ? nlohmann::json(f.nearest_mm) : nlohmann::json()},
           {"median_mm", f.median_mm},
           {"mean_mm", f.mean_mm},

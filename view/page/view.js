@@ -410,7 +410,7 @@ function drawHead() {
   const who = stopped || says('bevel-controller') || state.processes[0];
   if (!who) return;
   const old = age(who.age_s) > kStale_s.process;
-  badge('state', old ? `${who.name} silent` : who.state, old || stopped ? 'bad' : who.state === 'steering' ? 'good' : '');
+  badge('state', old ? `${who.name} silent` : who.state, old || stopped ? 'bad' : who.state === 'steering' || who.state === 'retracting' ? 'good' : '');
   byId('reason').textContent = who.reason ? `${who.name}: ${who.reason}` : '';
 }
 
