@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <tuple>
 
 #include "estimator/health.hpp"
@@ -65,6 +66,7 @@ void NeedleEstimator::remember(const Node& before, const Node& node) {
   if (!past_started_ || node.state.reset_count != before.state.reset_count) {
     const bool first = !past_started_;
     past_.restart(first ? before.state : node.state);
+    forgotten_since_.fill(std::numeric_limits<double>::infinity());
     past_mm_ = 0;
     past_due_mm_ = kFirstRelinearisation_mm;
     past_started_ = true;
@@ -74,10 +76,15 @@ void NeedleEstimator::remember(const Node& before, const Node& node) {
   PastStep step;
   step.insertion_mm = node.insertion_mm - before.insertion_mm;
   step.rotation_rad = node.rotation_rad - before.rotation_rad;
+  const double forgotten = filter_.forgotten(step.insertion_mm, step.rotation_rad,
+                                             static_cast<double>(node.utime - before.utime) * 1e-6);
+  for (double& since : forgotten_since_) since += forgotten;
   step.measured = node.kind == Kind::position && node.update.accepted;
   if (step.measured) {
     step.position_mm = node.measurement.position_mm;
-    step.information_per_mm2 = node.measurement.information_per_mm2;
+    double& since = forgotten_since_[node.camera == 0 ? 0 : 1];
+    step.information_per_mm2 = filter_.worth(since) * node.measurement.information_per_mm2;
+    since = 0;
   }
   if (node.kind == Kind::heading && node.update.accepted)
     (filter_.is_of_shaft(node.heading.camera) ? step.motion : step.heading) =

@@ -118,6 +118,7 @@ class NeedleEstimator {
   Past past_;                             // what has left the history, from its start or the last reset
   std::unique_ptr<WalkedStep[]> walked_;  // room to run it again in: sized once, memory comes as it is used
   bool past_started_ = false;
+  std::array<double, 2> forgotten_since_{};  // of cameras 0 and 1, since the last reading of each in it
   double past_mm_ = 0;  // insertion and retraction in it
   double past_due_mm_ = kFirstRelinearisation_mm;
   Counters counters_;
