@@ -15,7 +15,7 @@ struct RenderedPlan {
   double length_mm = 100;
   double rotation_rate_rad_s = 0.6;  // the shaft turns one way for two seconds, and back
   bool one_way = false;              // it turns on and on
-  bool half_turns = false;           // each two seconds, to one side and back; between them it rests
+  double half_turn_each_s = 0;       // to one side and back, the bevel resting between; 0: it turns as above
   double rest_s = 0;                 // with the length inserted, neither fed nor turned
   double frame_rate_hz = 30;
   camera::TrackerConfig tracker = [] {
@@ -76,10 +76,12 @@ inline RenderedInsertion watch(const model::NeedleParameters& truth, const model
   for (int ms = 0; ms <= last_ms; ++ms) {
     const std::int64_t utime = kStart_utime + std::int64_t{1000} * ms;
     const bool rests = ms > rests_ms;
-    const bool turns = !plan.half_turns || (ms % 2000) * 1e-3 * plan.rotation_rate_rad_s < std::numbers::pi;
-    const double rate = rests || !turns                     ? 0
-                        : !plan.one_way && (ms / 2000) % 2 ? -plan.rotation_rate_rad_s
-                                                           : plan.rotation_rate_rad_s;
+    const int one_way_ms = plan.half_turn_each_s > 0 ? static_cast<int>(1000 * plan.half_turn_each_s) : 2000;
+    const bool turns =
+        plan.half_turn_each_s == 0 || (ms % one_way_ms) * 1e-3 * plan.rotation_rate_rad_s < std::numbers::pi;
+    const double rate = rests || !turns                          ? 0
+                        : !plan.one_way && (ms / one_way_ms) % 2 ? -plan.rotation_rate_rad_s
+                                                                 : plan.rotation_rate_rad_s;
     const double feed_mm_s = rests ? 0 : plan.rate_mm_s;
     const model::Pose tip = plant.tip();
     if (ms % 10 == 0) {
