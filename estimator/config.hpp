@@ -44,6 +44,16 @@ struct ProcessNoise {
   double lambda2 = 5e-4;
 };
 
+// What neighbouring frames' errors have in common: of each axis of each camera's readings, `correlated_share` of the
+// variance that the camera states is of an error that changes slowly (first-order Gauss-Markov, six more states), the
+// rest is white. It is forgotten by 1/e over any of the three ways below; 0: not by that. Of cameras 0 and 1.
+struct ReadingNoise {
+  double correlated_share = 0;  // 0: all is white, the plain filter bit for bit
+  double correlation_s = 0;     // of time
+  double correlation_mm = 0;    // of insertion: a needle that rests shades the same pixels
+  double correlation_rad = 0;   // of turning: which shows the bevel from another side
+};
+
 struct Gate {
   double probability = 0.9999;  // share of good measurements that pass
   // Refused in a row, of one camera (another's good ones do not outweigh it), of all, or of headings. Unsure is slow: a
@@ -68,6 +78,7 @@ struct HealthLimits {
 struct EstimatorConfig {
   Prior prior;
   ProcessNoise process;
+  ReadingNoise reading;
   Gate gate;
   HealthLimits limits;
   // What the model file says that the bicycle leaves out, with its parameters held: applied in propagation, and in the

@@ -1,5 +1,6 @@
 #pragma once
-// The error of a FilterState as a vector of nine, or of ten with ell, and its covariance as one matrix.
+// The error of a FilterState as a vector of nine, or of ten with ell, and its covariance as one matrix. With the errors
+// that readings share behind them they are fifteen or sixteen.
 #include "estimator/needle_filter.hpp"
 
 namespace bevel::estimator {
@@ -9,12 +10,24 @@ using Error = Eigen::Matrix<double, kSize, 1>;
 template <int kSize>
 using Covariance = Eigen::Matrix<double, kSize, kSize>;
 
+// Of the state itself.
+template <int kSize>
+inline constexpr int kOwn = kSize > 10 ? kSize - kSharedErrors : kSize;
+
 inline const Matrix9d& get_covariance(const FilterState& state, std::integral_constant<int, 9>) {
   return state.covariance;
 }
 inline Covariance<10> get_covariance(const FilterState& state, std::integral_constant<int, 10>) {
   Covariance<10> P;
   P << state.covariance, state.tenth_covariance, state.tenth_covariance.transpose(), state.tenth_variance;
+  return P;
+}
+template <int kSize>
+Covariance<kSize> get_covariance(const FilterState& state, std::integral_constant<int, kSize>) {
+  const auto& with_state = state.shared.with_state.topRows<kOwn<kSize>>();
+  Covariance<kSize> P;
+  P << get_covariance(state, std::integral_constant<int, kOwn<kSize>>()), with_state, with_state.transpose(),
+      state.shared.covariance;
   return P;
 }
 // The state's own matrix where that is all of it, a copy otherwise.
@@ -26,9 +39,13 @@ decltype(auto) covariance_of(const FilterState& state) {
 template <int kSize>
 void set_covariance(FilterState& state, const Covariance<kSize>& P) {
   state.covariance = P.template topLeftCorner<9, 9>();
-  if constexpr (kSize == 10) {
+  if constexpr (kOwn<kSize> == 10) {
     state.tenth_covariance = P.template topRightCorner<9, 1>();
     state.tenth_variance = P(9, 9);
+  }
+  if constexpr (kSize > 10) {
+    state.shared.with_state.topRows<kOwn<kSize>>() = P.template topRightCorner<kOwn<kSize>, kSharedErrors>();
+    state.shared.covariance = P.template bottomRightCorner<kSharedErrors, kSharedErrors>();
   }
 }
 
@@ -39,7 +56,8 @@ void move(FilterState& state, const Error<kSize>& error) {
   state.curvature_per_mm += error[6];
   state.lambda1_per_rad += error[7];
   state.lambda2 += error[8];
-  if constexpr (kSize == 10) (state.bending_mm > 0 ? state.bending_mm : state.wheelbase_mm) += error[9];
+  if constexpr (kOwn<kSize> == 10) (state.bending_mm > 0 ? state.bending_mm : state.wheelbase_mm) += error[9];
+  if constexpr (kSize > 10) state.shared.mean += error.template tail<kSharedErrors>();
 }
 
 // The error by which `from` is moved to `to`.

@@ -37,6 +37,7 @@ bool NeedleFilter::predict_with_effects(FilterState& state, const model::BaseMot
     return false;
   Covariance<kSize> P = covariance_of<kSize>(state);
   propagate<kSize>(P, moved.D.leftCols<6>(), moved.D.middleCols<kSize - 6>(6));
+  if (coloured_) carry_shared<kSize>(state, moved.D.leftCols<6>(), moved.D.middleCols<kSize - 6>(6));
   P.diagonal() += process_variance<kSize>(P, increment.insertion_mm, increment.rotation_rad);
   for (int i = 0; i < 6; ++i) P(i, i) += spread.at(static_cast<std::size_t>(i));
   set_covariance<kSize>(state, P);

@@ -109,6 +109,8 @@ Eigen::Vector3d NeedleFilter::motion_of(const FilterState& state) const {
 
 Update NeedleFilter::update(FilterState& state, const model::TipHeading& measurement) const {
   if (stiff_) return {};  // the inclination of the shaft's end is not in the derivatives below
+  if (coloured_)
+    return wheelbase_estimated_ ? update_heading<16>(state, measurement) : update_heading<15>(state, measurement);
   return wheelbase_estimated_ ? update_heading<10>(state, measurement) : update_heading<9>(state, measurement);
 }
 

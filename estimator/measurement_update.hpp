@@ -18,6 +18,8 @@ struct SeenAxes {
   Eigen::Matrix3d axes;
   Eigen::Vector3d variance = Eigen::Vector3d::Zero();
   Eigen::Vector3d shared = Eigen::Vector3d::Zero();  // more of it, of an error that neighbouring readings share
+  Eigen::Vector3d coloured = Eigen::Vector3d::Zero();  // more of it, of the three SharedErrors from `first_error`
+  int first_error = 0;
   int rank = 0;
 };
 
@@ -31,11 +33,24 @@ Update update_rank(FilterState& state, const Eigen::Matrix<double, 3, kColumns>&
   Vec variance = (seen.variance + seen.shared).template tail<kRank>();
   const Eigen::Matrix<double, kRank, kColumns> H = axes.transpose() * by_state;
   const auto& covariance = covariance_of<kSize>(state);
-  const Eigen::Matrix<double, kSize, kRank> PHt = covariance.template leftCols<kColumns>() * H.transpose();
+  // Derivative by the shared errors of the camera, which are along the axes of {A}.
+  using ByErrors = Eigen::Matrix<double, kRank, 3>;
+  const Eigen::Index first = kOwn<kSize> + seen.first_error;
+  ByErrors by_errors;
+  if constexpr (kSize > 10)
+    by_errors = seen.coloured.template tail<kRank>().cwiseSqrt().asDiagonal() * axes.transpose();
+  const auto times_derivative = [&](const Covariance<kSize>& of) {
+    Eigen::Matrix<double, kSize, kRank> product = of.template leftCols<kColumns>().lazyProduct(H.transpose());
+    if constexpr (kSize > 10) product += of.template middleCols<3>(first).lazyProduct(by_errors.transpose());
+    return product;
+  };
+  const Eigen::Matrix<double, kSize, kRank> PHt = times_derivative(covariance);
   Mat S = H * PHt.template topRows<kColumns>();
+  if constexpr (kSize > 10) S += by_errors * PHt.template middleRows<3>(first);
   S.diagonal() += variance;
   Eigen::LLT<Mat> llt(S);
-  const Vec y = axes.transpose() * residual;
+  Vec y = axes.transpose() * residual;
+  if constexpr (kSize > 10) y -= by_errors * state.shared.mean.template segment<3>(seen.first_error);
   const Vec whitened = llt.matrixL().solve(y);
 
   Update result;
@@ -63,7 +78,7 @@ Update update_rank(FilterState& state, const Eigen::Matrix<double, 3, kColumns>&
   // Joseph form, (I - K H) P (I - K H)^T + K R K^T, with H only in its first columns; small products written out.
   Covariance<kSize> P = covariance;
   P.noalias() -= K.lazyProduct(PHt.transpose());
-  Eigen::Matrix<double, kSize, kRank> PHt2 = P.template leftCols<kColumns>().lazyProduct(H.transpose());
+  Eigen::Matrix<double, kSize, kRank> PHt2 = times_derivative(P);
   PHt2 -= K * variance.asDiagonal();
   P.noalias() -= PHt2.lazyProduct(K.transpose());
   set_covariance<kSize>(state, 0.5 * (P + P.transpose()));

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <tuple>
 
 #include "estimator/health.hpp"
@@ -63,6 +64,7 @@ void NeedleEstimator::drop_oldest() {
 
 void NeedleEstimator::restart_past(const FilterState& start) {
   past_.restart(start);
+  forgotten_since_.fill(std::numeric_limits<double>::infinity());
   past_mm_ = 0;
   past_due_mm_ = kFirstRelinearisation_mm;
   past_started_ = true;
@@ -72,6 +74,11 @@ void NeedleEstimator::restart_past(const FilterState& start) {
 void NeedleEstimator::remember(const Node& before, const Node& node) {
   const bool first = !past_started_, reset = node.state.reset_count != before.state.reset_count;
   if (first || reset) restart_past(first ? before.state : node.state);
+  // In the channel too: what the readings there share is not in the past's.
+  const double forgotten =
+      filter_.forgotten(node.insertion_mm - before.insertion_mm, node.rotation_rad - before.rotation_rad,
+                        static_cast<double>(node.utime - before.utime) * 1e-6);
+  for (double& since : forgotten_since_) since += forgotten;
   // Drawn back it is where it has been: the past goes on where it goes on, and what is seen meanwhile is the filter's
   // alone.
   if (node.state.channel.drawn_back_mm() > kDrawnBack_mm) {
@@ -97,7 +104,9 @@ void NeedleEstimator::remember(const Node& before, const Node& node) {
   step.measured = node.kind == Kind::position && node.update.accepted;
   if (step.measured) {
     step.position_mm = node.measurement.position_mm;
-    step.information_per_mm2 = node.measurement.information_per_mm2;
+    double& since = forgotten_since_[node.camera == 0 ? 0 : 1];
+    step.information_per_mm2 = filter_.worth(since) * node.measurement.information_per_mm2;
+    since = 0;
   }
   if (node.kind == Kind::heading && node.update.accepted)
     (filter_.is_of_shaft(node.heading.camera) ? step.motion : step.heading) =

@@ -126,6 +126,7 @@ class NeedleEstimator {
   struct {
     double insertion_mm, rotation_rad;
   } left_{};  // where the axes stood when it was
+  std::array<double, 2> forgotten_since_{};  // of cameras 0 and 1, since the last reading of each in it
   double past_mm_ = 0;  // insertion and retraction in it
   double past_due_mm_ = kFirstRelinearisation_mm;
   Counters counters_;

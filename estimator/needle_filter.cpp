@@ -61,6 +61,7 @@ NeedleFilter::NeedleFilter(const EstimatorConfig& config)
       wheelbase_estimated_(config.prior.wheelbase_sd_mm > 0),
       stiff_(config.prior.bending_mm > 0),
       ten_states_(wheelbase_estimated_ || stiff_),
+      coloured_(config.reading.correlated_share > 0),
       needle_(config.prior.needle, config.effects, wheelbase_estimated_ ? 10 : 9,
               {.curvature = 6, .lambda1 = 7, .lambda2 = 8, .wheelbase = wheelbase_estimated_ ? 9 : -1}) {
   for (int rank = 1; rank <= 3; ++rank)
@@ -125,6 +126,7 @@ model::SlipParameters NeedleFilter::slip_of(const FilterState& state) const {
 }
 
 void NeedleFilter::predict(FilterState& state, double insertion_mm, double rotation_rad, double duration_s) const {
+  if (coloured_) forget_shared(state, std::exp(-forgotten(insertion_mm, rotation_rad, duration_s)));
   if (!config_.effects.empty()) {
     const model::BaseMotion increment{duration_s, insertion_mm, rotation_rad};
     state.outside_model = !(wheelbase_estimated_ ? predict_with_effects<10>(state, increment)
@@ -144,9 +146,8 @@ void NeedleFilter::predict_cutting(FilterState& state, double insertion_mm, doub
 
 void NeedleFilter::predict_mean(FilterState& state, double insertion_mm, double rotation_rad, double duration_s) const {
   if (!config_.effects.empty()) return predict(state, insertion_mm, rotation_rad, duration_s);
-  follow(state, insertion_mm, rotation_rad, false, [&](double by_mm, double by_rad) {
-    state.outside_model = !mean_cutting(state, by_mm, by_rad);
-  });
+  follow(state, insertion_mm, rotation_rad, false,
+         [&](double by_mm, double by_rad) { state.outside_model = !mean_cutting(state, by_mm, by_rad); });
 }
 
 bool NeedleFilter::mean_cutting(FilterState& state, double insertion_mm, double rotation_rad) const {
@@ -193,6 +194,7 @@ void NeedleFilter::predict_plain(FilterState& state, double insertion_mm, double
                             ? !model::advance_by_midpoint(state.pose, input, slip_of(state), jacobian)
                             : !model::advance(state.pose, input, slip_of(state), jacobian);
   if (state.outside_model) return;
+  if (coloured_) carry_shared<kSize>(state, jacobian.pose, jacobian.needle.leftCols<kSize - 6>());
   const auto move_covariance = [&](Covariance<kSize>& P) {
     propagate<kSize>(P, jacobian.pose, jacobian.needle.leftCols<kSize - 6>());
     P.diagonal() += process_variance<kSize>(P, insertion_mm, rotation_rad);
@@ -225,6 +227,7 @@ template Error<9> NeedleFilter::process_variance<9>(const Covariance<9>&, double
 template Error<10> NeedleFilter::process_variance<10>(const Covariance<10>&, double, double) const;
 
 Update NeedleFilter::update(FilterState& state, const model::TipMeasurement& measurement) const {
+  if (coloured_) return ten_states_ ? update_sized<16>(state, measurement) : update_sized<15>(state, measurement);
   return ten_states_ ? update_sized<10>(state, measurement) : update_sized<9>(state, measurement);
 }
 
@@ -233,6 +236,11 @@ Update NeedleFilter::update_sized(FilterState& state, const model::TipMeasuremen
   SeenAxes seen = seen_axes(measurement.information_per_mm2);
   if (seen.rank == 0) return {};  // sees nothing: no rejection either
   state.reading_utime = std::max(state.reading_utime, measurement.utime);
+  if constexpr (kSize > 10) {
+    seen.coloured = config_.reading.correlated_share * seen.variance;
+    seen.variance -= seen.coloured;
+    seen.first_error = measurement.camera == 0 ? 0 : 3;
+  }
   const auto apply = [&]() -> Update {
     if (kSize == 10 && stiff_ && pressing(state) < 1) {
       Eigen::Matrix<double, 3, kSize> by_state;
@@ -244,7 +252,7 @@ Update NeedleFilter::update_sized(FilterState& state, const model::TipMeasuremen
     Eigen::Vector3d blur_mm2;
     const model::TipReading at = reading(state, &blur_mm2);
     seen.shared = seen.axes.cwiseAbs2().transpose() * blur_mm2;
-    return update_seen<kSize, kSize>(state, at.D, seen, measurement.position_mm - at.position_mm, gate_);
+    return update_seen<kSize, kOwn<kSize>>(state, at.D, seen, measurement.position_mm - at.position_mm, gate_);
   };
   Update result = apply();
   std::uint8_t& camera_rejects = state.camera_rejects_in_row.at(
@@ -294,11 +302,11 @@ void NeedleFilter::keep_in_domain(FilterState& state) const {
     if (!(variance > 0)) return;
     move<kSize>(state, -Pa * (excess / variance));
   };
-  if (kSize == 10 && stiff_) {
+  if (kOwn<kSize> == 10 && stiff_) {
     const double inside_mm = std::clamp(state.bending_mm, kBendingMin_mm, kBendingMax_mm);
-    if (state.bending_mm != inside_mm) move_by(Error<kSize>::Unit(kSize - 1), state.bending_mm - inside_mm);
+    if (state.bending_mm != inside_mm) move_by(Error<kSize>::Unit(kOwn<kSize> - 1), state.bending_mm - inside_mm);
     state.bending_mm = std::clamp(state.bending_mm, kBendingMin_mm, kBendingMax_mm);
-  } else if constexpr (kSize == 10) {
+  } else if constexpr (kOwn<kSize> == 10) {
     const double inside_mm = std::clamp(state.wheelbase_mm, kWheelbaseMin_mm, kWheelbaseMax_mm);
     if (state.wheelbase_mm != inside_mm) move_by(Error<kSize>::Unit(9), state.wheelbase_mm - inside_mm);
   }
@@ -325,12 +333,15 @@ void NeedleFilter::keep_in_domain(FilterState& state) const {
   keep_side();
   state.lambda2 = std::min(state.lambda2, kLambda2Max);
   state.lambda1_per_rad = std::max(state.lambda1_per_rad, square(state.lambda2) / (2 * std::numbers::pi) + 1e-9);
-  if (kSize == 10 && !stiff_) state.wheelbase_mm = std::clamp(state.wheelbase_mm, kWheelbaseMin_mm, kWheelbaseMax_mm);
+  if (kOwn<kSize> == 10 && !stiff_)
+    state.wheelbase_mm = std::clamp(state.wheelbase_mm, kWheelbaseMin_mm, kWheelbaseMax_mm);
   for (int i = 0; i < 9; ++i)
     if (state.covariance(i, i) != 0) state.covariance(i, i) = std::max(state.covariance(i, i), kVarianceFloor);
 }
 template void NeedleFilter::keep_in_domain<9>(FilterState&) const;
 template void NeedleFilter::keep_in_domain<10>(FilterState&) const;
+template void NeedleFilter::keep_in_domain<15>(FilterState&) const;
+template void NeedleFilter::keep_in_domain<16>(FilterState&) const;
 
 void NeedleFilter::declare_reset(FilterState& state, double reach_mm) const {
   // The pose is believed no more; the parameters are, but less: their prior widths come back, correlations go.
@@ -349,6 +360,7 @@ void NeedleFilter::declare_reset(FilterState& state, double reach_mm) const {
       square(gate.reset_tilt_sd_rad), square(gate.reset_tilt_sd_rad),
       std::max(square(gate.reset_tilt_sd_rad), prior.covariance(5, 5));
   widen_by_bend(state, state.pose.p_mm.z());
+  state.shared = {};
   state.rejects_in_row = 0;
   state.camera_rejects_in_row = {};
   state.heading_rejects_in_row = 0;

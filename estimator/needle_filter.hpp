@@ -33,6 +33,16 @@ struct EffectState {
   std::array<int, model::kMaxEffects> phase{};
 };
 
+// Errors that a camera's neighbouring readings share (ReadingNoise), in their own standard deviations: each of unit
+// variance beforehand; three along the axes of {A} of camera 0, three of camera 1. Not in use where all is white.
+inline constexpr int kSharedErrors = 6;
+struct SharedErrors {
+  Eigen::Matrix<double, kSharedErrors, 1> mean = Eigen::Matrix<double, kSharedErrors, 1>::Zero();
+  Eigen::Matrix<double, 10, kSharedErrors> with_state = Eigen::Matrix<double, 10, kSharedErrors>::Zero();  // covariance
+  Eigen::Matrix<double, kSharedErrors, kSharedErrors> covariance =
+      Eigen::Matrix<double, kSharedErrors, kSharedErrors>::Identity();
+};
+
 struct FilterState {
   model::Pose pose;
   double curvature_per_mm = 0;
@@ -54,6 +64,7 @@ struct FilterState {
   bool outside_model = false;
   Channel channel;
   EffectState effects;
+  SharedErrors shared;
 };
 
 struct Update {
@@ -150,6 +161,12 @@ class NeedleFilter {
   Eigen::Vector3d motion_of(const FilterState& state) const;
   std::int64_t latency_us() const;
 
+  // How much of a camera's shared errors is forgotten on such a motion: exp(-this) is left of their correlation.
+  double forgotten(double insertion_mm, double rotation_rad, double duration_s) const;
+  // What a reading is worth, of a white one, when so much was forgotten since its camera's last: over many readings of
+  // one constant exactly their information.
+  double worth(double forgotten_since) const;
+
   // A heading about a state, without effects, as a point of which all that is known is linear: information times
   // (seen - h) is what it says of h, R e3 or the way the tip moves, and the information is singular along that.
   DirectionReading made_linear(const model::TipHeading& measurement, const FilterState& state) const;
@@ -198,10 +215,17 @@ class NeedleFilter {
   Update update_sized(FilterState& state, const model::TipMeasurement& measurement) const;
   template <int kSize>
   Update update_heading(FilterState& state, const model::TipHeading& measurement) const;
+  // The shared errors' covariance with a state that a step moves by F = [Phi G; 0 I].
+  template <int kSize>
+  void carry_shared(FilterState& state, const model::Matrix6d& Phi, const Eigen::Matrix<double, 6, kSize - 6>& G) const;
+  void forget_shared(FilterState& state, double share) const;
   Eigen::Matrix3d seen_shift(const FilterState& state) const;
   template <int kSize>
   bool relinearise_sized(FilterState& state, const FilterState& start, std::span<const PastStep> steps,
                          std::span<WalkedStep> walked) const;
+  template <int kSize>
+  bool relinearise_coloured(FilterState& state, const FilterState& start, std::span<const PastStep> steps,
+                            std::span<WalkedStep> walked) const;
   template <int kSize>
   bool run_again(const FilterState& about, const FilterState& start, std::span<const PastStep> steps,
                  std::span<WalkedStep> walked, LinearFilter<kSize>& linear, double& cost) const;
@@ -227,6 +251,7 @@ class NeedleFilter {
   bool wheelbase_estimated_ = false;
   bool stiff_ = false;
   bool ten_states_ = false;
+  bool coloured_ = false;
   // Its parameters are set to those of the state in each step: one filter serves one thread.
   mutable model::AugmentedNeedle needle_;
 };

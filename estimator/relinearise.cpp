@@ -306,8 +306,31 @@ bool NeedleFilter::relinearise_sized(FilterState& state, const FilterState& star
   return true;
 }
 
+// The past goes in as white readings of what its coloured ones are worth. What the newest of them said of the shared
+// errors, given the state, still holds for the state as it is now: mean and covariance of that are taken over.
+template <int kSize>
+bool NeedleFilter::relinearise_coloured(FilterState& state, const FilterState& start, std::span<const PastStep> steps,
+                                        std::span<WalkedStep> walked) const {
+  const FilterState before = state;
+  if (!relinearise_sized<kSize>(state, start, steps, walked)) return false;
+  const auto had = before.shared.with_state.topRows<kSize>();
+  const Eigen::Matrix<double, kSharedErrors, kSize> by_state =
+      covariance_of<kSize>(before).ldlt().solve(had).transpose();
+  const Covariance<kSize> P = covariance_of<kSize>(state);
+  SharedErrors& shared = state.shared;
+  shared.mean = before.shared.mean + by_state * difference<kSize>(before, state);
+  shared.with_state.topRows<kSize>() = P * by_state.transpose();
+  const Eigen::Matrix<double, kSharedErrors, kSharedErrors> changed =
+      by_state * (P - covariance_of<kSize>(before)) * by_state.transpose();
+  shared.covariance = before.shared.covariance + 0.5 * (changed + changed.transpose());
+  return true;
+}
+
 bool NeedleFilter::relinearise(FilterState& state, const FilterState& start, std::span<const PastStep> steps,
                                std::span<WalkedStep> walked) const {
+  if (coloured_)
+    return wheelbase_estimated_ ? relinearise_coloured<10>(state, start, steps, walked)
+                                : relinearise_coloured<9>(state, start, steps, walked);
   return wheelbase_estimated_ ? relinearise_sized<10>(state, start, steps, walked)
                               : relinearise_sized<9>(state, start, steps, walked);
 }

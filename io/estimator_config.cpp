@@ -33,6 +33,17 @@ void read_estimator_config(Section section, estimator::EstimatorConfig& config) 
   process.read("lambda1_per_rad", config.process.lambda1_per_rad, optional, in_range(0, 1));
   process.read("lambda2", config.process.lambda2, optional, in_range(0, 1));
 
+  Section reading = section.section("reading_noise", optional);
+  estimator::ReadingNoise& noise = config.reading;
+  reading.read("correlated_share", noise.correlated_share, optional,
+               in_range(0, 0.99).because("the covariance stays regular by what is white"));
+  reading.read("correlation_s", noise.correlation_s, optional, in_range(0, 1000));
+  reading.read("correlation_mm", noise.correlation_mm, optional, in_range(0, 1000));
+  reading.read("correlation_rad", noise.correlation_rad, optional, in_range(0, 1000));
+  if (noise.correlated_share > 0 && noise.correlation_s + noise.correlation_mm + noise.correlation_rad == 0)
+    reading.fail("correlated_share", "is above 0, and nothing says how it is forgotten; allowed: with correlation_s, "
+                                     "correlation_mm or correlation_rad above 0");
+
   Section gate = section.section("gate", optional);
   gate.read("probability", config.gate.probability, optional, in_range(0.5, 0.9999999));
   gate.read("rejects_before_unsure", config.gate.rejects_before_unsure, optional, in_range(1, 20));

@@ -355,6 +355,13 @@ SystemConfig load_system_config(const std::string& path) {
                                   std::to_string(c.source.height_px) + ", allowed: " + std::to_string(camera.width_px) +
                                   " x " + std::to_string(camera.height_px) + ", of which the calibration of camera " +
                                   std::to_string(camera.camera) + " is");
+  if (c.estimator.reading.correlated_share > 0)
+    for (const CameraViewConfig& camera : c.cameras)
+      if (camera.camera > 1)
+        file.section("estimator", optional)
+            .section("reading_noise", optional)
+            .fail("correlated_share", "is above 0, and there is a camera " + std::to_string(camera.camera) +
+                                          "; allowed: with cameras 0 and 1 only, whose errors have states");
   // Whoever of them gives headings gives the shaft's.
   for (const CameraViewConfig& camera : c.cameras) c.estimator.shaft_cameras.push_back(camera.camera);
   c.rig.truth = c.needle;

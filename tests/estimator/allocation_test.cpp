@@ -8,12 +8,13 @@
 namespace bevel::estimator {
 namespace {
 
-void expect_no_allocation(double wheelbase_sd_mm, double heading_sd_rad = 0) {
+void expect_no_allocation(double wheelbase_sd_mm, double heading_sd_rad = 0, double correlated_share = 0) {
   std::mt19937_64 rng(21);
   EstimatorConfig config;
   config.prior.needle.lambda1_per_rad = 0.49;
   config.prior.needle.lambda2 = 0.22;
   config.prior.wheelbase_sd_mm = wheelbase_sd_mm;
+  config.reading = {.correlated_share = correlated_share, .correlation_mm = 2};
   testing::InsertionPlan plan;
   plan.cameras = 2;
   plan.heading_sd_rad = heading_sd_rad;
@@ -46,6 +47,11 @@ TEST(NeedleEstimator, AllocatesNothingInAStepWithEllAsAState) { expect_no_alloca
 TEST(NeedleEstimator, AllocatesNothingInAStepWithHeadings) {
   expect_no_allocation(0, 0.02);
   expect_no_allocation(5, 0.02);
+}
+
+TEST(NeedleEstimator, AllocatesNothingInAStepWithSharedErrors) {
+  expect_no_allocation(0, 0.02, 0.8);
+  expect_no_allocation(5, 0, 0.8);
 }
 
 TEST(NeedleEstimator, AllocatesNothingInAStepWithEffects) {

@@ -7,8 +7,14 @@
 namespace bevel::estimator {
 namespace {
 
-void BM_predict_update(benchmark::State& bench) {
-  const NeedleFilter filter(testing::agar_config());
+EstimatorConfig coloured_config() {
+  EstimatorConfig config = testing::agar_config();
+  config.reading = {.correlated_share = 0.9, .correlation_mm = 2};
+  return config;
+}
+
+void run_predict_update(benchmark::State& bench, const EstimatorConfig& config) {
+  const NeedleFilter filter(config);
   FilterState state = filter.initial();
   model::TipMeasurement m;
   m.information_per_mm2 = Eigen::Vector3d(0, 44, 44).asDiagonal();  // one camera
@@ -19,7 +25,11 @@ void BM_predict_update(benchmark::State& bench) {
     benchmark::DoNotOptimize(filter.update(state, m));
   }
 }
+void BM_predict_update(benchmark::State& bench) { run_predict_update(bench, testing::agar_config()); }
 BENCHMARK(BM_predict_update);
+// With the errors that neighbouring readings share as six more states.
+void BM_predict_update_coloured(benchmark::State& bench) { run_predict_update(bench, coloured_config()); }
+BENCHMARK(BM_predict_update_coloured);
 
 void BM_predict_heading(benchmark::State& bench) {
   const NeedleFilter filter(testing::agar_config());
@@ -106,9 +116,8 @@ void BM_floor_dense_9x9(benchmark::State& bench) {
 }
 BENCHMARK(BM_floor_dense_9x9);
 
-void BM_whole_insertion_per_message(benchmark::State& bench) {
+void run_whole_insertion(benchmark::State& bench, const EstimatorConfig& config) {
   std::mt19937_64 rng(1);
-  const auto config = testing::agar_config();
   const testing::Insertion data = testing::insert(config.prior.needle, {}, {}, rng);
   for (auto _ : bench) {
     NeedleEstimator estimator(config);
@@ -123,7 +132,10 @@ void BM_whole_insertion_per_message(benchmark::State& bench) {
   bench.SetItemsProcessed(bench.iterations() *
                           static_cast<std::int64_t>(data.actuators.size() + data.measurements.size()));
 }
+void BM_whole_insertion_per_message(benchmark::State& bench) { run_whole_insertion(bench, testing::agar_config()); }
 BENCHMARK(BM_whole_insertion_per_message)->Unit(benchmark::kMillisecond);
+void BM_whole_insertion_coloured(benchmark::State& bench) { run_whole_insertion(bench, coloured_config()); }
+BENCHMARK(BM_whole_insertion_coloured)->Unit(benchmark::kMillisecond);
 
 }  // namespace
 }  // namespace bevel::estimator

@@ -27,6 +27,7 @@ struct InsertionPlan {
   double rate_mm_s = 10;
   double length_mm = 100;
   double rotation_rate_rad_s = 0.6;
+  bool one_way = false;  // it turns on and on; else to and fro
   double sigma_mm = 0.15;
   int cameras = 1;  // 1: one camera that sees all three axes; 2: (y, z) and (x, z), taken at different times
   double lost_share = 0;
@@ -105,7 +106,7 @@ inline Insertion insert(const model::NeedleParameters& truth, const model::Pose&
     const double t = ms * 1e-3;
     const std::int64_t utime = kStart_utime + std::int64_t{1000} * ms;
     // The shaft turns one way and back, at constant rates between actuator samples.
-    const double rate = (ms / 2000) % 2 ? -plan.rotation_rate_rad_s : plan.rotation_rate_rad_s;
+    const double rate = !plan.one_way && (ms / 2000) % 2 ? -plan.rotation_rate_rad_s : plan.rotation_rate_rad_s;
     if (ms % 10 == 0) {
       model::ActuatorState a;
       a.utime = utime;

@@ -1,6 +1,8 @@
 #pragma once
 // A simulated insertion watched by two cameras whose pictures are rendered and tracked: what TIP_MEASUREMENT and
 // TIP_HEADING hold then, with all that neighbouring frames' errors have in common.
+#include <numbers>
+
 #include "drivers/camera/tip_tracker.hpp"
 #include "rig/camera/needle_renderer.hpp"
 #include "rig/plant/plant.hpp"
@@ -12,6 +14,9 @@ struct RenderedPlan {
   double rate_mm_s = 10;
   double length_mm = 100;
   double rotation_rate_rad_s = 0.6;  // the shaft turns one way for two seconds, and back
+  bool one_way = false;              // it turns on and on
+  double half_turn_each_s = 0;       // to one side and back, the bevel resting between; 0: it turns as above
+  double rest_s = 0;                 // with the length inserted, neither fed nor turned
   double frame_rate_hz = 30;
   camera::TrackerConfig tracker = [] {
     camera::TrackerConfig c;
@@ -27,8 +32,15 @@ struct HeadingError {
   int camera = 0;
   double of_shaft_rad = 0, of_body_rad = 0, claimed_rad = 0;
 };
+// Of each measurement of Insertion::measurements: how far it is off along the axes of {A} that its camera sees.
+struct TipError {
+  int camera = 0;
+  int frame = 0;
+  Eigen::Vector3d error_mm = Eigen::Vector3d::Zero();
+};
 struct RenderedInsertion {
   Insertion data;
+  std::vector<TipError> tip_errors;
   std::vector<HeadingError> heading_errors;
   int frames = 0;
 };
@@ -58,11 +70,19 @@ inline RenderedInsertion watch(const model::NeedleParameters& truth, const model
   }
   double inserted_mm = 0, rotation_rad = 0;
   std::int64_t seq = 0;
-  const int last_ms = static_cast<int>(1000 * plan.length_mm / plan.rate_mm_s);
+  const int rests_ms = static_cast<int>(1000 * plan.length_mm / plan.rate_mm_s);
+  const int last_ms = rests_ms + static_cast<int>(1000 * plan.rest_s);
   int next_frame_ms = 7;
   for (int ms = 0; ms <= last_ms; ++ms) {
     const std::int64_t utime = kStart_utime + std::int64_t{1000} * ms;
-    const double rate = (ms / 2000) % 2 ? -plan.rotation_rate_rad_s : plan.rotation_rate_rad_s;
+    const bool rests = ms > rests_ms;
+    const int one_way_ms = plan.half_turn_each_s > 0 ? static_cast<int>(1000 * plan.half_turn_each_s) : 2000;
+    const bool turns =
+        plan.half_turn_each_s == 0 || (ms % one_way_ms) * 1e-3 * plan.rotation_rate_rad_s < std::numbers::pi;
+    const double rate = rests || !turns                          ? 0
+                        : !plan.one_way && (ms / one_way_ms) % 2 ? -plan.rotation_rate_rad_s
+                                                                 : plan.rotation_rate_rad_s;
+    const double feed_mm_s = rests ? 0 : plan.rate_mm_s;
     const model::Pose tip = plant.tip();
     if (ms % 10 == 0) {
       model::ActuatorState a;
@@ -93,6 +113,8 @@ inline RenderedInsertion watch(const model::NeedleParameters& truth, const model
         m.position_mm = Eigen::Map<const Eigen::Vector3d>(at.data());
         m.information_per_mm2 = Eigen::Map<const Eigen::Matrix3d>(information.data());
         out.data.measurements.push_back(m);
+        const Eigen::Vector3d sees = m.information_per_mm2.diagonal().cwiseSign();
+        out.tip_errors.push_back({which, static_cast<int>(seq), sees.cwiseProduct(m.position_mm - tip.p_mm)});
         if (seen.heading_status != camera::TipStatus::ok) continue;
         const camera::SeenDirection direction =
             views[i].direction(seen.tip_px, seen.direction_px, seen.direction_variance_rad2);
@@ -109,8 +131,8 @@ inline RenderedInsertion watch(const model::NeedleParameters& truth, const model
       }
       ++seq;
     }
-    plant.advance(plan.rate_mm_s * 1e-3, rate * 1e-3, 1e-3);
-    inserted_mm += plan.rate_mm_s * 1e-3;
+    plant.advance(feed_mm_s * 1e-3, rate * 1e-3, 1e-3);
+    inserted_mm += feed_mm_s * 1e-3;
     rotation_rad += rate * 1e-3;
   }
   const auto& slip = plant.model().needle();

@@ -1,5 +1,6 @@
 #include "tools/steering/steered_insertion.hpp"
 
+#include <Eigen/Cholesky>
 #include <algorithm>
 #include <cmath>
 #include <deque>
@@ -223,7 +224,10 @@ Insertion steer(const SteeredRig& rig, const Believed& believed, const Eigen::Ve
   result.reason = supervisor.status().reason;
   if (!way_point_miss_mm.empty()) result.way_point_miss_mm = std::ranges::max(way_point_miss_mm);
   result.miss_mm = (plant->tip().p_mm - target_now()).norm();
-  result.estimate_error_mm = (estimator.estimate(axes.utime).tip.p_mm - plant->tip().p_mm).norm();
+  const estimator::Estimate last = estimator.estimate(axes.utime);
+  result.estimate_error_mm = (last.tip.p_mm - plant->tip().p_mm).norm();
+  const model::Vector6d error = model::log_se3(last.tip.inverse() * plant->tip());
+  result.pose_nees = error.dot(last.state.covariance.topLeftCorner<6, 6>().ldlt().solve(error));
   return result;
 }
 

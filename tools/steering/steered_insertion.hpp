@@ -61,7 +61,8 @@ struct Insertion {
   controller::Reason reason = controller::Reason::none;  // why not
   double turned_frame_said_mm = 0;                       // of insertion; 0: it was not
   double estimate_error_mm = 0;                          // estimate to true tip, at the end
-  double turned_rad = 0;                                 // of the base, both ways together
+  double pose_nees = 0;   // at the end, of six degrees of freedom: one each if the estimate's covariance is right
+  double turned_rad = 0;  // of the base, both ways together
   // Least distance of the true tip from any obstacle's surface, negative inside; infinite where there is none.
   double nearest_mm = std::numeric_limits<double>::infinity();
   double way_point_miss_mm = 0;            // the farthest of them, true tip to point where it was nearest

@@ -33,7 +33,7 @@ constexpr std::array<LawTried, 4> kLaws{{{"arcs", controller::Law::arcs},
 struct Figures {
   int targets = 0, arrived = 0, refused = 0;
   double median_mm = 0, mean_mm = 0, sd_mm = 0, at_95_mm = 0, worst_mm = 0;
-  double turns_per_100mm = 0, feed_mm_s = 0, estimate_error_mm = 0;
+  double turns_per_100mm = 0, feed_mm_s = 0, estimate_error_mm = 0, pose_nees_per_axis = 0;
   int turned_frame_said = 0;                                    // of all targets
   double way_point_miss_mm = 0;                                 // the worst, of those that arrived
   // The same of those that were drawn back: of the tip off the way in, of the estimate, and of the target before.
@@ -68,7 +68,7 @@ Figures figures_of(const std::vector<Insertion>& all) {
     f.before_miss_mm = std::max(f.before_miss_mm, one.before_miss_mm);
     miss_mm.push_back(one.miss_mm);
     turned_rad += one.turned_rad, inserted_mm += one.inserted_mm, duration_s += one.duration_s;
-    f.estimate_error_mm += one.estimate_error_mm;
+    f.estimate_error_mm += one.estimate_error_mm, f.pose_nees_per_axis += one.pose_nees / 6;
   }
   if (miss_mm.empty()) return f;
   const auto n = static_cast<double>(miss_mm.size());
@@ -80,16 +80,17 @@ Figures figures_of(const std::vector<Insertion>& all) {
   f.sd_mm = std::sqrt(f.sd_mm / std::max(n - 1, 1.0));
   f.turns_per_100mm = turned_rad / (2 * std::numbers::pi) / inserted_mm * 100;
   f.feed_mm_s = inserted_mm / duration_s;
-  f.estimate_error_mm /= n;
+  f.estimate_error_mm /= n, f.pose_nees_per_axis /= n;
   return f;
 }
 
 std::string row_of(const std::string& scenario, const char* law, const Figures& f) {
   std::array<char, 256> text{};
   std::snprintf(
-      text.data(), text.size(), "| %s | %s | %.2f | %.2f +- %.2f | %.2f | %.2f | %.1f | %d | %.1f | %.2f | %.2f |",
-      scenario.c_str(), law, f.median_mm, f.mean_mm, f.sd_mm, f.at_95_mm, f.worst_mm,
-      100.0 * f.arrived / std::max(f.targets, 1), f.refused, f.turns_per_100mm, f.feed_mm_s, f.estimate_error_mm);
+      text.data(), text.size(),
+      "| %s | %s | %.2f | %.2f +- %.2f | %.2f | %.2f | %.1f | %d | %.1f | %.2f | %.2f | %.2f |", scenario.c_str(), law,
+      f.median_mm, f.mean_mm, f.sd_mm, f.at_95_mm, f.worst_mm, 100.0 * f.arrived / std::max(f.targets, 1), f.refused,
+      f.turns_per_100mm, f.feed_mm_s, f.estimate_error_mm, f.pose_nees_per_axis);
   std::string row = text.data();
   for (const auto& [reason, count] : f.stopped) row += " " + std::to_string(count) + " " + reason + ";";
   if (f.turned_frame_said > 0) row += " frame said to be turned: " + std::to_string(f.turned_frame_said) + ";";
@@ -133,7 +134,8 @@ nlohmann::json json_of(const Scenario& scenario, const char* law, const Figures&
           {"worst_mm", f.worst_mm},
           {"turns_per_100mm", f.turns_per_100mm},
           {"feed_mm_s", f.feed_mm_s},
-          {"estimate_error_mm", f.estimate_error_mm}};
+          {"estimate_error_mm", f.estimate_error_mm},
+          {"pose_nees_per_axis", f.pose_nees_per_axis}};
 }
 
 }  // namespace
@@ -153,9 +155,8 @@ int run_targets(const TargetsOptions& options, std::ostream& out) {
   }
   out << options.targets << " targets each, seed " << options.seed << "; mm, of those that arrived\n\n"
       << "| scenario | law | median | mean +- sd | 95 % | worst | arrived, % | refused before | turns per 100 mm | "
-         "feed, mm/s | estimate to tip | stopped |\n| --- | --- | --- | --- | --- | --- | --- | --- | --- | --- | --- "
-         "| "
-         "--- |\n";
+         "feed, mm/s | estimate to tip | pose NEES / 6 | stopped |\n| --- | --- | --- | --- | --- | --- | --- | --- "
+         "| --- | --- | --- | --- | --- |\n";
   nlohmann::json all = nlohmann::json::array();
   const auto is_tried = [](const Scenario& scenario, const LawTried& law) {
     if (law.told_the_tip && !scenario.swings) return false;
