@@ -250,9 +250,20 @@ TrialClass class_of(std::uint64_t seed, int number) {
   return block[static_cast<std::size_t>(number % kBlockSize)];
 }
 
-Trial draw_trial(std::uint64_t seed, int number, const Population& population) {
-  Random random = Random::stream(seed, static_cast<std::uint64_t>(number));
+namespace {
+
+// A trial before anything is concealed, and the numbers that it goes on with.
+struct Begun {
   Trial trial;
+  Setting setting;
+  Random random;
+};
+
+Begun begin_trial(std::uint64_t seed, int number, const Population& population) {
+  Begun begun{.trial = {}, .setting = {}, .random = Random::stream(seed, static_cast<std::uint64_t>(number))};
+  Random& random = begun.random;
+  Trial& trial = begun.trial;
+  Setting& setting = begun.setting;
   Truth& truth = trial.truth;
   truth.trial = number;
   truth.trial_class = population.nulls ? TrialClass::nothing : class_of(seed, number);
@@ -262,7 +273,6 @@ Trial draw_trial(std::uint64_t seed, int number, const Population& population) {
   truth.rich = !random.chance(kPoorShare);
   truth.needle = draw_needle(random);
   truth.noise = draw_camera_noise(random);
-  Setting setting;
   setting.ripple = draw_ripple(random);
   const auto scripts = population.two_groups ? draw_two_groups(random, truth.rich) : draw_scripts(random, truth.rich);
   if (population.two_groups)
@@ -284,8 +294,20 @@ Trial draw_trial(std::uint64_t seed, int number, const Population& population) {
     for (std::size_t i = 0; i < setting.motions.size(); ++i)
       truth.variation.push_back(draw_variation(truth.spread, between));
     setting.variation = truth.variation;
-    setting.absorbers = find_absorbers(setting, truth.needle, truth.spread);
   }
+  return begun;
+}
+
+}  // namespace
+
+Trial draw_recordings(std::uint64_t seed, int number, const Population& population) {
+  return begin_trial(seed, number, population).trial;
+}
+
+Trial draw_trial(std::uint64_t seed, int number, const Population& population) {
+  auto [trial, setting, random] = begin_trial(seed, number, population);
+  Truth& truth = trial.truth;
+  if (truth.spread.any()) setting.absorbers = find_absorbers(setting, truth.needle, truth.spread);
   const Views seen = truth.beam ? conceal_in_beam(truth, setting, random, population.edition)
                                 : conceal_in_kinematics(truth, setting, random, population.edition);
   if (truth.entries.size() == 1 && truth.entries[0].effect.name == "unknown" && truth.visible_sigmas >= kVisible_sigmas)

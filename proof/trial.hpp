@@ -71,6 +71,9 @@ struct Population {
 
 // The same trial for the same seed and number, on any machine.
 Trial draw_trial(std::uint64_t seed, int number, const Population& population = {});
+// The same, before anything is concealed and seen: needle, noise, motions, frames, what insertions have of their own. A
+// fraction of the time.
+Trial draw_recordings(std::uint64_t seed, int number, const Population& population = {});
 TrialClass class_of(std::uint64_t seed, int number);
 
 // The distribution in words and tables (Markdown).
