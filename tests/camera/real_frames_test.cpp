@@ -1,6 +1,6 @@
 // Frames by others: a bevel needle in gelatin, one picture per 8 mm of insertion (LARA, University of Brasilia; no
 // licence, so they are looked at where they lie and never copied). Their tips were labelled by eye (real_tips.csv).
-// Folders `held_out` were not looked at while the tracker was made.
+// Folders `held_out` were not worked on; what was looked at of them is said in docs/camera.md.
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -25,28 +25,72 @@ const std::vector<test::SeenFrame>& seen_frames() {
   return seen;
 }
 
+fs::path labels_file(const char* name) { return fs::path(BEVEL_SOURCE_DIR) / "tests/camera" / name; }
+
+test::Repeatability second_look(const std::vector<test::TipLabel>& labels) {
+  return test::repeatability(labels, test::read_labels(labels_file("real_tips_again.csv")));
+}
+
+void expect_found(const test::LabelFigures& f) {
+  std::vector<double> across_px, along_px;
+  for (const test::LabelError& e : f.errors)
+    across_px.push_back(std::abs(e.across_px)), along_px.push_back(std::abs(e.along_px));
+  // One frame of each set has a true status: its end runs into a printed line, or into an old track at the glass.
+  EXPECT_GE(f.ok, f.labels - 1);
+  EXPECT_LT(test::percentile(across_px, 0.95), 1.5);
+  EXPECT_LT(test::percentile(along_px, 0.95), 4.0);
+  EXPECT_EQ(f.beyond_6_px, 0);
+  EXPECT_LT(f.squared, 1.25) << "the covariance is too small";
+  EXPECT_GT(f.squared, 0.8) << "the covariance is too large";
+}
+
+TEST(RealFrames, LabelsAreAsGoodAsASecondLookSays) {
+  const auto labels = test::read_labels(labels_file("real_tips.csv"));
+  const test::Repeatability r = second_look(labels);
+  std::printf(
+      "%zu labels; %d looked at again: across sd %.2f px (%.2f of the opinion), along %.2f px (%.2f); 95 %% of the "
+      "differences within %.2f and %.2f px\n",
+      labels.size(), r.looks, r.across_sd_px, r.across_of_opinion, r.along_sd_px, r.along_of_opinion, r.across_95_px,
+      r.along_95_px);
+  EXPECT_GE(r.looks, 30);
+  EXPECT_LT(r.across_sd_px, 1.0);
+  EXPECT_LT(r.along_sd_px, 2.0);
+}
+
 TEST(RealFrames, TipsAreWhereAnEyeSeesThem) {
   BEVEL_SKIP_WITHOUT(root());
-  const auto labels = test::read_labels(fs::path(BEVEL_SOURCE_DIR) / "tests/camera/real_tips.csv");
-  ASSERT_GE(labels.size(), 60U);
+  const auto labels = test::read_labels(labels_file("real_tips.csv"));
+  ASSERT_GE(labels.size(), 140U);
+  const test::Repeatability again = second_look(labels);
   for (const char* set : {"tuned", "held_out"}) {
-    const test::LabelFigures f = test::compare(labels, seen_frames(), set);
+    SCOPED_TRACE(set);
+    const test::LabelFigures f = test::compare(labels, seen_frames(), set, again);
     test::print(set, f);
-    std::vector<double> across_px, along_px;
-    double squared = 0.0;
-    for (const test::LabelError& e : f.errors) {
-      across_px.push_back(std::abs(e.across_px)), along_px.push_back(std::abs(e.along_px));
-      squared += e.squared / f.ok;
-    }
-    EXPECT_GE(f.ok, f.labels * 95 / 100);
-    EXPECT_LT(test::percentile(across_px, 0.5), 1.0);
-    EXPECT_LT(test::percentile(across_px, 0.95), 2.6);
-    EXPECT_LT(test::percentile(along_px, 0.5), 1.5);
-    EXPECT_LT(test::percentile(along_px, 0.95), 4.5);
-    EXPECT_LE(f.beyond_6_px, 3);
-    EXPECT_LT(squared, 2.5) << "the covariance is too small";
-    EXPECT_GT(squared, 0.7) << "the covariance is too large";
+    expect_found(f);
   }
+}
+
+// No frame needs the one before it.
+TEST(RealFrames, AFrameAloneIsFoundAsWell) {
+  BEVEL_SKIP_WITHOUT(root());
+  const auto labels = test::read_labels(labels_file("real_tips.csv"));
+  const test::Repeatability again = second_look(labels);
+  const auto alone = test::track_folders(root(), test::real_config(), test::kRealPxPerMm, test::Frames::alone);
+  for (const char* set : {"tuned", "held_out"}) {
+    SCOPED_TRACE(set);
+    const test::LabelFigures f = test::compare(labels, alone, set, again);
+    test::print(set, f);
+    expect_found(f);
+  }
+  int elsewhere = 0;
+  for (size_t i = 0; i < alone.size(); ++i) {
+    const TipResult &one = alone[i].tip, &other = seen_frames()[i].tip;
+    EXPECT_EQ(one.status, other.status) << alone[i].folder << " " << alone[i].file;
+    elsewhere += one.status == TipStatus::ok && cv::norm(one.tip_px - other.tip_px) > 1.0 ? 1 : 0;
+  }
+  std::printf("%zu frames alone, %d of them more than 1 px from where they are found in sequence\n", alone.size(),
+              elsewhere);
+  EXPECT_LE(elsewhere, 6);
 }
 
 TEST(RealFrames, TheTipAdvancesByTheCommandedStep) {
@@ -78,7 +122,7 @@ TEST(RealFrames, TheTipAdvancesByTheCommandedStep) {
       "advance over %zu pairs, mm: p5 %.2f p25 %.2f median %.2f p75 %.2f p95 %.2f largest %.2f; %ld within 1.5 of "
       "%.0f\n",
       advance_mm.size(), at(0.05), at(0.25), at(0.5), at(0.75), at(0.95), at(1.0), near_step, kStep_mm);
-  EXPECT_GE(by_status[0], frames * 95 / 100);
+  EXPECT_GE(by_status[0], frames - 2);
   EXPECT_NEAR(at(0.5), kStep_mm, 0.4);
   EXPECT_GE(near_step, static_cast<std::ptrdiff_t>(advance_mm.size() * 8 / 10));
   EXPECT_LT(at(1.0), 2.0 * kStep_mm);

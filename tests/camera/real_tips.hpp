@@ -35,9 +35,20 @@ struct SeenFrame {
   camera::TipResult tip;
 };
 
-/// Every folder of `root` through a tracker of its own, in natural order, one second a frame.
+/// Every folder of `root` through a tracker of its own, in natural order, one second a frame; or every frame alone,
+/// through a tracker that has seen nothing else.
+enum class Frames { in_sequence, alone };
 std::vector<SeenFrame> track_folders(const std::filesystem::path& root, const camera::TrackerConfig& config,
-                                     double px_per_mm);
+                                     double px_per_mm, Frames frames = Frames::in_sequence);
+
+/// What a second look at some of the frames says of the labels.
+struct Repeatability {
+  int looks = 0;
+  double across_sd_px = 0.0, along_sd_px = 0.0;          ///< of one look: of the differences, over sqrt 2
+  double across_95_px = 0.0, along_95_px = 0.0;          ///< 95 % of the differences
+  double across_of_opinion = 1.0, along_of_opinion = 1.0;  ///< the same over what the labeller thought
+};
+Repeatability repeatability(const std::vector<TipLabel>& labels, const std::vector<TipLabel>& again);
 
 /// One labelled frame: error in the directions of the tip found, px.
 struct LabelError {
@@ -51,8 +62,17 @@ struct LabelFigures {
   int labels = 0, ok = 0, beyond_6_px = 0;
   std::array<int, camera::kTipStatuses> by_status{};
   std::vector<LabelError> errors;  ///< of those that are ok
+  double squared = 0.0;            ///< mean over both axes of the normalised squared error, 1 if honest
 };
-LabelFigures compare(const std::vector<TipLabel>& labels, const std::vector<SeenFrame>& seen, const std::string& set);
+/// The labels' own error is the labeller's opinion times what the second look says of it.
+LabelFigures compare(const std::vector<TipLabel>& labels, const std::vector<SeenFrame>& seen, const std::string& set,
+                     const Repeatability& second_look);
+
+/// The middle 95 % of what percentile(values, share) is, drawn again and again from `values` (bootstrap, seed fixed).
+struct Interval {
+  double low = 0.0, high = 0.0;
+};
+Interval interval_of_percentile(const std::vector<double>& values, double share);
 void print(const char* name, const LabelFigures& figures);
 
 /// Value below which the share `share` of `values` lies; NaN of none.
