@@ -1,6 +1,7 @@
 #include "tests/camera/real_tips.hpp"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <cstdio>
 #include <fstream>
@@ -86,14 +87,73 @@ LabelFigures compare(const std::vector<TipLabel>& labels, const std::vector<Seen
     LabelError error{&label, &*at, e.dot(n), e.dot(t), 0.0};
     const double across_sd_px = second_look.across_of_opinion * label.across_sd_px;
     const double along_sd_px = second_look.along_of_opinion * label.along_sd_px;
-    const cv::Matx22d together = at->tip.covariance_px2 + across_sd_px * across_sd_px * (n * n.t()) +
-                                 along_sd_px * along_sd_px * (t * t.t());
+    const cv::Matx22d together =
+        at->tip.covariance_px2 + across_sd_px * across_sd_px * (n * n.t()) + along_sd_px * along_sd_px * (t * t.t());
     error.squared = e.dot(together.inv() * e);
     f.errors.push_back(error);
     f.beyond_6_px += cv::norm(e) > 6.0 ? 1 : 0;
   }
   for (const LabelError& e : f.errors) f.squared += 0.5 * e.squared / f.ok;
   return f;
+}
+
+std::vector<PathTip> path_tips(const std::vector<SeenFrame>& seen, size_t first, size_t last) {
+  std::vector<PathTip> tips;
+  for (size_t i = first; i < last; ++i) {
+    const camera::TipResult& tip = seen[i].tip;
+    if (tip.status != camera::TipStatus::ok) continue;
+    tips.push_back(
+        {tip.tip_px.y / kRealPxPerMm, tip.tip_px.x / kRealPxPerMm, std::sqrt(tip.covariance_px2(0, 0)) / kRealPxPerMm});
+  }
+  return tips;
+}
+
+namespace {
+
+constexpr double kStep_mm = 8.0;  // of insertion, a picture
+
+double slope_of(const std::vector<std::array<double, 3>>& rows, double without_folder) {  // folder, x, y
+  double n = 0, x = 0, y = 0, xx = 0, xy = 0;
+  for (const auto& r : rows)
+    if (r[0] != without_folder) n += 1, x += r[1], y += r[2], xx += r[1] * r[1], xy += r[1] * r[2];
+  return (n * xy - x * y) / (n * xx - x * x);
+}
+
+}  // namespace
+
+Headings compare_headings(const std::vector<SeenFrame>& axis) {
+  Headings h;
+  std::vector<std::array<double, 3>> rows;  // folder, direction of the path, tangent less that
+  double folders = 0.0;
+  const auto a_step = [](const cv::Point2d& d) { return std::abs(cv::norm(d) / kRealPxPerMm - kStep_mm) < 1.5; };
+  for (size_t i = 1; i + 1 < axis.size(); ++i) {
+    if (axis[i - 1].folder != axis[i].folder) folders += 1.0;
+    if (axis[i - 1].folder != axis[i].folder || axis[i + 1].folder != axis[i].folder) continue;
+    const camera::TipResult &before = axis[i - 1].tip, &tip = axis[i].tip, &after = axis[i + 1].tip;
+    constexpr auto ok = camera::TipStatus::ok;
+    if (before.status != ok || tip.heading_status != ok || after.status != ok) continue;
+    if (!a_step(tip.tip_px - before.tip_px) || !a_step(after.tip_px - tip.tip_px)) continue;
+    const cv::Point2d d = after.tip_px - before.tip_px;
+    const double path_rad = std::atan2(d.x, d.y);
+    const double off_rad = std::atan2(tip.direction_px[0], tip.direction_px[1]) - path_rad;
+    rows.push_back({folders, path_rad, off_rad});
+    h.off_mean_rad += off_rad, h.off_rms_rad += off_rad * off_rad, h.claimed_rad += tip.direction_variance_rad2;
+  }
+  h.tips = static_cast<int>(rows.size());
+  double sum = 0.0, squares = 0.0;
+  for (const auto& r : rows) sum += r[1], squares += r[1] * r[1];
+  h.path_sd_rad = std::sqrt(squares / h.tips - std::pow(sum / h.tips, 2));
+  h.off_mean_rad /= h.tips, h.off_rms_rad = std::sqrt(h.off_rms_rad / h.tips),
+                            h.claimed_rad = std::sqrt(h.claimed_rad / h.tips);
+  h.off_by_direction = slope_of(rows, -1.0);
+  std::vector<double> without;
+  for (double f = 0.0; f <= folders; f += 1.0) without.push_back(slope_of(rows, f));
+  double mean = 0.0, spread = 0.0;
+  for (const double w : without) mean += w / static_cast<double>(without.size());
+  for (const double w : without) spread += (w - mean) * (w - mean);
+  h.off_by_direction_sd =
+      std::sqrt(spread * (static_cast<double>(without.size()) - 1.0) / static_cast<double>(without.size()));
+  return h;
 }
 
 Repeatability repeatability(const std::vector<TipLabel>& labels, const std::vector<TipLabel>& again) {
