@@ -70,6 +70,9 @@ int main(int argc, char** argv) {
   config.tip_point = bevel::camera::TipPoint::axis;
   know_bevel(config);
   const Headings h = compare_headings(track_folders(argv[1], config, kRealPxPerMm));
-  std::printf("\nheading less the path's direction, %d tips: %+.3f rad on average, growing by %+.3f +- %.3f of it\n",
-              h.tips, h.off_mean_rad, h.off_by_direction, h.off_by_direction_sd);
+  std::printf(
+      "\nheading less the path's direction, %d tips: %+.3f rad on average, growing by %+.3f +- %.3f of it; by the slip "
+      "of "
+      "agar %+.3f\n",
+      h.tips, h.off_mean_rad, h.off_by_direction, h.off_by_direction_sd, h.agar_by_direction);
 }

@@ -146,6 +146,9 @@ Headings compare_headings(const std::vector<SeenFrame>& axis) {
   h.off_mean_rad /= h.tips, h.off_rms_rad = std::sqrt(h.off_rms_rad / h.tips),
                             h.claimed_rad = std::sqrt(h.claimed_rad / h.tips);
   h.off_by_direction = slope_of(rows, -1.0);
+  auto slipping = rows;
+  for (auto& r : slipping) r[2] = -(0.22 * r[1] - 0.49 * r[1] * std::abs(r[1]));
+  h.agar_by_direction = slope_of(slipping, -1.0);
   std::vector<double> without;
   for (double f = 0.0; f <= folders; f += 1.0) without.push_back(slope_of(rows, f));
   double mean = 0.0, spread = 0.0;

@@ -61,6 +61,7 @@ struct Headings {
   double off_mean_rad = 0.0, off_rms_rad = 0.0;              ///< tangent less path
   double claimed_rad = 0.0;                                  ///< what the tracker says of the tangent, RMS
   double off_by_direction = 0.0, off_by_direction_sd = 0.0;  ///< slope, and its sd by leaving out each folder in turn
+  double agar_by_direction = 0.0;  ///< the slope that the slip of agar, (25), would give, were the tangent e3 of {B}
 };
 Headings compare_headings(const std::vector<SeenFrame>& axis);
 
