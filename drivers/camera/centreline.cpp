@@ -25,6 +25,37 @@ double bilinear(const cv::Mat& m, double x, double y) {
   return (1.0 - fy) * ((1.0 - fx) * a[0] + fx * a[1]) + fy * ((1.0 - fx) * b[0] + fx * b[1]);
 }
 
+constexpr int kSideHalf_px = 2;
+
+/// What the needle is seen against: on each side two windows of five pixels beside each other.
+struct Beside {
+  std::array<double, 2> left_gray{}, right_gray{};  // nearer, farther
+};
+template <class GrayAt>
+Beside beside(const GrayAt& gray_at, int side_px) {
+  const auto mean_about = [&](int middle) {
+    double sum = 0.0;
+    for (int k = -kSideHalf_px; k <= kSideHalf_px; ++k) sum += gray_at(middle + k);
+    return sum / (2 * kSideHalf_px + 1);
+  };
+  constexpr int next = 2 * kSideHalf_px + 1;
+  return {{mean_about(-side_px), mean_about(-side_px - next)}, {mean_about(side_px), mean_about(side_px + next)}};
+}
+
+/// The background under the needle: the straight line between the lighter window of each side by `typical`. What is
+/// printed on the paper or was drawn through the gel is darker than both, and seldom as wide as two windows.
+struct Background {
+  double middle_gray = 0.0, gray_per_px = 0.0;
+};
+Background background(const Beside& here, const Beside& typical, int side_px) {
+  constexpr int next = 2 * kSideHalf_px + 1;
+  const size_t l = typical.left_gray[1] > typical.left_gray[0] ? 1 : 0;
+  const size_t r = typical.right_gray[1] > typical.right_gray[0] ? 1 : 0;
+  const double left_px = -side_px - next * static_cast<double>(l), right_px = side_px + next * static_cast<double>(r);
+  const double slope = (here.right_gray[r] - here.left_gray[l]) / (right_px - left_px);
+  return {here.left_gray[l] - slope * left_px, slope};
+}
+
 double median_of(std::vector<double>& values) {
   const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
   std::nth_element(values.begin(), middle, values.end());
@@ -136,40 +167,74 @@ Centreline fit_centreline(const std::vector<cv::Point2d>& centres, const Centrel
 
 EndProfile profile_along(const cv::Mat& patch, const Centreline& line, double row, int from_px, int to_px, int reach_px,
                          const RidgeScale& scale) {
-  constexpr int side_half = 2;
   const int side = scale.offset_px + 1;
-  const double margin = side + side_half + 1.0;
+  const double margin = side + kSideHalf_px + 1.0;
   EndProfile profile;
+  std::vector<Beside> sides;
   cv::Point2d p = line.along(row, from_px);
   for (int i = from_px; i <= to_px; ++i, p = line.along(p.y, 1.0)) {
     const bool inside = p.y >= 0.0 && p.y <= patch.rows - 1.0 && p.x >= margin && p.x <= patch.cols - 1.0 - margin;
     if (!inside) {
-      if (profile.dark.empty()) continue;
+      if (sides.empty()) continue;
       break;
     }
     const double slope = line.slope(p.y);
     const double length = std::hypot(1.0, slope);
     const cv::Point2d right(1.0 / length, -slope / length);
     const auto gray_at = [&](double off) { return bilinear(patch, p.x + off * right.x, p.y + off * right.y); };
-    double left_gray = 0.0, right_gray = 0.0;
-    for (int k = -side_half; k <= side_half; ++k) {
-      left_gray += gray_at(-side + k);
-      right_gray += gray_at(side + k);
-    }
-    left_gray /= 2 * side_half + 1, right_gray /= 2 * side_half + 1;
     double dark = 0.0, moment = 0.0, spread = 0.0;
     for (int k = -reach_px; k <= reach_px; ++k) {
-      const double share = 0.5 + 0.5 * k / side;
-      const double d = (1.0 - share) * left_gray + share * right_gray - gray_at(k);
-      dark += d, moment += d * k, spread += d * spread_weight(k, reach_px + 0.5);
+      const double gray = gray_at(k);
+      dark -= gray, moment -= gray * k, spread -= gray * spread_weight(k, reach_px + 0.5);
     }
-    if (profile.dark.empty()) profile.first_s_px = i;
-    profile.dark.push_back(dark);
-    profile.moment.push_back(moment);
-    profile.spread.push_back(spread);
-    profile.beside.push_back(0.5 * (left_gray + right_gray));
+    if (sides.empty()) profile.first_s_px = i;
+    profile.dark.push_back(dark), profile.moment.push_back(moment), profile.spread.push_back(spread);
+    sides.push_back(beside(gray_at, side));
+  }
+  double weights = 0.0, squares = 0.0, spreads = 0.0;
+  for (int k = -reach_px; k <= reach_px; ++k)
+    weights += 1.0, squares += k * k, spreads += spread_weight(k, reach_px + 0.5);
+  // Which window is the lighter is told by a needle's width of rows: by one alone it would be the noisier one.
+  const auto count = static_cast<int>(sides.size());
+  const int half = std::max(1, scale.core_px / 2);
+  for (int i = 0; i < count; ++i) {
+    Beside typical;
+    for (int j = std::max(0, i - half); j <= std::min(count - 1, i + half); ++j)
+      for (size_t n = 0; n < 2; ++n) {
+        typical.left_gray[n] += sides[static_cast<size_t>(j)].left_gray[n];
+        typical.right_gray[n] += sides[static_cast<size_t>(j)].right_gray[n];
+      }
+    const auto at = static_cast<size_t>(i);
+    const Background under = background(sides[at], typical, side);
+    profile.dark[at] += weights * under.middle_gray;
+    profile.moment[at] += squares * under.gray_per_px;
+    profile.spread[at] += spreads * under.middle_gray;
+    profile.beside.push_back(under.middle_gray);
   }
   return profile;
+}
+
+std::vector<double> mean_dark_across(const cv::Mat& patch, const Centreline& line, double row, double from_px,
+                                     double to_px, double across_px, int reach_px, const RidgeScale& scale) {
+  const int side = scale.offset_px + 1;
+  const int rows = std::max(1, cvRound(to_px - from_px));
+  const int furthest = std::max(reach_px, side + 3 * kSideHalf_px + 1);
+  std::vector<double> gray(static_cast<size_t>(2 * furthest + 1), 0.0);
+  for (int i = 0; i < rows; ++i) {
+    const cv::Point2d p = line.along(row, from_px + (i + 0.5) * (to_px - from_px) / rows);
+    const double slope = line.slope(p.y);
+    const double length = std::hypot(1.0, slope);
+    for (int k = -furthest; k <= furthest; ++k) {
+      const double off = (across_px + k) / length;
+      gray[static_cast<size_t>(k + furthest)] += bilinear(patch, p.x + off, p.y - off * slope) / rows;
+    }
+  }
+  const auto gray_at = [&](int k) { return gray[static_cast<size_t>(k + furthest)]; };
+  const Beside sides = beside(gray_at, side);
+  const Background under = background(sides, sides, side);
+  std::vector<double> dark;
+  for (int k = -reach_px; k <= reach_px; ++k) dark.push_back(under.middle_gray + under.gray_per_px * k - gray_at(k));
+  return dark;
 }
 
 namespace {

@@ -43,6 +43,11 @@ Centreline fit_centreline(const std::vector<cv::Point2d>& centres, const Centrel
 EndProfile profile_along(const cv::Mat& patch, const Centreline& line, double row, int from_px, int to_px, int reach_px,
                          const RidgeScale& scale);
 
+/// Mean darkness at every pixel as far as `reach_px` to each side of what lies `across_px` right of the line, over
+/// [from_px, to_px] of arc length past `row`.
+std::vector<double> mean_dark_across(const cv::Mat& patch, const Centreline& line, double row, double from_px,
+                                     double to_px, double across_px, int reach_px, const RidgeScale& scale);
+
 /// Standard deviation of the blur across the shaft in [first_row, last_row]: that of a bar of `needle_width_px` which
 /// fits its mean profile best, with what lies beside it left out. At most one and a half needle widths, then "at
 /// least".

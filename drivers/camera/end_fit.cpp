@@ -75,10 +75,8 @@ EndFit fit_end(const EndProfile& profile, const EndPriors& priors) {
   const Problem::Seen seen = problem.seen_with_gradient(p);
   fit.tip.s_px = p[tip];
   fit.tip.s_variance_px2 = covariance(tip, tip);
-  const cv::Vec2d aside = problem.aside_of_model(p, noise, seen.place[0]);
   const cv::Vec2d further = problem.beyond_model(p, noise, seen.place[0]);
-  fit.seen = {seen.place[0] + further[0], variance(seen.by_s) + further[1], seen.place[1] + aside[0],
-              variance(seen.by_across) + aside[1]};
+  fit.seen = {seen.place[0] + further[0], variance(seen.by_s) + further[1], seen.place[1], variance(seen.by_across)};
   // Another end that the picture allows nearly as well: as much variance as there is doubt which of the two it is.
   double least_gap = std::numeric_limits<double>::infinity();
   const Mode* second = nullptr;

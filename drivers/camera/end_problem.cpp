@@ -179,19 +179,23 @@ Noise Problem::noise_at(const Vector& p) {
 }
 
 std::vector<std::pair<double, double>> Problem::coarse(const Prior& prior, const Noise& noise) {
-  BlurredBevel table;
-  table.build(std::exp(prior.mean[log_bevel]), 0.75, priors_.blur_px);
+  Vector p = prior.mean;
+  p[roll] = std::asin(0.75);
+  build(p, tables_, false);
   std::vector<std::pair<double, double>> cost;  // cost, tip
-  const double width2 = kCauchy * kCauchy * noise.sigma[0] * noise.sigma[0];
+  Sample sample_i;
   for (int begin = 4; begin < size() - 2; begin += 3) {
-    const double at = s(begin);
+    p[tip] = s(begin);
     double sum = 0.0;
     for (int i = 0; i < size(); ++i) {
-      const double r =
-          profile_.dark[static_cast<size_t>(i)] - prior.mean[height] * table.at(at - s(i)).moments.outline.share;
-      sum += 0.5 * noise.information(0) * width2 * std::log1p(r * r / width2);
+      sample(p, tables_, i, false, sample_i);
+      for (const int channel : {0, 2}) {
+        const double sigma = noise.sigma[static_cast<size_t>(channel)];
+        const double width2 = kCauchy * kCauchy * sigma * sigma, r = sample_i.residual[channel];
+        sum += 0.5 * noise.information(channel) * width2 * std::log1p(r * r / width2);
+      }
     }
-    cost.emplace_back(sum, at);
+    cost.emplace_back(sum, p[tip]);
   }
   return cost;
 }

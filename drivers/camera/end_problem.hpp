@@ -97,10 +97,8 @@ class Problem {
 
   /// Where kSeenShare of the darkness is left, s and across, by the table of p's shape.
   cv::Vec2d seen(const Vector& p, const BlurredBevel& table) const;
-  /// How far aside of the model darkness really lies over the last needle's width before `until_s`, and the variance of
-  /// that: a cut that is worn or that shines shifts the middle of what is seen, whatever the model says.
-  cv::Vec2d aside_of_model(const Vector& p, const Noise& noise, double until_s);
-  /// The same along: how much further the last darkness reaches than the model says, over a needle's width around it.
+  /// How much further the last darkness reaches than the model says, over a needle's width around `about_s`, and the
+  /// variance of that: a cut that is worn or that shines ends elsewhere, whatever the model says.
   cv::Vec2d beyond_model(const Vector& p, const Noise& noise, double about_s);
   /// And what each parameter does to them; after assemble() with gradient.
   struct Seen {

@@ -32,21 +32,6 @@ cv::Vec2d Problem::more_than_chance(double offset_px, double variance_px2) const
   return {share * offset_px, share * variance_px2};
 }
 
-cv::Vec2d Problem::aside_of_model(const Vector& p, const Noise& noise, double until_s) {
-  build(p, tables_, false);
-  double weighted = 0.0, squares = 0.0;
-  Sample sample_i;
-  for (int i = 0; i < size(); ++i) {
-    if (s(i) > until_s || s(i) < until_s - 2.0 * priors_.radius_px) continue;
-    sample(p, tables_, i, false, sample_i);
-    const double g = p[height] * moment_scale_ * sample_i.share;
-    const double w = weight(sample_i.residual[1], 1, noise);
-    weighted += w * g * sample_i.residual[1], squares += w * g * g;
-  }
-  if (squares <= 0.0) return {0.0, 0.0};
-  return more_than_chance(weighted / squares, 1.0 / (noise.information(1) * squares));
-}
-
 cv::Vec2d Problem::beyond_model(const Vector& p, const Noise& noise, double about_s) {
   build(p, tables_, true);
   double weighted = 0.0, squares = 0.0;

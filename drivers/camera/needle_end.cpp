@@ -4,6 +4,8 @@
 #include <cmath>
 #include <numeric>
 
+#include "drivers/camera/line_location.hpp"
+
 namespace bevel::camera {
 namespace {
 
@@ -80,6 +82,17 @@ NeedleEnd find_end(const cv::Mat& patch, const RidgePath& path, int end_row, con
   end.fit = fit_end(profile, priors);
   if (!end.fit.converged) return end;
   end.contrast_gray = end.fit.height / settings.needle_px;
+
+  // An eye follows the dark line to its end. There it is thinner than the lens's blur, and what lies beside it is not
+  // it.
+  const LineLocation thin =
+      locate_line(mean_dark_across(patch, end.line, end_row, end.fit.seen.s_px - settings.needle_px, end.fit.seen.s_px,
+                                   end.fit.seen.across_px, scale.offset_px, scale),
+                  priors.blur_px, radius_px);
+  if (thin.found) {
+    end.fit.seen.across_px += thin.offset_px;
+    end.fit.seen.across_variance_px2 = thin.variance_px2;
+  }
 
   const auto place = [&](const EndPoint& point) {
     const cv::Point2d on_line = end.line.along(end_row, point.s_px);

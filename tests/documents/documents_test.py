@@ -55,7 +55,8 @@ ONLY_CHECKED = {
     "bevel-replay": "recordings from elsewhere, or run by tests/examples", "bevel-diagnose": "recordings from elsewhere",
     "bevel-table1": "has tests of its own",
     "test_": "is run by name elsewhere in this suite", "study_": "takes minutes", "bench_": "measures",
-    "tip_sheet": "makes a picture to be looked at", "tip_study": "takes minutes", "ceiling_study": "takes minutes",
+    "tip_sheet": "makes a picture to be looked at", "path_study": "needs the recordings of others",
+    "tip_study": "takes minutes", "ceiling_study": "takes minutes",
     "sampled_evidence_cases": "serves a test",
 }
 FOLDERS = {path.name for path in ROOT.iterdir() if path.is_dir() and not path.name.startswith((".", "build", "out"))}
