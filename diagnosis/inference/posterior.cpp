@@ -47,7 +47,7 @@ Posterior posterior_of(const Search& search, double discrepancy_size) {
     double large = 0;
     if (one.at->fit_with_curve) {
       const Fit& fit = *one.at->fit_with_curve;
-      if (search.discrepancy().visible_size(*fit.scales.curve, fit.curve_values) > discrepancy_size)
+      if (search.discrepancy().visible_size(fit.scales.curves, fit.curve_values) > discrepancy_size)
         large = share.with_discrepancy;
     }
     out.discrepancy += large;
@@ -60,12 +60,12 @@ Posterior posterior_of(const Search& search, double discrepancy_size) {
 }
 
 CurveColumns curve_of(const Search& search, const Fit& fit) {
-  return fit.scales.curve ? search.discrepancy().columns(*fit.likelihood, *fit.scales.curve) : CurveColumns{};
+  return search.discrepancy().columns(*fit.likelihood, fit.scales.curves);
 }
 
 const VectorXd& nuisance_weights_of(const Search& search, const Fit& fit) {
   const Evaluated& at = *search.visited().at(fit.layout.set()).at;
-  return fit.scales.curve ? at.nuisance_weights_with_curve : at.nuisance_weights;
+  return fit.scales.curves.empty() ? at.nuisance_weights : at.nuisance_weights_with_curve;
 }
 
 double Mixture::mean() const {

@@ -25,7 +25,7 @@ struct Posterior {
 // of form, which widen intervals and are not called missing physics.
 Posterior posterior_of(const Search& search, double discrepancy_size);
 
-// The curve of a fit with one, whitened by the fit's own noise; none for a fit without.
+// The curves of a fit with some, whitened by the fit's own noise; none for a fit without.
 CurveColumns curve_of(const Search& search, const Fit& fit);
 // Over the grid of the nuisances' standard deviations, of a fit of one of the sets that were visited.
 const Eigen::VectorXd& nuisance_weights_of(const Search& search, const Fit& fit);

@@ -141,8 +141,7 @@ Fit refit_without(const inference::Search& search, const Fit& whole, const Fit& 
       if (series.time_s[i] > until_s) gone.insert(series.message[i]);
   without[r].assign(gone.begin(), gone.end());
   const Likelihood some(all.system(), without, all.noise(), inputs_about(whole));
-  const auto curve =
-      whole.scales.curve ? search.discrepancy().columns(some, *whole.scales.curve) : inference::CurveColumns{};
+  const auto curve = search.discrepancy().columns(some, whole.scales.curves);
   Fit out = inference::fit(some, whole.layout, start.shared, start.local, whole.scales, curve);
   if (!out.valid) out = start;
   return out;

@@ -87,7 +87,7 @@ std::optional<Compared> compare(const fs::path& folder, const json& truth) {
   auto at = inference::evaluate(search.likelihood(), layout, shared, local, alone.scales.nuisance_sd);
   Compared out{.truth = describe(system, set), .found = describe(system, search.best().set)};
   out.found_log = search.best().log_posterior();
-  inference::add_discrepancy(search.likelihood(), search.discrepancy(), at);
+  inference::add_discrepancy(search.likelihood(), search.discrepancy(), {}, at);
   out.truth_log = at.valid ? search.weighed(set, std::make_shared<const inference::Evaluated>(at)).log_posterior()
                            : -std::numeric_limits<double>::infinity();
   return out;

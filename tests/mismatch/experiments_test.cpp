@@ -67,7 +67,7 @@ struct Known {
     const std::vector<Eigen::VectorXd> local(system.data().recordings.size(), layout.local_start());
     const auto groups = static_cast<Eigen::Index>(system.nuisance_groups().size());
     auto out = inference::fit(*likelihood, layout, shared, local,
-                              {.nuisance_sd = Eigen::VectorXd::Zero(groups), .curve = {}}, {}, {.tolerance = 1e-9});
+                              {.nuisance_sd = Eigen::VectorXd::Zero(groups), .curves = {}}, {}, {.tolerance = 1e-9});
     out.likelihood = likelihood;
     return out;
   }
