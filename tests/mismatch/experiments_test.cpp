@@ -113,8 +113,7 @@ TEST(Separation, IsByHowMuchTheRivalRefittedIsWorse) {
     Recording more;
     more.motion = script.motion;
     model::OpenLoop path;
-    ASSERT_TRUE(
-        known.system.tip_path(truth.layout.set(), script.motion, -1, truth.shared, true_one.local, nullptr, path));
+    ASSERT_TRUE(known.system.tip_path(truth.layout.set(), script.motion, -1, truth.shared, true_one.local, {}, path));
     for (const auto& channel : recorded.channels) {
       Series series;
       for (std::size_t i = 0; i < path.position_mm.size(); ++i) {
