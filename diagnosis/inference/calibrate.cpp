@@ -68,7 +68,7 @@ Fit tempered_base(const System& system, const Readings& outliers, const Noise& n
     if (step > 0 && change < kSettled) break;
     before = sigma;
     now = fit(Likelihood(system, outliers, sigma), nothing, now.shared, now.local,
-              {.nuisance_sd = middle_nuisance_sd(system), .curve = {}});
+              {.nuisance_sd = middle_nuisance_sd(system), .curves = {}});
     if (!now.valid) break;
   }
   return now;

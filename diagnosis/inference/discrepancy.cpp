@@ -18,13 +18,13 @@ namespace {
 // A curve that these recordings cannot show, as a mean square per reading.
 constexpr double kInvisible = 1e-14;
 
-// Rows in standard deviations of the noise, its autocorrelation left in.
-MatrixXd in_deviations(const Likelihood& likelihood, std::size_t r, MatrixXd rows) {
-  Index row = 0;
+// For rows in standard deviations of the noise, its autocorrelation left in.
+VectorXd one_per_deviation(const Likelihood& likelihood, std::size_t r) {
+  std::vector<double> out;
   const auto& series = likelihood.data().recordings[r].series;
   for (std::size_t c = 0; c < series.size(); ++c)
-    for (const double relative : series[c].relative_sd) rows.row(row++) /= likelihood.noise().sigma[c] * relative;
-  return rows;
+    for (const double relative : series[c].relative_sd) out.push_back(1 / (likelihood.noise().sigma[c] * relative));
+  return Eigen::Map<const VectorXd>(out.data(), static_cast<Index>(out.size()));
 }
 
 }  // namespace
@@ -44,8 +44,9 @@ Discrepancy::Discrepancy(const Likelihood& likelihood, const Fit& base) : system
   for (std::size_t r = 0; r < likelihood.recordings(); ++r) {
     const MatrixXd raw = likelihood.kept(r, system_->by_curves(r, base.shared.head(n)));
     system_->predict({}, r, base.shared.head(n), base.local[r], true, prediction);
-    const MatrixXd C = in_deviations(likelihood, r, raw);
-    const MatrixXd J = in_deviations(likelihood, r, likelihood.kept(r, prediction.by_shared));
+    per_sd_.push_back(one_per_deviation(likelihood, r));
+    const MatrixXd C = per_sd_.back().asDiagonal() * raw;
+    const MatrixXd J = per_sd_.back().asDiagonal() * likelihood.kept(r, prediction.by_shared);
     JJ += J.transpose() * J;
     JC += J.transpose() * C;
     for (std::size_t k = 0; k < first_.size(); ++k) {
@@ -61,13 +62,24 @@ Discrepancy::Discrepancy(const Likelihood& likelihood, const Fit& base) : system
     }
     square_.push_back(std::move(square));
   }
-  const auto rows = static_cast<double>(likelihood.data().rows());
-  const auto solver = JJ.completeOrthogonalDecomposition();
-  for (std::size_t k = 0; k < first_.size(); ++k) {
-    const MatrixXd across = JC.middleCols(first_[k], size_[k]);
-    visible_.emplace_back((CC.block(0, first_[k], size_[k], size_[k]) - across.transpose() * solver.solve(across)) /
-                          rows);
-  }
+  rows_ = static_cast<double>(likelihood.data().rows());
+  absorbed_ = JJ.completeOrthogonalDecomposition().solve(JC);
+  absorbing_ = std::move(JC);
+  for (std::size_t k = 0; k < first_.size(); ++k)
+    visible_.emplace_back(
+        (CC.block(0, first_[k], size_[k], size_[k]) -
+         absorbing_.middleCols(first_[k], size_[k]).transpose() * absorbed_.middleCols(first_[k], size_[k])) /
+        rows_);
+}
+
+MatrixXd Discrepancy::visible_together(std::size_t one, std::size_t other) const {
+  if (one == other) return visible_[one];
+  MatrixXd out =
+      -absorbing_.middleCols(first_[one], size_[one]).transpose() * absorbed_.middleCols(first_[other], size_[other]);
+  for (std::size_t r = 0; r < raw_.size(); ++r)
+    out += (per_sd_[r].asDiagonal() * raw_[r].middleCols(first_[one], size_[one]).cast<double>()).transpose() *
+           (per_sd_[r].asDiagonal() * raw_[r].middleCols(first_[other], size_[other]).cast<double>());
+  return out / rows_;
 }
 
 MatrixXd Discrepancy::unit_covariance(std::size_t curve, double length) const {
@@ -76,17 +88,44 @@ MatrixXd Discrepancy::unit_covariance(std::size_t curve, double length) const {
   return correlation / std::max(square, kInvisible);
 }
 
-CurveColumns Discrepancy::columns(const Likelihood& likelihood, const CurvePrior& prior) const {
-  CurveColumns out;
-  for (std::size_t r = 0; r < raw_.size(); ++r)
-    out.raw.emplace_back(raw_[r].middleCols(first_[prior.curve], size_[prior.curve]).cast<double>()),
-        out.columns.push_back(likelihood.whitened(r, out.raw.back()));
-  out.covariance = prior.scale * prior.scale * unit_covariance(prior.curve, prior.length);
+std::vector<Index> Discrepancy::places(std::span<const CurvePrior> curves) const {
+  std::vector<Index> out = {0};
+  for (const CurvePrior& one : curves) out.push_back(out.back() + size_[one.curve]);
   return out;
 }
 
-double Discrepancy::visible_size(const CurvePrior& prior, const VectorXd& values) const {
-  return std::sqrt(std::max(0.0, values.dot(visible_[prior.curve] * values)));
+CurveColumns Discrepancy::columns(const Likelihood& likelihood, std::span<const CurvePrior> curves) const {
+  CurveColumns out;
+  if (curves.empty()) return out;
+  const auto at = places(curves);
+  for (std::size_t r = 0; r < raw_.size(); ++r) {
+    MatrixXd& raw = out.raw.emplace_back(raw_[r].rows(), at.back());
+    for (std::size_t i = 0; i < curves.size(); ++i) {
+      const std::size_t k = curves[i].curve;
+      raw.middleCols(at[i], size_[k]) = raw_[r].middleCols(first_[k], size_[k]).cast<double>();
+    }
+    out.columns.push_back(likelihood.whitened(r, raw));
+  }
+  out.covariance = MatrixXd::Zero(at.back(), at.back());
+  for (std::size_t i = 0; i < curves.size(); ++i) {
+    const auto& [k, scale, length] = curves[i];
+    out.covariance.block(at[i], at[i], size_[k], size_[k]) = scale * scale * unit_covariance(k, length);
+  }
+  return out;
+}
+
+double Discrepancy::visible_size(std::size_t curve, const VectorXd& values) const {
+  return std::sqrt(std::max(0.0, values.dot(visible_[curve] * values)));
+}
+
+double Discrepancy::visible_size(std::span<const CurvePrior> curves, const VectorXd& values) const {
+  const auto at = places(curves);
+  double square = 0;
+  for (std::size_t i = 0; i < curves.size(); ++i)
+    for (std::size_t j = 0; j < curves.size(); ++j)
+      square += values.segment(at[i], at[i + 1] - at[i])
+                    .dot(visible_together(curves[i].curve, curves[j].curve) * values.segment(at[j], at[j + 1] - at[j]));
+  return std::sqrt(std::max(0.0, square));
 }
 
 std::vector<Marginal::Added> Discrepancy::added(const Marginal& beside) const {

@@ -1,6 +1,9 @@
 #pragma once
-// The discrepancy that nobody has a name for: a Gaussian process of one covariate in one component (Kennedy and O'Hagan
-// 2001, J. R. Stat. Soc. B 63), linear through the sensitivities, beside any set of effects.
+// The discrepancy that nobody has a name for: a sum of curves, each a Gaussian process of one covariate in one
+// component (Kennedy and O'Hagan 2001, J. R. Stat. Soc. B 63), linear through the sensitivities, beside any set of
+// effects.
+#include <span>
+
 #include "diagnosis/inference/marginal.hpp"
 
 namespace bevel::inference {
@@ -11,7 +14,7 @@ inline constexpr double kCurveLengths[] = {1.0, 0.2};
 
 struct CurveFactor {
   CurvePrior prior;
-  double log_bayes_factor = 0;  // against no discrepancy
+  double log_bayes_factor = 0;  // against none, or none more
 };
 
 class Discrepancy {
@@ -19,26 +22,34 @@ class Discrepancy {
   // About a fit of the base alone.
   Discrepancy(const Likelihood& likelihood, const Fit& base);
 
-  // Whitened by the noise of this likelihood, which may be another.
-  CurveColumns columns(const Likelihood& likelihood, const CurvePrior& prior) const;
-  // All curves at all scales and lengths beside a fit (without a curve), by the linear model and the noise that this
-  // was made with: the likeliest first.
+  // Side by side, whitened by the noise of this likelihood, which may be another. None of none.
+  CurveColumns columns(const Likelihood& likelihood, std::span<const CurvePrior> curves) const;
+  // Where the values of each of several curves begin among those of all, and at the end how many there are.
+  std::vector<Eigen::Index> places(std::span<const CurvePrior> curves) const;
+  // All curves at all scales and lengths beside a fit (with its own curves integrated out, if it has any), by the
+  // linear model and the noise that this was made with: the likeliest first.
   std::vector<CurveFactor> scan(const Marginal& beside) const;
   // The likelihood of each curve's values beside a fit.
   std::vector<Marginal::Added> added(const Marginal& beside) const;
   std::size_t choices() const { return first_.size() * std::size(kCurveScales) * std::size(kCurveLengths); }
-  // The root mean square over the readings, in standard deviations of the noise, of the part of a curve's values that
-  // the base's own parameters do not absorb.
-  double visible_size(const CurvePrior& prior, const Eigen::VectorXd& values) const;
+  // The root mean square over the readings, in standard deviations of the noise, of the part of a sum of curves, by all
+  // their values, that the base's own parameters do not absorb.
+  double visible_size(std::span<const CurvePrior> curves, const Eigen::VectorXd& values) const;
+  double visible_size(std::size_t curve, const Eigen::VectorXd& values) const;
 
  private:
   Eigen::MatrixXd unit_covariance(std::size_t curve, double length) const;
+  // Mean product over readings of the visible parts of two curves, as a bilinear form.
+  Eigen::MatrixXd visible_together(std::size_t one, std::size_t other) const;
 
   const System* system_;
   std::vector<Eigen::Index> first_, size_;    // columns of each curve
   std::vector<Eigen::MatrixXf> raw_, white_;  // per recording, of all curves
   std::vector<Eigen::MatrixXf> square_;       // per recording: inner products within each curve, side by side
   std::vector<Eigen::MatrixXd> visible_;      // per curve: mean square over readings, as a quadratic form
+  std::vector<Eigen::VectorXd> per_sd_;       // per recording: of its rows, 1 / standard deviation of the noise
+  Eigen::MatrixXd absorbed_, absorbing_;      // by the base's parameters: (J'J)^-1 J'C and J'C, of all curves
+  double rows_ = 0;
 };
 
 }  // namespace bevel::inference

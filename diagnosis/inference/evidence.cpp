@@ -130,7 +130,7 @@ Settled settle(const Likelihood& likelihood, const Discrepancy* discrepancy, con
   std::vector<VectorXd> inputs;
   bool noise_moved = false, settled = false;
   for (int pass = 0; pass < kRefits; ++pass) {
-    if (scales.curve) curve = discrepancy->columns(*now, *scales.curve);
+    if (discrepancy) curve = discrepancy->columns(*now, scales.curves);
     // What will move with the noise need not be known to the end.
     const FitRules rules{.tolerance = settled ? FitRules{}.tolerance : kWhileUnsettled};
     Settled one{.fit = fit(*now, layout, shared, local, scales, curve, rules), .over = {}};
@@ -269,9 +269,7 @@ InstantPosterior instant_posterior(const Likelihood& likelihood, const Fit& fit,
 
 std::pair<Fit, double> moved_to(const std::shared_ptr<const Likelihood>& likelihood, const Fit& from,
                                 const Discrepancy& discrepancy) {
-  const auto curve_of = [&](const Likelihood& by) {
-    return from.scales.curve ? discrepancy.columns(by, *from.scales.curve) : CurveColumns{};
-  };
+  const auto curve_of = [&](const Likelihood& by) { return discrepancy.columns(by, from.scales.curves); };
   const auto log_evidence = [&](const Fit& at, const CurveColumns& curve) {
     const auto blocks = linearise(*at.likelihood, at, curve);
     if (blocks.empty()) return -std::numeric_limits<double>::infinity();
@@ -288,7 +286,7 @@ std::pair<Fit, double> moved_to(const std::shared_ptr<const Likelihood>& likelih
 Evaluated evaluate(const Likelihood& likelihood, const Layout& layout, const VectorXd& shared,
                    const std::vector<VectorXd>& local, const VectorXd& nuisance_sd, double give_up_below) {
   const NuisanceGrid grid = nuisance_grid(likelihood.system());
-  Settled plain = settle(likelihood, nullptr, layout, shared, local, {.nuisance_sd = nuisance_sd, .curve = {}}, grid,
+  Settled plain = settle(likelihood, nullptr, layout, shared, local, {.nuisance_sd = nuisance_sd, .curves = {}}, grid,
                          give_up_below);
   Evaluated out(std::move(plain.fit));
   out.log_evidence = plain.over.log_mean;
@@ -297,35 +295,82 @@ Evaluated evaluate(const Likelihood& likelihood, const Layout& layout, const Vec
   return out;
 }
 
-void add_discrepancy(const Likelihood& likelihood, const Discrepancy& discrepancy, Evaluated& out) {
+namespace {
+
+// Of all curves of a scan together, each as likely beforehand: the likeliest's factor and what the rest adds to it.
+struct Integrated {
+  double log_factor = 0;
+  double log_spread = 0;  // log_factor less the likeliest's own
+};
+Integrated integrated(const std::vector<CurveFactor>& curves) {
+  std::vector<double> logs;
+  for (const auto& one : curves) logs.push_back(one.log_bayes_factor);
+  const double mean = log_sum(logs) - std::log(static_cast<double>(logs.size()));
+  return {.log_factor = mean, .log_spread = mean - logs.front()};
+}
+
+// One more curve beside those that a set has; whether it is likelier than none more. log_evidence: with those it has.
+bool add_curve(const Likelihood& likelihood, const Discrepancy& discrepancy, double log_prior_odds, Evaluated& out,
+               double& log_evidence) {
+  const Fit& here = *out.fit_with_curve;
+  auto more = discrepancy.scan(Marginal(likelihood, here, discrepancy.columns(likelihood, here.scales.curves)));
+  for (const CurvePrior& known : here.scales.curves)
+    std::erase_if(more, [&](const CurveFactor& one) { return one.prior.curve == known.curve; });
+  if (more.empty()) return false;
+  const Integrated all = integrated(more);
+  if (all.log_factor + log_prior_odds < 0) return false;
+  Scales scales = here.scales;
+  scales.curves.push_back(more.front().prior);
+  Settled with = settle(*here.likelihood, &discrepancy, here.layout, here.shared, here.local, scales,
+                        nuisance_grid(likelihood.system()), -std::numeric_limits<double>::infinity());
+  const double log_factor = with.over.log_mean + all.log_spread - log_evidence;
+  if (!(log_factor + log_prior_odds > 0)) return false;
+  log_evidence = with.over.log_mean;
+  out.fit_with_curve = std::move(with.fit);
+  out.nuisance_weights_with_curve = with.over.weights;
+  out.log_factors.push_back(log_factor);
+  return true;
+}
+
+}  // namespace
+
+void add_discrepancy(const Likelihood& likelihood, const Discrepancy& discrepancy, const CurveRules& rules,
+                     Evaluated& out) {
   out.with_discrepancy = true;
   // By the noise that the curves were prepared with.
   out.curves = discrepancy.scan(Marginal(likelihood, out.fit, {}));
   if (out.curves.empty()) return;
-  std::vector<double> logs;
-  for (const auto& one : out.curves) logs.push_back(one.log_bayes_factor);
-  const double spread = log_sum(logs) - logs.front();  // the rest of them, by the linear model
-  const double choices = std::log(static_cast<double>(logs.size()));
-  out.log_bayes_factor_curve = logs.front() + spread - choices;
-  if (logs.front() < kLikelyCurve) return;
+  const Integrated all = integrated(out.curves);  // the rest of them, by the linear model
+  out.log_bayes_factor_curve = all.log_factor;
+  if (out.curves.front().log_bayes_factor < kLikelyCurve) return;
   // The likeliest, where the model is nonlinear: about the mode that it moves to.
   Scales scales = out.fit.scales;
-  scales.curve = out.curves.front().prior;
+  scales.curves = {out.curves.front().prior};
   Settled with = settle(*out.fit.likelihood, &discrepancy, out.fit.layout, out.fit.shared, out.fit.local, scales,
                         nuisance_grid(likelihood.system()), -std::numeric_limits<double>::infinity());
   if (!std::isfinite(with.over.log_mean)) return;
   // Beside the curve another local minimum may have been found: it counts without the curve too.
   Settled again = settle(*with.fit.likelihood, nullptr, out.fit.layout, with.fit.shared, with.fit.local,
-                         {.nuisance_sd = with.fit.scales.nuisance_sd, .curve = {}}, nuisance_grid(likelihood.system()),
+                         {.nuisance_sd = with.fit.scales.nuisance_sd, .curves = {}}, nuisance_grid(likelihood.system()),
                          out.log_evidence);
   if (again.over.log_mean > out.log_evidence) {
     out.fit = std::move(again.fit);
     out.log_evidence = again.over.log_mean;
     out.nuisance_weights = again.over.weights;
   }
-  out.log_bayes_factor_curve = with.over.log_mean + spread - choices - out.log_evidence;
+  out.log_factors = {with.over.log_mean + all.log_spread - out.log_evidence};
   out.fit_with_curve = std::move(with.fit);
   out.nuisance_weights_with_curve = with.over.weights;
+  double log_evidence = with.over.log_mean;
+  while (out.log_factors.size() < rules.most &&
+         add_curve(likelihood, discrepancy, rules.log_prior_odds, out, log_evidence)) {
+  }
+  // Over their number, each more with its prior odds.
+  out.log_bayes_factor_curve = out.log_factors.back();
+  for (std::size_t i = out.log_factors.size() - 1; i > 0; --i) {
+    const double terms[] = {0, rules.log_prior_odds + out.log_bayes_factor_curve};
+    out.log_bayes_factor_curve = out.log_factors[i - 1] + log_sum(terms);
+  }
 }
 
 }  // namespace bevel::inference

@@ -1,7 +1,7 @@
 #pragma once
 // The evidence of a set of effects: the integral of likelihood times prior over everything unknown. By Laplace's method
 // in what is nonlinear, exactly in what is linear about the mode; over grids for the standard deviations of the
-// nuisances and for the discrepancy's curve, scale and length.
+// nuisances and for each of the discrepancy's curves, their scales and lengths.
 #include <limits>
 
 #include "diagnosis/inference/discrepancy.hpp"
@@ -12,10 +12,11 @@ namespace bevel::inference {
 struct Evaluated {
   explicit Evaluated(Fit f) : fit(std::move(f)) {}
   Fit fit;                            // without a curve, at the likeliest standard deviations
-  std::optional<Fit> fit_with_curve;  // with the likeliest curve, where one is likely at all
+  std::optional<Fit> fit_with_curve;  // with the likeliest curves, where one is likely at all
   double log_evidence = 0;            // without a discrepancy
-  double log_bayes_factor_curve = 0;  // of a discrepancy, against none
-  std::vector<CurveFactor> curves;    // each of them, the likeliest first
+  double log_bayes_factor_curve = 0;  // of a discrepancy of any number of curves, against none
+  std::vector<CurveFactor> curves;    // each of them as the first, the likeliest first
+  std::vector<double> log_factors;    // of each curve of fit_with_curve beside those before it, choices integrated over
   Eigen::VectorXd nuisance_weights;   // posterior over the grid of standard deviations
   Eigen::VectorXd nuisance_weights_with_curve;
   bool with_discrepancy = false;  // whether that was asked
@@ -35,8 +36,14 @@ Evaluated evaluate(const Likelihood& likelihood, const Layout& layout, const Eig
                    const std::vector<Eigen::VectorXd>& local, const Eigen::VectorXd& nuisance_sd,
                    double give_up_below = -std::numeric_limits<double>::infinity());
 
-// The discrepancy's part, added to a set that was evaluated without.
-void add_discrepancy(const Likelihood& likelihood, const Discrepancy& discrepancy, Evaluated& evaluated);
+struct CurveRules {
+  double log_prior_odds = -4;  // of a curve, against none; of one more, against no more
+  std::size_t most = 2;
+};
+// The discrepancy's part, added to a set that was evaluated without: the likeliest curve, then beside it the next, for
+// as long as one more is likelier than not.
+void add_discrepancy(const Likelihood& likelihood, const Discrepancy& discrepancy, const CurveRules& rules,
+                     Evaluated& evaluated);
 
 // The same mode sought again by the noise of another likelihood, and by how much its evidence is more there.
 std::pair<Fit, double> moved_to(const std::shared_ptr<const Likelihood>& likelihood, const Fit& from,

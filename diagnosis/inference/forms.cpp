@@ -177,7 +177,7 @@ std::vector<FormFit> fit_forms(const System& system, const Discrepancy& discrepa
         VectorXd f(static_cast<Index>(curve.at.size()));
         for (Index i = 0; i < f.size(); ++i)
           f[i] = value_of(form, curve, shape.value, shape.phase_rad, curve.at[static_cast<std::size_t>(i)]);
-        return weigh(f, discrepancy.visible_size({.curve = k}, f), likelihoods[k]);
+        return weigh(f, discrepancy.visible_size(k, f), likelihoods[k]);
       };
       FormFit one{.curve = k, .form = form};
       const auto shapes = shapes_of(form, curve);

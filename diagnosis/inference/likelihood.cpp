@@ -224,7 +224,7 @@ ArrowSolution solve_about(const Fit& fit, const std::vector<ArrowBlock>& blocks,
 
 ArrowSolution solve_at(const VectorXd& nuisance_sd, const Fit& fit, std::vector<ArrowBlock>& blocks,
                        const CurveColumns& curve, std::optional<std::vector<Index>> covariance_of) {
-  const VectorXd precision = local_precision_of(fit.layout, {.nuisance_sd = nuisance_sd, .curve = {}});
+  const VectorXd precision = local_precision_of(fit.layout, {.nuisance_sd = nuisance_sd, .curves = {}});
   for (ArrowBlock& block : blocks) block.precision = precision;
   return solve_about(fit, blocks, curve, std::move(covariance_of));
 }

@@ -2,7 +2,7 @@
 // The likelihood of readings under a set of effects, a discrepancy and autocorrelated noise, and its mode.
 //
 //   y_r = h(shared, local_r) + C_r c + e_r        e_r ~ noise;  local_r: nuisances ~ N(0, sd^2), phases, instants
-//                                                 c ~ N(0, K): the discrepancy, one curve
+//                                                 c ~ N(0, K): the discrepancy, a sum of curves
 //
 // Solution: Gauss-Newton with Levenberg's damping on the arrow-shaped normal equations, bounds by an active set.
 #include <memory>
@@ -27,8 +27,8 @@ Eigen::MatrixXd correlation_of(const Curve& curve, double length);
 
 // What is held while the mode is sought.
 struct Scales {
-  Eigen::VectorXd nuisance_sd;  // per group; 0: the recordings do not differ
-  std::optional<CurvePrior> curve;
+  Eigen::VectorXd nuisance_sd;     // per group; 0: the recordings do not differ
+  std::vector<CurvePrior> curves;  // of the discrepancy; empty: none
 };
 
 struct Residuals {
@@ -87,7 +87,7 @@ struct Fit {
   Scales scales;
   Eigen::VectorXd shared;
   std::vector<Eigen::VectorXd> local;
-  Eigen::VectorXd curve_values;                  // in the component's unit; empty: no curve
+  Eigen::VectorXd curve_values;                  // of all curves, in their components' units; empty: no curve
   std::shared_ptr<const Likelihood> likelihood;  // by whose noise it was fitted
   double cost = 0;                               // squared whitened residuals and priors' pulls
   std::vector<Eigen::Index> held;                // shared unknowns that press against a bound
@@ -103,7 +103,8 @@ struct FitRules {
   double tolerance = 0.02;  // of the cost
 };
 
-// Curves' columns, whitened, per recording: rows x values; the values' prior covariance is `covariance`.
+// Columns of one curve or of several side by side, whitened, per recording: rows x values; the values' prior covariance
+// is `covariance`, zero between curves.
 struct CurveColumns {
   std::vector<Eigen::MatrixXd> columns;
   std::vector<Eigen::MatrixXd> raw;  // the same, not whitened

@@ -73,12 +73,12 @@ Posterior posterior_of(const Search& search, double visible_sigmas) {
 }
 
 CurveColumns curve_of(const Search& search, const Fit& fit) {
-  return fit.scales.curve ? search.discrepancy().columns(*fit.likelihood, *fit.scales.curve) : CurveColumns{};
+  return search.discrepancy().columns(*fit.likelihood, fit.scales.curves);
 }
 
 const VectorXd& nuisance_weights_of(const Search& search, const Fit& fit) {
   const Evaluated& at = *search.visited().at(fit.layout.set()).at;
-  return fit.scales.curve ? at.nuisance_weights_with_curve : at.nuisance_weights;
+  return fit.scales.curves.empty() ? at.nuisance_weights : at.nuisance_weights_with_curve;
 }
 
 double Mixture::mean() const {

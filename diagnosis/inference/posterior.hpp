@@ -29,7 +29,7 @@ Posterior posterior_of(const Search& search, double visible_sigmas);
 // take their place, in standard deviations of the autocorrelated noise, root of the sum of squares over all readings.
 double visible_sigmas_of_curve(const Search& search, const Fit& fit);
 
-// The curve of a fit with one, whitened by the fit's own noise; none for a fit without.
+// The curves of a fit with some, whitened by the fit's own noise; none for a fit without.
 CurveColumns curve_of(const Search& search, const Fit& fit);
 // Over the grid of the nuisances' standard deviations, of a fit of one of the sets that were visited.
 const Eigen::VectorXd& nuisance_weights_of(const Search& search, const Fit& fit);

@@ -18,12 +18,14 @@ using Eigen::VectorXd;
 
 namespace {
 
-constexpr double kLikely = 1e-4;  // share of a combination of standard deviations, given all recordings
-constexpr double kShare = 1e-3;   // and given the others
-constexpr double kHeld = 1e18;    // precision of what is taken as it stands
+constexpr double kLikely = 1e-4;      // share of a combination of standard deviations, given all recordings
+constexpr double kShare = 1e-3;       // and given the others
+constexpr double kHeld = 1e18;        // precision of what is taken as it stands
+constexpr double kNeverWider = 1e-3;  // taken as the widest where none differs at all
+constexpr double kNone = 1e-5;        // standard deviation of what is none, as a share of the widest of its group
 constexpr double kTogether_s = 1e-9;
 
-// Unknowns: shared, the curve's values, the recording's own.
+// Unknowns: shared, the curves' values, the nuisances' mean if it is one, the recording's own.
 struct Belief {
   VectorXd mean;
   MatrixXd precision;
@@ -70,32 +72,61 @@ struct FromOthers {
   ArrowSolution shared;
   VectorXd own_precision;
   double log_evidence = 0;  // of the others and this combination; one constant for all is left out
+  Index spread = 0;         // which combination
 };
 
+// Beside the priors of what is shared, that of the mean of the nuisances: where it is no unknown, nothing.
+Pulls pulls_with_mean(const Pulls& pulls, const VectorXd& mean) {
+  const Index n = pulls.centre.size(), all = n + mean.size();
+  Pulls out{.precision = MatrixXd::Zero(all, all), .centre = VectorXd(all)};
+  out.precision.topLeftCorner(n, n) = pulls.precision;
+  out.centre << pulls.centre, -mean;
+  return out;
+}
+// The widest standard deviation that is tried for each nuisance.
+VectorXd widest_of(const System& system) {
+  VectorXd out(static_cast<Index>(system.nuisances().size()));
+  for (std::size_t i = 0; i < system.nuisances().size(); ++i) {
+    const auto& values = system.nuisance_groups()[system.nuisances()[i].group].standard_deviations;
+    out[static_cast<Index>(i)] = std::max(*std::max_element(values.begin(), values.end()), kNeverWider);
+  }
+  return out;
+}
+
+// recording: past the last, all are others.
 std::vector<FromOthers> from_others(LinearModel& model, const CurveColumns& curve, const NuisanceGrid& spreads,
-                                    std::size_t recording) {
+                                    std::size_t recording, double share = kShare) {
   const Fit& fit = *model.fit;
-  const Pulls pulls = pulls_of(fit.layout, fit.shared, fit.curve_values, curve.covariance);
+  Pulls pulls = pulls_with_mean(pulls_of(fit.layout, fit.shared, fit.curve_values, curve.covariance), model.mean);
   const auto free = free_locals(fit.layout);
+  // None is no more precise than need be: where the mode is elsewhere, the least square is a difference of such
+  // numbers.
+  const VectorXd widest = widest_of(fit.layout.system());
+  const Eigen::ArrayXd none = (kNone * widest.array()).square().inverse(), some = widest.array().square().inverse();
   ArrowRules rules{.held = fit.held, .covariance_of = std::vector<Index>{}};
   rules.used.assign(model.blocks.size(), true);
-  rules.used[recording] = false;
+  if (recording < model.blocks.size()) rules.used[recording] = false;
   std::vector<FromOthers> out;
   double most = -std::numeric_limits<double>::infinity();
   for (Index k = 0; k < spreads.log_prior.size(); ++k) {
     Scales scales = fit.scales;
     scales.nuisance_sd = spreads.standard_deviations.col(k);
     FromOthers one{.shared = {}, .own_precision = local_precision_of(fit.layout, scales)};
+    auto own = one.own_precision.head(widest.size()).array();  // nuisances come first, and none of them is an instant
+    own = own.min(none);
+    if (model.mean.size() > 0)
+      pulls.precision.diagonal().tail(widest.size()) = (own < none).select(some, none).matrix();
     for (ArrowBlock& block : model.blocks) block.precision = one.own_precision;
     one.shared = solve(model.blocks, pulls.precision, pulls.centre, rules);
     if (!one.shared.valid) continue;
     one.log_evidence = spreads.log_prior[k] - 0.5 * (one.shared.least + one.shared.log_volume_ratio);
     for (std::size_t i = 0; i < free.size(); ++i)
       if (fit.layout.is_scanned(static_cast<std::size_t>(free[i]))) one.own_precision[static_cast<Index>(i)] = kHeld;
+    one.spread = k;
     most = std::max(most, one.log_evidence);
     out.push_back(std::move(one));
   }
-  std::erase_if(out, [&](const FromOthers& one) { return one.log_evidence < most + std::log(kShare); });
+  std::erase_if(out, [&](const FromOthers& one) { return one.log_evidence < most + std::log(share); });
   return out;
 }
 
@@ -136,18 +167,19 @@ class Mixed {
   Forecast forecast_;
 };
 
-// The recording about a mode: shared unknowns, the curve's values, its own.
+// The recording about a mode: shared unknowns, the curves' values, the nuisances' mean if it is one, its own.
 struct Place {
   MatrixXd A;       // whitened
   VectorXd w, own;  // own: its own unknowns there, as steps from their mean
 };
-std::optional<Place> look(const Fit& fit, const CurveColumns& curve, std::size_t recording) {
+std::optional<Place> look(const Fit& fit, const CurveColumns& curve, std::size_t recording, const VectorXd& mean) {
   LinearRecording linear;
   if (!linearise(*fit.likelihood, fit, curve, recording, linear)) return std::nullopt;
-  Place out{.A = MatrixXd(linear.Z.rows(), linear.Z.cols() + linear.L.cols()),
+  Place out{.A = MatrixXd(linear.Z.rows(), linear.Z.cols() + mean.size() + linear.L.cols()),
             .w = linear.residuals.white,
             .own = -nuisance_centre(fit.layout, fit.local[recording])};
-  out.A << linear.Z, linear.L;
+  out.own.head(mean.size()) -= mean;  // nuisances come first, and none of them is an instant
+  out.A << linear.Z, linear.L.leftCols(mean.size()), linear.L;
   return out;
 }
 
@@ -206,6 +238,41 @@ double continued_from(const std::vector<FromOthers>& others, const RecordingRows
 
 }  // namespace
 
+LinearModel with_mean(LinearModel model, std::size_t recording) {
+  const Fit& fit = *model.fit;
+  const auto n = static_cast<Index>(fit.layout.system().nuisances().size());
+  model.mean = VectorXd::Zero(n);
+  double count = 0;
+  for (std::size_t r = 0; r < fit.local.size(); ++r)
+    if (r != recording) model.mean += fit.local[r].head(n), ++count;
+  model.mean /= std::max(count, 1.0);
+  for (ArrowBlock& block : model.blocks) {
+    const Index shared = block.zz.rows(), all = shared + n;
+    MatrixXd zz(all, all), lz(block.ll.rows(), all);
+    zz << block.zz, block.lz.topRows(n).transpose(), block.lz.topRows(n), block.ll.topLeftCorner(n, n);
+    lz << block.lz, block.ll.leftCols(n);
+    VectorXd zw(all);
+    zw << block.zw, block.lw.head(n);
+    block.zz = std::move(zz), block.lz = std::move(lz), block.zw = std::move(zw);
+    block.centre.head(n) += model.mean;
+  }
+  return model;
+}
+
+VectorXd spread_weights(LinearModel model, const CurveColumns& curve, const NuisanceGrid& grid) {
+  const std::size_t none = model.blocks.size();
+  const auto all = from_others(model, curve, grid, none, 0.1 * kLikely);
+  const double total = log_evidence_of(all);
+  VectorXd out = VectorXd::Zero(grid.log_prior.size());
+  for (const FromOthers& one : all) out[one.spread] = std::exp(one.log_evidence - total);
+  return out;
+}
+
+double log_evidence_of_others(LinearModel model, const CurveColumns& curve, const NuisanceGrid& spreads,
+                              std::size_t recording) {
+  return log_evidence_of(from_others(model, curve, spreads, recording));
+}
+
 NuisanceGrid likely_part(const NuisanceGrid& grid, const VectorXd& weights) {
   std::vector<Index> columns;
   for (Index k = 0; k < weights.size(); ++k)
@@ -263,18 +330,20 @@ std::optional<Forecasts> forecast(LinearModel others, LinearModel begun, const C
   const RecordingRows rows(*others.fit->likelihood, recording, until_s);
   // About its own unknowns' mean.
   Fit mean = *others.fit;
-  for (const Index i : free_locals(mean.layout))
-    if (!mean.layout.is_scanned(static_cast<std::size_t>(i))) mean.local[recording][i] = 0;
-  const auto place = look(mean, curve, recording);
+  const auto nuisances = static_cast<Index>(mean.layout.system().nuisances().size());
+  mean.local[recording].head(nuisances).setZero();
+  mean.local[recording].head(others.mean.size()) += others.mean;
+  const auto place = look(mean, curve, recording, others.mean);
   const auto before = from_others(others, curve, spreads, recording);
   if (before.empty() || !place) return std::nullopt;
   Forecasts out;
   as_new(before, rows, *place, out);
+  out.log_others = log_evidence_of(before);
   if (rows.first().empty() || rows.rest().empty()) return out;
-  const auto there = look(*begun.fit, curve, recording);
+  const auto there = look(*begun.fit, curve, recording, begun.mean);
   const auto beside = from_others(begun, curve, spreads, recording);
   if (beside.empty() || !there) return std::nullopt;
-  out.log_density_first = continued_from(beside, rows, *there, out.continued) - log_evidence_of(before);
+  out.log_density_first = continued_from(beside, rows, *there, out.continued) - out.log_others;
   return out;
 }
 

@@ -94,11 +94,12 @@ Search::Job Search::job_from(const Fit& fit, std::size_t effect, const StartPoin
 
 Visited Search::weighed(const ModelSet& set, const std::shared_ptr<const Evaluated>& at) const {
   Visited one{.set = set, .at = at};
-  const double curve = std::exp(rules_.log_prior_odds_curve);
-  one.log_without_curve = log_prior(set) + at->log_evidence - std::log1p(curve);
-  one.log_with_curve = at->with_discrepancy
-                           ? one.log_without_curve + rules_.log_prior_odds_curve + at->log_bayes_factor_curve
-                           : -std::numeric_limits<double>::infinity();
+  const double odds = rules_.curves.log_prior_odds;
+  double share = 0;  // of no curve, against any number
+  for (std::size_t n = 0; n <= rules_.curves.most; ++n) share += std::exp(odds * static_cast<double>(n));
+  one.log_without_curve = log_prior(set) + at->log_evidence - std::log(share);
+  one.log_with_curve = at->with_discrepancy ? one.log_without_curve + odds + at->log_bayes_factor_curve
+                                            : -std::numeric_limits<double>::infinity();
   return one;
 }
 
@@ -119,7 +120,7 @@ void Search::evaluate_all(std::vector<Job> jobs) {
     auto one = evaluate(*likelihood_, job.layout, job.shared, job.local, job.nuisance_sd,
                         best - rules_.window - rules_.doubt - log_prior(job.set));
     if (one.valid && (job.beside_curve || log_prior(job.set) + one.log_evidence > best - rules_.curve_window))
-      add_discrepancy(*likelihood_, *discrepancy_, one);
+      add_discrepancy(*likelihood_, *discrepancy_, rules_.curves, one);
     results[i] = std::make_shared<const Evaluated>(std::move(one));
   });
   for (std::size_t i = 0; i < jobs.size(); ++i)
@@ -164,7 +165,7 @@ void Search::expand(const ModelSet& set) {
     };
     if (here.at->fit_with_curve && here.log_with_curve > here.log_without_curve) {
       const auto [beside_curve, more] = moved_to(likelihood_, *here.at->fit_with_curve, *discrepancy_);
-      const CurveColumns curve = discrepancy_->columns(*likelihood_, *beside_curve.scales.curve);
+      const CurveColumns curve = discrepancy_->columns(*likelihood_, beside_curve.scales.curves);
       add(beside_curve, proposals_->beside(Marginal(*likelihood_, beside_curve, curve), rules_.starts),
           here.log_with_curve + more, Beside::curve);
     }
@@ -218,7 +219,7 @@ void Search::run(const Readings& outliers, const Noise& noise, const Progress& p
     Evaluated base = evaluate(*likelihood_, nothing, shared, local, nuisance_sd);
     if (!base.valid) throw std::domain_error("the model cannot follow the recordings");
     discrepancy_ = std::make_unique<const Discrepancy>(*likelihood_, base.fit);
-    add_discrepancy(*likelihood_, *discrepancy_, base);
+    add_discrepancy(*likelihood_, *discrepancy_, rules_.curves, base);
     shared = base.fit.shared, local = base.fit.local, nuisance_sd = base.fit.scales.nuisance_sd;
     if (round == 0) {
       // A curve takes up most of what is missing: the noise beside it is nearer to the truth.
@@ -275,7 +276,7 @@ void Search::look_around() {
     const auto at = visited_.at(set).at;
     if (!at->with_discrepancy) {
       auto with = std::make_shared<Evaluated>(*at);
-      add_discrepancy(*likelihood_, *discrepancy_, *with);
+      add_discrepancy(*likelihood_, *discrepancy_, rules_.curves, *with);
       keep(set, with);
     }
     expand(set);

@@ -23,7 +23,7 @@ struct SearchRules {
   std::size_t pairs = 8;
   std::size_t most_fits = 90;           // in all
   double log_prior_odds_effect = -5.0;  // of one effect being in the model, against not
-  double log_prior_odds_curve = -4.0;   // of a discrepancy
+  CurveRules curves{};                  // of a discrepancy
   std::size_t rounds = 3;
   int threads = 2;
 };

@@ -18,8 +18,7 @@ Checks check_model(const inference::Search& search, const ChosenModel& model, co
   Checks out;
   const inference::Fit& fit = *model.fit;
   const inference::Likelihood by_measured(search.system(), outliers, measured);
-  const auto curve =
-      model.curve ? search.discrepancy().columns(by_measured, *fit.scales.curve) : inference::CurveColumns{};
+  const auto curve = search.discrepancy().columns(by_measured, fit.scales.curves);
   inference::Residuals residuals;
   double chi2 = 0, count = 0, smallest_p = 1;
   int series_count = 0;

@@ -20,11 +20,13 @@ std::set<std::string> names_of(const Search& search, const ModelSet& set) {
 
 }  // namespace
 
-DiscrepancyValues ChosenModel::discrepancy() const { return {fit->scales.curve->curve, fit->curve_values}; }
-
 ChosenModel model_of(const Search& search, const Fit& fit, double log_posterior) {
   ChosenModel out{.fit = &fit, .curve = curve_of(search, fit), .blocks = {}, .log_posterior = log_posterior};
   out.blocks = linearise(*fit.likelihood, fit, out.curve);
+  const auto& curves = fit.scales.curves;
+  const auto at = search.discrepancy().places(curves);
+  for (std::size_t i = 0; i < curves.size(); ++i)
+    out.discrepancy.push_back({curves[i].curve, fit.curve_values.segment(at[i], at[i + 1] - at[i])});
   return out;
 }
 
@@ -69,7 +71,7 @@ Fit refitted_base(const Search& search, const Fit& like) {
   const inference::Layout nothing(search.system(), {});
   const Fit& base = search.visited().at({}).at->fit;
   Fit out =
-      fit(*like.likelihood, nothing, base.shared, base.local, {.nuisance_sd = like.scales.nuisance_sd, .curve = {}});
+      fit(*like.likelihood, nothing, base.shared, base.local, {.nuisance_sd = like.scales.nuisance_sd, .curves = {}});
   out.likelihood = like.likelihood;
   return out;
 }

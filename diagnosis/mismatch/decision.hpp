@@ -21,7 +21,7 @@ struct ChosenModel {
   inference::CurveColumns curve;
   std::vector<inference::ArrowBlock> blocks;
   double log_posterior = 0;
-  DiscrepancyValues discrepancy() const;  // where fit->scales.curve says so
+  std::vector<DiscrepancyValues> discrepancy{};  // its curves; empty: none
 };
 
 struct Decision {

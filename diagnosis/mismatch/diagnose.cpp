@@ -140,14 +140,12 @@ std::optional<NextExperiment> next_experiment(const inference::Search& search, c
   const auto& chosen = decision.model.fit->layout.set();
   if (decision.verdict == Verdict::unknown_effect) {
     // Against the likeliest explanation without a discrepancy, or the needle alone.
-    const DiscrepancyValues curve = decision.model.discrepancy();
     for (const auto& share : posterior.sets)
       if (!share.set.empty() && share.set != chosen) {
         const auto& fit = search.visited().at(share.set).at->fit;
-        return experiments.best(imagined(*decision.model.fit, decision.model, &curve),
-                                imagined(fit, model_of(search, fit, 0)));
+        return experiments.best(imagined(*decision.model.fit, decision.model), imagined(fit, model_of(search, fit, 0)));
       }
-    return experiments.best(imagined(*decision.model.fit, decision.model, &curve), imagined(*base.fit, base));
+    return experiments.best(imagined(*decision.model.fit, decision.model), imagined(*base.fit, base));
   }
   for (const auto& share : posterior.sets) {
     if (share.set == chosen) continue;

@@ -168,7 +168,7 @@ double Experiments::separation(std::size_t script, const Imagined& truth, const 
 NextExperiment Experiments::best(const Imagined& truth, const Imagined& rival) const {
   NextExperiment out;
   out.separates = {describe(system_, truth.set), describe(system_, rival.set)};
-  if (truth.discrepancy) out.separates[0] = "a discrepancy beside " + out.separates[0];
+  if (!truth.discrepancy.empty()) out.separates[0] = "a discrepancy beside " + out.separates[0];
   out.expected_gain = -1;
   for (std::size_t s = 0; s < scripts_.size(); ++s)
     if (const double gain = separation(s, truth, rival); gain > out.expected_gain)
@@ -176,8 +176,9 @@ NextExperiment Experiments::best(const Imagined& truth, const Imagined& rival) c
   return out;
 }
 
-Imagined imagined(const inference::Fit& fit, const ChosenModel& model, const DiscrepancyValues* discrepancy) {
-  Imagined out{.set = fit.layout.set(), .shared = fit.shared, .local = fit.local.front(), .discrepancy = discrepancy};
+Imagined imagined(const inference::Fit& fit, const ChosenModel& model) {
+  Imagined out{
+      .set = fit.layout.set(), .shared = fit.shared, .local = fit.local.front(), .discrepancy = model.discrepancy};
   for (std::size_t i = 0; i < fit.layout.local().size(); ++i)
     if (!fit.layout.is_scanned(i)) out.local[static_cast<Index>(i)] = 0;
   out.information = solve_about(fit, model.blocks, model.curve).information;

@@ -16,11 +16,11 @@ std::vector<MotionScript> motion_scripts(double depth_mm, double frame_s);
 struct Imagined {
   inference::ModelSet set;
   Eigen::VectorXd shared, local;
-  const DiscrepancyValues* discrepancy = nullptr;
+  std::vector<DiscrepancyValues> discrepancy{};
   Eigen::MatrixXd information{};      // of the shared unknowns, from what is recorded already
   Eigen::VectorXd local_precision{};  // of what differs between insertions
 };
-Imagined imagined(const inference::Fit& fit, const ChosenModel& model, const DiscrepancyValues* discrepancy = nullptr);
+Imagined imagined(const inference::Fit& fit, const ChosenModel& model);
 
 class Experiments {
  public:

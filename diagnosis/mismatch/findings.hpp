@@ -125,15 +125,16 @@ struct DetectableSize {
   std::string experiment;  // motion that would show it, if this size is above typical
 };
 
-// What remains unexplained, described: which quantity of the motion is off by how much, against what.
+// What remains unexplained, described: which quantity of the motion is off by how much, against what. Several add up.
 struct Discrepancy {
   model::DiscrepancyCurve curve;
-  double log_bayes_factor = 0;   // natural, against none
+  double log_bayes_factor = 0;   // natural: of the first against none, of the next against those before it alone
   double visible_size = 0;       // root mean square over the readings, in standard deviations of the noise
   double moved_at_depth_mm = 0;  // as of an effect
 };
 
-// The simplest equation that does for a discrepancy what its curve does: a proposal for an effect, not a cause.
+// The simplest equation that does for one of the discrepancies what its curve does, beside the others: a proposal for
+// an effect, not a cause.
 struct ProposedForm {
   model::DiscrepancyComponent component = model::DiscrepancyComponent::curvature_bevel;
   model::Covariate covariate = model::Covariate::depth_mm;
@@ -146,6 +147,7 @@ struct ProposedForm {
   double low = 0, range = 0;                        // of the covariate in the recordings: inference/forms.hpp
   bool periodic = false;                            // the covariate is an angle, s a share of its circle
   std::vector<double> shapes{};                     // those that were tried
+  std::size_t discrepancy = 0;                      // which of Findings::discrepancies it stands for
 };
 
 // How much insertions differ: the standard deviation of one quantity between them.
@@ -241,7 +243,7 @@ struct Findings {
   std::vector<TriedEffect> beside;  // beside what was found, best first
   std::vector<DetectableSize> detectable;
   std::vector<Discrepancy> discrepancies;  // unknown-effect only
-  std::vector<ProposedForm> proposals;     // beside it, the likeliest first
+  std::vector<ProposedForm> proposals;     // of each discrepancy in turn, the likeliest first
   std::optional<NextExperiment> next_experiment;
   std::optional<SteeredToTargets> steered;  // by whoever has a controller: diagnose() leaves it empty
   std::string not_steered;                  // why, in a clause, where something found might matter to steering

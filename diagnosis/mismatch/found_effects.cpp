@@ -82,8 +82,8 @@ std::vector<std::string> rivals_of(const Search& search, const ModelSet& set, st
   return {names.begin(), names.end()};
 }
 
-// Borrows `discrepancy`, which may be null.
-ModelledTip tip_of(const ChosenModel& model, const DiscrepancyValues* discrepancy) {
+// Borrows `discrepancy`.
+ModelledTip tip_of(const ChosenModel& model, std::span<const DiscrepancyValues> discrepancy) {
   const Fit& fit = *model.fit;
   return {.layout = &fit.layout, .shared = &fit.shared, .local = &fit.local, .discrepancy = discrepancy};
 }
@@ -97,8 +97,7 @@ std::vector<FoundEffect> found_effects(const NeedleSystem& system, const Search&
   const Fit& fit = *model.fit;
   const ModelSet& set = fit.layout.set();
   const auto solution = solve_about(fit, model.blocks, model.curve);
-  const auto discrepancy = fit.scales.curve ? model.discrepancy() : DiscrepancyValues{};
-  const ModelledTip tip = tip_of(model, fit.scales.curve ? &discrepancy : nullptr);
+  const ModelledTip tip = tip_of(model, model.discrepancy);
   for (std::size_t m = 0; m < set.size(); ++m) {
     const inference::Effect& effect = system.effects()[set[m]];
     FoundEffect found{.name = effect.name,
@@ -217,17 +216,25 @@ std::vector<InsertionValues> insertions_of(const NeedleSystem& system, const Sea
 
 std::vector<Discrepancy> discrepancies_of(const NeedleSystem& system, const Search& search, const ChosenModel& model) {
   const Fit& fit = *model.fit;
-  if (!fit.scales.curve) return {};
+  std::vector<Discrepancy> out;
+  const auto& curves = fit.scales.curves;
+  if (curves.empty()) return out;
   const MatrixXd covariance = solve_about(fit, model.blocks, model.curve).covariance;
-  std::vector<double> std_errors;
-  for (Index i = 0; i < fit.curve_values.size(); ++i)
-    std_errors.push_back(std::sqrt(std::max(0.0, covariance(fit.shared.size() + i, fit.shared.size() + i))));
-  const DiscrepancyValues values = model.discrepancy();
-  return {{.curve = system.model_curve(fit.scales.curve->curve, {fit.curve_values.begin(), fit.curve_values.end()},
-                                       std::move(std_errors)),
-           .log_bayes_factor = search.visited().at(fit.layout.set()).at->log_bayes_factor_curve,
-           .visible_size = search.discrepancy().visible_size(*fit.scales.curve, fit.curve_values),
-           .moved_at_depth_mm = apart_at_depth_mm(system, tip_of(model, &values), tip_of(model, nullptr))}};
+  const auto at = search.discrepancy().places(curves);
+  for (std::size_t i = 0; i < curves.size(); ++i) {
+    std::vector<double> std_errors;
+    for (Index k = fit.shared.size() + at[i]; k < fit.shared.size() + at[i + 1]; ++k)
+      std_errors.push_back(std::sqrt(std::max(0.0, covariance(k, k))));
+    const auto& [curve, values] = model.discrepancy[i];
+    auto others = model.discrepancy;
+    others.erase(others.begin() + static_cast<std::ptrdiff_t>(i));
+    out.push_back(
+        {.curve = system.model_curve(curve, {values.begin(), values.end()}, std::move(std_errors)),
+         .log_bayes_factor = search.visited().at(fit.layout.set()).at->log_factors[i],
+         .visible_size = search.discrepancy().visible_size(curve, values),
+         .moved_at_depth_mm = apart_at_depth_mm(system, tip_of(model, model.discrepancy), tip_of(model, others))});
+  }
+  return out;
 }
 
 }  // namespace bevel::diagnosis

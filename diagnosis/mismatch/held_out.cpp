@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <map>
 #include <numbers>
 #include <set>
 
@@ -141,8 +142,7 @@ Fit refit_without(const inference::Search& search, const Fit& whole, const Fit& 
       if (series.time_s[i] > until_s) gone.insert(series.message[i]);
   without[r].assign(gone.begin(), gone.end());
   const Likelihood some(all.system(), without, all.noise(), inputs_about(whole));
-  const auto curve =
-      whole.scales.curve ? search.discrepancy().columns(some, *whole.scales.curve) : inference::CurveColumns{};
+  const auto curve = search.discrepancy().columns(some, whole.scales.curves);
   Fit out = inference::fit(some, whole.layout, start.shared, start.local, whole.scales, curve);
   if (!out.valid) out = start;
   return out;
@@ -170,9 +170,10 @@ Sums sums_of(const NeedleSystem& system, const inference::Search& search, Fit fi
   return out;
 }
 
-// By the noise and the variation of the model itself. whole: the fit of all recordings, others: without this one.
+// By the noise and the variation of the model itself, as it would be used. whole: the fit of all recordings, others:
+// without this one; mean_spreads: of insertions that differ about a mean of their own, empty: about zero.
 std::optional<inference::Forecasts> forecast_of(const inference::Search& search, const Fit& whole, Fit others,
-                                                std::size_t r) {
+                                                const inference::NuisanceGrid& mean_spreads, std::size_t r) {
   constexpr double kKnown = 1.0 / 3;
   const double until_s = inference::time_of_share(whole.likelihood->data().recordings[r], kKnown);
   Fit begun = refit_without(search, whole, new_insertion(others, r), r, until_s);
@@ -181,8 +182,24 @@ std::optional<inference::Forecasts> forecast_of(const inference::Search& search,
   auto of_others = linearise(*whole.likelihood, others, curve), of_begun = linearise(*whole.likelihood, begun, curve);
   if (of_others.empty() || of_begun.empty()) return std::nullopt;
   const auto spreads = likely_part(nuisance_grid(search.system()), nuisance_weights_of(search, whole));
-  return inference::forecast({&others, std::move(of_others)}, {&begun, std::move(of_begun)}, curve, spreads, r,
-                             until_s);
+  inference::LinearModel before{&others, std::move(of_others)}, beside{&begun, std::move(of_begun)};
+  if (mean_spreads.log_prior.size() == 0)
+    return inference::forecast(std::move(before), std::move(beside), curve, spreads, r, until_s);
+  const double about_zero = log_evidence_of_others(before, curve, spreads, r);
+  auto out = inference::forecast(with_mean(std::move(before), r), with_mean(std::move(beside), r), curve, mean_spreads,
+                                 r, until_s);
+  if (out) out->log_others -= about_zero;  // by so much more are the others' readings likely
+  return out;
+}
+
+// Standard deviations between insertions that differ about a mean of their own.
+inference::NuisanceGrid mean_spreads_of(const inference::Search& search, const Fit& whole) {
+  const auto curve = curve_of(search, whole);
+  const auto grid = nuisance_grid(search.system());
+  auto blocks = linearise(*whole.likelihood, whole, curve);
+  if (blocks.empty()) return likely_part(grid, nuisance_weights_of(search, whole));
+  const std::size_t none = blocks.size();
+  return likely_part(grid, spread_weights(inference::with_mean({&whole, std::move(blocks)}, none), curve, grid));
 }
 
 // By the model file as it is: nothing is refitted, and it knows of no variation.
@@ -226,6 +243,7 @@ HeldOut hold_out(const NeedleSystem& system, const inference::Search& search, co
   const auto selected = leave_out_selection(search);
   std::vector<Sums> file, before, after, floor;
   InsertionSums predicted_before(system), predicted_after(system);
+  std::map<const Fit*, inference::NuisanceGrid> mean_spreads;
   for (std::size_t r = 0; r < likelihood.recordings(); ++r) {
     const Recording& recording = system.recorded().recordings[r];
     if (system.recorded().two_groups() && !recording.changed) continue;
@@ -254,16 +272,22 @@ HeldOut hold_out(const NeedleSystem& system, const inference::Search& search, co
     };
     std::vector<inference::Forecasts> models;
     std::vector<double> probabilities;
-    if (auto forecast = forecast_of(search, base, alone_refitted, r)) models.push_back(std::move(*forecast));
+    if (auto forecast = forecast_of(search, base, alone_refitted, {}, r)) models.push_back(std::move(*forecast));
     one.predicted_before = note(models, {1}, predicted_before);
     models.clear();
     for (const auto& share : selected[r].shares) {
       const bool likeliest = share.fit == &found;
+      if (!mean_spreads.contains(share.fit)) mean_spreads[share.fit] = mean_spreads_of(search, *share.fit);
       if (auto forecast =
-              forecast_of(search, *share.fit, likeliest ? found_refitted : refit_without(search, *share.fit, r), r)) {
+              forecast_of(search, *share.fit, likeliest ? found_refitted : refit_without(search, *share.fit, r),
+                          mean_spreads[share.fit], r)) {
+        probabilities.push_back(std::log(share.probability) + forecast->log_others);
         models.push_back(std::move(*forecast));
-        probabilities.push_back(share.probability);
       }
+    }
+    if (!probabilities.empty()) {
+      const double most = std::ranges::max(probabilities);
+      for (double& weight : probabilities) weight = std::exp(weight - most);
     }
     one.predicted_after = note(models, probabilities, predicted_after);
     out.recordings.push_back(std::move(one));

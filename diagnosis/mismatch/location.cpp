@@ -58,9 +58,10 @@ Begin begin_of(const NeedleSystem& system, const Fit& fit, std::size_t r) {
 
 model::Covariate covariate_of(const NeedleSystem& system, const Fit& fit) {
   if (!fit.layout.set().empty()) return system.physics(fit.layout.set().front()).covariate();
-  if (fit.scales.curve)
+  if (!fit.scales.curves.empty())  // of the likeliest, if there are several
     for (int i = 0; i <= static_cast<int>(model::Covariate::roll_rad); ++i)
-      if (model::name_of(static_cast<model::Covariate>(i)) == system.curves()[fit.scales.curve->curve].covariate)
+      if (model::name_of(static_cast<model::Covariate>(i)) ==
+          system.curves()[fit.scales.curves.front().curve].covariate)
         return static_cast<model::Covariate>(i);
   return model::Covariate::time_s;
 }
@@ -142,10 +143,9 @@ std::vector<Trace> make_traces(const NeedleSystem& system, const inference::Read
       trace.model_file_mm = path.position_mm;
     const auto predicted = [&](const ChosenModel& model) {
       const Fit& fit = *model.fit;
-      const auto discrepancy = fit.scales.curve ? model.discrepancy() : DiscrepancyValues{};
       model::OpenLoop out;
       if (!system.tip_path(fit.layout.set(), recording.motion, static_cast<int>(r), fit.shared, fit.local[r],
-                           fit.scales.curve ? &discrepancy : nullptr, out))
+                           model.discrepancy, out))
         return nowhere;
       return out.position_mm;
     };

@@ -5,12 +5,12 @@
 
 namespace bevel::diagnosis {
 
-// The needle with a set of effects, their values, and a discrepancy, which may be null. Borrows all of it.
+// The needle with a set of effects, their values, and a discrepancy's curves. Borrows all of it.
 struct ModelledTip {
   const inference::Layout* layout = nullptr;
   const Eigen::VectorXd* shared = nullptr;
   const std::vector<Eigen::VectorXd>* local = nullptr;  // one per recording
-  const DiscrepancyValues* discrepancy = nullptr;
+  std::span<const DiscrepancyValues> discrepancy{};
 };
 
 // How far apart the cameras would see the two tips at the deepest reading of each recording (of two groups: of the

@@ -42,32 +42,39 @@ std::string equation_of(const inference::FormFit& fit, const inference::Curve& c
 std::vector<ProposedForm> propose_forms(const NeedleSystem& system, const inference::Search& search,
                                         const ChosenModel& model) {
   std::vector<ProposedForm> out;
-  if (!model.fit->scales.curve) return out;
-  // About the needle and the effects as they are beside the curve, the curve itself left to the forms.
-  inference::Fit beside = *model.fit;
-  beside.scales.curve.reset();
-  beside.curve_values.resize(0);
-  const inference::Marginal marginal(search.likelihood(), beside, {});
-  const double curves = log_bayes_factor(search.discrepancy().scan(marginal));
-  for (const auto& fit : fit_forms(system, search.discrepancy(), marginal)) {
-    if (out.size() == kProposals) break;
-    const inference::Curve& curve = system.curves()[fit.curve];
-    const model::DiscrepancyCurve model_curve = system.model_curve(fit.curve, {}, {});
-    out.push_back({.component = model_curve.component,
-                   .covariate = model_curve.covariate,
-                   .form = fit.form,
-                   .equation = equation_of(fit, curve),
-                   .amplitude = fit.amplitude,
-                   .amplitude_sd = fit.amplitude_sd,
-                   .shape = fit.shape,
-                   .shape_low = fit.shape_low,
-                   .shape_high = fit.shape_high,
-                   .log_bayes_factor = fit.log_bayes_factor - curves,
-                   .phase_rad = fit.phase_rad,
-                   .low = curve.at.front(),
-                   .range = curve.at.back() - curve.at.front(),
-                   .periodic = curve.periodic,
-                   .shapes = shape_grid(fit.form, curve)});
+  const auto& curves = model.fit->scales.curves;
+  const auto at = search.discrepancy().places(curves);
+  for (std::size_t d = 0; d < curves.size(); ++d) {
+    // About the needle, the effects and the other curves as they are beside this one, which is left to the forms.
+    inference::Fit beside = *model.fit;
+    beside.scales.curves.erase(beside.scales.curves.begin() + static_cast<std::ptrdiff_t>(d));
+    beside.curve_values = Eigen::VectorXd(at.back() - (at[d + 1] - at[d]));
+    beside.curve_values << model.fit->curve_values.head(at[d]), model.fit->curve_values.tail(at.back() - at[d + 1]);
+    const inference::Marginal marginal(search.likelihood(), beside,
+                                       search.discrepancy().columns(search.likelihood(), beside.scales.curves));
+    const double all = log_bayes_factor(search.discrepancy().scan(marginal));
+    std::size_t count = 0;
+    for (const auto& fit : fit_forms(system, search.discrepancy(), marginal)) {
+      if (count++ == kProposals) break;
+      const inference::Curve& curve = system.curves()[fit.curve];
+      const model::DiscrepancyCurve model_curve = system.model_curve(fit.curve, {}, {});
+      out.push_back({.component = model_curve.component,
+                     .covariate = model_curve.covariate,
+                     .form = fit.form,
+                     .equation = equation_of(fit, curve),
+                     .amplitude = fit.amplitude,
+                     .amplitude_sd = fit.amplitude_sd,
+                     .shape = fit.shape,
+                     .shape_low = fit.shape_low,
+                     .shape_high = fit.shape_high,
+                     .log_bayes_factor = fit.log_bayes_factor - all,
+                     .phase_rad = fit.phase_rad,
+                     .low = curve.at.front(),
+                     .range = curve.at.back() - curve.at.front(),
+                     .periodic = curve.periodic,
+                     .shapes = shape_grid(fit.form, curve),
+                     .discrepancy = d});
+    }
   }
   return out;
 }

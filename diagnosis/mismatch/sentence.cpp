@@ -14,10 +14,11 @@ std::string listed(const std::vector<FoundEffect>& effects) {
 
 // What is on no list, and what was named beside it.
 std::string off_with(const Findings& findings) {
-  const model::DiscrepancyCurve& curve = findings.discrepancies.front().curve;
-  return "the " + std::string(info_of(curve.component).meaning) + " is off with " +
-         std::string(model::name_of(curve.covariate)) +
-         (findings.effects.empty() ? "." : ", beside " + listed(findings.effects) + ".");
+  std::string text;
+  for (const Discrepancy& one : findings.discrepancies)
+    text += (text.empty() ? "the " : ", and the ") + std::string(info_of(one.curve.component).meaning) +
+            " is off with " + std::string(model::name_of(one.curve.covariate));
+  return text + (findings.effects.empty() ? "." : ", beside " + listed(findings.effects) + ".");
 }
 
 std::string sentence_on_change(const Findings& findings) {

@@ -35,6 +35,30 @@ bool find_places(const std::vector<const model::Motion*>& motions, Covariate cov
   return true;
 }
 
+class CurveEffect final : public model::ComponentEffect {
+ public:
+  CurveEffect(const NeedleCurve& curve, const Eigen::VectorXd& values)
+      : ComponentEffect(curve.component, {.name = "discrepancy",
+                                          .meaning = "a discrepancy without a name",
+                                          .covariate = curve.covariate,
+                                          .parameters = {}}),
+        at_(curve.curve.at),
+        values_(values.begin(), values.end()),
+        periodic_(curve.curve.periodic) {}
+
+ protected:
+  model::Dual value_at(model::Parameters, double place) const override {
+    const model::KnotWeights weights = model::weights_at(at_, periodic_, place);
+    model::Dual sum;
+    for (std::size_t i = 0; i < 2; ++i) sum.value += weights.weight[i] * values_[weights.knot[i]];
+    return sum;
+  }
+
+ private:
+  std::vector<double> at_, values_;
+  bool periodic_;
+};
+
 }  // namespace
 
 std::vector<NeedleCurve> find_curves(const std::vector<const model::Motion*>& motions) {
@@ -66,6 +90,10 @@ model::DiscrepancyCurve to_model(const NeedleCurve& curve, std::vector<double> v
           .values = std::move(values),
           .std_errors = std::move(std_errors),
           .periodic = curve.curve.periodic};
+}
+
+std::shared_ptr<const model::Effect> make_curve(const NeedleCurve& curve, const Eigen::VectorXd& values) {
+  return std::make_shared<CurveEffect>(curve, values);
 }
 
 std::shared_ptr<const model::Effect> make_curve_part(const NeedleCurve& curve, std::size_t first) {

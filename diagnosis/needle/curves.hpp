@@ -26,6 +26,9 @@ Eigen::VectorXd weights_at(const inference::Curve& curve, double x);
 // The curve with these values, as a model file carries it.
 model::DiscrepancyCurve to_model(const NeedleCurve& curve, std::vector<double> values, std::vector<double> std_errors);
 
+// The curve with these values as an effect, whatever they are: a fit may go beyond what a model file may hold.
+std::shared_ptr<const model::Effect> make_curve(const NeedleCurve& curve, const Eigen::VectorXd& values);
+
 // The value itself as an effect with slope in one dual number: part of the curves' values, [first, first + 4), the rest
 // taken as zero.
 inline constexpr std::size_t kValuesOfPart = model::kKnotsOfPart;

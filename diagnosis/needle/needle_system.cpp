@@ -93,7 +93,7 @@ model::NeedleParameters NeedleSystem::needle_in(const ModelSet& set, int recordi
 }
 
 bool NeedleSystem::follow(const ModelSet& set, const model::Motion& motion, int recording, const VectorXd& shared,
-                          const VectorXd& local, const DiscrepancyValues* discrepancy, Columns* columns,
+                          const VectorXd& local, std::span<const DiscrepancyValues> discrepancy, Columns* columns,
                           model::OpenLoop& path) const {
   // Columns: the needle's three, tilt and roll, then the effects' in the order of the set.
   int column = kBaseParameters;
@@ -129,16 +129,12 @@ bool NeedleSystem::follow(const ModelSet& set, const model::Motion& motion, int 
     effects.push_back(active);
   }
   effects.insert(effects.end(), known(recording).begin(), known(recording).end());
-  if (discrepancy && acts) {
-    for (std::size_t part = 0; part < parts_of_curve_; ++part) {
-      model::ActiveEffect active;
-      active.effect = curve_physics_[discrepancy->curve * parts_of_curve_ + part].get();
-      for (std::size_t p = 0; p < kValuesOfPart; ++p)
-        if (const auto i = static_cast<Index>(part * kValuesOfPart + p); i < discrepancy->values.size())
-          active.parameters[p] = discrepancy->values[i];
-      effects.push_back(active);
+  if (acts)
+    for (const DiscrepancyValues& one : discrepancy) {
+      model::ActiveEffect& active = effects.emplace_back();
+      active.owned = make_curve(needle_curves_[one.curve], one.values);
+      active.effect = active.owned.get();
     }
-  }
   const model::AugmentedNeedle augmented(
       needle_in(set, recording, shared, local), std::move(effects), columns ? column : 0,
       columns ? model::NeedleColumns{.curvature = 0, .lambda1 = 1, .lambda2 = 2, .wheelbase = -1}
@@ -147,7 +143,8 @@ bool NeedleSystem::follow(const ModelSet& set, const model::Motion& motion, int 
 }
 
 bool NeedleSystem::tip_path(const ModelSet& set, const model::Motion& motion, int recording, const VectorXd& shared,
-                            const VectorXd& local, const DiscrepancyValues* discrepancy, model::OpenLoop& out) const {
+                            const VectorXd& local, std::span<const DiscrepancyValues> discrepancy,
+                            model::OpenLoop& out) const {
   if (!follow(set, motion, recording, shared, local, discrepancy, nullptr, out)) return false;
   for (auto& position : out.position_mm) position.head<2>() += local.segment<2>(kEntryX);
   if (common_at_mm_.empty()) return true;
@@ -170,7 +167,7 @@ bool NeedleSystem::predict(const ModelSet& set, std::size_t r, const VectorXd& s
                            bool derivatives, inference::Prediction& out) const {
   thread_local model::OpenLoop path;
   Columns columns;
-  if (!follow(set, recorded_.recordings[r].motion, static_cast<int>(r), shared, local, nullptr,
+  if (!follow(set, recorded_.recordings[r].motion, static_cast<int>(r), shared, local, {},
               derivatives ? &columns : nullptr, path))
     return false;
   out.reading = rows_of(r, path, false);
@@ -220,9 +217,9 @@ VectorXd NeedleSystem::by_inputs(const ModelSet& set, std::size_t r, const Vecto
     for (std::size_t i = 1; i < motion.nodes.size(); ++i) motion.nodes[i].insertion_mm += by_mm;
   };
   shift(kBase_mm);
-  const bool one = follow(set, motion, static_cast<int>(r), shared, local, nullptr, nullptr, ahead);
+  const bool one = follow(set, motion, static_cast<int>(r), shared, local, {}, nullptr, ahead);
   shift(-2 * kBase_mm);
-  if (!one || !follow(set, motion, static_cast<int>(r), shared, local, nullptr, nullptr, behind)) return {};
+  if (!one || !follow(set, motion, static_cast<int>(r), shared, local, {}, nullptr, behind)) return {};
   return 0.5 * (rows_of(r, ahead, false) - rows_of(r, behind, false)).cwiseAbs();
 }
 

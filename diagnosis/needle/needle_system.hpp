@@ -6,6 +6,8 @@
 // Where the recordings are of two groups, the question is what changed: effects, discrepancy and changes of the
 // needle's own parameters act in the second group alone, and what the model gets wrong in both groups alike is no
 // matter: each channel's error against depth, common to all recordings, is among the shared parameters.
+#include <span>
+
 #include "diagnosis/inference/system.hpp"
 #include "diagnosis/needle/curves.hpp"
 #include "diagnosis/needle/recorded_case.hpp"
@@ -67,10 +69,10 @@ class NeedleSystem final : public inference::System {
     return to_model(needle_curves_[curve], std::move(values), std::move(std_errors));
   }
   // Positions of the tip at the readings of any motion, in {A}, mm, and headings where some are measured; unknowns as
-  // for predict. discrepancy may be null. recording: whose motion it is, or -1: of the second group, if there are two.
+  // for predict. recording: whose motion it is, or -1: of the second group, if there are two.
   bool tip_path(const inference::ModelSet& set, const model::Motion& motion, int recording,
-                const Eigen::VectorXd& shared, const Eigen::VectorXd& local, const DiscrepancyValues* discrepancy,
-                model::OpenLoop& out) const;
+                const Eigen::VectorXd& shared, const Eigen::VectorXd& local,
+                std::span<const DiscrepancyValues> discrepancy, model::OpenLoop& out) const;
 
  private:
   // Which columns of a path's Jacobian are the members' shared unknowns, and which their own in the recording. kNone:
@@ -80,7 +82,7 @@ class NeedleSystem final : public inference::System {
     std::vector<Eigen::Index> shared, local;
   };
   bool follow(const inference::ModelSet& set, const model::Motion& motion, int recording, const Eigen::VectorXd& shared,
-              const Eigen::VectorXd& local, const DiscrepancyValues* discrepancy, Columns* columns,
+              const Eigen::VectorXd& local, std::span<const DiscrepancyValues> discrepancy, Columns* columns,
               model::OpenLoop& path) const;
   Eigen::MatrixXd rows_of(std::size_t recording, const model::OpenLoop& path, bool derivatives) const;
   // Whether effects and discrepancy act in it.
@@ -105,7 +107,6 @@ class NeedleSystem final : public inference::System {
   std::vector<NeedleCurve> needle_curves_;
   std::vector<inference::Curve> curves_;
   std::vector<std::shared_ptr<const model::Effect>> curve_physics_;  // parts of the curves, in their order
-  std::size_t parts_of_curve_ = 0;
   bool two_groups_, headings_;
   std::vector<double> common_at_mm_;             // depths at which each channel has a common error; none: no groups
   std::vector<Eigen::MatrixXd> common_columns_;  // of each recording

@@ -25,7 +25,7 @@ constexpr double kSmallestU = 1e-9;      // (26) is strict
 constexpr double kExpectedShare = 0.75;  // scale of a size's prior, of the largest that is reported
 constexpr double kFewestReadings = 2.5;  // a period
 constexpr double kFewestPeriods = 1.5;   // of the longest recording
-constexpr std::size_t kMostKnown = 2;    // beside the variation, three effects and the parts of a curve: kMaxEffects
+constexpr std::size_t kMostKnown = 2;    // beside the variation, three effects and two curves: kMaxEffects
 
 // By how much a parameter of the needle changed from one group of recordings to the other; NeedleSystem::needle_in
 // knows what it does.
@@ -182,7 +182,6 @@ NeedleSystem::NeedleSystem(RecordedCase recorded, const model::NeedleParameters&
     std::erase_if(needle_curves_, [](const NeedleCurve& curve) { return model::needs_clock(curve.covariate); });
   for (const NeedleCurve& curve : needle_curves_) {
     curves_.push_back(curve.curve);
-    parts_of_curve_ = (curve.curve.at.size() + kValuesOfPart - 1) / kValuesOfPart;
     for (std::size_t first = 0; first < curve.curve.at.size(); first += kValuesOfPart)
       curve_physics_.push_back(make_curve_part(curve, first));
   }

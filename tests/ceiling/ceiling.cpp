@@ -48,7 +48,7 @@ std::vector<Explanation> explanations_of(const Search& search) {
     out.push_back({names, label, one.log_without_curve, &one, false});
     if (!std::isfinite(one.log_with_curve)) continue;
     const auto& fit = one.at->fit_with_curve;
-    if (fit && search.discrepancy().visible_size(*fit->scales.curve, fit->curve_values) > diagnosis::kDiscrepancySize) {
+    if (fit && inference::visible_sigmas_of_curve(search, *fit) > diagnosis::kVisibleSigmas) {
       names.push_back("unknown");
       std::ranges::sort(names);
     }
@@ -203,7 +203,7 @@ json compare(const fs::path& folder, const json& campaign, const json& score, in
   const auto calibration = inference::calibrate(needle);
   Search search(needle, {.threads = threads});
   search.run(calibration.outliers, calibration.noise);
-  const auto posterior = inference::posterior_of(search, diagnosis::kDiscrepancySize);
+  const auto posterior = inference::posterior_of(search, diagnosis::kVisibleSigmas);
   const auto decision = diagnosis::decide(search, posterior);
   Answer said;
   for (const std::size_t e : decision.model.fit->layout.set()) said.push_back(needle.effects()[e].name);

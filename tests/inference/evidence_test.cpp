@@ -1,6 +1,8 @@
 // The evidence against closed forms: of a model linear in everything it is a normal density of all readings together.
 #include <gtest/gtest.h>
 
+#include <Eigen/QR>
+
 #include "diagnosis/inference/evidence.hpp"
 #include "diagnosis/inference/log_sum.hpp"
 #include "diagnosis/inference/posterior.hpp"
@@ -18,7 +20,7 @@ using testing::LinearSystem;
 using testing::log_normal;
 using testing::white;
 
-// Covariance of all readings: noise, shared parameters, nuisances, a curve.
+// Covariance of all readings: noise, shared parameters, nuisances, the values of all curves.
 MatrixXd covariance_of(const LinearSystem& system, const ModelSet& set, const Noise& noise, double nuisance_sd,
                        const MatrixXd& curve_covariance = {}) {
   const Index n = LinearSystem::kCount, rows = system.data().rows();
@@ -44,7 +46,7 @@ Evaluated evaluate_set(const LinearSystem& system, const ModelSet& set, const Di
   const Layout layout(system, set);
   const std::vector<VectorXd> local(system.data().recordings.size(), layout.local_start());
   Evaluated out = evaluate(likelihood, layout, layout.shared_start(), local, VectorXd::Constant(1, 0.2));
-  if (discrepancy) add_discrepancy(likelihood, *discrepancy, out);
+  if (discrepancy) add_discrepancy(likelihood, *discrepancy, {}, out);
   return out;
 }
 
@@ -91,7 +93,7 @@ TEST(Evidence, OfADiscrepancyIsTheRatioOfTwoNormalDensities) {
   const Layout layout(system, {});
   const std::vector<VectorXd> local(4, layout.local_start());
   Fit base =
-      fit(likelihood, layout, layout.shared_start(), local, {.nuisance_sd = VectorXd::Constant(1, 0.2), .curve = {}});
+      fit(likelihood, layout, layout.shared_start(), local, {.nuisance_sd = VectorXd::Constant(1, 0.2), .curves = {}});
   base.likelihood = std::make_shared<const Likelihood>(likelihood);
   const Discrepancy discrepancy(likelihood, base);
   const auto factors = discrepancy.scan(Marginal(likelihood, base, {}));
@@ -99,7 +101,7 @@ TEST(Evidence, OfADiscrepancyIsTheRatioOfTwoNormalDensities) {
   const VectorXd y = all_readings(system);
   const double without = log_normal(y, covariance_of(system, {}, white(system), 0.2));
   for (const CurveFactor& one : factors) {
-    const MatrixXd covariance = discrepancy.columns(likelihood, one.prior).covariance;
+    const MatrixXd covariance = discrepancy.columns(likelihood, {&one.prior, 1}).covariance;
     const double with = log_normal(y, covariance_of(system, {}, white(system), 0.2, covariance));
     EXPECT_NEAR(one.log_bayes_factor, with - without, 1e-3 * std::abs(with - without) + 0.02)  // in float
         << "scale " << one.prior.scale << ", length " << one.prior.length;
@@ -115,20 +117,145 @@ TEST(Evidence, ADiscrepancyScaleIsTheSizeOfItsVisiblePart) {
   const Layout layout(system, {});
   const std::vector<VectorXd> local(4, layout.local_start());
   const Fit base =
-      fit(likelihood, layout, layout.shared_start(), local, {.nuisance_sd = VectorXd::Constant(1, 0.2), .curve = {}});
+      fit(likelihood, layout, layout.shared_start(), local, {.nuisance_sd = VectorXd::Constant(1, 0.2), .curves = {}});
   const Discrepancy discrepancy(likelihood, base);
   // Drawn from the prior of scale 2: in the mean twice the noise, squared.
   const CurvePrior prior{.curve = 0, .scale = 2, .length = 0.2};
-  const MatrixXd root = discrepancy.columns(likelihood, prior).covariance.llt().matrixL();
+  const MatrixXd root = discrepancy.columns(likelihood, {&prior, 1}).covariance.llt().matrixL();
   std::mt19937_64 random(5);
   std::normal_distribution<double> normal;
   double square = 0;
   constexpr int kDraws = 4000;
   for (int i = 0; i < kDraws; ++i) {
     const VectorXd values = root * VectorXd::NullaryExpr(6, [&] { return normal(random); });
-    square += std::pow(discrepancy.visible_size(prior, values), 2) / kDraws;
+    square += std::pow(discrepancy.visible_size({&prior, 1}, values), 2) / kDraws;
   }
   EXPECT_NEAR(square, 4, 0.2);
+}
+
+// Two curves: a parabola in time, and a wave along a sawtooth.
+struct TwoCurves {
+  LinearSystem system{4, 3, 1.5, 0.2, 0, 0.5};
+  Likelihood likelihood{system, Readings(4), white(system)};
+  Evaluated at = evaluate_set(system, {});
+  Discrepancy discrepancy{likelihood, at.fit};
+
+  // Of both curves' values, at their places among all: zero where a curve is not among these.
+  MatrixXd covariance(const std::vector<CurvePrior>& curves) const {
+    MatrixXd out = MatrixXd::Zero(12, 12);
+    for (const CurvePrior& one : curves) {
+      const auto first = static_cast<Index>(6 * one.curve);
+      out.block(first, first, 6, 6) += discrepancy.columns(likelihood, {&one, 1}).covariance;
+    }
+    return out;
+  }
+  // Of all readings, over the standard deviations of what differs.
+  double log_evidence(const Noise& noise, const std::vector<CurvePrior>& curves) const {
+    std::vector<double> logs;
+    for (const double sd : {0.0, 0.2})
+      logs.push_back(log_normal(all_readings(system), covariance_of(system, {}, noise, sd, covariance(curves))) -
+                     std::log(2));
+    return log_sum(logs);
+  }
+};
+
+TEST(TwoCurves, TheNextIsWeighedBesideTheFirstAsTwoNormalDensitiesSay) {
+  const TwoCurves made;
+  const CurvePrior first{.curve = 0, .scale = 2, .length = 0.2};
+  Scales scales{.nuisance_sd = VectorXd::Constant(1, 0.2), .curves = {first}};
+  const Layout layout(made.system, {});
+  const auto columns = made.discrepancy.columns(made.likelihood, scales.curves);
+  const Fit beside = fit(made.likelihood, layout, layout.shared_start(), std::vector<VectorXd>(4, layout.local_start()),
+                         scales, columns);
+  const VectorXd y = all_readings(made.system);
+  const auto log_density = [&](const std::vector<CurvePrior>& curves) {
+    return log_normal(y, covariance_of(made.system, {}, white(made.system), 0.2, made.covariance(curves)));
+  };
+  const double without = log_density({first});
+  const auto factors = made.discrepancy.scan(Marginal(made.likelihood, beside, columns));
+  ASSERT_EQ(factors.size(), made.discrepancy.choices());
+  for (const CurveFactor& one : factors) {
+    const double expected = log_density({first, one.prior}) - without;
+    EXPECT_NEAR(one.log_bayes_factor, expected, 1e-3 * std::abs(expected) + 0.02)
+        << "curve " << one.prior.curve << ", scale " << one.prior.scale << ", length " << one.prior.length;
+  }
+  EXPECT_EQ(factors.front().prior.curve, 1U);
+}
+
+TEST(TwoCurves, AreAddedOneAfterTheOtherByTheRatiosOfNormalDensities) {
+  const TwoCurves made;
+  Evaluated one = evaluate_set(made.system, {}), both = one;
+  add_discrepancy(made.likelihood, made.discrepancy, {.most = 1}, one);
+  add_discrepancy(made.likelihood, made.discrepancy, {.log_prior_odds = -4, .most = 2}, both);
+  ASSERT_EQ(one.log_factors.size(), 1U);
+  ASSERT_EQ(both.log_factors.size(), 2U);
+  // What a first is worth does not depend on whether there may be a second.
+  EXPECT_EQ(both.log_factors[0], one.log_factors[0]);
+  EXPECT_EQ(one.log_bayes_factor_curve, one.log_factors[0]);
+  const auto& curves = both.fit_with_curve->scales.curves;
+  ASSERT_EQ(curves.size(), 2U);
+  EXPECT_EQ(curves[0], one.fit_with_curve->scales.curves[0]);
+  EXPECT_NE(curves[0].curve, curves[1].curve);
+  // Which scale and length the second has is integrated over by the linear model, relative to the likeliest.
+  std::vector<double> logs;
+  const auto beside = made.discrepancy.columns(made.likelihood, one.fit_with_curve->scales.curves);
+  for (const CurveFactor& other : made.discrepancy.scan(Marginal(made.likelihood, *one.fit_with_curve, beside)))
+    if (other.prior.curve == curves[1].curve) logs.push_back(other.log_bayes_factor);
+  const double spread = log_sum(logs) - logs.front() - std::log(static_cast<double>(logs.size()));
+  const double expected = made.log_evidence(both.fit_with_curve->likelihood->noise(), curves) -
+                          made.log_evidence(one.fit_with_curve->likelihood->noise(), {curves[0]}) + spread;
+  EXPECT_GT(expected, 20);
+  EXPECT_NEAR(both.log_factors[1], expected, 0.05);
+  // Over the number of curves, by their prior odds.
+  EXPECT_NEAR(both.log_bayes_factor_curve, both.log_factors[0] + std::log1p(std::exp(both.log_factors[1] - 4)), 1e-9);
+  // The values are those of generalised least squares.
+  const MatrixXd K = made.covariance(curves), C = made.system.by_curves(0, {});
+  const VectorXd y = all_readings(made.system);
+  const Fit& fit = *both.fit_with_curve;
+  MatrixXd all(y.size(), 12);
+  for (Index r = 0; r < 4; ++r) all.middleRows(r * LinearSystem::kCount, LinearSystem::kCount) = C;
+  const VectorXd values =
+      K * all.transpose() *
+      covariance_of(made.system, {}, fit.likelihood->noise(), fit.scales.nuisance_sd[0], K).lu().solve(y);
+  const auto places = made.discrepancy.places(curves);
+  VectorXd off = fit.curve_values;
+  for (std::size_t i = 0; i < 2; ++i)
+    off.segment(places[i], 6) -= values.segment(6 * static_cast<Index>(curves[i].curve), 6);
+  // Constants of both and the offset are one: to what can be seen of them, in standard deviations.
+  EXPECT_LT(made.discrepancy.visible_size(curves, off), 0.05);
+  EXPECT_GT(made.discrepancy.visible_size(curves, fit.curve_values), 1);
+}
+
+TEST(TwoCurves, WhereOneIsEnoughThereIsOne) {
+  for (const std::uint64_t seed : {3U, 4U, 5U, 6U, 7U}) {
+    // Hardly anything depends on the sawtooth: the curve is there to be chosen.
+    const LinearSystem system(4, seed, 0, 0.2, 0.4, 1e-6);
+    const Likelihood likelihood(system, Readings(4), white(system));
+    Evaluated at = evaluate_set(system, {});
+    const Discrepancy discrepancy(likelihood, at.fit);
+    add_discrepancy(likelihood, discrepancy, {}, at);
+    ASSERT_TRUE(at.fit_with_curve.has_value()) << "seed " << seed;
+    EXPECT_EQ(at.fit_with_curve->scales.curves.size(), 1U) << "seed " << seed;
+    EXPECT_EQ(at.log_bayes_factor_curve, at.log_factors[0]);
+  }
+}
+
+TEST(TwoCurves, TheVisibleSizeIsThatOfTheirSum) {
+  const TwoCurves made;
+  const std::vector<CurvePrior> curves = {{.curve = 1, .scale = 2, .length = 0.2},
+                                          {.curve = 0, .scale = 1, .length = 1}};
+  VectorXd values(12);
+  values << 0.3, -0.1, 0.2, 0.5, -0.4, 0.1, 1, 0.6, -0.2, -0.5, 0.1, 0.4;
+  VectorXd in_order(12);  // as the columns are
+  in_order << values.tail(6), values.head(6);
+  const VectorXd sum = made.system.by_curves(0, {}) * in_order / made.system.sigma;
+  const MatrixXd X = LinearSystem::design({});
+  const VectorXd left = sum - X * X.colPivHouseholderQr().solve(sum);
+  const double expected = std::sqrt(left.squaredNorm() / LinearSystem::kCount);
+  EXPECT_NEAR(made.discrepancy.visible_size(curves, values), expected, 1e-5 * expected);
+  EXPECT_GT(std::abs(expected - std::hypot(made.discrepancy.visible_size(1, values.head(6)),
+                                           made.discrepancy.visible_size(0, values.tail(6)))),
+            0.01 * expected);  // they are not at right angles
 }
 
 TEST(HeldOut, OfALinearModelIsTheConditionalDensity) {
@@ -168,7 +295,7 @@ TEST(Proposals, OfALinearModelAreExact) {
   const Layout layout(system, {});
   const std::vector<VectorXd> local(4, layout.local_start());
   const Fit base =
-      fit(*likelihood, layout, layout.shared_start(), local, {.nuisance_sd = VectorXd::Constant(1, 0.2), .curve = {}});
+      fit(*likelihood, layout, layout.shared_start(), local, {.nuisance_sd = VectorXd::Constant(1, 0.2), .curves = {}});
   const Proposals proposals(*likelihood, base, 2);
   const auto found = proposals.beside(Marginal(*likelihood, base, {}), 1);
   ASSERT_EQ(found.size(), 2U);

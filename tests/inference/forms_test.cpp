@@ -34,7 +34,7 @@ struct Made {
   Fit fit_base() const {
     const Layout layout(system, {});
     return fit(likelihood, layout, layout.shared_start(), std::vector<VectorXd>(4, layout.local_start()),
-               {.nuisance_sd = VectorXd::Constant(1, nuisance_sd), .curve = {}});
+               {.nuisance_sd = VectorXd::Constant(1, nuisance_sd), .curves = {}});
   }
   // Of all readings, with a part of covariance added that all recordings share.
   double log_density(const MatrixXd& added) const {
@@ -67,7 +67,7 @@ TEST(Forms, AreWeighedAsTheDensityOfAllReadingsSays) {
     VectorXd f(6);
     for (Index i = 0; i < 6; ++i)
       f[i] = value_of(Form::power, curve, exponent, 0, curve.at[static_cast<std::size_t>(i)]);
-    const double visible = made.discrepancy.visible_size({}, f);
+    const double visible = made.discrepancy.visible_size(0, f);
     for (const double scale : kCurveScales)
       logs.push_back(made.log_density(std::pow(scale / visible, 2) * (C * f) * (C * f).transpose()) - without);
   }

@@ -11,13 +11,15 @@
 namespace bevel::inference::testing {
 
 // One channel, `count` readings a recording at 10 Hz; base: offset and slope; effects: a parabola, a step; a nuisance
-// that adds a cosine; one curve of the reading by time.
+// that adds a cosine; one curve of the reading by time, and where something depends on it one by a sawtooth of 0.9 s,
+// whose rise the first cannot follow.
 class LinearSystem final : public System {
  public:
   static constexpr int kCount = 60;
   double sigma = 0.1;
 
-  LinearSystem(std::size_t recordings, std::uint64_t seed, double parabola, double nuisance_sd, double bump) {
+  LinearSystem(std::size_t recordings, std::uint64_t seed, double parabola, double nuisance_sd, double bump,
+               double by_sawtooth = 0) {
     std::mt19937_64 random(seed);
     std::normal_distribution<double> normal;
     data_.claimed_sd = {sigma};
@@ -34,7 +36,8 @@ class LinearSystem final : public System {
         series.time_s.push_back(t);
         series.relative_sd.push_back(1);
         series.measured.push_back(0.3 + 0.2 * t + parabola * parabola_of(t) + own * std::cos(t) +
-                                  bump * std::exp(-4 * (t - 3) * (t - 3)) + sigma * normal(random));
+                                  bump * std::exp(-4 * (t - 3) * (t - 3)) + by_sawtooth * std::sin(6 * sawtooth(t)) +
+                                  sigma * normal(random));
       }
       set.series.push_back(std::move(series));
       data_.recordings.push_back(std::move(set));
@@ -54,6 +57,10 @@ class LinearSystem final : public System {
     Curve curve{.component = "reading", .unit = "mm", .covariate = "time_s", .at = {}};
     for (int i = 0; i < 6; ++i) curve.at.push_back(1.2 * i);
     curves_ = {curve};
+    if (by_sawtooth == 0) return;
+    curve = {.component = "reading", .unit = "mm", .covariate = "sawtooth", .at = {}};
+    for (int i = 0; i < 6; ++i) curve.at.push_back(0.2 * i);
+    curves_.push_back(curve);
   }
 
   const Dataset& data() const override { return data_; }
@@ -88,18 +95,20 @@ class LinearSystem final : public System {
     return true;
   }
   Eigen::MatrixXd by_curves(std::size_t, const Eigen::VectorXd&) const override {
-    Eigen::MatrixXd out = Eigen::MatrixXd::Zero(kCount, 6);
-    for (int i = 0; i < kCount; ++i) {
-      const double u = 0.1 * i / 1.2;
-      const int k = std::min(static_cast<int>(u), 4);
-      out(i, k) = 1 - (u - k);
-      out(i, k + 1) = u - k;
-    }
+    Eigen::MatrixXd out = Eigen::MatrixXd::Zero(kCount, 6 * static_cast<int>(curves_.size()));
+    for (int i = 0; i < kCount; ++i)
+      for (std::size_t c = 0; c < curves_.size(); ++c) {
+        const double u = c == 0 ? 0.1 * i / 1.2 : sawtooth(0.1 * i) / 0.2;
+        const int k = std::min(static_cast<int>(u), 4), first = 6 * static_cast<int>(c);
+        out(i, first + k) = 1 - (u - k);
+        out(i, first + k + 1) = u - k;
+      }
     return out;
   }
 
  private:
   static double parabola_of(double t) { return (t - 3) * (t - 3) / 9; }
+  static double sawtooth(double t) { return t / 0.9 - std::floor(t / 0.9); }
   Dataset data_;
   std::vector<Parameter> base_;
   std::vector<Effect> effects_;

@@ -144,6 +144,67 @@ TEST_P(Predictive, NewAndContinuedAreTheConditionalDensitiesOfALinearModel) {
   EXPECT_EQ(found->continued.rows.front(), kRows / 3);
   EXPECT_NEAR(found->log_density_first, log_sum(by_both) - log_sum(by_others), 1e-6);
 }
+// Where recordings differ about a mean that they share, and that is normal about zero by the widest that is tried: the
+// same densities with it in the covariance of all readings.
+TEST_P(Predictive, WhatAllHaveInCommonTheNextHasToo) {
+  const LinearSystem system(4, 8, 0.3, 0.1, 0);
+  Noise noise = testing::white(system);
+  noise.ar1 = 0.6;
+  noise.ar2 = GetParam();
+  const auto likelihood = std::make_shared<const Likelihood>(system, Readings(4), noise);
+  const Layout layout(system, {0});
+  Fit fit(layout);
+  fit.scales.nuisance_sd = VectorXd::Constant(1, 0.2);
+  fit.shared = Eigen::Vector3d(0.5, 0.1, 0.2);
+  for (const double own : {0.2, 0.3, -0.1, 0.5}) fit.local.emplace_back(VectorXd::Constant(1, own));
+  fit.likelihood = likelihood;
+  Fit begun = fit;
+  begun.shared += Eigen::Vector3d(-0.2, 0.3, 0.1);
+  begun.local[kHeldOut][0] = -0.1;
+  const NuisanceGrid grid = nuisance_grid(system);
+  const double until_s = time_of_share(system.data().recordings[kHeldOut], 1.0 / 3);
+  const auto about = [&](const Fit& at, std::size_t recording) {
+    return with_mean({&at, linearise(*likelihood, at, {})}, recording);
+  };
+  const auto found = forecast(about(fit, kHeldOut), about(begun, kHeldOut), {}, grid, kHeldOut, until_s);
+  ASSERT_TRUE(found);
+
+  const VectorXd y = all_readings(system);
+  std::vector<Index> others, own, first, rest;
+  for (Index i = 0; i < y.size(); ++i)
+    if (i / kRows != kHeldOut) others.push_back(i);
+  for (Index i = 0; i < kRows; ++i) {
+    own.push_back(kHeldOut * kRows + i);
+    (i < kRows / 3 ? first : rest).push_back(own.back());
+  }
+  std::vector<Index> known = others;
+  known.insert(known.end(), first.begin(), first.end());
+  const VectorXd common = LinearSystem::cosine().replicate(4, 1);
+  std::vector<Normal> all, beyond, continued;
+  std::vector<double> by_others, by_both, about_zero, by_all;
+  for (Index k = 0; k < 2; ++k) {
+    const double sd = grid.standard_deviations(0, k);
+    const MatrixXd zero = covariance_of(system, noise, sd);
+    const MatrixXd C = zero + (sd > 0 ? 0.2 * 0.2 : 0.0) * common * common.transpose();
+    all.push_back(given(C, y, own, others));
+    beyond.push_back(given(C, y, rest, others));
+    continued.push_back(given(C, y, rest, known));
+    by_others.push_back(grid.log_prior[k] + log_normal(y(others), C(others, others)));
+    by_both.push_back(by_others.back() + given(C, y, first, others).log_density);
+    by_all.push_back(grid.log_prior[k] + log_normal(y, C));
+    about_zero.push_back(grid.log_prior[k] + log_normal(y(others), zero(others, others)));
+  }
+  expect_mixture(found->all, y(own), all, by_others);
+  expect_mixture(found->beyond, y(rest), beyond, by_others);
+  expect_mixture(found->continued, y(rest), continued, by_both);
+  EXPECT_NEAR(found->log_density_first, log_sum(by_both) - log_sum(by_others), 1e-4);
+  // Both ways of the others' readings stand on one scale.
+  EXPECT_NEAR(found->log_others - log_evidence_of_others({&fit, linearise(*likelihood, fit, {})}, {}, grid, kHeldOut),
+              log_sum(by_others) - log_sum(about_zero), 1e-4);
+  const VectorXd weights = spread_weights(about(fit, 4), {}, grid);
+  for (Index k = 0; k < 2; ++k)
+    EXPECT_NEAR(weights[k], std::exp(by_all[static_cast<std::size_t>(k)] - log_sum(by_all)), 1e-5);
+}
 INSTANTIATE_TEST_SUITE_P(OfFirstAndSecondOrder, Predictive, ::testing::Values(0.0, -0.3));
 
 // Readings with an error of their own beside the noise (a jump's): back from whitened rows, and what the first part
@@ -217,7 +278,7 @@ TEST(Nuisances, OfALinearModelAreTheNormalPosterior) {
   noise.ar1 = 0.5;
   const auto likelihood = std::make_shared<const Likelihood>(system, Readings(4), noise);
   const Layout layout(system, {0});
-  const Scales scales{.nuisance_sd = VectorXd::Constant(1, 0.2), .curve = {}};
+  const Scales scales{.nuisance_sd = VectorXd::Constant(1, 0.2), .curves = {}};
   Fit at = fit(*likelihood, layout, layout.shared_start(), std::vector<VectorXd>(4, layout.local_start()), scales);
   at.likelihood = likelihood;
   const VectorXd weights = Eigen::Vector2d(0.3, 0.7);

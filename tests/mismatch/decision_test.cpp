@@ -78,9 +78,10 @@ TEST_F(Decide, UnknownCarriesACurveAndTheNamesThatStandBesideIt) {
   posterior.sets = {{{}, 0.95, 0.9}, {{Pendulum::kDryFriction}, 0.05, 0.0}};
   const Decision decision = decide(search, posterior);
   EXPECT_EQ(decision.verdict, Verdict::unknown_effect);
-  EXPECT_TRUE(decision.model.fit->scales.curve.has_value());
+  ASSERT_EQ(decision.model.fit->scales.curves.size(), 1U);
   EXPECT_TRUE(static_cast<bool>(decision.model.curve));
-  EXPECT_EQ(decision.model.discrepancy().values.size(), decision.model.fit->curve_values.size());
+  ASSERT_EQ(decision.model.discrepancy.size(), 1U);
+  EXPECT_EQ(decision.model.discrepancy[0].values, decision.model.fit->curve_values);
 }
 
 // A pair that was never fitted together: the verdict speaks of a model that there is.

@@ -7,6 +7,7 @@
 
 #include "diagnosis/mismatch/diagnose.hpp"
 #include "diagnosis/mismatch/effect_source.hpp"
+#include "model/effects/discrepancy.hpp"
 #include "tests/needle/simulated_rig.hpp"
 
 namespace bevel::diagnosis::testing {
@@ -183,6 +184,47 @@ TEST(Diagnose, WhatIsOnNoListIsADiscrepancyWithItsErrors) {
   EXPECT_EQ(proposed_effect(found)->name, "advance_sinusoid_by_depth");
   EXPECT_LT(found.held_out.after.rmse_mm, found.held_out.before.rmse_mm);
   EXPECT_THAT(found.sentence, HasSubstr(std::string(info_of(one.curve.component).meaning)));
+}
+
+// The advance in waves, and a sideways bend in waves: no single curve is both.
+TEST(Diagnose, TwoThingsThatAreOnNoListAreTwoCurves) {
+  model::DiscrepancyCurve bend{.component = model::DiscrepancyComponent::curvature_across,
+                               .covariate = model::Covariate::depth_mm};
+  for (int i = 0; i <= 20; ++i) {
+    bend.at.push_back(4.0 * i);
+    bend.values.push_back(0.002 * std::sin(0.15 * bend.at.back()));
+    bend.std_errors.push_back(0);
+  }
+  SimulatedRig rig{.effects = {model::active_discrepancy(bend)}};
+  rig.true_motion = [](std::vector<model::ActuatorState>& states) {
+    for (auto& s : states) s.insertion_mm += 1.5 * std::pow(std::sin(0.11 * s.insertion_mm), 2);
+  };
+  const Findings found = findings_of(rig, 4);
+  EXPECT_EQ(found.verdict, Verdict::unknown_effect) << found.sentence;
+  EXPECT_THAT(found.effects, IsEmpty()) << found.sentence;
+  ASSERT_EQ(found.discrepancies.size(), 2U) << found.sentence;
+  for (const Discrepancy& one : found.discrepancies) {
+    const model::DiscrepancyCurve& curve = one.curve;
+    EXPECT_EQ(curve.covariate, model::Covariate::depth_mm) << found.sentence;
+    EXPECT_THAT(found.sentence, HasSubstr(std::string(info_of(curve.component).meaning)));
+    EXPECT_GT(one.log_bayes_factor, 10);
+    EXPECT_GT(one.visible_size, 0.5);
+    EXPECT_GT(one.moved_at_depth_mm, 0.1);
+    const bool advance = curve.component == model::DiscrepancyComponent::advance;
+    EXPECT_TRUE(advance || curve.component == model::DiscrepancyComponent::curvature_across) << found.sentence;
+    // As a share of what it is: an eighth of the depth from value to value smooths it.
+    double off = 0, all = 0;
+    for (std::size_t i = 0; i < curve.at.size(); ++i) {
+      const double truth = advance ? 1.5 * 0.11 * std::sin(0.22 * curve.at[i]) : 0.002 * std::sin(0.15 * curve.at[i]);
+      off += std::pow(curve.values[i] - truth, 2), all += truth * truth;
+    }
+    EXPECT_LT(std::sqrt(off / all), 0.5) << info_of(curve.component).name;
+  }
+  // Each has its equations.
+  std::set<std::size_t> stands_for;
+  for (const ProposedForm& one : found.proposals) stands_for.insert(one.discrepancy);
+  EXPECT_EQ(stands_for.size(), 2U);
+  EXPECT_NEAR(found.held_out.after.chi2_per_dof, 1, 0.25);
 }
 
 TEST(Diagnose, IsTheSameForOneThreadAndTwo) {

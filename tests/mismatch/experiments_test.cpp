@@ -67,7 +67,7 @@ struct Known {
     const std::vector<Eigen::VectorXd> local(system.data().recordings.size(), layout.local_start());
     const auto groups = static_cast<Eigen::Index>(system.nuisance_groups().size());
     auto out = inference::fit(*likelihood, layout, shared, local,
-                              {.nuisance_sd = Eigen::VectorXd::Zero(groups), .curve = {}}, {}, {.tolerance = 1e-9});
+                              {.nuisance_sd = Eigen::VectorXd::Zero(groups), .curves = {}}, {}, {.tolerance = 1e-9});
     out.likelihood = likelihood;
     return out;
   }
@@ -113,8 +113,7 @@ TEST(Separation, IsByHowMuchTheRivalRefittedIsWorse) {
     Recording more;
     more.motion = script.motion;
     model::OpenLoop path;
-    ASSERT_TRUE(
-        known.system.tip_path(truth.layout.set(), script.motion, -1, truth.shared, true_one.local, nullptr, path));
+    ASSERT_TRUE(known.system.tip_path(truth.layout.set(), script.motion, -1, truth.shared, true_one.local, {}, path));
     for (const auto& channel : recorded.channels) {
       Series series;
       for (std::size_t i = 0; i < path.position_mm.size(); ++i) {

@@ -129,8 +129,8 @@ void print_verdict(std::ostream& out, const Findings& f) {
         << " mm (rms over recordings) beside the needle refitted, by " << measured(moved->from_file_mm, 2)
         << " mm from where the model file as it stands has it\n";
   for (const auto& one : f.discrepancies)
-    out << "  the discrepancy moves the tip at the deepest readings by " << measured(one.moved_at_depth_mm, 2)
-        << " mm\n";
+    out << "  the discrepancy of the " << info_of(one.curve.component).meaning
+        << " moves the tip at the deepest readings by " << measured(one.moved_at_depth_mm, 2) << " mm\n";
   if (f.steered)
     out << "  steered in simulation to targets " << span_mm(*f.steered) << " deep: as it stands "
         << steered_in_words(f.steered->as_it_stands, f.steered->targets) << "; with what was found "

@@ -124,9 +124,8 @@ std::vector<report::Fact> figures_of_verdict(const Findings& f) {
          (effect.ambiguous_with.empty() ? "probability; no rival; "
                                         : "probability; or " + listed(effect.ambiguous_with, " or ") + "; ") +
              moved_in_words(effect.moved_at_depth_mm)});
-  if (!f.discrepancies.empty())
-    facts.push_back({"unknown part", meaning_of(f.discrepancies.front()),
-                     "against " + in_words(model::name_of(f.discrepancies.front().curve.covariate))});
+  for (const Discrepancy& one : f.discrepancies)
+    facts.push_back({"unknown part", meaning_of(one), "against " + in_words(model::name_of(one.curve.covariate))});
   facts.push_back(
       {"readings", std::to_string(f.readings),
        "in " + std::to_string(f.traces.size()) + " recordings; " + std::to_string(f.outliers) + " outliers"});
@@ -281,7 +280,8 @@ void add_unknown_part(report::Page& page, const Findings& f) {
   page.paragraph(
       "No effect on the list explains this. The discrepancy says by how much a quantity of the motion would have to be "
       "off, and against what it varies, for the model to fit: zero is the model as it is. It is a description, not a "
-      "cause.");
+      "cause." +
+      std::string(f.discrepancies.size() > 1 ? " One curve does not do: these add up." : ""));
   page.figures(discrepancy_panels(f.discrepancies), 2, "The discrepancy with a band of two standard errors.");
   std::vector<std::vector<std::string>> rows;
   for (const auto& c : f.discrepancies) {
@@ -297,14 +297,18 @@ void add_unknown_part(report::Page& page, const Findings& f) {
   std::vector<std::vector<std::string>> forms;
   for (const auto& p : f.proposals) {
     const std::string unit(info_of(p.component).unit);
-    forms.push_back({std::string(info_of(p.component).meaning), in_words(model::name_of(p.covariate)), p.equation,
+    forms.push_back({meaning_of(f.discrepancies.at(p.discrepancy)), std::string(info_of(p.component).meaning),
+                     in_words(model::name_of(p.covariate)), p.equation,
                      with_error(p.amplitude, p.amplitude_sd) + " " + unit,
                      number(p.shape) + " (" + number(p.shape_low) + " to " + number(p.shape_high) + ")",
                      log_factor(p.log_bayes_factor)});
   }
   page.subheading("Equations that would do");
-  page.table({"what is off by", "x", "equation", "a", "s (95 %)", "log Bayes factor against all curves"}, forms,
-             "Simple forms of one covariate, each beside the needle and what was named. Above zero, the equation is "
+  page.table({"instead of the curve in", "what is off by", "x", "equation", "a", "s (95 %)",
+              "log Bayes factor against all curves"},
+             forms,
+             "Simple forms of one covariate, each beside the needle, what was named and the other curves. Above zero, "
+             "the equation is "
              "worth more than the freedom of a curve. A proposal to be tried as an effect, not a cause.");
   if (const auto proposed = proposed_effect(f))
     page.paragraph(std::string(kProposedEffectFile) + " beside this page is the first of them as an effect, " +

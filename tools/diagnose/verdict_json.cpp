@@ -154,7 +154,8 @@ json as_json(const std::vector<Discrepancy>& discrepancies) {
 json as_json(const std::vector<ProposedForm>& proposals) {
   json all = json::array();
   for (const auto& p : proposals)
-    all.push_back({{"component", info_of(p.component).name},
+    all.push_back({{"discrepancy", p.discrepancy},
+                   {"component", info_of(p.component).name},
                    {"unit", info_of(p.component).unit},
                    {"covariate", model::name_of(p.covariate)},
                    {"form", name_of(p.form)},
