@@ -107,8 +107,7 @@ double log_ratio_of_sizes(const GeneratorSystem& system, const inference::Fit& f
   // The mean over the posterior, in the middles of equally probable parts.
   constexpr int kParts = 48;
   std::vector<double> z;
-  for (int k = 0; k < kParts; ++k)
-    z.push_back(boost::math::quantile(boost::math::normal(), (k + 0.5) / kParts));
+  for (int k = 0; k < kParts; ++k) z.push_back(boost::math::quantile(boost::math::normal(), (k + 0.5) / kParts));
   double sum = 0;
   int count = 0;
   for (int i = 0; i < kParts; ++i)

@@ -42,8 +42,7 @@ TEST(GeneratorPrior, SharesOfDrawsAreIntegralsOfTheDensity) {
     const proof::EffectKind& kind = kind_named(one.kind);
     const proof::ParameterRange& range = kind.parameters[one.size];
     const SizePrior prior({range}, kind.listed, kind.least_factor);
-    const double reach =
-        1.6 * std::max(std::abs(range.low - range.neutral), std::abs(range.high - range.neutral));
+    const double reach = 1.6 * std::max(std::abs(range.low - range.neutral), std::abs(range.high - range.neutral));
     constexpr int kDraws = 40000, kBins = 12, kInside = 4000;
     proof::Random random(5);
     std::vector<int> counts(kBins, 0);
@@ -79,9 +78,9 @@ TEST(GeneratorPrior, TwoSizesHaveMassOneAltogether) {
   for (int i = 0; i < kAngles; ++i)
     for (int j = 0; j < kRadii; ++j) {
       const double angle = (i + 0.5) / kAngles * M_PI / 2, radius = (j + 0.5) / kRadii * largest;
-      mass += prior.density(Eigen::Vector2d(radius * std::cos(angle), radius * std::sin(angle)),
-                            radius * sigmas_per_unit) *
-              radius * (largest / kRadii) * (M_PI / 2 / kAngles);
+      mass +=
+          prior.density(Eigen::Vector2d(radius * std::cos(angle), radius * std::sin(angle)), radius * sigmas_per_unit) *
+          radius * (largest / kRadii) * (M_PI / 2 / kAngles);
     }
   EXPECT_NEAR(4 * mass, 1, 0.01);
 }

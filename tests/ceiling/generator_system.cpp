@@ -53,8 +53,7 @@ Parameter parameter_of(const std::string& effect, const ParameterRange& range) {
   if (is_scanned(effect, range.name)) {
     out.shape = true;
     out.starts.clear();
-    for (int i = 0; i < kStarts; ++i)
-      out.starts.push_back(range.low + (range.high - range.low) * i / (kStarts - 1));
+    for (int i = 0; i < kStarts; ++i) out.starts.push_back(range.low + (range.high - range.low) * i / (kStarts - 1));
   }
   out.prior = inference::flat_prior(out.lower, out.upper);
   return out;
@@ -73,14 +72,20 @@ Slot slot_of(const std::string& effect, const ParameterRange& range) {
 
 GeneratorSystem::GeneratorSystem(const diagnosis::NeedleSystem& needle, const proof::Trial& trial,
                                  const proof::DriveRipple& ripple)
-    : needle_(needle), wheelbase_mm_(trial.truth.needle.wheelbase_mm), departure_(trial.truth.departure),
+    : needle_(needle),
+      wheelbase_mm_(trial.truth.needle.wheelbase_mm),
+      departure_(trial.truth.departure),
       tangents_(trial.recordings.size()) {
   const auto& data = needle.data();
   for (std::size_t r = 0; r < trial.recordings.size(); ++r) {
     const proof::Frames& frames = trial.recordings[r].frames;
-    settings_.push_back(
-        {.motions = {trial.recordings[r].motion}, .frames = {frames}, .whiteners = {}, .ripple = ripple,
-         .variation = {{}}, .absorbers = {}, .changed = {}});
+    settings_.push_back({.motions = {trial.recordings[r].motion},
+                         .frames = {frames},
+                         .whiteners = {},
+                         .ripple = ripple,
+                         .variation = {{}},
+                         .absorbers = {},
+                         .changed = {}});
     frame_.emplace_back();
     axis_.emplace_back(data.recordings[r].rows(), 3);
     for (std::size_t c = 0; c < data.recordings[r].series.size(); ++c)
@@ -197,8 +202,8 @@ GeneratorSystem::Plant GeneratorSystem::plant_of(const ModelSet& set, const Vect
                                                  const VectorXd& local) const {
   Plant plant;
   const double lambda2 = shared[diagnosis::kLambda2];
-  plant.needle = {shared[diagnosis::kCurvature], wheelbase_mm_,
-                  shared[diagnosis::kU] + lambda2 * lambda2 / kTurn, lambda2};
+  plant.needle = {shared[diagnosis::kCurvature], wheelbase_mm_, shared[diagnosis::kU] + lambda2 * lambda2 / kTurn,
+                  lambda2};
   plant.physics.departure = departure_;
   plant.beam.max_depth_mm = 120;
   plant.own = {local[diagnosis::kOwnCurvature], local[diagnosis::kTiltX],  local[diagnosis::kTiltY],
@@ -227,8 +232,8 @@ bool GeneratorSystem::read(const proof::Setting& setting, const Plant& plant, st
   here = setting;
   here.variation[0] = plant.own;
   try {
-    const proof::Views views = plant.is_beam ? proof::views_of(here, plant.beam)
-                                             : proof::views_of(here, plant.needle, plant.physics);
+    const proof::Views views =
+        plant.is_beam ? proof::views_of(here, plant.beam) : proof::views_of(here, plant.needle, plant.physics);
     out.resize(axis_[r].rows());
     for (Index row = 0; row < out.size(); ++row)
       out[row] = axis_[r].row(row).dot(views[0].col(frame_[r][static_cast<std::size_t>(row)]));
@@ -319,8 +324,8 @@ bool GeneratorSystem::differentiate(const ModelSet& set, std::size_t r, const Ve
   constexpr double kFar = std::numeric_limits<double>::infinity();
   const bool beam = std::ranges::any_of(set, [&](std::size_t e) { return effects_[e].label == "tip_swing"; });
   for (const int i : {diagnosis::kOwnCurvature, diagnosis::kTiltX, diagnosis::kTiltY, diagnosis::kRoll})
-    out.by_local.col(i) = by_difference(moved_local, i, i == diagnosis::kOwnCurvature ? kShare : kAngle_rad, false,
-                                        -kFar, kFar);
+    out.by_local.col(i) =
+        by_difference(moved_local, i, i == diagnosis::kOwnCurvature ? kShare : kAngle_rad, false, -kFar, kFar);
   out.by_local.col(diagnosis::kEntryX) = axis_[r].col(0);
   out.by_local.col(diagnosis::kEntryY) = axis_[r].col(1);
   if (!beam) {  // of which k, lambda1 and lambda2 are no part

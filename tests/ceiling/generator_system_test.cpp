@@ -61,9 +61,8 @@ std::vector<proof::ConcealedEffect> one_of_each(const NoiseFree& made) {
   auto fed = out.front();
   for (const auto& one : out)
     if (one.name == "lost_steps") fed = one;
-  fed.parameters = fed.parameters.contains("insertion_mm")
-                       ? std::map<std::string, double>{{"rotation_rad", -0.7}}
-                       : std::map<std::string, double>{{"insertion_mm", -1.4}};
+  fed.parameters = fed.parameters.contains("insertion_mm") ? std::map<std::string, double>{{"rotation_rad", -0.7}}
+                                                           : std::map<std::string, double>{{"insertion_mm", -1.4}};
   out.push_back(fed);
   return out;
 }
@@ -121,8 +120,8 @@ TEST(GeneratorSystem, ReadsWhatTheBeamSays) {
        {{"relaxing_fraction", beam.relaxing_fraction}, {"relaxation_time_s", beam.relaxation_time_s}},
        {}}};
   EXPECT_LT(largest_error_mm(system, place(system, made, effects)), kExact_mm);
-  EXPECT_FALSE(system.allows(inference::without(place(system, made, effects).set,
-                                                static_cast<std::size_t>(system.find(effects[0])))));
+  EXPECT_FALSE(system.allows(
+      inference::without(place(system, made, effects).set, static_cast<std::size_t>(system.find(effects[0])))));
 }
 
 TEST(GeneratorSystem, DerivativesAreThoseOfAnotherStep) {

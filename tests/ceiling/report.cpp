@@ -58,11 +58,13 @@ std::string row_of(const char* trial_class, const std::vector<json>& compared) {
 }  // namespace
 
 std::string report(const std::vector<json>& compared) {
-  std::string out = "| class | trials (right) | the truth wins (right) | as likely (right) | loses (right) |\n"
-                    "| --- | --- | --- | --- | --- |\n";
+  std::string out =
+      "| class | trials (right) | the truth wins (right) | as likely (right) | loses (right) |\n"
+      "| --- | --- | --- | --- | --- |\n";
   for (const char* trial_class : {"one", "two", "unlisted", "beam"}) out += row_of(trial_class, compared);
-  out += "\n| trial | concealed | shows | said | truth less the likeliest other answer | which | by the library |\n"
-         "| --- | --- | --- | --- | --- | --- | --- |\n";
+  out +=
+      "\n| trial | concealed | shows | said | truth less the likeliest other answer | which | by the library |\n"
+      "| --- | --- | --- | --- | --- | --- | --- |\n";
   for (const json& one : compared) {
     if (one.at("visibility") != "visible") continue;
     const bool by_generator = number(one, "rival_by_generator") > number(one, "rival_log");

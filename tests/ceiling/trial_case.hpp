@@ -47,10 +47,11 @@ struct NoiseFree {
     const proof::BaseNeedle& n = trial.truth.believed;
     auto read = diagnose::read_case(io::find_logs({given}));
     std::filesystem::remove_all(folder);
-    return {std::move(read.recorded), {.curvature_per_mm = n.curvature_per_mm,
-                                       .wheelbase_mm = n.wheelbase_mm,
-                                       .lambda1_per_rad = n.lambda1_per_rad,
-                                       .lambda2 = n.lambda2}};
+    return {std::move(read.recorded),
+            {.curvature_per_mm = n.curvature_per_mm,
+             .wheelbase_mm = n.wheelbase_mm,
+             .lambda1_per_rad = n.lambda1_per_rad,
+             .lambda2 = n.lambda2}};
   }
 };
 
