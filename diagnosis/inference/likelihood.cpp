@@ -13,7 +13,8 @@ using Eigen::MatrixXd;
 using Eigen::VectorXd;
 
 namespace {
-constexpr double kNone_sd = 1e-9;  // relative: a nuisance that does not vary
+constexpr double kNone_sd =
+    1e-6;  // of a nuisance that does not vary; less would cost its digits where the mode is elsewhere
 }
 
 MatrixXd correlation_of(const Curve& curve, double length) {
