@@ -12,11 +12,6 @@ using Eigen::Index;
 using Eigen::MatrixXd;
 using Eigen::VectorXd;
 
-namespace {
-constexpr double kNone_sd =
-    1e-6;  // of a nuisance that does not vary; less would cost its digits where the mode is elsewhere
-}
-
 MatrixXd correlation_of(const Curve& curve, double length) {
   const auto n = static_cast<Index>(curve.at.size());
   const double range = curve.periodic ? 2 * std::numbers::pi : curve.at.back() - curve.at.front();

@@ -25,6 +25,10 @@ struct CurvePrior {
 };
 Eigen::MatrixXd correlation_of(const Curve& curve, double length);
 
+// Standard deviation of a nuisance that does not vary, relative or in its unit. Smaller ones cost digits: where the
+// mode is elsewhere, the least square is a difference of numbers of its precision.
+inline constexpr double kNone_sd = 1e-6;
+
 // What is held while the mode is sought.
 struct Scales {
   Eigen::VectorXd nuisance_sd;     // per group; 0: the recordings do not differ

@@ -38,7 +38,9 @@ double visible_sigmas_of_curve(const Search& search, const Fit& fit) {
   const CurveColumns curve = curve_of(search, fit);
   const auto blocks = linearise(*fit.likelihood, fit, curve);
   if (blocks.empty()) return 0;
-  const MatrixXd information = solve_about(fit, blocks, curve, std::vector<Index>{}).information;
+  const ArrowSolution solution = solve_about(fit, blocks, curve, std::vector<Index>{});
+  if (!solution.valid) return 0;
+  const MatrixXd& information = solution.information;
   const Index shared = fit.shared.size(), values = fit.curve_values.size();
   const MatrixXd across = information.topRightCorner(shared, values);
   const MatrixXd visible = information.bottomRightCorner(values, values) - curve.covariance.inverse() -
@@ -55,16 +57,15 @@ Posterior posterior_of(const Search& search, double visible_sigmas) {
   out.not_visited = std::exp(logs.back() - all);
   const auto& effects = search.system().effects();
   for (const auto& [set, one] : search.visited()) {
-    const SetShare share{set, std::exp(one.log_posterior() - all), std::exp(one.log_with_curve - all)};
+    SetShare share{set, std::exp(one.log_posterior() - all), std::exp(one.log_with_curve - all), 0};
     std::set<std::string> names;
     for (const std::size_t e : set) names.insert(effects[e].name);
     for (const auto& name : names) out.inclusion[name] += share.probability;
-    double large = 0;
     if (one.at->fit_with_curve && share.with_discrepancy > 0 &&
         visible_sigmas_of_curve(search, *one.at->fit_with_curve) > visible_sigmas)
-      large = share.with_discrepancy;
-    out.discrepancy += large;
-    if (set.empty()) out.nothing += share.probability - large;
+      share.unknown = share.with_discrepancy;
+    out.discrepancy += share.unknown;
+    if (set.empty()) out.nothing += share.probability - share.unknown;
     out.sets.push_back(share);
   }
   std::stable_sort(out.sets.begin(), out.sets.end(),

@@ -11,6 +11,7 @@ struct SetShare {
   ModelSet set;
   double probability = 0;
   double with_discrepancy = 0;  // part of it
+  double unknown = 0;           // part of that: with one as visible as was asked for
 };
 
 struct Posterior {

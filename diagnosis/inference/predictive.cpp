@@ -18,11 +18,9 @@ using Eigen::VectorXd;
 
 namespace {
 
-constexpr double kLikely = 1e-4;      // share of a combination of standard deviations, given all recordings
-constexpr double kShare = 1e-3;       // and given the others
-constexpr double kHeld = 1e18;        // precision of what is taken as it stands
-constexpr double kNeverWider = 1e-3;  // taken as the widest where none differs at all
-constexpr double kNone = 1e-5;        // standard deviation of what is none, as a share of the widest of its group
+constexpr double kLikely = 1e-4;  // share of a combination of standard deviations, given all recordings
+constexpr double kShare = 1e-3;   // and given the others
+constexpr double kHeld = 1e18;    // precision of what is taken as it stands
 constexpr double kTogether_s = 1e-9;
 
 // Unknowns: shared, the curves' values, the nuisances' mean if it is one, the recording's own.
@@ -83,12 +81,15 @@ Pulls pulls_with_mean(const Pulls& pulls, const VectorXd& mean) {
   out.centre << pulls.centre, -mean;
   return out;
 }
-// The widest standard deviation that is tried for each nuisance.
-VectorXd widest_of(const System& system) {
+// Precision of the nuisances' mean: normal by the widest standard deviation that is tried, none where they do not vary.
+VectorXd mean_precision_of(const System& system, const VectorXd& nuisance_sd) {
   VectorXd out(static_cast<Index>(system.nuisances().size()));
   for (std::size_t i = 0; i < system.nuisances().size(); ++i) {
-    const auto& values = system.nuisance_groups()[system.nuisances()[i].group].standard_deviations;
-    out[static_cast<Index>(i)] = std::max(*std::max_element(values.begin(), values.end()), kNeverWider);
+    const std::size_t group = system.nuisances()[i].group;
+    const auto& values = system.nuisance_groups()[group].standard_deviations;
+    const double sd =
+        nuisance_sd[static_cast<Index>(group)] > 0 ? *std::max_element(values.begin(), values.end()) : kNone_sd;
+    out[static_cast<Index>(i)] = 1 / (sd * sd);
   }
   return out;
 }
@@ -99,10 +100,6 @@ std::vector<FromOthers> from_others(LinearModel& model, const CurveColumns& curv
   const Fit& fit = *model.fit;
   Pulls pulls = pulls_with_mean(pulls_of(fit.layout, fit.shared, fit.curve_values, curve.covariance), model.mean);
   const auto free = free_locals(fit.layout);
-  // None is no more precise than need be: where the mode is elsewhere, the least square is a difference of such
-  // numbers.
-  const VectorXd widest = widest_of(fit.layout.system());
-  const Eigen::ArrayXd none = (kNone * widest.array()).square().inverse(), some = widest.array().square().inverse();
   ArrowRules rules{.held = fit.held, .covariance_of = std::vector<Index>{}};
   rules.used.assign(model.blocks.size(), true);
   if (recording < model.blocks.size()) rules.used[recording] = false;
@@ -112,10 +109,8 @@ std::vector<FromOthers> from_others(LinearModel& model, const CurveColumns& curv
     Scales scales = fit.scales;
     scales.nuisance_sd = spreads.standard_deviations.col(k);
     FromOthers one{.shared = {}, .own_precision = local_precision_of(fit.layout, scales)};
-    auto own = one.own_precision.head(widest.size()).array();  // nuisances come first, and none of them is an instant
-    own = own.min(none);
     if (model.mean.size() > 0)
-      pulls.precision.diagonal().tail(widest.size()) = (own < none).select(some, none).matrix();
+      pulls.precision.diagonal().tail(model.mean.size()) = mean_precision_of(fit.layout.system(), scales.nuisance_sd);
     for (ArrowBlock& block : model.blocks) block.precision = one.own_precision;
     one.shared = solve(model.blocks, pulls.precision, pulls.centre, rules);
     if (!one.shared.valid) continue;

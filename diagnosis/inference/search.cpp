@@ -25,7 +25,7 @@ using Eigen::Index;
 using Eigen::VectorXd;
 
 // By the linear model: by how much the log likelihood falls where an effect's sizes are none. Infinite for one that has
-// no size to be none.
+// no size to be none, or one that presses against a bound.
 double log_cost_of_dropping(const Fit& fit, std::size_t effect) {
   const auto& set = fit.layout.set();
   const auto member = static_cast<std::size_t>(std::find(set.begin(), set.end(), effect) - set.begin());
@@ -37,11 +37,15 @@ double log_cost_of_dropping(const Fit& fit, std::size_t effect) {
     sizes.push_back(fit.layout.find_shared(member, p));
     apart.push_back(fit.shared[sizes.back()] - parameters[p].none);
   }
+  constexpr double kNever = std::numeric_limits<double>::infinity();
+  for (const Index held : fit.held)
+    if (std::count(sizes.begin(), sizes.end(), held) > 0) return kNever;
   const auto blocks = linearise(*fit.likelihood, fit, {});
-  if (sizes.empty() || blocks.empty()) return std::numeric_limits<double>::infinity();
-  const Eigen::MatrixXd covariance = solve_about(fit, blocks, {}, sizes).covariance(sizes, sizes);
+  if (sizes.empty() || blocks.empty()) return kNever;
+  const ArrowSolution solution = solve_about(fit, blocks, {}, sizes);
+  if (!solution.valid) return kNever;
   const auto d = Eigen::Map<const VectorXd>(apart.data(), static_cast<Index>(apart.size()));
-  return 0.5 * d.dot(covariance.ldlt().solve(d));
+  return 0.5 * d.dot(solution.covariance(sizes, sizes).ldlt().solve(d));
 }
 
 }  // namespace
@@ -176,14 +180,15 @@ void Search::expand(const ModelSet& set) {
       add(less.fit, proposals_->beside(Marginal(*likelihood_, less.fit, {}), rules_.starts),
           here.log_without_curve + change + less.log_change, Beside::less_spread);
   }
-  // Smaller sets, from which swaps come. One that was visited already once more, if by the linear model it is likelier
-  // from here: then it was in a local minimum.
+  // Smaller sets, from which swaps come. One that was visited already once more, if from here it is likelier even
+  // without what it gains by having fewer parameters: then it was in a local minimum.
   for (const std::size_t effect : set) {
     const ModelSet smaller = without(set, effect);
     const Fit& fit = here.at->fit;
     if (const auto known = visited_.find(smaller); known != visited_.end()) {
       const double promised = here.log_without_curve - log_cost_of_dropping(fit, effect) - rules_.log_prior_odds_effect;
-      if (known->second.log_posterior() > promised - rules_.optimism || !refitted_.insert(smaller).second) continue;
+      if (known->second.log_without_curve > promised - rules_.optimism || !from_larger_.insert(smaller).second)
+        continue;
     }
     Job job{.set = smaller,
             .layout = Layout(system_, smaller),
@@ -236,6 +241,7 @@ void Search::run(const Readings& outliers, const Noise& noise, const Progress& p
     expanded_.clear();
     promised_.clear();
     refitted_.clear();
+    from_larger_.clear();
     look_around();
     const Fit& likeliest = likeliest_fit();
     if (near(likeliest.likelihood->noise(), reference) && likeliest.layout.set() == about.layout.set()) break;

@@ -88,7 +88,7 @@ class Search {
   std::unique_ptr<const Discrepancy> discrepancy_;
   std::unique_ptr<const Proposals> proposals_;
   std::map<ModelSet, Visited> visited_;
-  std::set<ModelSet> expanded_, refitted_;
+  std::set<ModelSet> expanded_, refitted_, from_larger_;  // once a round each
   Progress progress_;
   std::map<ModelSet, double> promised_;  // log posterior of sets that were not fitted
   std::size_t fits_ = 0;

@@ -36,23 +36,36 @@ Decision decide(const Search& search, const Posterior& posterior) {
   if (something > 0.5)
     for (const auto& [name, probability] : posterior.inclusion)
       if (probability > 0.5 * something) names.insert(name);
-  // The likeliest of the sets that hold these names, or as many of them as any: it has another effect where that there
-  // is one is likelier than not, and rivals share it. By their shares with a discrepancy, or by those without.
+  // Of the sets that hold these names, or as many of them as any: those with another effect if that there is one is
+  // likelier than not, else that without, and of these the likeliest. With a discrepancy that counts, or without one.
   const auto likeliest = [&](bool with_discrepancy) {
-    const inference::Visited* best = nullptr;
-    std::ptrdiff_t most = 0;
-    double highest = 0;
+    struct Candidate {
+      const inference::Visited* one;
+      std::size_t held;
+      bool more;
+      double probability;
+    };
+    std::vector<Candidate> all;
     for (const auto& share : posterior.sets) {
       const auto& one = search.visited().at(share.set);
       if (with_discrepancy ? !one.at->fit_with_curve : share.set.empty()) continue;
-      const auto held = names_of(search, share.set);
-      const auto count =
-          std::count_if(names.begin(), names.end(), [&](const auto& name) { return held.contains(name); });
-      const double probability = with_discrepancy ? share.with_discrepancy : share.probability - share.with_discrepancy;
-      if (!best || count > most || (count == most && probability > highest))
-        best = &one, most = count, highest = probability;
+      const auto own = names_of(search, share.set);
+      const auto held = static_cast<std::size_t>(
+          std::count_if(names.begin(), names.end(), [&](const auto& name) { return own.contains(name); }));
+      all.push_back(
+          {&one, held, own.size() > held, with_discrepancy ? share.unknown : share.probability - share.unknown});
     }
-    return best;
+    std::size_t most = 0;
+    for (const Candidate& one : all) most = std::max(most, one.held);
+    std::erase_if(all, [&](const Candidate& one) { return one.held < most; });
+    double more = 0;
+    for (const Candidate& one : all)
+      if (one.more) more += one.probability;
+    const bool another = more > 0.5 * something || std::ranges::all_of(all, &Candidate::more);
+    const Candidate* best = nullptr;
+    for (const Candidate& one : all)
+      if (one.more == another && (!best || one.probability > best->probability)) best = &one;
+    return best ? best->one : nullptr;
   };
   bool unknown = something > 0.5 && posterior.discrepancy > 0.5 * something;
   const inference::Visited* best = something > 0.5 ? likeliest(unknown) : nullptr;

@@ -3,8 +3,8 @@
 //
 //   nothing missing   neither an effect nor a discrepancy of any consequence is likelier than not
 //   otherwise, given that something is missing: it is unknown where a discrepancy of consequence is likelier than not,
-//   and what is named is the likeliest of the sets that hold every effect which is likelier than not. Where rivals
-//   share the probability of one effect more, the likeliest of them is named, the others beside it.
+//   and every effect is named which is. Where one more is likelier than not, though rivals share its probability, the
+//   likeliest of the sets with one more is named, and the rivals beside it.
 #include "diagnosis/inference/posterior.hpp"
 #include "diagnosis/mismatch/findings.hpp"
 #include "diagnosis/needle/needle_system.hpp"

@@ -209,6 +209,8 @@ Findings diagnose(const RecordedCase& recorded, const model::NeedleParameters& m
   const ChosenModel base = model_of(search, base_fit, 0);
   findings.effects = found_effects(system, search, posterior, unknowns, decision.model);
   findings.discrepancies = discrepancies_of(system, search, decision.model);
+  if (!findings.discrepancies.empty())
+    findings.discrepancy_sigmas = visible_sigmas_of_curve(search, *decision.model.fit);
   findings.proposals = propose_forms(system, search, decision.model);
   findings.variation = variation_of(search, unknowns);
   findings.insertions = insertions_of(system, search, decision.model);

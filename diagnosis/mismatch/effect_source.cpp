@@ -288,7 +288,9 @@ EffectSource effect_source(const ProposedForm& p) {
 
 std::optional<EffectSource> proposed_effect(const Findings& findings) {
   if (findings.verdict != Verdict::unknown_effect || findings.proposals.empty()) return std::nullopt;
-  return effect_source(findings.proposals.front());
+  return effect_source(
+      *std::max_element(findings.proposals.begin(), findings.proposals.end(),
+                        [](const auto& a, const auto& b) { return a.log_bayes_factor < b.log_bayes_factor; }));
 }
 
 }  // namespace bevel::diagnosis

@@ -186,7 +186,7 @@ Imagined imagined(const inference::Fit& fit, const ChosenModel& model) {
   for (std::size_t i = 0; i < fit.layout.local().size(); ++i)
     if (!fit.layout.is_scanned(i)) {
       const auto group = static_cast<Index>(fit.layout.system().nuisances()[i].group);
-      const double sd = std::max(fit.scales.nuisance_sd[group], 1e-9);
+      const double sd = std::max(fit.scales.nuisance_sd[group], inference::kNone_sd);
       out.local_precision[static_cast<Index>(i)] = 1 / (sd * sd);
     }
   return out;

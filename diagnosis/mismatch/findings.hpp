@@ -230,6 +230,7 @@ struct Findings {
   std::vector<Explanation> explanations;  // the likeliest first
   double nothing_probability = 0;         // of no effect, and no discrepancy of any consequence
   double discrepancy_probability = 0;     // of one of consequence
+  double discrepancy_sigmas = 0;          // of the one in the model, all its curves: visible standard deviations
   double not_visited = 0;                 // share of sets that were judged by the linear model alone
   std::vector<Location> where;
   inference::Noise noise;

@@ -51,8 +51,8 @@ TEST_F(Decide, OfRivalsOfWhichNoneIsLikelierThanNotTheLikeliest) {
   Posterior posterior;
   posterior.nothing = 0.1;
   posterior.inclusion = {{"dry_friction", 0.42}, {"sensor_scale", 0.44}};
-  // With a discrepancy the first is likelier; the model that is written has none.
-  posterior.sets = {{{Pendulum::kDryFriction}, 0.42, 0.3}, {{Pendulum::kSensorScale}, 0.41, 0.0}};
+  // With a discrepancy that counts the first is likelier; the model that is written has none.
+  posterior.sets = {{{Pendulum::kDryFriction}, 0.42, 0.3, 0.3}, {{Pendulum::kSensorScale}, 0.41, 0.0}};
   const Decision decision = decide(search, posterior);
   EXPECT_EQ(decision.verdict, Verdict::effects_found);
   EXPECT_EQ(set_of(decision), ModelSet{Pendulum::kSensorScale});
@@ -61,11 +61,21 @@ TEST_F(Decide, OfRivalsOfWhichNoneIsLikelierThanNotTheLikeliest) {
 // That there is a second effect is certain, which of two is not: leaving it out would say what is known to be wrong.
 TEST_F(Decide, ASecondEffectThatRivalsShareIsNamed) {
   const ModelSet with_scale{Pendulum::kDryFriction, Pendulum::kSensorScale};
-  ASSERT_TRUE(search.visited().contains(with_scale));
+  const ModelSet with_knock{Pendulum::kDryFriction, Pendulum::kKnock};
+  ASSERT_TRUE(search.visited().contains(with_scale) && search.visited().contains(with_knock));
   Posterior posterior;
-  posterior.inclusion = {{"dry_friction", 1.0}, {"sensor_scale", 0.48}, {"another", 0.45}};
-  posterior.sets = {{with_scale, 0.48, 0.0}, {{Pendulum::kDryFriction}, 0.07, 0.0}};
+  posterior.inclusion = {{"dry_friction", 1.0}, {"sensor_scale", 0.48}, {"knock", 0.45}};
+  posterior.sets = {{with_scale, 0.48, 0.0}, {with_knock, 0.45, 0.0}, {{Pendulum::kDryFriction}, 0.07, 0.0}};
   EXPECT_EQ(set_of(decide(search, posterior)), with_scale);
+  // The likeliest set has a second effect, that there is one is not likelier than not.
+  posterior.nothing = 0.19;
+  posterior.inclusion = {{"dry_friction", 0.61}, {"sensor_scale", 0.31}};
+  posterior.sets = {{with_scale, 0.31, 0.0}, {{Pendulum::kDryFriction}, 0.30, 0.0}};
+  EXPECT_EQ(set_of(decide(search, posterior)), ModelSet{Pendulum::kDryFriction});
+  // Beside a discrepancy that is no more than an error of form it is as much there.
+  posterior.nothing = 0;
+  posterior.sets = {{with_scale, 0.35, 0.0}, {{Pendulum::kDryFriction}, 0.65, 0.5}};
+  EXPECT_EQ(set_of(decide(search, posterior)), ModelSet{Pendulum::kDryFriction});
   // Where one effect is the likeliest explanation, there is one.
   posterior.sets = {{{Pendulum::kDryFriction}, 0.55, 0.0}, {with_scale, 0.45, 0.0}};
   EXPECT_EQ(set_of(decide(search, posterior)), ModelSet{Pendulum::kDryFriction});
@@ -75,7 +85,7 @@ TEST_F(Decide, UnknownCarriesACurveAndTheNamesThatStandBesideIt) {
   Posterior posterior;
   posterior.nothing = 0.05;
   posterior.discrepancy = 0.8;
-  posterior.sets = {{{}, 0.95, 0.9}, {{Pendulum::kDryFriction}, 0.05, 0.0}};
+  posterior.sets = {{{}, 0.95, 0.9, 0.8}, {{Pendulum::kDryFriction}, 0.05, 0.0}};
   const Decision decision = decide(search, posterior);
   EXPECT_EQ(decision.verdict, Verdict::unknown_effect);
   ASSERT_EQ(decision.model.fit->scales.curves.size(), 1U);

@@ -264,6 +264,7 @@ std::string verdict_json(const Findings& f, const Provenance& made_of) {
   j["steered"] = steered_json(f);
   j["posterior"] = {{"nothing_missing", figure(f.nothing_probability)},
                     {"discrepancy", figure(f.discrepancy_probability)},
+                    {"discrepancy_visible_sigmas", figure(f.discrepancy_sigmas)},
                     {"not_fitted", figure(f.not_visited)},
                     {"explanations", as_json(f.explanations)}};
   j["variation"] = as_json(f.variation);
