@@ -95,8 +95,8 @@ std::vector<Claim> claims_of(const Search& search, const GeneratorSystem& system
 }  // namespace
 
 double Judged::log_posterior() const {
-  const double both[] = {log_without_curve, log_with_curve};
-  return valid ? inference::log_sum(both) : kNever;
+  // One of them, as each explanation that it is compared with is one.
+  return valid ? std::max(log_without_curve, log_with_curve) : kNever;
 }
 
 std::vector<Claim> claims_of(const GeneratorSystem& system, const proof::Truth& truth) {
