@@ -117,7 +117,6 @@ Vector3d NeedleFilter::drawn_back_tip(const FilterState& state, Eigen::Matrix<do
   by_state.col(kSize - 1) = released * (state.pose.R * middle.by_bending);
   return state.pose.p_mm + state.pose.R * aside_mm;
 }
-template Vector3d NeedleFilter::drawn_back_tip<9>(const FilterState&, Eigen::Matrix<double, 3, 9>&) const;
 template Vector3d NeedleFilter::drawn_back_tip<10>(const FilterState&, Eigen::Matrix<double, 3, 10>&) const;
 
 }  // namespace bevel::estimator

@@ -242,11 +242,12 @@ Update NeedleFilter::update_sized(FilterState& state, const model::TipMeasuremen
     seen.first_error = measurement.camera == 0 ? 0 : 3;
   }
   const auto apply = [&]() -> Update {
-    if (kSize == 10 && stiff_ && pressing(state) < 1) {
-      Eigen::Matrix<double, 3, kSize> by_state;
-      const Eigen::Vector3d at_mm = drawn_back_tip(state, by_state);
-      return update_seen<kSize, kSize>(state, by_state, seen, measurement.position_mm - at_mm, gate_);
-    }
+    if constexpr (kOwn<kSize> == 10)
+      if (stiff_ && pressing(state) < 1) {
+        Eigen::Matrix<double, 3, 10> by_state;
+        const Eigen::Vector3d at_mm = drawn_back_tip(state, by_state);
+        return update_seen<kSize, 10>(state, by_state, seen, measurement.position_mm - at_mm, gate_);
+      }
     if (config_.effects.empty())
       return update_seen<kSize, 3>(state, state.pose.R, seen, measurement.position_mm - state.pose.p_mm, gate_);
     Eigen::Vector3d blur_mm2;
