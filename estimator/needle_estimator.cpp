@@ -105,7 +105,9 @@ void NeedleEstimator::remember(const Node& before, const Node& node) {
   if (step.measured) {
     step.position_mm = node.measurement.position_mm;
     double& since = forgotten_since_[node.camera == 0 ? 0 : 1];
-    step.information_per_mm2 = filter_.worth(since) * node.measurement.information_per_mm2;
+    const double worth = filter_.worth(since);
+    step.measured = worth > 0;  // nothing has been forgotten since: it is the same reading again
+    step.information_per_mm2 = worth * node.measurement.information_per_mm2;
     since = 0;
   }
   if (node.kind == Kind::heading && node.update.accepted)
