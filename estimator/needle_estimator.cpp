@@ -84,7 +84,7 @@ void NeedleEstimator::remember(const Node& before, const Node& node) {
   if (node.state.channel.drawn_back_mm() > kDrawnBack_mm) {
     if (!past_waits_) past_.close(before.state, filter_);
     if (!past_waits_) left_ = {before.insertion_mm, before.rotation_rad};
-    past_begins_anew_ = reset || (past_waits_ && past_begins_anew_);
+    past_begins_anew_ = first || reset || (past_waits_ && past_begins_anew_);
     past_waits_ = true;
     return;
   }
