@@ -157,7 +157,7 @@ bool NeedleFilter::mean_cutting(FilterState& state, double insertion_mm, double 
 }
 
 // Part by part: what was cut before is passed through, and the rest is cut. Turning in the channel turns the bevel
-// alone, so that it does not matter when.
+// alone: it is turned after the part, which begins with the bevel as the channel has it so far.
 template <class Cutting>
 void NeedleFilter::follow(FilterState& state, double insertion_mm, double rotation_rad, bool with_covariance,
                           const Cutting& cutting) const {
@@ -176,8 +176,11 @@ void NeedleFilter::follow(FilterState& state, double insertion_mm, double rotati
       cutting(by_mm, by_rad);
       outside = outside || state.outside_model;
     } else {
-      if (by_rad != 0) cutting(0, by_rad);
       outside = !draw_through(state, part, with_covariance) || outside;
+      if (by_rad != 0) {
+        cutting(0, by_rad);
+        outside = outside || state.outside_model;
+      }
     }
     channel.pass(part, by_rad);
     first = false;
