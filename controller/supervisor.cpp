@@ -45,6 +45,8 @@ void Supervisor::request(Request request, const std::optional<Target>& target, s
       if (!target_ || (status_.state == State::armed && !axes_were_enabled_ && !see_enabled(now_utime))) return;
       if (!check_inputs(now_utime)) return;
       if (!check_axes()) return;
+      if (front_is_lost())
+        return stop(Reason::channel_unknown, front_->insertion_mm - actuator_->insertion_mm, "mm behind its end");
       if (status_.state == State::hold && !check_reach(now_utime)) return;
       reset_count_ = needle_state_->reset_count;
       arcs_.restart();

@@ -107,6 +107,7 @@ class Supervisor {
   model::MotionCommand retract(model::MotionCommand command, double dt_s);
   void note_front();
   double drawn_back_mm() const;
+  bool front_is_lost() const;
   model::Pose cutting_tip() const;
   bool check_reset();
   model::MotionCommand run(model::MotionCommand command, const Rates& wanted, double dt_s);
