@@ -76,6 +76,8 @@ const char* to_string(Reason reason) {
       return "only the law by arcs goes round obstacles and through way-points";
     case Reason::retraction_refused:
       return "there is no such depth behind the tip to retract to";
+    case Reason::channel_unknown:
+      return "drawn back in a channel whose end is not known since a reset";
     case Reason::ending:
       return "told to end";
   }

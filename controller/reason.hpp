@@ -32,6 +32,7 @@ enum class Reason {
   way_point_unreachable,  // refused before insertion, or found on the way; by how much the reach falls short
   way_points_too_many,
   retraction_refused,  // the depth that was told is none behind the tip
+  channel_unknown,     // drawn back, and the estimator declared a reset since it was at the end of its channel
   law_without_path,    // way-points or obstacles with a law that does not follow a path
 };
 const char* to_string(State state);

@@ -45,6 +45,9 @@ void Supervisor::request(Request request, const std::optional<Target>& target, s
       if (!target_ || (status_.state == State::armed && !axes_were_enabled_ && !see_enabled(now_utime))) return;
       if (!check_inputs(now_utime)) return;
       if (!check_axes()) return;
+      if (front_is_lost())
+        return stop(Reason::channel_unknown, front_->insertion_mm - actuator_->insertion_mm, "mm behind its end");
+      if (status_.state == State::hold && !check_reach(now_utime)) return;
       reset_count_ = needle_state_->reset_count;
       arcs_.restart();
       forget_way_points();
@@ -53,13 +56,7 @@ void Supervisor::request(Request request, const std::optional<Target>& target, s
     case Request::follow: {
       if (!in_motion_states() || !target || !target->position_mm.allFinite() || !check_inputs(now_utime)) return;
       rendezvous_.observe(target->utime_or(now_utime), target->position_mm);
-      rendezvous_.plan(now_utime, to_go_mm(), config_.limits.insertion_rate_mm_s);
-      if (status_.state == State::retracting) return;  // it goes nowhere now; seen again when it is steered
-      if (route_.is_needed()) return;  // which looks at the whole path, in the next period
-      // A prediction that is hardly one yet is no reason.
-      const double miss_mm = predicted_miss_mm(rendezvous_.target_mm());
-      if (!(miss_mm - kTargetDeviations * rendezvous_.target_sd_mm() <= config_.safety.target_miss_max_mm))
-        stop(Reason::target_unreachable, miss_mm, "mm predicted miss");
+      if (status_.state != State::retracting) check_reach(now_utime);  // which goes nowhere now; seen when it starts
       return;
     }
     case Request::way_point:
@@ -143,6 +140,17 @@ bool Supervisor::check_inputs(std::int64_t now_utime) {
   if (!(beyond <= safety.position_sd_mm + kDeviations * std::sqrt(n.position_variance_mm2)))
     return refuse(Reason::off_the_axes, beyond, "mm too far");
   return true;
+}
+
+// Of the target where it will be; with a route the whole path is looked at, in the next period.
+bool Supervisor::check_reach(std::int64_t now_utime) {
+  rendezvous_.plan(now_utime, to_go_mm(), config_.limits.insertion_rate_mm_s);
+  if (route_.is_needed()) return true;
+  // A prediction that is hardly one yet is no reason.
+  const double miss_mm = predicted_miss_mm(rendezvous_.target_mm());
+  if (miss_mm - kTargetDeviations * rendezvous_.target_sd_mm() <= config_.safety.target_miss_max_mm) return true;
+  stop(Reason::target_unreachable, miss_mm, "mm predicted miss");
+  return false;
 }
 
 bool Supervisor::all_enabled() const {

@@ -18,15 +18,7 @@
 
 namespace bevel::controller {
 
-enum class Request : std::int32_t {
-  stop = 0,
-  arm = 1,
-  start = 2,
-  hold = 3,
-  follow = 6,
-  way_point = 7,
-  retract = 8
-};
+enum class Request : std::int32_t { stop = 0, arm = 1, start = 2, hold = 3, follow = 6, way_point = 7, retract = 8 };
 
 // What the controller needs of NEEDLE_STATE.
 struct NeedleView {
@@ -76,13 +68,13 @@ class Supervisor {
 
   // An operator's word. arm: takes the target and leaves off, hold or stopped; refused (reason latched) when out of
   // reach. start: from armed or hold to steering, once both axes are enabled. hold: comes to rest within the limits of
-  // acceleration, may go on. stop: latched. follow: where the target is now, in motion too; it is aimed at
-  // where it will be (rendezvous.hpp), and stops the needle when that is out of reach. way_point: to be passed on the
-  // way to the target that is armed next, in the order told, within its tolerance (0: 1 mm); a start and a stop forget
-  // those told so far. retract: draws the needle back until no more of it is inserted than target's z says (mm, by the
-  // axis; 0: to the entry), then holds; from hold, armed or steering, once what moves has come to rest by the ramp, at
-  // its own rate, with the bevel at rest: the cable is not unwound. A depth that is not behind the tip is a latched
-  // stop.
+  // acceleration, may go on, if the target is still within reach and it is known where the needle cuts. stop: latched.
+  // follow: where the target is now, in motion too; it is aimed at where it will be (rendezvous.hpp), and stops the
+  // needle when that is out of reach. way_point: to be passed on the way to the target that is armed next, in the order
+  // told, within its tolerance (0: 1 mm); a start and a stop forget those told so far. retract: draws the needle back
+  // until no more of it is inserted than target's z says (mm, by the axis; 0: to the entry), then holds; from hold,
+  // armed or steering, once what moves has come to rest by the ramp, at its own rate, with the bevel at rest: the cable
+  // is not unwound. A depth that is not behind the tip is a latched stop.
   void request(Request request, const std::optional<Target>& target, std::int64_t now_utime);
   // Latches what others found: overrun, input_refused, ending.
   void report(Reason reason) { stop(reason, 0, ""); }
@@ -115,6 +107,7 @@ class Supervisor {
   model::MotionCommand retract(model::MotionCommand command, double dt_s);
   void note_front();
   double drawn_back_mm() const;
+  bool front_is_lost() const;
   model::Pose cutting_tip() const;
   bool check_reset();
   model::MotionCommand run(model::MotionCommand command, const Rates& wanted, double dt_s);
@@ -125,11 +118,10 @@ class Supervisor {
   double to_go_mm() const;
   bool by_arcs() const { return config_.law != Law::spin; }
   double predicted_miss_mm(const Eigen::Vector3d& target_mm) const;
+  bool check_reach(std::int64_t now_utime);
   model::NeedleParameters needle_now() const;
   ShaftConfig shaft_now() const;
-  bool in_motion_states() const {
-    return status_.state == State::armed || status_.state == State::hold || moves();
-  }
+  bool in_motion_states() const { return status_.state == State::armed || status_.state == State::hold || moves(); }
 
   ControllerConfig config_;
   model::NeedleParameters needle_;

@@ -11,6 +11,7 @@ namespace {
 constexpr double kBrakingShare = 0.5;  // of the acceleration, as at the closest approach
 constexpr double kThere_mm = 0.05;     // less than what the ramp needs from the rate at which it gets there
 constexpr double kAtFront_mm = 0.05;   // less bends by nothing
+constexpr double kOut_mm = 1.0;        // not inserted: within what an entry point is met by
 }  // namespace
 
 void Supervisor::start_retraction(const std::optional<Target>& target, std::int64_t now_utime) {
@@ -39,8 +40,10 @@ model::MotionCommand Supervisor::retract(model::MotionCommand command, double dt
   return run(command, wanted, dt_s);
 }
 
+// The deepest insertion stays one whatever the estimator declares; only where its end lies is not known after a reset.
 void Supervisor::note_front() {
-  if (front_ && front_->reset_count == needle_state_->reset_count && actuator_->insertion_mm < front_->insertion_mm)
+  if (front_ && actuator_->insertion_mm < front_->insertion_mm &&
+      (front_->reset_count == needle_state_->reset_count || front_is_lost()))
     return;
   front_ = {actuator_->insertion_mm, actuator_->rotation_rad, needle_state_->pose, needle_state_->reset_count};
 }
@@ -49,6 +52,12 @@ double Supervisor::drawn_back_mm() const {
   if (!config_.through_channel || !front_ || front_->reset_count != needle_state_->reset_count) return 0;
   const double back_mm = front_->insertion_mm - actuator_->insertion_mm;
   return back_mm > kAtFront_mm ? back_mm : 0;
+}
+
+// Until the axis is at the end again, or all the way out.
+bool Supervisor::front_is_lost() const {
+  return config_.through_channel && front_ && front_->reset_count != needle_state_->reset_count &&
+         front_->insertion_mm - actuator_->insertion_mm > kAtFront_mm && actuator_->insertion_mm > kOut_mm;
 }
 
 // From where the law's arcs start: the tip, or where it will come out of its channel, with the bevel as it stands now.

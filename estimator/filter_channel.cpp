@@ -96,9 +96,11 @@ bool NeedleFilter::draw_through(FilterState& state, const Channel::Part& part, b
   if (ten_states_) {
     Covariance<10> P = covariance_of<10>(state);
     propagate<10>(P, motions.by_pose, motions.by_needle);
+    if (coloured_) carry_shared<10>(state, motions.by_pose, motions.by_needle);
     P.diagonal() += process_variance<10>(P, part.insertion_mm, 0);
     set_covariance<10>(state, P);
   } else {
+    if (coloured_) carry_shared<9>(state, motions.by_pose, motions.by_needle.leftCols<3>());
     propagate<9>(state.covariance, motions.by_pose, motions.by_needle.leftCols<3>());
     state.covariance.diagonal() += process_variance<9>(state.covariance, part.insertion_mm, 0);
   }
@@ -117,7 +119,6 @@ Vector3d NeedleFilter::drawn_back_tip(const FilterState& state, Eigen::Matrix<do
   by_state.col(kSize - 1) = released * (state.pose.R * middle.by_bending);
   return state.pose.p_mm + state.pose.R * aside_mm;
 }
-template Vector3d NeedleFilter::drawn_back_tip<9>(const FilterState&, Eigen::Matrix<double, 3, 9>&) const;
 template Vector3d NeedleFilter::drawn_back_tip<10>(const FilterState&, Eigen::Matrix<double, 3, 10>&) const;
 
 }  // namespace bevel::estimator

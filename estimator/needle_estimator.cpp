@@ -84,7 +84,7 @@ void NeedleEstimator::remember(const Node& before, const Node& node) {
   if (node.state.channel.drawn_back_mm() > kDrawnBack_mm) {
     if (!past_waits_) past_.close(before.state, filter_);
     if (!past_waits_) left_ = {before.insertion_mm, before.rotation_rad};
-    past_begins_anew_ = reset || (past_waits_ && past_begins_anew_);
+    past_begins_anew_ = first || reset || (past_waits_ && past_begins_anew_);
     past_waits_ = true;
     return;
   }
@@ -105,7 +105,9 @@ void NeedleEstimator::remember(const Node& before, const Node& node) {
   if (step.measured) {
     step.position_mm = node.measurement.position_mm;
     double& since = forgotten_since_[node.camera == 0 ? 0 : 1];
-    step.information_per_mm2 = filter_.worth(since) * node.measurement.information_per_mm2;
+    const double worth = filter_.worth(since);
+    step.measured = worth > 0;  // nothing has been forgotten since: it is the same reading again
+    step.information_per_mm2 = worth * node.measurement.information_per_mm2;
     since = 0;
   }
   if (node.kind == Kind::heading && node.update.accepted)

@@ -157,7 +157,7 @@ bool NeedleFilter::mean_cutting(FilterState& state, double insertion_mm, double 
 }
 
 // Part by part: what was cut before is passed through, and the rest is cut. Turning in the channel turns the bevel
-// alone, so that it does not matter when.
+// alone: it is turned after the part, which begins with the bevel as the channel has it so far.
 template <class Cutting>
 void NeedleFilter::follow(FilterState& state, double insertion_mm, double rotation_rad, bool with_covariance,
                           const Cutting& cutting) const {
@@ -176,8 +176,11 @@ void NeedleFilter::follow(FilterState& state, double insertion_mm, double rotati
       cutting(by_mm, by_rad);
       outside = outside || state.outside_model;
     } else {
-      if (by_rad != 0) cutting(0, by_rad);
       outside = !draw_through(state, part, with_covariance) || outside;
+      if (by_rad != 0) {
+        cutting(0, by_rad);
+        outside = outside || state.outside_model;
+      }
     }
     channel.pass(part, by_rad);
     first = false;
@@ -242,11 +245,12 @@ Update NeedleFilter::update_sized(FilterState& state, const model::TipMeasuremen
     seen.first_error = measurement.camera == 0 ? 0 : 3;
   }
   const auto apply = [&]() -> Update {
-    if (kSize == 10 && stiff_ && pressing(state) < 1) {
-      Eigen::Matrix<double, 3, kSize> by_state;
-      const Eigen::Vector3d at_mm = drawn_back_tip(state, by_state);
-      return update_seen<kSize, kSize>(state, by_state, seen, measurement.position_mm - at_mm, gate_);
-    }
+    if constexpr (kOwn<kSize> == 10)
+      if (stiff_ && pressing(state) < 1) {
+        Eigen::Matrix<double, 3, 10> by_state;
+        const Eigen::Vector3d at_mm = drawn_back_tip(state, by_state);
+        return update_seen<kSize, 10>(state, by_state, seen, measurement.position_mm - at_mm, gate_);
+      }
     if (config_.effects.empty())
       return update_seen<kSize, 3>(state, state.pose.R, seen, measurement.position_mm - state.pose.p_mm, gate_);
     Eigen::Vector3d blur_mm2;

@@ -26,6 +26,7 @@ double bilinear(const cv::Mat& m, double x, double y) {
 }
 
 constexpr int kSideHalf_px = 2;
+constexpr int kNextSide_px = 2 * kSideHalf_px + 1;  // to the middle of the farther window
 
 /// What the needle is seen against: on each side two windows of five pixels beside each other.
 struct Beside {
@@ -38,8 +39,8 @@ Beside beside(const GrayAt& gray_at, int side_px) {
     for (int k = -kSideHalf_px; k <= kSideHalf_px; ++k) sum += gray_at(middle + k);
     return sum / (2 * kSideHalf_px + 1);
   };
-  constexpr int next = 2 * kSideHalf_px + 1;
-  return {{mean_about(-side_px), mean_about(-side_px - next)}, {mean_about(side_px), mean_about(side_px + next)}};
+  return {{mean_about(-side_px), mean_about(-side_px - kNextSide_px)},
+          {mean_about(side_px), mean_about(side_px + kNextSide_px)}};
 }
 
 /// The background under the needle: the straight line between the lighter window of each side by `typical`. What is
@@ -48,10 +49,10 @@ struct Background {
   double middle_gray = 0.0, gray_per_px = 0.0;
 };
 Background background(const Beside& here, const Beside& typical, int side_px) {
-  constexpr int next = 2 * kSideHalf_px + 1;
   const size_t l = typical.left_gray[1] > typical.left_gray[0] ? 1 : 0;
   const size_t r = typical.right_gray[1] > typical.right_gray[0] ? 1 : 0;
-  const double left_px = -side_px - next * static_cast<double>(l), right_px = side_px + next * static_cast<double>(r);
+  const double left_px = -side_px - kNextSide_px * static_cast<double>(l),
+               right_px = side_px + kNextSide_px * static_cast<double>(r);
   const double slope = (here.right_gray[r] - here.left_gray[l]) / (right_px - left_px);
   return {here.left_gray[l] - slope * left_px, slope};
 }
@@ -168,7 +169,7 @@ Centreline fit_centreline(const std::vector<cv::Point2d>& centres, const Centrel
 EndProfile profile_along(const cv::Mat& patch, const Centreline& line, double row, int from_px, int to_px, int reach_px,
                          const RidgeScale& scale) {
   const int side = scale.offset_px + 1;
-  const double margin = side + kSideHalf_px + 1.0;
+  const double margin = side + kNextSide_px + kSideHalf_px + 1.0;
   EndProfile profile;
   std::vector<Beside> sides;
   cv::Point2d p = line.along(row, from_px);

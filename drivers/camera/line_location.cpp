@@ -41,14 +41,17 @@ class Across {
     return covariance;
   }
 
-  /// Variance that such noise gives the offset. A shade that is wider than the line gives little.
+  /// Variance that such noise gives the offset. A shade that is wider than the line gives little. An autocovariance
+  /// that is cut off need not be one, and a sum that is not positive says nothing: then the noise is taken for white.
   double variance_px2(double offset_px, const Fit& fit, const std::vector<double>& covariance) const {
-    double sum = 0.0;
-    for (size_t lag = 0; lag < covariance.size(); ++lag)
+    double sum = 0.0, white = 0.0;
+    for (size_t lag = 0; lag < covariance.size(); ++lag) {
       for (int k = -reach_; k + static_cast<int>(lag) <= reach_; ++k)
         sum += (lag == 0 ? 1.0 : 2.0) * covariance[lag] * slope_of(k, offset_px) *
                slope_of(k + static_cast<int>(lag), offset_px);
-    return std::max(sum, 0.0) / (fit.height * fit.height * fit.slopes * fit.slopes);
+      if (lag == 0) white = sum;
+    }
+    return (sum > 0.0 ? sum : white) / (fit.height * fit.height * fit.slopes * fit.slopes);
   }
 
  private:

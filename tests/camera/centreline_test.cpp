@@ -46,6 +46,14 @@ TEST(ProfileAlong, ALineInOneWindowBesideTheNeedleChangesNothing) {
   }
 }
 
+// Two windows on each side of the needle are read: where the picture ends before that, there is no profile.
+TEST(ProfileAlong, EndsWhereThePictureDoes) {
+  const cv::Mat m = picture();
+  const int farthest = ridge_scale(kNeedle_px).offset_px + 1 + 7;
+  EXPECT_FALSE(profile(m.colRange(0, kMiddle_px + farthest + 2)).dark.empty());
+  EXPECT_TRUE(profile(m.colRange(0, kMiddle_px + farthest)).dark.empty());
+}
+
 TEST(ProfileAlong, BeyondTheNeedleIsNothing) {
   const EndProfile p = profile(picture());
   EXPECT_NEAR(p.dark.front(), 7.0 * 60.0, 15.0);

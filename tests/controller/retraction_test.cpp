@@ -22,6 +22,7 @@ class Retraction : public SupervisorTest {
     NeedleView v = view(now);
     v.pose.p_mm.z() = insertion_mm;
     v.unsure = unsure;
+    v.reset_count = resets;
     supervisor.set_needle(v);
     model::ActuatorState a = axes(now, last);
     a.insertion_mm = insertion_mm;
@@ -41,6 +42,7 @@ class Retraction : public SupervisorTest {
 
   double insertion_mm = 0, rotation_rad = 0;
   bool unsure = false;
+  std::int32_t resets = 0;
   std::function<void()> spoil;
 };
 
@@ -193,6 +195,64 @@ TEST_F(Retraction, NothingMovesByTheWordAlone) {
   supervisor.set_actuator(a);
   retract(10);
   EXPECT_EQ(state(), State::armed);
+}
+
+// The estimate is anew, the channel is not: where it ends is not known until the axis is there, or all the way out.
+TEST_F(Retraction, AfterAResetItIsNotSteeredInsideItsChannel) {
+  const auto start_from = [&](double by_hand_mm) {
+    supervisor.request(Request::stop, std::nullopt, now);
+    insertion_mm = by_hand_mm, last = {};
+    give();
+    supervisor.request(Request::arm, Target{{0, -1, 100}, 0}, now);
+    ASSERT_EQ(state(), State::armed) << to_string(supervisor.status().reason);
+    step();
+    supervisor.request(Request::start, std::nullopt, now);
+  };
+  config.through_channel = true;
+  for (const double known_mm : {60.5, 0.5}) {
+    supervisor = Supervisor(config, agar());
+    insertion_mm = rotation_rad = 0, last = {}, resets = 0;
+    steer_to_mm(60);
+    retract(20);
+    for (int i = 0; i < 2000 && state() == State::retracting; ++i) step();
+    for (int i = 0; i < 20; ++i) step();
+    ASSERT_EQ(state(), State::hold);
+    resets = 1;
+    for (int i = 0; i < 20; ++i) step();
+    supervisor.request(Request::start, std::nullopt, now);
+    EXPECT_EQ(supervisor.status().reason, Reason::channel_unknown) << to_string(supervisor.status().reason);
+    EXPECT_EQ(step().mode, 0);
+    start_from(45);
+    EXPECT_EQ(supervisor.status().reason, Reason::channel_unknown) << to_string(supervisor.status().reason);
+    // It may be drawn back further.
+    supervisor.request(Request::arm, Target{{0, -1, 100}, 0}, now);
+    retract(10);
+    EXPECT_LT(step().insertion_rate_mm_s, 0);
+    start_from(known_mm);
+    EXPECT_EQ(state(), State::steering) << to_string(supervisor.status().reason);
+  }
+}
+
+TEST_F(Retraction, ATargetThatWentOutOfReachMeanwhileIsRefusedWhenItStarts) {
+  for (const bool within : {true, false}) {
+    const Eigen::Vector3d seen_mm = within ? Eigen::Vector3d(3, -8, 100) : Eigen::Vector3d(0, 60, 60);
+    supervisor = Supervisor(config, agar());
+    insertion_mm = rotation_rad = 0, last = {};
+    steer_to_mm(40);
+    retract(20);
+    for (int i = 0; i < 2000 && state() == State::retracting; ++i) {
+      step();
+      if (i % 10 == 0) supervisor.request(Request::follow, Target{seen_mm, 0, now}, now);
+    }
+    for (int i = 0; i < 20; ++i) step();
+    ASSERT_EQ(state(), State::hold) << to_string(supervisor.status().reason);
+    supervisor.request(Request::start, std::nullopt, now);
+    EXPECT_EQ(state(), within ? State::steering : State::stopped);
+    EXPECT_EQ(supervisor.status().reason, within ? Reason::none : Reason::target_unreachable);
+    if (!within) {
+      EXPECT_GT(supervisor.status().value, config.safety.target_miss_max_mm);
+    }
+  }
 }
 
 // Drawn back by 40 mm a needle has, by its bend, three times the reach; its channel leaves it what it had.

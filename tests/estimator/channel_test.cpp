@@ -27,6 +27,25 @@ EstimatorConfig agar_config() {
 // for known too well by the past that is run again, drawn back or not.
 const std::vector<testing::Leg> kTurning{{35, 4}, {0, 3.14}, {20, -2}, {12, 2.2}, {0, -1.3}, {13, 0.5}};
 
+// Gives an estimator what is new in the data.
+class Feed {
+ public:
+  explicit Feed(NeedleEstimator& estimator) : estimator_(estimator) {}
+  FilterState operator()(const Insertion& data) {
+    for (; axes_ < data.actuators.size(); ++axes_) {
+      estimator_.add(data.actuators[axes_]);
+      for (; readings_ < data.measurements.size() && data.measurements[readings_].utime <= data.actuators[axes_].utime;
+           ++readings_)
+        estimator_.add(data.measurements[readings_]);
+    }
+    return estimator_.estimate(data.actuators.back().utime).state;
+  }
+
+ private:
+  NeedleEstimator& estimator_;
+  std::size_t axes_ = 0, readings_ = 0;
+};
+
 struct Far {
   double in_mm = 0, back_mm = 0, again_mm = 0;
 };
@@ -82,8 +101,7 @@ EstimatorConfig config_for(const model::BeamPlantConfig& beam) {
   config.prior.needle = rig::bicycle_of(beam);
   config.prior.curvature_sd_per_mm = 0.2 * config.prior.needle.curvature_per_mm;
   config.prior.lambda1_sd_per_rad = config.prior.lambda2_sd = 0;
-  config.prior.bending_mm =
-      std::pow(4 * beam.bending_stiffness_N_mm2 / (1e-3 * beam.foundation_modulus_kPa), 0.25);
+  config.prior.bending_mm = std::pow(4 * beam.bending_stiffness_N_mm2 / (1e-3 * beam.foundation_modulus_kPa), 0.25);
   config.prior.bending_sd_mm = 0.2 * config.prior.bending_mm;
   config.prior.guide_mm = beam.guide_gap_mm;
   return config;
@@ -172,6 +190,93 @@ TEST(Channel, ShuffledInputGivesTheSameStateBitForBit) {
   EXPECT_EQ(a.channel.inserted_mm(), b.channel.inserted_mm());
 }
 
+// In steps as coarse as a slow bus has: the path of a channel is the same however the bevel turns on the way.
+TEST(Channel, TurningOnTheWayIsTurningAtRest) {
+  const EstimatorConfig config = agar_config();
+  const NeedleFilter filter(config);
+  FilterState state = filter.initial();
+  rig::KinematicPlant plant(config.prior.needle, {}, 0, {}, rig::Cut::kept);
+  const auto step = [&](double mm, double rad) {
+    plant.advance(mm, rad, 0.1);
+    filter.predict(state, mm, rad);
+  };
+  testing::follow(kIn, step);
+  double far_mm = 0, turned_rad = 0;
+  for (const auto& [mm, rad] : {std::pair{-1.0, 0.08}, {1.0, -0.08}, {-1.0, -0.08}})
+    for (int i = 0; i < 30; ++i) {
+      step(mm, rad);
+      far_mm = std::max(far_mm, (state.pose.p_mm - plant.tip().p_mm).norm());
+      turned_rad = std::max(turned_rad, model::log_so3(state.pose.R.transpose() * plant.tip().R).norm());
+    }
+  EXPECT_LT(far_mm, 0.01);
+  EXPECT_LT(turned_rad, 1e-3);
+}
+
+// With errors that readings share, too: where the model has the tip, a reading of it is no news.
+TEST(Channel, OfAStiffShaftWithColouredReadings) {
+  EstimatorConfig white = config_for(beam_of(20, 0.5)), coloured = white;
+  coloured.reading = {.correlated_share = 0.8, .correlation_mm = 2};
+  for (const EstimatorConfig& config : {white, coloured}) {
+    const NeedleFilter filter(config);
+    FilterState state = filter.initial();
+    testing::follow(kIn, [&](double mm, double rad) { filter.predict(state, mm, rad); });
+    testing::follow(kBack, [&](double mm, double rad) { filter.predict(state, mm, rad); });
+    const Eigen::Vector3d tip_mm = filter.tip_pose(state).p_mm;
+    ASSERT_GT((tip_mm - state.pose.p_mm).norm(), 0.5);
+    model::TipMeasurement m;
+    m.utime = 1;
+    m.position_mm = tip_mm;
+    m.information_per_mm2 = Eigen::Vector3d(0, 100, 100).asDiagonal();
+    const Update update = filter.update(state, m);
+    EXPECT_TRUE(update.accepted);
+    EXPECT_LT(update.innovation.norm(), 1e-9) << config.reading.correlated_share;
+  }
+}
+
+// At rest every frame shows the same error, and the past that is run again learns nothing from it; it goes on.
+TEST(Channel, HalfATurnAtRestBetweenReadingsThatAreForgottenByInsertion) {
+  std::mt19937_64 rng(66);
+  EstimatorConfig config = agar_config();
+  config.reading = {.correlated_share = 0.8, .correlation_mm = 2};
+  rig::KinematicPlant plant(config.prior.needle, {}, 0, {}, rig::Cut::kept);
+  NeedleEstimator estimator(config, 256);
+  Feed feed(estimator);
+  Insertion data;
+  std::int64_t ran_again = 0;
+  for (int part = 0; part < 3; ++part) {
+    testing::record(plant, {{10, 1}, {0, 3.14}, {35, 2}}, 0.15, rng, data);
+    const FilterState state = feed(data);
+    EXPECT_TRUE(state.pose.p_mm.allFinite() && state.covariance.allFinite());
+    EXPECT_LT((state.pose.p_mm - data.final_pose.p_mm).norm(), 0.5);
+    const auto so_far = static_cast<std::int64_t>(estimator.counters().relinearised);
+    EXPECT_GT(so_far, ran_again) << part;
+    ran_again = so_far;
+  }
+}
+
+// The clock is set while the needle is drawn back: a past that began there would have the tip cut its way to the front.
+TEST(Channel, APastThatBeginsDrawnBackBeginsAnewAtTheFront) {
+  std::mt19937_64 rng(67);
+  const EstimatorConfig config = agar_config();
+  rig::KinematicPlant plant(config.prior.needle, {}, 0, {}, rig::Cut::kept);
+  NeedleEstimator estimator(config, 128);
+  Feed feed(estimator);
+  Insertion data;
+  for (const auto& legs : {kTurning, kBack}) testing::record(plant, legs, 0.15, rng, data);
+  feed(data);
+  const auto before = estimator.counters().relinearised;
+  estimator.shift_time(1'000'000);
+  for (auto& a : data.actuators) a.utime += 1'000'000;
+  for (auto& m : data.measurements) m.utime += 1'000'000;
+  testing::record(plant, {{0, 1.5}, {30, -0.6}, {45, 1}}, 0.15, rng, data);
+  const FilterState state = feed(data);
+  EXPECT_GT(estimator.counters().relinearised, before);
+  const double nees = testing::nees_of(state, data.final_pose, config.prior.needle);
+  std::cout << "NEES " << nees << ", off by " << (state.pose.p_mm - data.final_pose.p_mm).norm() << " mm, run again "
+            << estimator.counters().relinearised - before << " times\n";
+  EXPECT_LT(nees, boost::math::quantile(boost::math::chi_squared(9), 0.999));
+}
+
 TEST(Channel, AllocatesNothing) {
   std::mt19937_64 rng(63);
   for (const bool stiff : {false, true}) {
@@ -254,17 +359,11 @@ TEST(Channel, OfTissueThatIsAsUnevenAsTheFilterTakesIt) {
     WanderingNeedle plant(truth, testing::draw_start(prior, rng), config.process, rng);
     NeedleEstimator estimator(config);
     Insertion data;
-    std::size_t axes = 0, readings = 0;
+    Feed feed(estimator);
     const std::vector<std::vector<testing::Leg>> parts{kTurning, {{0, 1.2}, {-15, 0}}, {{-15, 0}}, kAgain};
     for (std::size_t part = 0; part < 4; ++part) {
       testing::record(plant, parts[part], 0.15, rng, data);
-      for (; axes < data.actuators.size(); ++axes) {
-        estimator.add(data.actuators[axes]);
-        for (; readings < data.measurements.size() && data.measurements[readings].utime <= data.actuators[axes].utime;
-             ++readings)
-          estimator.add(data.measurements[readings]);
-      }
-      const FilterState state = estimator.estimate(data.actuators.back().utime).state;
+      const FilterState state = feed(data);
       const Error<9> error = testing::error_of(state, data.final_pose, truth);
       const model::Vector6d pose = error.head<6>();
       nees.at(part) += pose.dot(state.covariance.topLeftCorner<6, 6>().ldlt().solve(pose)) / (6.0 * kRuns);
@@ -302,16 +401,10 @@ TEST(Channel, TwoHundredNeedlesAreDrawnBackConsistently) {
     rig::KinematicPlant plant(truth, {}, 0, own, rig::Cut::kept);
     NeedleEstimator estimator(config);
     Insertion data;
-    std::size_t axes = 0, readings = 0;
+    Feed feed(estimator);
     for (std::size_t part = 0; part < 3; ++part) {
       testing::record(plant, std::array{kTurning, kBack, kAgain}.at(part), 0.15, rng, data);
-      for (; axes < data.actuators.size(); ++axes) {
-        estimator.add(data.actuators[axes]);
-        for (; readings < data.measurements.size() && data.measurements[readings].utime <= data.actuators[axes].utime;
-             ++readings)
-          estimator.add(data.measurements[readings]);
-      }
-      const FilterState state = estimator.estimate(data.actuators.back().utime).state;
+      const FilterState state = feed(data);
       nees.at(part) += testing::nees_of(state, data.final_pose, truth) / (9.0 * kRuns);
       lateral_sd_mm.at(part) += std::sqrt(state.covariance(0, 0) + state.covariance(1, 1)) / kRuns;
     }

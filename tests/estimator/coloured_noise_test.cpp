@@ -89,38 +89,45 @@ TEST(ColouredNoise, IsForgottenByTimeInsertionAndTurning) {
   EXPECT_EQ(NeedleFilter(EstimatorConfig{}).worth(0.1), 1);
 }
 
-// The covariance of state and shared errors after a step, F by central differences of the mean.
+// The covariance of state and shared errors after a step, F by central differences of the mean: of a tip that cuts, and
+// of one that is drawn back through its channel.
 TEST(ColouredNoise, MovesWithTheStateByItsDerivative) {
   const ReadingNoise noise{.correlated_share = 0.7, .correlation_mm = 3, .correlation_rad = 1};
-  const NeedleFilter filter(told(testing::agar_config(), noise));
-  FilterState state = filter.initial();
-  std::mt19937_64 rng(63);
-  for (int i = 0; i < 200; ++i) {
-    filter.predict(state, 0.2, 0.03);
-    filter.update(state, testing::measure(state.pose.p_mm, i + 1, i, i % 2,
-                                          i % 2 ? Eigen::Vector3d(1, 0, 1) : Eigen::Vector3d(0, 1, 1), 0.1, rng));
+  for (const bool drawn_back : {false, true}) {
+    EstimatorConfig config = told(testing::agar_config(), noise);
+    config.through_channel = drawn_back;
+    if (drawn_back) config.midpoint_derivatives = false;
+    const double by_mm = drawn_back ? -1.3 : 0.3, by_rad = 0.04;
+    const NeedleFilter filter(config);
+    FilterState state = filter.initial();
+    std::mt19937_64 rng(63);
+    for (int i = 0; i < 200; ++i) {
+      filter.predict(state, drawn_back && i > 170 ? -0.2 : 0.2, 0.03);
+      filter.update(state, testing::measure(state.pose.p_mm, i + 1, i, i % 2,
+                                            i % 2 ? Eigen::Vector3d(1, 0, 1) : Eigen::Vector3d(0, 1, 1), 0.1, rng));
+    }
+    Error<9> scale;
+    scale << 1e-3, 1e-3, 1e-3, 1e-5, 1e-5, 1e-5, 1e-6, 1e-4, 1e-4;
+    const auto moved = [&](const Error<9>& by) {
+      FilterState s = state;
+      move<9>(s, by);
+      filter.predict_mean(s, by_mm, by_rad);
+      return s;
+    };
+    const FilterState middle = moved(Error<9>::Zero());
+    Matrix9d F;
+    for (int i = 0; i < 9; ++i) {
+      const Error<9> by = scale[i] * Error<9>::Unit(i);
+      F.col(i) = (difference<9>(middle, moved(by)) - difference<9>(middle, moved(-by))) / (2 * scale[i]);
+    }
+    const auto had = state.shared;
+    filter.predict(state, by_mm, by_rad);
+    const double left = std::exp(-std::abs(by_mm) / 3 - by_rad);
+    const Eigen::Matrix<double, 9, 6> expected = left * F * had.with_state.topRows<9>();
+    ASSERT_GT(expected.norm(), 1e-2);
+    EXPECT_LT((state.shared.with_state.topRows<9>() - expected).norm(), 1e-4 * expected.norm()) << drawn_back;
+    EXPECT_NEAR(state.shared.covariance(1, 1), left * left * had.covariance(1, 1) + 1 - left * left, 1e-12);
   }
-  Error<9> scale;
-  scale << 1e-3, 1e-3, 1e-3, 1e-5, 1e-5, 1e-5, 1e-6, 1e-4, 1e-4;
-  const auto moved = [&](const Error<9>& by) {
-    FilterState s = state;
-    move<9>(s, by);
-    filter.predict_mean(s, 0.3, 0.04);
-    return s;
-  };
-  const FilterState middle = moved(Error<9>::Zero());
-  Matrix9d F;
-  for (int i = 0; i < 9; ++i) {
-    const Error<9> by = scale[i] * Error<9>::Unit(i);
-    F.col(i) = (difference<9>(middle, moved(by)) - difference<9>(middle, moved(-by))) / (2 * scale[i]);
-  }
-  const auto had = state.shared;
-  filter.predict(state, 0.3, 0.04);
-  const double left = std::exp(-0.3 / 3 - 0.04);
-  const Eigen::Matrix<double, 9, 6> expected = left * F * had.with_state.topRows<9>();
-  ASSERT_GT(expected.norm(), 1e-2);
-  EXPECT_LT((state.shared.with_state.topRows<9>() - expected).norm(), 1e-4 * expected.norm());
-  EXPECT_NEAR(state.shared.covariance(1, 1), left * left * had.covariance(1, 1) + 1 - left * left, 1e-12);
 }
 
 TEST(ColouredNoise, OfNoShareIsThePlainFilterBitForBit) {
@@ -154,8 +161,8 @@ TEST(ColouredNoise, ForgottenAtOnceIsWhite) {
 
 TEST(ColouredNoise, ShuffledInputGivesTheSameStateBitForBit) {
   std::mt19937_64 rng(66);
-  const EstimatorConfig config = told(
-      testing::agar_config(), {.correlated_share = 0.8, .correlation_s = 0.2, .correlation_mm = 2});
+  const EstimatorConfig config =
+      told(testing::agar_config(), {.correlated_share = 0.8, .correlation_s = 0.2, .correlation_mm = 2});
   testing::InsertionPlan plan;
   plan.cameras = 2, plan.length_mm = 20;
   const auto data = testing::draw_insertion(config.prior, plan, rng).data;
@@ -170,21 +177,26 @@ TEST(ColouredNoise, ShuffledInputGivesTheSameStateBitForBit) {
   EXPECT_EQ(a.shared.covariance, b.shared.covariance);
 }
 
+// In and out by 40 mm, cutting anew and through the channel.
 TEST(ColouredNoise, AHundredThousandStepsStayPositiveDefinite) {
-  const NeedleFilter filter(told(testing::agar_config(), {.correlated_share = 0.95, .correlation_mm = 2}));
-  FilterState state = filter.initial();
-  std::mt19937_64 rng(67);
-  for (int i = 0; i < 100'000; ++i) {
-    filter.predict(state, (i / 400) % 2 ? -0.1 : 0.1, 0.01);
-    if (i % 3 == 0)
-      filter.update(state, testing::measure(state.pose.p_mm, i, i, i % 2,
-                                            i % 2 ? Eigen::Vector3d(1, 0, 1) : Eigen::Vector3d(0, 1, 1), 0.1, rng));
-    if (i % 10'000 == 0) {
+  for (const bool through_channel : {false, true}) {
+    EstimatorConfig config = told(testing::agar_config(), {.correlated_share = 0.95, .correlation_mm = 2});
+    config.through_channel = through_channel;
+    const NeedleFilter filter(config);
+    FilterState state = filter.initial();
+    std::mt19937_64 rng(67);
+    for (int i = 0; i < 100'000; ++i) {
+      filter.predict(state, (i / 400) % 2 ? -0.1 : 0.1, 0.01);
+      if (i % 3 == 0)
+        filter.update(state, testing::measure(state.pose.p_mm, i, i, i % 2,
+                                              i % 2 ? Eigen::Vector3d(1, 0, 1) : Eigen::Vector3d(0, 1, 1), 0.1, rng));
+      if (i % 1'000 != 0) continue;
       const Covariance<15> P = covariance_of<15>(state);
       ASSERT_EQ(P, P.transpose());
       const Error<15> unit = P.diagonal().cwiseSqrt().cwiseInverse();
       const Covariance<15> correlation = unit.asDiagonal() * P * unit.asDiagonal();
-      ASSERT_GT(Eigen::SelfAdjointEigenSolver<Covariance<15>>(correlation).eigenvalues()[0], 0) << i;
+      ASSERT_GT(Eigen::SelfAdjointEigenSolver<Covariance<15>>(correlation).eigenvalues()[0], 0)
+          << i << " " << through_channel;
     }
   }
 }
@@ -202,9 +214,7 @@ std::pair<double, double> band(double degrees) {
 
 // Of the variance of a reading; the rest is white.
 constexpr double kShare = 0.8;
-ReadingNoise of_frames(double rho) {
-  return {.correlated_share = kShare, .correlation_s = -0.033 / std::log(rho)};
-}
+ReadingNoise of_frames(double rho) { return {.correlated_share = kShare, .correlation_s = -0.033 / std::log(rho)}; }
 
 // Insertions whose readings' errors are alike, by rho from frame to frame of 33 ms.
 Consistency insert_many(double rho, bool on_and_on, const ReadingNoise& noise) {

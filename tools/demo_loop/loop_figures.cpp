@@ -81,12 +81,15 @@ LoopFigures loop_figures(const std::string& log_path) {
   need(!log.tips.empty() && !log.actuators.empty(), "measurements");
 
   LoopFigures f;
-  for (const auto& target : log.targets)
-    if (target.request == 1)
-      f.target_mm = Eigen::Vector3d(target.position_mm[0], target.position_mm[1], target.position_mm[2]);
+  auto since_armed = log.targets.begin();
+  for (auto target = log.targets.begin(); target != log.targets.end(); ++target)
+    if (target->request == 1) {
+      f.target_mm = Eigen::Vector3d(target->position_mm[0], target->position_mm[1], target->position_mm[2]);
+      since_armed = target;
+    }
   f.truth = log.truths.back();
   // Where it came to rest, from which it may have been drawn back.
-  const auto drawn_back = std::ranges::find(log.targets, 8, &steering_target_t::request);
+  const auto drawn_back = std::ranges::find(since_armed, log.targets.end(), 8, &steering_target_t::request);
   const auto rested = drawn_back != log.targets.end() ? truth_at(log.truths, drawn_back->utime) : std::nullopt;
   f.targeting_error_mm = (rested.value_or(position(log.truths.back())) - f.target_mm).norm();
 

@@ -11,6 +11,7 @@ namespace {
 constexpr std::int64_t kWordPeriod_ns = 300'000'000;
 constexpr std::int64_t kPrintPeriod_ns = 2'000'000'000;
 constexpr std::int64_t kSettle_ns = 500'000'000;
+constexpr double kThere_mm = 0.1;  // of the depth to be drawn back to: what the controller holds at, and its ramp
 }  // namespace
 
 SteeringSession::SteeringSession(lcm::LCM& lcm, const std::string& log_path, const Eigen::Vector3d& target_mm,
@@ -22,6 +23,8 @@ SteeringSession::SteeringSession(lcm::LCM& lcm, const std::string& log_path, con
                                     [this](const process_status_t& m) { processes_[m.process] = m; });
   port_.subscribe<needle_state_t>(io::channel::kNeedleState, [this](const needle_state_t& m) { estimate_ = m; });
   port_.subscribe<needle_state_t>(io::channel::kNeedleTruth, [this](const needle_state_t& m) { truth_ = m; });
+  port_.subscribe<actuator_state_t>(io::channel::kActuatorState,
+                                    [this](const actuator_state_t& m) { inserted_mm_ = m.insertion_mm; });
 }
 
 SteeringSession::~SteeringSession() { lcm_.unsubscribe(everything_); }
@@ -109,7 +112,8 @@ SteeringSession::Progress SteeringSession::step(const nodes::Now& now) {
 
 // It holds: at the target, or where it was to be drawn back to.
 SteeringSession::Progress SteeringSession::draw_back(const nodes::Now& now) {
-  if (retracting_seen_) return Progress::arrived;
+  // A way that is short may be over before a status has told of it.
+  if (retracting_seen_ || (inserted_mm_ && *inserted_mm_ <= *retract_to_mm_ + kThere_mm)) return Progress::arrived;
   if (now.ns < next_word_ns_) return Progress::going_on;
   next_word_ns_ = now.ns + kWordPeriod_ns;
   say(nodes::Word::retract, {0, 0, *retract_to_mm_});

@@ -50,6 +50,7 @@ class SteeringSession {
   std::map<std::string, process_status_t> processes_;
   std::optional<needle_state_t> estimate_;
   std::optional<needle_state_t> truth_;
+  std::optional<double> inserted_mm_;
   std::int64_t start_ns_ = 0;
   std::int64_t next_word_ns_ = 0;
   std::int64_t next_print_ns_ = 0;
