@@ -2,6 +2,10 @@
 // discrepancy where it is on no list.
 #include <gtest/gtest.h>
 
+#include <Eigen/Cholesky>
+#include <algorithm>
+#include <cmath>
+
 #include "diagnosis/inference/posterior.hpp"
 #include "tests/inference/pendulum.hpp"
 
@@ -91,6 +95,48 @@ TEST(PendulumTest, WhatIsOnNoListIsADiscrepancy) {
   ASSERT_EQ(found.fit.curve_values.size(), 9);
   EXPECT_GT(found.fit.curve_values[5], found.fit.curve_values[4] + 0.4) << found.fit.curve_values.transpose();
   EXPECT_GT(found.fit.curve_values[5], found.fit.curve_values[6] + 0.4) << found.fit.curve_values.transpose();
+}
+
+// By the projection itself, in one dense system of all readings and all unknowns, priors as readings of their own.
+TEST(PendulumTest, WhatOfACurveNothingElseTakesOverIsTheRestOfAProjection) {
+  TruePendulum truth;
+  truth.magnet = 1.5;
+  const Pendulum system(truth, 6, 51);
+  Search search(system, {});
+  search.run(Readings(6), white());
+  const Fit& fit = *search.visited().at({}).at->fit_with_curve;
+  const CurveColumns curve = curve_of(search, fit);
+  const Eigen::Index shared = fit.shared.size(), own = static_cast<Eigen::Index>(free_locals(fit.layout).size());
+  Eigen::MatrixXd A(0, shared + 6 * own);
+  Eigen::VectorXd c(0);
+  for (std::size_t r = 0; r < 6; ++r) {
+    LinearRecording one;
+    ASSERT_TRUE(linearise(*fit.likelihood, fit, curve, r, one));
+    const Eigen::Index before = A.rows();
+    A.conservativeResize(before + one.L.rows(), Eigen::NoChange);
+    A.bottomRows(one.L.rows()).setZero();
+    A.block(before, 0, one.L.rows(), shared) = one.Z.leftCols(shared);
+    A.block(before, shared + static_cast<Eigen::Index>(r) * own, one.L.rows(), own) = one.L;
+    c.conservativeResize(A.rows());
+    c.tail(one.L.rows()) = curve.columns[r] * fit.curve_values;
+  }
+  Eigen::MatrixXd normal = A.transpose() * A;
+  normal.topLeftCorner(shared, shared) +=
+      pulls_of(fit.layout, fit.shared, fit.curve_values, curve.covariance).precision.topLeftCorner(shared, shared);
+  for (Eigen::Index r = 0; r < 6; ++r)
+    normal.diagonal().segment(shared + r * own, own) += local_precision_of(fit.layout, fit.scales);
+  const Eigen::VectorXd across = A.transpose() * c;
+  const double rest = c.squaredNorm() - across.dot(normal.ldlt().solve(across));
+  EXPECT_GT(rest, 25);
+  EXPECT_NEAR(visible_sigmas_of_curve(search, fit), std::sqrt(rest), 1e-4 * std::sqrt(rest));
+  // From there on it counts, below it does not.
+  const auto counts = [&](double from_sigmas) {
+    const Posterior posterior = posterior_of(search, from_sigmas);
+    const auto base = std::ranges::find(posterior.sets, ModelSet{}, &SetShare::set);
+    return base->unknown / base->with_discrepancy;
+  };
+  EXPECT_EQ(counts(0.99 * std::sqrt(rest)), 1);
+  EXPECT_EQ(counts(1.01 * std::sqrt(rest)), 0);
 }
 
 TEST(PendulumTest, ProbabilitiesAddUpAndHeldOutIsBetterWithWhatWasFound) {
