@@ -56,8 +56,8 @@ void shares(report::Page& page, const Tally& t) {
   page.heading("Verdicts");
   std::vector<ShareLine> lines{{"exact set, all of it visible", at(t.strict, "visible"), 0.9},
                                {"the same, counting ambiguous ones", at(t.lenient, "visible"), -1},
-                               {"one of two visible: that one, or both", at(t.strict, "partly"), -1},
-                               {"nothing visible: silence, or what is concealed", at(t.strict, "invisible"), -1},
+                               {"one of two visible: it, or both", at(t.strict, "partly"), -1},
+                               {"none visible: silence, or the name", at(t.strict, "invisible"), -1},
                                {"nothing concealed: silence", at(t.strict, "null"), 1.0},
                                {"all trials", at(t.strict, "all"), -1},
                                {"on no list: called unknown", t.unknown_called_unknown, 0.8},
