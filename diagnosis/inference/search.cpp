@@ -56,7 +56,15 @@ double Visited::log_posterior() const {
 }
 
 double Search::log_prior(const ModelSet& set) const {
-  return rules_.log_prior_odds_effect * static_cast<double>(set.size());
+  double sum = 0;
+  for (const std::size_t e : set) sum += log_prior_odds(e);
+  return sum;
+}
+
+double Search::log_prior_odds(std::size_t effect) const {
+  const auto& all = system_.effects();
+  const auto kinds = std::ranges::count(all, all[effect].name, &Effect::name);
+  return rules_.log_prior_odds_effect - std::log(static_cast<double>(kinds));
 }
 
 const Visited& Search::best() const {
@@ -148,9 +156,9 @@ void Search::expand(const ModelSet& set) {
       for (const Proposal& one : list) {
         // Far from its start an effect may bring much more than in proportion: the foremost are fitted in any case.
         const bool foremost = beside != Beside::less_spread && rank++ < rules_.foremost &&
-                              one.log_bayes_factor > -rules_.log_prior_odds_effect;
+                              one.log_bayes_factor > -log_prior_odds(one.effect);
         const ModelSet larger = with(set, one.effect);
-        const double promised = from + one.log_bayes_factor + rules_.log_prior_odds_effect;
+        const double promised = from + one.log_bayes_factor + log_prior_odds(one.effect);
         auto& known = promised_.try_emplace(larger, -std::numeric_limits<double>::infinity()).first->second;
         const bool nothing_new = beside == Beside::less_spread && promised < known + rules_.optimism;
         known = std::max(known, promised);
@@ -186,7 +194,7 @@ void Search::expand(const ModelSet& set) {
     const ModelSet smaller = without(set, effect);
     const Fit& fit = here.at->fit;
     if (const auto known = visited_.find(smaller); known != visited_.end()) {
-      const double promised = here.log_without_curve - log_cost_of_dropping(fit, effect) - rules_.log_prior_odds_effect;
+      const double promised = here.log_without_curve - log_cost_of_dropping(fit, effect) - log_prior_odds(effect);
       if (known->second.log_without_curve > promised - rules_.optimism || !from_larger_.insert(smaller).second)
         continue;
     }
