@@ -1,12 +1,12 @@
 #include "diagnosis/inference/search.hpp"
 
-#include <Eigen/Cholesky>
 #include <algorithm>
 #include <cmath>
 #include <limits>
 #include <stdexcept>
 
 #include "diagnosis/inference/calibrate.hpp"
+#include "diagnosis/inference/local_minima.hpp"
 #include "diagnosis/inference/log_sum.hpp"
 #include "diagnosis/parallel.hpp"
 
@@ -23,30 +23,6 @@ bool near(const Noise& a, const Noise& b) {
 
 using Eigen::Index;
 using Eigen::VectorXd;
-
-// By the linear model: by how much the log likelihood falls where an effect's sizes are none. Infinite for one that has
-// no size to be none, or one that presses against a bound.
-double log_cost_of_dropping(const Fit& fit, std::size_t effect) {
-  const auto& set = fit.layout.set();
-  const auto member = static_cast<std::size_t>(std::find(set.begin(), set.end(), effect) - set.begin());
-  const auto& parameters = fit.likelihood->system().effects()[effect].parameters;
-  std::vector<Index> sizes;
-  std::vector<double> apart;
-  for (std::size_t p = 0; p < parameters.size(); ++p) {
-    if (parameters[p].scope != Scope::shared || !is_size(parameters[p])) continue;
-    sizes.push_back(fit.layout.find_shared(member, p));
-    apart.push_back(fit.shared[sizes.back()] - parameters[p].none);
-  }
-  constexpr double kNever = std::numeric_limits<double>::infinity();
-  for (const Index held : fit.held)
-    if (std::count(sizes.begin(), sizes.end(), held) > 0) return kNever;
-  const auto blocks = linearise(*fit.likelihood, fit, {});
-  if (sizes.empty() || blocks.empty()) return kNever;
-  const ArrowSolution solution = solve_about(fit, blocks, {}, sizes);
-  if (!solution.valid) return kNever;
-  const auto d = Eigen::Map<const VectorXd>(apart.data(), static_cast<Index>(apart.size()));
-  return 0.5 * d.dot(solution.covariance(sizes, sizes).ldlt().solve(d));
-}
 
 }  // namespace
 
@@ -190,11 +166,12 @@ void Search::expand(const ModelSet& set) {
   }
   // Smaller sets, from which swaps come. One that was visited already once more, if from here it is likelier even
   // without what it gains by having fewer parameters: then it was in a local minimum.
-  for (const std::size_t effect : set) {
-    const ModelSet smaller = without(set, effect);
-    const Fit& fit = here.at->fit;
+  const Fit& fit = here.at->fit;
+  const auto costs = log_costs_of_dropping(fit);
+  for (std::size_t m = 0; m < set.size(); ++m) {
+    const ModelSet smaller = without(set, set[m]);
     if (const auto known = visited_.find(smaller); known != visited_.end()) {
-      const double promised = here.log_without_curve - log_cost_of_dropping(fit, effect) - log_prior_odds(effect);
+      const double promised = here.log_without_curve - costs[m] - log_prior_odds(set[m]);
       if (known->second.log_without_curve > promised - rules_.optimism || !from_larger_.insert(smaller).second)
         continue;
     }
