@@ -279,12 +279,12 @@ void DriveNode::read_error_code(std::int64_t now_ns, Transmitter& out) {
   if (frame && out.send(*frame, now_ns)) sdo_.sent(now_ns);
 }
 
-void DriveNode::command(std::uint16_t controlword, double rate_unit_s, std::int64_t now_ns, Transmitter& out) const {
+bool DriveNode::command(std::uint16_t controlword, double rate_unit_s, std::int64_t now_ns, Transmitter& out) const {
   can::Frame frame{cia301::rpdo1_id(node_), 6, {}};
   cia301::put_u16(frame, 0, controlword);
   const auto rate = static_cast<std::int32_t>(std::lround(rate_unit_s * config_.axes.at(axis_).counts_per_unit));
   cia301::put_u32(frame, 2, static_cast<std::uint32_t>(rate));
-  out.send(frame, now_ns);
+  return out.send(frame, now_ns);
 }
 
 double DriveNode::position_unit() const {

@@ -38,8 +38,8 @@ class DriveNode {
   void renew_limits(std::int64_t now_ns, Transmitter& out);
   void supervise(std::int64_t now_ns);                          // time-outs
   void read_error_code(std::int64_t now_ns, Transmitter& out);  // in fault: 0x603F, once
-  // rate: in counts of the drive, by sign of counts_per_unit.
-  void command(std::uint16_t controlword, double rate_unit_s, std::int64_t now_ns, Transmitter& out) const;
+  // rate: in counts of the drive, by sign of counts_per_unit. False: not accepted (Transmitter::send()).
+  bool command(std::uint16_t controlword, double rate_unit_s, std::int64_t now_ns, Transmitter& out) const;
 
   Stop take_trouble();  // the oldest trouble since the last call
 
