@@ -245,8 +245,7 @@ void StepperDriver::step(std::int64_t now_ns, const std::optional<MotionSetpoint
     case DriverState::stopped:
     case DriverState::fault:
       judge_rest(now_ns);
-      if (!silent_)
-        for (auto& node : nodes_) node.read_error_code(now_ns, out_);
+      ask_why(now_ns);
       break;
   }
   transmit(now_ns);

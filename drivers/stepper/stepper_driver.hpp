@@ -120,6 +120,7 @@ class StepperDriver {
   void shape(std::int64_t now_ns, const std::array<double, kAxes>& rates);
   void supervise_motion(std::int64_t now_ns);
   void judge_rest(std::int64_t now_ns);
+  void ask_why(std::int64_t now_ns);
   std::array<double, kAxes> wanted_rates(std::int64_t now_ns, const std::optional<MotionSetpoint>& setpoint);
   void transmit(std::int64_t now_ns);
   bool may_send() const { return bus_.is_open() && !silent_; }

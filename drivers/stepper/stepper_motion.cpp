@@ -104,6 +104,14 @@ void StepperDriver::supervise_motion(std::int64_t now_ns) {
   }
 }
 
+// What only the drive knows of a stop.
+void StepperDriver::ask_why(std::int64_t now_ns) {
+  if (silent_) return;
+  if (stop_.reason == StopReason::travel_limit)
+    stop_.reason = nodes_.at(static_cast<std::size_t>(stop_.axis)).read_limit(now_ns, out_);
+  for (auto& node : nodes_) node.read_error_code(now_ns, out_);
+}
+
 // Once an axis rests after a stop: is it where it should be, or was it held back?
 void StepperDriver::judge_rest(std::int64_t now_ns) {
   for (std::size_t axis = 0; axis < kAxes; ++axis) {

@@ -233,7 +233,7 @@ TEST(DriveSupervision, ALimitSwitchIsALatchedStopAndIsLeftAgain) {
   ASSERT_TRUE(ms.has_value());
   EXPECT_LE(*ms, 100);
   bench.run_ms(100);
-  EXPECT_EQ(bench.reason(), StopReason::travel_limit);
+  EXPECT_EQ(bench.reason(), StopReason::upper_switch);
   EXPECT_EQ(bench.report().stop.axis, 0);
   EXPECT_EQ(bench.report().state, DriverState::stopped);
   // Enabled again, it may go back, and not on.
@@ -244,7 +244,7 @@ TEST(DriveSupervision, ALimitSwitchIsALatchedStopAndIsLeftAgain) {
   bench.move(10.0, 0.0);
   bench.run_ms(300);
   EXPECT_NEAR(bench.insertion.position_unit(), stands_mm, 0.01);
-  EXPECT_EQ(bench.reason(), StopReason::travel_limit);
+  EXPECT_EQ(bench.reason(), StopReason::upper_switch) << "asked anew";
   bench.command = stepper::MotionSetpoint{};
   ASSERT_TRUE(bench.driver->rearm());
   ASSERT_TRUE(bench.enable());
@@ -252,6 +252,42 @@ TEST(DriveSupervision, ALimitSwitchIsALatchedStopAndIsLeftAgain) {
   bench.run_ms(500);
   EXPECT_LT(bench.insertion.position_unit(), 4.0);
   EXPECT_EQ(bench.report().state, DriverState::enabled) << describe(bench.report().stop);
+}
+
+// Which one it was the drive says (0x60FD); the axis may count the other way round than the drive.
+TEST(DriveSupervision, WhichLimitItWas) {
+  struct Case {
+    double counts_per_mm, rate_mm_s;
+    StopReason wanted;
+  };
+  for (const auto& [counts_per_mm, rate_mm_s, wanted] :
+       {Case{2000, 10, StopReason::upper_switch}, Case{2000, -10, StopReason::lower_switch},
+        Case{-2000, 10, StopReason::upper_switch}, Case{-2000, -10, StopReason::lower_switch}}) {
+    stepper::StepperConfig config;
+    config.axes[0].counts_per_unit = counts_per_mm;
+    Bench bench(config, {-5.0 * 2000.0, 5.0 * 2000.0});
+    ASSERT_TRUE(bench.enable());
+    bench.move(rate_mm_s, 0.0);
+    ASSERT_TRUE(bench.run_until([&] { return bench.reason() == StopReason::travel_limit; }, 1000));
+    EXPECT_TRUE(bench.run_until([&] { return bench.reason() == wanted; }, 50)) << describe(bench.report().stop);
+  }
+}
+
+TEST(DriveSupervision, ADriveWithoutInputsLeavesOpenWhichLimitItWas) {
+  Bench bench({}, {-5.0 * 2000.0, 5.0 * 2000.0});
+  bench.wire.set_tap([](can::Frame& frame) {
+    if (frame.id == 0x581 && frame.data[1] == 0xFD && frame.data[2] == 0x60) {
+      frame.data[0] = 0x80;
+      stepper::cia301::put_u32(frame, 4, 0x06020000);
+    }
+    return true;
+  });
+  ASSERT_TRUE(bench.enable());
+  bench.move(10.0, 0.0);
+  ASSERT_TRUE(bench.run_until([&] { return bench.reason() == StopReason::travel_limit; }, 1000));
+  bench.run_ms(1000);
+  EXPECT_EQ(bench.reason(), StopReason::travel_limit);
+  EXPECT_EQ(bench.report().counters.sdo_ignored, 0U);
 }
 
 TEST(DriveSupervision, FollowingErrorWindowReachesTheDrive) {
