@@ -105,7 +105,7 @@ TEST(Evidence, WhatDroppingAnEffectCostsIsTheFallOfTheLikelihood) {
   const auto costs = log_costs_of_dropping(both);
   ASSERT_EQ(costs.size(), 2U);
   for (std::size_t m = 0; m < 2; ++m) EXPECT_NEAR(costs[m], 0.5 * (fitted({1 - m}).cost - both.cost), 1e-4 * costs[m]);
-  EXPECT_GT(costs[0], 20);  // a parabola of four deviations at its ends, of which the cosine may take much
+  EXPECT_GT(costs[0], 10);  // a parabola of four deviations at its ends, of which the cosine may take much
   EXPECT_LT(costs[1], 5);   // no step
 }
 
