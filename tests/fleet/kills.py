@@ -12,7 +12,9 @@ Exit status: 0 all held, 1 something did not, and is named, 2 usage.
 
 Of the cores used three shares are printed: the CPU time of the cases that were kept of all time of all cores; of what other
 processes left of that (from /proc/stat), since a machine may have others at work; and the time in which a case was at work
-of the time of all that may be at work at once. Beside them the CPU time of all that is not a case: fleet, engine, interpreters.
+of the time of all that may be at work at once. The same without start and page is from when each place had its first result to the
+last result, which is all there is of it in a long run (cases of one length are meant). Beside them the CPU time of all that is not a
+case: fleet, engine, interpreters.
 """
 import argparse
 import collections
@@ -118,12 +120,17 @@ class CoreUse:
         self.wall, self.ours_s, self.given = wall, ours, max(os.cpu_count() * wall - (busy - ours), 1e-9)
 
     def shares(self, out):
-        kept = [json.loads(file.read_text(encoding="utf-8")) for file in (out / "results").glob("*/case.json")]
+        files = list((out / "results").glob("*/case.json"))
+        kept = [json.loads(file.read_text(encoding="utf-8")) for file in files]
         cpu, at_work = (sum(case[name] for case in kept) for name in ("cpu_s", "seconds"))
-        slots = len(os.sched_getaffinity(0)) * self.wall
+        places = len(os.sched_getaffinity(0))
+        slots = places * self.wall
+        # While all places are taken: from when each had its first result, to the last one.
+        ends = sorted(file.stat().st_mtime for file in files)
+        steady = at_work / len(kept) * (len(kept) - places) / (places * (ends[-1] - ends[places - 1]))
         return (f"{100 * cpu / (os.cpu_count() * self.wall):.1f} % of {os.cpu_count()} cores x {self.wall:.1f} s, "
                 f"{100 * cpu / self.given:.1f} % of the {self.given:.1f} s that others left; "
-                f"at work {100 * at_work / slots:.1f} %; beside the cases {self.ours_s - cpu:.1f} s of CPU time, "
+                f"at work {100 * at_work / slots:.1f} %, without start and page {100 * steady:.1f} %; beside the cases {self.ours_s - cpu:.1f} s of CPU time, "
                 f"{(self.ours_s - cpu) / len(kept):.2f} s a case")
 
 
