@@ -140,8 +140,10 @@ Trial kinematic(const Kinematic& kind, std::uint64_t seed) {
   trial.rig.cameras = cameras(kind.cameras);
   trial.rig.cameras.outlier_share = kind.outlier_share;
   trial.rig.cameras.turned_rad = kind.camera_turned_rad * Eigen::Vector3d(std::cos(angle), std::sin(angle), 0);
-  trial.rig.make_plant = [truth, effects, roll_rad] {
-    return std::make_unique<rig::KinematicPlant>(truth, effects, roll_rad, model::OwnValues{}, rig::Cut::kept);
+  trial.needle = {.bicycle = truth, .effects = effects, .roll_rad = roll_rad};
+  trial.rig.make_plant = [needle = trial.needle] {
+    return std::make_unique<rig::KinematicPlant>(needle.bicycle, needle.effects, needle.roll_rad, model::OwnValues{},
+                                                 rig::Cut::kept);
   };
   return trial;
 }
@@ -183,6 +185,7 @@ Trial beam(const Beam& kind, std::uint64_t seed) {
   if (kind.way_point) draw_way(draw, deep, trial);
   if (kind.retract) draw_before(draw, deep, trial);
   trial.rig.cameras = cameras(2);
+  trial.needle = {.bicycle = deep, .beam = config};
   trial.rig.make_plant = [config] { return std::make_unique<rig::BeamNeedle>(config); };
   return trial;
 }

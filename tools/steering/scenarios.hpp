@@ -1,6 +1,7 @@
 #pragma once
 // Needles, tissue and cameras that steering is tried on, and what the software is told of each.
 #include <cstdint>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -8,9 +9,18 @@
 
 namespace bevel::steering {
 
+// The needle of a rig, as the rig's part of a system file has it.
+struct TrueNeedle {
+  model::NeedleParameters bicycle;
+  std::optional<model::BeamPlantConfig> beam{};  // in its place
+  std::vector<model::ActiveEffect> effects{};    // of the bicycle
+  double roll_rad = 0;                           // of the bevel at the start
+};
+
 // One target with a rig of its own, and what the software believes.
 struct Trial {
   SteeredRig rig;
+  TrueNeedle needle;
   Believed believed;
   Eigen::Vector3d target_mm;
 };
