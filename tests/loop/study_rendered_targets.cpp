@@ -131,7 +131,9 @@ Outcome one(const steering::Scenario& scenario, std::uint64_t seed) {
   loop.run(120, [&] { return loop.state() != controller::State::steering; });
   out.duration_s = 1e-3 * static_cast<double>(loop.ms - from_ms);
   loop.run(0.5);
-  if (loop.state() != controller::State::hold) out.why_not = controller::to_string(loop.reason());
+  if (loop.state() != controller::State::hold)
+    out.why_not = std::string(controller::to_string(loop.reason())) + " (" + loop.said("bevel-estimator").reason +
+                  ", " + std::to_string(std::lround(loop.rig->drive(0).position_unit())) + " mm in)";
   out.miss_mm = (loop.tip() - trial.target_mm).norm();
   if (loop.needle_state)
     out.estimate_error_mm = (Eigen::Map<const Eigen::Vector3d>(loop.needle_state->position_mm) - loop.tip()).norm();
