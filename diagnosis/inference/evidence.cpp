@@ -313,7 +313,8 @@ Integrated integrated(const std::vector<CurveFactor>& curves) {
 bool add_curve(const Likelihood& likelihood, const Discrepancy& discrepancy, double log_prior_odds, Evaluated& out,
                double& log_evidence) {
   const Fit& here = *out.fit_with_curve;
-  auto more = discrepancy.scan(Marginal(likelihood, here, discrepancy.columns(likelihood, here.scales.curves)));
+  const Likelihood by(likelihood, likelihood.noise(), inputs_about(here));
+  auto more = discrepancy.scan(Marginal(by, here, discrepancy.columns(by, here.scales.curves), &likelihood));
   for (const CurvePrior& known : here.scales.curves)
     std::erase_if(more, [&](const CurveFactor& one) { return one.prior.curve == known.curve; });
   if (more.empty()) return false;
@@ -338,7 +339,8 @@ void add_discrepancy(const Likelihood& likelihood, const Discrepancy& discrepanc
                      Evaluated& out) {
   out.with_discrepancy = true;
   // By the noise that the curves were prepared with.
-  out.curves = discrepancy.scan(Marginal(likelihood, out.fit, {}));
+  const Likelihood by(likelihood, likelihood.noise(), inputs_about(out.fit));
+  out.curves = discrepancy.scan(Marginal(by, out.fit, {}, &likelihood));
   if (out.curves.empty()) return;
   const Integrated all = integrated(out.curves);  // the rest of them, by the linear model
   out.log_bayes_factor_curve = all.log_factor;

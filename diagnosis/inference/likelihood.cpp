@@ -235,6 +235,11 @@ std::vector<VectorXd> inputs_about(const Fit& fit) {
   return out;
 }
 
+std::shared_ptr<const Likelihood> with_inputs_of(const Fit& fit, const std::shared_ptr<const Likelihood>& likelihood) {
+  const auto inputs = inputs_about(fit);
+  return inputs.empty() ? likelihood : std::make_shared<const Likelihood>(*likelihood, likelihood->noise(), inputs);
+}
+
 std::vector<ArrowBlock> linearise(const Likelihood& likelihood, const Fit& fit, const CurveColumns& curve) {
   std::vector<ArrowBlock> blocks;
   if (!make_blocks(likelihood, fit, curve, blocks)) blocks.clear();

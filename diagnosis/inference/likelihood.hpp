@@ -101,6 +101,8 @@ struct Fit {
 
 // System::by_inputs() of a fit, per recording; empty: nothing.
 std::vector<Eigen::VectorXd> inputs_about(const Fit& fit);
+// The same readings and noise with them; itself where there is nothing.
+std::shared_ptr<const Likelihood> with_inputs_of(const Fit& fit, const std::shared_ptr<const Likelihood>& likelihood);
 
 struct FitRules {
   int max_iterations = 25;

@@ -8,8 +8,23 @@ using Eigen::Index;
 using Eigen::MatrixXd;
 using Eigen::MatrixXf;
 using Eigen::VectorXd;
+using Eigen::VectorXf;
 
-Marginal::Marginal(const Likelihood& likelihood, const Fit& fit, const CurveColumns& curve) : set_(fit.layout.set()) {
+namespace {
+
+VectorXf weights_of(const Likelihood& likelihood, const Likelihood& columns_by, std::size_t r) {
+  std::vector<float> out;
+  for (std::size_t c = 0; c < likelihood.whitening(r).size(); ++c)
+    for (std::size_t i = 0; i < likelihood.whitening(r)[c].weight.size(); ++i)
+      out.push_back(static_cast<float>(likelihood.whitening(r)[c].weight[i] / columns_by.whitening(r)[c].weight[i]));
+  return Eigen::Map<const VectorXf>(out.data(), static_cast<Index>(out.size()));
+}
+
+}  // namespace
+
+Marginal::Marginal(const Likelihood& likelihood, const Fit& fit, const CurveColumns& curve,
+                   const Likelihood* columns_by)
+    : set_(fit.layout.set()) {
   LinearRecording recording;
   for (std::size_t r = 0; r < likelihood.recordings(); ++r) {
     if (!linearise(likelihood, fit, curve, r, recording)) return;
@@ -22,15 +37,22 @@ Marginal::Marginal(const Likelihood& likelihood, const Fit& fit, const CurveColu
     MatrixXf LZ(Z.rows(), L.cols() + Z.cols());
     LZ.leftCols(L.cols()) = L.cast<float>();
     LZ.rightCols(Z.cols()) = Z.cast<float>();
+    VectorXf white = recording.residuals.white.cast<float>();
+    if (columns_by != nullptr && columns_by != &likelihood) {
+      weight_.push_back(weights_of(likelihood, *columns_by, r));
+      LZ = weight_.back().asDiagonal() * LZ;
+      white = weight_.back().cwiseProduct(white);
+    }
     LZ_.push_back(std::move(LZ));
-    w_.emplace_back(recording.residuals.white.cast<float>());
+    w_.push_back(std::move(white));
     blocks_.push_back(block);
   }
   solution_ = solve_about(fit, blocks_, curve);
 }
 
 MatrixXd Marginal::Part::square(const MatrixXf& X, Index first, Index size) const {
-  const auto columns = X.middleCols(first, size);
+  MatrixXf columns = X.middleCols(first, size);
+  if (weight != nullptr) columns = weight->asDiagonal() * columns;
   return (columns.transpose() * columns).cast<double>() -
          own.middleRows(first, size) * by_own.middleRows(first, size).transpose();
 }
@@ -39,6 +61,7 @@ Marginal::Part Marginal::part(std::size_t r, const MatrixXf& X) const {
   const MatrixXd products = (X.transpose() * LZ_[r]).cast<double>();
   const Index count = inner_[r].rows();
   Part out{.own = products.leftCols(count) * inner_[r], .by_own = products.leftCols(count), .across = {}, .pull = {}};
+  if (!weight_.empty()) out.weight = &weight_[r];
   out.across = products.rightCols(products.cols() - count) - out.own * blocks_[r].lz;
   out.pull = (X.transpose() * w_[r]).cast<double>() - out.own * pull_[r];
   return out;

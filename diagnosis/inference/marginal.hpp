@@ -8,7 +8,11 @@ namespace bevel::inference {
 
 class Marginal {
  public:
-  Marginal(const Likelihood& likelihood, const Fit& fit, const CurveColumns& curve);
+  // columns_by: by what the columns are whitened, if by another likelihood, of the same noise without the errors of
+  // this one's inputs (with_inputs_of). Their rows have as much less weight then as those make them uncertain: exact
+  // for white noise.
+  Marginal(const Likelihood& likelihood, const Fit& fit, const CurveColumns& curve,
+           const Likelihood* columns_by = nullptr);
   // False outside the model's domain.
   bool valid() const { return solution_.valid; }
   std::size_t recordings() const { return blocks_.size(); }
@@ -20,9 +24,10 @@ class Marginal {
   // Inner products of a recording's columns X (whitened) with what is left once its own unknowns are integrated out;
   // those that all recordings share are still in: `across` is by them.
   struct Part {
-    Eigen::MatrixXd own, by_own;  // X'L (L'L + T)^-1, X'L
-    Eigen::MatrixXd across;       // X'MZ
-    Eigen::VectorXd pull;         // X'Mw
+    Eigen::MatrixXd own, by_own;              // X'L (L'L + T)^-1, X'L
+    Eigen::MatrixXd across;                   // X'MZ
+    Eigen::VectorXd pull;                     // X'Mw
+    const Eigen::VectorXf* weight = nullptr;  // of the rows; null: one
     // X'MX of columns [first, first + size).
     Eigen::MatrixXd square(const Eigen::MatrixXf& X, Eigen::Index first, Eigen::Index size) const;
   };
@@ -41,8 +46,9 @@ class Marginal {
   std::vector<ArrowBlock> blocks_;
   std::vector<Eigen::MatrixXf> LZ_;  // [L Z] per recording
   std::vector<Eigen::VectorXf> w_;
-  std::vector<Eigen::MatrixXd> inner_;  // (L'L + T)^-1
-  std::vector<Eigen::VectorXd> pull_;   // L'w and the prior's part
+  std::vector<Eigen::VectorXf> weight_;  // of the rows of columns; empty: one. LZ_ and w_ have it already
+  std::vector<Eigen::MatrixXd> inner_;   // (L'L + T)^-1
+  std::vector<Eigen::VectorXd> pull_;    // L'w and the prior's part
   ArrowSolution solution_;
 };
 

@@ -175,10 +175,11 @@ VectorXd Unknowns::of_group(std::size_t group) const {
   return out / std::max(out.sum(), 1e-300);
 }
 
-LeftOut leave_out(const Fit& fit, const std::vector<ArrowBlock>& blocks, const CurveColumns& curve,
-                  std::size_t recording) {
+std::optional<LeftOut> leave_out(const Fit& fit, const std::vector<ArrowBlock>& blocks, const CurveColumns& curve,
+                                 std::size_t recording) {
   const ArrowSolution all = solve_without(fit, blocks, curve, blocks.size());
   const ArrowSolution rest = solve_without(fit, blocks, curve, recording);
+  if (!all.valid || !rest.valid) return std::nullopt;
   LeftOut out;
   out.chi2 = all.least - rest.least;
   out.log_density =
@@ -190,15 +191,18 @@ LeftOut leave_out(const Fit& fit, const std::vector<ArrowBlock>& blocks, const C
   return out;
 }
 
-Predictive predictive_of(const Fit& fit, const std::vector<ArrowBlock>& blocks, const CurveColumns& curve,
-                         std::size_t recording) {
+std::optional<Predictive> predictive_of(const Fit& fit, const std::vector<ArrowBlock>& blocks,
+                                        const CurveColumns& curve, std::size_t recording) {
   const ArrowSolution rest = solve_without(fit, blocks, curve, recording);
+  if (!rest.valid) return std::nullopt;
   const VectorXd here = VectorXd::Zero(rest.shared.size());
   ArrowRules rules;
   rules.held = fit.held;
   const ArrowSolution alone = solve({blocks[recording]}, rest.information, here, rules);
-  return {.log_density = fit.likelihood->log_weights(recording) - 0.5 * (alone.least + alone.log_volume_ratio),
-          .chi2 = alone.least};
+  if (!alone.valid) return std::nullopt;
+  return Predictive{
+      .log_density = fit.likelihood->log_weights(recording) - 0.5 * (alone.least + alone.log_volume_ratio),
+      .chi2 = alone.least};
 }
 
 std::vector<LeftOutSelection> leave_out_selection(const Search& search) {
@@ -220,9 +224,9 @@ std::vector<LeftOutSelection> leave_out_selection(const Search& search) {
     const CurveColumns curve = curve_of(search, fit);
     const auto blocks = linearise(*fit.likelihood, fit, curve);
     for (std::size_t r = 0; r < recordings && !blocks.empty(); ++r)
-      models[m].parts.push_back(leave_out(fit, blocks, curve, r));
+      if (auto part = leave_out(fit, blocks, curve, r)) models[m].parts.push_back(std::move(*part));
   });
-  std::erase_if(models, [](const Model& model) { return model.parts.empty(); });
+  std::erase_if(models, [&](const Model& model) { return model.parts.size() < recordings; });
   std::vector<LeftOutSelection> out;
   for (std::size_t r = 0; r < recordings; ++r) {
     std::vector<double> with, without;

@@ -2,6 +2,7 @@
 // What follows from the sets that were visited: probabilities of sets, of each effect, of a discrepancy; each unknown's
 // posterior; what each recording would have been given the others.
 #include <map>
+#include <optional>
 
 #include "diagnosis/inference/search.hpp"
 
@@ -71,15 +72,16 @@ struct LeftOut {
   double log_density = 0;                // of the recording; constants of 2 pi left out
   double chi2 = 0;                       // of its readings under the predictive density
 };
-LeftOut leave_out(const Fit& fit, const std::vector<ArrowBlock>& blocks, const CurveColumns& curve,
-                  std::size_t recording);
+// None where the linear model has no mode.
+std::optional<LeftOut> leave_out(const Fit& fit, const std::vector<ArrowBlock>& blocks, const CurveColumns& curve,
+                                 std::size_t recording);
 // Its predictive density about the fit's own values, with the covariance that the others give them.
 struct Predictive {
   double log_density = 0;  // constants of 2 pi left out
   double chi2 = 0;
 };
-Predictive predictive_of(const Fit& fit, const std::vector<ArrowBlock>& blocks, const CurveColumns& curve,
-                         std::size_t recording);
+std::optional<Predictive> predictive_of(const Fit& fit, const std::vector<ArrowBlock>& blocks,
+                                        const CurveColumns& curve, std::size_t recording);
 
 // Each recording given the others, sets and parameters: sets are weighed, and their parameters fitted, without it, by
 // the linear models. (Which sets were visited was decided with all recordings.)

@@ -124,7 +124,8 @@ void Search::expand(const ModelSet& set) {
   std::vector<Job> jobs;
   if (set.size() < rules_.largest) {
     // What is promised is relative to this set by the reference's noise.
-    const auto [plain, change] = moved_to(likelihood_, here.at->fit, *discrepancy_);
+    const auto own = with_inputs_of(here.at->fit, likelihood_);
+    const auto [plain, change] = moved_to(own, here.at->fit, *discrepancy_);
     const double best = best_log();
     enum class Beside { as_it_is, curve, less_spread };
     const auto add = [&](const Fit& about, const std::vector<Proposal>& list, double from, Beside beside) {
@@ -152,16 +153,17 @@ void Search::expand(const ModelSet& set) {
       }
     };
     if (here.at->fit_with_curve && here.log_with_curve > here.log_without_curve) {
-      const auto [beside_curve, more] = moved_to(likelihood_, *here.at->fit_with_curve, *discrepancy_);
-      const CurveColumns curve = discrepancy_->columns(*likelihood_, beside_curve.scales.curves);
-      add(beside_curve, proposals_->beside(Marginal(*likelihood_, beside_curve, curve), rules_.starts),
+      const auto by = with_inputs_of(*here.at->fit_with_curve, likelihood_);
+      const auto [beside_curve, more] = moved_to(by, *here.at->fit_with_curve, *discrepancy_);
+      const CurveColumns curve = discrepancy_->columns(*by, beside_curve.scales.curves);
+      add(beside_curve, proposals_->beside(Marginal(*by, beside_curve, curve, likelihood_.get()), rules_.starts),
           here.log_with_curve + more, Beside::curve);
     }
     // Without the curve too: an effect may take its place.
-    add(plain, proposals_->beside(Marginal(*likelihood_, plain, {}), rules_.starts), here.log_without_curve + change,
-        Beside::as_it_is);
-    for (const LessSpread& less : with_less_spread(*likelihood_, plain))
-      add(less.fit, proposals_->beside(Marginal(*likelihood_, less.fit, {}), rules_.starts),
+    add(plain, proposals_->beside(Marginal(*own, plain, {}, likelihood_.get()), rules_.starts),
+        here.log_without_curve + change, Beside::as_it_is);
+    for (const LessSpread& less : with_less_spread(*own, plain))
+      add(less.fit, proposals_->beside(Marginal(*own, less.fit, {}, likelihood_.get()), rules_.starts),
           here.log_without_curve + change + less.log_change, Beside::less_spread);
   }
   // Smaller sets, from which swaps come. One that was visited already once more, if from here it is likelier even
@@ -244,8 +246,10 @@ void Search::look_around() {
     const std::size_t first = is_visited({set[0]}) ? set[0] : set[1], second = set[0] + set[1] - first;
     const auto single = visited_.find({first});
     if (single == visited_.end()) continue;
-    if (!known.contains(first))
-      known[first] = proposals_->beside(Marginal(*likelihood_, single->second.at->fit, {}), 1);
+    if (!known.contains(first)) {
+      const auto own = with_inputs_of(single->second.at->fit, likelihood_);
+      known[first] = proposals_->beside(Marginal(*own, single->second.at->fit, {}, likelihood_.get()), 1);
+    }
     for (const Proposal& one : known[first])
       if (one.effect == second && !one.starts.empty())
         jobs.push_back(job_from(single->second.at->fit, second, one.starts.front()));

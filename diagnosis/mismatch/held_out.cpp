@@ -165,8 +165,9 @@ Sums sums_of(const NeedleSystem& system, const inference::Search& search, Fit fi
   if (curve) errors -= curve.raw[r] * fit.curve_values;
   add_errors(system, *fit.likelihood, r, errors, out);
   const auto predictive = predictive_of(fit, blocks, curve, r);
-  out.chi2 = predictive.chi2;
-  out.log_density = predictive.log_density + constant_of(out.count);
+  if (!predictive) return {};
+  out.chi2 = predictive->chi2;
+  out.log_density = predictive->log_density + constant_of(out.count);
   return out;
 }
 

@@ -165,7 +165,7 @@ TEST(PendulumTest, ProbabilitiesAddUpAndHeldOutIsBetterWithWhatWasFound) {
   const Fit& base = search.visited().at({}).at->fit;
   const auto blocks = linearise(*base.likelihood, base, {});
   for (std::size_t r = 0; r < 6; ++r)
-    EXPECT_GT(found[r].log_density, leave_out(base, blocks, {}, r).log_density) << "recording " << r;
+    EXPECT_GT(found[r].log_density, leave_out(base, blocks, {}, r)->log_density) << "recording " << r;
 }
 
 }  // namespace
