@@ -109,6 +109,32 @@ TEST(Evidence, WhatDroppingAnEffectCostsIsTheFallOfTheLikelihood) {
   EXPECT_LT(costs[1], 5);   // no step
 }
 
+// Columns were whitened once, without what a set leaves open of some readings; what stands beside that set is estimated
+// with it all the same.
+TEST(Evidence, WhatASetLeavesOpenCountsInColumnsBesideIt) {
+  LinearSystem system(4, 7, 0.3, 0.2, 0);
+  system.input_sd = VectorXd::Zero(LinearSystem::kCount);
+  system.input_sd.segment(18, 9).setConstant(0.7);
+  const auto reference = std::make_shared<const Likelihood>(system, Readings(4), white(system));
+  const Layout layout(system, {0});
+  Fit at = fit(*reference, layout, layout.shared_start(), std::vector<VectorXd>(4, layout.local_start()),
+               {.nuisance_sd = VectorXd::Constant(1, 0.2), .curves = {}}, {});
+  at.likelihood = reference;
+  const auto own = with_inputs_of(at, reference);
+  ASSERT_NE(own, reference);
+  const MatrixXd step = LinearSystem::design({1}).rightCols(1);
+  const std::vector<Eigen::MatrixXf> columns(4, reference->whitened(0, step).cast<float>());
+  const auto added = Marginal(*own, at, {}, reference.get()).added(columns);
+  MatrixXd covariance = covariance_of(system, {0}, white(system), 0.2);
+  covariance.diagonal() += system.input_sd.cwiseAbs2().replicate(4, 1);
+  const VectorXd weighed = covariance.llt().solve(step.replicate(4, 1));
+  EXPECT_NEAR(added.square(0, 0), weighed.dot(step.replicate(4, 1).col(0)), 1e-3 * added.square(0, 0));
+  EXPECT_NEAR(added.pull[0], weighed.dot(all_readings(system)), 1e-3 * std::sqrt(added.square(0, 0)));
+  // And it matters: without, the readings that are open would count like the others.
+  const auto blind = Marginal(*reference, at, {}).added(columns);
+  EXPECT_GT(std::abs(blind.square(0, 0) / added.square(0, 0) - 1), 0.1);
+}
+
 TEST(Evidence, TheNoiseIsTheLikeliest) {
   const LinearSystem system(6, 11, 0, 0.2, 0);
   const Evaluated at = evaluate_set(system, {});

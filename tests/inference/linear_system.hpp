@@ -17,6 +17,7 @@ class LinearSystem final : public System {
  public:
   static constexpr int kCount = 60;
   double sigma = 0.1;
+  Eigen::VectorXd input_sd;  // of each recording's readings; empty: none
 
   LinearSystem(std::size_t recordings, std::uint64_t seed, double parabola, double nuisance_sd, double bump,
                double by_sawtooth = 0) {
@@ -93,6 +94,10 @@ class LinearSystem final : public System {
     out.reading = X * shared + L * local;
     if (derivatives) out.by_shared = X, out.by_local = L;
     return true;
+  }
+  Eigen::VectorXd by_inputs(const ModelSet&, std::size_t, const Eigen::VectorXd&,
+                            const Eigen::VectorXd&) const override {
+    return input_sd;
   }
   Eigen::MatrixXd by_curves(std::size_t, const Eigen::VectorXd&) const override {
     Eigen::MatrixXd out = Eigen::MatrixXd::Zero(kCount, 6 * static_cast<int>(curves_.size()));
