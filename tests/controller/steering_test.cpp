@@ -136,7 +136,9 @@ TEST(Reach, EndedAtWhatIsEnoughSaysTheSame) {
     const Reach best = predict_reach({}, agar(), target, kTolerance_mm);
     const Reach enough = predict_reach({}, agar(), target, kTolerance_mm, kTolerance_mm);
     EXPECT_EQ(enough.reachable, best.reachable) << "seed " << kSeed << ", target " << target.transpose();
-    if (!best.reachable) EXPECT_EQ(enough.miss_mm, best.miss_mm);
+    if (!best.reachable) {
+      EXPECT_EQ(enough.miss_mm, best.miss_mm);
+    }
     if (best.reachable) ++reached;
   }
   EXPECT_GT(reached, 50);
