@@ -157,6 +157,7 @@ void EstimatorNode::restart() {
 void EstimatorNode::on_word(Word word) {
   switch (word) {
     case Word::arm:
+    case Word::arm_to_retract:
       break;
     case Word::entry:
       restart();
