@@ -64,12 +64,9 @@ void end_with(int parent) {
 std::string try_realtime(int priority) {
   sched_param parameters{};
   parameters.sched_priority = priority;
-  std::string refused;
-  if (sched_setscheduler(0, SCHED_FIFO, &parameters) != 0)
-    refused = std::string("no SCHED_FIFO: ") + std::strerror(errno);
-  if (mlockall(MCL_CURRENT | MCL_FUTURE) != 0)
-    refused += std::string(refused.empty() ? "" : ", ") + "memory not locked: " + std::strerror(errno);
-  return refused;
+  if (sched_setscheduler(0, SCHED_FIFO, &parameters) != 0) return std::string("no SCHED_FIFO: ") + std::strerror(errno);
+  if (mlockall(MCL_CURRENT | MCL_FUTURE) != 0) return std::string("memory not locked: ") + std::strerror(errno);
+  return "";
 }
 
 void pump(lcm::LCM& lcm) {

@@ -97,7 +97,7 @@ void StepperNode::stop(stepper::StopReason reason, std::string detail) {
   if (is_latched(driver_.report())) return;
   driver_.stop_now(reason, port_.now().ns);
   note_latch();
-  detail_ = std::move(detail);
+  if (driver_.report().stop.reason == reason) detail_ = std::move(detail);  // else a drive had one of its own first
 }
 
 void StepperNode::note_latch() {

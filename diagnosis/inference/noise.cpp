@@ -170,7 +170,7 @@ double squared_distance(const Series& series, const Eigen::VectorXd& error, cons
   const double a = series.relative_sd[i], b = series.relative_sd[j];
   const double correlation = std::pow(noise.ar1, std::abs(series.time_s[i] - series.time_s[j]) / noise.frame_s);
   const double apart = error[static_cast<Eigen::Index>(i)] - error[static_cast<Eigen::Index>(j)];
-  return apart * apart / (sigma * sigma * (a * a + b * b - 2 * a * b * correlation));
+  return apart * apart / (sigma * sigma * std::max(a * a + b * b - 2 * a * b * correlation, 1e-12));
 }
 
 // The error with what a flexible curve leaves of it clipped: outliers would pass for white noise of their size.

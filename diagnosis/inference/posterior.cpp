@@ -6,6 +6,7 @@
 #include <boost/math/distributions/normal.hpp>
 #include <cmath>
 #include <set>
+#include <stdexcept>
 
 #include "diagnosis/inference/log_sum.hpp"
 #include "diagnosis/parallel.hpp"
@@ -227,6 +228,7 @@ std::vector<LeftOutSelection> leave_out_selection(const Search& search) {
       if (auto part = leave_out(fit, blocks, curve, r)) models[m].parts.push_back(std::move(*part));
   });
   std::erase_if(models, [&](const Model& model) { return model.parts.size() < recordings; });
+  if (models.empty()) throw std::domain_error("no model can be fitted to these recordings without one of them");
   std::vector<LeftOutSelection> out;
   for (std::size_t r = 0; r < recordings; ++r) {
     std::vector<double> with, without;

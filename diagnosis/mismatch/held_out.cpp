@@ -165,9 +165,9 @@ Sums sums_of(const NeedleSystem& system, const inference::Search& search, Fit fi
   if (curve) errors -= curve.raw[r] * fit.curve_values;
   add_errors(system, *fit.likelihood, r, errors, out);
   const auto predictive = predictive_of(fit, blocks, curve, r);
-  if (!predictive) return {};
-  out.chi2 = predictive->chi2;
-  out.log_density = predictive->log_density + constant_of(out.count);
+  constexpr double kNotPredicted = std::numeric_limits<double>::quiet_NaN();
+  out.chi2 = predictive ? predictive->chi2 : kNotPredicted;
+  out.log_density = predictive ? predictive->log_density + constant_of(out.count) : kNotPredicted;
   return out;
 }
 

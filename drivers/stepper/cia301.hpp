@@ -87,6 +87,7 @@ class SdoClient {
   void on_response(const Frame& frame);
 
   Status status() const { return status_; }
+  ObjectAddress object() const { return object_; }  // of the last transfer
   std::uint32_t value() const { return value_; }
   std::string_view text() const { return {text_.data(), text_size_}; }
   std::uint32_t abort_code() const { return abort_code_; }

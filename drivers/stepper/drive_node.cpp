@@ -270,9 +270,12 @@ void DriveNode::transfer(std::int64_t now_ns, Transmitter& out) {
 bool DriveNode::ask_once(cia301::ObjectAddress object, bool& asked, std::int64_t now_ns, Transmitter& out) {
   using Status = cia301::SdoClient::Status;
   sdo_.check_time(now_ns);
-  const bool answered = asked && sdo_.status() == Status::done;
-  if (!asked) sdo_.upload(object);
-  asked = true;
+  const bool busy = sdo_.status() == Status::to_send || sdo_.status() == Status::waiting;  // with another question
+  if (!asked && !busy) {
+    sdo_.upload(object);
+    asked = true;
+  }
+  const bool answered = asked && sdo_.object() == object && sdo_.status() == Status::done;
   if (answered) sdo_.cancel();
   const auto frame = sdo_.frame_to_send();
   if (frame && out.send(*frame, now_ns)) sdo_.sent(now_ns);

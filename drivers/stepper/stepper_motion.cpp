@@ -56,7 +56,8 @@ void StepperDriver::run_enabled(std::int64_t now_ns, const std::optional<MotionS
 
 void StepperDriver::take(std::int64_t now_ns, const MotionSetpoint& setpoint) {
   if (state_ != DriverState::enabled || config_.mode != VelocityMode::profile) return;
-  take_in(now_ns);  // echoes, so that nothing holds the command back
+  take_in(now_ns);                          // echoes, so that nothing holds the command back
+  if (latched()) return send_stop(now_ns);  // or what a drive says
   if (state_ != DriverState::enabled) return;
   const auto rates = wanted_rates(now_ns, setpoint);
   if (state_ == DriverState::enabled) {

@@ -127,10 +127,13 @@ class CoreUse:
         slots = places * self.wall
         # While all places are taken: from when each had its first result, to the last one.
         ends = sorted(file.stat().st_mtime for file in files)
-        steady = at_work / len(kept) * (len(kept) - places) / (places * (ends[-1] - ends[places - 1]))
+        steady = ""
+        if len(ends) > places:
+            share = at_work / len(kept) * (len(kept) - places) / (places * (ends[-1] - ends[places - 1]))
+            steady = f", without start and page {100 * share:.1f} %"
         return (f"{100 * cpu / (os.cpu_count() * self.wall):.1f} % of {os.cpu_count()} cores x {self.wall:.1f} s, "
                 f"{100 * cpu / self.given:.1f} % of the {self.given:.1f} s that others left; "
-                f"at work {100 * at_work / slots:.1f} %, without start and page {100 * steady:.1f} %; beside the cases {self.ours_s - cpu:.1f} s of CPU time, "
+                f"at work {100 * at_work / slots:.1f} %{steady}; beside the cases {self.ours_s - cpu:.1f} s of CPU time, "
                 f"{(self.ours_s - cpu) / len(kept):.2f} s a case")
 
 

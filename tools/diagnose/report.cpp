@@ -180,8 +180,9 @@ void add_what_to_do(report::Page& page, const Findings& f) {
           "rig and record again.");
       if (f.steered && steers_worse(*f.steered))
         todo.emplace_back(
-            "It predicts better, but do not steer by it untried: in simulation the needle comes nearer to its targets "
-            "when estimator and controller believe the model as it stands (\"At the target\").");
+            std::string("It predicts better, but do not steer by it untried: in simulation the needle ") +
+            (f.steered->found.arrived < f.steered->as_it_stands.arrived ? "reaches more of" : "comes nearer to") +
+            " its targets when estimator and controller believe the model as it stands (\"At the target\").");
       if (has_rivals(f))
         todo.emplace_back(
             "Before you name the cause, record the next experiment below: these recordings cannot tell the named "

@@ -53,10 +53,12 @@ def turn(out, at_once):
         files = [open(out / "work" / f"turn{i}.lock", "w", encoding="utf-8") for i in range(at_once)]
         while files:
             for file in files:
-                with contextlib.suppress(BlockingIOError):
+                try:
                     fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
-                    yield [file]
-                    return
+                except BlockingIOError:
+                    continue
+                yield [file]
+                return
             time.sleep(LOOK_S)
         yield []
     finally:

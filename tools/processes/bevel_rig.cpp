@@ -24,7 +24,9 @@ int main(int argc, char** argv) {
     if (config.can.starts_with(kLocal)) {
       hub = std::make_unique<can::LocalHub>(config.can.substr(kLocal.size()));
       hub_thread = std::jthread([&](const std::stop_token& stop) {
-        if (config.realtime) (void)nodes::try_realtime(kWirePriority);
+        if (config.realtime)
+          if (const std::string refused = nodes::try_realtime(kWirePriority); !refused.empty())
+            std::fprintf(stderr, "bevel-rig: the local bus runs without: %s\n", refused.c_str());
         hub->run(stop);
       });
     }

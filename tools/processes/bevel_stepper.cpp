@@ -24,7 +24,8 @@ int main(int argc, char** argv) {
                            node.step(now);
                            return !(to_rest && node.at_rest());
                          },
-                         [&] { return node.waits_for_bus() ? bus->poll_fd() : -1; }, [&](const nodes::Now& now) { node.hear_bus(now); }};
+                         [&] { return node.waits_for_bus() ? bus->poll_fd() : -1; },
+                         [&](const nodes::Now& now) { node.hear_bus(now); }};
     };
     // The axes are brought to rest before this ends, and others hear of it.
     nodes::run_with_end(

@@ -211,6 +211,8 @@ Insertion one_insertion(const Row& row, const TargetsOptions& options, std::uint
 
 int run_targets(const TargetsOptions& options, std::ostream& out) {
   const std::vector<Row> rows = rows_of(options);
+  if (rows.empty())
+    throw std::runtime_error("--law \"" + options.law + "\" is not tried in --scenario " + options.scenario);
   std::ofstream file;
   if (!options.json.empty()) {
     file.open(options.json);
