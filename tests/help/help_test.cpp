@@ -115,6 +115,16 @@ TEST_F(Help, AnUnknownOptionOfAScriptStartsNothing) {
   }
 }
 
+TEST_F(Help, TheDemoKnowsAllOptionsOfItsProgram) {
+  const std::string help = run(std::string(BEVEL_BINARY_DIR) + "/bin/bevel-demo", "--help").out;
+  const std::string script = test::text_of(std::string(BEVEL_SOURCE_DIR) + "/tools/demo");
+  const std::regex option("\n +(-.,)?(--[a-z-]+)");
+  int options = 0;
+  for (std::sregex_iterator at(help.begin(), help.end(), option), end; at != end; ++at, ++options)
+    EXPECT_THAT(script, HasSubstr((*at)[2].str()));
+  EXPECT_GT(options, 8);
+}
+
 TEST_F(Help, AnUnknownOptionIsNamedWithTheNearestBeforeWhatIsMissing) {
   for (const std::string& program : programs()) {
     const Said said = run(program, "--hlep");
