@@ -309,12 +309,17 @@ Integrated integrated(const std::vector<CurveFactor>& curves) {
   return {.log_factor = mean, .log_spread = mean - logs.front()};
 }
 
+// Every curve beside a fit, with what its set leaves open, by the noise that the curves were prepared with.
+std::vector<CurveFactor> scan_beside(const Likelihood& likelihood, const Discrepancy& discrepancy, const Fit& fit) {
+  const auto by = with_inputs_of(fit, {std::shared_ptr<const void>(), &likelihood});  // not owned: no longer than here
+  return discrepancy.scan(Marginal(*by, fit, discrepancy.columns(*by, fit.scales.curves), &likelihood));
+}
+
 // One more curve beside those that a set has; whether it is likelier than none more. log_evidence: with those it has.
 bool add_curve(const Likelihood& likelihood, const Discrepancy& discrepancy, double log_prior_odds, Evaluated& out,
                double& log_evidence) {
   const Fit& here = *out.fit_with_curve;
-  const Likelihood by(likelihood, likelihood.noise(), inputs_about(here));
-  auto more = discrepancy.scan(Marginal(by, here, discrepancy.columns(by, here.scales.curves), &likelihood));
+  auto more = scan_beside(likelihood, discrepancy, here);
   for (const CurvePrior& known : here.scales.curves)
     std::erase_if(more, [&](const CurveFactor& one) { return one.prior.curve == known.curve; });
   if (more.empty()) return false;
@@ -338,9 +343,7 @@ bool add_curve(const Likelihood& likelihood, const Discrepancy& discrepancy, dou
 void add_discrepancy(const Likelihood& likelihood, const Discrepancy& discrepancy, const CurveRules& rules,
                      Evaluated& out) {
   out.with_discrepancy = true;
-  // By the noise that the curves were prepared with.
-  const Likelihood by(likelihood, likelihood.noise(), inputs_about(out.fit));
-  out.curves = discrepancy.scan(Marginal(by, out.fit, {}, &likelihood));
+  out.curves = scan_beside(likelihood, discrepancy, out.fit);
   if (out.curves.empty()) return;
   const Integrated all = integrated(out.curves);  // the rest of them, by the linear model
   out.log_bayes_factor_curve = all.log_factor;

@@ -86,8 +86,7 @@ class System {
   virtual bool predict(const ModelSet& set, std::size_t recording, const Eigen::VectorXd& shared,
                        const Eigen::VectorXd& local, bool derivatives, Prediction& out) const = 0;
   // Standard deviations of the rows by what the model's inputs are not known to, and by what it leaves open itself,
-  // where that matters to this set;
-  // unknowns as for predict. Empty: nowhere. Thread-safe.
+  // where that matters to this set; unknowns as for predict. Empty: nowhere. Thread-safe.
   virtual Eigen::VectorXd by_inputs(const ModelSet& /*set*/, std::size_t /*recording*/,
                                     const Eigen::VectorXd& /*shared*/, const Eigen::VectorXd& /*local*/) const {
     return {};
