@@ -78,6 +78,8 @@ const char* to_string(Reason reason) {
       return "there is no such depth behind the tip to retract to";
     case Reason::channel_unknown:
       return "drawn back in a channel whose end is not known since a reset";
+    case Reason::way_in_unknown:
+      return "its way in was not watched, so it is not drawn back by itself: draw it out by hand";
     case Reason::ending:
       return "told to end";
   }

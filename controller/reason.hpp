@@ -33,6 +33,7 @@ enum class Reason {
   way_points_too_many,
   retraction_refused,  // the depth that was told is none behind the tip
   channel_unknown,     // drawn back, and the estimator declared a reset since it was at the end of its channel
+  way_in_unknown,      // to be drawn back, and nobody watched it go in; how much of it is inserted
   law_without_path,    // way-points or obstacles with a law that does not follow a path
 };
 const char* to_string(State state);

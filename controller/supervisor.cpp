@@ -54,7 +54,9 @@ void Supervisor::request(Request request, const std::optional<Target>& target, s
       status_.state = State::steering;
       return;
     case Request::follow: {
-      if (!in_motion_states() || !target || !target->position_mm.allFinite() || !check_inputs(now_utime)) return;
+      if (!in_motion_states() || for_retraction_ || !target || !target->position_mm.allFinite() ||
+          !check_inputs(now_utime))
+        return;
       rendezvous_.observe(target->utime_or(now_utime), target->position_mm);
       if (status_.state != State::retracting) check_reach(now_utime);  // which goes nowhere now; seen when it starts
       return;
@@ -71,14 +73,22 @@ void Supervisor::request(Request request, const std::optional<Target>& target, s
     case Request::retract:
       return start_retraction(target, now_utime);
     case Request::arm:
+    case Request::arm_to_retract:
       break;
   }
-  if (moves() || !target || !target->position_mm.allFinite()) return;
+  const bool to_retract = request == Request::arm_to_retract;
+  if (moves() || (!to_retract && (!target || !target->position_mm.allFinite()))) return;
   status_.state = State::off;  // re-arming is this explicit word, and it clears a latched reason
   status_.reason = Reason::none;
   status_.value = 0;
   status_.unit = "";
   rates_ = {};
+  for_retraction_ = to_retract;
+  if (to_retract) {
+    target_.reset();
+    if (check_inputs(now_utime)) await_axes();
+    return;
+  }
   if (way_points_lost_) return stop(Reason::way_points_too_many, static_cast<double>(kMostWayPoints), "at most");
   if (!check_inputs(now_utime)) return;
   aim_mm_ = target->position_mm;
@@ -99,6 +109,10 @@ void Supervisor::request(Request request, const std::optional<Target>& target, s
   }
   target_ = target;
   rendezvous_.restart(target->utime_or(now_utime), target->position_mm);
+  await_axes();
+}
+
+void Supervisor::await_axes() {
   status_.state = State::armed;
   axes_were_enabled_ = false;
   enabling_s_ = 0;
@@ -129,12 +143,12 @@ bool Supervisor::check_inputs(std::int64_t now_utime) {
   if (!(std::abs(age_s(actuator_->utime)) <= safety.actuator_age_s))
     return refuse(Reason::actuator_stale, age_s(actuator_->utime), "s old");
   const double depth = n.pose.p_mm.z();
-  if (!(depth >= safety.depth_min_mm && depth <= safety.depth_max_mm))
+  if (!(depth >= safety.depth_min_mm && (for_retraction_ || depth <= safety.depth_max_mm)))
     return refuse(Reason::workspace, depth, "mm deep");
-  if (const double left_mm = route_.clearance_left_mm(n.pose.p_mm); left_mm < 0)
-    return refuse(Reason::obstacle_near, left_mm, "mm of its clearance left");
-  const double lateral = n.pose.p_mm.head<2>().norm();
-  if (!(lateral <= safety.lateral_max_mm)) return refuse(Reason::workspace, lateral, "mm lateral");
+  const double left_mm = route_.clearance_left_mm(n.pose.p_mm), lateral = n.pose.p_mm.head<2>().norm();
+  // Back along the way that it came leads out of both.
+  if (!for_retraction_ && left_mm < 0) return refuse(Reason::obstacle_near, left_mm, "mm of its clearance left");
+  if (!for_retraction_ && !(lateral <= safety.lateral_max_mm)) return refuse(Reason::workspace, lateral, "mm lateral");
   // Tissue that moves with its camera, and an entry point that was not quite met, are within the bound on the error.
   const double beyond = n.pose.p_mm.norm() - std::abs(actuator_->insertion_mm);
   if (!(beyond <= safety.position_sd_mm + kDeviations * std::sqrt(n.position_variance_mm2)))

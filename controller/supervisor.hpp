@@ -18,7 +18,16 @@
 
 namespace bevel::controller {
 
-enum class Request : std::int32_t { stop = 0, arm = 1, start = 2, hold = 3, follow = 6, way_point = 7, retract = 8 };
+enum class Request : std::int32_t {
+  stop = 0,
+  arm = 1,
+  start = 2,
+  hold = 3,
+  follow = 6,
+  way_point = 7,
+  retract = 8,
+  arm_to_retract = 9
+};
 
 // What the controller needs of NEEDLE_STATE.
 struct NeedleView {
@@ -33,6 +42,7 @@ struct NeedleView {
   std::int32_t health = 0;           // not zero: it must not be steered by
   bool unsure = false;  // it doubts its newest readings: come to rest, and go on when they are believed again
   std::int32_t reset_count = 0;
+  bool from_entry = true;  // the estimator has been there since it went in
 };
 
 struct Target {
@@ -60,9 +70,13 @@ class Supervisor {
              std::vector<model::ActiveEffect> effects = {});
 
   // The newest of each; the supervisor judges their age by the time handed to step().
-  void set_needle(const NeedleView& view) { needle_state_ = view; }
+  void set_needle(const NeedleView& view) {
+    needle_state_ = view;
+    watch_way_in();
+  }
   void set_actuator(const model::ActuatorState& state) {
     actuator_ = state;
+    watch_way_in();
     axes_.follow(state, needle_state_ ? needle_state_->pose.p_mm.z() : 0);
   }
 
@@ -74,7 +88,9 @@ class Supervisor {
   // told, within its tolerance (0: 1 mm); a start and a stop forget those told so far. retract: draws the needle back
   // until no more of it is inserted than target's z says (mm, by the axis; 0: to the entry), then holds; from hold,
   // armed or steering, once what moves has come to rest by the ramp, at its own rate, with the bevel at rest: the cable
-  // is not unwound. A depth that is not behind the tip is a latched stop.
+  // is not unwound. A depth that is not behind the tip is a latched stop, and so is a needle with a channel that this
+  // supervisor, or the estimator, has not watched go in. arm_to_retract: arms without a target, for that alone; a tip
+  // in an obstacle's clearance, too deep or too far aside is drawn back from there.
   void request(Request request, const std::optional<Target>& target, std::int64_t now_utime);
   // Latches what others found: overrun, input_refused, ending.
   void report(Reason reason) { stop(reason, 0, ""); }
@@ -106,6 +122,8 @@ class Supervisor {
   void start_retraction(const std::optional<Target>& target, std::int64_t now_utime);
   model::MotionCommand retract(model::MotionCommand command, double dt_s);
   void note_front();
+  void watch_way_in();
+  void await_axes();
   double drawn_back_mm() const;
   bool front_is_lost() const;
   model::Pose cutting_tip() const;
@@ -140,6 +158,8 @@ class Supervisor {
   ArcLaw arcs_;
   Rates rates_;
   double retract_to_mm_ = 0;
+  bool for_retraction_ = false;  // armed for that alone
+  bool way_in_watched_ = false;  // by this and by the estimator, since it was out
   // Where it was inserted deepest: there it cuts on, however far it was drawn back.
   struct Front {
     double insertion_mm, rotation_rad;

@@ -20,6 +20,8 @@ void Supervisor::start_retraction(const std::optional<Target>& target, std::int6
   if (!check_inputs(now_utime) || !check_axes()) return;
   const double to_mm = target ? target->position_mm.z() : std::nan("");
   if (!(to_mm >= 0 && to_mm <= actuator_->insertion_mm)) return stop(Reason::retraction_refused, to_mm, "mm");
+  if (config_.through_channel && !way_in_watched_)
+    return stop(Reason::way_in_unknown, actuator_->insertion_mm, "mm inserted");
   if (!moves()) reset_count_ = needle_state_->reset_count;
   retract_to_mm_ = to_mm;
   status_.state = State::retracting;
@@ -38,6 +40,14 @@ model::MotionCommand Supervisor::retract(model::MotionCommand command, double dt
     wanted.insertion_mm_s = -std::min(limits.retraction_rate_mm_s, braking);
   }
   return run(command, wanted, dt_s);
+}
+
+// One that began to look when it was inserted does not know the channel, nor does one that was told it is known.
+void Supervisor::watch_way_in() {
+  if (actuator_ && actuator_->insertion_mm <= kOut_mm)
+    way_in_watched_ = true;
+  else if (needle_state_ && !needle_state_->from_entry)
+    way_in_watched_ = false;
 }
 
 // The deepest insertion stays one whatever the estimator declares; only where its end lies is not known after a reset.

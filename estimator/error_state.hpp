@@ -1,6 +1,6 @@
 #pragma once
 // The error of a FilterState as a vector of nine, or of ten with ell, and its covariance as one matrix. With the errors
-// that readings share behind them they are fifteen or sixteen.
+// that readings share behind them they are fifteen or sixteen; the nuisance states, where there are any, come last.
 #include "estimator/needle_filter.hpp"
 
 namespace bevel::estimator {
@@ -10,9 +10,14 @@ using Error = Eigen::Matrix<double, kSize, 1>;
 template <int kSize>
 using Covariance = Eigen::Matrix<double, kSize, kSize>;
 
+// Without the nuisance states, which are the last where there are any: 18, 19, 24 or 25.
+template <int kSize>
+inline constexpr int kFiltered = kSize > 16 ? kSize - kNuisance : kSize;
+template <int kSize>
+inline constexpr bool kHasShared = kFiltered<kSize> > 10;
 // Of the state itself.
 template <int kSize>
-inline constexpr int kOwn = kSize > 10 ? kSize - kSharedErrors : kSize;
+inline constexpr int kOwn = kHasShared<kSize> ? kFiltered<kSize> - kSharedErrors : kFiltered<kSize>;
 
 inline const Matrix9d& get_covariance(const FilterState& state, std::integral_constant<int, 9>) {
   return state.covariance;
@@ -23,7 +28,19 @@ inline Covariance<10> get_covariance(const FilterState& state, std::integral_con
   return P;
 }
 template <int kSize>
-Covariance<kSize> get_covariance(const FilterState& state, std::integral_constant<int, kSize>) {
+requires(kSize > 16) Covariance<kSize> get_covariance(const FilterState& state, std::integral_constant<int, kSize>) {
+  constexpr int kBefore = kFiltered<kSize>;
+  const Nuisance& nuisance = state.nuisance;
+  Eigen::Matrix<double, kBefore, kNuisance> with;
+  with.template topRows<kOwn<kSize>>() = nuisance.with_state.topRows<kOwn<kSize>>();
+  if constexpr (kHasShared<kSize>) with.template bottomRows<kSharedErrors>() = nuisance.with_shared;
+  Covariance<kSize> P;
+  P << get_covariance(state, std::integral_constant<int, kBefore>()), with, with.transpose(), nuisance.covariance;
+  return P;
+}
+template <int kSize>
+requires(kSize > 10 && kSize <= 16) Covariance<kSize> get_covariance(const FilterState& state,
+                                                                     std::integral_constant<int, kSize>) {
   const auto& with_state = state.shared.with_state.topRows<kOwn<kSize>>();
   Covariance<kSize> P;
   P << get_covariance(state, std::integral_constant<int, kOwn<kSize>>()), with_state, with_state.transpose(),
@@ -40,12 +57,19 @@ template <int kSize>
 void set_covariance(FilterState& state, const Covariance<kSize>& P) {
   state.covariance = P.template topLeftCorner<9, 9>();
   if constexpr (kOwn<kSize> == 10) {
-    state.tenth_covariance = P.template topRightCorner<9, 1>();
+    state.tenth_covariance = P.template block<9, 1>(0, 9);
     state.tenth_variance = P(9, 9);
   }
-  if constexpr (kSize > 10) {
-    state.shared.with_state.topRows<kOwn<kSize>>() = P.template topRightCorner<kOwn<kSize>, kSharedErrors>();
-    state.shared.covariance = P.template bottomRightCorner<kSharedErrors, kSharedErrors>();
+  constexpr int kStates = kOwn<kSize>;
+  if constexpr (kHasShared<kSize>) {
+    state.shared.with_state.topRows<kStates>() = P.template block<kStates, kSharedErrors>(0, kStates);
+    state.shared.covariance = P.template block<kSharedErrors, kSharedErrors>(kStates, kStates);
+  }
+  if constexpr (kSize > 16) {
+    state.nuisance.with_state.topRows<kStates>() = P.template topRightCorner<kStates, kNuisance>();
+    if constexpr (kHasShared<kSize>)
+      state.nuisance.with_shared = P.template block<kSharedErrors, kNuisance>(kStates, kFiltered<kSize>);
+    state.nuisance.covariance = P.template bottomRightCorner<kNuisance, kNuisance>();
   }
 }
 
@@ -57,7 +81,12 @@ void move(FilterState& state, const Error<kSize>& error) {
   state.lambda1_per_rad += error[7];
   state.lambda2 += error[8];
   if constexpr (kOwn<kSize> == 10) (state.bending_mm > 0 ? state.bending_mm : state.wheelbase_mm) += error[9];
-  if constexpr (kSize > 10) state.shared.mean += error.template tail<kSharedErrors>();
+  if constexpr (kHasShared<kSize>) state.shared.mean += error.template segment<kSharedErrors>(kOwn<kSize>);
+  if constexpr (kSize > 16) {
+    const auto by = error.template tail<kNuisance>();
+    state.nuisance.mean += by;
+    state.nuisance.lag_rad += state.nuisance.lag_by_windup * by[kWindup];
+  }
 }
 
 // The error by which `from` is moved to `to`.

@@ -17,16 +17,20 @@ inline constexpr double kReadingsOfOneError = 30;
 struct SeenAxes {
   Eigen::Matrix3d axes;
   Eigen::Vector3d variance = Eigen::Vector3d::Zero();
-  Eigen::Vector3d shared = Eigen::Vector3d::Zero();  // more of it, of an error that neighbouring readings share
+  Eigen::Vector3d shared = Eigen::Vector3d::Zero();    // more of it, of an error that neighbouring readings share
   Eigen::Vector3d coloured = Eigen::Vector3d::Zero();  // more of it, of the three SharedErrors from `first_error`
   int first_error = 0;
   int rank = 0;
 };
 
+using ByNuisance = Eigen::Matrix<double, 3, kNuisance>;
+inline const ByNuisance kByNoNuisance = ByNuisance::Zero();
+
 // `by_state`: derivative of what is seen by the first columns of the error; R of the pose if it is the tip itself.
+// `by_nuisance`: by the nuisance states, of which the residual has the mean.
 template <int kSize, int kRank, int kColumns>
 Update update_rank(FilterState& state, const Eigen::Matrix<double, 3, kColumns>& by_state, const SeenAxes& seen,
-                   const Eigen::Vector3d& residual, double gate) {
+                   const Eigen::Vector3d& residual, double gate, const ByNuisance& by_nuisance) {
   using Vec = Eigen::Matrix<double, kRank, 1>;
   using Mat = Eigen::Matrix<double, kRank, kRank>;
   const auto axes = seen.axes.template rightCols<kRank>();
@@ -35,22 +39,26 @@ Update update_rank(FilterState& state, const Eigen::Matrix<double, 3, kColumns>&
   const auto& covariance = covariance_of<kSize>(state);
   // Derivative by the shared errors of the camera, which are along the axes of {A}.
   using ByErrors = Eigen::Matrix<double, kRank, 3>;
-  const Eigen::Index first = kOwn<kSize> + seen.first_error;
+  const Eigen::Index first = kOwn<kSize> + seen.first_error, last = kFiltered<kSize>;
+  Eigen::Matrix<double, kRank, kNuisance> by_last;
+  if constexpr (kSize > 16) by_last = axes.transpose() * by_nuisance;
   ByErrors by_errors;
-  if constexpr (kSize > 10)
+  if constexpr (kHasShared<kSize>)
     by_errors = seen.coloured.template tail<kRank>().cwiseSqrt().asDiagonal() * axes.transpose();
   const auto times_derivative = [&](const Covariance<kSize>& of) {
     Eigen::Matrix<double, kSize, kRank> product = of.template leftCols<kColumns>().lazyProduct(H.transpose());
-    if constexpr (kSize > 10) product += of.template middleCols<3>(first).lazyProduct(by_errors.transpose());
+    if constexpr (kHasShared<kSize>) product += of.template middleCols<3>(first).lazyProduct(by_errors.transpose());
+    if constexpr (kSize > 16) product += of.template middleCols<kNuisance>(last).lazyProduct(by_last.transpose());
     return product;
   };
   const Eigen::Matrix<double, kSize, kRank> PHt = times_derivative(covariance);
   Mat S = H * PHt.template topRows<kColumns>();
-  if constexpr (kSize > 10) S += by_errors * PHt.template middleRows<3>(first);
+  if constexpr (kHasShared<kSize>) S += by_errors * PHt.template middleRows<3>(first);
+  if constexpr (kSize > 16) S += by_last * PHt.template middleRows<kNuisance>(last);
   S.diagonal() += variance;
   Eigen::LLT<Mat> llt(S);
   Vec y = axes.transpose() * residual;
-  if constexpr (kSize > 10) y -= by_errors * state.shared.mean.template segment<3>(seen.first_error);
+  if constexpr (kHasShared<kSize>) y -= by_errors * state.shared.mean.template segment<3>(seen.first_error);
   const Vec whitened = llt.matrixL().solve(y);
 
   Update result;
@@ -89,14 +97,15 @@ Update update_rank(FilterState& state, const Eigen::Matrix<double, 3, kColumns>&
 
 template <int kSize, int kColumns>
 Update update_seen(FilterState& state, const Eigen::Matrix<double, 3, kColumns>& by_state, const SeenAxes& seen,
-                   const Eigen::Vector3d& residual, const std::array<double, 3>& gate) {
+                   const Eigen::Vector3d& residual, const std::array<double, 3>& gate,
+                   const ByNuisance& by_nuisance = kByNoNuisance) {
   switch (seen.rank) {
     case 1:
-      return update_rank<kSize, 1, kColumns>(state, by_state, seen, residual, gate[0]);
+      return update_rank<kSize, 1, kColumns>(state, by_state, seen, residual, gate[0], by_nuisance);
     case 2:
-      return update_rank<kSize, 2, kColumns>(state, by_state, seen, residual, gate[1]);
+      return update_rank<kSize, 2, kColumns>(state, by_state, seen, residual, gate[1], by_nuisance);
     case 3:
-      return update_rank<kSize, 3, kColumns>(state, by_state, seen, residual, gate[2]);
+      return update_rank<kSize, 3, kColumns>(state, by_state, seen, residual, gate[2], by_nuisance);
     default:
       return {};
   }

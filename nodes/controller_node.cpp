@@ -50,6 +50,7 @@ controller::NeedleView to_view(const needle_state_t& m) {
   v.health = estimator::lost(m.health);
   v.unsure = (m.health & estimator::kUnsure) != 0;
   v.reset_count = m.reset_count;
+  v.from_entry = (m.health & estimator::kNotFromEntry) == 0;
   return v;
 }
 
@@ -109,7 +110,7 @@ void ControllerNode::check_alive(const needle_state_t& m) {
 
 void ControllerNode::on_word(Word word, const steering_target_t& m) {
   if (word == Word::entry || word == Word::confirm) return;  // for those who count and estimate
-  if (word == Word::arm) {
+  if (word == Word::arm || word == Word::arm_to_retract) {
     port_.forget_senders();
     detail_.clear();  // of the stop before: what this arm is refused for is another
   }

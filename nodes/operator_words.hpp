@@ -17,7 +17,8 @@ enum class Word : std::int32_t {
   confirm = 5,
   follow = 6,
   way_point = 7,
-  retract = 8
+  retract = 8,
+  arm_to_retract = 9
 };
 // Place of a receiver's session in steering_target_t.session.
 enum class Receiver : std::size_t { controller = 0, stepper = 1, estimator = 2 };

@@ -64,6 +64,7 @@ void StepperNode::on_word(Word word) {
       enable_wanted_ = false;
       break;
     case Word::arm:
+    case Word::arm_to_retract:
       port_.forget_senders();
       driver_.rearm();
       ran_since_armed_ = false;

@@ -23,6 +23,7 @@ class Retraction : public SupervisorTest {
     v.pose.p_mm.z() = insertion_mm;
     v.unsure = unsure;
     v.reset_count = resets;
+    v.from_entry = from_entry;
     supervisor.set_needle(v);
     model::ActuatorState a = axes(now, last);
     a.insertion_mm = insertion_mm;
@@ -41,7 +42,7 @@ class Retraction : public SupervisorTest {
   State state() { return supervisor.status().state; }
 
   double insertion_mm = 0, rotation_rad = 0;
-  bool unsure = false;
+  bool unsure = false, from_entry = true;
   std::int32_t resets = 0;
   std::function<void()> spoil;
 };
@@ -231,6 +232,84 @@ TEST_F(Retraction, AfterAResetItIsNotSteeredInsideItsChannel) {
     start_from(known_mm);
     EXPECT_EQ(state(), State::steering) << to_string(supervisor.status().reason);
   }
+}
+
+// A controller that is started again with the needle inserted has not seen its way in, and an estimator neither: what
+// was confirmed since is where it stands, not the channel.
+TEST_F(Retraction, ANeedleWhoseWayInNobodyWatchedIsNotDrawnBack) {
+  config.through_channel = true;
+  const auto refused_when_armed_to_retract = [&](double at_mm) {
+    supervisor.request(Request::stop, std::nullopt, now);
+    insertion_mm = at_mm, last = {};
+    give();
+    supervisor.request(Request::arm_to_retract, std::nullopt, now);
+    EXPECT_EQ(state(), State::armed) << to_string(supervisor.status().reason);
+    step();
+    retract(0);
+    if (state() == State::retracting) return false;
+    EXPECT_EQ(state(), State::stopped);
+    EXPECT_EQ(supervisor.status().reason, Reason::way_in_unknown);
+    EXPECT_EQ(supervisor.status().value, at_mm);
+    EXPECT_EQ(step().mode, 0);
+    return true;
+  };
+  supervisor = Supervisor(config, agar());
+  EXPECT_TRUE(refused_when_armed_to_retract(45)) << "a controller begun in the tissue";
+  EXPECT_TRUE(refused_when_armed_to_retract(30)) << "drawn back by hand, but not out";
+  // Out, and in again.
+  insertion_mm = 0.5;
+  give();
+  insertion_mm = 45;
+  give();
+  EXPECT_FALSE(refused_when_armed_to_retract(45));
+  // An estimator begun in the tissue, and confirmed.
+  supervisor.request(Request::stop, std::nullopt, now);
+  from_entry = false;
+  give();
+  from_entry = true;
+  EXPECT_TRUE(refused_when_armed_to_retract(45)) << "an estimator begun in the tissue";
+  // Where nothing is made of a channel, nothing needs to be known of it.
+  config.through_channel = false;
+  supervisor = Supervisor(config, agar());
+  EXPECT_FALSE(refused_when_armed_to_retract(45));
+}
+
+TEST_F(Retraction, ArmedForThatAloneItGoesBackAndNowhereElse) {
+  steer_to_mm(40);
+  // Within an obstacle's clearance no target can be armed for.
+  config.obstacles = {{{0, 3, 40}, {0, 3, 40}, 2.5, 1.0}};
+  supervisor = Supervisor(config, agar());
+  last = {};
+  give();
+  supervisor.request(Request::arm, Target{{2, -8, 100}, 0}, now);
+  ASSERT_EQ(supervisor.status().reason, Reason::obstacle_near);
+  supervisor.request(Request::arm_to_retract, std::nullopt, now);
+  ASSERT_EQ(state(), State::armed) << to_string(supervisor.status().reason);
+  step();
+  supervisor.request(Request::start, std::nullopt, now);
+  EXPECT_EQ(state(), State::armed) << "there is no target";
+  supervisor.request(Request::follow, Target{{2, -8, 100}, 0, now}, now);
+  EXPECT_EQ(state(), State::armed) << to_string(supervisor.status().reason);
+  retract(20);
+  for (int i = 0; i < 2000 && state() == State::retracting; ++i) step();
+  for (int i = 0; i < 20; ++i) step();
+  EXPECT_EQ(state(), State::hold) << to_string(supervisor.status().reason);
+  EXPECT_NEAR(insertion_mm, 20, 0.1);
+  supervisor.request(Request::start, std::nullopt, now);
+  EXPECT_EQ(state(), State::hold);
+  // Everything else that stops it does.
+  supervisor.request(Request::stop, std::nullopt, now);
+  supervisor.request(Request::arm_to_retract, std::nullopt, now);
+  NeedleView lost = view(now);
+  lost.health = 2;
+  supervisor.set_needle(lost);
+  EXPECT_EQ(supervisor.step(now, 0.02).mode, 0);
+  EXPECT_EQ(supervisor.status().reason, Reason::state_unhealthy);
+  // And armed for a target again, the obstacle counts.
+  insertion_mm = 40;
+  give();
+  supervisor.request(Request::arm, Target{{2, -8, 100}, 0}, now);
+  EXPECT_EQ(supervisor.status().reason, Reason::obstacle_near);
 }
 
 TEST_F(Retraction, ATargetThatWentOutOfReachMeanwhileIsRefusedWhenItStarts) {

@@ -44,17 +44,18 @@ bool latched(SimulatedLoop& loop) {
     const DriverState state = loop.stepper->report().state;
     if (state != DriverState::stopped && state != DriverState::fault) return false;
   }
-  return !loop.controller || loop.state() != controller::State::steering;
+  return !loop.controller || !loop.controller->supervisor().moves();
 }
 
-bool steering(SimulatedLoop& loop) {
-  return loop.controller && loop.state() == controller::State::steering && loop.stepper &&
+bool moves(SimulatedLoop& loop) {
+  return loop.controller && loop.controller->supervisor().moves() && loop.stepper &&
          loop.stepper->report().state == stepper::DriverState::enabled;
 }
 
 }  // namespace
 
-Verdict run_injection(const std::vector<FaultClass>& classes, std::size_t fault_class, std::uint64_t seed) {
+Verdict run_injection(const std::vector<FaultClass>& classes, std::size_t fault_class, std::uint64_t seed,
+                      During during) {
   const FaultClass& fault = classes.at(fault_class);
   Verdict verdict;
   verdict.fault_class = fault_class;
@@ -67,8 +68,16 @@ Verdict run_injection(const std::vector<FaultClass>& classes, std::size_t fault_
   };
   const std::string started = loop.steer_to(draw_target(rng, loop.config.needle.curvature_per_mm));
   if (!started.empty()) return violates("did not start: " + started);
-  loop.run(draw_instant_s(rng));
-  if (loop.state() != controller::State::steering) return violates("stopped without a fault: " + all_reasons(loop));
+  auto wanted = controller::State::steering;
+  if (during == During::retracting) {
+    wanted = controller::State::retracting;
+    loop.run(uniform(rng, 6, 12));
+    loop.say(nodes::Word::retract);  // to the entry, five seconds and more away
+    loop.run(uniform(rng, 0.5, 3));
+  } else {
+    loop.run(draw_instant_s(rng));
+  }
+  if (loop.state() != wanted) return violates("stopped without a fault: " + all_reasons(loop));
 
   // Reasons are collected as they are said: a process that is started again says others.
   std::string said;
@@ -83,7 +92,7 @@ Verdict run_injection(const std::vector<FaultClass>& classes, std::size_t fault_
   for (const std::int64_t from = loop.ms; loop.ms < from + std::llround(1000 * longest_s);) {
     loop.step_one_ms();
     listen();
-    if (fault.shows && steering(loop)) {
+    if (fault.shows && moves(loop)) {
       const bool shows = fault.shows(loop);
       if (shows && !showing) {
         shown_ms = loop.ms;
@@ -115,12 +124,13 @@ Verdict run_injection(const std::vector<FaultClass>& classes, std::size_t fault_
   return verdict;
 }
 
-std::vector<Verdict> run_matrix(const std::vector<FaultClass>& classes, int injections, std::uint64_t first_seed) {
+std::vector<Verdict> run_matrix(const std::vector<FaultClass>& classes, int injections, std::uint64_t first_seed,
+                                During during) {
   std::vector<Verdict> verdicts(static_cast<std::size_t>(injections));
   std::atomic<std::size_t> next{0};
   const auto work = [&] {
     for (std::size_t i = next++; i < verdicts.size(); i = next++)
-      verdicts[i] = run_injection(classes, (first_seed + i) % classes.size(), first_seed + i);
+      verdicts[i] = run_injection(classes, (first_seed + i) % classes.size(), first_seed + i, during);
   };
   std::vector<std::jthread> threads;
   for (unsigned i = 0; i < std::max(1U, std::thread::hardware_concurrency()); ++i) threads.emplace_back(work);

@@ -34,11 +34,17 @@ struct Verdict {
   std::string violation;  // "" or which law, and how
 };
 
-// One insertion, steered to a random target, hit at a random instant; both drawn from the seed.
-Verdict run_injection(const std::vector<FaultClass>& classes, std::size_t fault_class, std::uint64_t seed);
+// What the needle is doing when it is hit.
+enum class During { steering, retracting };
+
+// One insertion, steered to a random target, or drawn back on the way there, hit at a random instant; all drawn from
+// the seed.
+Verdict run_injection(const std::vector<FaultClass>& classes, std::size_t fault_class, std::uint64_t seed,
+                      During during = During::steering);
 
 // Classes in turn, seeds counted up from first_seed, on all processors; the order of the result is that of the seeds.
-std::vector<Verdict> run_matrix(const std::vector<FaultClass>& classes, int injections, std::uint64_t first_seed);
+std::vector<Verdict> run_matrix(const std::vector<FaultClass>& classes, int injections, std::uint64_t first_seed,
+                                During during = During::steering);
 
 // By class: injections, p50 and worst time to rest with its seed, violations.
 std::string table(const std::vector<FaultClass>& classes, const std::vector<Verdict>& verdicts);

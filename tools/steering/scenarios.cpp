@@ -175,6 +175,7 @@ Trial beam(const Beam& kind, std::uint64_t seed) {
   prior.bending_mm = bending_mm * draw.uniform(0.7, 1.3);
   prior.bending_sd_mm = 0.2 * prior.bending_mm;
   prior.guide_mm = config.guide_gap_mm;
+  trial.believed.estimator.nuisance.windup_sd_rad = 0.4;  // whether it winds up or not
   trial.believed.controller.shaft = {prior.bending_mm, prior.guide_mm};
   trial.target_mm = draw_target(draw, deep.curvature_per_mm);
   if (kind.obstacle) trial.believed.controller.obstacles = {draw_obstacle(draw, trial.target_mm)};
@@ -233,8 +234,8 @@ const std::vector<Scenario>& scenarios() {
                           {.retract = true}, kinematic),
       scenario<Kinematic>("retract-30", "the same, k, lambda1, lambda2 off by up to 30 %",
                           {.parameters_off = 0.3, .retract = true}, kinematic),
-      scenario<Beam>("retract-beam", "the same, beam, 50 kPa, 1 N",
-                     {.modulus_kPa = 50, .force_N = 1, .retract = true}, beam),
+      scenario<Beam>("retract-beam", "the same, beam, 50 kPa, 1 N", {.modulus_kPa = 50, .force_N = 1, .retract = true},
+                     beam),
       scenario<Kinematic>("outliers", "a tenth of the messages off by 3 to 10 mm", {.outlier_share = 0.1}, kinematic),
   };
   return all;
