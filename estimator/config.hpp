@@ -20,7 +20,7 @@ struct Prior {
   double bending_mm = 0;
   double bending_sd_mm = 0;
   double guide_mm = 0;
-  double bevel_mm = 3.5;        // length of the bevel: drawn back by this, it is out of what it cuts and pushes no more
+  double bevel_mm = 3.5;  // length of the bevel: drawn back by this, it is out of what it cuts and pushes no more
   double position_sd_mm = 0.3;  // tip at the entry point
   double tilt_sd_rad = 0.02;    // heading about body x and y
   double roll_sd_rad = 0.05;    // bevel about the heading
