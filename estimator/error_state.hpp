@@ -10,9 +10,11 @@ using Error = Eigen::Matrix<double, kSize, 1>;
 template <int kSize>
 using Covariance = Eigen::Matrix<double, kSize, kSize>;
 
-// Without the nuisance states, which are the last where there are any: 18, 19, 24 or 25.
+// With the nuisance states, which come last, all are carried, in use or not: what is not has no variance, or is not
+// seen.
+inline constexpr int kAllStates = 10 + kSharedErrors + kNuisance;
 template <int kSize>
-inline constexpr int kFiltered = kSize > 16 ? kSize - kNuisance : kSize;
+inline constexpr int kFiltered = kSize == kAllStates ? kSize - kNuisance : kSize;
 template <int kSize>
 inline constexpr bool kHasShared = kFiltered<kSize> > 10;
 // Of the state itself.
@@ -33,7 +35,7 @@ requires(kSize > 16) Covariance<kSize> get_covariance(const FilterState& state, 
   const Nuisance& nuisance = state.nuisance;
   Eigen::Matrix<double, kBefore, kNuisance> with;
   with.template topRows<kOwn<kSize>>() = nuisance.with_state.topRows<kOwn<kSize>>();
-  if constexpr (kHasShared<kSize>) with.template bottomRows<kSharedErrors>() = nuisance.with_shared;
+  with.template bottomRows<kSharedErrors>() = nuisance.with_shared;
   Covariance<kSize> P;
   P << get_covariance(state, std::integral_constant<int, kBefore>()), with, with.transpose(), nuisance.covariance;
   return P;
@@ -65,10 +67,9 @@ void set_covariance(FilterState& state, const Covariance<kSize>& P) {
     state.shared.with_state.topRows<kStates>() = P.template block<kStates, kSharedErrors>(0, kStates);
     state.shared.covariance = P.template block<kSharedErrors, kSharedErrors>(kStates, kStates);
   }
-  if constexpr (kSize > 16) {
+  if constexpr (kSize == kAllStates) {
     state.nuisance.with_state.topRows<kStates>() = P.template topRightCorner<kStates, kNuisance>();
-    if constexpr (kHasShared<kSize>)
-      state.nuisance.with_shared = P.template block<kSharedErrors, kNuisance>(kStates, kFiltered<kSize>);
+    state.nuisance.with_shared = P.template block<kSharedErrors, kNuisance>(kStates, kFiltered<kSize>);
     state.nuisance.covariance = P.template bottomRightCorner<kNuisance, kNuisance>();
   }
 }
@@ -82,7 +83,7 @@ void move(FilterState& state, const Error<kSize>& error) {
   state.lambda2 += error[8];
   if constexpr (kOwn<kSize> == 10) (state.bending_mm > 0 ? state.bending_mm : state.wheelbase_mm) += error[9];
   if constexpr (kHasShared<kSize>) state.shared.mean += error.template segment<kSharedErrors>(kOwn<kSize>);
-  if constexpr (kSize > 16) {
+  if constexpr (kSize == kAllStates) {
     const auto by = error.template tail<kNuisance>();
     state.nuisance.mean += by;
     state.nuisance.lag_rad += state.nuisance.lag_by_windup * by[kWindup];

@@ -109,10 +109,7 @@ Eigen::Vector3d NeedleFilter::motion_of(const FilterState& state) const {
 
 Update NeedleFilter::update(FilterState& state, const model::TipHeading& measurement) const {
   if (stiff_) return {};  // the inclination of the shaft's end is not in the derivatives below
-  if (has_nuisance_ && coloured_)
-    return wheelbase_estimated_ ? update_heading<25>(state, measurement) : update_heading<24>(state, measurement);
-  if (has_nuisance_)
-    return wheelbase_estimated_ ? update_heading<19>(state, measurement) : update_heading<18>(state, measurement);
+  if (has_nuisance_) return update_heading<kAllStates>(state, measurement);
   if (coloured_)
     return wheelbase_estimated_ ? update_heading<16>(state, measurement) : update_heading<15>(state, measurement);
   return wheelbase_estimated_ ? update_heading<10>(state, measurement) : update_heading<9>(state, measurement);
@@ -124,7 +121,7 @@ Update NeedleFilter::update_heading(FilterState& state, const model::TipHeading&
   const std::optional<SeenHeading> of_motion = of_shaft ? seen_motion(state) : std::nullopt;
   if (of_shaft && !of_motion) return {};  // no model of what it sees
   SeenHeading predicted = of_motion ? *of_motion : seen_heading(state);
-  if constexpr (kSize > 16) {
+  if constexpr (kSize == kAllStates) {
     const Eigen::Matrix3d frame = frame_of_camera(state, measurement.camera);
     predicted = {frame * predicted.along, frame * predicted.by_error, frame * predicted.by_slip};
   }

@@ -41,20 +41,21 @@ Update update_rank(FilterState& state, const Eigen::Matrix<double, 3, kColumns>&
   using ByErrors = Eigen::Matrix<double, kRank, 3>;
   const Eigen::Index first = kOwn<kSize> + seen.first_error, last = kFiltered<kSize>;
   Eigen::Matrix<double, kRank, kNuisance> by_last;
-  if constexpr (kSize > 16) by_last = axes.transpose() * by_nuisance;
+  if constexpr (kSize == kAllStates) by_last = axes.transpose() * by_nuisance;
   ByErrors by_errors;
   if constexpr (kHasShared<kSize>)
     by_errors = seen.coloured.template tail<kRank>().cwiseSqrt().asDiagonal() * axes.transpose();
   const auto times_derivative = [&](const Covariance<kSize>& of) {
     Eigen::Matrix<double, kSize, kRank> product = of.template leftCols<kColumns>().lazyProduct(H.transpose());
     if constexpr (kHasShared<kSize>) product += of.template middleCols<3>(first).lazyProduct(by_errors.transpose());
-    if constexpr (kSize > 16) product += of.template middleCols<kNuisance>(last).lazyProduct(by_last.transpose());
+    if constexpr (kSize == kAllStates)
+      product += of.template middleCols<kNuisance>(last).lazyProduct(by_last.transpose());
     return product;
   };
   const Eigen::Matrix<double, kSize, kRank> PHt = times_derivative(covariance);
   Mat S = H * PHt.template topRows<kColumns>();
   if constexpr (kHasShared<kSize>) S += by_errors * PHt.template middleRows<3>(first);
-  if constexpr (kSize > 16) S += by_last * PHt.template middleRows<kNuisance>(last);
+  if constexpr (kSize == kAllStates) S += by_last * PHt.template middleRows<kNuisance>(last);
   S.diagonal() += variance;
   Eigen::LLT<Mat> llt(S);
   Vec y = axes.transpose() * residual;

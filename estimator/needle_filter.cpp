@@ -238,9 +238,7 @@ template Error<9> NeedleFilter::process_variance<9>(const Covariance<9>&, double
 template Error<10> NeedleFilter::process_variance<10>(const Covariance<10>&, double, double) const;
 
 Update NeedleFilter::update(FilterState& state, const model::TipMeasurement& measurement) const {
-  if (has_nuisance_ && coloured_)
-    return ten_states_ ? update_sized<25>(state, measurement) : update_sized<24>(state, measurement);
-  if (has_nuisance_) return ten_states_ ? update_sized<19>(state, measurement) : update_sized<18>(state, measurement);
+  if (has_nuisance_) return update_sized<kAllStates>(state, measurement);
   if (coloured_) return ten_states_ ? update_sized<16>(state, measurement) : update_sized<15>(state, measurement);
   return ten_states_ ? update_sized<10>(state, measurement) : update_sized<9>(state, measurement);
 }
@@ -256,17 +254,15 @@ Update NeedleFilter::update_sized(FilterState& state, const model::TipMeasuremen
     seen.first_error = measurement.camera == 0 ? 0 : 3;
   }
   const auto apply = [&]() -> Update {
-    if constexpr (kSize > 16) {
-      constexpr int kColumns = kOwn<kSize> == 10 ? 10 : 3;
-      Eigen::Matrix<double, 3, kColumns> by_state = Eigen::Matrix<double, 3, kColumns>::Zero();
-      by_state.template leftCols<3>() = state.pose.R;
+    if constexpr (kSize == kAllStates) {
+      Eigen::Matrix<double, 3, 10> by_state = Eigen::Matrix<double, 3, 10>::Zero();
+      by_state.leftCols<3>() = state.pose.R;
       Eigen::Vector3d at_mm = state.pose.p_mm;
-      if constexpr (kColumns == 10)
-        if (stiff_ && pressing(state) < 1) at_mm = drawn_back_tip(state, by_state);
+      if (stiff_ && pressing(state) < 1) at_mm = drawn_back_tip(state, by_state);
       ByNuisance by_nuisance;
       const Eigen::Vector3d seen_mm = seen_by_camera(state, measurement.camera, at_mm, by_nuisance);
       by_state = frame_of_camera(state, measurement.camera) * by_state;
-      return update_seen<kSize, kColumns>(state, by_state, seen, measurement.position_mm - seen_mm, gate_, by_nuisance);
+      return update_seen<kSize, 10>(state, by_state, seen, measurement.position_mm - seen_mm, gate_, by_nuisance);
     }
     if constexpr (kOwn<kSize> == 10)
       if (stiff_ && pressing(state) < 1) {
@@ -345,7 +341,7 @@ void NeedleFilter::keep_in_domain(FilterState& state) const {
   if (side * state.curvature_per_mm < kStraight_per_mm && side != 0)
     move_by(side * Error<kSize>::Unit(6), side * state.curvature_per_mm - kStraight_per_mm);
   keep_side();
-  if constexpr (kSize > 16)
+  if constexpr (kSize == kAllStates)
     if (state.nuisance.mean[kWindup] < 0)
       move_by(Error<kSize>::Unit(kFiltered<kSize> + kWindup), state.nuisance.mean[kWindup]);
   if (state.lambda1_per_rad == 0 && state.lambda2 == 0) return;
@@ -372,10 +368,7 @@ template void NeedleFilter::keep_in_domain<9>(FilterState&) const;
 template void NeedleFilter::keep_in_domain<10>(FilterState&) const;
 template void NeedleFilter::keep_in_domain<15>(FilterState&) const;
 template void NeedleFilter::keep_in_domain<16>(FilterState&) const;
-template void NeedleFilter::keep_in_domain<18>(FilterState&) const;
-template void NeedleFilter::keep_in_domain<19>(FilterState&) const;
-template void NeedleFilter::keep_in_domain<24>(FilterState&) const;
-template void NeedleFilter::keep_in_domain<25>(FilterState&) const;
+template void NeedleFilter::keep_in_domain<kAllStates>(FilterState&) const;
 
 void NeedleFilter::declare_reset(FilterState& state, double reach_mm) const {
   // The pose is believed no more; the parameters are, but less: their prior widths come back, correlations go.

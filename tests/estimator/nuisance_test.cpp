@@ -31,14 +31,13 @@ FilterState somewhere(const NeedleFilter& filter) {
   return state;
 }
 
-template <int kSize>
 void expect_turns_by_windup(const EstimatorConfig& config) {
   const NeedleFilter filter(config);
   const FilterState state = somewhere(filter);
   constexpr double kStep_rad = 1e-5;
   const auto turned_over = [&](double off_rad) {
     FilterState s = state;
-    move<kSize>(s, off_rad * Error<kSize>::Unit(kFiltered<kSize> + kWindup));
+    move<kAllStates>(s, off_rad * Error<kAllStates>::Unit(kFiltered<kAllStates> + kWindup));
     for (int i = 0; i < 100; ++i) filter.predict(s, 0.01, -0.02, 0.01);  // through its play to the other side
     return s;
   };
@@ -46,7 +45,8 @@ void expect_turns_by_windup(const EstimatorConfig& config) {
       model::log_se3(turned_over(-kStep_rad).pose.inverse() * turned_over(kStep_rad).pose) / (2 * kStep_rad);
   EXPECT_GT(std::abs(numeric[5]), 0.5) << "twice (80 / 100)^2, by a tip that turns late";
   FilterState s = state;
-  set_covariance<kSize>(s, Covariance<kSize>(Error<kSize>::Unit(kFiltered<kSize> + kWindup).asDiagonal()));
+  set_covariance<kAllStates>(
+      s, Covariance<kAllStates>(Error<kAllStates>::Unit(kFiltered<kAllStates> + kWindup).asDiagonal()));
   for (int i = 0; i < 100; ++i) filter.predict(s, 0.01, -0.02, 0.01);
   const model::Vector6d derivative = s.nuisance.with_state.col(kWindup).head<6>();
   EXPECT_LT((derivative - numeric).norm(), 2e-3 * numeric.norm()) << derivative.transpose() << "\n"
@@ -56,19 +56,18 @@ void expect_turns_by_windup(const EstimatorConfig& config) {
 
 TEST(Nuisance, DerivativesByTheWindUpAgreeWithPerturbation) {
   EstimatorConfig config = with({.windup_sd_rad = 0.4});
-  expect_turns_by_windup<18>(config);
+  expect_turns_by_windup(config);
   config.through_channel = true;
-  expect_turns_by_windup<18>(config);
+  expect_turns_by_windup(config);
   config.prior.wheelbase_sd_mm = 3;
-  expect_turns_by_windup<19>(config);
+  expect_turns_by_windup(config);
   config.prior.wheelbase_sd_mm = 0;
   config.prior.bending_mm = 40, config.prior.bending_sd_mm = 8, config.prior.guide_mm = 15;
   config.prior.needle.lambda1_per_rad = config.prior.needle.lambda2 = 0;
-  expect_turns_by_windup<19>(config);
+  expect_turns_by_windup(config);
 }
 
 // Along one axis that is seen S = (n . h)^2 + variance, where all that is not known is one state; h by perturbation.
-template <int kSize>
 void expect_sees_each(const EstimatorConfig& config) {
   const NeedleFilter filter(config);
   const FilterState state = somewhere(filter);
@@ -82,9 +81,9 @@ void expect_sees_each(const EstimatorConfig& config) {
       m.position_mm = filter.seen_position_mm(state) + Eigen::Vector3d(0.1, 0.1, 0.1);
       const auto innovation = [&](double off, double variance) {
         FilterState s = state;
-        Covariance<kSize> P = Covariance<kSize>::Zero();
-        P(kFiltered<kSize> + i, kFiltered<kSize> + i) = variance;
-        set_covariance<kSize>(s, P);
+        Covariance<kAllStates> P = Covariance<kAllStates>::Zero();
+        P(kFiltered<kAllStates> + i, kFiltered<kAllStates> + i) = variance;
+        set_covariance<kAllStates>(s, P);
         s.nuisance.mean[i] += off;
         return filter.update(s, m);
       };
@@ -92,7 +91,7 @@ void expect_sees_each(const EstimatorConfig& config) {
       const double numeric = (innovation(step, 0).innovation[0] - innovation(-step, 0).innovation[0]) / (2 * step);
       const Update update = innovation(0, 1e-4);
       const double variance = update.innovation[0] * update.innovation[0] / update.mahalanobis2;
-      EXPECT_NEAR(variance - 0.04 * (kHasShared<kSize> ? 0.5 : 1.0), 1e-4 * numeric * numeric,
+      EXPECT_NEAR(variance - 0.04 * (config.reading.correlated_share > 0 ? 0.5 : 1.0), 1e-4 * numeric * numeric,
                   1e-5 + 3e-2 * 1e-4 * numeric * numeric)
           << camera << ", " << i;
       const bool of_camera = i > 0 && (i - 1) / 4 == camera;
@@ -101,8 +100,8 @@ void expect_sees_each(const EstimatorConfig& config) {
 }
 
 TEST(Nuisance, EachCameraSeesItsOwnFrameAndLatencyByThePerturbedReading) {
-  expect_sees_each<18>(with({.windup_sd_rad = 0.4, .frame_sd_rad = 0.03, .latency_sd_s = 0.02}));
-  expect_sees_each<24>(with({.windup_sd_rad = 0.4, .frame_sd_rad = 0.03, .latency_sd_s = 0.02}, true));
+  expect_sees_each(with({.windup_sd_rad = 0.4, .frame_sd_rad = 0.03, .latency_sd_s = 0.02}));
+  expect_sees_each(with({.windup_sd_rad = 0.4, .frame_sd_rad = 0.03, .latency_sd_s = 0.02}, true));
 }
 
 TEST(Nuisance, OfNextToNoWidthIsThePlainFilter) {
