@@ -12,6 +12,9 @@ class ArcWalk {
   ArcWalk(const model::NeedleParameters& needle, const ShaftConfig& shaft)
       : needle_(needle), slip_(model::slip_parameters(needle)), shaft_(shaft) {}
 
+  // Of a path that is looked at between its steps, and of a stiff shaft, which yields less near the entry.
+  static constexpr double kDrawnStep_mm = 4.0;
+
   // The middle of the swing of a tip, both in {A}.
   model::Pose middle_of(const model::Pose& tip) const;
   model::Pose tip_of(const model::Pose& middle) const;  // the same back
@@ -20,12 +23,12 @@ class ArcWalk {
 
   // By step_mm of insertion; false outside the model's domain.
   bool step(model::Pose& middle, double share, double step_mm) const;
-  // To the plane through point_mm across `along`, by steps of 4 mm, with this share of the bend; at_mm: the tip there.
+  // To the plane through point_mm across `along` with this share of the bend; at_mm: the tip there.
   bool to_plane(model::Pose middle, const Eigen::Vector3d& point_mm, const Eigen::Vector3d& along, double share,
                 Eigen::Vector3d& at_mm) const;
   // What is to be inserted until the plane, but no more than a step; nothing where it is passed.
   static double step_to_plane_mm(const model::Pose& middle, const Eigen::Vector3d& point_mm,
-                                 const Eigen::Vector3d& along);
+                                 const Eigen::Vector3d& along, double longest_mm = kDrawnStep_mm);
 
   // What a stiff shaft does at a depth; of a slack one only the curvature, the needle's.
   struct End {

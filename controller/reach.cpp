@@ -29,7 +29,7 @@ double closest_approach(model::Pose pose, const model::NeedleParameters& needle,
 }  // namespace
 
 Reach predict_reach(const model::Pose& tip, const model::NeedleParameters& needle, const Eigen::Vector3d& target_mm,
-                    double tolerance_mm) {
+                    double tolerance_mm, double enough_mm) {
   Reach reach;
   reach.miss_mm = std::numeric_limits<double>::infinity();
   const SteeringGeometry geometry = steering_geometry(tip, needle, target_mm, 0, 0);
@@ -39,24 +39,28 @@ Reach predict_reach(const model::Pose& tip, const model::NeedleParameters& needl
   turned.R = tip.R * model::exp_so3({0, 0, geometry.sigma_rad});
   reach.roll_rad = geometry.sigma_rad;
 
-  // The miss is smooth in the duty with one minimum: golden section.
+  const auto try_duty = [&](double duty) {
+    const double miss_mm = closest_approach(turned, needle, target_mm, duty);
+    if (miss_mm < reach.miss_mm) reach.miss_mm = miss_mm, reach.duty = duty;
+    return miss_mm;
+  };
+  const auto enough = [&] { return reach.miss_mm <= enough_mm; };
+  // The miss is smooth in the duty with one minimum: golden section, and the ends.
   double low = 0, high = 1;
   const double ratio = 0.5 * (std::sqrt(5.0) - 1);
   double x1 = high - ratio * (high - low), x2 = low + ratio * (high - low);
-  double f1 = closest_approach(turned, needle, target_mm, x1), f2 = closest_approach(turned, needle, target_mm, x2);
-  for (int i = 0; i < 24; ++i) {
+  double f1 = try_duty(x1), f2 = enough() ? f1 : try_duty(x2);
+  for (int i = 0; i < 24 && !enough(); ++i) {
     if (f1 < f2) {
       high = x2, x2 = x1, f2 = f1;
-      x1 = high - ratio * (high - low), f1 = closest_approach(turned, needle, target_mm, x1);
+      x1 = high - ratio * (high - low), f1 = try_duty(x1);
     } else {
       low = x1, x1 = x2, f1 = f2;
-      x2 = low + ratio * (high - low), f2 = closest_approach(turned, needle, target_mm, x2);
+      x2 = low + ratio * (high - low), f2 = try_duty(x2);
     }
   }
-  for (const double duty : {0.0, 0.5 * (low + high), 1.0}) {
-    const double miss = closest_approach(turned, needle, target_mm, duty);
-    if (miss < reach.miss_mm) reach.miss_mm = miss, reach.duty = duty;
-  }
+  for (const double duty : {0.0, 1.0})
+    if (!enough()) try_duty(duty);
   reach.reachable = reach.miss_mm <= tolerance_mm;
   return reach;
 }

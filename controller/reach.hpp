@@ -12,8 +12,9 @@ struct Reach {
 };
 
 // Best over a turn of the bevel (in place, then kept) and a duty of spinning (which scales the curvature): the set of
-// constant inputs. A target whose miss is above the tolerance lies outside the set that the needle reaches.
+// constant inputs. A target whose miss is above the tolerance lies outside the set that the needle reaches. The search
+// ends at the first inputs that miss by no more than enough_mm: most often the first, where the answer is yes or no.
 Reach predict_reach(const model::Pose& tip, const model::NeedleParameters& needle, const Eigen::Vector3d& target_mm,
-                    double tolerance_mm);
+                    double tolerance_mm, double enough_mm = 0);
 
 }  // namespace bevel::controller

@@ -161,8 +161,9 @@ bool Supervisor::check_reach(std::int64_t now_utime) {
   rendezvous_.plan(now_utime, to_go_mm(), config_.limits.insertion_rate_mm_s);
   if (route_.is_needed()) return true;
   // A prediction that is hardly one yet is no reason.
-  const double miss_mm = predicted_miss_mm(rendezvous_.target_mm());
-  if (miss_mm - kTargetDeviations * rendezvous_.target_sd_mm() <= config_.safety.target_miss_max_mm) return true;
+  const double allowed_mm = config_.safety.target_miss_max_mm + kTargetDeviations * rendezvous_.target_sd_mm();
+  const double miss_mm = predicted_miss_mm(rendezvous_.target_mm(), allowed_mm);
+  if (miss_mm <= allowed_mm) return true;
   stop(Reason::target_unreachable, miss_mm, "mm predicted miss");
   return false;
 }

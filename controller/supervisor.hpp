@@ -135,7 +135,8 @@ class Supervisor {
   bool see_geometry();
   double to_go_mm() const;
   bool by_arcs() const { return config_.law != Law::spin; }
-  double predicted_miss_mm(const Eigen::Vector3d& target_mm) const;
+  // Where it comes to no more than enough_mm, not necessarily the least.
+  double predicted_miss_mm(const Eigen::Vector3d& target_mm, double enough_mm = 0) const;
   bool check_reach(std::int64_t now_utime);
   model::NeedleParameters needle_now() const;
   ShaftConfig shaft_now() const;

@@ -24,13 +24,13 @@ ShaftConfig Supervisor::shaft_now() const {
   return shaft;
 }
 
-double Supervisor::predicted_miss_mm(const Eigen::Vector3d& target_mm) const {
+double Supervisor::predicted_miss_mm(const Eigen::Vector3d& target_mm, double enough_mm) const {
   const model::Pose tip = cutting_tip();
   if (shaft_now().bending_mm > 0) {
     const ArcGeometry arc = arc_geometry(tip, needle_now(), shaft_now(), target_mm);
     return arc.in_domain && arc.ahead_mm <= 0 ? (target_mm - tip.p_mm).norm() : arc_miss_mm(arc);
   }
-  return predict_reach(tip, needle_now(), target_mm, config_.safety.target_miss_max_mm).miss_mm;
+  return predict_reach(tip, needle_now(), target_mm, config_.safety.target_miss_max_mm, enough_mm).miss_mm;
 }
 
 // To the plane through the target across the needle.

@@ -24,7 +24,7 @@ TargetTrack::TargetTrack(const TargetMotion& motion) : motion_(motion) {
 }
 
 void TargetTrack::restart() {
-  empty_ = true;
+  empty_ = at_rest_ = true;
   jumped_before_ = false;
   const double v = motion_.velocity_sd_mm_s, a = motion_.breathing_sd_mm;
   const double c = motion_.reading_sd_mm + a;  // from the first reading, which is the origin
@@ -57,6 +57,7 @@ void TargetTrack::observe(std::int64_t utime, const Eigen::Vector3d& position_mm
     restart();
     return observe(utime, position_mm);
   }
+  at_rest_ = empty_;
   empty_ = jumped_before_ = false;
   const double since_s = ahead_s(utime);
   const double a = motion_.breathing_sd_mm, v = motion_.velocity_sd_mm_s;
@@ -105,6 +106,7 @@ Eigen::Vector4d TargetTrack::reading_after(const Breath& breath, double ahead_s)
 
 Eigen::Vector3d TargetTrack::position_mm(std::int64_t utime) const {
   if (empty()) return Eigen::Vector3d::Zero();
+  if (at_rest_) return origin_mm_;
   Eigen::Vector3d mean_mm = origin_mm_;
   for (const Breath& breath : breaths_)
     if (breath.weight > 0) mean_mm += breath.weight * (breath.mean.transpose() * reading_after(breath, ahead_s(utime)));

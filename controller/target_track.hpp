@@ -65,6 +65,7 @@ class TargetTrack {
   std::int64_t newest_utime_ = 0;
   Eigen::Vector3d origin_mm_ = Eigen::Vector3d::Zero();  // the first position
   bool empty_ = true;
+  bool at_rest_ = true;  // as far as is known: of one reading, every coefficient is zero
   bool jumped_before_ = false;
 };
 

@@ -30,25 +30,16 @@ inline Covariance<10> get_covariance(const FilterState& state, std::integral_con
   return P;
 }
 template <int kSize>
-requires(kSize > 16) Covariance<kSize> get_covariance(const FilterState& state, std::integral_constant<int, kSize>) {
-  constexpr int kBefore = kFiltered<kSize>;
-  const Nuisance& nuisance = state.nuisance;
-  Eigen::Matrix<double, kBefore, kNuisance> with;
-  with.template topRows<kOwn<kSize>>() = nuisance.with_state.topRows<kOwn<kSize>>();
-  with.template bottomRows<kSharedErrors>() = nuisance.with_shared;
-  Covariance<kSize> P;
-  P << get_covariance(state, std::integral_constant<int, kBefore>()), with, with.transpose(), nuisance.covariance;
-  return P;
-}
-template <int kSize>
-requires(kSize > 10 && kSize <= 16) Covariance<kSize> get_covariance(const FilterState& state,
-                                                                     std::integral_constant<int, kSize>) {
+Covariance<kSize> get_covariance(const FilterState& state, std::integral_constant<int, kSize>) {
   const auto& with_state = state.shared.with_state.topRows<kOwn<kSize>>();
   Covariance<kSize> P;
   P << get_covariance(state, std::integral_constant<int, kOwn<kSize>>()), with_state, with_state.transpose(),
       state.shared.covariance;
   return P;
 }
+// Of all (filter_nuisance.cpp).
+Covariance<kAllStates> get_covariance(const FilterState& state, std::integral_constant<int, kAllStates>);
+void set_all_covariance(FilterState& state, const Covariance<kAllStates>& P);
 // The state's own matrix where that is all of it, a copy otherwise.
 template <int kSize>
 decltype(auto) covariance_of(const FilterState& state) {
@@ -57,6 +48,7 @@ decltype(auto) covariance_of(const FilterState& state) {
 
 template <int kSize>
 void set_covariance(FilterState& state, const Covariance<kSize>& P) {
+  if constexpr (kSize == kAllStates) return set_all_covariance(state, P);
   state.covariance = P.template topLeftCorner<9, 9>();
   if constexpr (kOwn<kSize> == 10) {
     state.tenth_covariance = P.template block<9, 1>(0, 9);
@@ -66,11 +58,6 @@ void set_covariance(FilterState& state, const Covariance<kSize>& P) {
   if constexpr (kHasShared<kSize>) {
     state.shared.with_state.topRows<kStates>() = P.template block<kStates, kSharedErrors>(0, kStates);
     state.shared.covariance = P.template block<kSharedErrors, kSharedErrors>(kStates, kStates);
-  }
-  if constexpr (kSize == kAllStates) {
-    state.nuisance.with_state.topRows<kStates>() = P.template topRightCorner<kStates, kNuisance>();
-    state.nuisance.with_shared = P.template block<kSharedErrors, kNuisance>(kStates, kFiltered<kSize>);
-    state.nuisance.covariance = P.template bottomRightCorner<kNuisance, kNuisance>();
   }
 }
 

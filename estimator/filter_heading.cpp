@@ -129,18 +129,23 @@ Update NeedleFilter::update_heading(FilterState& state, const model::TipHeading&
   const int rank = angles.seen.rank;
   if (rank == 0) return {};  // sees nothing: no rejection either
   Update result;
-  ByNuisance by_nuisance = ByNuisance::Zero();
-  if (measurement.camera >= 0 && measurement.camera < kCamerasInFrame)
-    by_nuisance.middleCols<3>(frame_of(measurement.camera)) = -angles.by_heading * model::hat(predicted.along);
   if (angles.cosine > 0) {
-    if (of_shaft) {
+    if constexpr (kSize == kAllStates) {
+      Eigen::Matrix<double, 3, 10> by_state = Eigen::Matrix<double, 3, 10>::Zero();
+      by_state.leftCols<6>() = angles.by_heading * predicted.by_error;
+      by_state.middleCols<2>(7) = angles.by_heading * predicted.by_slip;
+      ByNuisance by_nuisance = ByNuisance::Zero();
+      if (measurement.camera >= 0 && measurement.camera < kCamerasInFrame)
+        by_nuisance.middleCols<3>(frame_of(measurement.camera)) = -angles.by_heading * model::hat(predicted.along);
+      result = update_all(state, by_state, by_nuisance, angles.seen, angles.residual_rad, gate_);
+    } else if (of_shaft) {
       Eigen::Matrix<double, 3, 9> by_state = Eigen::Matrix<double, 3, 9>::Zero();
       by_state.leftCols<6>() = angles.by_heading * predicted.by_error;
       by_state.rightCols<2>() = angles.by_heading * predicted.by_slip;
-      result = update_seen<kSize, 9>(state, by_state, angles.seen, angles.residual_rad, gate_, by_nuisance);
+      result = update_seen<kSize, 9>(state, by_state, angles.seen, angles.residual_rad, gate_);
     } else {
       const Eigen::Matrix<double, 3, 6> by_error = angles.by_heading * predicted.by_error;
-      result = update_seen<kSize, 6>(state, by_error, angles.seen, angles.residual_rad, gate_, by_nuisance);
+      result = update_seen<kSize, 6>(state, by_error, angles.seen, angles.residual_rad, gate_);
     }
   } else {
     // Half way round, the angle in a camera's picture may be nothing, or anything.

@@ -13,12 +13,73 @@
 #include <algorithm>
 #include <cmath>
 
-#include "estimator/error_state.hpp"
+#include "estimator/measurement_update.hpp"
 
 namespace bevel::estimator {
 namespace {
+constexpr int kOwnStates = kOwn<kAllStates>, kBefore = kFiltered<kAllStates>;
+using ToSeen = Eigen::Matrix<double, 3, kAllStates>;
+
 double square(double x) { return x * x; }
 }  // namespace
+
+Covariance<kAllStates> get_covariance(const FilterState& state, std::integral_constant<int, kAllStates>) {
+  const Nuisance& nuisance = state.nuisance;
+  Covariance<kAllStates> P;
+  P.topLeftCorner<kBefore, kBefore>() = covariance_of<kBefore>(state);
+  P.block<kOwnStates, kNuisance>(0, kBefore) = nuisance.with_state;
+  P.block<kSharedErrors, kNuisance>(kOwnStates, kBefore) = nuisance.with_shared;
+  P.bottomLeftCorner<kNuisance, kBefore>() = P.topRightCorner<kBefore, kNuisance>().transpose();
+  P.bottomRightCorner<kNuisance, kNuisance>() = nuisance.covariance;
+  return P;
+}
+
+void set_all_covariance(FilterState& state, const Covariance<kAllStates>& P) {
+  set_covariance<kBefore>(state, P.topLeftCorner<kBefore, kBefore>());
+  state.nuisance.with_state = P.block<kOwnStates, kNuisance>(0, kBefore);
+  state.nuisance.with_shared = P.block<kSharedErrors, kNuisance>(kOwnStates, kBefore);
+  state.nuisance.covariance = P.bottomRightCorner<kNuisance, kNuisance>();
+}
+
+Update update_all(FilterState& state, const Eigen::Matrix<double, 3, 10>& by_state, const ByNuisance& by_nuisance,
+                  const SeenAxes& seen, const Eigen::Vector3d& residual, const std::array<double, 3>& gate) {
+  const int rank = seen.rank, unseen = 3 - rank;
+  Eigen::Matrix3d axes = seen.axes.transpose();
+  axes.topRows(unseen).setZero();
+  Eigen::Vector3d variance = seen.variance;
+  variance.head(unseen).setOnes();
+  const Eigen::Matrix3d by_errors = seen.coloured.cwiseSqrt().asDiagonal() * axes;
+  ToSeen H = ToSeen::Zero();
+  H.leftCols<kOwnStates>() = axes * by_state;
+  H.middleCols<3>(kOwnStates + seen.first_error) = by_errors;
+  H.rightCols<kNuisance>() = axes * by_nuisance;
+  Covariance<kAllStates> P = covariance_of<kAllStates>(state);
+  const Eigen::Matrix<double, kAllStates, 3> PHt = P * H.transpose();
+  Eigen::Matrix3d S = H * PHt;
+  S.diagonal() += variance;
+  const Eigen::LLT<Eigen::Matrix3d> llt(S);
+  const Eigen::Vector3d y = axes * residual - by_errors * state.shared.mean.segment<3>(seen.first_error);
+  const Eigen::Vector3d whitened = llt.matrixL().solve(y);
+
+  Update result;
+  result.rank = rank;
+  result.mahalanobis2 = whitened.squaredNorm();
+  result.test_ratio = result.mahalanobis2 / gate.at(static_cast<std::size_t>(rank - 1));
+  result.innovation.head(rank) = y.tail(rank);
+  result.innovation_whitened.head(rank) = whitened.tail(rank);
+  result.accepted = result.test_ratio <= 1;  // false for a NaN too
+  if (!result.accepted) return result;
+
+  const Eigen::Matrix<double, kAllStates, 3> K = llt.solve(PHt.transpose()).transpose();
+  // Joseph form, as update_rank().
+  P.noalias() -= K * PHt.transpose();
+  const Eigen::Matrix<double, kAllStates, 3> left = P * H.transpose() - K * variance.asDiagonal();
+  P.noalias() -= left * K.transpose();
+  set_all_covariance(state, 0.5 * (P + P.transpose()));
+  move<kAllStates>(state, K * y);
+  state.pose.R = model::orthonormalised(state.pose.R);
+  return result;
+}
 
 void NeedleFilter::begin_nuisance(FilterState& state) const {
   const NuisancePrior& prior = config_.nuisance;

@@ -23,14 +23,10 @@ struct SeenAxes {
   int rank = 0;
 };
 
-using ByNuisance = Eigen::Matrix<double, 3, kNuisance>;
-inline const ByNuisance kByNoNuisance = ByNuisance::Zero();
-
 // `by_state`: derivative of what is seen by the first columns of the error; R of the pose if it is the tip itself.
-// `by_nuisance`: by the nuisance states, of which the residual has the mean.
 template <int kSize, int kRank, int kColumns>
 Update update_rank(FilterState& state, const Eigen::Matrix<double, 3, kColumns>& by_state, const SeenAxes& seen,
-                   const Eigen::Vector3d& residual, double gate, const ByNuisance& by_nuisance) {
+                   const Eigen::Vector3d& residual, double gate) {
   using Vec = Eigen::Matrix<double, kRank, 1>;
   using Mat = Eigen::Matrix<double, kRank, kRank>;
   const auto axes = seen.axes.template rightCols<kRank>();
@@ -39,27 +35,22 @@ Update update_rank(FilterState& state, const Eigen::Matrix<double, 3, kColumns>&
   const auto& covariance = covariance_of<kSize>(state);
   // Derivative by the shared errors of the camera, which are along the axes of {A}.
   using ByErrors = Eigen::Matrix<double, kRank, 3>;
-  const Eigen::Index first = kOwn<kSize> + seen.first_error, last = kFiltered<kSize>;
-  Eigen::Matrix<double, kRank, kNuisance> by_last;
-  if constexpr (kSize == kAllStates) by_last = axes.transpose() * by_nuisance;
+  const Eigen::Index first = kOwn<kSize> + seen.first_error;
   ByErrors by_errors;
-  if constexpr (kHasShared<kSize>)
+  if constexpr (kSize > 10)
     by_errors = seen.coloured.template tail<kRank>().cwiseSqrt().asDiagonal() * axes.transpose();
   const auto times_derivative = [&](const Covariance<kSize>& of) {
     Eigen::Matrix<double, kSize, kRank> product = of.template leftCols<kColumns>().lazyProduct(H.transpose());
-    if constexpr (kHasShared<kSize>) product += of.template middleCols<3>(first).lazyProduct(by_errors.transpose());
-    if constexpr (kSize == kAllStates)
-      product += of.template middleCols<kNuisance>(last).lazyProduct(by_last.transpose());
+    if constexpr (kSize > 10) product += of.template middleCols<3>(first).lazyProduct(by_errors.transpose());
     return product;
   };
   const Eigen::Matrix<double, kSize, kRank> PHt = times_derivative(covariance);
   Mat S = H * PHt.template topRows<kColumns>();
-  if constexpr (kHasShared<kSize>) S += by_errors * PHt.template middleRows<3>(first);
-  if constexpr (kSize == kAllStates) S += by_last * PHt.template middleRows<kNuisance>(last);
+  if constexpr (kSize > 10) S += by_errors * PHt.template middleRows<3>(first);
   S.diagonal() += variance;
   Eigen::LLT<Mat> llt(S);
   Vec y = axes.transpose() * residual;
-  if constexpr (kHasShared<kSize>) y -= by_errors * state.shared.mean.template segment<3>(seen.first_error);
+  if constexpr (kSize > 10) y -= by_errors * state.shared.mean.template segment<3>(seen.first_error);
   const Vec whitened = llt.matrixL().solve(y);
 
   Update result;
@@ -98,19 +89,24 @@ Update update_rank(FilterState& state, const Eigen::Matrix<double, 3, kColumns>&
 
 template <int kSize, int kColumns>
 Update update_seen(FilterState& state, const Eigen::Matrix<double, 3, kColumns>& by_state, const SeenAxes& seen,
-                   const Eigen::Vector3d& residual, const std::array<double, 3>& gate,
-                   const ByNuisance& by_nuisance = kByNoNuisance) {
+                   const Eigen::Vector3d& residual, const std::array<double, 3>& gate) {
   switch (seen.rank) {
     case 1:
-      return update_rank<kSize, 1, kColumns>(state, by_state, seen, residual, gate[0], by_nuisance);
+      return update_rank<kSize, 1, kColumns>(state, by_state, seen, residual, gate[0]);
     case 2:
-      return update_rank<kSize, 2, kColumns>(state, by_state, seen, residual, gate[1], by_nuisance);
+      return update_rank<kSize, 2, kColumns>(state, by_state, seen, residual, gate[1]);
     case 3:
-      return update_rank<kSize, 3, kColumns>(state, by_state, seen, residual, gate[2], by_nuisance);
+      return update_rank<kSize, 3, kColumns>(state, by_state, seen, residual, gate[2]);
     default:
       return {};
   }
 }
+
+// The same of all states, those of the rig included, in one function for every rank: an axis that is not seen is a row
+// of zeros. `by_state`: by the state's own ten; `by_nuisance`: by the nuisance states, of which the residual has the
+// mean.
+Update update_all(FilterState& state, const Eigen::Matrix<double, 3, 10>& by_state, const ByNuisance& by_nuisance,
+                  const SeenAxes& seen, const Eigen::Vector3d& residual, const std::array<double, 3>& gate);
 
 // The x across `along` with information x = left, where that is singular along it: nothing along it, nor along an axis
 // that is not seen.

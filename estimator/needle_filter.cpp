@@ -262,20 +262,21 @@ Update NeedleFilter::update_sized(FilterState& state, const model::TipMeasuremen
       ByNuisance by_nuisance;
       const Eigen::Vector3d seen_mm = seen_by_camera(state, measurement.camera, at_mm, by_nuisance);
       by_state = frame_of_camera(state, measurement.camera) * by_state;
-      return update_seen<kSize, 10>(state, by_state, seen, measurement.position_mm - seen_mm, gate_, by_nuisance);
+      return update_all(state, by_state, by_nuisance, seen, measurement.position_mm - seen_mm, gate_);
+    } else {
+      if constexpr (kOwn<kSize> == 10)
+        if (stiff_ && pressing(state) < 1) {
+          Eigen::Matrix<double, 3, 10> by_state;
+          const Eigen::Vector3d at_mm = drawn_back_tip(state, by_state);
+          return update_seen<kSize, 10>(state, by_state, seen, measurement.position_mm - at_mm, gate_);
+        }
+      if (config_.effects.empty())
+        return update_seen<kSize, 3>(state, state.pose.R, seen, measurement.position_mm - state.pose.p_mm, gate_);
+      Eigen::Vector3d blur_mm2;
+      const model::TipReading at = reading(state, &blur_mm2);
+      seen.shared = seen.axes.cwiseAbs2().transpose() * blur_mm2;
+      return update_seen<kSize, kOwn<kSize>>(state, at.D, seen, measurement.position_mm - at.position_mm, gate_);
     }
-    if constexpr (kOwn<kSize> == 10)
-      if (stiff_ && pressing(state) < 1) {
-        Eigen::Matrix<double, 3, 10> by_state;
-        const Eigen::Vector3d at_mm = drawn_back_tip(state, by_state);
-        return update_seen<kSize, 10>(state, by_state, seen, measurement.position_mm - at_mm, gate_);
-      }
-    if (config_.effects.empty())
-      return update_seen<kSize, 3>(state, state.pose.R, seen, measurement.position_mm - state.pose.p_mm, gate_);
-    Eigen::Vector3d blur_mm2;
-    const model::TipReading at = reading(state, &blur_mm2);
-    seen.shared = seen.axes.cwiseAbs2().transpose() * blur_mm2;
-    return update_seen<kSize, kOwn<kSize>>(state, at.D, seen, measurement.position_mm - at.position_mm, gate_);
   };
   Update result = apply();
   std::uint8_t& camera_rejects = state.camera_rejects_in_row.at(

@@ -15,6 +15,8 @@ inline constexpr int kCamerasInFrame = 2;  // of number 0 and 1
 inline constexpr int frame_of(int camera) { return 1 + 4 * camera; }
 inline constexpr int latency_of(int camera) { return 4 + 4 * camera; }
 
+using ByNuisance = Eigen::Matrix<double, 3, kNuisance>;  // derivative of what a camera sees
+
 struct Nuisance {
   Eigen::Matrix<double, kNuisance, 1> mean = Eigen::Matrix<double, kNuisance, 1>::Zero();
   Eigen::Matrix<double, kNuisance, kNuisance> covariance = Eigen::Matrix<double, kNuisance, kNuisance>::Zero();

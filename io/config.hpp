@@ -148,7 +148,9 @@ class ConfigFile {
   std::unique_ptr<ConfigContents> contents_;
 };
 
-// Nearest of `candidates` by edit distance (insert, delete, replace, swap neighbours); empty if there are none.
+// Letters put in, left out, changed, or swapped with a neighbour, from the one to the other.
+std::size_t edit_distance(std::string_view given, std::string_view candidate);
+// Nearest of `candidates` by that; empty if there are none.
 std::string nearest_name(std::string_view given, const std::vector<std::string>& candidates);
 
 // Shortest text that reads back as the same number.

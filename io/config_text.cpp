@@ -13,33 +13,31 @@ std::string format_number(double value) {
   return error == std::errc() ? std::string(buffer.data(), end) : std::to_string(value);
 }
 
-std::string nearest_name(std::string_view given, const std::vector<std::string>& candidates) {
-  std::string best;
-  std::size_t best_distance = std::numeric_limits<std::size_t>::max();
-  for (const auto& candidate : candidates) {
-    // Optimal string alignment: three rows of the usual table, the third for swapped neighbours.
-    std::vector<std::size_t> before_last(candidate.size() + 1);
-    std::vector<std::size_t> last(candidate.size() + 1);
-    std::vector<std::size_t> row(candidate.size() + 1);
-    for (std::size_t j = 0; j <= candidate.size(); ++j) last[j] = j;
-    for (std::size_t i = 1; i <= given.size(); ++i) {
-      row[0] = i;
-      for (std::size_t j = 1; j <= candidate.size(); ++j) {
-        const std::size_t replace = last[j - 1] + (given[i - 1] == candidate[j - 1] ? 0 : 1);
-        row[j] = std::min({last[j] + 1, row[j - 1] + 1, replace});
-        if (i > 1 && j > 1 && given[i - 1] == candidate[j - 2] && given[i - 2] == candidate[j - 1]) {
-          row[j] = std::min(row[j], before_last[j - 2] + 1);
-        }
+// Optimal string alignment: three rows of the usual table, the third for swapped neighbours.
+std::size_t edit_distance(std::string_view given, std::string_view candidate) {
+  std::vector<std::size_t> before_last(candidate.size() + 1);
+  std::vector<std::size_t> last(candidate.size() + 1);
+  std::vector<std::size_t> row(candidate.size() + 1);
+  for (std::size_t j = 0; j <= candidate.size(); ++j) last[j] = j;
+  for (std::size_t i = 1; i <= given.size(); ++i) {
+    row[0] = i;
+    for (std::size_t j = 1; j <= candidate.size(); ++j) {
+      const std::size_t replace = last[j - 1] + (given[i - 1] == candidate[j - 1] ? 0 : 1);
+      row[j] = std::min({last[j] + 1, row[j - 1] + 1, replace});
+      if (i > 1 && j > 1 && given[i - 1] == candidate[j - 2] && given[i - 2] == candidate[j - 1]) {
+        row[j] = std::min(row[j], before_last[j - 2] + 1);
       }
-      before_last = last;
-      last = row;
     }
-    if (last.back() < best_distance) {
-      best_distance = last.back();
-      best = candidate;
-    }
+    before_last = last;
+    last = row;
   }
-  return best;
+  return last.back();
+}
+
+std::string nearest_name(std::string_view given, const std::vector<std::string>& candidates) {
+  const auto nearest =
+      std::ranges::min_element(candidates, {}, [&](const auto& candidate) { return edit_distance(given, candidate); });
+  return nearest == candidates.end() ? "" : *nearest;
 }
 
 bool Range::contains(double value) const {

@@ -115,7 +115,7 @@ std::string far_tips(const PlacedReadings& readings, const std::vector<Base>& ba
   const std::string share = std::to_string(far) + " of " + std::to_string(readings.tips.size()) + " tips";
   if (static_cast<double>(far) > kMostLeftOut * static_cast<double>(readings.tips.size()))
     throw std::runtime_error(where + "; in all " + share +
-                             " are too far. Are tip.unit, insertion.unit and the columns right?");
+                             " are too far. Are tip.unit, insertion.unit, the units of time and the columns right?");
   return where + "; in all " + share + " are too far, and stay in the log";
 }
 

@@ -77,7 +77,8 @@ bool is_exported(const std::string& folder) {
 
 Recording import_exported(const std::string& folder) {
   if (!is_exported(folder))
-    throw std::runtime_error(folder + ": has none of the files of bevel-export, " + exported::kTips + " for instance");
+    throw std::runtime_error(folder + ": has none of the files of bevel-export, " + exported::kTips +
+                             " for instance; CSV files of one's own need a column map, --columns");
   Recording out;
   ArrivalsByNumber arrivals;
   // Of equal number the axes come first: a reading of the tip is taken of where the base is.

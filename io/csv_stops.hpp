@@ -22,8 +22,9 @@ struct Stop {
 };
 
 // Rows of one depth, one after the other, are a stop. `still`: how many of a reading's first columns are positions in
-// mm, which say whether the needle lies still: rows that are further from where the stop's rows crowd than a fifth of
-// the way to the nearest other stop are left out and counted.
+// mm, which say whether the needle lies still. Where a stop is, its rows crowd, one step from the stops beside it; rows
+// further from there than a fifth of the way to the nearest other stop are left out and counted: those on the way to
+// the next, and those that lie there before its depth is noted.
 std::vector<Stop> find_stops(const std::vector<StopRow>& rows, Eigen::Index still, int& left_out);
 
 }  // namespace bevel::io

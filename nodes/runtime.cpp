@@ -7,6 +7,7 @@
 #include <unistd.h>
 
 #include <algorithm>
+#include <array>
 #include <cerrno>
 #include <chrono>
 #include <cmath>
@@ -23,6 +24,8 @@ static_assert(std::atomic<bool>::is_always_lock_free, "set from a signal handler
 void on_signal(int) { stop_flag = true; }
 
 constexpr int kMaxMessagesAtOnce = 256;
+// So often in a period: a descriptor that is readable for ever must not keep this thread, whose priority is high, busy.
+constexpr int kMostOtherWakings = 64;
 constexpr std::int64_t kTogether_ns = 1'000'000;  // two readings that belong together
 
 thread_local LoopTimes loop_times;
@@ -61,9 +64,12 @@ void end_with(int parent) {
 std::string try_realtime(int priority) {
   sched_param parameters{};
   parameters.sched_priority = priority;
-  if (sched_setscheduler(0, SCHED_FIFO, &parameters) != 0) return std::string("no SCHED_FIFO: ") + std::strerror(errno);
-  if (mlockall(MCL_CURRENT | MCL_FUTURE) != 0) return std::string("memory not locked: ") + std::strerror(errno);
-  return "";
+  std::string refused;
+  if (sched_setscheduler(0, SCHED_FIFO, &parameters) != 0)
+    refused = std::string("no SCHED_FIFO: ") + std::strerror(errno);
+  if (mlockall(MCL_CURRENT | MCL_FUTURE) != 0)
+    refused += std::string(refused.empty() ? "" : ", ") + "memory not locked: " + std::strerror(errno);
+  return refused;
 }
 
 void pump(lcm::LCM& lcm) {
@@ -91,19 +97,28 @@ void run_loop(lcm::LCM& lcm, const Loop& loop, const GoOn& go_on) {
   const auto tell = [&loop](const Now& at) {
     if (loop.tell) loop.tell(at);
   };
+  int other_wakings = 0;
   while (go_on()) {
     const Now waking = now();
     const std::int64_t wait_ns = due_ns - waking.ns;
     if (wait_ns > 0) {
-      pollfd fd{lcm.getFileno(), POLLIN, 0};
+      const bool hear_other = loop.other_fd && other_wakings < kMostOtherWakings;
+      std::array<pollfd, 2> fds{{{lcm.getFileno(), POLLIN, 0}, {hear_other ? loop.other_fd() : -1, POLLIN, 0}}};
       const timespec timeout{wait_ns / 1'000'000'000, wait_ns % 1'000'000'000};
-      if (ppoll(&fd, 1, &timeout, nullptr) <= 0) continue;
+      if (ppoll(fds.data(), fds.size(), &timeout, nullptr) <= 0) continue;
       const Now begun = now();
-      tell(begun);
-      lcm.handleTimeout(0);
+      if (fds[0].revents != 0) {
+        tell(begun);
+        lcm.handleTimeout(0);
+      }
+      if (fds[1].revents != 0) {
+        ++other_wakings;
+        loop.on_other(begun);
+      }
       note_run(now().ns - begun.ns);
       continue;
     }
+    other_wakings = 0;
     tell(waking);
     pump(lcm);
     const Now at = now();

@@ -20,13 +20,17 @@ bool stop_requested();
 // already is.
 void end_with(int parent);
 
-// SCHED_FIFO and locked memory; an empty string, or why it was refused (the loop runs all the same).
+// SCHED_FIFO for this thread and those that it starts from here on, and locked memory; an empty string, or what of it
+// was refused and why (the loop runs all the same).
 std::string try_realtime(int priority);
 
 struct Loop {
   double period_s = 0.01;
   std::function<void(const Now&)> tell;                 // the time, before messages are handled
   std::function<bool(const Now&, double late_s)> step;  // false ends the loop
+  // Optional: something else to wait for beside messages, and what is done when it is readable. -1: nothing now.
+  std::function<int()> other_fd{};
+  std::function<void(const Now&)> on_other{};
 };
 // Calls step every period until a stop is requested or step returns false, handling LCM messages as they arrive in
 // between. After a stall the missed periods are skipped, not caught up.

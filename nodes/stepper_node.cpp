@@ -135,6 +135,12 @@ void StepperNode::enable_if_wanted(const stepper::AxesReport& report) {
   }
 }
 
+void StepperNode::hear_bus(const Now& now) {
+  tell_time(now);
+  driver_.receive(now.ns);
+  note_latch();
+}
+
 void StepperNode::step(const Now& now) {
   port_.tell_time(now);
   port_.rethrow();
@@ -145,10 +151,12 @@ void StepperNode::step(const Now& now) {
   enable_if_wanted(report);
   note_latch();
   if (report.sampled_ns > published_ns_) publish(report);
-  std::string reason = stepper::describe(report.stop);
-  if (report.stop.reason == stepper::StopReason::none) reason = refusal_.empty() ? words_.refusal() : refusal_;
-  if (!detail_.empty()) reason += ": " + detail_;
-  status_.report(stepper::to_string(report.state), reason);
+  status_.report(stepper::to_string(report.state), reason(report.stop));
+}
+
+std::string StepperNode::reason(const stepper::Stop& stop) const {
+  if (stop.reason == stepper::StopReason::none) return refusal_.empty() ? words_.refusal() : refusal_;
+  return stepper::describe(stop) + (detail_.empty() ? "" : ": " + detail_);
 }
 
 void StepperNode::end() { stop(stepper::StopReason::ending); }

@@ -20,6 +20,9 @@ class StepperNode {
   // The bus must outlive the node and hear StepperDriver::listen_ids(config).
   StepperNode(lcm::LCM& lcm, can::Bus& bus, const stepper::StepperConfig& config);
   void tell_time(const Now& now) { port_.tell_time(now); }
+  // Between cycles, when the bus is readable; of use while a command waits for it.
+  bool waits_for_bus() const { return driver_.command_waits(); }
+  void hear_bus(const Now& now);
   // One cycle of config.period_ns.
   void step(const Now& now);
   // Quick stop because this process ends; step on until at_rest().
@@ -37,6 +40,7 @@ class StepperNode {
   void note_latch();
   void enable_if_wanted(const stepper::AxesReport& report);
   void publish(const stepper::AxesReport& report);
+  std::string reason(const stepper::Stop& stop) const;
 
   stepper::StepperConfig config_;
   LcmPort port_;

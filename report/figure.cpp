@@ -40,7 +40,7 @@ class Range {
   std::pair<double, double> with_room() const {
     if (!(low_ <= high_)) return logarithmic_ ? std::pair(0.1, 10.0) : std::pair(0.0, 1.0);
     if (logarithmic_) return {low_ / 1.3, high_ * 1.3};
-    const double room = high_ > low_ ? 0.04 * (high_ - low_) : std::max(1e-9, std::abs(low_)) * 0.5;
+    const double room = high_ > low_ ? 0.04 * (high_ - low_) : (low_ != 0 ? std::abs(low_) * 0.5 : 0.5);
     return {low_ - room, high_ + room};
   }
 

@@ -1,5 +1,6 @@
 #include "diagnosis/inference/local_minima.hpp"
 
+#include <Eigen/Cholesky>
 #include <algorithm>
 #include <cmath>
 #include <limits>
@@ -191,6 +192,30 @@ void scan_shapes(const Likelihood& likelihood, const CurveColumns& curve, Fit& f
       if (again.valid && again.cost < fitted.cost) fitted = std::move(again);
     }
   }
+}
+
+std::vector<double> log_costs_of_dropping(const Fit& fit) {
+  const ModelSet& set = fit.layout.set();
+  std::vector<double> out(set.size(), std::numeric_limits<double>::infinity());
+  const auto blocks = linearise(*fit.likelihood, fit, {});
+  for (std::size_t m = 0; m < set.size() && !blocks.empty(); ++m) {
+    const auto& parameters = fit.layout.system().effects()[set[m]].parameters;
+    std::vector<Index> sizes;
+    std::vector<double> apart;
+    bool held = false;
+    for (std::size_t p = 0; p < parameters.size(); ++p) {
+      if (parameters[p].scope != Scope::shared || !is_size(parameters[p])) continue;
+      sizes.push_back(fit.layout.find_shared(m, p));
+      apart.push_back(fit.shared[sizes.back()] - parameters[p].none);
+      held = held || std::ranges::count(fit.held, sizes.back()) > 0;
+    }
+    if (sizes.empty() || held) continue;
+    const ArrowSolution solution = solve_about(fit, blocks, {}, sizes);
+    if (!solution.valid) continue;
+    const auto d = Eigen::Map<const VectorXd>(apart.data(), static_cast<Index>(apart.size()));
+    out[m] = 0.5 * d.dot(solution.covariance(sizes, sizes).ldlt().solve(d));
+  }
+  return out;
 }
 
 }  // namespace bevel::inference

@@ -22,4 +22,8 @@ void doubt_instants(const Likelihood& likelihood, const CurveColumns& curve, Fit
 // grid about where it is, all else following by the linear model.
 void scan_shapes(const Likelihood& likelihood, const CurveColumns& curve, Fit& fitted);
 
+// By the linear model: by how much the log likelihood falls where one member's sizes are none, for each member.
+// Infinite for one that has no size to be none, or one that presses against a bound.
+std::vector<double> log_costs_of_dropping(const Fit& fit);
+
 }  // namespace bevel::inference

@@ -3,6 +3,7 @@
 #include <Eigen/Cholesky>
 #include <Eigen/QR>
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <limits>
 
@@ -15,7 +16,8 @@ constexpr double kSecondOrder = 10.8;  // fall of the deviance that chance bring
 // Sum over a message's axes of squared errors against its neighbours, each in standard deviations. A Gaussian message
 // of three axes passes this once in 3e5.
 constexpr double kOutlier = 28.0;
-constexpr double kGrossOutlier = 200.0;  // beside whatever
+constexpr double kAgrees = 11.3;  // of three axes, between two readings: 99 %
+constexpr std::array kBeside{-2, -1, 1, 2};
 constexpr int kOutlierPasses = 12;
 constexpr double kLeastLeft = 0.02;  // of a reading's precision: where a curve takes more, nothing is known of it
 constexpr double kClipped = 3.0;     // deviations, by the median of their size, while outliers are still in
@@ -159,6 +161,16 @@ Eigen::VectorXd surprise(const Series& series, Eigen::VectorXd error, const Nois
     squared[i] = residual * residual * precision / (sigma * sigma * left_by_curve(i));
   }
   return squared;
+}
+
+// Squared distance in standard deviations of two errors of a series. Where a membrane gives way or a tip jumps,
+// readings agree with those on their own side, and with no curve; an outlier agrees with none.
+double squared_distance(const Series& series, const Eigen::VectorXd& error, const Noise& noise, double sigma,
+                        std::size_t i, std::size_t j) {
+  const double a = series.relative_sd[i], b = series.relative_sd[j];
+  const double correlation = std::pow(noise.ar1, std::abs(series.time_s[i] - series.time_s[j]) / noise.frame_s);
+  const double apart = error[static_cast<Eigen::Index>(i)] - error[static_cast<Eigen::Index>(j)];
+  return apart * apart / (sigma * sigma * (a * a + b * b - 2 * a * b * correlation));
 }
 
 // The error with what a flexible curve leaves of it clipped: outliers would pass for white noise of their size.
@@ -305,23 +317,30 @@ Calibration calibrate_noise(const Dataset& data, const Errors& errors) {
     for (std::size_t r = 0; r < now.recordings.size(); ++r) {
       const auto& recording = now.recordings[r];
       std::vector<double> sum(recording.messages, 0);
+      std::array<std::vector<double>, kBeside.size()> apart;  // of a message from those beside it
+      apart.fill(sum);
       for (std::size_t c = 0; c < now.claimed_sd.size(); ++c) {
         const Series& series = recording.series[c];
         if (series.time_s.size() < 8) continue;
         const Eigen::VectorXd squared = surprise(series, left[r][c], out.noise, out.noise.sigma[c]);
-        for (std::size_t i = 0; i < series.message.size(); ++i)
+        for (std::size_t i = 0; i < series.message.size(); ++i) {
           sum[series.message[i]] += squared[static_cast<Eigen::Index>(i)];
+          for (std::size_t n = 0; n < kBeside.size(); ++n) {
+            const auto beside = static_cast<std::ptrdiff_t>(i) + kBeside[n];
+            if (beside >= 0 && beside < std::ssize(series.message))
+              apart[n][series.message[i]] += squared_distance(series, left[r][c], out.noise, out.noise.sigma[c], i,
+                                                              static_cast<std::size_t>(beside));
+            else
+              apart[n][series.message[i]] = std::numeric_limits<double>::infinity();
+          }
+        }
       }
+      for (std::size_t i = 0; i < sum.size(); ++i)
+        if (std::ranges::any_of(apart, [&](const auto& from) { return from[i] < kAgrees; })) sum[i] = 0;
       for (std::size_t i = 0; i < sum.size(); ++i) {
         // An outlier makes its neighbours look bad too: only the worst of three goes, the others are looked at again.
         const bool worst = (i == 0 || sum[i] >= sum[i - 1]) && (i + 1 == sum.size() || sum[i] >= sum[i + 1]);
-        // Small outliers come alone: a run of them may be physics that acts for a moment, a membrane or a jump.
-        const auto flagged = [&](std::size_t j) {
-          return std::find(out.outliers[r].begin(), out.outliers[r].end(), j) != out.outliers[r].end();
-        };
-        const bool alone = !(i > 0 && flagged(i - 1)) && !flagged(i + 1);
-        if (worst && (sum[i] > kGrossOutlier || (sum[i] > kOutlier && alone)))
-          out.outliers[r].push_back(i), ++dropped, found = true;
+        if (worst && sum[i] > kOutlier) out.outliers[r].push_back(i), ++dropped, found = true;
       }
     }
     if (!found) break;

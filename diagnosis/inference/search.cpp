@@ -1,12 +1,12 @@
 #include "diagnosis/inference/search.hpp"
 
-#include <Eigen/Cholesky>
 #include <algorithm>
 #include <cmath>
 #include <limits>
 #include <stdexcept>
 
 #include "diagnosis/inference/calibrate.hpp"
+#include "diagnosis/inference/local_minima.hpp"
 #include "diagnosis/inference/log_sum.hpp"
 #include "diagnosis/parallel.hpp"
 
@@ -24,30 +24,6 @@ bool near(const Noise& a, const Noise& b) {
 using Eigen::Index;
 using Eigen::VectorXd;
 
-// By the linear model: by how much the log likelihood falls where an effect's sizes are none. Infinite for one that has
-// no size to be none, or one that presses against a bound.
-double log_cost_of_dropping(const Fit& fit, std::size_t effect) {
-  const auto& set = fit.layout.set();
-  const auto member = static_cast<std::size_t>(std::find(set.begin(), set.end(), effect) - set.begin());
-  const auto& parameters = fit.likelihood->system().effects()[effect].parameters;
-  std::vector<Index> sizes;
-  std::vector<double> apart;
-  for (std::size_t p = 0; p < parameters.size(); ++p) {
-    if (parameters[p].scope != Scope::shared || !is_size(parameters[p])) continue;
-    sizes.push_back(fit.layout.find_shared(member, p));
-    apart.push_back(fit.shared[sizes.back()] - parameters[p].none);
-  }
-  constexpr double kNever = std::numeric_limits<double>::infinity();
-  for (const Index held : fit.held)
-    if (std::count(sizes.begin(), sizes.end(), held) > 0) return kNever;
-  const auto blocks = linearise(*fit.likelihood, fit, {});
-  if (sizes.empty() || blocks.empty()) return kNever;
-  const ArrowSolution solution = solve_about(fit, blocks, {}, sizes);
-  if (!solution.valid) return kNever;
-  const auto d = Eigen::Map<const VectorXd>(apart.data(), static_cast<Index>(apart.size()));
-  return 0.5 * d.dot(solution.covariance(sizes, sizes).ldlt().solve(d));
-}
-
 }  // namespace
 
 double Visited::log_posterior() const {
@@ -56,7 +32,15 @@ double Visited::log_posterior() const {
 }
 
 double Search::log_prior(const ModelSet& set) const {
-  return rules_.log_prior_odds_effect * static_cast<double>(set.size());
+  double sum = 0;
+  for (const std::size_t e : set) sum += log_prior_odds(e);
+  return sum;
+}
+
+double Search::log_prior_odds(std::size_t effect) const {
+  const auto& all = system_.effects();
+  const auto kinds = std::ranges::count(all, all[effect].name, &Effect::name);
+  return rules_.log_prior_odds_effect - std::log(static_cast<double>(kinds));
 }
 
 const Visited& Search::best() const {
@@ -148,9 +132,9 @@ void Search::expand(const ModelSet& set) {
       for (const Proposal& one : list) {
         // Far from its start an effect may bring much more than in proportion: the foremost are fitted in any case.
         const bool foremost = beside != Beside::less_spread && rank++ < rules_.foremost &&
-                              one.log_bayes_factor > -rules_.log_prior_odds_effect;
+                              one.log_bayes_factor > -log_prior_odds(one.effect);
         const ModelSet larger = with(set, one.effect);
-        const double promised = from + one.log_bayes_factor + rules_.log_prior_odds_effect;
+        const double promised = from + one.log_bayes_factor + log_prior_odds(one.effect);
         auto& known = promised_.try_emplace(larger, -std::numeric_limits<double>::infinity()).first->second;
         const bool nothing_new = beside == Beside::less_spread && promised < known + rules_.optimism;
         known = std::max(known, promised);
@@ -182,11 +166,12 @@ void Search::expand(const ModelSet& set) {
   }
   // Smaller sets, from which swaps come. One that was visited already once more, if from here it is likelier even
   // without what it gains by having fewer parameters: then it was in a local minimum.
-  for (const std::size_t effect : set) {
-    const ModelSet smaller = without(set, effect);
-    const Fit& fit = here.at->fit;
+  const Fit& fit = here.at->fit;
+  const auto costs = log_costs_of_dropping(fit);
+  for (std::size_t m = 0; m < set.size(); ++m) {
+    const ModelSet smaller = without(set, set[m]);
     if (const auto known = visited_.find(smaller); known != visited_.end()) {
-      const double promised = here.log_without_curve - log_cost_of_dropping(fit, effect) - rules_.log_prior_odds_effect;
+      const double promised = here.log_without_curve - costs[m] - log_prior_odds(set[m]);
       if (known->second.log_without_curve > promised - rules_.optimism || !from_larger_.insert(smaller).second)
         continue;
     }

@@ -22,7 +22,7 @@ struct SearchRules {
   std::size_t foremost = 2;    // proposals beside a set that are fitted though they do not come near
   std::size_t pairs = 8;
   std::size_t most_fits = 90;           // in all
-  double log_prior_odds_effect = -5.0;  // of one effect being in the model, against not
+  double log_prior_odds_effect = -5.0;  // of one effect being in the model, against not; its kinds share it
   CurveRules curves{};                  // of a discrepancy
   std::size_t rounds = 3;
   int threads = 2;
@@ -60,6 +60,7 @@ class Search {
   // Log of the share of sets that were judged by the linear model alone, by its estimate.
   double log_not_visited() const;
   double log_prior(const ModelSet& set) const;
+  double log_prior_odds(std::size_t effect) const;  // of this kind of the effect, against not
   // A set that was evaluated, with its share in the posterior.
   Visited weighed(const ModelSet& set, const std::shared_ptr<const Evaluated>& at) const;
 

@@ -85,7 +85,8 @@ class System {
   // the model's domain. Thread-safe.
   virtual bool predict(const ModelSet& set, std::size_t recording, const Eigen::VectorXd& shared,
                        const Eigen::VectorXd& local, bool derivatives, Prediction& out) const = 0;
-  // Standard deviations of the rows by what the model's inputs are not known to, where that matters to this set;
+  // Standard deviations of the rows by what the model's inputs are not known to, and by what it leaves open itself,
+  // where that matters to this set;
   // unknowns as for predict. Empty: nowhere. Thread-safe.
   virtual Eigen::VectorXd by_inputs(const ModelSet& /*set*/, std::size_t /*recording*/,
                                     const Eigen::VectorXd& /*shared*/, const Eigen::VectorXd& /*local*/) const {

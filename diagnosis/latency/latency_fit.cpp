@@ -3,6 +3,7 @@
 #include <Eigen/Dense>
 #include <algorithm>
 #include <array>
+#include <boost/math/distributions/students_t.hpp>
 #include <cmath>
 #include <cstdio>
 #include <limits>
@@ -211,20 +212,42 @@ class Problem {
   double spacing_s_, deepest_mm_;
 };
 
-// Newey and West, eq. (5), Bartlett weights and the usual number of lags; with the degrees of freedom of the fit.
-Eigen::Matrix4d covariance_of(const Rows& rows) {
-  const Index n = rows.error.size();
-  const Eigen::Matrix4d bread = (rows.design.transpose() * rows.design).inverse();
-  const VectorXd left = rows.error - rows.design * (bread * (rows.design.transpose() * rows.error));
-  const Eigen::Matrix<double, Eigen::Dynamic, 4> scores = left.asDiagonal() * rows.design;
-  const auto lags = static_cast<Index>(4 * std::pow(static_cast<double>(n) / 100, 2.0 / 9));
-  Eigen::Matrix4d sum = scores.transpose() * scores;
-  for (Index lag = 1; lag <= std::min(lags, n - 1); ++lag) {
-    const double weight = 1 - static_cast<double>(lag) / static_cast<double>(lags + 1);
-    const Eigen::Matrix4d one = scores.bottomRows(n - lag).transpose() * scores.topRows(n - lag);
-    sum += weight * (one + one.transpose());
+// Where a stretch of readings begins whose errors are taken as independent of those before: in the middle of each rest
+// of the axis. Readings where it never rests are cut into stretches of equal number.
+std::vector<Index> stretches_of(const std::vector<double>& rates_mm_s, double fastest_mm_s) {
+  constexpr double kRest = 0.25;  // of the fastest
+  constexpr Index kFewest = 5, kEqual = 10;
+  const auto n = static_cast<Index>(rates_mm_s.size());
+  std::vector<Index> begins{0};
+  for (Index i = 0; i < n;) {
+    Index end = i;
+    while (end < n && rates_mm_s[static_cast<std::size_t>(end)] < kRest * fastest_mm_s) ++end;
+    const bool inside = i > 0 && end < n;
+    if (inside && end > i && (i + end) / 2 - begins.back() >= kFewest) begins.push_back((i + end) / 2);
+    i = std::max(end, i + 1);
   }
-  return static_cast<double>(n) / static_cast<double>(n - 4) * bread * sum * bread;
+  if (static_cast<Index>(begins.size()) >= kFewest) return begins;
+  begins.clear();
+  for (Index k = 0; k < kEqual; ++k) begins.push_back(k * n / kEqual);
+  return begins;
+}
+
+// Standard error of the latency by the jackknife, each stretch left out in turn.
+double jackknife_sd_s(const Rows& rows, const std::vector<Index>& begins) {
+  using Normal = Eigen::Matrix4d;
+  const Normal all = rows.design.transpose() * rows.design;
+  const Eigen::Vector4d right = rows.design.transpose() * rows.error;
+  const auto groups = static_cast<Index>(begins.size());
+  VectorXd without(groups);
+  for (Index g = 0; g < groups; ++g) {
+    const Index from = begins[static_cast<std::size_t>(g)];
+    const Index to = g + 1 < groups ? begins[static_cast<std::size_t>(g + 1)] : rows.error.size();
+    const auto design = rows.design.middleRows(from, to - from);
+    const Normal rest = all - design.transpose() * design;
+    without[g] = rest.ldlt().solve(right - design.transpose() * rows.error.segment(from, to - from))[kPolynomial];
+  }
+  const double share = static_cast<double>(groups - 1) / static_cast<double>(groups);
+  return std::sqrt(share * (without.array() - without.mean()).square().sum());
 }
 
 double at_share(std::vector<double> values, double share) {
@@ -242,11 +265,11 @@ std::string why_not(const LatencyFit& fit) {
                   "or more, at the rate of use in between",
                   fit.slowest_mm_s, fit.fastest_mm_s);
   else
-    std::snprintf(
-        text.data(), text.size(),
-        "the delay is known to %.1f ms, wanted %.0f ms or better: %d readings with errors of %.2f mm at up to "
-        "%.2f mm/s are too few, too noisy or too slow. Record more stops, or go in faster between them",
-        1e3 * fit.sd_s, 1e3 * kLatencyMaxSd_s, fit.readings, fit.rms_mm, fit.fastest_mm_s);
+    std::snprintf(text.data(), text.size(),
+                  "the delay is known to +-%.1f ms (95 %%), wanted are %.0f ms or better: %d readings with errors of "
+                  "%.2f mm at up to "
+                  "%.2f mm/s are too few, too noisy or too slow. Record more stops, or go in faster between them",
+                  1e3 * fit.within_95_s, 1e3 * kLatencyWorst_s, fit.readings, fit.rms_mm, fit.fastest_mm_s);
   return text.data();
 }
 
@@ -288,10 +311,14 @@ LatencyFit fit_latency(const model::AugmentedNeedle& needle, std::span<const mod
   const VectorXd c = plain.design.colPivHouseholderQr().solve(plain.error);
   fit.rms_mm = std::sqrt((plain.error - plain.design * c).cwiseProduct(plain.sd_mm).squaredNorm() / fit.readings);
   const Rows rows = problem.rows(fit.latency_s, fit.correlation);
-  fit.sd_s = std::sqrt(covariance_of(rows)(kPolynomial, kPolynomial));
+  const std::vector<Index> begins = stretches_of(rates_mm_s, fit.fastest_mm_s);
+  fit.stretches = static_cast<int>(begins.size());
+  fit.sd_s = jackknife_sd_s(rows, begins);
+  const boost::math::students_t student(fit.stretches - 1);
+  fit.within_95_s = boost::math::quantile(student, 0.975) * fit.sd_s;
   const Eigen::Matrix4d normal = rows.design.transpose() * rows.design;
   fit.inflation = normal(kPolynomial, kPolynomial) * normal.inverse()(kPolynomial, kPolynomial);
-  if (!std::isfinite(fit.sd_s) || !std::isfinite(fit.inflation) || fit.sd_s > kLatencyMaxSd_s)
+  if (!std::isfinite(fit.sd_s) || !std::isfinite(fit.inflation) || fit.within_95_s > kLatencyWorst_s)
     fit.refusal = why_not(fit);
   else if (fit.latency_s < kLatencyLowest_s + 0.01 || fit.latency_s > kLatencyHighest_s - 0.01)
     fit.refusal = "no delay from " + std::to_string(kLatencyLowest_s) + " to " + std::to_string(kLatencyHighest_s) +

@@ -12,8 +12,11 @@
 //
 // Least squares in (latency, c0, c1, c2): the latency by its profile on a grid, then by Gauss-Newton with the
 // derivative -h . dp/dt. Errors of neighbouring frames are alike; they are taken as a first-order autoregression in
-// time, whose correlation is found from the residuals, and the covariance is that of Newey and West (Econometrica 55,
-// 1987) on what is left after that, so that an error of another kind is accounted for as well.
+// time, whose correlation is found from the residuals. That is for the estimate; its standard error must hold for
+// errors of another kind too, as for those of a tracker that change where the bevel is turned at rest and then stay. So
+// the readings are cut in the middle of each rest, and each of these stretches is left out in turn (jackknife of
+// groups: Efron and Tibshirani, An Introduction to the Bootstrap, 1993, ch. 11): errors may be alike in any way within
+// one.
 //
 // Of the log what comes before the first withdrawal is used: after one the play of the insertion looks like a delay.
 #include <cstdint>
@@ -29,6 +32,8 @@ struct LatencyFit {
   std::string refusal;      // why nothing can be said and what to record; the rest is then what led to it. Empty if ok
   double latency_s = 0;     // positive: stamped later than taken, by the clock of the axes' stamps
   double sd_s = 0;          // standard error
+  double within_95_s = 0;   // half of the interval in which the latency is with 95 %
+  int stretches = 0;        // of readings whose errors are taken as independent; the interval is Student's
   double inflation = 1;     // of its variance by c0, c1 and c2 not being known: large where the rate hardly changes
   int readings = 0;         // used
   double rms_mm = 0;        // of the errors along the needle
@@ -39,7 +44,7 @@ struct LatencyFit {
 };
 
 inline constexpr double kLatencyLowest_s = -0.2, kLatencyHighest_s = 1.0;  // where it is looked for
-inline constexpr double kLatencyMaxSd_s = 0.004;  // less well known is refused: 10 ms are 2.5 of these
+inline constexpr double kLatencyWorst_s = 0.01;  // what is not known to this (within_95_s) is refused
 
 // `needle` without a camera_latency of its own. `tips` of one camera, those whose status is 0; in any order. Throws
 // std::invalid_argument for fewer than two actuator samples and std::domain_error where the model's needle leaves the

@@ -126,7 +126,7 @@ std::vector<FoundEffect> found_effects(const NeedleSystem& system, const Search&
     found.visible_sigmas = std::sqrt(std::max(0.0, less.cost - fit.cost));
     if (const auto at = search.visited().find(rest); at != search.visited().end())
       found.log_bayes_factor =
-          search.visited().at(set).log_posterior() - at->second.log_posterior() - search.rules().log_prior_odds_effect;
+          search.visited().at(set).log_posterior() - at->second.log_posterior() - search.log_prior_odds(set[m]);
     found.moved_at_depth_mm = moved_by_member_mm(system, tip, m);
     out.push_back(std::move(found));
   }
@@ -136,10 +136,11 @@ std::vector<FoundEffect> found_effects(const NeedleSystem& system, const Search&
 std::vector<TriedEffect> tried_beside(const Search& search, const ModelSet& set) {
   std::vector<TriedEffect> out;
   const auto& effects = search.system().effects();
-  const double from = search.visited().at(set).log_posterior(), odds = search.rules().log_prior_odds_effect;
+  const double from = search.visited().at(set).log_posterior();
   for (std::size_t e = 0; e < effects.size(); ++e) {
     const ModelSet larger = inference::with(set, e);
     if (inference::contains(set, e) || !search.system().allows(larger)) continue;
+    const double odds = search.log_prior_odds(e);
     TriedEffect one{.name = effects[e].label, .beside = set.empty() ? "" : describe(search.system(), set)};
     if (const auto at = search.visited().find(larger); at != search.visited().end()) {
       one.fitted = true;

@@ -220,7 +220,16 @@ VectorXd NeedleSystem::by_inputs(const ModelSet& set, std::size_t r, const Vecto
   const bool one = follow(set, motion, static_cast<int>(r), shared, local, {}, nullptr, ahead);
   shift(-2 * kBase_mm);
   if (!one || !follow(set, motion, static_cast<int>(r), shared, local, {}, nullptr, behind)) return {};
-  return 0.5 * (rows_of(r, ahead, false) - rows_of(r, behind, false)).cwiseAbs();
+  VectorXd variance = 0.25 * (rows_of(r, ahead, false) - rows_of(r, behind, false)).cwiseAbs2();
+  Index row = 0;
+  for (std::size_t c = 0; c < recorded_.channels.size(); ++c)
+    for (const std::size_t reading : recorded_.recordings[r].series[c].message) {
+      if (!recorded_.channels[c].heading)
+        variance[row] +=
+            recorded_.channels[c].axis.cwiseAbs2().dot(Eigen::Vector3d::Map(ahead.blur_mm2[reading].data()));
+      ++row;
+    }
+  return variance.cwiseSqrt();
 }
 
 MatrixXd NeedleSystem::by_curves(std::size_t r, const VectorXd& base) const {

@@ -119,7 +119,7 @@ std::string label_of(const model::Effect& effect, std::uint32_t variant) {
   for (const std::uint32_t one : effect.variants()) common &= one;
   for (std::size_t p = 0; p < effect.parameters().size(); ++p)
     if ((variant & ~common) >> p & 1U && effect.parameters()[p].scope == model::Scope::rig)
-      label += " (" + std::string(effect.parameters()[p].name.substr(0, effect.parameters()[p].name.find('_'))) + ")";
+      label += " (" + std::string(effect.parameters()[p].name.substr(0, effect.parameters()[p].name.rfind('_'))) + ")";
   return label;
 }
 

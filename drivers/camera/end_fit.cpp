@@ -14,11 +14,33 @@ using namespace end;  // NOLINT(google-build-using-namespace): the problem is th
 Prior prior_from(const EndPriors& known, const Problem& problem) {
   const auto of_sd = [](double sd) { return 1.0 / (sd * sd); };
   Prior prior;
-  prior.mean = Vector(0.0, known.height, 0.0, 0.0, std::log(known.bevel_px), 0.1, 0.0, 0.0, 0.0);
-  const double bend = 0.5 * known.curvature_sigma_per_px * problem.length_px() * problem.length_px();
-  prior.information = Vector(0.0, of_sd(0.2 * known.height), of_sd(0.04 * known.height), 0.0, of_sd(known.bevel_log_sd),
-                             of_sd(0.25), 1e-4, 1e-4, bend > 0.0 ? of_sd(bend) : 0.0);
+  prior.mean = Vector::zeros();
+  prior.mean[height] = known.height, prior.mean[log_bevel] = std::log(known.bevel_px), prior.mean[pale] = 0.1;
+  prior.information[height] = of_sd(0.2 * known.height), prior.information[base] = of_sd(0.04 * known.height);
+  prior.information[log_bevel] = of_sd(known.bevel_log_sd), prior.information[pale] = of_sd(0.25);
+  prior.information[c0] = prior.information[c1] = 1e-4;
+  const double bend_px = 0.5 * problem.length_px() * problem.length_px();  // of unit curvature
+  if (known.curvature_sigma_per_px > 0.0) prior.information[c2] = of_sd(known.curvature_sigma_per_px * bend_px);
+  prior.hold_bends(1e-9 * bend_px);
   return prior;
+}
+
+/// Which end it is has been told with an axis that does not bend, for what is printed beside an end is not to be taken
+/// for a bend. How the axis lies there is told with one that may: where the needle was turned its curvature changes at
+/// once, and whatever is taken to go on from before the turn is an offset that all frames after it have in common.
+void set_axis(Problem& problem, Vector p, Prior prior, const Noise& noise, const EndPriors& known, EndFit& fit) {
+  const double length = problem.length_px();
+  prior.hold_bends(0.5 * length * length * std::max(known.curvature_change_per_px / std::sqrt(kBends), 1e-9));
+  const double tip_s = p[tip], t = problem.t(tip_s);
+  problem.descend(p, prior, noise, 6);
+  const Matrix covariance = problem.assemble(p, prior, noise, true).normal.inv(cv::DECOMP_CHOLESKY);
+  fit.tip.across_px = problem.offset(p, tip_s);
+  fit.slope = (p[c1] + 2.0 * t * p[c2]) / length;
+  Vector across{}, slope{};
+  across[c0] = 1.0, across[c1] = t, across[c2] = t * t;
+  slope[c1] = 1.0 / length, slope[c2] = 2.0 * t / length;
+  fit.tip.across_variance_px2 = across.dot(covariance * across);
+  fit.slope_variance = slope.dot(covariance * slope);
 }
 
 struct Mode {
@@ -96,27 +118,7 @@ EndFit fit_end(const EndProfile& profile, const EndPriors& priors) {
     fit.seen.across_variance_px2 += share * off_seen[1] * off_seen[1];
   }
 
-  const double t = problem.t(p[tip]);
-  const double length = problem.length_px();
-  fit.tip.across_px = p[c0] + t * (p[c1] + t * p[c2]);
-  fit.slope = (p[c1] + 2.0 * t * p[c2]) / length;
-  Vector across{}, slope{};
-  across[c0] = 1.0, across[c1] = t, across[c2] = t * t;
-  slope[c1] = 1.0 / length, slope[c2] = 2.0 * t / length;
-  fit.tip.across_variance_px2 = across.dot(covariance * across);
-  fit.slope_variance = slope.dot(covariance * slope);
-  constexpr int bends = 4;
-  const double piece = p[tip] - problem.first_s();
-  for (int k = 0; k < bends; ++k) {
-    const double from = p[tip] - (k + 0.5) * piece / bends;
-    const double beyond = p[tip] - from;
-    const Vector drawn = problem.drawn_by_bend(p, covariance, noise, from);
-    const double off_slope = slope.dot(drawn) - beyond;
-    const double off_across = across.dot(drawn) - 0.5 * beyond * beyond;
-    const double change = priors.curvature_change_per_px * priors.curvature_change_per_px / bends;
-    fit.slope_variance += change * off_slope * off_slope;
-    fit.tip.across_variance_px2 += change * off_across * off_across;
-  }
+  set_axis(problem, p, prior, noise, priors, fit);
   fit.height = p[height];
   fit.base = p[base];
   fit.bevel_px = std::exp(p[log_bevel]);

@@ -33,7 +33,7 @@ void Problem::sample(const Vector& p, const Tables& tables, int i, bool gradient
   const double x = p[tip] - s(i);
   const double r = priors_.radius_px;
   const double ti = t(s(i));
-  const double c = p[c0] + ti * (p[c1] + ti * p[c2]);
+  const double c = offset(p, s(i));
   // The three sums over a shape, per unit of height.
   const double by_second = std::sqrt(5.0) * 1.5 / (priors_.window_px * priors_.window_px);
   const double by_share = -0.5 * std::sqrt(5.0);
@@ -71,6 +71,7 @@ void Problem::sample(const Vector& p, const Tables& tables, int i, bool gradient
     g[log_bevel] = h * (longer.value[n] - here.value[n]) / kLogStep;
     g[pale] = -h * face.value[n];
     g[c0] = by_offset[n], g[c1] = g[c0] * ti, g[c2] = g[c1] * ti;
+    for (int b = 0; b < kBends; ++b) g[bend0 + b] = g[c0] * by_bend(b, s(i));
   }
 }
 
@@ -133,7 +134,7 @@ double Problem::descend(Vector& p, const Prior& prior, const Noise& noise, int t
     p = next;
     here = there;
     damping = std::max(1e-7, damping * 0.1);
-    if (moved < 0.01 && gained < 0.05) break;
+    if (moved < 0.01 && gained < 0.01) break;
   }
   return here.cost;
 }

@@ -2,7 +2,9 @@
 // The least-squares problem behind fit_end() (end_fit.hpp): parameters, residuals and gradients, damped descent with
 // weights that forgive what is no needle, the noise that the residuals show, and what the parameters say of the end
 // that is seen.
+#include <algorithm>
 #include <array>
+#include <cmath>
 #include <numbers>
 #include <opencv2/core.hpp>
 #include <utility>
@@ -14,9 +16,11 @@
 namespace bevel::camera::end {
 
 // Of the model in end_fit.hpp: tip px; height and base gray px; roll rad; the bevel's length as the logarithm of px;
-// pale; the axis's offset in px, by powers of s over the profile's length.
-enum Parameter { tip, height, base, roll, log_bevel, pale, c0, c1, c2 };
-inline constexpr int kParameters = 9;
+// pale; the axis's offset in px, by powers of s over the profile's length; and by how much its curvature, in the same
+// unit, is another one before each of kBends places.
+enum Parameter { tip, height, base, roll, log_bevel, pale, c0, c1, c2, bend0 };
+inline constexpr int kBends = 3;
+inline constexpr int kParameters = bend0 + kBends;
 using Vector = cv::Vec<double, kParameters>;
 using Matrix = cv::Matx<double, kParameters, kParameters>;
 inline constexpr double kHalfPi = std::numbers::pi / 2.0;
@@ -24,6 +28,9 @@ inline constexpr double kHalfPi = std::numbers::pi / 2.0;
 struct Prior {
   Vector mean;
   Vector information;  // 1 / sd^2; 0 where nothing is known
+  void hold_bends(double sd) {
+    for (int k = 0; k < kBends; ++k) information[bend0 + k] = 1.0 / (sd * sd);
+  }
 };
 
 inline constexpr int kChannels = 3;  // m0, m1 in the scale of m0, m2
@@ -59,6 +66,18 @@ class Problem {
   double last_s() const { return s(size() - 1); }
   double t(double s_px) const { return s_px / length_px_; }
   double length_px() const { return length_px_; }
+  /// What a change of curvature by 2 / length_px^2 before bend `k` sets a point at s aside by, px.
+  double by_bend(int k, double s_px) const {
+    const double before = std::max(0.0, bend_s(k) - s_px) / length_px_;
+    return before * before;
+  }
+  /// Offset of the axis from the nominal line, px.
+  double offset(const Vector& p, double s_px) const {
+    const double ti = t(s_px);
+    double c = p[c0] + ti * (p[c1] + ti * p[c2]);
+    for (int k = 0; k < kBends; ++k) c += p[bend0 + k] * by_bend(k, s_px);
+    return c;
+  }
 
   struct Tables {
     BlurredBevel here, rolled, longer;
@@ -107,10 +126,9 @@ class Problem {
   };
   Seen seen_with_gradient(const Vector& p) const;
 
-  /// What a bend of unit curvature from `from_s` on does to the lateral parameters.
-  Vector drawn_by_bend(const Vector& p, const Matrix& covariance, const Noise& noise, double from_s);
-
  private:
+  /// Evenly over the piece up to where the nominal line ends.
+  double bend_s(int k) const { return profile_.first_s_px * (k + 0.5) / kBends; }
   /// What blur adds to the second moment, from how wide the shaft is where it is whole.
   double shaft_width_px2() const;
   /// As much of an offset as is more than chance, where one of a radius is nothing unusual, and the variance of that.

@@ -22,8 +22,7 @@ cv::Vec2d Problem::seen(const Vector& p, const BlurredBevel& table) const {
   }
   aside /= weights;
   const double s_px = p[tip] - high;
-  const double ti = t(s_px);
-  return {s_px, p[c0] + ti * (p[c1] + ti * p[c2]) + aside};
+  return {s_px, offset(p, s_px) + aside};
 }
 
 cv::Vec2d Problem::more_than_chance(double offset_px, double variance_px2) const {
@@ -52,7 +51,7 @@ cv::Vec2d Problem::beyond_model(const Vector& p, const Noise& noise, double abou
 Problem::Seen Problem::seen_with_gradient(const Vector& p) const {
   Seen out;
   out.place = seen(p, tables_.here);
-  for (const int k : {tip, roll, log_bevel, pale, c0, c1, c2}) {
+  for (const int k : {tip, roll, log_bevel, pale, c0, c1, c2}) {  // no bend lies so near the end
     const double step = k == roll ? kRollStep_rad : k == log_bevel ? kLogStep : 0.02;
     Vector moved = p;
     moved[k] += step;
@@ -61,19 +60,6 @@ Problem::Seen Problem::seen_with_gradient(const Vector& p) const {
     out.by_s[k] = change[0], out.by_across[k] = change[1];
   }
   return out;
-}
-
-Vector Problem::drawn_by_bend(const Vector& p, const Matrix& covariance, const Noise& noise, double from_s) {
-  Vector right{};
-  Sample sample_i;
-  for (int i = 0; i < size(); ++i) {
-    const double beyond = s(i) - from_s;
-    if (beyond <= 0.0) continue;
-    sample(p, tables_, i, true, sample_i);
-    const double signal = moment_scale_ * p[height] * sample_i.share * 0.5 * beyond * beyond;
-    right += noise.information(1) * weight(sample_i.residual[1], 1, noise) * signal * sample_i.gradient[1];
-  }
-  return covariance * right;
 }
 
 }  // namespace bevel::camera::end

@@ -34,15 +34,13 @@ struct TrackerConfig {
   double min_contrast_gray = 20.0;  ///< darker than its surroundings by at least this; fainter lines are ignored
   double min_length_mm = 6.0;       ///< shorter visible needles are reported as `too_short`
   // What is fitted
-  /// Piece behind the tip which fixes direction and curvature. A needle whose bevel is turned changes its curvature by
-  /// up to 2 k at once, and a parabola cannot follow that: its end is then wrong by about k length^2 / 10, slowly, and
-  /// a controller in the loop answers with a weave. 25 mm gave errors of 0.15 mm; noise is no problem at 10 mm.
+  /// Piece behind the tip which fixes direction and curvature. 25 mm gave errors of 0.15 mm where the bevel had been
+  /// turned; noise is no problem at 10 mm.
   double fit_length_mm = 10.0;
   double curvature_sigma_per_mm = 0.01;  ///< curvatures expected; twice the 0.0047 / mm of the model's needle
-  /// Change of curvature along that piece, as where the bevel was turned. A parabola cannot follow it, and the
-  /// heading's information says so. With 0.003, needles of 0.005 / mm that are turned by up to 0.3 rad / mm have errors
-  /// of 1.1 times what is claimed, needles that are not, of 0.83 times.
-  double curvature_change_per_mm = 0.0035;
+  /// Change of curvature along that piece: 2 k where the bevel was turned over. Told less, a needle's end is taken to
+  /// bend on as before the turn.
+  double curvature_change_per_mm = 0.01;
   // Region of interest
   double roi_ahead_mm = 10.0;  ///< how far beyond the prediction the tip may be
   double roi_side_mm = 8.0;    ///< how far beside it

@@ -64,6 +64,7 @@ bool LocalBus::open() {
     return false;
   }
   fd_ = fd;
+  arrived_.forget();
   return true;
 }
 
@@ -88,21 +89,19 @@ SendResult LocalBus::send(const Frame& frame) {
 
 Reception LocalBus::receive() {
   while (fd_ >= 0 && !has_event()) {
-    wire::Packet packet{};
-    const ssize_t got = ::recv(fd_, packet.data(), packet.size(), MSG_DONTWAIT | MSG_TRUNC);
-    if (got < 0 && errno == EINTR) continue;
-    if (got < 0 && errno == EAGAIN) return {};
-    if (got <= 0) {
+    const auto* arrived = arrived_.next(fd_);
+    if (arrived == nullptr && errno == EAGAIN) return {};
+    if (arrived == nullptr || arrived->size == 0) {
       lose(BusEvent::gone);
       break;
     }
-    const auto frame = got == static_cast<ssize_t>(packet.size()) ? wire::decode(packet) : std::nullopt;
+    const auto frame = arrived->size == arrived->data.size() ? wire::decode(arrived->data) : std::nullopt;
     if (!frame) {
       ++counters_.malformed;
       continue;
     }
     if (!hears(frame->id)) continue;
-    if ((packet[wire::kFlagsAt] & wire::kEcho) != 0) return {Reception::Kind::echo, *frame, {}};
+    if ((arrived->data[wire::kFlagsAt] & wire::kEcho) != 0) return {Reception::Kind::echo, *frame, {}};
     ++counters_.received;
     return {Reception::Kind::frame, *frame, {}};
   }

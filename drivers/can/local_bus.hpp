@@ -8,6 +8,8 @@
 #include <string>
 #include <vector>
 
+#include "drivers/can/local_wire.hpp"
+#include "drivers/can/read_ahead.hpp"
 #include "drivers/can/socket_bus.hpp"
 
 namespace bevel::can {
@@ -28,6 +30,7 @@ class LocalBus final : public SocketBus {
 
   std::string path_;
   std::vector<std::uint32_t> listen_;
+  ReadAhead<wire::Packet> arrived_;
 };
 
 class LocalHub {

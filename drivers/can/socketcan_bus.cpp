@@ -92,6 +92,7 @@ bool SocketCanBus::open() {
   }
   fd_ = fd;
   overflow_total_ = 0;
+  arrived_.forget();
   return true;
 }
 
@@ -119,48 +120,41 @@ SendResult SocketCanBus::send(const Frame& frame) {
   }
 }
 
+void SocketCanBus::note_overflow(msghdr& header) {
+  for (cmsghdr* c = CMSG_FIRSTHDR(&header); c != nullptr; c = CMSG_NXTHDR(&header, c)) {
+    if (c->cmsg_level != SOL_SOCKET || c->cmsg_type != SO_RXQ_OVFL) continue;
+    std::uint32_t total = 0;
+    std::memcpy(&total, CMSG_DATA(c), sizeof total);
+    if (total == overflow_total_) continue;
+    counters_.overflows += total - overflow_total_;
+    overflow_total_ = total;
+    tell(BusEvent::overflow);
+  }
+}
+
 Reception SocketCanBus::receive() {
   if (has_event()) return take_event();
   while (fd_ >= 0) {
-    can_frame raw{};
-    iovec io{&raw, sizeof raw};
-    alignas(cmsghdr) std::array<char, CMSG_SPACE(sizeof(std::uint32_t))> control{};
-    msghdr message{};
-    message.msg_iov = &io;
-    message.msg_iovlen = 1;
-    message.msg_control = control.data();
-    message.msg_controllen = control.size();
-    const ssize_t got = recvmsg(fd_, &message, MSG_DONTWAIT);
-    if (got < 0) {
-      if (errno == EINTR) continue;
-      if (errno == ENETDOWN || errno == ENODEV || errno == ENXIO) {
-        lose(errno == ENETDOWN ? BusEvent::link_down : BusEvent::gone);
-        return take_event();
-      }
-      return {};
+    auto* arrived = arrived_.next(fd_);
+    if (arrived == nullptr) {
+      if (errno != ENETDOWN && errno != ENODEV && errno != ENXIO) return {};
+      lose(errno == ENETDOWN ? BusEvent::link_down : BusEvent::gone);
+      return take_event();
     }
-    for (cmsghdr* c = CMSG_FIRSTHDR(&message); c != nullptr; c = CMSG_NXTHDR(&message, c)) {
-      if (c->cmsg_level != SOL_SOCKET || c->cmsg_type != SO_RXQ_OVFL) continue;
-      std::uint32_t total = 0;
-      std::memcpy(&total, CMSG_DATA(c), sizeof total);
-      if (total != overflow_total_) {
-        counters_.overflows += total - overflow_total_;
-        overflow_total_ = total;
-        tell(BusEvent::overflow);
-      }
-    }
+    note_overflow(arrived->header);
+    const can_frame& raw = arrived->data;
     if ((raw.can_id & CAN_ERR_FLAG) != 0) {
       ++counters_.error_frames;
       if (const auto event = event_of(raw)) return {Reception::Kind::event, {}, *event};
       continue;
     }
-    if (got != static_cast<ssize_t>(sizeof raw) || (raw.can_id & (CAN_EFF_FLAG | CAN_RTR_FLAG)) != 0 ||
+    if (arrived->size != sizeof raw || (raw.can_id & (CAN_EFF_FLAG | CAN_RTR_FLAG)) != 0 ||
         raw.can_dlc > CAN_MAX_DLEN) {
       ++counters_.malformed;
       continue;
     }
     Reception found;
-    found.kind = (message.msg_flags & MSG_CONFIRM) != 0 ? Reception::Kind::echo : Reception::Kind::frame;
+    found.kind = (arrived->header.msg_flags & MSG_CONFIRM) != 0 ? Reception::Kind::echo : Reception::Kind::frame;
     found.frame.id = raw.can_id & CAN_SFF_MASK;
     found.frame.size = raw.can_dlc;
     std::copy_n(std::begin(raw.data), raw.can_dlc, found.frame.data.begin());

@@ -1,9 +1,12 @@
 // Bus over a Linux SocketCAN interface (can0, vcan0, ...). See Documentation/networking/can.rst of the kernel.
 #pragma once
 
+#include <linux/can.h>
+
 #include <string>
 #include <vector>
 
+#include "drivers/can/read_ahead.hpp"
 #include "drivers/can/socket_bus.hpp"
 
 namespace bevel::can {
@@ -21,9 +24,11 @@ class SocketCanBus final : public SocketBus {
 
  private:
   bool open() override;
+  void note_overflow(msghdr& header);
 
   std::string interface_;
   std::vector<std::uint32_t> listen_;
+  ReadAhead<can_frame> arrived_;
   std::uint32_t overflow_total_ = 0;  // SO_RXQ_OVFL counts since the socket was opened
 };
 

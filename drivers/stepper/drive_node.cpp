@@ -15,6 +15,8 @@ constexpr std::int64_t kStartPause_ns = 100 * kMs;
 constexpr std::uint8_t kStatusPdoBytes = 6;    // 6041, 606C
 constexpr std::uint8_t kPositionPdoBytes = 5;  // 6064, 6061
 constexpr cia301::ObjectAddress kErrorCode{0x603F, 0};
+constexpr cia301::ObjectAddress kInputs{0x60FD, 0};
+constexpr std::uint32_t kNegativeSwitch = 1U << 0, kPositiveSwitch = 1U << 1;  // of kInputs, in the drive's direction
 
 }  // namespace
 
@@ -184,7 +186,7 @@ void DriveNode::configure(std::int64_t now_ns, Transmitter& out) {
           position_pdo_ns_ > phase_since_ns_) {
         phase_ = Phase::operational;
         seen_operational_ = true;
-        error_code_asked_ = false;
+        error_code_asked_ = inputs_asked_ = false;
       } else if (now_ns - phase_since_ns_ > config_.transition_timeout_ns) {
         out_of_sight();
         trouble(StopReason::start_timeout);
@@ -264,27 +266,38 @@ void DriveNode::transfer(std::int64_t now_ns, Transmitter& out) {
   if (frame && out.send(*frame, now_ns)) sdo_.sent(now_ns);
 }
 
-void DriveNode::read_error_code(std::int64_t now_ns, Transmitter& out) {
+// True when sdo_ holds the answer, in one call.
+bool DriveNode::ask_once(cia301::ObjectAddress object, bool& asked, std::int64_t now_ns, Transmitter& out) {
   using Status = cia301::SdoClient::Status;
-  if (phase_ != Phase::operational || state() != cia402::State::fault) return;
   sdo_.check_time(now_ns);
-  if (!error_code_asked_) {
-    error_code_asked_ = true;
-    sdo_.upload(kErrorCode);
-  } else if (sdo_.status() == Status::done) {
-    error_code_ = static_cast<std::uint16_t>(sdo_.value());
-    sdo_.cancel();
-  }
+  const bool answered = asked && sdo_.status() == Status::done;
+  if (!asked) sdo_.upload(object);
+  asked = true;
+  if (answered) sdo_.cancel();
   const auto frame = sdo_.frame_to_send();
   if (frame && out.send(*frame, now_ns)) sdo_.sent(now_ns);
+  return answered;
 }
 
-void DriveNode::command(std::uint16_t controlword, double rate_unit_s, std::int64_t now_ns, Transmitter& out) const {
+void DriveNode::read_error_code(std::int64_t now_ns, Transmitter& out) {
+  if (phase_ != Phase::operational || state() != cia402::State::fault) return;
+  if (ask_once(kErrorCode, error_code_asked_, now_ns, out)) error_code_ = static_cast<std::uint16_t>(sdo_.value());
+}
+
+StopReason DriveNode::read_limit(std::int64_t now_ns, Transmitter& out) {
+  if (phase_ != Phase::operational || !ask_once(kInputs, inputs_asked_, now_ns, out)) return StopReason::travel_limit;
+  const bool negative = (sdo_.value() & kNegativeSwitch) != 0, positive = (sdo_.value() & kPositiveSwitch) != 0;
+  if (negative == positive) return negative ? StopReason::travel_limit : StopReason::drive_limit;
+  const bool turned_over = config_.axes.at(axis_).counts_per_unit < 0;
+  return negative != turned_over ? StopReason::lower_switch : StopReason::upper_switch;
+}
+
+bool DriveNode::command(std::uint16_t controlword, double rate_unit_s, std::int64_t now_ns, Transmitter& out) const {
   can::Frame frame{cia301::rpdo1_id(node_), 6, {}};
   cia301::put_u16(frame, 0, controlword);
   const auto rate = static_cast<std::int32_t>(std::lround(rate_unit_s * config_.axes.at(axis_).counts_per_unit));
   cia301::put_u32(frame, 2, static_cast<std::uint32_t>(rate));
-  out.send(frame, now_ns);
+  return out.send(frame, now_ns);
 }
 
 double DriveNode::position_unit() const {

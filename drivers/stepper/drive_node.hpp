@@ -38,8 +38,10 @@ class DriveNode {
   void renew_limits(std::int64_t now_ns, Transmitter& out);
   void supervise(std::int64_t now_ns);                          // time-outs
   void read_error_code(std::int64_t now_ns, Transmitter& out);  // in fault: 0x603F, once
-  // rate: in counts of the drive, by sign of counts_per_unit.
-  void command(std::uint16_t controlword, double rate_unit_s, std::int64_t now_ns, Transmitter& out) const;
+  // Which limit stopped the axis, by 0x60FD, once it has answered; travel_limit until then, and where it has no answer.
+  StopReason read_limit(std::int64_t now_ns, Transmitter& out);
+  // rate: in counts of the drive, by sign of counts_per_unit. False: not accepted (Transmitter::send()).
+  bool command(std::uint16_t controlword, double rate_unit_s, std::int64_t now_ns, Transmitter& out) const;
 
   Stop take_trouble();  // the oldest trouble since the last call
 
@@ -66,6 +68,7 @@ class DriveNode {
   void out_of_sight();
   void trouble(StopReason reason, std::uint32_t code = 0);
   void transfer(std::int64_t now_ns, Transmitter& out);
+  bool ask_once(cia301::ObjectAddress object, bool& asked, std::int64_t now_ns, Transmitter& out);
   bool has_limits() const { return std::isfinite(limits_.min_unit) || std::isfinite(limits_.max_unit); }
   void place_limits();
   void begin_job();
@@ -87,6 +90,7 @@ class DriveNode {
   std::int64_t job_since_ns_ = 0;
   bool seen_operational_ = false;
   bool error_code_asked_ = false;
+  bool inputs_asked_ = false;
   Stop trouble_{};
 
   cia301::NmtState nmt_state_ = cia301::NmtState::boot_up;

@@ -36,6 +36,12 @@ const char* to_string(StopReason reason) {
       return "axis does not follow the commanded rate";
     case StopReason::travel_limit:
       return "axis is at a limit switch or at the drive's own limit";
+    case StopReason::lower_switch:
+      return "axis is at its lower limit switch";
+    case StopReason::upper_switch:
+      return "axis is at its upper limit switch";
+    case StopReason::drive_limit:
+      return "axis is at the drive's own limit, no limit switch is active";
     case StopReason::bus_error_passive:
       return "CAN controller error-passive";
     case StopReason::bus_off:

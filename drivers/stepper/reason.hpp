@@ -21,7 +21,11 @@ enum class StopReason : std::uint8_t {
   pdo_lost,              // no positions within tpdo_timeout_ns
   enable_timeout,
   not_following,  // is not where the commanded rate should have brought it
-  travel_limit,   // the drive's limit switch or its software limit stopped the axis (statusword bit 11)
+  travel_limit,  // the drive's limit switch or its software limit stopped the axis (statusword bit 11); once its inputs
+                 // (0x60FD) are read, one of the next three. A drive without 0x60FD leaves it at this
+  lower_switch,  // of the axis as the driver counts it, whichever way the drive does
+  upper_switch,
+  drive_limit,  // no switch is active: the drive's own limit (0x607D)
   bus_error_passive,
   bus_off,
   link_down,  // the interface is down or gone

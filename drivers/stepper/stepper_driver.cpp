@@ -67,13 +67,9 @@ void StepperDriver::disable() {
 
 void StepperDriver::stop_now(StopReason reason, std::int64_t now_ns) {
   if (latched()) return;
-  receive(now_ns);  // echoes, so that nothing holds the stop back
+  take_in(now_ns);  // echoes, so that nothing holds the stop back
   latch({reason, -1, 0});
-  if (!bus_.is_open() || silent_) return;
-  send_commands(now_ns);
-  // What SYNC latches must not wait for the next one.
-  if (config_.mode == VelocityMode::cyclic && out_.send(cia301::sync(), now_ns))
-    for (auto& node : nodes_) node.on_sync(now_ns);
+  send_stop(now_ns);
 }
 
 bool StepperDriver::rearm() {
@@ -186,9 +182,21 @@ void StepperDriver::on_frame(const can::Frame& frame, std::int64_t now_ns) {
 }
 
 void StepperDriver::receive(std::int64_t now_ns) {
+  const bool was_latched = latched();
+  take_in(now_ns);
+  if (latched() && !was_latched) return send_stop(now_ns);
+  if (!may_send()) return;
+  for (std::size_t axis = 0; axis < kAxes; ++axis)
+    if (command_waits_.at(axis) && !out_.waits_for_echo(cia301::rpdo1_id(config_.axes.at(axis).node_id)))
+      send_command(axis, now_ns);
+}
+
+void StepperDriver::take_in(std::int64_t now_ns) {
   can::drain(
       bus_, [&](const can::Frame& frame) { on_frame(frame, now_ns); },
       [&](const can::Frame& frame) { out_.on_echo(frame); }, [&](can::BusEvent event) { on_event(event, now_ns); });
+  for (auto& node : nodes_)
+    if (const Stop trouble = node.take_trouble(); trouble.reason != StopReason::none) on_trouble(trouble);
 }
 
 void StepperDriver::note_timing(std::int64_t now_ns) {
@@ -215,7 +223,7 @@ void StepperDriver::supervise_transmission(std::int64_t now_ns) {
 void StepperDriver::step(std::int64_t now_ns, const std::optional<MotionSetpoint>& setpoint) {
   note_timing(now_ns);
   bus_.maintain(now_ns);
-  receive(now_ns);
+  take_in(now_ns);
   for (auto& node : nodes_) {
     node.supervise(now_ns);
     if (const Stop trouble = node.take_trouble(); trouble.reason != StopReason::none) on_trouble(trouble);
@@ -237,8 +245,7 @@ void StepperDriver::step(std::int64_t now_ns, const std::optional<MotionSetpoint
     case DriverState::stopped:
     case DriverState::fault:
       judge_rest(now_ns);
-      if (!silent_)
-        for (auto& node : nodes_) node.read_error_code(now_ns, out_);
+      ask_why(now_ns);
       break;
   }
   transmit(now_ns);
@@ -315,18 +322,30 @@ std::uint16_t StepperDriver::controlword_for(const DriveNode& node) const {
   return cia402::controlword_towards(on ? Goal::enabled : Goal::ready, node.state());
 }
 
+void StepperDriver::send_command(std::size_t axis, std::int64_t now_ns) {
+  const DriveNode& node = nodes_.at(axis);
+  command_waits_.at(axis) = false;
+  // A stop is meant for every drive, also for one that we do not see.
+  if (node.phase() != DriveNode::Phase::operational && !latched()) return;
+  const double rate = state_ == DriverState::enabled ? shapers_.at(axis).rate_unit_s() : 0.0;
+  const bool accepted = node.command(controlword_for(node), rate, now_ns, out_);
+  command_waits_.at(axis) = !accepted && out_.waits_for_echo(cia301::rpdo1_id(config_.axes.at(axis).node_id));
+}
+
 void StepperDriver::send_commands(std::int64_t now_ns) {
-  for (std::size_t axis = 0; axis < kAxes; ++axis) {
-    const DriveNode& node = nodes_.at(axis);
-    // A stop is meant for every drive, also for one that we do not see.
-    if (node.phase() != DriveNode::Phase::operational && !latched()) continue;
-    const double rate = state_ == DriverState::enabled ? shapers_.at(axis).rate_unit_s() : 0.0;
-    node.command(controlword_for(node), rate, now_ns, out_);
-  }
+  for (std::size_t axis = 0; axis < kAxes; ++axis) send_command(axis, now_ns);
+}
+
+void StepperDriver::send_stop(std::int64_t now_ns) {
+  if (!may_send()) return;
+  send_commands(now_ns);
+  // What SYNC latches must not wait for the next one.
+  if (config_.mode == VelocityMode::cyclic && out_.send(cia301::sync(), now_ns))
+    for (auto& node : nodes_) node.on_sync(now_ns);
 }
 
 void StepperDriver::transmit(std::int64_t now_ns) {
-  if (state_ == DriverState::off || silent_ || !bus_.is_open()) return;
+  if (state_ == DriverState::off || !may_send()) return;
   send_commands(now_ns);
   if (out_.send(cia301::sync(), now_ns))
     for (auto& node : nodes_) node.on_sync(now_ns);

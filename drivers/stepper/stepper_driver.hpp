@@ -89,7 +89,8 @@ class StepperDriver {
   // Optional, between steps, when a new set-point has arrived: in profile velocity it is on the bus at once, in cyclic
   // velocity with the next SYNC. The limits hold as in step().
   void take(std::int64_t now_ns, const MotionSetpoint& setpoint);
-  // Optional, between steps, when the bus is readable: takes in frames early.
+  // Optional, between steps, when the bus is readable: takes in frames as they arrive. What they ask to be stopped is
+  // told to stop at once, and a command that waited for the echo of the one before goes out, not in the next step.
   void receive(std::int64_t now_ns);
 
   EnableAnswer enable();                                  // carried out by the following steps
@@ -99,10 +100,12 @@ class StepperDriver {
   void set_zero();          // both axes are at their zero now
   void confirm_position();  // the drives' positions still hold, although a drive was out of sight
 
+  bool command_waits() const { return command_waits_[kInsertion] || command_waits_[kRotation]; }  // for an echo
   bool moving() const;  // a rate other than zero is commanded
   AxesReport report() const;
 
  private:
+  void take_in(std::int64_t now_ns);
   void on_frame(const can::Frame& frame, std::int64_t now_ns);
   void on_event(can::BusEvent event, std::int64_t now_ns);
   void on_trouble(const Stop& trouble);
@@ -117,9 +120,13 @@ class StepperDriver {
   void shape(std::int64_t now_ns, const std::array<double, kAxes>& rates);
   void supervise_motion(std::int64_t now_ns);
   void judge_rest(std::int64_t now_ns);
+  void ask_why(std::int64_t now_ns);
   std::array<double, kAxes> wanted_rates(std::int64_t now_ns, const std::optional<MotionSetpoint>& setpoint);
   void transmit(std::int64_t now_ns);
+  bool may_send() const { return bus_.is_open() && !silent_; }
+  void send_command(std::size_t axis, std::int64_t now_ns);
   void send_commands(std::int64_t now_ns);
+  void send_stop(std::int64_t now_ns);
   std::uint16_t controlword_for(const DriveNode& node) const;
   bool latched() const { return state_ == DriverState::stopped || state_ == DriverState::fault; }
   bool all_in(cia402::State state) const;
@@ -148,7 +155,8 @@ class StepperDriver {
   // Of a stop: how fast each axis was, whether it has come to rest since, and whether it was behind then.
   std::array<double, kAxes> stopped_from_unit_s_{};
   std::array<bool, kAxes> judged_{}, held_back_{};
-  std::array<bool, kAxes> at_limit_{};  // what the statuswords said last
+  std::array<bool, kAxes> command_waits_{};  // for the echo of the one before
+  std::array<bool, kAxes> at_limit_{};       // what the statuswords said last
   DriverCounters counters_;
 };
 

@@ -56,14 +56,14 @@ void StepperDriver::run_enabled(std::int64_t now_ns, const std::optional<MotionS
 
 void StepperDriver::take(std::int64_t now_ns, const MotionSetpoint& setpoint) {
   if (state_ != DriverState::enabled || config_.mode != VelocityMode::profile) return;
-  receive(now_ns);  // echoes, so that nothing holds the command back
+  take_in(now_ns);  // echoes, so that nothing holds the command back
   if (state_ != DriverState::enabled) return;
   const auto rates = wanted_rates(now_ns, setpoint);
   if (state_ == DriverState::enabled) {
     for (std::size_t axis = 0; axis < kAxes; ++axis) follows_.at(axis).advance(now_ns, shapers_.at(axis).rate_unit_s());
     shape(now_ns, rates);
   }
-  if (bus_.is_open() && !silent_) send_commands(now_ns);
+  if (may_send()) send_commands(now_ns);
 }
 
 void StepperDriver::shape(std::int64_t now_ns, const std::array<double, kAxes>& rates) {
@@ -102,6 +102,14 @@ void StepperDriver::supervise_motion(std::int64_t now_ns) {
     if (!follows_.at(axis).follows(now_ns, shapers_.at(axis).rate_unit_s(), node.position_unit()))
       return latch({StopReason::not_following, static_cast<int>(axis), 0});
   }
+}
+
+// What only the drive knows of a stop.
+void StepperDriver::ask_why(std::int64_t now_ns) {
+  if (silent_) return;
+  if (stop_.reason == StopReason::travel_limit)
+    stop_.reason = nodes_.at(static_cast<std::size_t>(stop_.axis)).read_limit(now_ns, out_);
+  for (auto& node : nodes_) node.read_error_code(now_ns, out_);
 }
 
 // Once an axis rests after a stop: is it where it should be, or was it held back?

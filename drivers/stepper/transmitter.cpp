@@ -44,6 +44,10 @@ void Transmitter::on_echo(const can::Frame& frame) {
     if (slot.id == frame.id) slot.outstanding = false;
 }
 
+bool Transmitter::waits_for_echo(std::uint32_t id) const {
+  return std::any_of(slots_.begin(), slots_.end(), [&](const Slot& s) { return s.id == id && s.outstanding; });
+}
+
 void Transmitter::forget() {
   for (auto& slot : slots_) slot.outstanding = false;
   refused_in_a_row_ = 0;

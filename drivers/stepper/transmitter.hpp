@@ -18,7 +18,8 @@ class Transmitter {
   // The caller drops the frame, or makes a new one in its next step.
   bool send(const can::Frame& frame, std::int64_t now_ns);
   void on_echo(const can::Frame& frame);
-  void forget();  // after the queue was lost: nothing is outstanding any more
+  bool waits_for_echo(std::uint32_t id) const;  // a frame with this identifier was accepted and is not on the wire yet
+  void forget();                                // after the queue was lost: nothing is outstanding any more
 
   bool is_ours(std::uint32_t id) const;  // an identifier that only the master of these drives sends
   std::int64_t longest_wait_ns(std::int64_t now_ns) const;

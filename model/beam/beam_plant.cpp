@@ -97,7 +97,9 @@ void BeamPlant::step(double insertion_mm, double rotation_rad, double dt_s) {
     return;
   }
   // The piece of tissue reached in this step has no spring yet: its stretch is only of the order of the step.
-  beam_.set_tip(depth_mm_);
+  const double settled_mm = cut_.settled_mm(depth_mm_);
+  beam_.set_tip(depth_mm_, std::min(settled_mm_, settled_mm));
+  settled_mm_ = settled_mm;
   cut_.add_springs(beam_, dt_s);
   beam_.add_force(depth_mm_, std::polar(bevel_force_N(), tip_roll_rad()) * Lateral(0.0, -1.0));
   beam_.solve();

@@ -79,7 +79,8 @@ class BeamPlant {
   HermiteBeam beam_;
   CutPath cut_;
   Windup windup_;
-  bool bent_ = false;  // the beam has been solved for the present depth
+  bool bent_ = false;        // the beam has been solved for the present depth
+  double settled_mm_ = 0.0;  // down to here the springs of the problem last solved were what they will be
   double base_roll_rad_ = 0.0;
   double fed_mm_ = 0.0;
   double depth_mm_ = 0.0;

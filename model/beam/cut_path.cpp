@@ -29,7 +29,9 @@ void CutPath::add_springs(HermiteBeam& beam, double dt_s) const {
   const double relaxing = spring_.modulus_N_mm2 * spring_.relaxing_fraction;
   const double stiffness = spring_.modulus_N_mm2 - relaxing * s.after;
   const double tip_mm = beam.tip_mm();
-  for (std::size_t c = 0; c < cut_cells_; ++c) {
+  // Those before the beam has; one cell more, for rounding.
+  const double known = std::max(0.0, beam.kept_mm() / cell_mm_ - 1.0);
+  for (auto c = static_cast<std::size_t>(known); c < cut_cells_; ++c) {
     const double length_mm = length_on_shaft_mm(c, tip_mm);
     if (!(length_mm > 0.0)) break;
     const Cell& cell = cells_[c];
@@ -37,6 +39,12 @@ void CutPath::add_springs(HermiteBeam& beam, double dt_s) const {
         stiffness * cell.anchor_mm + relaxing * (s.keep * cell.dashpot_mm + s.before * cell.stretch_mm);
     beam.add_spring(cell_mm_ * static_cast<double>(c) + 0.5 * length_mm, length_mm * stiffness, length_mm * load);
   }
+}
+
+// Of the last whole cell a rest may still be cut, to rounding. A spring that relaxes is another in each step.
+double CutPath::settled_mm(double tip_mm) const {
+  if (spring_.relaxing_fraction > 0.0) return 0.0;
+  return cell_mm_ * std::max(0.0, std::floor(std::min(front_mm_, tip_mm) / cell_mm_) - 1.0);
 }
 
 void CutPath::relax(const HermiteBeam& beam, double dt_s) {

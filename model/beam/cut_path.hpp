@@ -34,6 +34,9 @@ class CutPath {
   // Adds the springs along the beam, as they act at the end of a step of dt_s >= 0, to a beam not yet solved.
   void add_springs(HermiteBeam& beam, double dt_s) const;
 
+  // Down to here the springs on a shaft with its tip at this depth are what they will be, however the tip moves beyond.
+  [[nodiscard]] double settled_mm(double tip_mm) const;
+
   // Ends that step: takes the relaxation up to the solved beam. Springs beyond the tip are free.
   void relax(const HermiteBeam& beam, double dt_s);
 

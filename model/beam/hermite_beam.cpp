@@ -40,7 +40,8 @@ HermiteBeam::HermiteBeam(double bending_stiffness_N_mm2, double element_length_m
       free_element_mm_(element_length_mm),
       free_elements_(count_for(free_span_mm, element_length_mm)),
       matrix_(2 * (free_elements_ + count_for(max_tip_mm, element_length_mm) + 1)),
-      solution_(2 * (free_elements_ + count_for(max_tip_mm, element_length_mm) + 1)) {
+      loads_(2 * (free_elements_ + count_for(max_tip_mm, element_length_mm) + 1)),
+      solution_(loads_.size()) {
   if (free_elements_ > 0) free_element_mm_ = free_span_mm / static_cast<double>(free_elements_);
   const std::size_t tissue_elements = count_for(max_tip_mm, element_length_mm);
   nodes_mm_.reserve(free_elements_ + tissue_elements + 1);
@@ -52,7 +53,7 @@ HermiteBeam::HermiteBeam(double bending_stiffness_N_mm2, double element_length_m
   }
 }
 
-void HermiteBeam::set_tip(double tip_mm) {
+void HermiteBeam::set_tip(double tip_mm, double settled_mm) {
   if (!(tip_mm > nodes_mm_.front() && tip_mm <= nodes_mm_.back())) {
     throw std::out_of_range("beam: tip at " + std::to_string(tip_mm) + " mm, allowed above " +
                             std::to_string(nodes_mm_.front()) + " and up to " + std::to_string(nodes_mm_.back()));
@@ -61,10 +62,17 @@ void HermiteBeam::set_tip(double tip_mm) {
   // A sliver at the end would only spoil the conditioning, so the last whole element swallows it.
   const double last_left_mm = tip_mm - 0.5 * element_length_mm_;
   const auto past = std::upper_bound(nodes_mm_.begin(), nodes_mm_.end(), last_left_mm);
+  const std::size_t before = elements_;
   elements_ = std::max<std::size_t>(1, static_cast<std::size_t>(past - nodes_mm_.begin()));
-  matrix_.reset(2 * elements_);
-  std::fill_n(solution_.begin(), 2 * elements_, Lateral{});
-  for (std::size_t e = 0; e < elements_; ++e) add_bending(e);
+  // Settled elements end at nodes of the mesh in both problems. The node after them has a neighbour that is not.
+  const std::size_t inner = std::min(before, elements_);
+  settled_ = 0;
+  while (settled_ + 1 < inner && nodes_mm_[settled_ + 1] <= settled_mm) ++settled_;
+  first_row_ = settled_ > 0 ? 2 * settled_ - 2 : 0;
+  matrix_.reset(2 * elements_, first_row_);
+  std::fill(loads_.begin() + static_cast<std::ptrdiff_t>(first_row_),
+            loads_.begin() + static_cast<std::ptrdiff_t>(2 * elements_), Lateral{});
+  for (std::size_t e = settled_ > 0 ? settled_ - 1 : 0; e < elements_; ++e) add_bending(e);
 }
 
 void HermiteBeam::add_bending(std::size_t element) {
@@ -75,8 +83,9 @@ void HermiteBeam::add_bending(std::size_t element) {
                                                 {-12.0 * s, -6.0 * h * s, 12.0 * s, -6.0 * h * s},
                                                 {6.0 * h * s, 2.0 * h * h * s, -6.0 * h * s, 4.0 * h * h * s}}};
   for (std::size_t a = element == 0 ? 2 : 0; a < 4; ++a) {
-    for (std::size_t b = element == 0 ? 2 : 0; b <= a; ++b)
-      matrix_.add(2 * element + a - 2, 2 * element + b - 2, k[a][b]);
+    const std::size_t row = 2 * element + a - 2;
+    if (row < first_row_) continue;
+    for (std::size_t b = element == 0 ? 2 : 0; b <= a; ++b) matrix_.add(row, 2 * element + b - 2, k[a][b]);
   }
 }
 
@@ -85,7 +94,8 @@ void HermiteBeam::add_spring(double z_mm, double stiffness_N_mm, Lateral load_N)
   const auto n = shape(at.xi, at.length_mm);
   for (std::size_t a = at.element == 0 ? 2 : 0; a < 4; ++a) {
     const std::size_t row = 2 * at.element + a - 2;
-    solution_[row] += n[a] * load_N;
+    if (row < first_row_) continue;
+    loads_[row] += n[a] * load_N;
     for (std::size_t b = at.element == 0 ? 2 : 0; b <= a; ++b) {
       matrix_.add(row, 2 * at.element + b - 2, stiffness_N_mm * n[a] * n[b]);
     }
@@ -94,7 +104,9 @@ void HermiteBeam::add_spring(double z_mm, double stiffness_N_mm, Lateral load_N)
 
 void HermiteBeam::solve() {
   matrix_.factor();
-  matrix_.solve(solution_);
+  matrix_.forward(loads_);
+  std::copy_n(loads_.begin(), 2 * elements_, solution_.begin());
+  matrix_.backward(solution_);
 }
 
 Lateral HermiteBeam::displacement_mm(double z_mm) const {

@@ -12,6 +12,7 @@
 #include <array>
 #include <complex>
 #include <cstddef>
+#include <limits>
 #include <vector>
 
 #include "model/beam/band_ldlt.hpp"
@@ -26,9 +27,13 @@ class HermiteBeam {
   // tip.
   HermiteBeam(double bending_stiffness_N_mm2, double element_length_mm, double free_span_mm, double max_tip_mm);
 
-  // Starts a new problem with the tip at this depth: mesh, bending stiffness, no loads.
-  // Throws std::out_of_range unless clamp < tip_mm <= max_tip_mm.
-  void set_tip(double tip_mm);
+  // Starts a new problem with the tip at this depth: mesh, bending stiffness, no loads. Down to settled_mm the springs
+  // are those of the problem before, solved: there its equations and their factors stay, and what is added is left out
+  // (add_spring); the solution is the same to the last digit. Throws std::out_of_range unless clamp < tip_mm <=
+  // max_tip_mm.
+  void set_tip(double tip_mm, double settled_mm = -std::numeric_limits<double>::infinity());
+  // What is added at less depth than this changes nothing: it is in there.
+  [[nodiscard]] double kept_mm() const { return nodes_mm_[settled_ > 0 ? settled_ - 1 : 0]; }
 
   // A point spring at depth z_mm in [clamp, tip], with force load_N - stiffness_N_mm w on the beam: a spring with its
   // rest position at w0 has load_N = stiffness_N_mm w0.
@@ -64,9 +69,12 @@ class HermiteBeam {
   std::size_t free_elements_;
   std::vector<double> nodes_mm_;  // the mesh at rest in space; the node nearest the tip gives way to the tip itself
   std::size_t elements_ = 0;      // in the present problem
+  std::size_t settled_ = 0;       // the first of them, as in the problem before
+  std::size_t first_row_ = 0;     // of the equations that are not
   double tip_mm_ = 0.0;
   BandLdlt matrix_;
-  std::vector<Lateral> solution_;  // loads, then displacement (mm) and slope of nodes 1, 2, ...; node 0 is the clamp
+  std::vector<Lateral> loads_;     // half eliminated by solve()
+  std::vector<Lateral> solution_;  // displacement (mm) and slope of nodes 1, 2, ...; node 0 is the clamp
 };
 
 }  // namespace bevel::model

@@ -121,6 +121,7 @@ bool predict(const AugmentedNeedle& needle, const Motion& motion, OpenLoop& out,
   out.node_jacobian.resize(static_cast<Eigen::Index>(3 * count), columns);
   out.node_heading.resize(headings ? count : 0);
   out.node_heading_jacobian.resize(headings ? static_cast<Eigen::Index>(3 * count) : 0, columns);
+  out.node_blur_mm2.resize(columns == 0 ? count : 0);
   AugmentedState state = needle.entry(motion.nodes.front());
   TipReading reading;
   HeadingReading heading;
@@ -128,7 +129,10 @@ bool predict(const AugmentedNeedle& needle, const Motion& motion, OpenLoop& out,
     if (i > 0 && !needle.advance(state, motion.nodes[i])) return false;
     needle.point(state, reading);
     out.node_position_mm[i] = reading.position_mm;
-    if (columns > 0) out.node_jacobian.middleRows<3>(static_cast<Eigen::Index>(3 * i)) = reading.D;
+    if (columns > 0)
+      out.node_jacobian.middleRows<3>(static_cast<Eigen::Index>(3 * i)) = reading.D;
+    else
+      out.node_blur_mm2[i] = needle.blur_mm2(state);
     if (!headings) continue;
     needle.heading(state, heading);
     out.node_heading[i] = heading.direction;
@@ -140,6 +144,7 @@ bool predict(const AugmentedNeedle& needle, const Motion& motion, OpenLoop& out,
   const std::size_t readings = motion.at.size();
   out.position_mm.resize(readings);
   out.jacobian.resize(static_cast<Eigen::Index>(3 * readings), columns);
+  out.blur_mm2.resize(columns == 0 ? readings : 0);
   out.heading.resize(headings ? readings : 0);
   out.heading_jacobian.resize(headings ? static_cast<Eigen::Index>(3 * readings) : 0, columns);
   for (std::size_t r = 0; r < readings; ++r) {
@@ -148,7 +153,10 @@ bool predict(const AugmentedNeedle& needle, const Motion& motion, OpenLoop& out,
     look(place, out.node_position_mm, out.node_jacobian, latency_s, reading.position_mm, reading.D);
     needle.through_cameras(reading);
     out.position_mm[r] = reading.position_mm;
-    if (columns > 0) out.jacobian.middleRows<3>(static_cast<Eigen::Index>(3 * r)) = reading.D;
+    if (columns > 0)
+      out.jacobian.middleRows<3>(static_cast<Eigen::Index>(3 * r)) = reading.D;
+    else
+      out.blur_mm2[r] = out.node_blur_mm2[place.to];
     if (!headings) continue;
     look(place, out.node_heading, out.node_heading_jacobian, latency_s, heading.direction, heading.D);
     needle.through_frame(heading);

@@ -1,5 +1,6 @@
 #pragma once
 // The tip along a recording from the base's motion alone, as the cameras would report it, with sensitivities.
+#include <array>
 #include <cstdint>
 #include <span>
 #include <vector>
@@ -24,6 +25,8 @@ Motion make_motion(std::span<const ActuatorState> actuators, std::span<const std
 struct OpenLoop {
   std::vector<Eigen::Vector3d> position_mm;  // one per reading
   Eigen::MatrixXd jacobian;                  // 3 rows per reading, by the needle's columns
+  // Without columns: variance of each by what effects do not know of themselves, along the axes of {A}.
+  std::vector<std::array<double, 3>> blur_mm2;
   // Unit vectors; where headings are asked for, one per reading.
   std::vector<Eigen::Vector3d> heading;
   Eigen::MatrixXd heading_jacobian;
@@ -31,6 +34,7 @@ struct OpenLoop {
   // Room for predict(), kept from one call to the next.
   std::vector<Eigen::Vector3d> node_position_mm, node_heading;
   Eigen::MatrixXd node_jacobian, node_heading_jacobian;
+  std::vector<std::array<double, 3>> node_blur_mm2;
 };
 
 // False where the tip leaves the domain of the slip law. A late camera sees the path between two nodes as straight.

@@ -157,10 +157,20 @@ class Chart {
         c.lineWidth = scale;
         c.stroke();
         c.setLineDash([]);
-        c.textAlign = r.level ? 'right' : 'left';
-        c.fillText(r.label, r.level ? left + width - 4 * scale : at + 5 * scale, r.level ? at - 4 * scale : top + 13 * scale);
       }
       for (const s of this.spec.series) if (!s.off) this.drawSeries(c, scale, s, px);
+      for (const r of this.spec.references || []) {  // over the curves, with a rim of the ground to stand out from them
+        const { left, top, width } = u.bbox;
+        const at = u.valToPos(r.at, r.level ? 'y' : 'x', true);
+        const place = [r.level ? left + width - 4 * scale : at + 5 * scale, r.level ? at - 4 * scale : top + 13 * scale];
+        c.textAlign = r.level ? 'right' : 'left';
+        c.lineWidth = 3 * scale;
+        c.lineJoin = 'round';
+        c.strokeStyle = inkOf('ground');
+        c.fillStyle = inkOf('soft');
+        c.strokeText(r.label, ...place);
+        c.fillText(r.label, ...place);
+      }
     });
   }
 

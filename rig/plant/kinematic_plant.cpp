@@ -87,12 +87,17 @@ void KinematicPlant::follow_path() {
   model::TipReading reading;
   needle_.point(state_, reading);
   tip_ = {state_.pose.R, reading.position_mm};
-  // An offset of the tip bends the shaft, evenly from the entry on.
+}
+
+// An offset of the tip bends the shaft, evenly from the entry on.
+const std::vector<Eigen::Vector3d>& KinematicPlant::shaft_mm() const {
+  const double inserted_mm = state_.tip_insertion_mm.value;
   const Eigen::Vector3d offset_mm = tip_.p_mm - state_.pose.p_mm;
   shaft_mm_ = path_mm_;
   for (std::size_t i = 0; i < shaft_mm_.size(); ++i)
     shaft_mm_[i] += std::max(0.0, path_depth_mm_[i] / std::max(inserted_mm, kShaftSpacing_mm)) * offset_mm;
   shaft_mm_.back() = tip_.p_mm;
+  return shaft_mm_;
 }
 
 }  // namespace bevel::rig

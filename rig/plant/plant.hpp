@@ -37,7 +37,7 @@ class KinematicPlant : public Plant {
                           double roll_rad = 0, const model::OwnValues& own = {}, Cut cut = Cut::forgotten);
   void advance(double insertion_mm, double rotation_rad, double dt_s) override;
   model::Pose tip() const override { return tip_; }
-  const std::vector<Eigen::Vector3d>& shaft_mm() const override { return shaft_mm_; }
+  const std::vector<Eigen::Vector3d>& shaft_mm() const override;
   const model::AugmentedNeedle& model() const override { return needle_; }
 
  private:
@@ -55,10 +55,10 @@ class KinematicPlant : public Plant {
   };
   std::vector<Passed> cut_;
   bool keeps_cut_;
-  model::Pose tip_;                       // with its elastic offset
-  std::vector<Eigen::Vector3d> path_mm_;  // where the tip has passed; last point is the tip, without offset
-  std::vector<double> path_depth_mm_;     // inserted length at each point
-  std::vector<Eigen::Vector3d> shaft_mm_;
+  model::Pose tip_;                                // with its elastic offset
+  std::vector<Eigen::Vector3d> path_mm_;           // where the tip has passed; last point is the tip, without offset
+  std::vector<double> path_depth_mm_;              // inserted length at each point
+  mutable std::vector<Eigen::Vector3d> shaft_mm_;  // drawn when it is asked for
 };
 
 // A beam in elastic tissue (model/beam): no bicycle is its truth. Its guide stands as it stands, so that where

@@ -120,6 +120,44 @@ TEST(HermiteBeam, IsReciprocal) {  // Maxwell-Betti: w at a for a force at b equ
   EXPECT_GT(std::abs(at_for(30.3, 79.0)), 1e-3);
 }
 
+// A shaft that is fed, drawn back and fed again by drawn steps while its force turns: the beam that keeps what is
+// settled beside one that is built anew each time.
+TEST(HermiteBeam, WhatIsKeptOfTheProblemBeforeIsTheSameToTheLastDigit) {
+  constexpr unsigned kSeed = 5;
+  std::mt19937_64 random(kSeed);
+  std::uniform_real_distribution<double> uniform(0, 1);
+  for (const double cell_mm : {0.5, 0.7}) {
+    CutPath tissue({0.05, 0.0, 1.0}, cell_mm, 100.0);
+    HermiteBeam kept(kEI_N_mm2, 2.0, 15.0, 100.0);
+    double tip_mm = 0.0, settled_mm = 0.0, most_kept_mm = -15.0;
+    Lateral at_mm;
+    for (int i = 0; i < 1500; ++i) {
+      const double from_mm = tip_mm;
+      const bool back = i % 500 > 400;
+      tip_mm = std::clamp(tip_mm + (back ? -0.6 : 0.4) * uniform(random), -10.0, 100.0);
+      const double before_mm = settled_mm;
+      settled_mm = tissue.settled_mm(tip_mm);
+      kept.set_tip(tip_mm, std::min(before_mm, settled_mm));
+      most_kept_mm = std::max(most_kept_mm, kept.kept_mm());
+      HermiteBeam anew(kEI_N_mm2, 2.0, 15.0, 100.0);
+      anew.set_tip(tip_mm);
+      for (HermiteBeam* beam : {&kept, &anew}) {
+        tissue.add_springs(*beam, 0.005);
+        beam->add_force(tip_mm, std::polar(0.8, 0.01 * i));
+        beam->solve();
+      }
+      for (const double share : {0.0, 0.2, 0.6, 0.9, 1.0}) {
+        const double z_mm = -15.0 + share * (tip_mm + 15.0);
+        ASSERT_EQ(kept.displacement_mm(z_mm), anew.displacement_mm(z_mm)) << "seed " << kSeed << ", step " << i;
+      }
+      const Lateral tip_at_mm = kept.displacement_mm(tip_mm);
+      tissue.cut(from_mm, at_mm, tip_mm, tip_at_mm);
+      at_mm = tip_at_mm;
+    }
+    EXPECT_GT(most_kept_mm, 60.0) << "something was kept";
+  }
+}
+
 TEST(HermiteBeam, RefusesATipOutsideItsRoom) {
   HermiteBeam beam(kEI_N_mm2, 2.0, 5.0, 50.0);
   EXPECT_THROW(beam.set_tip(-5.0), std::out_of_range);

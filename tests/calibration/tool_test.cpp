@@ -103,7 +103,7 @@ TEST_F(Tool, PicturesAndAFiducialGiveCamerasThatFindTheTip) {
   o.fiducial_origin_mm = {0, 25, 2};
   EXPECT_EQ(run(o, out_, err_), 0);
   std::printf("seed %llu\n%s%s", kSeed, out_.str().c_str(), err_.str().c_str());
-  EXPECT_THAT(err_.str(), HasSubstr("empty.png: no board found"));
+  EXPECT_THAT(err_.str(), HasSubstr("empty.png: no board of 8 x 6 squares found"));
   const double worst_mm = worst_tip_mm(path("out/cameras.yaml"));
   std::printf("largest error of a tip in the gel: %.3f mm\n", worst_mm);
   EXPECT_LT(worst_mm, 0.35);
@@ -114,7 +114,7 @@ TEST_F(Tool, PicturesAndAFiducialGiveCamerasThatFindTheTip) {
   }
   std::stringstream page;
   page << std::ifstream(path("out/report.html")).rdbuf();
-  for (const char* words : {"empty.png", "no board found", "held out", "if refraction were ignored",
+  for (const char* words : {"empty.png", "no board of 8 x 6 squares found", "held out", "if refraction were ignored",
                             "calibration = ", "<svg", "wall: distance"})
     EXPECT_THAT(page.str(), HasSubstr(words));
 }
@@ -194,7 +194,8 @@ TEST_F(Tool, AnUnreadablePictureIsToldByTheStatus) {
   fs::remove(fs::path(path("air0")) / "broken.png");
 }
 
-void expect_refused(const Options& o, const std::vector<std::string>& words) {
+// What was said before the refusal.
+std::string expect_refused(const Options& o, const std::vector<std::string>& words) {
   std::ostringstream out, err;
   try {
     run(o, out, err);
@@ -202,6 +203,7 @@ void expect_refused(const Options& o, const std::vector<std::string>& words) {
   } catch (const std::exception& error) {
     for (const std::string& word : words) EXPECT_THAT(error.what(), HasSubstr(word));
   }
+  return err.str();
 }
 
 TEST_F(Tool, WhatIsWrongIsNamed) {
@@ -220,6 +222,13 @@ TEST_F(Tool, WhatIsWrongIsNamed) {
   expect_refused(o, {"nowhere' is not a folder", "allowed"});
   o.air = {few};
   expect_refused(o, {"camera 0: pictures in air with a board are 0, allowed: 6 or more"});
+  o.air = {path("air0"), path("air1"), path("air0")};
+  expect_refused(o, {"--air has 3 folders, allowed: 1 or 2"});
+  // Another board than the one in the pictures: its markers are known, but lie elsewhere on it.
+  o.air = {path("air0"), path("air1")};
+  o.board.columns = 9;
+  EXPECT_THAT(expect_refused(o, {"camera 0: pictures in air with a board are 0, allowed: 6 or more"}),
+              HasSubstr("no board of 9 x 6 squares found in it"));
   o = options();
   o.immersed = {path("wet0")};
   expect_refused(o, {"--immersed has 1 values, allowed: 2"});

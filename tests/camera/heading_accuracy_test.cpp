@@ -1,6 +1,7 @@
 // The heading that a picture shows, against rendered needles of known tangent: its error over what is claimed of it.
 #include <gtest/gtest.h>
 
+#include <cmath>
 #include <cstdio>
 #include <functional>
 
@@ -25,13 +26,13 @@ double error_rad(const TipResult& tip, const cv::Vec2d& truth) {
 }
 
 Figures figures_of(const char* name, int frames, uint64_t seed,
-                   const std::function<test::SpaceCurve(std::mt19937_64&)>& draw) {
+                   const std::function<test::SpacePath(std::mt19937_64&)>& draw) {
   std::mt19937_64 random(seed);
   const PlanarView view(test::side_view());
   Figures f;
   for (int i = 0; i < frames; ++i) {
     const rig::SceneConfig scene = test::random_scene(random, seed + static_cast<uint64_t>(i));
-    const test::SpacePath path = test::space_path(draw(random));
+    const test::SpacePath path = draw(random);
     const double roll_rad = test::uniform(random, 0.0, 6.28);
     const cv::Mat gray = rig::NeedleRenderer(scene, view).render(path.points_mm, roll_rad).gray;
     TipTracker tracker(test::tracker_config(), view.px_per_mm());
@@ -73,6 +74,13 @@ test::SpaceCurve turning(std::mt19937_64& random) {
   return c;
 }
 
+test::SpacePath turned_at_rest(std::mt19937_64& random) {
+  const double length_mm = test::uniform(random, 12.0, 85.0);
+  const test::TurnedOver n = test::turned_over(length_mm, test::uniform(random, 0.0, 1.0) < 0.5 ? 0.005 : -0.005,
+                                               test::uniform(random, -0.15, 0.15));
+  return {n.path, {0.0, std::sin(n.heading_rad), std::cos(n.heading_rad)}};
+}
+
 test::SpaceCurve along_the_view(std::mt19937_64& random) {
   test::SpaceCurve c = arc_in_the_picture(random);
   c.length_mm = test::uniform(random, 40.0, 85.0);
@@ -80,20 +88,26 @@ test::SpaceCurve along_the_view(std::mt19937_64& random) {
   return c;
 }
 
-// Over all kinds of needles together it is one; those that turn have more error than those that do not, which no single
-// picture tells. Bounds for 500 headings: their own scatter is 0.06.
+auto curve(test::SpaceCurve (*draw)(std::mt19937_64&)) {
+  return [draw](std::mt19937_64& random) { return test::space_path(draw(random)); };
+}
+
+// Those that turn have more error than those that do not, which no single picture tells: needles of one curvature are
+// claimed to half as much again as they have, so that those that were turned over are claimed to no less. Bounds for
+// 500 headings: their own scatter is 0.06.
 TEST(HeadingAccuracy, ItsErrorIsOfTheSizeThatItClaims) {
   struct Kind {
     const char* name;
     uint64_t seed;
-    test::SpaceCurve (*draw)(std::mt19937_64&);
+    std::function<test::SpacePath(std::mt19937_64&)> draw;
     double low, high;
   };
   double together = 0.0;
   int headings = 0;
-  for (const Kind& kind : {Kind{"arcs in the picture", 11, arc_in_the_picture, 0.6, 1.1},
-                           Kind{"arcs out of it by up to 0.5 rad", 12, arc_out_of_the_picture, 0.6, 1.1},
-                           Kind{"needles that turn", 13, turning, 0.9, 1.5}}) {
+  for (const Kind& kind : {Kind{"arcs in the picture", 11, curve(arc_in_the_picture), 0.35, 1.1},
+                           Kind{"arcs out of it by up to 0.5 rad", 12, curve(arc_out_of_the_picture), 0.35, 1.1},
+                           Kind{"needles that turn", 13, curve(turning), 0.45, 1.3},
+                           Kind{"turned over at rest each 10 mm", 15, turned_at_rest, 0.8, 1.5}}) {
     const Figures f = figures_of(kind.name, 500, kind.seed, kind.draw);
     EXPECT_GE(f.headings, f.frames * 95 / 100);
     EXPECT_GT(f.nse, kind.low);
@@ -104,14 +118,14 @@ TEST(HeadingAccuracy, ItsErrorIsOfTheSizeThatItClaims) {
     headings += f.headings;
   }
   std::printf("together %d headings, normalised squared error %.2f\n", headings, together / headings);
-  EXPECT_GT(together / headings, 0.7);
+  EXPECT_GT(together / headings, 0.6);
   EXPECT_LT(together / headings, 1.3);
 }
 
 // Nearly along the viewing axis a bent needle is seen bent more sharply than any needle bends, which no single picture
 // tells: the claim is then too bold by up to a half. No needle of the model points so far from z_A (pi/4).
 TEST(HeadingAccuracy, NearlyAlongTheViewItClaimsHardlyMoreThanItKnows) {
-  const Figures f = figures_of("0.9 to 1.25 rad out of the picture", 200, 14, along_the_view);
+  const Figures f = figures_of("0.9 to 1.25 rad out of the picture", 200, 14, curve(along_the_view));
   ASSERT_GT(f.headings, 20);
   EXPECT_LT(f.nse, 2.5);
 }

@@ -73,6 +73,30 @@ inline SpacePath space_path(const SpaceCurve& c) {
   return path;
 }
 
+/// A needle in the plane y-z that was turned over at rest each 10 mm.
+struct TurnedOver {
+  std::vector<camera::Vector3> path;
+  double side = 1.0;  ///< +1 where the last piece bends toward +y, -1 toward -y
+  double heading_rad = 0.0;
+};
+inline TurnedOver turned_over(double length_mm, double first_curvature_per_mm, double slope_rad) {
+  constexpr double step_mm = 0.1, each_mm = 10.0;
+  TurnedOver needle;
+  double y = 0.0, z = 0.0;
+  double& heading_rad = needle.heading_rad = slope_rad;
+  needle.path.push_back({0.0, y, z});
+  const int steps = static_cast<int>(std::lround(length_mm / step_mm));
+  for (int i = 0; i < steps; ++i) {
+    const bool over = static_cast<int>((i + 0.5) * step_mm / each_mm) % 2 == 1;
+    const double bend_rad = (over ? -1.0 : 1.0) * first_curvature_per_mm * step_mm;
+    needle.side = bend_rad > 0.0 ? 1.0 : -1.0;
+    y += step_mm * std::sin(heading_rad + 0.5 * bend_rad), z += step_mm * std::cos(heading_rad + 0.5 * bend_rad);
+    heading_rad += bend_rad;
+    if (i % 5 == 4 || i == steps - 1) needle.path.push_back({0.0, y, z});
+  }
+  return needle;
+}
+
 struct Needle {
   std::vector<camera::Vector3> path;
   double roll_rad = 0.0;

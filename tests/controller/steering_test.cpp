@@ -125,5 +125,25 @@ TEST(Reach, TellsAReachableTargetFromOneToTheSide) {
   EXPECT_GT(far.miss_mm, 20);
 }
 
+TEST(Reach, EndedAtWhatIsEnoughSaysTheSame) {
+  constexpr unsigned kSeed = 29;
+  constexpr double kTolerance_mm = 2;
+  std::mt19937 random(kSeed);
+  std::uniform_real_distribution<double> uniform(-1, 1);
+  int reached = 0;
+  for (int i = 0; i < 300; ++i) {
+    const Eigen::Vector3d target(30 * uniform(random), 30 * uniform(random), 80 + 20 * uniform(random));
+    const Reach best = predict_reach({}, agar(), target, kTolerance_mm);
+    const Reach enough = predict_reach({}, agar(), target, kTolerance_mm, kTolerance_mm);
+    EXPECT_EQ(enough.reachable, best.reachable) << "seed " << kSeed << ", target " << target.transpose();
+    if (!best.reachable) {
+      EXPECT_EQ(enough.miss_mm, best.miss_mm);
+    }
+    if (best.reachable) ++reached;
+  }
+  EXPECT_GT(reached, 50);
+  EXPECT_LT(reached, 250);
+}
+
 }  // namespace
 }  // namespace bevel::controller

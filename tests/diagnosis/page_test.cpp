@@ -136,6 +136,43 @@ TEST(Page, says_what_a_target_is_missed_by) {
 }
 
 // Figures that the diagnosis may leave empty.
+TEST(Page, does_not_send_anybody_to_steer_by_what_steers_worse) {
+  auto findings = made_up(Verdict::effects_found);
+  const auto page = [&] { return report_html(findings, {}); };
+  findings.steered->as_it_stands = {.arrived = 8, .median_mm = 0.19, .worst_mm = 0.40};
+  findings.steered->found = {.arrived = 8, .median_mm = 0.20, .worst_mm = 0.79};  // within a tenth
+  EXPECT_THAT(page(), Not(HasSubstr("do not steer by it untried")));
+  findings.steered->found.median_mm = 0.33;
+  EXPECT_THAT(page(), HasSubstr("do not steer by it untried"));
+  findings.steered->found = {.arrived = 7, .median_mm = 0.05, .worst_mm = 0.05, .stopped_by = "workspace"};
+  EXPECT_THAT(page(), HasSubstr("do not steer by it untried"));
+}
+
+TEST(Page, what_is_left_may_be_less_than_the_noise_or_only_correlated) {
+  auto findings = made_up(Verdict::effects_found);
+  const auto left = [&](double chi2, double p) {
+    findings.checks = {.chi2_per_dof = chi2, .band = {0.92, 1.08}, .ljung_box_p = p, .clean = false};
+    return report_html(findings, {});
+  };
+  EXPECT_THAT(left(1.2, 0.5), HasSubstr("What is left is more than that noise; the verdict"));
+  EXPECT_THAT(left(0.83, 0.5), HasSubstr("What is left is less than that noise (a curve"));
+  EXPECT_THAT(left(1.2, 0.001), HasSubstr("What is left is more than that noise, and correlated; the verdict"));
+  EXPECT_THAT(left(1, 0.001), HasSubstr("What is left is correlated from reading to reading; the verdict"));
+}
+
+TEST(Page, next_experiment_says_how_many_recordings_it_takes) {
+  auto findings = made_up(Verdict::effects_found);
+  ASSERT_TRUE(findings.next_experiment);
+  const auto page = [&](double gain) {
+    findings.next_experiment->expected_gain = gain;
+    return report_html(findings, {});
+  };
+  EXPECT_THAT(page(12), HasSubstr("25 settles it).<"));
+  EXPECT_THAT(page(3), HasSubstr("25 settles it), so it takes 4 of them."));
+  EXPECT_THAT(page(0.36), HasSubstr("so none of these motions tells them apart in earnest."));
+  EXPECT_THAT(page(0), HasSubstr("so none of these motions tells them apart in earnest."));
+}
+
 TEST(Page, holds_when_findings_are_bare) {
   diagnosis::Findings bare;
   bare.sentence = "Nothing <b>at all</b>.";

@@ -56,6 +56,7 @@ ONLY_CHECKED = {
     "bevel-table1": "has tests of its own",
     "test_": "is run by name elsewhere in this suite", "study_": "takes minutes", "bench_": "measures",
     "tip_sheet": "makes a picture to be looked at", "path_study": "needs the recordings of others",
+    "tip_variations": "needs the recordings of others",
     "tip_study": "takes minutes", "ceiling_study": "takes minutes",
     "sampled_evidence_cases": "serves a test",
 }

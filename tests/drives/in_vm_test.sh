@@ -34,6 +34,16 @@ expect 126 'no kernel with SocketCAN' broken "$in_vm" true
 [ -e /sys/class/net/vcan0 ] || expect 77 'SKIPPED' broken "$on_can" "$in_vm" true
 expect 125 'before the command began' broken BEVEL_VM=uml "$in_vm" true
 
+# Tools that are not there: what to install is said, for each way, and it is skipped.
+mkdir "$work/without"
+ln -s /usr/bin/* /bin/* "$work/without/" 2>/dev/null
+rm -f "$work"/without/linux.uml "$work"/without/qemu-system-x86_64
+# shellcheck disable=SC2317  # called by expect
+without() { env -u BEVEL_VM PATH="$work/without:/usr/sbin:/sbin" "$@"; }
+expect 126 'install user-mode-linux' without "$in_vm" true
+expect 126 'install qemu-system-x86' without "$in_vm" true
+[ -e /sys/class/net/vcan0 ] || expect 77 'SKIPPED' without "$on_can" "$in_vm" true
+
 # With a guest.
 "$in_vm" -t 60 true >"$work/boot" 2>&1
 if [ $? = 126 ]; then
@@ -43,6 +53,7 @@ if [ $? = 126 ]; then
   exit 77
 fi
 expect 7 'vcan0' "$in_vm" -t 60 sh -c 'ls /sys/class/net; exit 7'
+expect 7 'vcan0 of this machine' "$in_vm" -t 60 "$on_can" /no/such/in-vm sh -c 'exit 7'
 expect 124 'begun' "$in_vm" -t 3 sh -c 'echo begun; sleep 300'
 expect 125 'ended under the command' "$in_vm" -t 60 /bin/busybox poweroff -f
 mkdir "$work/kept"

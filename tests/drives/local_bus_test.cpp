@@ -43,6 +43,32 @@ TEST_F(LocalBusTest, FramesReachAllOthersAndEchoToTheSender) {
   EXPECT_EQ(c->receive().kind, Reception::Kind::nothing);  // does not listen to it
 }
 
+// More than are fetched at once; what was fetched before a link was lost is not heard after it.
+TEST_F(LocalBusTest, ManyFramesComeInTheirOrderAndNoneFromBeforeALoss) {
+  constexpr std::uint8_t kFrames = 20;
+  const auto a = open_bus("unix:" + path_);
+  const auto b = open_bus("unix:" + path_);
+  hub_->service();
+  for (int round = 0; round < 2; ++round) {
+    for (std::uint8_t i = 0; i < kFrames; ++i) {
+      ASSERT_EQ(a->send({0x181, 1, {i}}), SendResult::sent);
+      hub_->service();
+    }
+    for (std::uint8_t i = 0; i < (round == 0 ? kFrames : 3); ++i) {
+      const auto heard = b->receive();
+      ASSERT_EQ(heard.kind, Reception::Kind::frame);
+      EXPECT_EQ(heard.frame.data[0], i);
+    }
+  }
+  (void)b->purge();
+  b->maintain(0);
+  hub_->service();
+  EXPECT_EQ(b->receive().kind, Reception::Kind::event);
+  ASSERT_EQ(a->send({0x182, 0, {}}), SendResult::sent);
+  hub_->service();
+  EXPECT_EQ(b->receive().frame.id, 0x182U);
+}
+
 TEST_F(LocalBusTest, AFullQueueIsCountedAndNeverBlocks) {
   const auto a = open_bus("unix:" + path_);
   hub_->service();

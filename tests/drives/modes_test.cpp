@@ -134,6 +134,76 @@ TEST(ASetpointTaken, WaitsForTheSyncInCyclicVelocity) {
   EXPECT_EQ(commands, 0);
 }
 
+// A bus on which the command before is not on the wire yet: the newest goes out when its echo comes.
+class BetweenCycles : public testing::Test {
+ protected:
+  BetweenCycles() {
+    bench_.wire.set_tap([this](can::Frame& frame) {
+      if (frame.id == 0x201) sent_.push_back(static_cast<std::int32_t>(stepper::cia301::get_u32(frame, 2)));
+      if (frame.id == 0x202) words_.push_back(stepper::cia301::get_u16(frame, 0));
+      return true;
+    });
+  }
+  void take(double rate_mm_s) { bench_.driver->take(bench_.now_ns, {0, true, rate_mm_s, 0.0}); }
+  Bench bench_;
+  std::vector<std::int32_t> sent_;    // to the insertion axis, counts/s
+  std::vector<std::uint16_t> words_;  // to the rotation axis
+};
+
+TEST_F(BetweenCycles, ACommandThatIsHeldBackGoesOutWithTheEchoOfTheOneBefore) {
+  ASSERT_TRUE(bench_.enable());
+  bench_.move(5.0, 0.0);
+  bench_.run_ms(200);
+  EXPECT_FALSE(bench_.driver->command_waits());
+  sent_.clear();
+  bench_.wire.set_acknowledged(false);
+  take(5.001);
+  EXPECT_FALSE(bench_.driver->command_waits()) << "the first one is under way";
+  take(5.002);
+  take(5.003);
+  EXPECT_TRUE(bench_.driver->command_waits());
+  bench_.driver->receive(bench_.now_ns);
+  EXPECT_TRUE(bench_.driver->command_waits()) << "no echo yet";
+  bench_.wire.set_acknowledged(true);
+  bench_.driver->receive(bench_.now_ns);
+  EXPECT_FALSE(bench_.driver->command_waits());
+  bench_.driver->receive(bench_.now_ns);
+  // Of three at one instant: the first, and the newest of the others, none twice. No time has passed for another rate.
+  ASSERT_EQ(sent_.size(), 2U);
+  EXPECT_EQ(sent_[0], sent_[1]);
+  bench_.run_ms(4);
+  take(5.003);
+  EXPECT_EQ(sent_.back(), 10'006);
+}
+
+TEST_F(BetweenCycles, AStopThatIsHeldBackGoesOutWithTheEcho) {
+  ASSERT_TRUE(bench_.enable());
+  bench_.move(5.0, 1.0);
+  bench_.run_ms(200);
+  bench_.wire.set_acknowledged(false);
+  take(5.0);
+  words_.clear();
+  bench_.driver->stop_now(StopReason::operator_stop, bench_.now_ns);
+  EXPECT_TRUE(bench_.driver->command_waits());
+  bench_.wire.set_acknowledged(true);
+  bench_.driver->receive(bench_.now_ns);
+  ASSERT_EQ(words_.size(), 2U);
+  EXPECT_EQ(words_[1], stepper::cia402::controlword::kQuickStop);
+}
+
+TEST_F(BetweenCycles, AnEmergencyStopsBothAxesAtOnce) {
+  ASSERT_TRUE(bench_.enable());
+  bench_.move(5.0, 1.0);
+  bench_.run_ms(200);
+  bench_.driver_runs = false;
+  words_.clear();
+  bench_.wire.inject({0x081, 8, {0x10, 0x23, 0x01}});
+  bench_.driver->receive(bench_.now_ns);
+  EXPECT_EQ(bench_.reason(), StopReason::drive_emergency);
+  ASSERT_EQ(words_.size(), 1U);
+  EXPECT_EQ(words_[0], stepper::cia402::controlword::kQuickStop);
+}
+
 TEST(CyclicMode, BothAxesActAtOneSync) {
   Bench bench(in_mode(VelocityMode::cyclic));
   ASSERT_TRUE(bench.enable());
@@ -163,7 +233,7 @@ TEST(DriveSupervision, ALimitSwitchIsALatchedStopAndIsLeftAgain) {
   ASSERT_TRUE(ms.has_value());
   EXPECT_LE(*ms, 100);
   bench.run_ms(100);
-  EXPECT_EQ(bench.reason(), StopReason::travel_limit);
+  EXPECT_EQ(bench.reason(), StopReason::upper_switch);
   EXPECT_EQ(bench.report().stop.axis, 0);
   EXPECT_EQ(bench.report().state, DriverState::stopped);
   // Enabled again, it may go back, and not on.
@@ -174,7 +244,7 @@ TEST(DriveSupervision, ALimitSwitchIsALatchedStopAndIsLeftAgain) {
   bench.move(10.0, 0.0);
   bench.run_ms(300);
   EXPECT_NEAR(bench.insertion.position_unit(), stands_mm, 0.01);
-  EXPECT_EQ(bench.reason(), StopReason::travel_limit);
+  EXPECT_EQ(bench.reason(), StopReason::upper_switch) << "asked anew";
   bench.command = stepper::MotionSetpoint{};
   ASSERT_TRUE(bench.driver->rearm());
   ASSERT_TRUE(bench.enable());
@@ -182,6 +252,42 @@ TEST(DriveSupervision, ALimitSwitchIsALatchedStopAndIsLeftAgain) {
   bench.run_ms(500);
   EXPECT_LT(bench.insertion.position_unit(), 4.0);
   EXPECT_EQ(bench.report().state, DriverState::enabled) << describe(bench.report().stop);
+}
+
+// Which one it was the drive says (0x60FD); the axis may count the other way round than the drive.
+TEST(DriveSupervision, WhichLimitItWas) {
+  struct Case {
+    double counts_per_mm, rate_mm_s;
+    StopReason wanted;
+  };
+  for (const auto& [counts_per_mm, rate_mm_s, wanted] :
+       {Case{2000, 10, StopReason::upper_switch}, Case{2000, -10, StopReason::lower_switch},
+        Case{-2000, 10, StopReason::upper_switch}, Case{-2000, -10, StopReason::lower_switch}}) {
+    stepper::StepperConfig config;
+    config.axes[0].counts_per_unit = counts_per_mm;
+    Bench bench(config, {-5.0 * 2000.0, 5.0 * 2000.0});
+    ASSERT_TRUE(bench.enable());
+    bench.move(rate_mm_s, 0.0);
+    ASSERT_TRUE(bench.run_until([&] { return bench.reason() == StopReason::travel_limit; }, 1000));
+    EXPECT_TRUE(bench.run_until([&] { return bench.reason() == wanted; }, 50)) << describe(bench.report().stop);
+  }
+}
+
+TEST(DriveSupervision, ADriveWithoutInputsLeavesOpenWhichLimitItWas) {
+  Bench bench({}, {-5.0 * 2000.0, 5.0 * 2000.0});
+  bench.wire.set_tap([](can::Frame& frame) {
+    if (frame.id == 0x581 && frame.data[1] == 0xFD && frame.data[2] == 0x60) {
+      frame.data[0] = 0x80;
+      stepper::cia301::put_u32(frame, 4, 0x06020000);
+    }
+    return true;
+  });
+  ASSERT_TRUE(bench.enable());
+  bench.move(10.0, 0.0);
+  ASSERT_TRUE(bench.run_until([&] { return bench.reason() == StopReason::travel_limit; }, 1000));
+  bench.run_ms(1000);
+  EXPECT_EQ(bench.reason(), StopReason::travel_limit);
+  EXPECT_EQ(bench.report().counters.sdo_ignored, 0U);
 }
 
 TEST(DriveSupervision, FollowingErrorWindowReachesTheDrive) {

@@ -5,7 +5,7 @@
 set -u
 in_vm=$1
 shift
-[ -e /sys/class/net/vcan0 ] && exec "$@"
+[ -e /sys/class/net/vcan0 ] && { echo "on_can.sh: vcan0 of this machine" >&2; exec "$@"; }
 command -v "$1" >/dev/null || { echo "on_can.sh: cannot run $1" >&2; exit 127; }  # not to be taken for a missing guest
 "$in_vm" -t 500 "$@"
 status=$?

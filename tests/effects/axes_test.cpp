@@ -194,6 +194,20 @@ TEST(Puncture, StallsAtTheMembraneAndCatchesUp) {
       EXPECT_NEAR(path[i].z(), held ? kDepth_mm : base_mm, 1e-9);
     }
   }
+
+  // Meanwhile it may be at either end of its way, the likelier through the more of it is done.
+  const AugmentedNeedle needle(straight, {effect});
+  int on_the_way = 0;
+  AugmentedState state = needle.entry({});
+  for (double base_mm = 0.01; base_mm < 30; base_mm += 0.01) {
+    ASSERT_TRUE(needle.advance(state, {base_mm / 10, base_mm, 0}));
+    const double share = (base_mm - kDepth_mm - kBreaks_mm) / 0.4;
+    const double sd_mm = share > 0 && share < 1 ? std::sqrt(share * (1 - share)) * (kBreaks_mm + 0.4) : 0;
+    on_the_way += sd_mm > 0 ? 1 : 0;
+    EXPECT_NEAR(std::sqrt(needle.blur_mm2(state)[2]), sd_mm, 1e-5) << base_mm;
+    EXPECT_NEAR(needle.blur_mm2(state)[0], 0, 1e-12);
+  }
+  EXPECT_GE(on_the_way, 39);
 }
 
 TEST(Puncture, ReleasesANeedleThatIsDrawnBackBeforeItBreaks) {

@@ -1,17 +1,20 @@
 #!/usr/bin/env python3
 """Many cases through tools/fleet, undisturbed and with random kills: nothing lost, nothing done twice, the same verdicts.
 
-Usage: tests/fleet/kills.py --out DIR [--cases N] [--seed S] [--engine E] [--every-s T] [--kills K] [--stand-in]
+Usage: tests/fleet/kills.py --out DIR [--cases N] [--seed S] [--engine E] [--every-s T] [--kills K] [--stand-in [--seconds T]]
 Generates the cases (two insertions each, by bevel-blindtrial), has tools/fleet do them once undisturbed, and once while
 it, its engine, the process of a case or bevel-diagnose is ended by SIGKILL, K times, after random pauses of T seconds in the
 mean; then compares. A fifth of the pauses begin with the run, the others when it has begun a case: Snakemake needs seconds
 until then on a loaded machine, and would get nowhere. --stand-in: tests/fleet/stand_in.py in place of bevel-diagnose, with
-cases that it reads.
+cases that it reads; it sleeps for T seconds, 0.5 if not said, so that what other work there is on the machine takes no time from it:
+what is missing to all of the time at work is the fleet's own.
 Exit status: 0 all held, 1 something did not, and is named, 2 usage.
 
 Of the cores used three shares are printed: the CPU time of the cases that were kept of all time of all cores; of what other
 processes left of that (from /proc/stat), since a machine may have others at work; and the time in which a case was at work
-of the time of all that may be at work at once.
+of the time of all that may be at work at once. The same without start and page is from when each place had its first result to the
+last result, which is all there is of it in a long run (cases of one length are meant). Beside them the CPU time of all that is not a
+case: fleet, engine, interpreters.
 """
 import argparse
 import collections
@@ -52,6 +55,7 @@ def arguments():
     parser.add_argument("--every-s", type=float, default=10.0)
     parser.add_argument("--kills", type=int, default=20)
     parser.add_argument("--stand-in", action="store_true")
+    parser.add_argument("--seconds", type=float, default=0.5)
     parser.add_argument("--build", type=pathlib.Path, default=ROOT / "build")
     return parser.parse_args()
 
@@ -62,7 +66,7 @@ def make_cases(options, folder):
         for i in range(options.cases):
             case = folder / f"rig{i // 10}" / f"case{i:03}"
             case.mkdir(parents=True)
-            (case / "model.toml").write_text("seconds = 0.5\n", encoding="utf-8")
+            (case / "model.toml").write_text(f"seconds = {options.seconds}\n", encoding="utf-8")
             for j in (1, 2):
                 (case / f"rec0{j}.lcm").write_text(f"{i} {j}\n", encoding="utf-8")
         return
@@ -113,15 +117,21 @@ class CoreUse:
             pass
         wall, busy, idle, ours = (now - then for now, then in
                                   zip((time.monotonic(), *machine_s(), self.ours()), self.begun))
-        self.wall, self.given = wall, max(os.cpu_count() * wall - (busy - ours), 1e-9)
+        self.wall, self.ours_s, self.given = wall, ours, max(os.cpu_count() * wall - (busy - ours), 1e-9)
 
     def shares(self, out):
-        kept = [json.loads(file.read_text(encoding="utf-8")) for file in (out / "results").glob("*/case.json")]
+        files = list((out / "results").glob("*/case.json"))
+        kept = [json.loads(file.read_text(encoding="utf-8")) for file in files]
         cpu, at_work = (sum(case[name] for case in kept) for name in ("cpu_s", "seconds"))
-        slots = len(os.sched_getaffinity(0)) * self.wall
+        places = len(os.sched_getaffinity(0))
+        slots = places * self.wall
+        # While all places are taken: from when each had its first result, to the last one.
+        ends = sorted(file.stat().st_mtime for file in files)
+        steady = at_work / len(kept) * (len(kept) - places) / (places * (ends[-1] - ends[places - 1]))
         return (f"{100 * cpu / (os.cpu_count() * self.wall):.1f} % of {os.cpu_count()} cores x {self.wall:.1f} s, "
                 f"{100 * cpu / self.given:.1f} % of the {self.given:.1f} s that others left; "
-                f"at work {100 * at_work / slots:.1f} %")
+                f"at work {100 * at_work / slots:.1f} %, without start and page {100 * steady:.1f} %; beside the cases {self.ours_s - cpu:.1f} s of CPU time, "
+                f"{(self.ours_s - cpu) / len(kept):.2f} s a case")
 
 
 def reaped_one():
@@ -250,7 +260,7 @@ def judge(options, quiet, disturbed, kills, *statuses):
     starts = {out: sum(count for note, count in ledger.items() if note[0] == "start") for out, ledger in ledgers.items()}
     if starts[quiet] != options.cases:
         faults.append(f"undisturbed: {starts[quiet]} starts for {options.cases} cases")
-    left = [path.name for path in (disturbed / "work").iterdir() if path.name != "lock"]
+    left = [path.name for path in (disturbed / "work").iterdir() if path.name != "lock" and not path.name.startswith("turn")]
     if left:
         faults.append(f"left behind: {', '.join(left)}")
     print(f"starts: {starts[quiet]} undisturbed, {starts[disturbed]} with kills; verdicts the same to the last byte: "

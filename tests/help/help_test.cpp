@@ -103,6 +103,18 @@ TEST_F(Help, OfEveryScriptIsSafeQuickAndAlike) {
     for (const char* argument : {"--help", "-h"}) expect_help(script, argument);
 }
 
+TEST_F(Help, AnUnknownOptionOfAScriptStartsNothing) {
+  for (const std::string& script : scripts()) {
+    const std::string name = fs::path(script).filename().string();
+    if (fs::path(script).parent_path().filename() != "tools") continue;  // of these alone people type the names
+    if (name == "in-vm" || name == "fuzz") continue;                     // what they take is a command, and targets
+    const Said said = run(script, "--hlep");
+    EXPECT_EQ(said.status, 2) << name;
+    EXPECT_THAT(said.err, AllOf(HasSubstr("unknown"), HasSubstr("--hlep"))) << name;
+    EXPECT_TRUE(fs::is_empty(folder / "here")) << name;
+  }
+}
+
 TEST_F(Help, AnUnknownOptionIsNamedWithTheNearestBeforeWhatIsMissing) {
   for (const std::string& program : programs()) {
     const Said said = run(program, "--hlep");
@@ -114,6 +126,9 @@ TEST_F(Help, AnUnknownOptionIsNamedWithTheNearestBeforeWhatIsMissing) {
   EXPECT_THAT(run(diagnose, "--modle m.toml -o v a.lcm").err,
               AllOf(HasSubstr("unknown option --modle; did you mean --model?"), Not(HasSubstr("required"))));
   EXPECT_THAT(run(diagnose, "--modle=m.toml").err, HasSubstr("unknown option --modle; did you mean --model?"));
+  // What is like none of its options is not taken for one.
+  EXPECT_THAT(run(std::string(BEVEL_BINARY_DIR) + "/bin/bevel-view", "--modle m.toml").err,
+              HasSubstr("unknown option --modle\n"));
   EXPECT_THAT(run(diagnose, "-o v a.lcm").err, HasSubstr("--model is required"));
 }
 

@@ -4,6 +4,7 @@
 #include <Eigen/QR>
 
 #include "diagnosis/inference/evidence.hpp"
+#include "diagnosis/inference/local_minima.hpp"
 #include "diagnosis/inference/log_sum.hpp"
 #include "diagnosis/inference/posterior.hpp"
 #include "diagnosis/inference/proposals.hpp"
@@ -68,6 +69,44 @@ TEST(Evidence, OfALinearModelIsTheNormalDensityOfAllReadings) {
         EXPECT_EQ(at.fit.scales.nuisance_sd[0] > 0, nuisance_sd > 0);
       }
     }
+}
+
+// Two ways out of a local minimum: what a fit would be worth with less spread, and without one of its effects.
+TEST(Evidence, WithLessSpreadIsTheNormalDensityWithIt) {
+  for (const double nuisance_sd : {0.02, 0.2}) {
+    const LinearSystem system(4, 7, 0.3, nuisance_sd, 0);
+    const Evaluated at = evaluate_set(system, {0});
+    Fit wide = at.fit;
+    wide.scales.nuisance_sd[0] = 0.2;
+    const auto less = with_less_spread(*at.fit.likelihood, wide);
+    ASSERT_EQ(less.size(), 1U);
+    EXPECT_EQ(less[0].fit.scales.nuisance_sd[0], 0);
+    const Noise& noise = at.fit.likelihood->noise();
+    const VectorXd y = all_readings(system);
+    const double change =
+        log_normal(y, covariance_of(system, {0}, noise, 0.0)) - log_normal(y, covariance_of(system, {0}, noise, 0.2));
+    EXPECT_NEAR(less[0].log_change, change, 1e-6 * std::abs(change) + 1e-6);
+    EXPECT_TRUE(with_less_spread(*at.fit.likelihood, less[0].fit).empty());
+  }
+}
+
+TEST(Evidence, WhatDroppingAnEffectCostsIsTheFallOfTheLikelihood) {
+  const LinearSystem system(4, 7, 0.4, 0.2, 0);
+  const auto likelihood = std::make_shared<const Likelihood>(system, Readings(4), white(system));
+  const Scales scales{.nuisance_sd = VectorXd::Constant(1, 0.2), .curves = {}};
+  const auto fitted = [&](const ModelSet& set) {
+    const Layout layout(system, set);
+    Fit out = fit(*likelihood, layout, layout.shared_start(), std::vector<VectorXd>(4, layout.local_start()), scales,
+                  {}, {.tolerance = 1e-9});
+    out.likelihood = likelihood;
+    return out;
+  };
+  const Fit both = fitted({0, 1});
+  const auto costs = log_costs_of_dropping(both);
+  ASSERT_EQ(costs.size(), 2U);
+  for (std::size_t m = 0; m < 2; ++m) EXPECT_NEAR(costs[m], 0.5 * (fitted({1 - m}).cost - both.cost), 1e-4 * costs[m]);
+  EXPECT_GT(costs[0], 10);  // a parabola of four deviations at its ends, of which the cosine may take much
+  EXPECT_LT(costs[1], 5);   // no step
 }
 
 TEST(Evidence, TheNoiseIsTheLikeliest) {

@@ -94,6 +94,20 @@ TEST(Noise, OutliersAtTheEndOfASeriesAreFound) {
     EXPECT_EQ(found.outliers[r], r % 2 == 0 ? planted : std::vector<std::size_t>()) << "recording " << r;
 }
 
+// Where a tip jumps no curve follows, and readings are off to one side before it and to the other after it; but they
+// agree with their own side, and an outlier beside the jump does not.
+TEST(Noise, WhatAgreesWithOneSideOfAJumpIsNoOutlier) {
+  Made made = make(0.6, 0, 0, 33);
+  for (std::size_t r = 0; r < 6; ++r)
+    for (std::size_t c = 0; c < 2; ++c) {
+      made.errors[r][c].tail(200).array() += c == 0 ? 3.0 : 1.5;
+      made.errors[r][c](r % 2 == 0 ? 198 : 201) += c == 0 ? 2.0 : -3.0;
+    }
+  const Calibration found = calibrate_noise(made.data, made.errors);
+  for (std::size_t r = 0; r < 6; ++r)
+    EXPECT_EQ(found.outliers[r], std::vector<std::size_t>{r % 2 == 0 ? 198UL : 201UL}) << "recording " << r;
+}
+
 // Readings with an error of their own beside autocorrelated noise, frames missing: against the dense covariance.
 TEST(Noise, AReadingsOwnErrorIsWhitenedExactly) {
   Noise noise{.sigma = {0.3}, .ar1 = 0.7};

@@ -93,6 +93,24 @@ TEST_F(CsvImport, RowsOfOneStopAreOneReadingWithoutAClock) {
   EXPECT_EQ(back.headings.size(), 3u);
 }
 
+// The needle lies at the next stop before its depth is noted, and longer than it lay at the one before.
+TEST_F(CsvImport, RowsThatLieAtTheNextStopAlreadyAreNotTheStopBefore) {
+  const std::string stops = file("stops.toml",
+                                 "[tip]\naxes = [\"x\", \"y\", \"z\"]\nunit = \"mm\"\nsigma_mm = [0.1, 0.1, 0.1]\n"
+                                 "[insertion]\ncolumn = \"depth\"\nunit = \"mm\"\nstops = true\n");
+  const std::string csv = file("early.csv",
+                               "depth,x,y,z\n"
+                               "0,0,0,0\n0,0,0,0.1\n0,0,0,5.9\n0,0,0,5.1\n0,0,0,5\n0,0,0,5\n"
+                               "5,0,0,5\n5,0,0,5.1\n5,0,0,9.6\n5,0,0,9.6\n5,0,0,9.6\n5,0,0,9.6\n"
+                               "10,0,0,9.6\n10,0,0,9.5\n");
+  const ImportedRecording r = import_csv(csv, load_column_map(stops));
+  ASSERT_EQ(r.tips.size(), 3u);
+  EXPECT_NEAR(r.tips[0].position_mm.z(), 0.05, 1e-12);
+  EXPECT_NEAR(r.tips[1].position_mm.z(), 5.05, 1e-12);
+  EXPECT_NEAR(r.tips[2].position_mm.z(), 9.55, 1e-12);
+  EXPECT_EQ(r.rows_unsettled, 8);
+}
+
 // A needle that is turned over between two stops: rows of the base alone are the way there.
 TEST_F(CsvImport, SettledStepsMayTurnOnTheWay) {
   const std::string turned =

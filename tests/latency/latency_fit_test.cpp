@@ -72,8 +72,8 @@ double latency_by_correlation_s(const Seen& seen) {
 }
 
 struct Tally {
-  int fits = 0;
-  double worst_s = 0, squares = 0, worst_by_correlation_s = 0, mean_sd_s = 0;
+  int fits = 0, within = 0;  // of those, with the truth in the interval of 95 %
+  double worst_s = 0, worst_by_correlation_s = 0, mean_within_s = 0;
 };
 
 Tally over_latencies_and_seeds(StopAndGo run) {
@@ -89,8 +89,8 @@ Tally over_latencies_and_seeds(StopAndGo run) {
       const double error_s = found.latency_s - latency_s;
       ++tally.fits;
       tally.worst_s = std::max(tally.worst_s, std::abs(error_s));
-      tally.squares += error_s * error_s / (found.sd_s * found.sd_s);
-      tally.mean_sd_s += found.sd_s / (kLatencies_s.size() * kSeeds);
+      tally.within += std::abs(error_s) <= found.within_95_s ? 1 : 0;
+      tally.mean_within_s += found.within_95_s / (kLatencies_s.size() * kSeeds);
       tally.worst_by_correlation_s =
           std::max(tally.worst_by_correlation_s, std::abs(latency_by_correlation_s(seen) - latency_s));
     }
@@ -100,6 +100,7 @@ Tally over_latencies_and_seeds(StopAndGo run) {
 struct Case {
   const char* name;
   StopAndGo run;
+  bool wider = false;  // the interval is known to be wider than it need be
 };
 void PrintTo(const Case& c, std::ostream* out) { *out << c.name; }
 class Latency : public testing::TestWithParam<Case> {};
@@ -107,27 +108,27 @@ class Latency : public testing::TestWithParam<Case> {};
 TEST_P(Latency, IsFoundWithinTenMilliseconds) {
   const Tally t = over_latencies_and_seeds(GetParam().run);
   std::printf(
-      "%s: %d fits (0, 40, 100, 250 ms, seeds 1 to %llu): largest error %.1f ms, claimed %.1f ms, normalised "
-      "squared error %.2f; by correlation of rates, largest error %.1f ms\n",
+      "%s: %d fits (0, 40, 100, 250 ms, seeds 1 to %llu): largest error %.1f ms, claimed +-%.1f ms (95 %%), which held "
+      "%d; by correlation of rates, largest error %.1f ms\n",
       GetParam().name, t.fits, kSeeds * static_cast<unsigned long long>(kLatencies_s.size()), 1e3 * t.worst_s,
-      1e3 * t.mean_sd_s, t.squares / t.fits, 1e3 * t.worst_by_correlation_s);
+      1e3 * t.mean_within_s, t.within, 1e3 * t.worst_by_correlation_s);
   EXPECT_LT(t.worst_s, 0.010);
-  // Of 100 such sums 99.8 % lie in 0.62 to 1.49.
-  EXPECT_GT(t.squares / t.fits, 0.62);
-  EXPECT_LT(t.squares / t.fits, 1.49);
+  EXPECT_GE(t.within, 90);
+  EXPECT_LE(t.within, GetParam().wider ? t.fits : 98);
   EXPECT_LT(t.worst_by_correlation_s, 0.025);
 }
 
 INSTANTIATE_TEST_SUITE_P(
     Insertions, Latency,
-    testing::Values(Case{"white noise", {}},
-                    Case{
-                        "correlated noise",
-                        {.rate_mm_s = 10, .stops = 18, .half_period_s = 0.5, .reading_sd_mm = 0.1, .correlation = 0.8}},
-                    Case{"wrong model, wrong depth", {.depth_error_mm = 1.5, .curvature_ratio = 1.2, .slip = 0.93}},
-                    Case{"one planar camera",
-                         {.reading_sd_mm = 0.1, .correlation = 0.5, .curvature_ratio = 0.9, .blind_along_x = true}},
-                    Case{"drawn back at the end", {.withdrawn_mm = 30}}),
+    testing::Values(
+        Case{"white noise", {}},
+        Case{"correlated noise",
+             {.rate_mm_s = 10, .stops = 18, .half_period_s = 0.5, .reading_sd_mm = 0.1, .correlation = 0.8}},
+        Case{"wrong model, wrong depth", {.depth_error_mm = 1.5, .curvature_ratio = 1.2, .slip = 0.93}},
+        Case{"one planar camera",
+             {.reading_sd_mm = 0.1, .correlation = 0.5, .curvature_ratio = 0.9, .blind_along_x = true}},
+        Case{"error turned at rest", {.stops = 10, .reading_sd_mm = 0.05, .turned_at_rest_sd_mm = 0.1}, true},
+        Case{"drawn back at the end", {.withdrawn_mm = 30}}),
     [](const auto& i) {
       std::string name = i.param.name;
       std::erase_if(name, [](char c) { return !std::isalnum(static_cast<unsigned char>(c)); });

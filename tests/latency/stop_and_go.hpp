@@ -34,6 +34,9 @@ struct StopAndGo {
   double slip = 1;             // mm of tip per mm of base
   bool blind_along_x = false;  // one camera that looks along x, as a planar view reports it
   double withdrawn_mm = 0;     // at the end, with play of this size
+  // Of an error along the needle that keeps its value while the needle moves, and goes to another one in each stop, as
+  // that of a tracker does whose bevel is turned there.
+  double turned_at_rest_sd_mm = 0;
   std::uint64_t seed = 1;
 };
 
@@ -52,6 +55,15 @@ inline Seen simulate(const StopAndGo& s) {
   std::mt19937_64 random(s.seed);
   std::normal_distribution<double> noise;
   Eigen::Vector3d error = Eigen::Vector3d::NullaryExpr([&] { return noise(random); });
+  std::mt19937_64 random_levels(s.seed + 1'000'000);
+  std::vector<double> levels_mm(static_cast<std::size_t>(s.stops) + 2);
+  for (double& level_mm : levels_mm) level_mm = s.turned_at_rest_sd_mm * noise(random_levels);
+  const auto level_mm = [&](double phase_s) {  // over the whole of a stop from one to the next
+    const double cycle = std::clamp(phase_s / (2 * s.half_period_s), 0.0, static_cast<double>(s.stops));
+    const auto k = static_cast<std::size_t>(cycle);
+    const double turned = std::clamp(2 * (cycle - static_cast<double>(k)) - 1, 0.0, 1.0);
+    return levels_mm[k] + turned * (levels_mm[k + 1] - levels_mm[k]);
+  };
   double rate_mm_s = 0, rotation_rad = 0, insertion_mm = 0, next_frame_s = 0.0117;
   Seen seen;
   const double going_s = 2 * s.half_period_s * s.stops,
@@ -84,6 +96,7 @@ inline Seen simulate(const StopAndGo& s) {
     m.utime = utime + std::llround(1e6 * s.latency_s);
     m.seq = static_cast<std::int64_t>(seen.tips.size());
     m.position_mm = plant.tip().p_mm + Eigen::Vector3d(0, 0, s.depth_error_mm) + s.reading_sd_mm * error;
+    m.position_mm += level_mm(phase_s) * plant.tip().R.col(2);
     m.information_per_mm2 = Eigen::Matrix3d::Identity() / (s.reading_sd_mm * s.reading_sd_mm);
     if (s.blind_along_x) m.position_mm.x() = 0, m.information_per_mm2(0, 0) = 0;
     seen.tips.push_back(m);

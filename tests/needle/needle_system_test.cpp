@@ -4,6 +4,8 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <map>
+
 #include <numbers>
 
 #include "diagnosis/inference/search.hpp"
@@ -195,6 +197,20 @@ TEST(NeedleSystem, KindsOfOneEffectAreNeverTogether) {
   EXPECT_FALSE(system.allows(inference::with({rotation}, insertion)));
 }
 
+TEST(NeedleSystem, KindsOfOneEffectShareItsPriorOdds) {
+  const SimulatedRig rig;
+  const NeedleSystem system(record_case(rig, 3), rig.needle);
+  const inference::Search search(system, {.log_prior_odds_effect = -5});
+  std::map<std::string, double> odds;
+  for (std::size_t e = 0; e < system.effects().size(); ++e)
+    odds[system.effects()[e].name] += std::exp(search.log_prior({e}));
+  for (const auto& [name, sum] : odds) EXPECT_NEAR(sum, std::exp(-5), 1e-12) << name;
+  const auto about_x = effect_named(system, "camera_rotation (about_x)"),
+             both = effect_named(system, "camera_rotation (about_x) (about_y)"), layer = effect_named(system, "layer");
+  EXPECT_NEAR(search.log_prior({about_x}), -5 - std::log(3), 1e-12);
+  EXPECT_NEAR(search.log_prior(inference::with({both}, layer)), -10 - std::log(3), 1e-12);
+}
+
 // Each component once, where its form is plain: a reading is off by the curve's value; an advance is the integral.
 TEST(NeedleCurves, ShiftReadingsAndAdvanceTheTip) {
   const SimulatedRig rig;
@@ -311,6 +327,38 @@ TEST(NeedleSystem, AJumpIsAsUncertainAsTheBase) {
   }
   EXPECT_GT(doubtful, 0);
   EXPECT_LT(doubtful, readings / 10);
+}
+
+// A tip that is catching up after a membrane is anywhere on its way.
+TEST(NeedleSystem, ATipThatCatchesUpIsAsUncertainAsItsWay) {
+  const double depth_mm = 14.2, indentation_mm = 3;
+  const SimulatedRig rig;
+  const NeedleSystem system(record_case(rig, 3), rig.needle);
+  Setting at = setting_of(system, {"puncture"});
+  at.shared.tail(2) << depth_mm, indentation_mm;
+  int catching_up = 0;
+  for (std::size_t r = 0; r < 4; ++r) {
+    const VectorXd sd = system.by_inputs(at.set, r, at.shared, at.local);
+    inference::Prediction with, without;
+    ASSERT_TRUE(system.predict(at.set, r, at.shared, at.local, false, with));
+    at.shared.tail(1) << 0;
+    ASSERT_TRUE(system.predict(at.set, r, at.shared, at.local, false, without));
+    at.shared.tail(1) << indentation_mm;
+    const auto rows = static_cast<Index>(system.data().recordings[r].series[2].message.size());  // along z
+    bool held = false;
+    for (Index i = sd.size() - rows; i < sd.size(); ++i) {
+      const double behind_mm = without.reading[i] - with.reading[i];
+      held = held || behind_mm > 0.2;
+      if (sd[i] < 0.15) continue;
+      ++catching_up;
+      EXPECT_TRUE(held);
+      // Through with a probability of the share of the way that is done.
+      const double share = 1 - behind_mm / indentation_mm;
+      EXPECT_NEAR(sd[i], indentation_mm * std::sqrt(std::max(0.0, share * (1 - share))), 0.35 * indentation_mm);
+      EXPECT_LT(sd[i], 0.51 * (indentation_mm + 0.2));
+    }
+  }
+  EXPECT_GT(catching_up, 0);
 }
 
 // End to end on the simulated rig: nothing, one effect, and one that is on no list.

@@ -191,6 +191,19 @@ class Faults(Rig):
         self.arm()
         self.insert()
 
+    def test_a_limit_switch(self):
+        """Of one drive: it holds, the driver asks it which (60FD) and stops both."""
+        self.arm()
+        self.insert()
+        since = time.monotonic()
+        self.drives[0].switch_at = self.drives[0].position
+        self.assertLessEqual(self.ms_to_rest(since), 200 * support.PATIENCE)
+        self.reach("stopped", 1)
+        end = time.monotonic() + 1
+        while "upper limit switch" not in self.controller.status.reason and time.monotonic() < end:
+            time.sleep(0.02)
+        self.assertIn("insertion: axis is at its upper limit switch", self.controller.status.reason)
+
     def test_an_unplugged(self):
         """Drive stops, and so does the other."""
         self.arm()

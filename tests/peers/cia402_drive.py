@@ -13,7 +13,7 @@ import canopen_support as support
 
 # State: bits of the statusword under 0x6F.
 SWITCH_ON_DISABLED, READY, SWITCHED_ON, ENABLED, QUICK_STOP, FAULT = 0x40, 0x21, 0x23, 0x27, 0x07, 0x08
-REMOTE = 0x200
+REMOTE, INTERNAL_LIMIT = 0x200, 0x800
 MASTER = 127
 RAMPS_DOWN = {6: QUICK_STOP, 2: SWITCH_ON_DISABLED}
 
@@ -31,6 +31,7 @@ class Drive:
         self.position = 0.0  # counts
         self.velocity = 0.0
         self.silent = False
+        self.switch_at = None  # counts, of a limit switch in the positive direction
         self.log = []  # (monotonic s, velocity), for who measures
         self._lock = threading.RLock()
         self._moved = time.monotonic()
@@ -69,11 +70,15 @@ class Drive:
         return self._written[index, sub]
 
     def _live(self):
-        return {0x6041: self.state | REMOTE, 0x6064: round(self.position), 0x606C: round(self.velocity),
-                0x6061: self.value(0x6060)}
+        at_switch = INTERNAL_LIMIT if self._at_switch() else 0
+        return {0x6041: self.state | REMOTE | at_switch, 0x6064: round(self.position), 0x606C: round(self.velocity),
+                0x6061: self.value(0x6060), 0x60FD: 2 if self._at_switch() else 0}
+
+    def _at_switch(self):
+        return self.switch_at is not None and self.position >= self.switch_at
 
     def _on_read(self, index, subindex, od):
-        if index not in (0x6041, 0x6061, 0x6064, 0x606C):
+        if index not in (0x6041, 0x6061, 0x6064, 0x606C, 0x60FD):
             return None  # stored
         with self._lock:
             self._move()
@@ -95,6 +100,8 @@ class Drive:
         if self.state == ENABLED:
             target = self.value(0x60FF)
             ramp = self.value(0x6083 if abs(target) > abs(self.velocity) else 0x6084)
+            if self._at_switch():
+                target = min(target, 0.0)
         if self.state not in (ENABLED, QUICK_STOP, SWITCHED_ON):
             self.velocity = 0.0
         change = target - self.velocity

@@ -52,6 +52,9 @@ void print_board(const camera::Board& board, const std::string& path, std::ostre
       << (extension == ".svg" ? ": print it at 100 %, without fitting it to the page"
                               : ": print it so that a square has the side you will give")
       << "; then measure the squares and give that as --square-mm\n";
+  if (!board.oriented())
+    out << "it looks the same upside down, good for one lens: for two cameras or as a fiducial take an even number of "
+           "squares one way and an odd one the other\n";
 }
 
 // What a system file says of each camera.
@@ -69,6 +72,10 @@ int fit_pictures(const camera::Board& board, const Options& o, std::ostream& out
   if (o.gel_index != 0 && !(o.gel_index >= 1))
     throw std::invalid_argument("--gel-index is " + format_significant(o.gel_index) + ", allowed: 1 to 2.5, or 0");
   const Pictures pictures = read_pictures(board, o);
+  const auto say_left_out = [&err](const std::vector<camera::LeftOut>& all) {
+    for (const auto& left : all) err << "left out: " << left.name << ": " << left.why << '\n';
+  };
+  say_left_out(pictures.left_out);  // also if too little is left
   camera::Calibrated got = camera::calibrate(board, pictures.input);
   got.calibration.made_utc = utc_now();
   Told told;
@@ -112,7 +119,7 @@ int fit_pictures(const camera::Board& board, const Options& o, std::ostream& out
                 : "")
         << '\n';
   out << "frame {A}: " << told.frame << '\n' << told.yaml_path << ", " << o.out_folder << "/report.html\n";
-  for (const auto& left : told.left_out) err << "left out: " << left.name << ": " << left.why << '\n';
+  say_left_out(got.left_out);
   return pictures.unreadable > 0 ? tools::kDamagedInput : tools::kOk;
 }
 

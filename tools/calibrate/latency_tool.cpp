@@ -62,8 +62,8 @@ int fit_latency(const Options& o, std::ostream& out, std::ostream& err) {
     }
     const auto before = applied_s.find(camera);
     const double already_s = before == applied_s.end() ? 0 : before->second;
-    out << "camera " << camera << ": stamps are " << format_significant(1e3 * fit.latency_s) << " ms late, sd "
-        << format_significant(1e3 * fit.sd_s, 2) << " ms; " << fit.readings << " readings, RMS "
+    out << "camera " << camera << ": stamps are " << format_significant(1e3 * fit.latency_s) << " ms late, +-"
+        << format_significant(1e3 * fit.within_95_s, 2) << " ms (95 %, by " << fit.stretches << " stretches); " << fit.readings << " readings, RMS "
         << format_significant(fit.rms_mm) << " mm along the needle, correlation "
         << format_significant(fit.correlation, 2) << " over " << format_significant(1e3 * fit.spacing_s) << " ms\n";
     if (already_s != 0)

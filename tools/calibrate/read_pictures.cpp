@@ -66,7 +66,9 @@ class Reader {
                                   " as '" + first_[camera] +
                                   "', the first of this camera; a calibration holds for one size");
     camera::Sighting seen = board_.find(gray);
-    if (seen.ids.empty()) out_.left_out.push_back({file.string(), "no board found in it"});
+    if (seen.ids.empty())
+      out_.left_out.push_back({file.string(), "no board of " + std::to_string(board_.spec().columns) + " x " +
+                                                  std::to_string(board_.spec().rows) + " squares found in it"});
     return seen;
   }
 
@@ -80,6 +82,8 @@ class Reader {
 
 Pictures read_pictures(const camera::Board& board, const Options& options) {
   const size_t cameras = options.air.size();
+  if (cameras > 2)
+    throw std::invalid_argument("--air has " + std::to_string(cameras) + " folders, allowed: 1 or 2, one per camera");
   for (const auto& [what, given] :
        {std::pair("--immersed", options.immersed.size()), {"--fiducial", options.fiducial.size()}})
     if (given != 0 && given != cameras)

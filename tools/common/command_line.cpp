@@ -36,7 +36,9 @@ std::string unknown_option(const CLI::App& app, int argc, char** argv) {
       for (const std::string& name : option->get_snames()) known.push_back("-" + name);
     }
     if (std::ranges::find(known, given) != known.end()) continue;
-    return "unknown option " + given + "; did you mean " + io::nearest_name(given, known) + "?";
+    const std::string nearest = io::nearest_name(given, known);
+    const bool likely = is_long && io::edit_distance(given, nearest) <= (given.size() - 2) / 2;
+    return "unknown option " + given + (likely ? "; did you mean " + nearest + "?" : "");
   }
   return "";
 }

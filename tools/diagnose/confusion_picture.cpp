@@ -12,8 +12,8 @@ using namespace bevel::report;     // NOLINT(google-build-using-namespace)
 
 namespace {
 
-constexpr double kNames = 150;
-constexpr double kLeaning = 72;  // how far the last column's name leans to the right
+constexpr double kNames = 172;
+constexpr double kLeaning = 78;  // how far the last column's name leans to the right
 constexpr double kWorthANumber = 0.5;
 
 // The least absorbed of an effect's parameters: that by which it can be seen. NaN if nothing is known of it.
@@ -49,7 +49,7 @@ std::string confusion_picture(const Findings& findings) {
   const double left = kNames + 50;
   const double cell = std::min((832 - left - kLeaning) / static_cast<double>(count), 34.0);
   const double height = std::min(cell, 24.0);
-  const double top = 118;
+  const double top = 142;
   Drawing drawing(832, top + height * static_cast<double>(count) + 12);
   drawing.text({kNames + 24, top - 8}, "absorbed", {.size = 11, .colour = ink::kSoft, .turned_deg = -50});
   for (Eigen::Index i = 0; i < count; ++i) {

@@ -64,8 +64,9 @@ Found find(const Options& options, std::ostream& err) {
   Progress progress(options.quiet ? nullptr : stderr);
   io::ModelFile model = io::load_model_file(options.model_path);
   const auto logs = io::find_logs(options.logs);  // folders among them
-  progress.say(options.changed.empty() ? "reading " + std::to_string(logs.size()) + " logs"
-                                       : "reading two groups of logs");
+  progress.say(options.changed.empty()
+                   ? "reading " + std::to_string(logs.size()) + (logs.size() == 1 ? " log" : " logs")
+                   : "reading two groups of logs");
   ReadCase input = options.changed.empty() ? read_case(logs) : read_groups(options.baseline, options.changed);
   for (const auto& remark : input.remarks) err << remark << std::endl;  // before the minutes of work
   const double reading_s = progress.seconds();
@@ -137,7 +138,7 @@ void print_verdict(std::ostream& out, const Findings& f) {
         << steered_in_words(f.steered->found, f.steered->targets)
         << (f.steered->not_known_live.empty() ? ""
                                               : "; neither knows beforehand of " + listed(f.steered->not_known_live))
-        << '\n';
+        << (steers_worse(*f.steered) ? "; what was found predicts better and steers worse" : "") << '\n';
   if (!f.not_steered.empty()) out << "  not steered to a target in simulation: " << f.not_steered << '\n';
   out << "  insertions differ by (standard deviation):";
   for (const auto& v : f.variation) out << (&v == f.variation.data() ? " " : ", ") << variation_in_words(v);

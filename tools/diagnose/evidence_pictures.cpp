@@ -13,7 +13,7 @@ using namespace bevel::report;     // NOLINT(google-build-using-namespace)
 
 namespace {
 
-constexpr double kNames = 164;  // room for names on the left
+constexpr double kNames = 184;  // room for names on the left
 constexpr double kNameSize = 12.5;
 constexpr const char* kLikelyInk = "var(--likely)";
 

@@ -59,7 +59,7 @@ std::string percent(double share) {
   return number(value, value >= 99 ? 3 : 2) + " %";
 }
 
-std::string probability(double p) { return p > 0.999 ? "> 99.9 %" : percent(p); }
+std::string probability(double p) { return p > 0.999 ? "> 99.9 %" : p < 0.001 ? "< 0.1 %" : percent(p); }
 
 std::string log_factor(double log_bayes_factor) {
   if (!std::isfinite(log_bayes_factor)) return "-";
@@ -141,6 +141,12 @@ std::string steered_in_words(const diagnosis::SteeredFigures& s, std::size_t tar
       s.arrived == 0 ? "" : "median " + measured(s.median_mm, 2) + " mm, worst " + measured(s.worst_mm, 2) + " mm, ";
   return miss + std::to_string(s.arrived) + " of " + std::to_string(targets) + " arrived" +
          (s.stopped_by.empty() ? "" : " (else: " + s.stopped_by + ")");
+}
+
+bool steers_worse(const diagnosis::SteeredToTargets& s) {
+  constexpr double kFarther = 1.1;
+  if (s.found.arrived != s.as_it_stands.arrived) return s.found.arrived < s.as_it_stands.arrived;
+  return s.found.median_mm > kFarther * s.as_it_stands.median_mm;
 }
 
 std::string span_mm(const diagnosis::SteeredToTargets& s) {

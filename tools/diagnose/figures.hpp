@@ -19,7 +19,7 @@ std::string with_error(double value, double std_error);
 // Both ends rounded alike: "0.76 to 0.89".
 std::string interval(const std::array<double, 2>& ends);
 std::string percent(double share);
-std::string probability(double p);                // never 100 %
+std::string probability(double p);                // never 100 %, never 0 %
 std::string log_factor(double log_bayes_factor);  // a tenth is as fine as it means anything
 std::string listed(const std::vector<std::string>& names, const std::string& last = " and ");
 // "curvature 5 % (none: 2 %)"
@@ -52,6 +52,9 @@ std::optional<MovedAtDepth> moved_at_depth(const diagnosis::Findings& findings);
 std::string moved_in_words(double moved_at_depth_mm);
 // "median 0.31 mm, worst 0.8 mm, 7 of 8 arrived (else: workspace)"
 std::string steered_in_words(const diagnosis::SteeredFigures& figures, std::size_t targets);
+// The needle comes to rest farther from the targets by what was found than by the model file, by a tenth, or arrives
+// less often.
+bool steers_worse(const diagnosis::SteeredToTargets& steered);
 std::string span_mm(const diagnosis::SteeredToTargets& steered);  // "74 to 82 mm", of the targets' depths
 
 std::string headline_of(diagnosis::Verdict verdict, bool two_groups = false);  // "Effects found", ...

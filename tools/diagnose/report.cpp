@@ -178,6 +178,10 @@ void add_what_to_do(report::Page& page, const Findings& f) {
       todo.emplace_back(
           "Put model.toml in place of the model in use (simulator, estimator and bevel-predict read it), or mend the "
           "rig and record again.");
+      if (f.steered && steers_worse(*f.steered))
+        todo.emplace_back(
+            "It predicts better, but do not steer by it untried: in simulation the needle comes nearer to its targets "
+            "when estimator and controller believe the model as it stands (\"At the target\").");
       if (has_rivals(f))
         todo.emplace_back(
             "Before you name the cause, record the next experiment below: these recordings cannot tell the named "

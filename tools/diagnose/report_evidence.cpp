@@ -59,10 +59,11 @@ void add_evidence(report::Page& page, const Findings& f) {
   for (const auto& e : f.explanations) {
     std::string names;
     for (const auto& name : e.effects) names += (names.empty() ? "" : " + ") + name;
-    shares.push_back({names.empty() ? "no effect" : names, percent(e.probability), percent(e.with_discrepancy)});
+    shares.push_back(
+        {names.empty() ? "no effect" : names, probability(e.probability), probability(e.with_discrepancy)});
   }
   page.table({"effects in the model", "probability", "of it with a discrepancy"}, shares,
-             "Neither an effect nor a discrepancy of any consequence: " + percent(f.nothing_probability) +
+             "Neither an effect nor a discrepancy of any consequence: " + probability(f.nothing_probability) +
                  ". Sets that were not fitted, by the linear model's estimate: " + percent(f.not_visited) + ".");
   page.heading("Every effect that was tried");
   page.paragraph(
@@ -182,6 +183,11 @@ void add_reach(report::Page& page, const Findings& f) {
                "found. The first column is what is absorbed.");
 }
 
+namespace {
+constexpr double kConvincing = 10;  // chi2
+constexpr double kFeasible = 20;    // recordings of one motion
+}  // namespace
+
 void add_next_experiment(report::Page& page, const Findings& f) {
   page.heading("The next experiment");
   if (!f.next_experiment) {
@@ -193,9 +199,26 @@ void add_next_experiment(report::Page& page, const Findings& f) {
   page.paragraph("Of the safe motions that were simulated, this one tells " + next.separates[0] + " from " +
                  next.separates[1] + " best, each refitted to explain the other away.");
   page.code(next.script);
+  const double recordings = std::ceil(kConvincing / next.expected_gain);
   page.paragraph("One recording of it should separate them by " + number(next.expected_gain, 2) +
-                 " in chi2 (10 is convincing, 25 settles it).");
+                 " in chi2 (10 is convincing, 25 settles it)" +
+                 (recordings <= 1           ? "."
+                  : recordings <= kFeasible ? ", so it takes " + number(recordings, 2) + " of them."
+                                            : ", so none of these motions tells them apart in earnest."));
 }
+
+namespace {
+
+std::string what_is_left(const Checks& c) {
+  if (c.clean) return "What is left is noise.";
+  std::string left;
+  if (c.chi2_per_dof > c.band[1]) left = "more than that noise";
+  if (c.chi2_per_dof < c.band[0]) left = "less than that noise (a curve with a knot a second takes jumps for noise)";
+  if (c.ljung_box_p <= 0.01) left += left.empty() ? "correlated from reading to reading" : ", and correlated";
+  return "What is left is " + left + "; the verdict does not rest on this.";
+}
+
+}  // namespace
 
 void add_noise_and_checks(report::Page& page, const Findings& f) {
   page.heading("Noise and checks");
@@ -214,7 +237,7 @@ void add_noise_and_checks(report::Page& page, const Findings& f) {
       {{"chi2 per reading, by the noise that a flexible curve leaves", measured(c.chi2_per_dof, 4), interval(c.band)},
        {"correlation left in the residuals (Ljung-Box p)", c.ljung_box_p < 0.001 ? "< 0.001" : number(c.ljung_box_p, 2),
         "above 0.01"}},
-      c.clean ? "What is left is noise." : "What is left is more than that noise; the verdict does not rest on this.");
+      what_is_left(c));
   if (!f.remarks.empty()) page.subheading("Remarks").list(f.remarks);
 }
 
@@ -222,9 +245,11 @@ void add_making(report::Page& page, const Findings& f, const Provenance& made_of
   page.heading("How this was made");
   std::vector<std::vector<std::string>> files{{"model in use", made_of.model.name, made_of.model.sha256}};
   for (const auto& file : made_of.recordings) files.push_back({"recording", file.name, file.sha256});
-  page.table({"", "file", "SHA-256"}, files,
-             "By bevel-diagnose " + made_of.version +
-                 ". Nothing is drawn at random: the same files and version give the same verdict, to the last bit.");
+  page.table(
+      {"", "file", "SHA-256"}, files,
+      "By bevel-diagnose " + made_of.version +
+          ". The same files and version give the same verdict, to the last bit: nothing is drawn at random but the "
+          "targets and noise of steered insertions, by a fixed seed.");
   std::vector<std::vector<std::string>> rows;
   double total = 0;
   for (const auto& t : f.times) {

@@ -18,7 +18,7 @@ def main(config):
     else:
         # Threads do: each waits for a process.
         client = distributed.Client(distributed.LocalCluster(
-            processes=False, n_workers=1, threads_per_worker=config["jobs"], dashboard_address=None))
+            processes=False, n_workers=1, threads_per_worker=config["processes"], dashboard_address=None))
     waiting = distributed.as_completed(
         client.submit(subprocess.run, [*config["command"], key], check=True, stdin=subprocess.DEVNULL, key=key,
                       retries=config["retries"]) for key in config["keys"])

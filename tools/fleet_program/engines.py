@@ -11,14 +11,17 @@ import time
 
 HERE = pathlib.Path(__file__).resolve().parent
 RETRIES = 2  # of a case whose process was killed or whose machine was lost; refusals of input are none
+READY = 1  # processes of cases that wait for their turn
 PROGRESS_S = 1.0
 PATIENCE_S = 10.0  # for an engine that was told to end
 
 
 def configuration(out, keys, options):
+    elsewhere = options.slurm or options.scheduler  # whoever hands out the machines counts there
     # -S: it needs the standard library alone, and starts sooner without looking for more.
-    return {"keys": keys, "command": [sys.executable, "-S", str(HERE / "one_case.py"), str(out)],
-            "threads": options.threads, "jobs": options.jobs, "scheduler": options.scheduler, "retries": RETRIES}
+    command = [sys.executable, "-S", str(HERE / "one_case.py"), str(0 if elsewhere else options.jobs), str(out)]
+    return {"keys": keys, "command": command, "threads": options.threads, "processes": options.jobs + READY,
+            "scheduler": options.scheduler, "retries": RETRIES}
 
 
 def command_line(folder, options):
@@ -26,7 +29,7 @@ def command_line(folder, options):
     if options.engine == "dask":
         return [sys.executable, str(HERE / "dask_engine.py"), str(folder / "config.json")]
     where = ["--executor", "slurm", "--jobs", str(options.jobs)] if options.slurm else [
-        "--cores", str(options.jobs * options.threads)]
+        "--cores", str((options.jobs + READY) * options.threads)]
     return [sys.executable, "-m", "snakemake", "--snakefile", str(HERE / "Snakefile"), "--directory", str(folder),
             "--configfile", str(folder / "config.json"), "--runtime-source-cache-path", str(folder / "cache"), *where,
             "--keep-going", "--retries", str(RETRIES), "--scheduler", "greedy", "--nocolor", *options.passed_on]

@@ -1,11 +1,14 @@
 """Does one case: OUT/results/KEY is there afterwards, whole, or not at all.
 
-Usage: python3 one_case.py OUT KEY; OUT/cases/KEY.json says what to do. It is what every engine runs, alone.
+Usage: python3 one_case.py AT_ONCE OUT KEY; OUT/cases/KEY.json says what to do. It is what every engine runs, alone.
+Where engines start one more process than cases may be at work on this machine, AT_ONCE, it gets ready and waits for its turn,
+so that no core waits for an interpreter to start; 0: it is always its turn.
 Exit status: 0 the case has its answer, a result or a refusal of its input (OUT/refused/KEY.json); else worth another try.
 
 A lock a case: where an engine was killed and its case goes on by itself, the same case of the next engine waits for it
 and then finds it done. The program dies with this process, and holds the lock as well until it has.
 """
+import contextlib
 import fcntl
 import json
 import os
@@ -21,6 +24,7 @@ sys.path.insert(0, str(pathlib.Path(__file__).resolve().parent))
 import cases  # noqa: E402
 
 DONE = (0, 3)  # 3: the input was damaged, and the verdict stands
+LOOK_S = 0.02  # from one look for a turn to the next
 ENDED_BY_SIGNAL = 128  # and above, where a program or a shell says so in its status
 
 
@@ -41,13 +45,32 @@ def on_disk(paths):
         os.close(handle)
 
 
-def diagnose(spec, folder, lock):
-    """Runs the program into `folder`; its status, what it said and what it took."""
+@contextlib.contextmanager
+def turn(out, at_once):
+    """One of so many locks, held within."""
+    files = []
+    try:
+        files = [open(out / "work" / f"turn{i}.lock", "w", encoding="utf-8") for i in range(at_once)]
+        while files:
+            for file in files:
+                with contextlib.suppress(BlockingIOError):
+                    fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
+                    yield [file]
+                    return
+            time.sleep(LOOK_S)
+        yield []
+    finally:
+        for file in files:
+            file.close()
+
+
+def diagnose(spec, folder, locks):
+    """Runs the program into `folder`; its status, what it said and what it took. The program holds the locks as well."""
     command = [spec["program"], "--model", spec["model_path"], "--out", str(folder), *spec["options"], *spec["log_paths"]]
     started = time.monotonic()
     # setpriv: the program ends with this process even where that is killed.
     ran = subprocess.run(["setpriv", "--pdeathsig", "KILL", "--", *command], stdin=subprocess.DEVNULL, capture_output=True,
-                         text=True, errors="replace", check=False, pass_fds=(lock.fileno(),))
+                         text=True, errors="replace", check=False, pass_fds=[lock.fileno() for lock in locks])
     used = resource.getrusage(resource.RUSAGE_CHILDREN)
     return {"status": ran.returncode, "said": ran.stderr.strip()[-4000:], "seconds": round(time.monotonic() - started, 3),
             "cpu_s": round(used.ru_utime + used.ru_stime, 3), "machine": os.uname().nodename}
@@ -71,7 +94,7 @@ def fault_of_result(spec, answer, folder):
     return f"changed while it was read: {', '.join(changed)}; run the fleet again" if changed else ""
 
 
-def run(out, key):
+def run(at_once, out, key):
     result = out / "results" / key
     lock = out / "work" / f"{key}.lock"
     with open(lock, "w", encoding="utf-8") as held:
@@ -85,7 +108,8 @@ def run(out, key):
         folder = pathlib.Path(tempfile.mkdtemp(prefix=f"{key}-", dir=out / "work"))
         try:
             os.chmod(folder, 0o755)
-            answer = diagnose(spec, folder, held)
+            with turn(out, at_once) as turns:
+                answer = diagnose(spec, folder, [held, *turns])
             if answer["status"] < 0 or answer["status"] >= ENDED_BY_SIGNAL:  # which says nothing of the case
                 print(f"{key}: {spec['program']} was ended by a signal, status {answer['status']}", file=sys.stderr)
                 return 1
@@ -104,6 +128,6 @@ def run(out, key):
 
 if __name__ == "__main__":
     try:
-        sys.exit(run(pathlib.Path(sys.argv[1]), sys.argv[2]))
+        sys.exit(run(int(sys.argv[1]), pathlib.Path(sys.argv[2]), sys.argv[3]))
     except KeyboardInterrupt:
         sys.exit(130)

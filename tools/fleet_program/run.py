@@ -1,6 +1,5 @@
 """tools/fleet from its command line to its page."""
 import argparse
-import difflib
 import fcntl
 import importlib.util
 import json
@@ -12,20 +11,10 @@ import signal
 import sys
 
 from . import cases, engines, one_case, progress
+from .command_line import USAGE, Parser
 
-OK, FAILED, USAGE, DAMAGED, INTERRUPTED = 0, 1, 2, 3, 130
+OK, FAILED, DAMAGED, INTERRUPTED = 0, 1, 3, 130
 SLURM_JOBS = 100
-
-
-class Parser(argparse.ArgumentParser):
-    def error(self, message):
-        known = [text for action in self._actions for text in action.option_strings]
-        if message.startswith("unrecognized arguments: -"):
-            word = message.split()[2].split("=")[0]
-            near = difflib.get_close_matches(word, known, 1)
-            message = f"unknown option {word}" + (f"; did you mean {near[0]}?" if near else "")
-        print(f"fleet: {message}\nfleet: --help says how it is used", file=sys.stderr)
-        sys.exit(USAGE)
 
 
 def number(low, high):
@@ -42,7 +31,7 @@ def options_of(arguments, root):
     if "--" in arguments:
         cut = arguments.index("--")
         arguments, passed_on = arguments[:cut], arguments[cut + 1:]
-    parser = Parser(add_help=False, allow_abbrev=False)
+    parser = Parser(prog="fleet", add_help=False, allow_abbrev=False)
     parser.add_argument("fleet", nargs="?", type=pathlib.Path)
     parser.add_argument("--out", type=pathlib.Path)
     parser.add_argument("--engine", choices=("snakemake", "dask"), default="snakemake")

@@ -20,6 +20,7 @@ namespace fs = std::filesystem;
 std::vector<std::string> csv_files(const std::vector<std::string>& paths) {
   std::vector<std::string> files;
   for (const std::string& path : paths) {
+    if (!fs::exists(path)) throw std::runtime_error(path + ": no such file or folder");
     if (!fs::is_directory(path)) {
       files.push_back(path);
       continue;

@@ -10,6 +10,7 @@
 int main(int argc, char** argv) {
   using namespace bevel;
   constexpr double kOutlives_s = 0.5;
+  constexpr int kWirePriority = 60;  // of SCHED_FIFO: a wire waits for no program
   tools::CommandLine command_line("bevel-rig",
                                   "Simulates needle, cameras and drives; the other processes cannot tell.");
   command_line.example("bevel-rig --config config/demo.toml");
@@ -22,7 +23,10 @@ int main(int argc, char** argv) {
     std::jthread hub_thread;
     if (config.can.starts_with(kLocal)) {
       hub = std::make_unique<can::LocalHub>(config.can.substr(kLocal.size()));
-      hub_thread = std::jthread([&hub](const std::stop_token& stop) { hub->run(stop); });
+      hub_thread = std::jthread([&](const std::stop_token& stop) {
+        if (config.realtime) (void)nodes::try_realtime(kWirePriority);
+        hub->run(stop);
+      });
     }
     const auto insertion = can::open_bus(config.can), rotation = can::open_bus(config.can);
     rig::FrameServer frames(config.rig.frames_socket);

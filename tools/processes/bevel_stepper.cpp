@@ -5,15 +5,15 @@
 
 int main(int argc, char** argv) {
   using namespace bevel;
+  constexpr int kPriority = 50;  // of SCHED_FIFO
   constexpr double kLongestStop_s = 0.5;
   tools::CommandLine command_line("bevel-stepper", "Drives the insertion and rotation axes over CANopen.");
   command_line.example("bevel-stepper --config config/demo.toml");
   std::string can;
   command_line.option("--can", can, "bus instead of the file's: can0, or unix:/path for the rig's local bus");
   const auto name = [](const nodes::SystemConfig&) { return "bevel-stepper"; };
-  return tools::process_main(command_line, argc, argv, name, [&](tools::ProcessContext& context) {
+  return tools::process_main(command_line, argc, argv, name, kPriority, [&](tools::ProcessContext& context) {
     const stepper::StepperConfig& config = context.config.stepper;
-    tools::go_realtime(context.config, "bevel-stepper", 50);
     const auto bus = can::open_bus(can.empty() ? context.config.can : can, stepper::StepperDriver::listen_ids(config));
     nodes::StepperNode node(context.lcm, *bus, config);
     tools::inject(context, node.port());
@@ -23,7 +23,8 @@ int main(int argc, char** argv) {
                          [&, to_rest](const nodes::Now& now, double) {
                            node.step(now);
                            return !(to_rest && node.at_rest());
-                         }};
+                         },
+                         [&] { return node.waits_for_bus() ? bus->poll_fd() : -1; }, [&](const nodes::Now& now) { node.hear_bus(now); }};
     };
     // The axes are brought to rest before this ends, and others hear of it.
     nodes::run_with_end(

@@ -10,7 +10,8 @@
 
 namespace bevel::tools {
 
-int process_main(CommandLine& command_line, int argc, char** argv, const ProcessName& name, const ProcessBody& body) {
+int process_main(CommandLine& command_line, int argc, char** argv, const ProcessName& name, int realtime_priority,
+                 const ProcessBody& body) {
   std::string config_path, lcm_url, fault;
   int parent = 0;
   command_line.option("-c,--config", config_path, "system file (TOML); config/demo.toml is one", true)
@@ -22,6 +23,9 @@ int process_main(CommandLine& command_line, int argc, char** argv, const Process
     nodes::catch_signals();
     if (parent != 0) nodes::end_with(parent);
     nodes::SystemConfig config = nodes::load_system_config(config_path);
+    if (config.realtime && realtime_priority > 0)
+      if (const std::string refused = nodes::try_realtime(realtime_priority); !refused.empty())
+        std::fprintf(stderr, "%s: %s; running without\n", name(config).c_str(), refused.c_str());
     if (lcm_url.empty()) lcm_url = config.lcm_url;
     lcm::LCM lcm(lcm_url);
     if (!lcm.good()) throw std::runtime_error("LCM does not start; is multicast routed? (see docs/running.md)");
@@ -39,12 +43,6 @@ void inject(const ProcessContext& context, nodes::LcmPort& port) {
   auto injector = std::make_unique<nodes::FaultInjector>(component);
   injector->begin(kind, start_ns, kFaultSeed);
   port.inject(std::move(injector));
-}
-
-void go_realtime(const nodes::SystemConfig& config, const char* program, int priority) {
-  if (!config.realtime) return;
-  if (const std::string refused = nodes::try_realtime(priority); !refused.empty())
-    std::fprintf(stderr, "%s: %s; running without\n", program, refused.c_str());
 }
 
 void warn_of_effects_left_out(const nodes::SystemConfig& config, const char* program) {

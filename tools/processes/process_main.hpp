@@ -24,14 +24,17 @@ using ProcessBody = std::function<int(ProcessContext& context)>;
 using ProcessName = std::function<std::string(const nodes::SystemConfig& config)>;
 
 // Adds --config, --lcm-url, --fault and --end-with, parses, loads, starts LCM, catches signals, claims the name, runs.
-// Returns the exit status.
-int process_main(CommandLine& command_line, int argc, char** argv, const ProcessName& name, const ProcessBody& body);
+// realtime_priority: of SCHED_FIFO, asked for before LCM starts where the file wants it, so that the thread on which
+// LCM receives has it too; a refusal is said and not fatal. 0: never. Returns the exit status.
+int process_main(CommandLine& command_line, int argc, char** argv, const ProcessName& name, int realtime_priority,
+                 const ProcessBody& body);
+inline int process_main(CommandLine& command_line, int argc, char** argv, const ProcessName& name,
+                        const ProcessBody& body) {
+  return process_main(command_line, argc, argv, name, 0, body);
+}
 
 // Makes what the port sends suffer the fault that was asked for, if any.
 void inject(const ProcessContext& context, nodes::LcmPort& port);
-
-// Asks for real-time scheduling where the file wants it; a refusal is said and not fatal.
-void go_realtime(const nodes::SystemConfig& config, const char* program, int priority);
 
 // A line on stderr for each effect of the file that cannot be used live.
 void warn_of_effects_left_out(const nodes::SystemConfig& config, const char* program);

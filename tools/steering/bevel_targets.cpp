@@ -16,7 +16,9 @@ int main(int argc, char** argv) {
   command_line.example("bevel-targets --targets 20 --json targets.json")
       .option("-n,--targets", o.targets, "targets in each scenario", 1, 100000)
       .option("--seed", seed, "the same seed draws the same targets, needles and noise", 0, 2147483647)
-      .option("--scenario", o.scenario, "one of them; without, all")
+      .option("--compared", o.compared, "of them by what the controller's own law is compared with", 1, 100000)
+      .option("--scenario", o.scenario, "one of them, or all; without, those of the table")
+      .option("--law", o.law, "one of them; without, all but half turns at rest")
       .option("--tube-share", o.tube_share, "of the law by arcs; below 0: as the controller has it", -1, 10)
       .option("--threads", o.threads, "at a time", 1, 256)
       .option("--json", o.json, "writes the figures to this file as well");

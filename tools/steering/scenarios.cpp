@@ -93,14 +93,15 @@ struct Kinematic {
   double windup_at_100mm_rad = 0;
   bool windup_known = false;  // in the model file
   bool windup_told = false;   // as a state of the filter
-  double drift_mm = 0;      // of the target in 20 s, in a drawn direction across
-  double breathing_mm = 0;  // of the target, amplitude at 0.25 Hz along x, phase drawn
+  double drift_mm = 0;        // of the target in 20 s, in a drawn direction across
+  double breathing_mm = 0;    // of the target, amplitude at 0.25 Hz along x, phase drawn
   bool gated = false;
   bool obstacle = false;
   bool way_point = false;
   bool retract = false;
   double camera_turned_rad = 0;  // of both, about a drawn axis across the needle
   bool frame_told = false;       // as a state of the filter, beside slopes of insertions of half a degree
+  bool by_flips = false;
 };
 Trial kinematic(const Kinematic& kind, std::uint64_t seed) {
   Draw draw(seed);
@@ -147,8 +148,10 @@ Trial kinematic(const Kinematic& kind, std::uint64_t seed) {
     trial.believed.estimator.nuisance.frame_sd_rad = 2 * std::numbers::pi / 180;
     prior.tilt_sd_rad = trial.believed.estimator.entry_slope_sd_rad;
   }
-  trial.rig.make_plant = [truth, effects, roll_rad] {
-    return std::make_unique<rig::KinematicPlant>(truth, effects, roll_rad, model::OwnValues{}, rig::Cut::kept);
+  trial.needle = {.bicycle = truth, .effects = effects, .roll_rad = roll_rad};
+  trial.rig.make_plant = [needle = trial.needle] {
+    return std::make_unique<rig::KinematicPlant>(needle.bicycle, needle.effects, needle.roll_rad, model::OwnValues{},
+                                                 rig::Cut::kept);
   };
   return trial;
 }
@@ -161,6 +164,7 @@ struct Beam {
   bool obstacle = false;
   bool way_point = false;
   bool retract = false;
+  static constexpr bool by_flips = false, gated = false;
 };
 // The software is told a curvature and a bending length, each off by up to 30 %, and a bicycle's slip of none.
 Trial beam(const Beam& kind, std::uint64_t seed) {
@@ -192,67 +196,87 @@ Trial beam(const Beam& kind, std::uint64_t seed) {
   if (kind.way_point) draw_way(draw, deep, trial);
   if (kind.retract) draw_before(draw, deep, trial);
   trial.rig.cameras = cameras(2);
+  trial.needle = {.bicycle = deep, .beam = config};
   trial.rig.make_plant = [config] { return std::make_unique<rig::BeamNeedle>(config); };
   return trial;
 }
 
+enum class Row { table, floor, apart };  // of the table; with what the true tip would bring; by its name alone
 template <class Kind>
-Scenario scenario(const char* name, const char* what, const Kind& kind, Trial (*draw)(const Kind&, std::uint64_t)) {
-  return {name, what, [=](std::uint64_t seed) { return draw(kind, seed); }, kind.obstacle || kind.way_point,
-          std::is_same_v<Kind, Beam>};
+Scenario scenario(Row row, const char* name, const char* what, const Kind& kind,
+                  Trial (*draw)(const Kind&, std::uint64_t)) {
+  Scenario out{name, what, [=](std::uint64_t seed) { return draw(kind, seed); }};
+  out.along_path = kind.obstacle || kind.way_point;
+  out.goes_back = kind.retract;
+  out.gated = kind.gated;
+  out.in_table = row != Row::apart;
+  out.with_floor = row == Row::floor || std::is_same_v<Kind, Beam>;
+  out.by_flips = kind.by_flips;
+  return out;
 }
 
 }  // namespace
 
 const std::vector<Scenario>& scenarios() {
   static const std::vector<Scenario> all{
-      scenario<Kinematic>("kinematic", "the filter's own model, parameters as told", {}, kinematic),
-      scenario<Kinematic>("kinematic-30", "k, lambda1, lambda2 off by up to 30 %", {.parameters_off = 0.3}, kinematic),
-      scenario<Beam>("beam-100-0.3", "beam, 100 kPa, 0.3 N", {100, 0.3}, beam),
-      scenario<Beam>("beam-100-1", "beam, 100 kPa, 1 N", {100, 1}, beam),
-      scenario<Beam>("beam-50-1", "beam, 50 kPa, 1 N", {50, 1}, beam),
-      scenario<Beam>("beam-20-0.5", "beam, 20 kPa, 0.5 N", {20, 0.5}, beam),
-      scenario<Beam>("beam-any", "beam, 2 to 100 kPa, 0.2 to 1 N", {}, beam),
-      scenario<Beam>("beam-relaxing", "beam, 20 kPa, 0.5 N, of which 30 % relax in 3 s",
-                     {.modulus_kPa = 20, .force_N = 0.5, .relaxing_fraction = 0.3}, beam),
-      scenario<Beam>("beam-windup", "beam, 100 kPa, 1 N, wind-up of 0.5 rad at 100 mm, unknown",
-                     {.modulus_kPa = 100, .force_N = 1, .windup_at_100mm_rad = 0.5}, beam),
-      scenario<Beam>("beam-windup-state", "the same, wind-up as a state of the filter, 0 +- 0.4 rad beforehand",
-                     {.modulus_kPa = 100, .force_N = 1, .windup_at_100mm_rad = 0.5, .windup_told = true}, beam),
-      scenario<Kinematic>("windup", "wind-up of 0.5 rad at 100 mm, unknown", {.windup_at_100mm_rad = 0.5}, kinematic),
-      scenario<Kinematic>("windup-state", "the same, as a state of the filter, 0 +- 0.4 rad beforehand",
-                          {.windup_at_100mm_rad = 0.5, .windup_told = true}, kinematic),
-      scenario<Kinematic>("windup-known", "the same, in the model file",
-                          {.windup_at_100mm_rad = 0.5, .windup_known = true}, kinematic),
-      scenario<Kinematic>("moving", "a target that moves by 5 mm in 20 s, told of at 17 Hz", {.drift_mm = 5},
+      scenario<Kinematic>(Row::table, "kinematic", "the filter's own model, parameters as told", {}, kinematic),
+      scenario<Kinematic>(Row::table, "kinematic-30", "k, lambda1, lambda2 off by up to 30 %", {.parameters_off = 0.3},
                           kinematic),
-      scenario<Kinematic>("breathing", "a target that breathes by +-3 mm at 0.25 Hz, told of at 17 Hz",
+      scenario<Beam>(Row::floor, "beam-100-0.3", "beam, 100 kPa, 0.3 N", {100, 0.3}, beam),
+      scenario<Beam>(Row::floor, "beam-100-1", "beam, 100 kPa, 1 N", {100, 1}, beam),
+      scenario<Beam>(Row::floor, "beam-50-1", "beam, 50 kPa, 1 N", {50, 1}, beam),
+      scenario<Beam>(Row::floor, "beam-20-0.5", "beam, 20 kPa, 0.5 N", {20, 0.5}, beam),
+      scenario<Beam>(Row::apart, "beam-any", "beam, 2 to 100 kPa, 0.2 to 1 N", {}, beam),
+      scenario<Beam>(Row::apart, "beam-relaxing", "beam, 20 kPa, 0.5 N, of which 30 % relax in 3 s",
+                     {.modulus_kPa = 20, .force_N = 0.5, .relaxing_fraction = 0.3}, beam),
+      scenario<Beam>(Row::floor, "beam-windup", "beam, 100 kPa, 1 N, wind-up of 0.5 rad at 100 mm, unknown",
+                     {.modulus_kPa = 100, .force_N = 1, .windup_at_100mm_rad = 0.5}, beam),
+      scenario<Beam>(Row::apart, "beam-windup-state",
+                     "the same, wind-up as a state of the filter, 0 +- 0.4 rad beforehand",
+                     {.modulus_kPa = 100, .force_N = 1, .windup_at_100mm_rad = 0.5, .windup_told = true}, beam),
+      scenario<Kinematic>(Row::floor, "windup", "wind-up of 0.5 rad at 100 mm, unknown", {.windup_at_100mm_rad = 0.5},
+                          kinematic),
+      scenario<Kinematic>(Row::apart, "windup-state", "the same, as a state of the filter, 0 +- 0.4 rad beforehand",
+                          {.windup_at_100mm_rad = 0.5, .windup_told = true}, kinematic),
+      scenario<Kinematic>(Row::apart, "windup-known", "the same, in the model file",
+                          {.windup_at_100mm_rad = 0.5, .windup_known = true}, kinematic),
+      scenario<Kinematic>(Row::table, "moving", "a target that moves by 5 mm in 20 s, told of at 17 Hz",
+                          {.drift_mm = 5}, kinematic),
+      scenario<Kinematic>(Row::table, "breathing", "a target that breathes by +-3 mm at 0.25 Hz, told of at 17 Hz",
                           {.breathing_mm = 3}, kinematic),
-      scenario<Kinematic>("breathing-gated", "the same, arriving where it turns round",
+      scenario<Kinematic>(Row::table, "breathing-gated", "the same, arriving where it turns round",
                           {.breathing_mm = 3, .gated = true}, kinematic),
-      scenario<Kinematic>("roll", "the bevel's roll at the start off by 0.5 rad (standard deviation)",
+      scenario<Kinematic>(Row::table, "roll", "the bevel's roll at the start off by 0.5 rad (standard deviation)",
                           {.roll_sd_rad = 0.5}, kinematic),
-      scenario<Kinematic>("one-camera", "one camera, along x", {.cameras = 1}, kinematic),
-      scenario<Kinematic>("camera-turned", "both cameras' frame turned by 2 degrees about an axis across the needle",
+      scenario<Kinematic>(Row::floor, "one-camera", "one camera, along x", {.cameras = 1}, kinematic),
+      scenario<Kinematic>(Row::floor, "one-camera-flips", "the same, by half turns at rest alone",
+                          {.cameras = 1, .by_flips = true}, kinematic),
+      scenario<Kinematic>(Row::table, "camera-turned",
+                          "both cameras' frame turned by 2 degrees about an axis across the needle",
                           {.camera_turned_rad = 2 * std::numbers::pi / 180}, kinematic),
-      scenario<Kinematic>("camera-turned-state", "the same, frames as states of the filter, 0 +- 2 degrees beforehand",
+      scenario<Kinematic>(Row::apart, "camera-turned-state",
+                          "the same, frames as states of the filter, 0 +- 2 degrees beforehand",
                           {.camera_turned_rad = 2 * std::numbers::pi / 180, .frame_told = true}, kinematic),
-      scenario<Kinematic>("obstacle", "a sphere or capsule of 2 to 5 mm radius within 8 mm of the line to the target",
+      scenario<Kinematic>(Row::table, "obstacle",
+                          "a sphere or capsule of 2 to 5 mm radius within 8 mm of the line to the target",
                           {.obstacle = true}, kinematic),
-      scenario<Beam>("obstacle-beam", "the same, beam, 50 kPa, 1 N",
+      scenario<Beam>(Row::apart, "obstacle-beam", "the same, beam, 50 kPa, 1 N",
                      {.modulus_kPa = 50, .force_N = 1, .obstacle = true}, beam),
       scenario<Kinematic>(
-          "way-point", "a way-point of 1 mm tolerance half way, which it reaches by one arc and the target by another",
+          Row::apart, "way-point",
+          "a way-point of 1 mm tolerance half way, which it reaches by one arc and the target by another",
           {.way_point = true}, kinematic),
-      scenario<Beam>("way-point-beam", "the same, beam, 50 kPa, 1 N",
+      scenario<Beam>(Row::apart, "way-point-beam", "the same, beam, 50 kPa, 1 N",
                      {.modulus_kPa = 50, .force_N = 1, .way_point = true}, beam),
-      scenario<Kinematic>("retract", "at a target 40 to 60 mm deep drawn back by 30 mm, then to another 40 to 60 mm on",
+      scenario<Kinematic>(Row::apart, "retract",
+                          "at a target 40 to 60 mm deep drawn back by 30 mm, then to another 40 to 60 mm on",
                           {.retract = true}, kinematic),
-      scenario<Kinematic>("retract-30", "the same, k, lambda1, lambda2 off by up to 30 %",
+      scenario<Kinematic>(Row::apart, "retract-30", "the same, k, lambda1, lambda2 off by up to 30 %",
                           {.parameters_off = 0.3, .retract = true}, kinematic),
-      scenario<Beam>("retract-beam", "the same, beam, 50 kPa, 1 N",
+      scenario<Beam>(Row::apart, "retract-beam", "the same, beam, 50 kPa, 1 N",
                      {.modulus_kPa = 50, .force_N = 1, .retract = true}, beam),
-      scenario<Kinematic>("outliers", "a tenth of the messages off by 3 to 10 mm", {.outlier_share = 0.1}, kinematic),
+      scenario<Kinematic>(Row::table, "outliers", "a tenth of the messages off by 3 to 10 mm", {.outlier_share = 0.1},
+                          kinematic),
   };
   return all;
 }

@@ -1,6 +1,7 @@
 #pragma once
 // Needles, tissue and cameras that steering is tried on, and what the software is told of each.
 #include <cstdint>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -8,9 +9,18 @@
 
 namespace bevel::steering {
 
+// The needle of a rig, as the rig's part of a system file has it.
+struct TrueNeedle {
+  model::NeedleParameters bicycle;
+  std::optional<model::BeamPlantConfig> beam{};  // in its place
+  std::vector<model::ActiveEffect> effects{};    // of the bicycle
+  double roll_rad = 0;                           // of the bevel at the start
+};
+
 // One target with a rig of its own, and what the software believes.
 struct Trial {
   SteeredRig rig;
+  TrueNeedle needle;
   Believed believed;
   Eigen::Vector3d target_mm;
 };
@@ -21,7 +31,12 @@ struct Scenario {
   // The same trial for the same seed.
   std::function<Trial(std::uint64_t seed)> draw;
   bool along_path = false;  // with obstacles or way-points, which the law by arcs alone knows
-  bool swings = false;      // a stiff shaft, whose tip turning moves
+  bool goes_back = false;   // is drawn back on the way
+  bool gated = false;       // arrives where its target turns round
+  bool in_table = false;    // of docs/steering.md
+  // What the estimate costs is asked for: the same steered by the true tip.
+  bool with_floor = false;
+  bool by_flips = false;  // the controller by half turns at rest
 };
 
 // 5 mm/s, targets 80 to 120 mm deep within 0.6 of the needle's reach, two cameras of 0.2 mm noise where nothing else is

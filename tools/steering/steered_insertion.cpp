@@ -126,6 +126,40 @@ class WayIn {
   std::vector<std::pair<double, Eigen::Vector3d>> way_;
 };
 
+// The controller, or a law that it is measured against.
+class Pilot {
+ public:
+  Pilot(const controller::ControllerConfig& config, const model::NeedleParameters& needle, const Believed& believed)
+      : supervisor_(config, needle, believed.undone), period_s_(config.period_s) {
+    if (believed.yardstick) yardstick_.emplace(*believed.yardstick, config.limits);
+  }
+  void see(const model::ActuatorState& axes) { supervisor_.set_actuator(axes); }
+  void see(const controller::NeedleView& needle) { supervisor_.set_needle(needle); }
+  void request(controller::Request request, const Eigen::Vector3d& target_mm, std::int64_t utime) {
+    told_mm_ = target_mm;
+    supervisor_.request(request, controller::Target{target_mm, 0}, utime);
+  }
+  controller::Rates step(const controller::NeedleView& needle, const model::ActuatorState& axes, std::int64_t utime) {
+    if (yardstick_) return yardstick_->step(needle, axes, told_mm_, period_s_);
+    const model::MotionCommand command = supervisor_.step(utime, period_s_);
+    return {command.insertion_rate_mm_s, command.rotation_rate_rad_s};
+  }
+  bool moves() const { return yardstick_ ? yardstick_->moves() : supervisor_.moves(); }
+  bool holds() const {
+    return yardstick_ ? yardstick_->arrived() : supervisor_.status().state == controller::State::hold;
+  }
+  controller::Reason reason() const {
+    if (!yardstick_) return supervisor_.status().reason;
+    return moves() || holds() ? controller::Reason::none : controller::Reason::state_unhealthy;
+  }
+
+ private:
+  controller::Supervisor supervisor_;
+  double period_s_;
+  std::optional<Yardstick> yardstick_;
+  Eigen::Vector3d told_mm_ = Eigen::Vector3d::Zero();
+};
+
 }  // namespace
 
 Insertion steer(const SteeredRig& rig, const Believed& believed, const Eigen::Vector3d& target_mm, std::uint64_t seed,
@@ -140,7 +174,7 @@ Insertion steer(const SteeredRig& rig, const Believed& believed, const Eigen::Ve
   controller::ControllerConfig config = believed.controller;
   config.through_channel = settings.through_channel && settings.effects.empty();
   const model::NeedleParameters needle = model::AugmentedNeedle(settings.prior.needle, settings.effects).needle();
-  controller::Supervisor supervisor(config, needle, believed.undone);
+  Pilot pilot(config, needle, believed);
   const auto frame_us = std::llround(1e6 * rig.cameras.frame_s);
   const auto control_us = std::llround(1e6 * config.period_s);
   const double tick_s = static_cast<double>(kTick_us) * 1e-6;
@@ -179,7 +213,7 @@ Insertion steer(const SteeredRig& rig, const Believed& believed, const Eigen::Ve
       ++axes.seq;
       estimator.add(axes);
       entry.add(axes);
-      supervisor.set_actuator(axes);
+      pilot.see(axes);
     }
     if (us >= next_frame_us) {
       next_frame_us += frame_us;
@@ -192,36 +226,33 @@ Insertion steer(const SteeredRig& rig, const Believed& believed, const Eigen::Ve
     if (leg == Leg::back)
       result.drawn_back_error_mm = std::max(result.drawn_back_error_mm, (view.pose.p_mm - plant->tip().p_mm).norm());
     if (told_the_tip) view.pose = plant->tip();
-    supervisor.set_needle(view);
+    pilot.see(view);
+    using controller::Request;
     const auto go = [&](const Eigen::Vector3d& to_mm) {
-      const controller::Target target{to_mm, 0};
-      for (const Eigen::Vector3d& point_mm : believed.way_points_mm)
-        supervisor.request(controller::Request::way_point, controller::Target{point_mm, 0}, utime);
-      supervisor.request(controller::Request::arm, target, utime);
-      supervisor.request(controller::Request::start, target, utime);
+      for (const Eigen::Vector3d& point_mm : believed.way_points_mm) pilot.request(Request::way_point, point_mm, utime);
+      pilot.request(Request::arm, to_mm, utime);
+      pilot.request(Request::start, to_mm, utime);
       started = true;
     };
     if (!started) go(leg == Leg::before ? believed.before->target_mm : target_mm);
-    if (rig.target_mm && us % kFollow_us == 0)
-      supervisor.request(controller::Request::follow, controller::Target{target_now(), 0}, utime);
-    const model::MotionCommand command = supervisor.step(utime, config.period_s);
-    axes.insertion_rate_mm_s = command.insertion_rate_mm_s;
-    axes.rotation_rate_rad_s = command.rotation_rate_rad_s;
-    if (supervisor.moves()) continue;
-    if (leg == Leg::last || supervisor.status().state != controller::State::hold) break;
+    if (rig.target_mm && us % kFollow_us == 0) pilot.request(Request::follow, target_now(), utime);
+    const controller::Rates rates = pilot.step(view, axes, utime);
+    axes.insertion_rate_mm_s = rates.insertion_mm_s;
+    axes.rotation_rate_rad_s = rates.rotation_rad_s;
+    if (pilot.moves()) continue;
+    if (leg == Leg::last || !pilot.holds()) break;
     if (leg == Leg::before) {
       leg = Leg::back;
       result.before_miss_mm = (plant->tip().p_mm - believed.before->target_mm).norm();
-      const double to_mm = axes.insertion_mm - believed.before->drawn_back_mm;
-      supervisor.request(controller::Request::retract, controller::Target{{0, 0, to_mm}, 0}, utime);
-    } else if (command.insertion_rate_mm_s == 0) {
+      pilot.request(Request::retract, {0, 0, axes.insertion_mm - believed.before->drawn_back_mm}, utime);
+    } else if (rates.insertion_mm_s == 0) {
       leg = Leg::last;
       go(target_mm);
     }
   }
   result.inserted_mm = axes.insertion_mm;
-  result.arrived = leg == Leg::last && supervisor.status().state == controller::State::hold;
-  result.reason = supervisor.status().reason;
+  result.arrived = leg == Leg::last && pilot.holds();
+  result.reason = pilot.reason();
   if (!way_point_miss_mm.empty()) result.way_point_miss_mm = std::ranges::max(way_point_miss_mm);
   result.miss_mm = (plant->tip().p_mm - target_now()).norm();
   const estimator::Estimate last = estimator.estimate(axes.utime);

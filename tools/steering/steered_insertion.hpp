@@ -13,6 +13,7 @@
 #include "controller/supervisor.hpp"
 #include "estimator/config.hpp"
 #include "rig/plant/plant.hpp"
+#include "tools/steering/yardstick.hpp"
 
 namespace bevel::steering {
 
@@ -53,6 +54,8 @@ struct Believed {
     double drawn_back_mm = 0;
   };
   std::optional<Before> before{};
+  // In place of the controller; of a target alone, without way-points, obstacles or one before.
+  std::optional<YardstickLaw> yardstick{};
 };
 
 struct Insertion {
@@ -65,7 +68,7 @@ struct Insertion {
   double turned_rad = 0;  // of the base, both ways together
   // Least distance of the true tip from any obstacle's surface, negative inside; infinite where there is none.
   double nearest_mm = std::numeric_limits<double>::infinity();
-  double way_point_miss_mm = 0;            // the farthest of them, true tip to point where it was nearest
+  double way_point_miss_mm = 0;  // the farthest of them, true tip to point where it was nearest
   // Of one that went to a target before and was drawn back: there, and the farthest on the way back of the true tip
   // from where it was on the way in, and of the estimate from the true tip.
   double before_miss_mm = 0, off_the_path_mm = 0, drawn_back_error_mm = 0;

@@ -4,13 +4,16 @@
 #include <array>
 #include <cmath>
 #include <cstdio>
+#include <ctime>
 #include <fstream>
 #include <limits>
 #include <map>
 #include <nlohmann/json.hpp>
 #include <numbers>
+#include <optional>
 #include <ostream>
 #include <stdexcept>
+#include <utility>
 
 #include "diagnosis/parallel.hpp"
 #include "tools/common/progress_line.hpp"
@@ -22,20 +25,25 @@ namespace {
 struct LawTried {
   const char* name;
   controller::Law law;
-  bool told_the_tip = false;  // what an estimate without error would bring: asked where the tip swings
+  bool told_the_tip = false;  // what an estimate without error would bring
+  std::optional<YardstickLaw> yardstick{};
+  bool compared = true;  // with the controller's own
 };
-constexpr std::array<LawTried, 4> kLaws{{{"arcs", controller::Law::arcs},
-                                         {"arcs, told the tip", controller::Law::arcs, true},
-                                         {"flip", controller::Law::flip},
-                                         {"spin", controller::Law::spin}}};
+constexpr std::array<LawTried, 6> kLaws{
+    {{.name = "arcs", .law = controller::Law::arcs, .compared = false},
+     {.name = "told the tip", .law = controller::Law::arcs, .told_the_tip = true},
+     {.name = "spin", .law = controller::Law::spin},
+     {.name = "duty cycle", .law = controller::Law::spin, .yardstick = YardstickLaw::duty_cycle},
+     {.name = "bang-bang", .law = controller::Law::spin, .yardstick = YardstickLaw::bang_bang},
+     {.name = "flip", .law = controller::Law::flip}}};
 
 // Of those that came to rest at the target's depth.
 struct Figures {
   int targets = 0, arrived = 0, refused = 0;
   double median_mm = 0, mean_mm = 0, sd_mm = 0, at_95_mm = 0, worst_mm = 0;
   double turns_per_100mm = 0, feed_mm_s = 0, estimate_error_mm = 0, pose_nees_per_axis = 0;
-  int turned_frame_said = 0;                                    // of all targets
-  double way_point_miss_mm = 0;                                 // the worst, of those that arrived
+  std::vector<double> turned_frame_said_mm{};  // of insertion, of all targets
+  double way_point_miss_mm = 0;                // the worst, of those that arrived
   // The same of those that were drawn back: of the tip off the way in, of the estimate, and of the target before.
   double off_the_path_mm = 0, drawn_back_error_mm = 0, before_miss_mm = 0;
   int touched = 0;                                              // an obstacle, of all targets
@@ -49,7 +57,7 @@ Figures figures_of(const std::vector<Insertion>& all) {
   double turned_rad = 0, inserted_mm = 0, duration_s = 0;
   for (const Insertion& one : all) {
     ++f.targets;
-    if (one.turned_frame_said_mm > 0) ++f.turned_frame_said;
+    if (one.turned_frame_said_mm > 0) f.turned_frame_said_mm.push_back(one.turned_frame_said_mm);
     if (one.nearest_mm < 0) ++f.touched;
     f.nearest_mm = std::min(f.nearest_mm, one.nearest_mm);
     if (!one.arrived) {
@@ -70,6 +78,7 @@ Figures figures_of(const std::vector<Insertion>& all) {
     turned_rad += one.turned_rad, inserted_mm += one.inserted_mm, duration_s += one.duration_s;
     f.estimate_error_mm += one.estimate_error_mm, f.pose_nees_per_axis += one.pose_nees / 6;
   }
+  std::ranges::sort(f.turned_frame_said_mm);
   if (miss_mm.empty()) return f;
   const auto n = static_cast<double>(miss_mm.size());
   std::ranges::sort(miss_mm);
@@ -86,14 +95,21 @@ Figures figures_of(const std::vector<Insertion>& all) {
 
 std::string row_of(const std::string& scenario, const char* law, const Figures& f) {
   std::array<char, 256> text{};
-  std::snprintf(
-      text.data(), text.size(),
-      "| %s | %s | %.2f | %.2f +- %.2f | %.2f | %.2f | %.1f | %d | %.1f | %.2f | %.2f | %.2f |", scenario.c_str(), law,
-      f.median_mm, f.mean_mm, f.sd_mm, f.at_95_mm, f.worst_mm, 100.0 * f.arrived / std::max(f.targets, 1), f.refused,
-      f.turns_per_100mm, f.feed_mm_s, f.estimate_error_mm, f.pose_nees_per_axis);
+  std::snprintf(text.data(), text.size(),
+                "| %s | %s | %d | %.2f | %.2f +- %.2f | %.2f | %.2f | %.1f | %d | %.1f | %.2f | %.2f | %.2f |",
+                scenario.c_str(), law, f.targets, f.median_mm, f.mean_mm, f.sd_mm, f.at_95_mm, f.worst_mm,
+                100.0 * f.arrived / std::max(f.targets, 1), f.refused, f.turns_per_100mm, f.feed_mm_s,
+                f.estimate_error_mm, f.pose_nees_per_axis);
   std::string row = text.data();
+  if (f.arrived == 0)
+    row = "| " + scenario + " | " + law + " | " + std::to_string(f.targets) + " | | | | | 0.0 | " +
+          std::to_string(f.refused) + " | | | | |";
   for (const auto& [reason, count] : f.stopped) row += " " + std::to_string(count) + " " + reason + ";";
-  if (f.turned_frame_said > 0) row += " frame said to be turned: " + std::to_string(f.turned_frame_said) + ";";
+  if (const auto& said_mm = f.turned_frame_said_mm; !said_mm.empty()) {
+    std::snprintf(text.data(), text.size(), " frame said to be turned: %zu, half of them by %.0f mm, all by %.0f;",
+                  said_mm.size(), said_mm[said_mm.size() / 2], said_mm.back());
+    row += text.data();
+  }
   if (f.way_point_miss_mm > 0) {
     std::snprintf(text.data(), text.size(), " way-point missed by at most %.2f;", f.way_point_miss_mm);
     row += text.data();
@@ -120,7 +136,7 @@ nlohmann::json json_of(const Scenario& scenario, const char* law, const Figures&
           {"arrived", f.arrived},
           {"refused", f.refused},
           {"stopped", f.stopped},
-          {"turned_frame_said", f.turned_frame_said},
+          {"turned_frame_said_mm", f.turned_frame_said_mm},
           {"touched", f.touched},
           {"way_point_miss_mm", f.way_point_miss_mm},
           {"off_the_path_mm", f.off_the_path_mm},
@@ -138,56 +154,98 @@ nlohmann::json json_of(const Scenario& scenario, const char* law, const Figures&
           {"pose_nees_per_axis", f.pose_nees_per_axis}};
 }
 
+std::vector<const Scenario*> wanted_scenarios(const std::string& name) {
+  std::vector<const Scenario*> wanted;
+  std::string names = "all";
+  for (const Scenario& scenario : scenarios()) {
+    names += ", " + scenario.name;
+    if (name.empty() ? scenario.in_table : name == "all" || name == scenario.name) wanted.push_back(&scenario);
+  }
+  if (wanted.empty()) throw std::runtime_error("no scenario '" + name + "'; there are: " + names);
+  return wanted;
+}
+
+std::vector<LawTried> wanted_laws(const std::string& name) {
+  std::vector<LawTried> wanted;
+  std::string names;
+  for (const LawTried& law : kLaws) {
+    names += (names.empty() ? "" : ", ") + std::string(law.name);
+    if (name.empty() ? law.law != controller::Law::flip : name == law.name) wanted.push_back(law);
+  }
+  if (wanted.empty()) throw std::runtime_error("no law '" + name + "'; there are: " + names);
+  return wanted;
+}
+
+bool is_tried(const Scenario& scenario, const LawTried& law) {
+  if (law.told_the_tip && !scenario.with_floor) return false;
+  if (law.yardstick && (scenario.goes_back || scenario.gated)) return false;
+  if (scenario.by_flips) return law.law == controller::Law::arcs;
+  return !scenario.along_path || law.law == controller::Law::arcs;
+}
+
+struct Row {
+  const Scenario* scenario;
+  LawTried law;
+  int targets;
+};
+
+std::vector<Row> rows_of(const TargetsOptions& options) {
+  std::vector<Row> rows;
+  const std::vector<LawTried> laws = wanted_laws(options.law);
+  for (const Scenario* scenario : wanted_scenarios(options.scenario))
+    for (const LawTried& law : laws)
+      if (is_tried(*scenario, law))
+        rows.push_back({scenario, law, law.compared ? std::min(options.targets, options.compared) : options.targets});
+  return rows;
+}
+
+Insertion one_insertion(const Row& row, const TargetsOptions& options, std::uint64_t seed) {
+  Trial trial = row.scenario->draw(seed);
+  trial.believed.controller.law = row.scenario->by_flips ? controller::Law::flip : row.law.law;
+  trial.believed.yardstick = row.law.yardstick;
+  if (options.tube_share >= 0) trial.believed.controller.gains.tube_share = options.tube_share;
+  return steer(trial.rig, trial.believed, trial.target_mm, seed, row.law.told_the_tip);
+}
+
 }  // namespace
 
 int run_targets(const TargetsOptions& options, std::ostream& out) {
-  std::vector<const Scenario*> wanted;
-  std::string names;
-  for (const Scenario& scenario : scenarios()) {
-    names += (names.empty() ? "" : ", ") + scenario.name;
-    if (options.scenario.empty() || options.scenario == scenario.name) wanted.push_back(&scenario);
-  }
-  if (wanted.empty()) throw std::runtime_error("no scenario '" + options.scenario + "'; there are: " + names);
+  const std::vector<Row> rows = rows_of(options);
   std::ofstream file;
   if (!options.json.empty()) {
     file.open(options.json);
     if (!file) throw std::runtime_error(options.json + ": cannot be written");
   }
-  out << options.targets << " targets each, seed " << options.seed << "; mm, of those that arrived\n\n"
-      << "| scenario | law | median | mean +- sd | 95 % | worst | arrived, % | refused before | turns per 100 mm | "
-         "feed, mm/s | estimate to tip | pose NEES / 6 | stopped |\n| --- | --- | --- | --- | --- | --- | --- | --- "
-         "| --- | --- | --- | --- | --- |\n";
+  out << "seed " << options.seed << "; mm, of those that arrived\n\n"
+      << "| scenario | law | targets | median | mean +- sd | 95 % | worst | arrived, % | refused before | turns per "
+         "100 "
+         "mm | feed, mm/s | estimate to tip | pose NEES / 6 | stopped |\n| --- | --- | --- | --- | --- | --- | --- | "
+         "--- | --- | --- | --- | --- | --- | --- |\n";
   nlohmann::json all = nlohmann::json::array();
-  const auto is_tried = [](const Scenario& scenario, const LawTried& law) {
-    if (law.told_the_tip && !scenario.swings) return false;
-    return !scenario.along_path || law.law == controller::Law::arcs;
-  };
-  std::size_t rows = 0;
-  for (const Scenario* scenario : wanted)
-    for (const LawTried& law : kLaws) rows += is_tried(*scenario, law) ? 1 : 0;
+  std::size_t insertions_all = 0;
+  for (const Row& row : rows) insertions_all += static_cast<std::size_t>(row.targets);
   tools::ProgressLine progress(tools::ProgressLine::as_stderr_is());
-  progress.begin("insertions", rows * static_cast<std::size_t>(options.targets),
-                 static_cast<std::size_t>(options.threads));
-  for (const Scenario* scenario : wanted)
-    for (const LawTried& law : kLaws) {
-      if (!is_tried(*scenario, law)) continue;
-      std::vector<Insertion> insertions(static_cast<std::size_t>(options.targets));
-      parallel_for(insertions.size(), options.threads, [&](std::size_t i) {
-        const std::uint64_t seed = 1'000'003 * options.seed + i;
-        Trial trial = scenario->draw(seed);
-        trial.believed.controller.law = law.law;
-        if (options.tube_share >= 0) trial.believed.controller.gains.tube_share = options.tube_share;
-        insertions[i] = steer(trial.rig, trial.believed, trial.target_mm, seed, law.told_the_tip);
-        progress.one_done();
-      });
-      const Figures figures = figures_of(insertions);
-      progress.make_room();
-      out << row_of(scenario->name, law.name, figures) << std::endl;
-      all.push_back(json_of(*scenario, law.name, figures));
-    }
+  progress.begin("insertions", insertions_all, static_cast<std::size_t>(options.threads));
+  const std::clock_t from = std::clock();
+  for (const Row& row : rows) {
+    std::vector<Insertion> insertions(static_cast<std::size_t>(row.targets));
+    parallel_for(insertions.size(), options.threads, [&](std::size_t i) {
+      insertions[i] = one_insertion(row, options, 1'000'003 * options.seed + i);
+      progress.one_done();
+    });
+    const char* law = row.scenario->by_flips && !row.law.told_the_tip ? "flip" : row.law.name;
+    const Figures figures = figures_of(insertions);
+    progress.make_room();
+    out << row_of(row.scenario->name, law, figures) << std::endl;
+    all.push_back(json_of(*row.scenario, law, figures));
+  }
   progress.end();
-  out << "\n";
-  for (const Scenario* scenario : wanted) out << "- " << scenario->name << ": " << scenario->what << "\n";
+  const double processor_s = static_cast<double>(std::clock() - from) / CLOCKS_PER_SEC;
+  out << "\n" << insertions_all << " insertions, " << std::lround(processor_s) << " s of processor time\n\n";
+  const Scenario* before = nullptr;
+  for (const Row& row : rows)
+    if (std::exchange(before, row.scenario) != row.scenario)
+      out << "- " << row.scenario->name << ": " << row.scenario->what << "\n";
   if (file.is_open()) file << nlohmann::json{{"seed", options.seed}, {"rows", all}}.dump(1) << "\n";
   return 0;
 }

@@ -245,7 +245,7 @@ class Chart {
     byId('charts').append(this.holder);
     const axis = { stroke: style('--faint'), grid: { stroke: style('--line'), width: 1 }, ticks: { stroke: style('--line') }, font: '11px system-ui' };
     this.plot = new uPlot({
-      title: `${title} (${unit})`, width: 400, height: 130, cursor: { sync: { key: 'time' } },
+      title: unit ? `${title} (${unit})` : title, width: 400, height: 130, cursor: { sync: { key: 'time' } },
       scales: { x: { time: false }, y: scale },
       axes: [axis, { ...axis, size: 60 }],
       series: [{ label: 's', value: (_, v) => fixed(v, 2) }].concat(series.map(([label, , colour, dashed]) =>
@@ -267,7 +267,7 @@ function makeCharts() {
     new Chart('insertion rate', 'mm/s', [['commanded', 0, '--target', true], ['axis', 1, '--estimate']]),
     new Chart('rotation rate', 'rad/s', [['commanded', 2, '--target', true], ['axis', 3, '--estimate']]),
     new Chart('distance to the target', 'mm', [['distance', 7, '--estimate']]),
-    new Chart('test ratio, above 1 is rejected', '–', [['first camera', 8, '--estimate'], ['second camera', 9, '--target']],
+    new Chart('test ratio, above 1 is rejected', '', [['first camera', 8, '--estimate'], ['second camera', 9, '--target']],
               { range: (_, low, high) => [0, Math.max(1.2, high)] }),
     new Chart('k', '1/mm', [['k', 4, '--estimate']]),
     new Chart('slip', 'lambda1 1/rad, lambda2', [['lambda1', 5, '--estimate'], ['lambda2', 6, '--target']]));

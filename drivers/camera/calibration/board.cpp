@@ -1,5 +1,6 @@
 #include "drivers/camera/calibration/board.hpp"
 
+#include <algorithm>
 #include <cmath>
 #include <map>
 #include <opencv2/aruco/charuco.hpp>
@@ -37,6 +38,27 @@ struct Board::Charuco {
 namespace {
 
 constexpr int kMarkers = 250;
+
+// Whether corners lie in the picture as they do on the board, up to a lens: where the board has other columns or rows
+// than this one its markers are taken for others, and corners lie squares beside where a plane would show them.
+bool lie_as_on(const Board& board, const Sighting& seen) {
+  constexpr size_t kFewest = 8;  // fewer are not used, and four always fit
+  if (seen.ids.size() < kFewest) return true;
+  std::vector<cv::Point2d> on_board;
+  for (const int id : seen.ids) on_board.emplace_back(board.corner_mm(id)[0], board.corner_mm(id)[1]);
+  const cv::Mat homography = cv::findHomography(on_board, seen.px);
+  if (homography.empty()) return false;
+  std::vector<cv::Point2d> shown, next = on_board, shown_next;
+  for (cv::Point2d& p : next) p.x += board.spec().square_mm;
+  cv::perspectiveTransform(on_board, shown, homography);
+  cv::perspectiveTransform(next, shown_next, homography);
+  std::vector<double> off_squares;
+  for (size_t i = 0; i < shown.size(); ++i)
+    off_squares.push_back(cv::norm(seen.px[i] - shown[i]) / std::max(1e-9, cv::norm(shown_next[i] - shown[i])));
+  const auto middle = off_squares.begin() + static_cast<std::ptrdiff_t>(off_squares.size() / 2);
+  std::nth_element(off_squares.begin(), middle, off_squares.end());
+  return *middle < 0.25;
+}
 
 // Chessboards come in any of the orders that look alike; `grid` is turned so that it runs as printed.
 void turn_as_printed(const cv::Mat& gray, int across, int down, std::vector<cv::Point2f>& grid) {
@@ -111,7 +133,7 @@ Sighting Board::find(const cv::Mat& gray) const {
   if (charuco_) {
     Sighting theirs = charuco_->find(gray);
     for (int& id : theirs.ids) id = charuco_->ours.at(id);
-    return theirs;
+    return lie_as_on(*this, theirs) ? theirs : Sighting{};
   }
   const cv::Size inner(spec_.columns - 1, spec_.rows - 1);
   std::vector<cv::Point2f> grid;
