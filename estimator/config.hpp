@@ -54,6 +54,15 @@ struct ReadingNoise {
   double correlation_rad = 0;   // of turning: which shows the bevel from another side
 };
 
+// Slowly known states of the rig (nuisance.hpp), standard deviations beforehand; 0 each: not a state. The past is then
+// not run again, and there are no effects beside them.
+struct NuisancePrior {
+  double windup_sd_rad = 0;  // of the tip's lag at 100 mm inserted, which is not negative
+  double frame_sd_rad = 0;   // of each camera's frame about each axis
+  double latency_sd_s = 0;   // of each camera
+  bool any() const { return windup_sd_rad > 0 || frame_sd_rad > 0 || latency_sd_s > 0; }
+};
+
 struct Gate {
   double probability = 0.9999;  // share of good measurements that pass
   // Refused in a row, of one camera (another's good ones do not outweigh it), of all, or of headings. Unsure is slow: a
@@ -79,6 +88,7 @@ struct EstimatorConfig {
   Prior prior;
   ProcessNoise process;
   ReadingNoise reading;
+  NuisancePrior nuisance;
   Gate gate;
   HealthLimits limits;
   // What the model file says that the bicycle leaves out, with its parameters held: applied in propagation, and in the
@@ -109,5 +119,9 @@ struct EstimatorConfig {
   // turned. False: wherever the axes stand at first is the entry, as in recordings made elsewhere.
   bool start_at_axes = false;
 };
+
+inline bool takes_midpoint(const EstimatorConfig& config, double insertion_mm, double rotation_rad) {
+  return config.midpoint_derivatives && std::abs(insertion_mm) <= 0.5 && std::abs(rotation_rad) <= 0.05;
+}
 
 }  // namespace bevel::estimator

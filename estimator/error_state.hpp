@@ -1,6 +1,6 @@
 #pragma once
 // The error of a FilterState as a vector of nine, or of ten with ell, and its covariance as one matrix. With the errors
-// that readings share behind them they are fifteen or sixteen.
+// that readings share behind them they are fifteen or sixteen; the nuisance states, where there are any, come last.
 #include "estimator/needle_filter.hpp"
 
 namespace bevel::estimator {
@@ -10,9 +10,16 @@ using Error = Eigen::Matrix<double, kSize, 1>;
 template <int kSize>
 using Covariance = Eigen::Matrix<double, kSize, kSize>;
 
+// With the nuisance states, which come last, all are carried, in use or not: what is not has no variance, or is not
+// seen.
+inline constexpr int kAllStates = 10 + kSharedErrors + kNuisance;
+template <int kSize>
+inline constexpr int kFiltered = kSize == kAllStates ? kSize - kNuisance : kSize;
+template <int kSize>
+inline constexpr bool kHasShared = kFiltered<kSize> > 10;
 // Of the state itself.
 template <int kSize>
-inline constexpr int kOwn = kSize > 10 ? kSize - kSharedErrors : kSize;
+inline constexpr int kOwn = kHasShared<kSize> ? kFiltered<kSize> - kSharedErrors : kFiltered<kSize>;
 
 inline const Matrix9d& get_covariance(const FilterState& state, std::integral_constant<int, 9>) {
   return state.covariance;
@@ -30,6 +37,9 @@ Covariance<kSize> get_covariance(const FilterState& state, std::integral_constan
       state.shared.covariance;
   return P;
 }
+// Of all (filter_nuisance.cpp).
+Covariance<kAllStates> get_covariance(const FilterState& state, std::integral_constant<int, kAllStates>);
+void set_all_covariance(FilterState& state, const Covariance<kAllStates>& P);
 // The state's own matrix where that is all of it, a copy otherwise.
 template <int kSize>
 decltype(auto) covariance_of(const FilterState& state) {
@@ -38,14 +48,16 @@ decltype(auto) covariance_of(const FilterState& state) {
 
 template <int kSize>
 void set_covariance(FilterState& state, const Covariance<kSize>& P) {
+  if constexpr (kSize == kAllStates) return set_all_covariance(state, P);
   state.covariance = P.template topLeftCorner<9, 9>();
   if constexpr (kOwn<kSize> == 10) {
-    state.tenth_covariance = P.template topRightCorner<9, 1>();
+    state.tenth_covariance = P.template block<9, 1>(0, 9);
     state.tenth_variance = P(9, 9);
   }
-  if constexpr (kSize > 10) {
-    state.shared.with_state.topRows<kOwn<kSize>>() = P.template topRightCorner<kOwn<kSize>, kSharedErrors>();
-    state.shared.covariance = P.template bottomRightCorner<kSharedErrors, kSharedErrors>();
+  constexpr int kStates = kOwn<kSize>;
+  if constexpr (kHasShared<kSize>) {
+    state.shared.with_state.topRows<kStates>() = P.template block<kStates, kSharedErrors>(0, kStates);
+    state.shared.covariance = P.template block<kSharedErrors, kSharedErrors>(kStates, kStates);
   }
 }
 
@@ -57,7 +69,12 @@ void move(FilterState& state, const Error<kSize>& error) {
   state.lambda1_per_rad += error[7];
   state.lambda2 += error[8];
   if constexpr (kOwn<kSize> == 10) (state.bending_mm > 0 ? state.bending_mm : state.wheelbase_mm) += error[9];
-  if constexpr (kSize > 10) state.shared.mean += error.template tail<kSharedErrors>();
+  if constexpr (kHasShared<kSize>) state.shared.mean += error.template segment<kSharedErrors>(kOwn<kSize>);
+  if constexpr (kSize == kAllStates) {
+    const auto by = error.template tail<kNuisance>();
+    state.nuisance.mean += by;
+    state.nuisance.lag_rad += state.nuisance.lag_by_windup * by[kWindup];
+  }
 }
 
 // The error by which `from` is moved to `to`.

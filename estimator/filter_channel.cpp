@@ -19,7 +19,6 @@ namespace bevel::estimator {
 namespace {
 
 using Eigen::Vector3d;
-constexpr double kShort_mm = 0.5;  // as needle_filter.cpp
 
 // Motions in the body, one after the other, and their derivatives by the error before the first and by k, lambda1,
 // lambda2 and the tenth.
@@ -80,7 +79,7 @@ bool NeedleFilter::draw_through(FilterState& state, const Channel::Part& part, b
   }
   model::NeedleJacobian J;
   const model::StepInput input{part.insertion_mm, 0, {curvature, 0}};
-  const bool in_domain = config_.midpoint_derivatives && std::abs(part.insertion_mm) <= kShort_mm
+  const bool in_domain = takes_midpoint(config_, part.insertion_mm, 0)
                              ? model::advance_by_midpoint(motions.pose, input, slip_of(state), J)
                              : model::advance(motions.pose, input, slip_of(state), J);
   if (!in_domain) return false;
@@ -96,11 +95,11 @@ bool NeedleFilter::draw_through(FilterState& state, const Channel::Part& part, b
   if (ten_states_) {
     Covariance<10> P = covariance_of<10>(state);
     propagate<10>(P, motions.by_pose, motions.by_needle);
-    if (coloured_) carry_shared<10>(state, motions.by_pose, motions.by_needle);
+    if (coloured_ || has_nuisance_) carry_shared<10>(state, motions.by_pose, motions.by_needle);
     P.diagonal() += process_variance<10>(P, part.insertion_mm, 0);
     set_covariance<10>(state, P);
   } else {
-    if (coloured_) carry_shared<9>(state, motions.by_pose, motions.by_needle.leftCols<3>());
+    if (coloured_ || has_nuisance_) carry_shared<9>(state, motions.by_pose, motions.by_needle.leftCols<3>());
     propagate<9>(state.covariance, motions.by_pose, motions.by_needle.leftCols<3>());
     state.covariance.diagonal() += process_variance<9>(state.covariance, part.insertion_mm, 0);
   }

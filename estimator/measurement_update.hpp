@@ -17,7 +17,7 @@ inline constexpr double kReadingsOfOneError = 30;
 struct SeenAxes {
   Eigen::Matrix3d axes;
   Eigen::Vector3d variance = Eigen::Vector3d::Zero();
-  Eigen::Vector3d shared = Eigen::Vector3d::Zero();  // more of it, of an error that neighbouring readings share
+  Eigen::Vector3d shared = Eigen::Vector3d::Zero();    // more of it, of an error that neighbouring readings share
   Eigen::Vector3d coloured = Eigen::Vector3d::Zero();  // more of it, of the three SharedErrors from `first_error`
   int first_error = 0;
   int rank = 0;
@@ -101,6 +101,12 @@ Update update_seen(FilterState& state, const Eigen::Matrix<double, 3, kColumns>&
       return {};
   }
 }
+
+// The same of all states, those of the rig included, in one function for every rank: an axis that is not seen is a row
+// of zeros. `by_state`: by the state's own ten; `by_nuisance`: by the nuisance states, of which the residual has the
+// mean.
+Update update_all(FilterState& state, const Eigen::Matrix<double, 3, 10>& by_state, const ByNuisance& by_nuisance,
+                  const SeenAxes& seen, const Eigen::Vector3d& residual, const std::array<double, 3>& gate);
 
 // The x across `along` with information x = left, where that is singular along it: nothing along it, nor along an axis
 // that is not seen.

@@ -12,7 +12,7 @@ namespace bevel::estimator {
 
 NeedleEstimator::NeedleEstimator(const EstimatorConfig& config, std::size_t history)
     : filter_(config),
-      past_(config.effects.empty() && config.prior.bending_mm == 0
+      past_(config.effects.empty() && config.prior.bending_mm == 0 && !config.nuisance.any()
                 ? static_cast<std::size_t>(std::max(config.relinearised_steps, 0))
                 : 0),
       walked_(std::make_unique_for_overwrite<WalkedStep[]>(past_.room())) {

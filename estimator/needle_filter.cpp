@@ -23,7 +23,6 @@ constexpr double kBendingMin_mm = 5, kBendingMax_mm = 200;
 constexpr double kVarianceFloor = 1e-14;
 constexpr double kAtEntry_mm = 1.0;  // not inserted yet: within what an entry point is met by
 constexpr std::int32_t kCamerasCounted = 4;
-constexpr double kShort_mm = 0.5, kShort_rad = 0.05;  // see EstimatorConfig::midpoint_derivatives
 
 double square(double x) { return x * x; }
 
@@ -62,6 +61,7 @@ NeedleFilter::NeedleFilter(const EstimatorConfig& config)
       stiff_(config.prior.bending_mm > 0),
       ten_states_(wheelbase_estimated_ || stiff_),
       coloured_(config.reading.correlated_share > 0),
+      has_nuisance_(config.nuisance.any()),
       needle_(config.prior.needle, config.effects, wheelbase_estimated_ ? 10 : 9,
               {.curvature = 6, .lambda1 = 7, .lambda2 = 8, .wheelbase = wheelbase_estimated_ ? 9 : -1}) {
   for (int rank = 1; rank <= 3; ++rank)
@@ -83,6 +83,7 @@ FilterState NeedleFilter::initial(double insertion_mm, double rotation_rad) cons
   state.covariance.diagonal() << aside_mm2, aside_mm2, square(prior.position_sd_mm), tilt_rad2, tilt_rad2,
       square(prior.roll_sd_rad) + square(prior.variation.roll_rad), square(insertion_curvature_sd_per_mm(prior)),
       square(prior.lambda1_sd_per_rad), square(prior.lambda2_sd);
+  begin_nuisance(state);
   if (config_.effects.empty()) return state;
   const model::AugmentedState entry = needle_.entry({0, insertion_mm, rotation_rad});
   state.pose = entry.pose;
@@ -102,6 +103,8 @@ FilterState NeedleFilter::inserted(double insertion_mm, double rotation_rad) con
   const ProcessNoise& noise = config_.process;
   state.covariance(5, 5) +=
       square(noise.roll_rad) * std::abs(insertion_mm) + square(noise.roll_per_sqrt_rad) * std::abs(rotation_rad);
+  state.nuisance.inserted_mm = insertion_mm;
+  state.covariance(5, 5) += square(config_.nuisance.windup_sd_rad * square(insertion_mm / 100));
   return state;
 }
 
@@ -133,8 +136,13 @@ void NeedleFilter::predict(FilterState& state, double insertion_mm, double rotat
                                                  : predict_with_effects<9>(state, increment));
     return;
   }
-  follow(state, insertion_mm, rotation_rad, true,
-         [&](double by_mm, double by_rad) { predict_cutting(state, by_mm, by_rad); });
+  const auto cutting = [&](double by_mm, double by_rad) { predict_cutting(state, by_mm, by_rad); };
+  if (!has_nuisance_) return follow(state, insertion_mm, rotation_rad, true, cutting);
+  const Eigen::Vector3d before_mm = state.pose.p_mm;
+  const TipTurn turn = follow_windup(state, insertion_mm, rotation_rad);
+  follow(state, insertion_mm, turn.rad, true, cutting);
+  spread_turn(state, turn.by_windup);
+  if (duration_s > 0) state.nuisance.tip_velocity_mm_s = (state.pose.p_mm - before_mm) / duration_s;
 }
 
 void NeedleFilter::predict_cutting(FilterState& state, double insertion_mm, double rotation_rad) const {
@@ -146,6 +154,7 @@ void NeedleFilter::predict_cutting(FilterState& state, double insertion_mm, doub
 
 void NeedleFilter::predict_mean(FilterState& state, double insertion_mm, double rotation_rad, double duration_s) const {
   if (!config_.effects.empty()) return predict(state, insertion_mm, rotation_rad, duration_s);
+  if (has_nuisance_) rotation_rad = follow_windup(state, insertion_mm, rotation_rad).rad;
   follow(state, insertion_mm, rotation_rad, false,
          [&](double by_mm, double by_rad) { state.outside_model = !mean_cutting(state, by_mm, by_rad); });
 }
@@ -192,12 +201,11 @@ template <int kSize>
 void NeedleFilter::predict_plain(FilterState& state, double insertion_mm, double rotation_rad) const {
   model::NeedleJacobian jacobian;
   const model::StepInput input{insertion_mm, rotation_rad, {state.curvature_per_mm, 0}};
-  const bool short_step = std::abs(insertion_mm) <= kShort_mm && std::abs(rotation_rad) <= kShort_rad;
-  state.outside_model = config_.midpoint_derivatives && short_step
-                            ? !model::advance_by_midpoint(state.pose, input, slip_of(state), jacobian)
-                            : !model::advance(state.pose, input, slip_of(state), jacobian);
+  const bool by_midpoint = takes_midpoint(config_, insertion_mm, rotation_rad);
+  state.outside_model = by_midpoint ? !model::advance_by_midpoint(state.pose, input, slip_of(state), jacobian)
+                                    : !model::advance(state.pose, input, slip_of(state), jacobian);
   if (state.outside_model) return;
-  if (coloured_) carry_shared<kSize>(state, jacobian.pose, jacobian.needle.leftCols<kSize - 6>());
+  if (coloured_ || has_nuisance_) carry_shared<kSize>(state, jacobian.pose, jacobian.needle.leftCols<kSize - 6>());
   const auto move_covariance = [&](Covariance<kSize>& P) {
     propagate<kSize>(P, jacobian.pose, jacobian.needle.leftCols<kSize - 6>());
     P.diagonal() += process_variance<kSize>(P, insertion_mm, rotation_rad);
@@ -230,6 +238,7 @@ template Error<9> NeedleFilter::process_variance<9>(const Covariance<9>&, double
 template Error<10> NeedleFilter::process_variance<10>(const Covariance<10>&, double, double) const;
 
 Update NeedleFilter::update(FilterState& state, const model::TipMeasurement& measurement) const {
+  if (has_nuisance_) return update_sized<kAllStates>(state, measurement);
   if (coloured_) return ten_states_ ? update_sized<16>(state, measurement) : update_sized<15>(state, measurement);
   return ten_states_ ? update_sized<10>(state, measurement) : update_sized<9>(state, measurement);
 }
@@ -239,24 +248,35 @@ Update NeedleFilter::update_sized(FilterState& state, const model::TipMeasuremen
   SeenAxes seen = seen_axes(measurement.information_per_mm2);
   if (seen.rank == 0) return {};  // sees nothing: no rejection either
   state.reading_utime = std::max(state.reading_utime, measurement.utime);
-  if constexpr (kSize > 10) {
+  if constexpr (kHasShared<kSize>) {
     seen.coloured = config_.reading.correlated_share * seen.variance;
     seen.variance -= seen.coloured;
     seen.first_error = measurement.camera == 0 ? 0 : 3;
   }
   const auto apply = [&]() -> Update {
-    if constexpr (kOwn<kSize> == 10)
-      if (stiff_ && pressing(state) < 1) {
-        Eigen::Matrix<double, 3, 10> by_state;
-        const Eigen::Vector3d at_mm = drawn_back_tip(state, by_state);
-        return update_seen<kSize, 10>(state, by_state, seen, measurement.position_mm - at_mm, gate_);
-      }
-    if (config_.effects.empty())
-      return update_seen<kSize, 3>(state, state.pose.R, seen, measurement.position_mm - state.pose.p_mm, gate_);
-    Eigen::Vector3d blur_mm2;
-    const model::TipReading at = reading(state, &blur_mm2);
-    seen.shared = seen.axes.cwiseAbs2().transpose() * blur_mm2;
-    return update_seen<kSize, kOwn<kSize>>(state, at.D, seen, measurement.position_mm - at.position_mm, gate_);
+    if constexpr (kSize == kAllStates) {
+      Eigen::Matrix<double, 3, 10> by_state = Eigen::Matrix<double, 3, 10>::Zero();
+      by_state.leftCols<3>() = state.pose.R;
+      Eigen::Vector3d at_mm = state.pose.p_mm;
+      if (stiff_ && pressing(state) < 1) at_mm = drawn_back_tip(state, by_state);
+      ByNuisance by_nuisance;
+      const Eigen::Vector3d seen_mm = seen_by_camera(state, measurement.camera, at_mm, by_nuisance);
+      by_state = frame_of_camera(state, measurement.camera) * by_state;
+      return update_all(state, by_state, by_nuisance, seen, measurement.position_mm - seen_mm, gate_);
+    } else {
+      if constexpr (kOwn<kSize> == 10)
+        if (stiff_ && pressing(state) < 1) {
+          Eigen::Matrix<double, 3, 10> by_state;
+          const Eigen::Vector3d at_mm = drawn_back_tip(state, by_state);
+          return update_seen<kSize, 10>(state, by_state, seen, measurement.position_mm - at_mm, gate_);
+        }
+      if (config_.effects.empty())
+        return update_seen<kSize, 3>(state, state.pose.R, seen, measurement.position_mm - state.pose.p_mm, gate_);
+      Eigen::Vector3d blur_mm2;
+      const model::TipReading at = reading(state, &blur_mm2);
+      seen.shared = seen.axes.cwiseAbs2().transpose() * blur_mm2;
+      return update_seen<kSize, kOwn<kSize>>(state, at.D, seen, measurement.position_mm - at.position_mm, gate_);
+    }
   };
   Update result = apply();
   std::uint8_t& camera_rejects = state.camera_rejects_in_row.at(
@@ -322,6 +342,9 @@ void NeedleFilter::keep_in_domain(FilterState& state) const {
   if (side * state.curvature_per_mm < kStraight_per_mm && side != 0)
     move_by(side * Error<kSize>::Unit(6), side * state.curvature_per_mm - kStraight_per_mm);
   keep_side();
+  if constexpr (kSize == kAllStates)
+    if (state.nuisance.mean[kWindup] < 0)
+      move_by(Error<kSize>::Unit(kFiltered<kSize> + kWindup), state.nuisance.mean[kWindup]);
   if (state.lambda1_per_rad == 0 && state.lambda2 == 0) return;
   if (state.lambda2 > kLambda2Max) move_by(Error<kSize>::Unit(8), state.lambda2 - kLambda2Max);
   // (26), linearised at the present lambda2; the set is convex, so twice is enough for small excesses.
@@ -346,6 +369,7 @@ template void NeedleFilter::keep_in_domain<9>(FilterState&) const;
 template void NeedleFilter::keep_in_domain<10>(FilterState&) const;
 template void NeedleFilter::keep_in_domain<15>(FilterState&) const;
 template void NeedleFilter::keep_in_domain<16>(FilterState&) const;
+template void NeedleFilter::keep_in_domain<kAllStates>(FilterState&) const;
 
 void NeedleFilter::declare_reset(FilterState& state, double reach_mm) const {
   // The pose is believed no more; the parameters are, but less: their prior widths come back, correlations go.
@@ -365,6 +389,7 @@ void NeedleFilter::declare_reset(FilterState& state, double reach_mm) const {
       std::max(square(gate.reset_tilt_sd_rad), prior.covariance(5, 5));
   widen_by_bend(state, state.pose.p_mm.z());
   state.shared = {};
+  begin_nuisance(state);
   state.rejects_in_row = 0;
   state.camera_rejects_in_row = {};
   state.heading_rejects_in_row = 0;

@@ -16,6 +16,7 @@
 #include "estimator/channel.hpp"
 #include "estimator/config.hpp"
 #include "estimator/end_motion.hpp"
+#include "estimator/nuisance.hpp"
 #include "model/kinematics.hpp"
 #include "model/samples.hpp"
 
@@ -65,6 +66,7 @@ struct FilterState {
   Channel channel;
   EffectState effects;
   SharedErrors shared;
+  Nuisance nuisance;
 };
 
 struct Update {
@@ -219,6 +221,16 @@ class NeedleFilter {
   template <int kSize>
   void carry_shared(FilterState& state, const model::Matrix6d& Phi, const Eigen::Matrix<double, 6, kSize - 6>& G) const;
   void forget_shared(FilterState& state, double share) const;
+  // Of the nuisance states (filter_nuisance.cpp).
+  struct TipTurn {
+    double rad = 0, by_windup = 0;
+  };
+  TipTurn follow_windup(FilterState& state, double insertion_mm, double rotation_rad) const;
+  void spread_turn(FilterState& state, double by_windup) const;
+  void begin_nuisance(FilterState& state) const;
+  Eigen::Matrix3d frame_of_camera(const FilterState& state, int camera) const;
+  Eigen::Vector3d seen_by_camera(const FilterState& state, int camera, const Eigen::Vector3d& tip_mm,
+                                 Eigen::Matrix<double, 3, kNuisance>& by_nuisance) const;
   Eigen::Matrix3d seen_shift(const FilterState& state) const;
   template <int kSize>
   bool relinearise_sized(FilterState& state, const FilterState& start, std::span<const PastStep> steps,
@@ -252,6 +264,7 @@ class NeedleFilter {
   bool stiff_ = false;
   bool ten_states_ = false;
   bool coloured_ = false;
+  bool has_nuisance_ = false;
   // Its parameters are set to those of the state in each step: one filter serves one thread.
   mutable model::AugmentedNeedle needle_;
 };

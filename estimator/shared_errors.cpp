@@ -31,6 +31,7 @@ void NeedleFilter::forget_shared(FilterState& state, double left) const {
   SharedErrors& shared = state.shared;
   shared.mean *= left;
   shared.with_state *= left;
+  state.nuisance.with_shared *= left;
   shared.covariance *= left * left;
   shared.covariance.diagonal().array() += 1 - left * left;
 }
@@ -38,9 +39,12 @@ void NeedleFilter::forget_shared(FilterState& state, double left) const {
 template <int kSize>
 void NeedleFilter::carry_shared(FilterState& state, const model::Matrix6d& Phi,
                                 const Eigen::Matrix<double, 6, kSize - 6>& G) const {
-  auto& with_state = state.shared.with_state;
-  const Eigen::Matrix<double, 6, kSharedErrors> moved = Phi.lazyProduct(with_state.topRows<6>());
-  with_state.topRows<6>() = moved + G.lazyProduct(with_state.middleRows<kSize - 6>(6));
+  const auto carry = [&](auto& with_state) {
+    const auto moved = Phi.lazyProduct(with_state.template topRows<6>()).eval();
+    with_state.template topRows<6>() = moved + G.lazyProduct(with_state.template middleRows<kSize - 6>(6));
+  };
+  if (coloured_) carry(state.shared.with_state);
+  if (has_nuisance_) carry(state.nuisance.with_state);
 }
 template void NeedleFilter::carry_shared<9>(FilterState&, const model::Matrix6d&,
                                             const Eigen::Matrix<double, 6, 3>&) const;

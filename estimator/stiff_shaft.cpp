@@ -72,7 +72,7 @@ void NeedleFilter::predict_stiff(FilterState& state, double insertion_mm, double
       J.needle.col(0) * (k * end.share_by_bending) + J.pose.leftCols<3>() * end.by_bending;
   Covariance<10> P = covariance_of<10>(state);
   propagate<10>(P, J.pose * shift, by_parameters);
-  if (coloured_) carry_shared<10>(state, J.pose * shift, by_parameters);
+  if (coloured_ || has_nuisance_) carry_shared<10>(state, J.pose * shift, by_parameters);
   P.diagonal() += process_variance<10>(P, insertion_mm, rotation_rad);
   set_covariance<10>(state, P);
 }

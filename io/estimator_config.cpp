@@ -41,8 +41,14 @@ void read_estimator_config(Section section, estimator::EstimatorConfig& config) 
   reading.read("correlation_mm", noise.correlation_mm, optional, in_range(0, 1000));
   reading.read("correlation_rad", noise.correlation_rad, optional, in_range(0, 1000));
   if (noise.correlated_share > 0 && noise.correlation_s + noise.correlation_mm + noise.correlation_rad == 0)
-    reading.fail("correlated_share", "is above 0, and nothing says how it is forgotten; allowed: with correlation_s, "
-                                     "correlation_mm or correlation_rad above 0");
+    reading.fail("correlated_share",
+                 "is above 0, and nothing says how it is forgotten; allowed: with correlation_s, "
+                 "correlation_mm or correlation_rad above 0");
+
+  Section nuisance = section.section("nuisance", optional);
+  nuisance.read("windup_sd_rad", config.nuisance.windup_sd_rad, optional, in_range(0, 2));
+  nuisance.read("frame_sd_rad", config.nuisance.frame_sd_rad, optional, in_range(0, 0.1));
+  nuisance.read("latency_sd_s", config.nuisance.latency_sd_s, optional, in_range(0, 0.1));
 
   Section gate = section.section("gate", optional);
   gate.read("probability", config.gate.probability, optional, in_range(0.5, 0.9999999));

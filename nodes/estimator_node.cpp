@@ -61,6 +61,34 @@ std::string describe(const estimator::InnovationWatch& innovations) {
   return text + " of what is expected: too large of camera" + too_large + ": model or camera is not what the file says";
 }
 
+std::string describe(const estimator::Nuisance& nuisance) {
+  constexpr double kDegrees = 180 / std::numbers::pi;
+  std::string text;
+  std::array<char, 160> one{};
+  const auto sd = [&nuisance](int i) { return std::sqrt(nuisance.covariance(i, i)); };
+  const auto add = [&] { text += (text.empty() ? "" : ", ") + std::string(one.data()); };
+  if (const int w = estimator::kWindup; sd(w) > 0) {
+    std::snprintf(one.data(), one.size(), "wind-up %.2f +- %.2f rad at 100 mm", nuisance.mean[w], sd(w));
+    add();
+  }
+  for (int camera = 0; camera < estimator::kCamerasInFrame; ++camera) {
+    if (const int f = estimator::frame_of(camera); sd(f) > 0) {
+      const Eigen::Vector3d turned = kDegrees * nuisance.mean.segment<3>(f);
+      std::snprintf(one.data(), one.size(),
+                    "frame of camera %d turned by %.1f +- %.1f, %.1f +- %.1f, %.1f +- %.1f degrees about x, y, z",
+                    camera, turned.x(), kDegrees * sd(f), turned.y(), kDegrees * sd(f + 1), turned.z(),
+                    kDegrees * sd(f + 2));
+      add();
+    }
+    if (const int l = estimator::latency_of(camera); sd(l) > 0) {
+      std::snprintf(one.data(), one.size(), "camera %d late by %.0f +- %.0f ms", camera, 1e3 * nuisance.mean[l],
+                    1e3 * sd(l));
+      add();
+    }
+  }
+  return text;
+}
+
 needle_state_t to_message(const estimator::Estimate& estimate, std::int64_t seq) {
   needle_state_t m{};
   const estimator::FilterState& s = estimate.state;
@@ -235,10 +263,11 @@ void EstimatorNode::step(const Now& now) {
   if (now.ns - described_ns_ >= kDescribed_ns) {  // numbers that change all the time
     innovation_text_ = describe(innovations_);
     entry_text_ = describe(entry_line_);
+    nuisance_text_ = describe(estimator_.estimate(now.utime).state.nuisance);
     described_ns_ = now.ns;
   }
   std::string reason = estimator::describe_health(health());
-  for (const std::string& more : {innovation_text_, entry_text_, remark_, words_.refusal()})
+  for (const std::string& more : {innovation_text_, entry_text_, nuisance_text_, remark_, words_.refusal()})
     if (!more.empty()) reason += "; " + more;
   status_.report(axes_ ? "running" : "waiting", reason);
 }

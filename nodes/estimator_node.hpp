@@ -22,6 +22,8 @@ namespace bevel::nodes {
 std::string describe(const estimator::EntryLine& entry);
 // The ratio of each camera's innovations to what is expected of them, and which are too large. Empty before any.
 std::string describe(const estimator::InnovationWatch& innovations);
+// Of the states that the file gives a width, with their standard deviations. Empty where there are none.
+std::string describe(const estimator::Nuisance& nuisance);
 needle_state_t to_message(const estimator::Estimate& estimate, std::int64_t seq);
 
 class EstimatorNode {
@@ -60,9 +62,9 @@ class EstimatorNode {
   std::int64_t published_utime_ = 0;
   std::int64_t seq_ = 0;
   bool input_refused_ = false;
-  std::string innovation_text_, entry_text_;  // as of described_ns_
-  std::int64_t described_ns_ = 0;             // steady
-  std::string remark_;                        // what the last trouble was
+  std::string innovation_text_, entry_text_, nuisance_text_;  // as of described_ns_
+  std::int64_t described_ns_ = 0;                             // steady
+  std::string remark_;                                        // what the last trouble was
 };
 
 }  // namespace bevel::nodes

@@ -380,6 +380,9 @@ SystemConfig load_system_config(const std::string& path) {
   if (c.estimator.prior.bending_mm > 0 && !c.estimator.effects.empty())
     throw io::ConfigError({path + ": [estimator.prior] bending_mm: a stiff shaft is estimated without [[effect]]s; " +
                            std::string(c.estimator.effects.front().effect->name()) + " is one"});
+  if (c.estimator.nuisance.any() && !c.estimator.effects.empty())
+    throw io::ConfigError({path + ": [estimator.nuisance]: wind-up, frames and latencies are estimated without " +
+                           "[[effect]]s; " + std::string(c.estimator.effects.front().effect->name()) + " is one"});
   return c;
 }
 

@@ -8,13 +8,15 @@
 namespace bevel::estimator {
 namespace {
 
-void expect_no_allocation(double wheelbase_sd_mm, double heading_sd_rad = 0, double correlated_share = 0) {
+void expect_no_allocation(double wheelbase_sd_mm, double heading_sd_rad = 0, double correlated_share = 0,
+                          const NuisancePrior& nuisance = {}) {
   std::mt19937_64 rng(21);
   EstimatorConfig config;
   config.prior.needle.lambda1_per_rad = 0.49;
   config.prior.needle.lambda2 = 0.22;
   config.prior.wheelbase_sd_mm = wheelbase_sd_mm;
   config.reading = {.correlated_share = correlated_share, .correlation_mm = 2};
+  config.nuisance = nuisance;
   testing::InsertionPlan plan;
   plan.cameras = 2;
   plan.heading_sd_rad = heading_sd_rad;
@@ -35,7 +37,7 @@ void expect_no_allocation(double wheelbase_sd_mm, double heading_sd_rad = 0, dou
   }
   EXPECT_EQ(bevel::testing::allocations - before, 0);
   EXPECT_GT(estimator.counters().positions.late, 100);
-  EXPECT_GT(estimator.counters().relinearised, 0);
+  EXPECT_EQ(estimator.counters().relinearised > 0, !nuisance.any());
   EXPECT_EQ(estimator.counters().headings.late > 100, heading_sd_rad > 0);
   EXPECT_GT(estimator.estimate(data.actuators.back().utime).state.reset_count, 0);
 }
@@ -52,6 +54,12 @@ TEST(NeedleEstimator, AllocatesNothingInAStepWithHeadings) {
 TEST(NeedleEstimator, AllocatesNothingInAStepWithSharedErrors) {
   expect_no_allocation(0, 0.02, 0.8);
   expect_no_allocation(5, 0, 0.8);
+}
+
+TEST(NeedleEstimator, AllocatesNothingInAStepWithNuisanceStates) {
+  const NuisancePrior nuisance{.windup_sd_rad = 0.4, .frame_sd_rad = 0.02, .latency_sd_s = 0.02};
+  expect_no_allocation(0, 0.02, 0, nuisance);
+  expect_no_allocation(5, 0.02, 0.8, nuisance);
 }
 
 TEST(NeedleEstimator, AllocatesNothingInAStepWithEffects) {
