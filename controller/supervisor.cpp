@@ -72,6 +72,9 @@ void Supervisor::request(Request request, const std::optional<Target>& target, s
       return;
     case Request::retract:
       return start_retraction(target, now_utime);
+    case Request::entry:
+    case Request::confirm:
+      return;  // for those who count and estimate
     case Request::arm:
     case Request::arm_to_retract:
       break;

@@ -13,21 +13,11 @@
 #include "controller/reach.hpp"
 #include "controller/reason.hpp"
 #include "controller/rendezvous.hpp"
+#include "controller/request.hpp"
 #include "controller/route.hpp"
 #include "model/samples.hpp"
 
 namespace bevel::controller {
-
-enum class Request : std::int32_t {
-  stop = 0,
-  arm = 1,
-  start = 2,
-  hold = 3,
-  follow = 6,
-  way_point = 7,
-  retract = 8,
-  arm_to_retract = 9
-};
 
 // What the controller needs of NEEDLE_STATE.
 struct NeedleView {

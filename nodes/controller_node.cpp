@@ -109,13 +109,12 @@ void ControllerNode::check_alive(const needle_state_t& m) {
 }
 
 void ControllerNode::on_word(Word word, const steering_target_t& m) {
-  if (word == Word::entry || word == Word::confirm) return;  // for those who count and estimate
   if (word == Word::arm || word == Word::arm_to_retract) {
     port_.forget_senders();
     detail_.clear();  // of the stop before: what this arm is refused for is another
   }
   const controller::Target target{{m.position_mm[0], m.position_mm[1], m.position_mm[2]}, m.tolerance_mm, m.utime};
-  supervisor_.request(static_cast<controller::Request>(word), target, port_.now().utime);
+  supervisor_.request(word, target, port_.now().utime);
   if (word == Word::stop) command(0);
 }
 

@@ -4,22 +4,12 @@
 #include <functional>
 #include <string>
 
+#include "controller/request.hpp"
 #include "nodes/status_reporter.hpp"
 
 namespace bevel::nodes {
 
-enum class Word : std::int32_t {
-  stop = 0,
-  arm = 1,
-  start = 2,
-  hold = 3,
-  entry = 4,
-  confirm = 5,
-  follow = 6,
-  way_point = 7,
-  retract = 8,
-  arm_to_retract = 9
-};
+using Word = controller::Request;
 // Place of a receiver's session in steering_target_t.session.
 enum class Receiver : std::size_t { controller = 0, stepper = 1, estimator = 2 };
 
