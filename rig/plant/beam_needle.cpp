@@ -47,11 +47,11 @@ void BeamNeedle::solve() {
   tip_ = {entry_.R * beam_.tip_rotation(), entry_.p_mm + entry_.R * beam_.tip_position_mm()};
 }
 
-const std::vector<Eigen::Vector3d>& BeamNeedle::shaft_mm() const {
+std::vector<Eigen::Vector3d> BeamNeedle::shaft_mm() const {
   const double length_mm = std::max(beam_.tip_position_mm().z(), 0.0);
-  shaft_mm_ = beam_.shaft_polyline_mm(2 + static_cast<std::size_t>(length_mm / kShaftSpacing_mm));
-  for (Eigen::Vector3d& p : shaft_mm_) p = entry_.p_mm + entry_.R * p;
-  return shaft_mm_;
+  auto drawn_mm = beam_.shaft_polyline_mm(2 + static_cast<std::size_t>(length_mm / kShaftSpacing_mm));
+  for (Eigen::Vector3d& p : drawn_mm) p = entry_.p_mm + entry_.R * p;
+  return drawn_mm;
 }
 
 }  // namespace bevel::rig

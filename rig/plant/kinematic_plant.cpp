@@ -90,14 +90,14 @@ void KinematicPlant::follow_path() {
 }
 
 // An offset of the tip bends the shaft, evenly from the entry on.
-const std::vector<Eigen::Vector3d>& KinematicPlant::shaft_mm() const {
+std::vector<Eigen::Vector3d> KinematicPlant::shaft_mm() const {
   const double inserted_mm = state_.tip_insertion_mm.value;
   const Eigen::Vector3d offset_mm = tip_.p_mm - state_.pose.p_mm;
-  shaft_mm_ = path_mm_;
-  for (std::size_t i = 0; i < shaft_mm_.size(); ++i)
-    shaft_mm_[i] += std::max(0.0, path_depth_mm_[i] / std::max(inserted_mm, kShaftSpacing_mm)) * offset_mm;
-  shaft_mm_.back() = tip_.p_mm;
-  return shaft_mm_;
+  std::vector<Eigen::Vector3d> drawn_mm = path_mm_;
+  for (std::size_t i = 0; i < drawn_mm.size(); ++i)
+    drawn_mm[i] += std::max(0.0, path_depth_mm_[i] / std::max(inserted_mm, kShaftSpacing_mm)) * offset_mm;
+  drawn_mm.back() = tip_.p_mm;
+  return drawn_mm;
 }
 
 }  // namespace bevel::rig

@@ -15,8 +15,9 @@ class Plant {
   // Moves the base by these increments within dt_s.
   virtual void advance(double insertion_mm, double rotation_rad, double dt_s) = 0;
   virtual model::Pose tip() const = 0;
-  // Axis of the shaft in {A} from the entry point to the tip, at least two points once the needle is in.
-  virtual const std::vector<Eigen::Vector3d>& shaft_mm() const = 0;
+  // Axis of the shaft in {A}, drawn when it is asked for, from the entry point to the tip, at least two points once the
+  // needle is in.
+  virtual std::vector<Eigen::Vector3d> shaft_mm() const = 0;
   // k and lambda as they are, and what effects make of the cameras' pictures.
   virtual const model::AugmentedNeedle& model() const = 0;
 };
@@ -37,7 +38,7 @@ class KinematicPlant : public Plant {
                           double roll_rad = 0, const model::OwnValues& own = {}, Cut cut = Cut::forgotten);
   void advance(double insertion_mm, double rotation_rad, double dt_s) override;
   model::Pose tip() const override { return tip_; }
-  const std::vector<Eigen::Vector3d>& shaft_mm() const override;
+  std::vector<Eigen::Vector3d> shaft_mm() const override;
   const model::AugmentedNeedle& model() const override { return needle_; }
 
  private:
@@ -55,10 +56,9 @@ class KinematicPlant : public Plant {
   };
   std::vector<Passed> cut_;
   bool keeps_cut_;
-  model::Pose tip_;                                // with its elastic offset
-  std::vector<Eigen::Vector3d> path_mm_;           // where the tip has passed; last point is the tip, without offset
-  std::vector<double> path_depth_mm_;              // inserted length at each point
-  mutable std::vector<Eigen::Vector3d> shaft_mm_;  // drawn when it is asked for
+  model::Pose tip_;                       // with its elastic offset
+  std::vector<Eigen::Vector3d> path_mm_;  // where the tip has passed; last point is the tip, without offset
+  std::vector<double> path_depth_mm_;     // inserted length at each point
 };
 
 // A beam in elastic tissue (model/beam): no bicycle is its truth. Its guide stands as it stands, so that where
@@ -72,7 +72,7 @@ class BeamNeedle : public Plant {
   // fiftieth of a radian and each 5 ms, whichever comes first.
   void advance(double insertion_mm, double rotation_rad, double dt_s) override;
   model::Pose tip() const override { return tip_; }
-  const std::vector<Eigen::Vector3d>& shaft_mm() const override;
+  std::vector<Eigen::Vector3d> shaft_mm() const override;
   const model::AugmentedNeedle& model() const override { return needle_; }
 
  private:
@@ -83,7 +83,6 @@ class BeamNeedle : public Plant {
   model::AugmentedNeedle needle_;
   model::Pose entry_, tip_;
   double due_insertion_mm_ = 0, due_rotation_rad_ = 0, due_s_ = 0;  // not solved for yet
-  mutable std::vector<Eigen::Vector3d> shaft_mm_;                   // drawn when it is asked for
 };
 
 // The bicycle that a beam is deep in uniform tissue: k = F / (EI lambda), lambda^4 = modulus / (4 EI); no slip law.

@@ -46,9 +46,10 @@ TEST(PlantWithEffects, IsTheModelAlongTheSameMotion) {
       ++reading;
     }
     EXPECT_EQ(reading, path.size());
-    EXPECT_EQ(plant.shaft_mm().back(), plant.tip().p_mm);
-    for (std::size_t i = 1; i < plant.shaft_mm().size(); ++i)  // no kinks where an offset begins
-      EXPECT_LT((plant.shaft_mm()[i] - plant.shaft_mm()[i - 1]).norm(), 2.6);
+    const std::vector<Vector3d> shaft_mm = plant.shaft_mm();
+    EXPECT_EQ(shaft_mm.back(), plant.tip().p_mm);
+    for (std::size_t i = 1; i < shaft_mm.size(); ++i)  // no kinks where an offset begins
+      EXPECT_LT((shaft_mm[i] - shaft_mm[i - 1]).norm(), 2.6);
   }
 }
 

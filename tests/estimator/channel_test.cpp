@@ -317,7 +317,7 @@ class WanderingNeedle : public rig::Plant {
                    model::slip_parameters(needle_));
   }
   model::Pose tip() const override { return tip_; }
-  const std::vector<Eigen::Vector3d>& shaft_mm() const override { return shaft_; }
+  std::vector<Eigen::Vector3d> shaft_mm() const override { return {}; }
   const model::AugmentedNeedle& model() const override { return model_; }
 
  private:
@@ -342,7 +342,6 @@ class WanderingNeedle : public rig::Plant {
   double inserted_mm_ = 0, rolled_rad_ = 0;
   model::Pose tip_;
   std::vector<model::Pose> cut_;  // at each step, unrolled
-  std::vector<Eigen::Vector3d> shaft_;
 };
 
 TEST(Channel, OfTissueThatIsAsUnevenAsTheFilterTakesIt) {
