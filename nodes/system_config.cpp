@@ -324,6 +324,26 @@ void read_rig(Section s, const std::filesystem::path& folder, RigConfig& c) {
   l.read("rotation_max_rad", c.limit_switches[stepper::kRotation].max_unit, optional, beyond);
 }
 
+// What the filter has states of: of cameras 0 and 1, and of frames where the two show each other's.
+void check_states_of_cameras(Section s, const SystemConfig& c) {
+  const auto has = [&c](int camera) { return std::ranges::count(c.cameras, camera, &CameraViewConfig::camera) > 0; };
+  Section noise = s.section("reading_noise", optional), nuisance = s.section("nuisance", optional);
+  const estimator::NuisancePrior& told = c.estimator.nuisance;
+  const std::string has_more = "is above 0, and there is a camera ",
+                    of_two = "; allowed: with cameras 0 and 1 only, whose ";
+  for (const CameraViewConfig& camera : c.cameras) {
+    if (camera.camera <= 1) continue;
+    const std::string why = has_more + std::to_string(camera.camera) + of_two;
+    if (c.estimator.reading.correlated_share > 0) noise.fail("correlated_share", why + "errors have states");
+    if (told.frame_sd_rad > 0) nuisance.fail("frame_sd_rad", why + "frames have states");
+    if (told.latency_sd_s > 0) nuisance.fail("latency_sd_s", why + "latencies have states");
+  }
+  if (told.frame_sd_rad > 0 && !(has(0) && has(1)))
+    nuisance.fail("frame_sd_rad",
+                  "is above 0, and one camera cannot tell its frame's turn from the needle's own slope; "
+                  "allowed: with a [[camera]] 0 and a [[camera]] 1");
+}
+
 }  // namespace
 
 SystemConfig load_system_config(const std::string& path) {
@@ -355,13 +375,7 @@ SystemConfig load_system_config(const std::string& path) {
                                   std::to_string(c.source.height_px) + ", allowed: " + std::to_string(camera.width_px) +
                                   " x " + std::to_string(camera.height_px) + ", of which the calibration of camera " +
                                   std::to_string(camera.camera) + " is");
-  if (c.estimator.reading.correlated_share > 0)
-    for (const CameraViewConfig& camera : c.cameras)
-      if (camera.camera > 1)
-        file.section("estimator", optional)
-            .section("reading_noise", optional)
-            .fail("correlated_share", "is above 0, and there is a camera " + std::to_string(camera.camera) +
-                                          "; allowed: with cameras 0 and 1 only, whose errors have states");
+  check_states_of_cameras(file.section("estimator", optional), c);
   // Whoever of them gives headings gives the shaft's.
   for (const CameraViewConfig& camera : c.cameras) c.estimator.shaft_cameras.push_back(camera.camera);
   c.rig.truth = c.needle;

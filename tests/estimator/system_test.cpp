@@ -94,6 +94,38 @@ TEST_F(SystemFile, MistakesAreNamed) {
   EXPECT_THAT(fault_of("[system]\n"), HasSubstr("needle"));
 }
 
+TEST_F(SystemFile, StatesOfTheRigAreRefusedWhereTheyMeanNothing) {
+  const std::string view = "px_per_mm = 4.4\norigin_px = [240.0, 40.0]\nrows_carry = \"+z\"\n";
+  const std::array cameras{"[[camera]]\ncamera = 0\ncolumns_carry = \"+y\"\n" + view,
+                           "[[camera]]\ncamera = 1\ncolumns_carry = \"+x\"\n" + view,
+                           "[[camera]]\ncamera = 2\ncolumns_carry = \"+x\"\n" + view};
+  // What is said of a file with the first so many of them.
+  const auto fault_of = [&](const std::string& told, std::size_t count, const std::string& more = "") -> std::string {
+    std::string text = kNeedle + more;
+    for (std::size_t i = 0; i < count; ++i) text += cameras.at(i);
+    try {
+      nodes::load_system_config(write(text + "[estimator.nuisance]\n" + told + "\n"));
+    } catch (const io::ConfigError& error) {
+      return error.what();
+    }
+    return "";
+  };
+  const auto names = [](const std::string& text) { return HasSubstr("nuisance." + text); };
+  EXPECT_EQ(fault_of("windup_sd_rad = 0.4\nframe_sd_rad = 0.02\nlatency_sd_s = 0.02", 2), "");
+  EXPECT_EQ(fault_of("windup_sd_rad = 0.4\nlatency_sd_s = 0.02", 1), "");
+  EXPECT_EQ(fault_of("windup_sd_rad = 0.4", 3), "");
+  for (const std::size_t count : {0, 1})
+    EXPECT_THAT(fault_of("frame_sd_rad = 0.02", count),
+                AllOf(names("frame_sd_rad"), HasSubstr("allowed: with a [[camera]] 0 and a [[camera]] 1")));
+  EXPECT_THAT(fault_of("frame_sd_rad = 0.02", 3), AllOf(names("frame_sd_rad"), HasSubstr("there is a camera 2")));
+  EXPECT_THAT(fault_of("latency_sd_s = 0.02", 3), AllOf(names("latency_sd_s"), HasSubstr("there is a camera 2")));
+  EXPECT_THAT(fault_of("windup_sd_rad = -0.4", 2), AllOf(names("windup_sd_rad"), HasSubstr("0")));
+  EXPECT_THAT(fault_of("frame_sd_rad = 0.2", 2), AllOf(names("frame_sd_rad"), HasSubstr("0.1")));
+  EXPECT_THAT(fault_of("latency_sd_s = 20", 2), AllOf(names("latency_sd_s"), HasSubstr("0.1")));
+  EXPECT_THAT(fault_of("windup_rad = 0.4", 2), names("windup_rad"));
+  EXPECT_THAT(fault_of("windup_sd_rad = 0.4", 2, kWindup), HasSubstr("torsional_windup is one"));
+}
+
 estimator::testing::Insertion insertion(std::mt19937_64& rng, const estimator::Prior& prior) {
   estimator::testing::InsertionPlan plan;
   plan.cameras = 2;
