@@ -3,7 +3,8 @@
 // demo's system file at 30 Hz whose pictures arrive 50 ms after they were taken. Simulated time: the same seed gives
 // the same run.
 //   study_rendered_targets [targets in each scenario] [scenario...]
-// Prints a row for each scenario; exit status 0 if each has arrived, 1 if one has not.
+// Prints a row for each scenario; exit status 0 if each has arrived, 1 if one has not, 2 where a scenario is none, or
+// has more to it than a needle (cameras that are off, a target that moves, a path): its rig is not taken over.
 #include <algorithm>
 #include <array>
 #include <cmath>
@@ -17,6 +18,7 @@
 #include <opencv2/core/utility.hpp>
 #include <optional>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "diagnosis/parallel.hpp"
@@ -95,6 +97,7 @@ nodes::SystemConfig system_of(const steering::Trial& trial) {
   nodes::SystemConfig config = nodes::load_system_config(std::string(BEVEL_SOURCE_DIR "/config/") +
                                                          (trial.needle.beam ? "beam" : "demo") + ".toml");
   config.estimator.prior = trial.believed.estimator.prior;
+  config.estimator.nuisance = trial.believed.estimator.nuisance;
   config.needle = config.estimator.prior.needle;
   config.controller.shaft = trial.believed.controller.shaft;
   config.controller.limits = trial.believed.controller.limits;
@@ -171,7 +174,29 @@ int print(const std::string& name, std::vector<Outcome> all) {
   return missing;
 }
 
-int run(int targets, const std::vector<std::string>& names) {
+// Those of these names; none, and what is said of it, where one cannot be taken over.
+std::vector<steering::Scenario> taken_over(const std::vector<std::string>& names) {
+  std::vector<steering::Scenario> taken;
+  const auto& all = steering::scenarios();
+  for (const std::string& name : names) {
+    const auto scenario = std::ranges::find(all, name, &steering::Scenario::name);
+    if (scenario != all.end() && steering::is_of_needle_alone(*scenario)) {
+      taken.push_back(*scenario);
+      continue;
+    }
+    std::cerr << "scenario '" << name << "' "
+              << (scenario == all.end() ? "is none" : "has more to it than a needle, which would be left out")
+              << "; allowed: ";
+    const char* separator = "";
+    for (const steering::Scenario& one : all)
+      if (steering::is_of_needle_alone(one)) std::cerr << std::exchange(separator, ", ") << one.name;
+    std::cerr << "\n";
+    return {};
+  }
+  return taken;
+}
+
+int run(int targets, const std::vector<steering::Scenario>& scenarios) {
   cv::setNumThreads(1);
   std::printf(
       "seed %llu; mm, of those that arrived\n\n| scenario | targets | median | mean +- sd | 95 %% | worst | "
@@ -181,16 +206,10 @@ int run(int targets, const std::vector<std::string>& names) {
   const std::clock_t from = std::clock();
   std::vector<Outcome> everything;
   int missing = 0;
-  for (const std::string& name : names) {
-    const auto& all = steering::scenarios();
-    const auto scenario = std::ranges::find(all, name, &steering::Scenario::name);
-    if (scenario == all.end()) {
-      std::cerr << "no scenario '" << name << "'\n";
-      return 2;
-    }
+  for (const steering::Scenario& scenario : scenarios) {
     std::vector<Outcome> outcomes(static_cast<std::size_t>(targets));
-    parallel_for(outcomes.size(), 2, [&](std::size_t i) { outcomes[i] = one(*scenario, 1'000'003 * kSeed + i); });
-    missing += print(name, outcomes);
+    parallel_for(outcomes.size(), 2, [&](std::size_t i) { outcomes[i] = one(scenario, 1'000'003 * kSeed + i); });
+    missing += print(scenario.name, outcomes);
     std::ranges::copy(outcomes, std::back_inserter(everything));
   }
   print("all of them", everything);
@@ -209,5 +228,6 @@ int main(int argc, char** argv) {
   std::vector<std::string> names(argv + std::min(argc, 2), argv + argc);
   if (names.empty()) names = {"kinematic", "kinematic-30", "beam-100-1", "beam-50-1", "beam-20-0.5"};
   if (targets < 1) return 2;
-  return bevel::run(targets, names);
+  const auto scenarios = bevel::taken_over(names);
+  return scenarios.empty() ? 2 : bevel::run(targets, scenarios);
 }

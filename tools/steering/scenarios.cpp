@@ -12,7 +12,8 @@ namespace {
 constexpr double kNoise_mm = 0.2;
 constexpr double kShareOfReach = 0.6;
 constexpr double kWidest_mm = 30;
-constexpr double kTold_rad = 0.4;  // standard deviation of a wind-up that the filter estimates
+constexpr double kDegree_rad = std::numbers::pi / 180;
+constexpr double kToldWindup_rad = 0.4;  // standard deviation of a wind-up that the filter estimates
 
 class Draw {
  public:
@@ -92,7 +93,6 @@ struct Kinematic {
   double outlier_share = 0;
   double windup_at_100mm_rad = 0;
   bool windup_known = false;  // in the model file
-  bool windup_told = false;   // as a state of the filter
   double drift_mm = 0;        // of the target in 20 s, in a drawn direction across
   double breathing_mm = 0;    // of the target, amplitude at 0.25 Hz along x, phase drawn
   bool gated = false;
@@ -100,7 +100,9 @@ struct Kinematic {
   bool way_point = false;
   bool retract = false;
   double camera_turned_rad = 0;  // of both, about a drawn axis across the needle
-  bool frame_told = false;       // as a state of the filter, beside slopes of insertions of half a degree
+  double camera_late_s = 0;      // of both
+  // States of the filter; frames beside slopes of insertions of half a degree.
+  estimator::NuisancePrior told{};
   bool by_flips = false;
 };
 Trial kinematic(const Kinematic& kind, std::uint64_t seed) {
@@ -122,8 +124,12 @@ Trial kinematic(const Kinematic& kind, std::uint64_t seed) {
     model::ActiveEffect windup{.effect = model::find_effect("torsional_windup"), .parameters = {}};
     windup.parameters[0] = kind.windup_at_100mm_rad;
     effects.push_back(windup);
-    if (kind.windup_told) trial.believed.estimator.nuisance.windup_sd_rad = kTold_rad;
     if (kind.windup_known) trial.believed.estimator.effects = trial.believed.undone = effects;
+  }
+  if (kind.camera_late_s > 0) {
+    model::ActiveEffect latency{.effect = model::find_effect("camera_latency"), .parameters = {}};
+    latency.parameters[0] = kind.camera_late_s;
+    effects.push_back(latency);
   }
   trial.target_mm = draw_target(draw, std::min(truth.curvature_per_mm, believed.curvature_per_mm));
   const double angle = draw.uniform(0, 2 * std::numbers::pi);
@@ -144,10 +150,8 @@ Trial kinematic(const Kinematic& kind, std::uint64_t seed) {
   trial.rig.cameras = cameras(kind.cameras);
   trial.rig.cameras.outlier_share = kind.outlier_share;
   trial.rig.cameras.turned_rad = kind.camera_turned_rad * Eigen::Vector3d(std::cos(angle), std::sin(angle), 0);
-  if (kind.frame_told) {
-    trial.believed.estimator.nuisance.frame_sd_rad = 2 * std::numbers::pi / 180;
-    prior.tilt_sd_rad = trial.believed.estimator.entry_slope_sd_rad;
-  }
+  trial.believed.estimator.nuisance = kind.told;
+  if (kind.told.frame_sd_rad > 0) prior.tilt_sd_rad = trial.believed.estimator.entry_slope_sd_rad;
   trial.needle = {.bicycle = truth, .effects = effects, .roll_rad = roll_rad};
   trial.rig.make_plant = [needle = trial.needle] {
     return std::make_unique<rig::KinematicPlant>(needle.bicycle, needle.effects, needle.roll_rad, model::OwnValues{},
@@ -159,7 +163,7 @@ Trial kinematic(const Kinematic& kind, std::uint64_t seed) {
 struct Beam {
   double modulus_kPa = 0, force_N = 0;  // 0: drawn, 2 to 100 kPa, 0.2 to 1 N
   double windup_at_100mm_rad = 0;
-  bool windup_told = false;
+  double told_windup_rad = 0;  // standard deviation; 0: not a state of the filter
   double relaxing_fraction = 0;
   bool obstacle = false;
   bool way_point = false;
@@ -188,8 +192,7 @@ Trial beam(const Beam& kind, std::uint64_t seed) {
   prior.bending_mm = bending_mm * draw.uniform(0.7, 1.3);
   prior.bending_sd_mm = 0.2 * prior.bending_mm;
   prior.guide_mm = config.guide_gap_mm;
-  // That it winds up, not by how much.
-  if (kind.windup_told) trial.believed.estimator.nuisance.windup_sd_rad = kTold_rad;
+  trial.believed.estimator.nuisance.windup_sd_rad = kind.told_windup_rad;
   trial.believed.controller.shaft = {prior.bending_mm, prior.guide_mm};
   trial.target_mm = draw_target(draw, deep.curvature_per_mm);
   if (kind.obstacle) trial.believed.controller.obstacles = {draw_obstacle(draw, trial.target_mm)};
@@ -217,6 +220,14 @@ Scenario scenario(Row row, const char* name, const char* what, const Kind& kind,
 
 }  // namespace
 
+bool is_of_needle_alone(const Scenario& scenario) {
+  if (scenario.along_path || scenario.goes_back || scenario.gated || scenario.by_flips) return false;
+  const Trial trial = scenario.draw(1);  // what differs from seed to seed is by how much
+  const Cameras& eyes = trial.rig.cameras;
+  return trial.needle.effects.empty() && !trial.rig.target_mm && eyes.axes.size() == cameras(2).axes.size() &&
+         eyes.outlier_share == 0 && eyes.turned_rad.isZero();
+}
+
 const std::vector<Scenario>& scenarios() {
   static const std::vector<Scenario> all{
       scenario<Kinematic>(Row::table, "kinematic", "the filter's own model, parameters as told", {}, kinematic),
@@ -231,18 +242,18 @@ const std::vector<Scenario>& scenarios() {
                      {.modulus_kPa = 20, .force_N = 0.5, .relaxing_fraction = 0.3}, beam),
       scenario<Beam>(Row::floor, "beam-windup", "beam, 100 kPa, 1 N, wind-up of 0.5 rad at 100 mm, unknown",
                      {.modulus_kPa = 100, .force_N = 1, .windup_at_100mm_rad = 0.5}, beam),
-      scenario<Beam>(Row::apart, "beam-windup-state",
-                     "the same, wind-up as a state of the filter, 0 +- 0.4 rad beforehand",
-                     {.modulus_kPa = 100, .force_N = 1, .windup_at_100mm_rad = 0.5, .windup_told = true}, beam),
+      scenario<Beam>(
+          Row::apart, "beam-windup-state", "the same, wind-up as a state of the filter, 0 +- 0.4 rad beforehand",
+          {.modulus_kPa = 100, .force_N = 1, .windup_at_100mm_rad = 0.5, .told_windup_rad = kToldWindup_rad}, beam),
       scenario<Kinematic>(Row::floor, "windup", "wind-up of 0.5 rad at 100 mm, unknown", {.windup_at_100mm_rad = 0.5},
                           kinematic),
       scenario<Kinematic>(Row::apart, "windup-state", "the same, as a state of the filter, 0 +- 0.4 rad beforehand",
-                          {.windup_at_100mm_rad = 0.5, .windup_told = true}, kinematic),
+                          {.windup_at_100mm_rad = 0.5, .told = {.windup_sd_rad = kToldWindup_rad}}, kinematic),
       scenario<Kinematic>(Row::apart, "windup-known", "the same, in the model file",
                           {.windup_at_100mm_rad = 0.5, .windup_known = true}, kinematic),
       scenario<Kinematic>(Row::table, "moving", "a target that moves by 5 mm in 20 s, told of at 17 Hz",
                           {.drift_mm = 5}, kinematic),
-      scenario<Kinematic>(Row::table, "breathing", "a target that breathes by +-3 mm at 0.25 Hz, told of at 17 Hz",
+      scenario<Kinematic>(Row::floor, "breathing", "a target that breathes by +-3 mm at 0.25 Hz, told of at 17 Hz",
                           {.breathing_mm = 3}, kinematic),
       scenario<Kinematic>(Row::table, "breathing-gated", "the same, arriving where it turns round",
                           {.breathing_mm = 3, .gated = true}, kinematic),
@@ -253,10 +264,29 @@ const std::vector<Scenario>& scenarios() {
                           {.cameras = 1, .by_flips = true}, kinematic),
       scenario<Kinematic>(Row::table, "camera-turned",
                           "both cameras' frame turned by 2 degrees about an axis across the needle",
-                          {.camera_turned_rad = 2 * std::numbers::pi / 180}, kinematic),
+                          {.camera_turned_rad = 2 * kDegree_rad}, kinematic),
       scenario<Kinematic>(Row::apart, "camera-turned-state",
                           "the same, frames as states of the filter, 0 +- 2 degrees beforehand",
-                          {.camera_turned_rad = 2 * std::numbers::pi / 180, .frame_told = true}, kinematic),
+                          {.camera_turned_rad = 2 * kDegree_rad, .told = {.frame_sd_rad = 2 * kDegree_rad}}, kinematic),
+      scenario<Kinematic>(Row::apart, "camera-turned-5", "both cameras' frame turned by 5 degrees",
+                          {.camera_turned_rad = 5 * kDegree_rad}, kinematic),
+      scenario<Kinematic>(Row::apart, "camera-turned-5-state",
+                          "the same, frames as states of the filter, 0 +- 5 degrees beforehand",
+                          {.camera_turned_rad = 5 * kDegree_rad, .told = {.frame_sd_rad = 5 * kDegree_rad}}, kinematic),
+      scenario<Kinematic>(Row::apart, "late", "both cameras' stamps late by 50 ms, unknown", {.camera_late_s = 0.05},
+                          kinematic),
+      scenario<Kinematic>(Row::apart, "late-state",
+                          "the same, latencies as states of the filter, 0 +- 50 ms beforehand",
+                          {.camera_late_s = 0.05, .told = {.latency_sd_s = 0.05}}, kinematic),
+      scenario<Kinematic>(Row::apart, "windup-in-vain", "the model's needle, wind-up as a state, 0 +- 0.4 rad",
+                          {.told = {.windup_sd_rad = kToldWindup_rad}}, kinematic),
+      scenario<Kinematic>(Row::apart, "frames-in-vain", "the model's needle, frames as states, 0 +- 2 degrees",
+                          {.told = {.frame_sd_rad = 2 * kDegree_rad}}, kinematic),
+      scenario<Kinematic>(Row::apart, "late-in-vain", "the model's needle, latencies as states, 0 +- 50 ms",
+                          {.told = {.latency_sd_s = 0.05}}, kinematic),
+      scenario<Beam>(Row::apart, "beam-any-windup-in-vain",
+                     "beam, 2 to 100 kPa, 0.2 to 1 N, wind-up as a state, 0 +- 0.4 rad",
+                     {.told_windup_rad = kToldWindup_rad}, beam),
       scenario<Kinematic>(Row::table, "obstacle",
                           "a sphere or capsule of 2 to 5 mm radius within 8 mm of the line to the target",
                           {.obstacle = true}, kinematic),

@@ -43,4 +43,8 @@ struct Scenario {
 // said.
 const std::vector<Scenario>& scenarios();
 
+// A needle, what is believed of it and a target that stands still, seen by two cameras as they should be: what another
+// loop, with cameras and axes of its own, can take over from a trial. No effects beside the needle, nothing on the way.
+bool is_of_needle_alone(const Scenario& scenario);
+
 }  // namespace bevel::steering
