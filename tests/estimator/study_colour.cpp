@@ -255,6 +255,7 @@ void rendered(int runs, std::uint64_t seed) {
     std::mt19937_64 rng(seed);
     const ReadingNoise noise{.correlated_share = 0.8, .correlation_mm = 2, .correlation_rad = 1.2};
     const ReadingNoise long_noise{.correlated_share = 0.8, .correlation_mm = 10, .correlation_rad = 1.2};
+    const ReadingNoise of_demo{.correlated_share = 0.5, .correlation_mm = 3, .correlation_rad = 1.2};  // its file's
     for (int i = 0; i < runs; ++i) {
       Drawn drawn = (row.demo ? demo_rendered : draw_rendered)(exact_model().prior, plan, rng);
       drawn.seen.data.headings.clear();
@@ -267,6 +268,8 @@ void rendered(int runs, std::uint64_t seed) {
         run(told(config, noise), data, drawn.needle, sums["told 0.8, 2 mm, 1.2 rad" + process]);
         run(told(config, long_noise), with_floors(data, 0.02, 0.02), drawn.needle,
             sums["floors 0.02, told 0.8, 10 mm" + process]);
+        run(told(config, of_demo), with_floors(data, 0.02, 0.02), drawn.needle,
+            sums["floors 0.02, told 0.5, 3 mm (demo)" + process]);
       }
     }
     char title[128];
