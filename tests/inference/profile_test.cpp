@@ -6,6 +6,7 @@
 #include <boost/math/distributions/normal.hpp>
 
 #include "diagnosis/inference/local_minima.hpp"
+#include "diagnosis/inference/search.hpp"
 #include "tests/inference/linear_system.hpp"
 
 namespace bevel::inference {
@@ -122,7 +123,7 @@ class TwoScales final : public System {
   }
   static double reading(double t, double slope, double gain, double feed, double place, double size) {
     // Without a width no derivative says anything of its place.
-    const double passed = ((1 + feed) * t - place) / kWidth;
+    const double passed = (t - place / (1 + feed)) / kWidth;
     return (1 + gain) * slope * (1 + feed) * t + size / (1 + std::exp(-passed));
   }
   const Dataset& data() const override { return data_; }
@@ -190,6 +191,20 @@ TEST(Replaced, AStepFollowsWhereOneScaleTakesTheOthersPlace) {
   EXPECT_NEAR(there.shared[1], TwoScales::kFeed, 0.005);
   EXPECT_NEAR(there.shared[2], TwoScales::kPlace, 0.02);
   EXPECT_NEAR(there.shared[3], TwoScales::kSize, 0.02);
+}
+
+TEST(Search, WeighsBothNamesOfOnePathBesideAStep) {
+  const TwoScales system;
+  Noise noise;
+  noise.sigma = {TwoScales::kSigma};
+  noise.frame_s = 0.02;
+  Search search(system, {});
+  search.run(Readings(1), noise);
+  const auto& visited = search.visited();
+  ASSERT_TRUE(visited.contains({0, 2}) && visited.contains({1, 2}));
+  // One path: their evidence differs by the prior of the step's place alone.
+  EXPECT_NEAR(visited.at({0, 2}).log_posterior(), visited.at({1, 2}).log_posterior(), 0.5);
+  EXPECT_GT(visited.at({1, 2}).log_posterior(), search.best().log_posterior() - 1);
 }
 
 TEST(Fit, KeepsWhatIsFixed) {
