@@ -191,9 +191,10 @@ double cost_of(const Pulls& pulls, const std::vector<ArrowBlock>& blocks) {
   return cost;
 }
 
-// What presses against a bound stays there.
-ArrowSolution solve_within(const Fit& now, const std::vector<ArrowBlock>& blocks, const Pulls& pulls, ArrowRules& how) {
-  how.held.clear();
+// What presses against a bound stays there, as what is fixed does.
+ArrowSolution solve_within(const Fit& now, const std::vector<ArrowBlock>& blocks, const Pulls& pulls, ArrowRules& how,
+                           const std::vector<Index>& fixed = {}) {
+  how.held = fixed;
   ArrowSolution step = solve(blocks, pulls.precision, pulls.centre, how);
   for (int pass = 0; step.valid && pass < 3; ++pass) {
     const auto before = how.held.size();
@@ -201,7 +202,7 @@ ArrowSolution solve_within(const Fit& now, const std::vector<ArrowBlock>& blocks
       const Parameter& p = *now.layout.shared()[static_cast<std::size_t>(i)].parameter;
       const bool outwards = !p.periodic && ((now.shared[i] <= p.lower && step.shared[i] < 0) ||
                                             (now.shared[i] >= p.upper && step.shared[i] > 0));
-      if (outwards) how.held.push_back(i);
+      if (outwards && std::ranges::count(fixed, i) == 0) how.held.push_back(i);
     }
     if (how.held.size() == before) break;
     step = solve(blocks, pulls.precision, pulls.centre, how);
@@ -275,7 +276,7 @@ Fit fit(const Likelihood& likelihood, const Layout& layout, const VectorXd& shar
     ArrowRules how{.damping = damping, .covariance_of = std::vector<Index>{}};
     bool moved = false, small = false;
     while (how.damping < 1e8) {
-      const ArrowSolution step = solve_within(now, here.blocks, here.pulls, how);
+      const ArrowSolution step = solve_within(now, here.blocks, here.pulls, how, rules.fixed);
       if (!step.valid) {
         how.damping = std::max(how.damping * 6, 1e-6);
         continue;

@@ -106,7 +106,8 @@ std::shared_ptr<const Likelihood> with_inputs_of(const Fit& fit, const std::shar
 
 struct FitRules {
   int max_iterations = 25;
-  double tolerance = 0.02;  // of the cost
+  double tolerance = 0.02;            // of the cost
+  std::vector<Eigen::Index> fixed{};  // shared unknowns that stay where they start
 };
 
 // Columns of one curve or of several side by side, whitened, per recording: rows x values; the values' prior covariance

@@ -5,6 +5,8 @@
 #include <cmath>
 #include <limits>
 
+#include "diagnosis/inference/profile.hpp"
+
 namespace bevel::inference {
 
 using Eigen::Index;
@@ -20,6 +22,9 @@ constexpr double kInstantWidth_s = 0.1;  // of an instant's posterior, while it 
 constexpr std::size_t kGrid = 5;         // starts from which on a parameter is taken to have many local minima
 constexpr int kSteps = 10;               // of a scan, to each side
 constexpr int kZooms = 2;
+constexpr int kSizeSteps = 5;       // to each side, of the size of what happens at an instant
+constexpr double kSizeShare = 0.1;  // of it, as far as they go
+constexpr int kWaypoints = 10;      // from one effect to another
 
 // What an instant has to bring in a recording to be taken for one, in chi2: its expected odds.
 double instant_cost(double duration_s) { return 2 * std::log(kHappensNot / kHappens * duration_s / kInstantWidth_s); }
@@ -74,57 +79,6 @@ double grid_spacing(const Parameter& p, double value) {
   return *upper - *(upper - 1);
 }
 
-// A fit's linear model, asked for the cost where one parameter is held at another value.
-class Profile {
- public:
-  Profile(const Likelihood& likelihood, const CurveColumns& curve, const Fit& fit)
-      : likelihood_(likelihood), curve_(curve), fit_(fit), free_(free_locals(fit.layout)) {
-    LinearRecording recording;
-    for (std::size_t r = 0; r < likelihood.recordings(); ++r) {
-      if (!linearise(likelihood, fit, curve, r, recording)) return;
-      Z_.push_back(std::move(recording.Z));
-      L_.push_back(std::move(recording.L));
-      blocks_.push_back(std::move(recording.block));
-    }
-    valid_ = true;
-  }
-  bool valid() const { return valid_; }
-
-  // The unknowns with this one at this value, all else at the least cost by the linear model; its cost.
-  double at(Index which, double value, VectorXd& shared, std::vector<VectorXd>& local) {
-    shared = fit_.shared;
-    shared[which] = value;
-    Residuals residuals;
-    for (std::size_t r = 0; r < blocks_.size(); ++r) {
-      if (!likelihood_.evaluate(fit_.layout, r, shared, fit_.local[r], false, residuals))
-        return std::numeric_limits<double>::infinity();
-      if (curve_) residuals.white -= curve_.columns[r] * fit_.curve_values;
-      blocks_[r].lw = L_[r].transpose() * residuals.white;
-      blocks_[r].zw = Z_[r].transpose() * residuals.white;
-      blocks_[r].ww = residuals.white.squaredNorm();
-    }
-    const Pulls pulls = pulls_of(fit_.layout, shared, fit_.curve_values, curve_.covariance);
-    ArrowRules how{.held = fit_.held};
-    how.held.push_back(which);
-    const ArrowSolution step = solve(blocks_, pulls.precision, pulls.centre, how);
-    if (!step.valid) return std::numeric_limits<double>::infinity();
-    shared += step.shared.head(shared.size());
-    local = fit_.local;
-    for (std::size_t r = 0; r < local.size(); ++r)
-      for (std::size_t i = 0; i < free_.size(); ++i) local[r][free_[i]] += step.local[r][static_cast<Index>(i)];
-    return step.least;
-  }
-
- private:
-  const Likelihood& likelihood_;
-  const CurveColumns& curve_;
-  const Fit& fit_;
-  std::vector<Index> free_;
-  std::vector<MatrixXd> L_, Z_;
-  std::vector<ArrowBlock> blocks_;
-  bool valid_ = false;
-};
-
 }  // namespace
 
 bool has_many_minima(const Parameter& parameter) {
@@ -169,29 +123,97 @@ void doubt_instants(const Likelihood& likelihood, const CurveColumns& curve, Fit
   }
 }
 
-void scan_shapes(const Likelihood& likelihood, const CurveColumns& curve, Fit& fitted) {
-  for (std::size_t i = 0; i < fitted.layout.shared().size(); ++i) {
-    const Parameter& p = *fitted.layout.shared()[i].parameter;
-    if (!has_many_minima(p)) continue;
-    const auto which = static_cast<Index>(i);
-    double step = grid_spacing(p, fitted.shared[which]) / kSteps;
-    for (int zoom = 0; zoom < kZooms; ++zoom, step /= kSteps) {
-      Profile profile(likelihood, curve, fitted);
-      if (!profile.valid()) return;
-      VectorXd shared, best_shared;
-      std::vector<VectorXd> local, best_local;
-      double least = fitted.cost;
-      for (int k = -kSteps; k <= kSteps; ++k) {
-        const double value = fitted.shared[which] + k * step;
-        if (k == 0 || value < p.lower || value > p.upper) continue;
-        const double cost = profile.at(which, value, shared, local);
-        if (cost < least) least = cost, best_shared = shared, best_local = local;
-      }
-      if (best_local.empty()) continue;
-      Fit again = fit(likelihood, fitted.layout, best_shared, best_local, fitted.scales, curve);
-      if (again.valid && again.cost < fitted.cost) fitted = std::move(again);
+bool has_instant(const Layout& layout, int member) {
+  for (std::size_t i = 0; i < layout.local().size(); ++i)
+    if (layout.is_instant(i) && layout.local()[i].member == member) return true;
+  return false;
+}
+
+namespace {
+
+// The least cost of a fit's linear model with one parameter `step` by `step` away, to each side; the fit from there
+// where that costs less.
+void scan_about(const Likelihood& likelihood, const CurveColumns& curve, Index which, double step, int steps,
+                Fit& fitted) {
+  const Parameter& p = *fitted.layout.shared()[static_cast<std::size_t>(which)].parameter;
+  const Profile profile(likelihood, curve, fitted);
+  if (!profile.valid()) return;
+  VectorXd best_shared;
+  std::vector<VectorXd> best_local;
+  double least = fitted.cost;
+  for (const double direction : {-1.0, 1.0}) {
+    VectorXd shared = fitted.shared;
+    std::vector<VectorXd> local = fitted.local;
+    for (int k = 1; k <= steps; ++k) {
+      const double value = fitted.shared[which] + direction * k * step;
+      if (value < p.lower || value > p.upper) break;
+      const double cost = profile.following_instants(which, value, shared, local);
+      if (cost < least) least = cost, best_shared = shared, best_local = local;
     }
   }
+  if (best_local.empty()) return;
+  Fit again = fit(likelihood, fitted.layout, best_shared, best_local, fitted.scales, curve);
+  if (again.valid && again.cost < fitted.cost) fitted = std::move(again);
+}
+
+}  // namespace
+
+void scan_shapes(const Likelihood& likelihood, const CurveColumns& curve, Fit& fitted) {
+  for (std::size_t i = 0; i < fitted.layout.shared().size(); ++i) {
+    const Unknown& unknown = fitted.layout.shared()[i];
+    const Parameter& p = *unknown.parameter;
+    const auto which = static_cast<Index>(i);
+    if (has_many_minima(p)) {
+      double step = grid_spacing(p, fitted.shared[which]) / kSteps;
+      for (int zoom = 0; zoom < kZooms; ++zoom, step /= kSteps)
+        scan_about(likelihood, curve, which, step, kSteps, fitted);
+    } else if (unknown.member >= 0 && is_size(p) && has_instant(fitted.layout, unknown.member)) {
+      // A larger one that happens later is much the same.
+      const double step = kSizeShare / kSizeSteps * std::abs(fitted.shared[which] - p.none);
+      scan_about(likelihood, curve, which, step, kSizeSteps, fitted);
+    }
+  }
+}
+
+Fit replaced(const Likelihood& likelihood, const CurveColumns& curve, const Fit& from, std::size_t member,
+             std::size_t effect, const VectorXd& start) {
+  const System& system = from.layout.system();
+  const std::size_t leaving = from.layout.set()[member];
+  const Layout both(system, with(from.layout.set(), effect));
+  const auto place = [&](std::size_t one) {
+    return static_cast<std::size_t>(std::ranges::find(both.set(), one) - both.set().begin());
+  };
+  Fit now(both);
+  now.scales = from.scales;
+  now.shared = both.shared_from(from.layout, from.shared);
+  for (const auto& local : from.local) now.local.push_back(both.local_from(from.layout, local));
+  const auto& joining = system.effects()[effect].parameters;
+  Index next = 0;
+  for (std::size_t p = 0; p < joining.size(); ++p)
+    if (const int i = both.find_shared(place(effect), p); i >= 0) {
+      if (!is_size(joining[p])) now.shared[i] = start[next];
+      ++next;
+    }
+  FitRules rules{.tolerance = 0.5};
+  const auto& parameters = system.effects()[leaving].parameters;
+  for (std::size_t p = 0; p < parameters.size(); ++p)
+    if (const int i = both.find_shared(place(leaving), p); i >= 0) rules.fixed.push_back(i);
+  const VectorXd at_first = now.shared;
+  for (int k = 1; k <= kWaypoints; ++k) {
+    const double left = 1 - static_cast<double>(k) / kWaypoints;
+    for (std::size_t p = 0; p < parameters.size(); ++p)
+      if (const int i = both.find_shared(place(leaving), p); i >= 0 && is_size(parameters[p]))
+        now.shared[i] = parameters[p].none + left * (at_first[i] - parameters[p].none);
+    now = fit(likelihood, both, now.shared, now.local, now.scales, curve, rules);
+    if (!now.valid) break;
+  }
+  Fit out(Layout(system, with(without(from.layout.set(), leaving), effect)));
+  out.scales = now.scales;
+  out.curve_values = now.curve_values;
+  out.shared = out.layout.shared_from(both, now.shared);
+  for (const auto& local : now.local) out.local.push_back(out.layout.local_from(both, local));
+  out.valid = now.valid;
+  return out;
 }
 
 std::vector<double> log_costs_of_dropping(const Fit& fit) {

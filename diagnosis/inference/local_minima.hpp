@@ -11,6 +11,9 @@ inline constexpr double kInstantSpacing_s = 0.3;
 // Of a shared parameter: its starts are a grid (a depth, a jump).
 bool has_many_minima(const Parameter& parameter);
 
+// Whether a member of the set happens at instants.
+bool has_instant(const Layout& layout, int member);
+
 // Every phase and instant at the best of a grid, all else as it is, again and again until that helps no more.
 void scan_locals(const Likelihood& likelihood, const CurveColumns& curve, Fit& fitted);
 
@@ -18,9 +21,16 @@ void scan_locals(const Likelihood& likelihood, const CurveColumns& curve, Fit& f
 // parameters that are still off may hold them there.
 void doubt_instants(const Likelihood& likelihood, const CurveColumns& curve, Fit& fitted);
 
-// Each shared parameter that has many local minima along a finer
-// grid about where it is, all else following by the linear model.
+// Each shared parameter that has many local minima along a finer grid about where it is, and the size of what happens
+// at instants, all else following by the linear model, and the instants too.
 void scan_shapes(const Likelihood& likelihood, const CurveColumns& curve, Fit& fitted);
+
+// From a fit to one in which another effect does what one of its members does: that member is taken out step by step,
+// and all else follows, the other effect too, from where it starts (its shared parameters). Between two names of one
+// path the rest of the model has to change as well, and what has many local minima (a depth, a jump) is lost on the
+// way if the change is made at once. Not settled yet: without scans. Invalid where the way leaves the model's domain.
+Fit replaced(const Likelihood& likelihood, const CurveColumns& curve, const Fit& from, std::size_t member,
+             std::size_t effect, const Eigen::VectorXd& start);
 
 // By the linear model: by how much the log likelihood falls where one member's sizes are none, for each member.
 // Infinite for one that has no size to be none, or one that presses against a bound.

@@ -8,6 +8,7 @@
 #include <set>
 #include <stdexcept>
 
+#include "diagnosis/inference/local_minima.hpp"
 #include "diagnosis/inference/log_sum.hpp"
 #include "diagnosis/parallel.hpp"
 
@@ -22,6 +23,11 @@ namespace {
 constexpr double kNegligible = 1e-3;  // share of a posterior that is not worth a computation
 constexpr double kShare = 0.02;       // of a model, given the others, that a prediction takes part of
 constexpr double kFarBehind = 15;     // log posterior: what no recording that is left out brings back
+
+bool near_bound(const Parameter& p, double value, double sd) {
+  constexpr double kNear = 3;  // standard deviations
+  return !p.periodic && (value - kNear * sd <= p.lower || value + kNear * sd >= p.upper);
+}
 
 ArrowSolution solve_without(const Fit& fit, const std::vector<ArrowBlock>& blocks, const CurveColumns& curve,
                             std::size_t recording) {
@@ -126,6 +132,7 @@ Unknowns::Unknowns(const Search& search) : search_(&search) {
     const CurveColumns curve = curve_of(search, fit);
     auto blocks = linearise(*fit.likelihood, fit, curve);
     if (blocks.empty()) return;
+    std::optional<Part> first;  // the likelihood is followed once for all standard deviations
     for (Index k = 0; k < over.size(); ++k) {
       if (weight * over[k] < kNegligible) continue;
       const VectorXd nuisance_sd = grid.standard_deviations.col(k);
@@ -135,10 +142,18 @@ Unknowns::Unknowns(const Search& search) : search_(&search) {
                 .layout = &fit.layout,
                 .mean = fit.shared,
                 .sd = fit.shared,
-                .nuisance_sd = nuisance_sd};
+                .nuisance_sd = nuisance_sd,
+                .along = {},
+                .sd_beside = {}};
       for (Index i = 0; i < fit.shared.size(); ++i) {
         part.mean[i] += solution.shared[i];
         part.sd[i] = std::sqrt(std::max(0.0, solution.covariance(i, i)));
+      }
+      if (weight > kShare && !first) {
+        look_along(fit, curve, solution.covariance, part);
+        first = part;
+      } else if (first) {
+        part.along = first->along, part.at_bound = first->at_bound, part.sd_beside = first->sd_beside;
       }
       parts_.push_back(std::move(part));
     }
@@ -148,6 +163,29 @@ Unknowns::Unknowns(const Search& search) : search_(&search) {
     if (one.at->fit_with_curve)
       add(std::exp(one.log_with_curve - best), *one.at->fit_with_curve, one.at->nuisance_weights_with_curve);
   }
+}
+
+// Of those effects' unknowns whose density is no normal one.
+void Unknowns::look_along(const Fit& fit, const CurveColumns& curve, const MatrixXd& covariance, Part& part) {
+  constexpr double kOfHeld = 0.01;  // of its range: where one that presses against a bound may be
+  std::optional<Profile> profile;
+  for (Index i = 0; i < fit.shared.size(); ++i) {
+    const Unknown& unknown = fit.layout.shared()[static_cast<std::size_t>(i)];
+    if (unknown.member < 0) continue;
+    const Parameter& p = *unknown.parameter;
+    const bool bound = near_bound(p, fit.shared[i], part.sd[i]);
+    if (!bound && !has_many_minima(p) && !has_instant(fit.layout, unknown.member)) continue;
+    if (!profile) profile.emplace(*fit.likelihood, curve, fit);
+    if (!profile->valid()) return;
+    part.along[i] = posterior_along(*profile, i, part.sd[i] > 0 ? part.sd[i] : kOfHeld * (p.upper - p.lower));
+    if (bound && part.at_bound < 0) part.at_bound = i;
+  }
+  part.sd_beside = part.sd;
+  if (part.at_bound < 0 || !(part.sd[part.at_bound] > 0)) return;
+  const Index bound = part.at_bound;
+  for (Index i = 0; i < part.sd.size(); ++i)
+    part.sd_beside[i] = std::sqrt(
+        std::max(0.0, covariance(i, i) - covariance(i, bound) * covariance(i, bound) / covariance(bound, bound)));
 }
 
 Mixture Unknowns::of(int effect, std::size_t parameter) const {
@@ -162,7 +200,16 @@ Mixture Unknowns::of(int effect, std::size_t parameter) const {
       if (found < 0) continue;
       at = static_cast<std::size_t>(found);
     }
-    out.parts.push_back({part.weight, part.mean[static_cast<Index>(at)], part.sd[static_cast<Index>(at)]});
+    const auto i = static_cast<Index>(at);
+    if (const auto own = part.along.find(i); own != part.along.end()) {
+      for (const ProfileStep& one : own->second)
+        out.parts.push_back({part.weight * one.weight, one.middle, one.width / std::sqrt(12.0)});
+    } else if (part.at_bound >= 0) {
+      for (const ProfileStep& one : part.along.at(part.at_bound))
+        out.parts.push_back({part.weight * one.weight, one.shared[i], part.sd_beside[i]});
+    } else {
+      out.parts.push_back({part.weight, part.mean[i], part.sd[i]});
+    }
   }
   return out;
 }

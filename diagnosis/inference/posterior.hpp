@@ -4,6 +4,7 @@
 #include <map>
 #include <optional>
 
+#include "diagnosis/inference/profile.hpp"
 #include "diagnosis/inference/search.hpp"
 
 namespace bevel::inference {
@@ -47,7 +48,8 @@ struct Mixture {
   double quantile(double share) const;
 };
 
-// Posteriors of shared unknowns, by the linear models about the modes.
+// Posteriors of shared unknowns: by the linear models about the modes, and along the likelihood where an unknown has
+// many local minima or a bound is near.
 class Unknowns {
  public:
   explicit Unknowns(const Search& search);
@@ -61,7 +63,12 @@ class Unknowns {
     double weight = 0;
     const Layout* layout = nullptr;
     Eigen::VectorXd mean, sd, nuisance_sd;
+    std::map<Eigen::Index, std::vector<ProfileStep>> along;
+    Eigen::Index at_bound = -1;  // the one of those that is near a bound; with it the others move
+    Eigen::VectorXd sd_beside;   // with that one held
   };
+  static void look_along(const Fit& fit, const CurveColumns& curve, const Eigen::MatrixXd& covariance, Part& part);
+
   const Search* search_;
   std::vector<Part> parts_;
 };

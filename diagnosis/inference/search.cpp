@@ -186,7 +186,52 @@ void Search::expand(const ModelSet& set) {
     for (const auto& local : fit.local) job.local.push_back(job.layout.local_from(fit.layout, local));
     jobs.push_back(std::move(job));
   }
+  for (Job& job : swaps(here)) jobs.push_back(std::move(job));
   evaluate_all(std::move(jobs));
+}
+
+// Each member's place taken by another effect, with all else where it is: what two have in common is far from where the
+// smaller set alone would be fitted, and what sets them apart is little. Promised is the difference between the two, by
+// one linear model.
+std::vector<Search::Job> Search::swaps(const Visited& here) {
+  const bool beside_curve = here.at->fit_with_curve && here.log_with_curve > here.log_without_curve;
+  const Fit& fit = beside_curve ? *here.at->fit_with_curve : here.at->fit;
+  const double log_here = beside_curve ? here.log_with_curve : here.log_without_curve, best = best_log();
+  const auto own = with_inputs_of(fit, likelihood_);
+  std::vector<Job> out;
+  for (const std::size_t member : here.set) {
+    const ModelSet rest = without(here.set, member);
+    Fit about{Layout(system_, rest)};
+    about.scales = fit.scales;
+    about.curve_values = fit.curve_values;
+    about.shared = about.layout.shared_from(fit.layout, fit.shared);
+    for (const auto& local : fit.local) about.local.push_back(about.layout.local_from(fit.layout, local));
+    const CurveColumns curve = beside_curve ? discrepancy_->columns(*own, fit.scales.curves) : CurveColumns{};
+    const auto list = proposals_->beside(Marginal(*own, about, curve, likelihood_.get()), rules_.starts);
+    const auto leaves = std::ranges::find(list, member, &Proposal::effect);
+    if (leaves == list.end()) continue;
+    std::size_t rank = 0;
+    for (const Proposal& one : list) {
+      if (one.effect == member) continue;
+      const ModelSet swapped = with(rest, one.effect);
+      const double difference = one.log_bayes_factor - leaves->log_bayes_factor;
+      const double promised = log_here + difference + log_prior_odds(one.effect) - log_prior_odds(member);
+      const double doubtful = rules_.optimism + rules_.linear_error * std::max(0.0, leaves->log_bayes_factor);
+      if (rank++ >= rules_.foremost || promised + doubtful < best - rules_.window) break;
+      const auto visited = visited_.find(swapped);
+      if (visited != visited_.end() && visited->second.log_posterior() > best - rules_.window) continue;
+      if (!swapped_.insert(swapped).second || one.starts.empty()) continue;
+      out.push_back(job_from(about, one.effect, one.starts.front()));
+      Job& job = out.back();
+      job.beside_curve = beside_curve;
+      const auto many = [](const Unknown& u) { return u.parameter != nullptr && has_many_minima(*u.parameter); };
+      if (!std::ranges::any_of(about.layout.shared(), many) || !system_.allows(with(here.set, one.effect))) continue;
+      const auto place = static_cast<std::size_t>(std::ranges::find(here.set, member) - here.set.begin());
+      const Fit there = replaced(*own, curve, fit, place, one.effect, one.starts.front().shared);
+      if (there.valid) job.shared = there.shared, job.local = there.local;
+    }
+  }
+  return out;
 }
 
 const Fit& Search::likeliest_fit() const {
@@ -229,11 +274,36 @@ void Search::run(const Readings& outliers, const Noise& noise, const Progress& p
     promised_.clear();
     refitted_.clear();
     from_larger_.clear();
+    swapped_.clear();
     look_around();
     const Fit& likeliest = likeliest_fit();
     if (near(likeliest.likelihood->noise(), reference) && likeliest.layout.set() == about.layout.set()) break;
     reference = likeliest.likelihood->noise();
   }
+  look_with_less_spread();
+}
+
+// Noise and spread are fitted in turn, each by the other: what one took at first the other does not get back. The
+// likeliest sets once more from no spread, for each kind of it.
+void Search::look_with_less_spread() {
+  std::vector<Job> jobs;
+  const double best = best_log();
+  for (const auto& [set, one] : visited_) {
+    if (one.log_posterior() < best - rules_.window) continue;
+    const bool beside_curve = one.at->fit_with_curve && one.log_with_curve > one.log_without_curve;
+    const Fit& fit = beside_curve ? *one.at->fit_with_curve : one.at->fit;
+    for (Index g = 0; g < fit.scales.nuisance_sd.size(); ++g) {
+      if (fit.scales.nuisance_sd[g] == 0) continue;
+      jobs.push_back({.set = set,
+                      .layout = fit.layout,
+                      .shared = fit.shared,
+                      .local = fit.local,
+                      .nuisance_sd = fit.scales.nuisance_sd,
+                      .beside_curve = beside_curve});
+      jobs.back().nuisance_sd[g] = 0;
+    }
+  }
+  evaluate_all(std::move(jobs));
 }
 
 void Search::look_around() {

@@ -74,6 +74,7 @@ class Search {
     bool beside_curve = false;
   };
   void expand(const ModelSet& set);
+  std::vector<Job> swaps(const Visited& here);
   void keep(const ModelSet& set, const std::shared_ptr<const Evaluated>& at);
   void evaluate_all(std::vector<Job> jobs);
   Job job_from(const Fit& fit, std::size_t effect, const StartPoint& start) const;
@@ -82,6 +83,7 @@ class Search {
   bool is_visited(const ModelSet& set) const { return visited_.contains(set); }
 
   void look_around();
+  void look_with_less_spread();
 
   const System& system_;
   SearchRules rules_;
@@ -89,7 +91,7 @@ class Search {
   std::unique_ptr<const Discrepancy> discrepancy_;
   std::unique_ptr<const Proposals> proposals_;
   std::map<ModelSet, Visited> visited_;
-  std::set<ModelSet> expanded_, refitted_, from_larger_;  // once a round each
+  std::set<ModelSet> expanded_, refitted_, from_larger_, swapped_;  // once a round each
   Progress progress_;
   std::map<ModelSet, double> promised_;  // log posterior of sets that were not fitted
   std::size_t fits_ = 0;

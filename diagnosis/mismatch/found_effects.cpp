@@ -32,6 +32,12 @@ FoundParameter shared_parameter(const NeedleSystem& system, const inference::Unk
   const double off = mixture.mean() - out.value;
   out.std_error = std::sqrt(mixture.sd() * mixture.sd() + off * off);
   out.ci95 = {std::min(mixture.quantile(0.025), out.value), std::max(mixture.quantile(0.975), out.value)};
+  // What the form adds is no part of the readings' own evidence.
+  if (const double form_sd = system.parameter(layout.set()[member], p).form_sd; form_sd > 0) {
+    out.std_error = std::hypot(out.std_error, form_sd);
+    out.ci95 = {out.value - std::hypot(out.value - out.ci95[0], k95 * form_sd),
+                out.value + std::hypot(out.ci95[1] - out.value, k95 * form_sd)};
+  }
   if (!parameter.periodic)
     for (double& end : out.ci95) end = std::clamp(end, parameter.lower, parameter.upper);
   // The same but for whole turns: the one that is meant.

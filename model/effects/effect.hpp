@@ -54,6 +54,9 @@ struct EffectParameter {
   double smallest_seen = 0;  // how far from `none` the effect's causes bring it at least
   double largest_seen = std::numeric_limits<double>::infinity();  // the largest value that they bring about
   double usual = std::numeric_limits<double>::quiet_NaN();        // where a model file does not say; NaN: it has to
+  // Standard uncertainty, in the parameter's unit, that this form of the effect adds to a value found by it (JCGM 100,
+  // 4.3: one that no repetition shows). 0: none is known.
+  double form_sd = 0;
 };
 // Starts from first to last, evenly: as close as the effect is narrow, or a fit never finds it.
 std::vector<double> starts_every(double step, double first, double last);

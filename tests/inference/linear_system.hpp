@@ -64,6 +64,8 @@ class LinearSystem final : public System {
     curves_.push_back(curve);
   }
 
+  void least_size(std::size_t effect, double least) { effects_[effect].parameters[0].lower = least; }
+
   const Dataset& data() const override { return data_; }
   const std::vector<Parameter>& base() const override { return base_; }
   const std::vector<Effect>& effects() const override { return effects_; }

@@ -1,0 +1,123 @@
+#include "diagnosis/inference/profile.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+namespace bevel::inference {
+
+using Eigen::Index;
+using Eigen::VectorXd;
+
+namespace {
+
+constexpr double kNegligible = 20;                            // of chi2: values beyond have no part in an integral
+constexpr double kFirstStep = 0.1;                            // of what is near
+constexpr double kGrowth = 1.15;                              // of the steps
+constexpr int kMostSteps = 60;                                // to each side
+constexpr double kWidestStep_s = 0.2, kFinestStep_s = 0.004;  // of an instant that follows
+
+}  // namespace
+
+Profile::Profile(const Likelihood& likelihood, const CurveColumns& curve, const Fit& fit)
+    : likelihood_(likelihood), curve_(curve), fit_(fit), free_(free_locals(fit.layout)) {
+  LinearRecording recording;
+  for (std::size_t r = 0; r < likelihood.recordings(); ++r) {
+    if (!linearise(likelihood, fit, curve, r, recording)) return;
+    Z_.push_back(std::move(recording.Z));
+    L_.push_back(std::move(recording.L));
+    blocks_.push_back(std::move(recording.block));
+  }
+  valid_ = true;
+}
+
+double Profile::at(Index which, double value, VectorXd& shared, std::vector<VectorXd>& local) const {
+  shared = fit_.shared;
+  shared[which] = value;
+  std::vector<VectorXd> instants = fit_.local;
+  for (std::size_t r = 0; r < instants.size(); ++r)
+    for (std::size_t i = 0; i < fit_.layout.local().size(); ++i)
+      if (fit_.layout.is_instant(i)) instants[r][static_cast<Index>(i)] = local[r][static_cast<Index>(i)];
+  Residuals residuals;
+  auto blocks = blocks_;
+  for (std::size_t r = 0; r < blocks.size(); ++r) {
+    if (!likelihood_.evaluate(fit_.layout, r, shared, instants[r], false, residuals))
+      return std::numeric_limits<double>::infinity();
+    if (curve_) residuals.white -= curve_.columns[r] * fit_.curve_values;
+    blocks[r].lw = L_[r].transpose() * residuals.white;
+    blocks[r].zw = Z_[r].transpose() * residuals.white;
+    blocks[r].ww = residuals.white.squaredNorm();
+  }
+  const Pulls pulls = pulls_of(fit_.layout, shared, fit_.curve_values, curve_.covariance);
+  ArrowRules how{.held = fit_.held};
+  if (std::ranges::count(how.held, which) == 0) how.held.push_back(which);
+  const ArrowSolution step = solve(blocks, pulls.precision, pulls.centre, how);
+  if (!step.valid) return std::numeric_limits<double>::infinity();
+  shared += step.shared.head(shared.size());
+  local = std::move(instants);
+  for (std::size_t r = 0; r < local.size(); ++r)
+    for (std::size_t i = 0; i < free_.size(); ++i) local[r][free_[i]] += step.local[r][static_cast<Index>(i)];
+  return step.least;
+}
+
+double Profile::chi2(std::size_t r, const VectorXd& shared, const VectorXd& local) const {
+  Residuals residuals;
+  if (!likelihood_.evaluate(fit_.layout, r, shared, local, false, residuals))
+    return std::numeric_limits<double>::infinity();
+  if (curve_) residuals.white -= curve_.columns[r] * fit_.curve_values;
+  return residuals.white.squaredNorm();
+}
+
+double Profile::following_instants(Index which, double value, VectorXd& shared, std::vector<VectorXd>& local) const {
+  const Layout& layout = fit_.layout;
+  const int member = layout.shared()[static_cast<std::size_t>(which)].member;
+  shared[which] = value;
+  for (std::size_t i = 0; i < layout.local().size(); ++i) {
+    if (!layout.is_instant(i) || layout.local()[i].member != member) continue;
+    const auto at = static_cast<Index>(i);
+    for (std::size_t r = 0; r < local.size(); ++r) {
+      if (!(local[r][at] > 0)) continue;
+      VectorXd trial = local[r];
+      double least = chi2(r, shared, trial);
+      for (double step_s = kWidestStep_s; step_s > kFinestStep_s; step_s *= 0.5)
+        for (const double direction : {-1.0, 1.0}) {
+          trial[at] = std::clamp(local[r][at] + direction * step_s, kFinestStep_s, layout.upper(i, r));
+          if (const double there = chi2(r, shared, trial); there < least) least = there, local[r] = trial;
+        }
+    }
+  }
+  return at(which, value, shared, local);
+}
+
+std::vector<ProfileStep> posterior_along(const Profile& profile, Index which, double near) {
+  const Fit& fit = profile.fit();
+  const Parameter& p = *fit.layout.shared()[static_cast<std::size_t>(which)].parameter;
+  const double mode = fit.shared[which];
+  VectorXd at_mode;
+  std::vector<VectorXd> local = fit.local;
+  const double least = profile.at(which, mode, at_mode, local);
+  std::vector<ProfileStep> out;
+  for (const double direction : {-1.0, 1.0}) {
+    double width = kFirstStep * near, edge = mode, before = 1;
+    VectorXd shared = at_mode, shared_before = at_mode;
+    local = fit.local;
+    for (int i = 0; i < kMostSteps; ++i, width *= kGrowth) {
+      const double end = std::clamp(edge + direction * width, p.lower, p.upper);
+      if (end == edge) break;
+      const double cost = profile.following_instants(which, end, shared, local);
+      const double now = std::exp(-0.5 * std::clamp(cost - least, -kNegligible, 1e3));
+      out.push_back({.weight = 0.5 * (before + now) * std::abs(end - edge),
+                     .middle = 0.5 * (edge + end),
+                     .width = std::abs(end - edge),
+                     .shared = 0.5 * (shared_before + shared)});
+      edge = end, before = now, shared_before = shared;
+      if (now < std::exp(-0.5 * kNegligible)) break;
+    }
+  }
+  double sum = 0;
+  for (const ProfileStep& one : out) sum += one.weight;
+  for (ProfileStep& one : out) one.weight /= sum;
+  return out;
+}
+
+}  // namespace bevel::inference
