@@ -3,6 +3,7 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
 #include <cstdio>
 #include <random>
@@ -104,6 +105,12 @@ struct Share {
   double value() const { return inside / count; }
 };
 
+double quantile(std::vector<double> values, double share) {
+  const auto at = values.begin() + static_cast<std::ptrdiff_t>(share * static_cast<double>(values.size() - 1));
+  std::nth_element(values.begin(), at, values.end());
+  return *at;
+}
+
 Fit settled(const TwoChannels& system) {
   Noise noise;
   noise.sigma = system.data().claimed_sd;
@@ -118,7 +125,7 @@ Fit settled(const TwoChannels& system) {
 TEST(PredictionNoise, IntervalsOfSmallSetsHold) {
   constexpr int kSets = 100;
   Share beyond, whole, continued, by_one_autocorrelation;
-  double white = 0, white_ar1 = 0, drifting_ar1 = 0;
+  std::vector<double> white, white_ar1, drifting_ar1;
   for (int set = 0; set < kSets; ++set) {
     const TwoChannels system(static_cast<std::uint64_t>(1000 + set));
     Fit fit = settled(system);
@@ -134,7 +141,7 @@ TEST(PredictionNoise, IntervalsOfSmallSetsHold) {
       by_one_autocorrelation.add(found->continued);
     }
     const Noise noise = prediction_noise(about(kRecordings), {});
-    white += noise.sigma[0] / kSets, white_ar1 += noise.own_ar1[0] / kSets, drifting_ar1 += noise.own_ar1[1] / kSets;
+    white.push_back(noise.sigma[0]), white_ar1.push_back(noise.own_ar1[0]), drifting_ar1.push_back(noise.own_ar1[1]);
     fit.likelihood = std::make_shared<const Likelihood>(*fit.likelihood, noise);
     const NuisanceGrid spreads = likely_part(grid, spread_weights(about(kRecordings), {}, grid));
     for (std::size_t r = 0; r < kRecordings; ++r) {
@@ -145,15 +152,16 @@ TEST(PredictionNoise, IntervalsOfSmallSetsHold) {
   }
   std::printf(
       "%d sets of %zu: of %.0f readings of new recordings %.1f %% in 95 %%, of %.0f continued %.1f %%; by one "
-      "autocorrelation %.1f %%; white %.4f (%.2f), drifting (%.2f)\n",
+      "autocorrelation %.1f %%; median of the white one's deviation %.4f\n",
       kSets, kRecordings, whole.count, 100 * whole.value(), continued.count, 100 * continued.value(),
-      100 * by_one_autocorrelation.value(), white, white_ar1, drifting_ar1);
+      100 * by_one_autocorrelation.value(), quantile(white, 0.5));
   EXPECT_NEAR(whole.value(), 0.95, 0.02);
   EXPECT_NEAR(continued.value(), 0.95, 0.02);
   // Each channel's own: what is white is not taken for a drift, and the deviation is not that of residuals at the mode.
-  EXPECT_NEAR(white / TwoChannels::kWhite, 1, 0.03);
-  EXPECT_LT(white_ar1, 0.1);
-  EXPECT_GT(drifting_ar1, 0.7);
+  // (What recordings differ by may still pass for a drift, where they are few: in one set of twenty.)
+  EXPECT_NEAR(quantile(white, 0.5) / TwoChannels::kWhite, 1, 0.03);
+  EXPECT_LT(quantile(white_ar1, 0.9), 0.2);
+  EXPECT_GT(quantile(drifting_ar1, 0.1), 0.6);
 }
 
 }  // namespace
