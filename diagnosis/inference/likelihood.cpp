@@ -58,7 +58,7 @@ void Likelihood::set_noise(Noise noise, const std::vector<VectorXd>& inputs) {
   whitening_.assign(data_.recordings.size(), {});
   for (std::size_t r = 0; r < data_.recordings.size(); ++r)
     for (std::size_t c = 0; c < data_.recordings[r].series.size(); ++c) {
-      whitening_[r].push_back(make_whitening(data_.recordings[r].series[c], noise_, noise_.sigma[c]));
+      whitening_[r].push_back(make_whitening(data_.recordings[r].series[c], noise_.of(c), noise_.sigma[c]));
       for (const double weight : whitening_[r].back().weight) log_weights_[static_cast<Index>(r)] += std::log(weight);
     }
 }

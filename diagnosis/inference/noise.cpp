@@ -198,6 +198,12 @@ Eigen::VectorXd clipped(const Series& series, const Eigen::VectorXd& error) {
 
 }  // namespace
 
+Noise Noise::of(std::size_t channel) const {
+  Noise out = *this;
+  if (!own_ar1.empty()) out.ar1 = own_ar1[channel], out.ar2 = 0;
+  return out;
+}
+
 Whitening make_whitening(const Series& series, const Noise& noise, double sigma) {
   Whitening out;
   const std::size_t n = series.time_s.size();

@@ -17,6 +17,9 @@ struct Noise {
   double ar2 = 0;             // of readings two frames apart, given the one between; 0: of first order
   double outlier_share = 0;   // of messages
   double frame_s = 1.0 / 30;
+  std::vector<double> own_ar1{};  // per channel, where each has one of its own, of first order; empty: ar1, ar2 of all
+  // What it is of one channel.
+  Noise of(std::size_t channel) const;
 };
 
 // Coefficients that turn a series of errors into independent ones of unit variance:

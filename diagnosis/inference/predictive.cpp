@@ -16,6 +16,27 @@ using Eigen::Index;
 using Eigen::MatrixXd;
 using Eigen::VectorXd;
 
+// Beside the priors of what is shared, that of the mean of the nuisances: where it is no unknown, nothing.
+Pulls pulls_with_mean(const Pulls& pulls, const VectorXd& mean) {
+  const Index n = pulls.centre.size(), all = n + mean.size();
+  Pulls out{.precision = MatrixXd::Zero(all, all), .centre = VectorXd(all)};
+  out.precision.topLeftCorner(n, n) = pulls.precision;
+  out.centre << pulls.centre, -mean;
+  return out;
+}
+// Precision of the nuisances' mean: normal by the widest standard deviation that is tried, none where they do not vary.
+VectorXd mean_precision_of(const System& system, const VectorXd& nuisance_sd) {
+  VectorXd out(static_cast<Index>(system.nuisances().size()));
+  for (std::size_t i = 0; i < system.nuisances().size(); ++i) {
+    const std::size_t group = system.nuisances()[i].group;
+    const auto& values = system.nuisance_groups()[group].standard_deviations;
+    const double sd =
+        nuisance_sd[static_cast<Index>(group)] > 0 ? *std::max_element(values.begin(), values.end()) : kNone_sd;
+    out[static_cast<Index>(i)] = 1 / (sd * sd);
+  }
+  return out;
+}
+
 namespace {
 
 constexpr double kLikely = 1e-4;  // share of a combination of standard deviations, given all recordings
@@ -72,27 +93,6 @@ struct FromOthers {
   double log_evidence = 0;  // of the others and this combination; one constant for all is left out
   Index spread = 0;         // which combination
 };
-
-// Beside the priors of what is shared, that of the mean of the nuisances: where it is no unknown, nothing.
-Pulls pulls_with_mean(const Pulls& pulls, const VectorXd& mean) {
-  const Index n = pulls.centre.size(), all = n + mean.size();
-  Pulls out{.precision = MatrixXd::Zero(all, all), .centre = VectorXd(all)};
-  out.precision.topLeftCorner(n, n) = pulls.precision;
-  out.centre << pulls.centre, -mean;
-  return out;
-}
-// Precision of the nuisances' mean: normal by the widest standard deviation that is tried, none where they do not vary.
-VectorXd mean_precision_of(const System& system, const VectorXd& nuisance_sd) {
-  VectorXd out(static_cast<Index>(system.nuisances().size()));
-  for (std::size_t i = 0; i < system.nuisances().size(); ++i) {
-    const std::size_t group = system.nuisances()[i].group;
-    const auto& values = system.nuisance_groups()[group].standard_deviations;
-    const double sd =
-        nuisance_sd[static_cast<Index>(group)] > 0 ? *std::max_element(values.begin(), values.end()) : kNone_sd;
-    out[static_cast<Index>(i)] = 1 / (sd * sd);
-  }
-  return out;
-}
 
 // recording: past the last, all are others.
 std::vector<FromOthers> from_others(LinearModel& model, const CurveColumns& curve, const NuisanceGrid& spreads,

@@ -45,6 +45,10 @@ struct LinearModel {
   std::vector<ArrowBlock> blocks;
   Eigen::VectorXd mean{};  // of the nuisances, where it is an unknown: about this; its columns are the last shared ones
 };
+// Priors of its shared part with that mean, about the model's; and its precision: normal by the widest standard
+// deviation that is tried, none where the nuisances do not vary.
+Pulls pulls_with_mean(const Pulls& pulls, const Eigen::VectorXd& mean);
+Eigen::VectorXd mean_precision_of(const System& system, const Eigen::VectorXd& nuisance_sd);
 // The same with a mean of the nuisances that is unknown, about that of the other recordings' (of all: past the last).
 LinearModel with_mean(LinearModel model, std::size_t recording);
 // Posterior over the grid of the nuisances' standard deviations, of all recordings.

@@ -95,7 +95,7 @@ WhiteReadings RecordingRows::rest_alone(const MatrixXd& A, const VectorXd& error
       if (!series.input_sd.empty()) later.input_sd.push_back(series.input_sd[i]);
     }
     const auto count = static_cast<Index>(later.time_s.size());
-    const Whitening whitening = make_whitening(later, noise, noise.sigma[c]);
+    const Whitening whitening = make_whitening(later, noise.of(c), noise.sigma[c]);
     whiten(whitening, out.A.middleRows(row, count));
     whiten(whitening, out.w.segment(row, count));
     for (const double weight : whitening.weight) out.log_weights += std::log(weight);

@@ -7,7 +7,7 @@
 #include <numbers>
 #include <set>
 
-#include "diagnosis/inference/predictive.hpp"
+#include "diagnosis/inference/prediction_noise.hpp"
 
 namespace bevel::diagnosis {
 
@@ -171,36 +171,61 @@ Sums sums_of(const NeedleSystem& system, const inference::Search& search, Fit fi
   return out;
 }
 
+// How insertions differ about a mean of their own, and the noise beside that.
+struct Varied {
+  std::shared_ptr<const Likelihood> likelihood;
+  inference::NuisanceGrid spreads;
+};
+
+double log_weights_without(const Likelihood& likelihood, std::size_t r) {
+  return likelihood.log_weights() - likelihood.log_weights(r);
+}
+
 // By the noise and the variation of the model itself, as it would be used. whole: the fit of all recordings, others:
-// without this one; mean_spreads: of insertions that differ about a mean of their own, empty: about zero.
+// without this one; varied: null: about zero, by the noise of the fit.
 std::optional<inference::Forecasts> forecast_of(const inference::Search& search, const Fit& whole, Fit others,
-                                                const inference::NuisanceGrid& mean_spreads, std::size_t r) {
+                                                const Varied* varied, std::size_t r) {
   constexpr double kKnown = 1.0 / 3;
   const double until_s = inference::time_of_share(whole.likelihood->data().recordings[r], kKnown);
   Fit begun = refit_without(search, whole, new_insertion(others, r), r, until_s);
-  others.likelihood = begun.likelihood = whole.likelihood;
-  const auto curve = curve_of(search, whole);
-  auto of_others = linearise(*whole.likelihood, others, curve), of_begun = linearise(*whole.likelihood, begun, curve);
-  if (of_others.empty() || of_begun.empty()) return std::nullopt;
+  others.likelihood = whole.likelihood;
+  auto curve = curve_of(search, others);
   const auto spreads = likely_part(nuisance_grid(search.system()), nuisance_weights_of(search, whole));
-  inference::LinearModel before{&others, std::move(of_others)}, beside{&begun, std::move(of_begun)};
-  if (mean_spreads.log_prior.size() == 0)
-    return inference::forecast(std::move(before), std::move(beside), curve, spreads, r, until_s);
-  const double about_zero = log_evidence_of_others(before, curve, spreads, r);
-  auto out = inference::forecast(with_mean(std::move(before), r), with_mean(std::move(beside), r), curve, mean_spreads,
-                                 r, until_s);
-  if (out) out->log_others -= about_zero;  // by so much more are the others' readings likely
+  inference::LinearModel before{&others, linearise(*others.likelihood, others, curve)};
+  if (before.blocks.empty()) return std::nullopt;
+  double about_zero = 0;
+  if (varied) {
+    about_zero = log_evidence_of_others(before, curve, spreads, r) + log_weights_without(*whole.likelihood, r);
+    others.likelihood = varied->likelihood;
+    curve = curve_of(search, others);
+    before.blocks = linearise(*others.likelihood, others, curve);
+  }
+  begun.likelihood = others.likelihood;
+  inference::LinearModel beside{&begun, linearise(*begun.likelihood, begun, curve)};
+  if (before.blocks.empty() || beside.blocks.empty()) return std::nullopt;
+  if (!varied) return inference::forecast(std::move(before), std::move(beside), curve, spreads, r, until_s);
+  auto out = inference::forecast(with_mean(std::move(before), r), with_mean(std::move(beside), r), curve,
+                                 varied->spreads, r, until_s);
+  // By so much more are the others' readings likely.
+  if (out) out->log_others += log_weights_without(*varied->likelihood, r) - about_zero;
   return out;
 }
 
-// Standard deviations between insertions that differ about a mean of their own.
-inference::NuisanceGrid mean_spreads_of(const inference::Search& search, const Fit& whole) {
-  const auto curve = curve_of(search, whole);
-  const auto grid = nuisance_grid(search.system());
-  auto blocks = linearise(*whole.likelihood, whole, curve);
-  if (blocks.empty()) return likely_part(grid, nuisance_weights_of(search, whole));
+std::optional<Varied> varied_about(const inference::Search& search, Fit fit) {
+  auto curve = curve_of(search, fit);
+  auto blocks = linearise(*fit.likelihood, fit, curve);
+  if (blocks.empty()) return std::nullopt;
   const std::size_t none = blocks.size();
-  return likely_part(grid, spread_weights(inference::with_mean({&whole, std::move(blocks)}, none), curve, grid));
+  const auto noise = inference::prediction_noise(inference::with_mean({&fit, std::move(blocks)}, none), curve);
+  Varied out{.likelihood = std::make_shared<const Likelihood>(*fit.likelihood, noise, inputs_about(fit)),
+             .spreads = {}};
+  fit.likelihood = out.likelihood;
+  curve = curve_of(search, fit);
+  blocks = linearise(*fit.likelihood, fit, curve);
+  if (blocks.empty()) return std::nullopt;
+  const auto grid = nuisance_grid(search.system());
+  out.spreads = likely_part(grid, spread_weights(inference::with_mean({&fit, std::move(blocks)}, none), curve, grid));
+  return out;
 }
 
 // By the model file as it is: nothing is refitted, and it knows of no variation.
@@ -244,7 +269,7 @@ HeldOut hold_out(const NeedleSystem& system, const inference::Search& search, co
   const auto selected = leave_out_selection(search);
   std::vector<Sums> file, before, after, floor;
   InsertionSums predicted_before(system), predicted_after(system);
-  std::map<const Fit*, inference::NuisanceGrid> mean_spreads;
+  std::map<const Fit*, std::optional<Varied>> varied;
   for (std::size_t r = 0; r < likelihood.recordings(); ++r) {
     const Recording& recording = system.recorded().recordings[r];
     if (system.recorded().two_groups() && !recording.changed) continue;
@@ -273,15 +298,16 @@ HeldOut hold_out(const NeedleSystem& system, const inference::Search& search, co
     };
     std::vector<inference::Forecasts> models;
     std::vector<double> probabilities;
-    if (auto forecast = forecast_of(search, base, alone_refitted, {}, r)) models.push_back(std::move(*forecast));
+    if (auto forecast = forecast_of(search, base, alone_refitted, nullptr, r)) models.push_back(std::move(*forecast));
     one.predicted_before = note(models, {1}, predicted_before);
     models.clear();
     for (const auto& share : selected[r].shares) {
       const bool likeliest = share.fit == &found;
-      if (!mean_spreads.contains(share.fit)) mean_spreads[share.fit] = mean_spreads_of(search, *share.fit);
-      if (auto forecast =
-              forecast_of(search, *share.fit, likeliest ? found_refitted : refit_without(search, *share.fit, r),
-                          mean_spreads[share.fit], r)) {
+      if (!varied.contains(share.fit)) varied[share.fit] = varied_about(search, *share.fit);
+      const auto& about = varied[share.fit];
+      if (!about) continue;
+      if (auto forecast = forecast_of(search, *share.fit,
+                                      likeliest ? found_refitted : refit_without(search, *share.fit, r), &*about, r)) {
         probabilities.push_back(std::log(share.probability) + forecast->log_others);
         models.push_back(std::move(*forecast));
       }
