@@ -136,7 +136,9 @@ Update NeedleFilter::update_heading(FilterState& state, const model::TipHeading&
       by_state.middleCols<2>(7) = angles.by_heading * predicted.by_slip;
       ByNuisance by_nuisance = ByNuisance::Zero();
       if (measurement.camera >= 0 && measurement.camera < kCamerasInFrame)
-        by_nuisance.middleCols<3>(frame_of(measurement.camera)) = -angles.by_heading * model::hat(predicted.along);
+        by_nuisance.middleCols<3>(frame_of(measurement.camera)) =
+            -angles.by_heading * model::hat(predicted.along) *
+            model::right_jacobian_so3(-state.nuisance.mean.segment<3>(frame_of(measurement.camera)));
       result = update_all(state, by_state, by_nuisance, angles.seen, angles.residual_rad, gate_);
     } else if (of_shaft) {
       Eigen::Matrix<double, 3, 9> by_state = Eigen::Matrix<double, 3, 9>::Zero();
