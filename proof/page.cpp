@@ -172,7 +172,8 @@ std::string middle_of(std::vector<double> z) {
     return digits(z[below] + (at - static_cast<double>(below)) * (above - z[below]), 2);
   };
   return "median " + quantile(0.5) + ", half of them from " + quantile(0.25) + " to " + quantile(0.75) +
-         ", the farthest off by " + digits(std::max(std::abs(z.front()), std::abs(z.back())), 3) + " standard errors";
+         ", the farthest off by " + std::to_string(std::lround(std::max(std::abs(z.front()), std::abs(z.back())))) +
+         " standard errors";
 }
 
 void parameters(report::Page& page, const Tally& t) {
