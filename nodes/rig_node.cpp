@@ -179,7 +179,7 @@ void RigNode::take_frames(const Now& now) {
   const model::Pose tip = plant_->tip();
   for (Eye& eye : eyes_) {
     // A bevel's point is on the side to which the needle bends: body -y (model/needle.hpp).
-    const double roll_rad = eye.renderer.roll_seen_rad(vector(tip.p), vector(tip.R.col(2)), vector(-tip.R.col(1)));
+    const double roll_rad = eye.renderer.roll_seen_rad(vector(tip.p_mm), vector(tip.R.col(2)), vector(-tip.R.col(1)));
     camera::Frame frame;
     frame.capture_utime = now.utime + late_us;
     frame.seq = frame_seq_;

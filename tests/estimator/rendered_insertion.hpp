@@ -102,7 +102,8 @@ inline RenderedInsertion watch(const model::NeedleParameters& truth, const model
       const auto vector = [](const Eigen::Vector3d& v) { return camera::Vector3{v.x(), v.y(), v.z()}; };
       for (const int which : {0, 1}) {
         const auto i = static_cast<std::size_t>(which);
-        const double roll_rad = renderers[i].roll_seen_rad(vector(tip.p), vector(tip.R.col(2)), vector(-tip.R.col(1)));
+        const double roll_rad =
+            renderers[i].roll_seen_rad(vector(tip.p_mm), vector(tip.R.col(2)), vector(-tip.R.col(1)));
         const rig::NeedlePicture picture = renderers[i].render(path, roll_rad);
         const camera::TipResult seen = trackers[i].track({utime, seq, which, picture.gray});
         ++out.frames;

@@ -74,7 +74,7 @@ class RenderedCameras {
     const model::Pose tip = plant.tip();
     const auto i = static_cast<std::size_t>(which);
     rig::NeedleRenderer& renderer = renderers_.at(i);
-    const double roll_rad = renderer.roll_seen_rad(vector(tip.p), vector(tip.R.col(2)), vector(-tip.R.col(1)));
+    const double roll_rad = renderer.roll_seen_rad(vector(tip.p_mm), vector(tip.R.col(2)), vector(-tip.R.col(1)));
     source_->hand({utime, seq_.at(i)++, which, renderer.render(path, roll_rad).gray});
     if (estimate && estimate->health == 0)
       pipeline_->predict({estimate->position_mm[0], estimate->position_mm[1], estimate->position_mm[2]});
