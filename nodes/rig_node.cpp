@@ -175,10 +175,11 @@ void RigNode::take_frames(const Now& now) {
   };
   const auto path = to_camera(plant_->shaft_mm());
   const auto path_along_x = to_camera(rig::shaft_seen_along_x(*plant_));
+  const auto vector = [](const Eigen::Vector3d& v) { return camera::Vector3{v.x(), v.y(), v.z()}; };
   const model::Pose tip = plant_->tip();
   for (Eye& eye : eyes_) {
-    // Where body x points beside the heading: the roll that shapes the bevel's silhouette.
-    const double roll_rad = std::atan2(tip.R(1, 0), tip.R(0, 0));
+    // A bevel's point is on the side to which the needle bends: body -y (model/needle.hpp).
+    const double roll_rad = eye.renderer.roll_seen_rad(vector(tip.p_mm), vector(tip.R.col(2)), vector(-tip.R.col(1)));
     camera::Frame frame;
     frame.capture_utime = now.utime + late_us;
     frame.seq = frame_seq_;

@@ -19,6 +19,10 @@ std::string digits(double value, int count = 3) { return report::format_signific
 
 std::string percent(double share) { return digits(100 * share, 3) + " %"; }
 
+std::string counted(int count, const std::string& one) {
+  return std::to_string(count) + " " + one + (count == 1 ? "" : "s");
+}
+
 std::string words(const std::vector<std::string>& names) {
   std::string text;
   for (const auto& name : names) text += (text.empty() ? "" : " + ") + name;
@@ -38,10 +42,9 @@ void headline(report::Page& page, const Tally& t, const CampaignFacts& facts) {
                "Exactly the right physics in " + std::to_string(visible.hits) + " of " + std::to_string(visible.of) +
                    " trials in which all of it could be seen (" + percent(visible.value()) + ", 95 % interval " +
                    percent(w.low) + " to " + percent(w.high) + ")",
-               std::to_string(t.false_alarms.hits) + " false alarms in " + std::to_string(t.false_alarms.of) +
-                   " trials with nothing missing: the rate is below " +
-                   percent(clopper_pearson_upper95(t.false_alarms)) + " (95 %, one-sided). " +
-                   std::to_string(t.unknown_called_unknown.hits) + " of " +
+               counted(t.false_alarms.hits, "false alarm") + " in " + counted(t.false_alarms.of, "trial") +
+                   " with nothing missing: the rate is below " + percent(clopper_pearson_upper95(t.false_alarms)) +
+                   " (95 %, one-sided). " + std::to_string(t.unknown_called_unknown.hits) + " of " +
                    std::to_string(t.unknown_called_unknown.of) + " effects on no list were called unknown. " +
                    (facts.sealed ? "" : "The tool ran WITHOUT being sealed off from the truths."));
   page.paragraph(std::to_string(t.trials) + " trials, seed " + std::to_string(facts.seed) +
@@ -132,7 +135,8 @@ void sensitivity(report::Page& page, const Tally& t) {
   }
   if (x.empty()) return;
   page.heading("Sensitivity");
-  figure.bars("95 %", x, low, high, report::Colour::blue).line("effect named", x, named, report::Colour::blue);
+  figure.bars("its 95 % interval", x, low, high, report::Colour::blue)
+      .line("effect named", x, named, report::Colour::blue);
   figure.points("", x, named, report::Colour::blue);
   if (!alarmed_x.empty()) figure.dashed("anything said", alarmed_x, alarmed, report::Colour::orange);
   page.figure(figure, "Effects named, against how much of them could be seen at all. Binned; the bars are Wilson's.");
@@ -151,12 +155,25 @@ void confusion(report::Page& page, const Tally& t) {
   page.picture(confusion_figure(t.confusion),
                "Each effect that could be seen against what was named for it. Blue is right. Row \"none\": trials in "
                "which nothing could be seen, with nothing concealed (" +
-                   std::to_string(t.false_alarms.of) + " trials, " + std::to_string(t.false_alarms.hits) +
-                   " false alarms) or too little of it; of " + std::to_string(unseen) + " entries " +
-                   std::to_string(silent) +
+                   std::to_string(t.false_alarms.of) + " trials, " + counted(t.false_alarms.hits, "false alarm") +
+                   ") or too little of it; of " + std::to_string(unseen) + " entries " + std::to_string(silent) +
                    " are silence, the others were named without being there or without being visible. Row \"" +
                    std::string(kBeyond) +
                    "\": named beside what was there. Column \"none\": missed. Depth of colour: share of the row.");
+}
+
+// A few that are off by hundreds of standard errors would be all that a mean tells of the others.
+std::string middle_of(std::vector<double> z) {
+  std::ranges::sort(z);
+  const auto quantile = [&](double share) {
+    const double at = share * static_cast<double>(z.size() - 1);
+    const auto below = static_cast<std::size_t>(at);
+    const double above = below + 1 < z.size() ? z[below + 1] : z[below];
+    return digits(z[below] + (at - static_cast<double>(below)) * (above - z[below]), 2);
+  };
+  return "median " + quantile(0.5) + ", half of them from " + quantile(0.25) + " to " + quantile(0.75) +
+         ", the farthest off by " + std::to_string(std::lround(std::max(std::abs(z.front()), std::abs(z.back())))) +
+         " standard errors";
 }
 
 void parameters(report::Page& page, const Tally& t) {
@@ -194,9 +211,9 @@ void parameters(report::Page& page, const Tally& t) {
               "Errors of the parameters of effects named rightly, in their own standard errors. The outermost "
               "columns hold everything beyond.");
   const Interval w = wilson95(t.covered);
-  page.paragraph(std::to_string(t.z.size()) + " parameters: mean " + digits(t.z_mean) + ", spread " +
-                 digits(t.z_spread) + " (right are 0 and 1); the 95 % intervals hold the truth in " +
-                 percent(t.covered.value()) + " (" + percent(w.low) + " to " + percent(w.high) + ").");
+  page.paragraph(std::to_string(t.z.size()) + " parameters: " + middle_of(t.z) +
+                 " (right are 0, -0.67 and 0.67); the 95 % intervals hold the truth in " + percent(t.covered.value()) +
+                 " (" + percent(w.low) + " to " + percent(w.high) + ").");
   if (t.z_nearest.empty()) return;
   const Interval n = wilson95(t.covers_nearest);
   page.paragraph(

@@ -69,7 +69,7 @@ const char* to_string(StopReason reason) {
     case StopReason::wrong_mode:
       return "drive left its mode of operation";
     case StopReason::second_drive:
-      return "two drives answer with one node id";
+      return "two drives answer with one node id, or frames are doubled on the bus";
     case StopReason::foreign_master:
       return "another master commands the drives";
   }

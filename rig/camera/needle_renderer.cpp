@@ -114,6 +114,26 @@ cv::Point2d NeedleRenderer::while_read_out(const cv::Point2d& p) const {
   return {p.x + m[0] * time, v};
 }
 
+double NeedleRenderer::roll_seen_rad(const camera::Vector3& tip_mm, const camera::Vector3& heading,
+                                     const camera::Vector3& pointed_side) const {
+  constexpr double kAside_mm = 0.01;
+  cv::Matx23d by_mm;  // of u, v by x, y, z
+  for (int axis = 0; axis < 3; ++axis) {
+    camera::Vector3 before = tip_mm, after = tip_mm;
+    before.at(static_cast<size_t>(axis)) -= kAside_mm;
+    after.at(static_cast<size_t>(axis)) += kAside_mm;
+    const cv::Point2d change = (view_->pixel(after) - view_->pixel(before)) / (2.0 * kAside_mm);
+    by_mm(0, axis) = change.x, by_mm(1, axis) = change.y;
+  }
+  const cv::Vec3d point(pointed_side[0], pointed_side[1], pointed_side[2]);
+  const cv::Vec2d along = by_mm * cv::Vec3d(heading[0], heading[1], heading[2]);
+  // add_needle's `side` grows this way; with v down, u x v points away from the camera, where the point is at roll 0.
+  const cv::Vec3d side = cv::normalize(by_mm.t() * cv::Vec2d(along[1], -along[0]));
+  const cv::Vec3d away = cv::normalize(
+      cv::Vec3d(by_mm(0, 0), by_mm(0, 1), by_mm(0, 2)).cross(cv::Vec3d(by_mm(1, 0), by_mm(1, 1), by_mm(1, 2))));
+  return std::atan2(point.dot(side), point.dot(away));
+}
+
 void NeedleRenderer::add_needle(cv::Mat& light, const std::vector<cv::Point2d>& axis_px, double roll_rad) const {
   const double radius_px = 0.5 * scene_.needle_diameter_mm * view_->px_per_mm();
   const double bevel_px = scene_.bevel_length_mm * view_->px_per_mm();

@@ -72,6 +72,12 @@ class NeedleRenderer {
   /// the side. Fewer than two points, or one that the view cannot see: a picture without a needle (tip_px is then NaN).
   NeedlePicture render(const std::vector<camera::Vector3>& path_mm, double roll_rad);
 
+  /// That roll as this camera sees it, of a bevel whose foremost point lies from the shaft's axis toward the unit
+  /// vector `pointed_side` in {A}, square to the unit vector `heading` of the shaft at the tip. Of a picture that is
+  /// not mirrored.
+  double roll_seen_rad(const camera::Vector3& tip_mm, const camera::Vector3& heading,
+                       const camera::Vector3& pointed_side) const;
+
   void set_gain(double gain) { scene_.gain = gain; }
   const cv::Mat& background() const { return background_; }
 

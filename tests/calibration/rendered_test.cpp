@@ -57,8 +57,14 @@ TEST(RenderedNeedles, TwoCamerasThroughTheirWallsFindTheTip) {
   for (int n = 0; n < kNeedles; ++n) {
     const auto needle =
         test::space_path({50 + 25 * any(random), 0.004, 0.06 * any(random), 0.06 * any(random), 3 * any(random), 0});
-    const double roll_rad = 3 * any(random);
+    // The bevel's point: to a side of the axis that both cameras see from where they are.
+    const double side_rad = 3 * any(random);
+    const cv::Vec3d& heading = needle.tangent;
+    const cv::Vec3d one = cv::normalize(heading.cross(cv::Vec3d(1, 0, 0))), other = heading.cross(one);
+    const cv::Vec3d point = std::cos(side_rad) * one + std::sin(side_rad) * other;
     for (size_t c = 0; c < 2; ++c) {
+      const double roll_rad = renderers[c].roll_seen_rad(needle.points_mm.back(), {heading[0], heading[1], heading[2]},
+                                                         {point[0], point[1], point[2]});
       Frame frame;
       frame.camera = static_cast<int32_t>(c);
       frame.seq = n;

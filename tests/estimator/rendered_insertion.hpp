@@ -99,9 +99,11 @@ inline RenderedInsertion watch(const model::NeedleParameters& truth, const model
       next_frame_ms += static_cast<int>(std::lround(1000 / plan.frame_rate_hz));
       std::vector<camera::Vector3> path;
       for (const Eigen::Vector3d& p : plant.shaft_mm()) path.push_back({p.x(), p.y(), p.z()});
-      const double roll_rad = std::atan2(tip.R(1, 0), tip.R(0, 0));
+      const auto vector = [](const Eigen::Vector3d& v) { return camera::Vector3{v.x(), v.y(), v.z()}; };
       for (const int which : {0, 1}) {
         const auto i = static_cast<std::size_t>(which);
+        const double roll_rad =
+            renderers[i].roll_seen_rad(vector(tip.p_mm), vector(tip.R.col(2)), vector(-tip.R.col(1)));
         const rig::NeedlePicture picture = renderers[i].render(path, roll_rad);
         const camera::TipResult seen = trackers[i].track({utime, seq, which, picture.gray});
         ++out.frames;

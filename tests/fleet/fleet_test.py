@@ -305,6 +305,19 @@ class Page(unittest.TestCase):
         still = page.html([{**row, "curvature_per_mm": 0.004} for row in rows], "f")
         self.assertNotIn("class=drifts", still)
 
+    def test_says_verdicts_and_sizes_in_words_with_their_units(self):
+        names = rollup.schema().names
+        found = [{"effect": "friction", "parameter": "loss_per_mm", "value": 0.1029, "std_error": 0.01},
+                 {"effect": "camera_latency", "parameter": "latency_s", "value": 0.04, "std_error": 0.002},
+                 {"effect": "unknown", "parameter": None, "value": None, "std_error": None}]
+        row = {**dict.fromkeys(names), "case": "c", "rig": "r", "key": "ff", "effects": found, "verdict": "effects-found",
+               "date": datetime.datetime(2026, 1, 1)}
+        shown = page.html([row], "f")
+        self.assertIn("<span>effects found</span><b>1</b>", shown)
+        self.assertIn("friction: loss 0.1029 ± 0.01 1/mm<br>camera_latency: latency 0.04 ± 0.002 s<br>unknown", shown)
+        self.assertIn("prefers-color-scheme: dark", shown)
+        self.assertNotRegex(shown.split("</style>")[1], r"#[0-9a-f]{3}")  # a colour that would stay as it is in the dark
+
 
 class Progress(unittest.TestCase):
     """As tests/help/progress_line_test.cpp, by the same figures."""

@@ -72,9 +72,12 @@ class RenderedCameras {
                                        const std::optional<needle_state_t>& estimate) {
     std::vector<camera::Vector3> path;
     for (const Eigen::Vector3d& p : plant.shaft_mm()) path.push_back({p.x(), p.y(), p.z()});
-    const Eigen::Matrix3d R = plant.tip().R;
+    const auto vector = [](const Eigen::Vector3d& v) { return camera::Vector3{v.x(), v.y(), v.z()}; };
+    const model::Pose tip = plant.tip();
     const auto i = static_cast<std::size_t>(which);
-    source_->hand({utime, seq_.at(i)++, which, renderers_.at(i).render(path, std::atan2(R(1, 0), R(0, 0))).gray});
+    rig::NeedleRenderer& renderer = renderers_.at(i);
+    const double roll_rad = renderer.roll_seen_rad(vector(tip.p_mm), vector(tip.R.col(2)), vector(-tip.R.col(1)));
+    source_->hand({utime, seq_.at(i)++, which, renderer.render(path, roll_rad).gray});
     if (estimate && estimate->health == 0)
       pipeline_->predict({estimate->position_mm[0], estimate->position_mm[1], estimate->position_mm[2]});
     const auto seen = pipeline_->next(std::chrono::milliseconds(0));

@@ -126,6 +126,16 @@ TEST(Page, SaysTheMainFiguresAndEveryTrial) {
   EXPECT_THAT(results_page({7, false, "", "", ""}, tally(scores), scores), HasSubstr("ran WITHOUT"));
 }
 
+TEST(Page, SaysWhereTheMiddleOfTheParametersIsWhateverTheFarthestDoes) {
+  TrialScore s = trial({"layer"}, {"layer"});
+  for (const double z : {2000.0, -1.0, 0.2, 1.0, 0.0})
+    s.parameters.push_back({"layer", "depth_mm", 30, 30, z, z < 1.5});
+  const std::vector<TrialScore> scores{s, trial({}, {"layer"})};
+  const std::string page = results_page({7, true, "aa", "bb", "cc"}, tally(scores), scores);
+  EXPECT_THAT(page, HasSubstr("5 parameters: median 0.2, half of them from 0 to 1, the farthest off by 2000 standard"));
+  EXPECT_THAT(page, HasSubstr("1 false alarm in 1 trial"));
+}
+
 TEST(Page, StandsWithNoTrialsOfAKind) {
   const std::vector<TrialScore> scores{trial({}, {})};
   EXPECT_THAT(results_page({}, tally(scores), scores), HasSubstr("no trials"));

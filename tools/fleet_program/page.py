@@ -7,22 +7,27 @@ import math
 from . import drift
 
 STYLE = """
-:root { --ink: #222; --soft: #666; --line: #ddd; }
+:root { --ground: #fff; --ink: #222; --soft: #666; --line: #ddd; --faint: #aaa; --blue: #1f6fb2; --orange: #d1622b;
+        --warning: #fbf6e8; --bad: #fbeeec; }
+@media screen and (prefers-color-scheme: dark) {
+  :root { --ground: #14171b; --ink: #e6e9ed; --soft: #9aa3ae; --line: #343b45; --faint: #5c6570; --blue: #62aef0;
+          --orange: #f0875a; --warning: #2b2613; --bad: #301a18; color-scheme: dark; } }
 body { font: 16px/1.5 system-ui, "Helvetica Neue", Helvetica, Arial, sans-serif; color: var(--ink);
-       max-width: 72rem; margin: 2.5rem auto; padding: 0 1.2rem; background: #fff; }
+       max-width: 72rem; margin: 2.5rem auto; padding: 0 1.2rem; background: var(--ground); }
+a { color: var(--blue); }
 h1 { font-size: 1.7rem; line-height: 1.25; margin: 0 0 1.2rem; }
 h2 { font-size: 1.25rem; margin: 2.2rem 0 .6rem; padding-bottom: .25rem; border-bottom: 1px solid var(--line); }
 caption, .note { color: var(--soft); font-size: .88rem; text-align: left; }
 caption { caption-side: bottom; padding-top: .4rem; }
 table { border-collapse: collapse; margin: 1rem 0; font-size: .88rem; font-variant-numeric: tabular-nums; }
 th, td { padding: .25rem .7rem; border-bottom: 1px solid var(--line); text-align: left; vertical-align: top; }
-th { border-bottom: 2px solid #999; font-weight: 600; } .number { text-align: right; }
+th { border-bottom: 2px solid var(--faint); font-weight: 600; } .number { text-align: right; }
 .number, .date { white-space: nowrap; }
 .facts { display: flex; flex-wrap: wrap; gap: .7rem; margin: 1.1rem 0; }
 .facts div { flex: 1 1 6.5rem; border: 1px solid var(--line); border-radius: 6px; padding: .55rem .8rem; }
 .facts span { display: block; color: var(--soft); font-size: .82rem; } .facts b { font-size: 1.12rem; font-weight: 600; }
 .panels { display: grid; grid-template-columns: repeat(auto-fill, minmax(19rem, 1fr)); gap: .6rem 1.2rem; }
-.panels svg { width: 100%; height: auto; } .drifts { background: #fbf6e8; } .bad { background: #fbeeec; }
+.panels svg { width: 100%; height: auto; } .drifts { background: var(--warning); } .bad { background: var(--bad); }
 @media print { body { margin: 0; max-width: none; } svg, table { break-inside: avoid; } }
 """
 NEEDLE = (("k", "1/mm", "curvature_per_mm", "curvature_sd_per_mm"),
@@ -48,6 +53,21 @@ def days_of(row):
     return (row["date"] - datetime.datetime(1970, 1, 1)).total_seconds() / 86400
 
 
+def name_and_unit(parameter):
+    """Of a parameter of a verdict: loss_per_mm is a loss in 1/mm."""
+    unit = next((unit for unit in UNITS if parameter.endswith("_" + unit)), "")
+    name = parameter.removesuffix("_" + unit) if unit else parameter
+    return name, unit.replace("_per_", "/").replace("per_", "1/")
+
+
+def size_of(line):
+    """What was found in a case, and its size: one effect, one parameter."""
+    if not line.get("parameter"):
+        return line["effect"]
+    name, unit = name_and_unit(line["parameter"])
+    return f"{line['effect']}: {name} {figure(line['value'])} ± {figure(line['std_error'], 2)} {unit}".rstrip()
+
+
 def curves_of(rows):
     """What is drawn of a rig: (title, unit, [(days, value, sd)]): the needle, the noise, then each parameter found."""
     done = [row for row in rows if row["verdict"] is not None]
@@ -59,10 +79,8 @@ def curves_of(rows):
             if line.get("parameter") and line["value"] is not None:
                 found[line["effect"], line["parameter"]].append((days_of(row), line["value"], line["std_error"]))
     for (effect, parameter), points in sorted(found.items()):
-        unit = next((unit for unit in UNITS if parameter.endswith("_" + unit)), "")
-        name = parameter.removesuffix("_" + unit) if unit else parameter
-        curves.append((f"{effect}: {name}, in {len(points)} of {len(done)}",
-                       unit.replace("_per_", "/").replace("per_", "1/"), points))
+        name, unit = name_and_unit(parameter)
+        curves.append((f"{effect}: {name}, in {len(points)} of {len(done)}", unit, points))
     return [curve for curve in curves if curve[2]]
 
 
@@ -85,7 +103,7 @@ def svg(title, unit, points):
     marks = []
     for share in (0.1, 0.5, 0.9):
         value = low + share * (high - low)
-        marks.append(f'<line x1="{LEFT}" x2="{WIDTH - RIGHT}" y1="{y(value):.1f}" y2="{y(value):.1f}" stroke="#eee"/>'
+        marks.append(f'<line x1="{LEFT}" x2="{WIDTH - RIGHT}" y1="{y(value):.1f}" y2="{y(value):.1f}" style="stroke:var(--line)"/>'
                      f'<text x="{LEFT - 5}" y="{y(value) + 3.5:.1f}" text-anchor="end">{figure(value, digits)}</text>')
     for t, anchor in ((first, "start"), (last, "end"))[: 2 if last > first else 1]:
         when = datetime.datetime(1970, 1, 1) + datetime.timedelta(days=t)
@@ -95,16 +113,16 @@ def svg(title, unit, points):
     if line := drift.trend(*zip(*points)):
         at = [line.mean + line.per_day * (t - line.at_mean_days) for t in (first, last)]
         marks.append(f'<line x1="{x(first):.1f}" x2="{x(last):.1f}" y1="{y(at[0]):.1f}" y2="{y(at[1]):.1f}" '
-                     'stroke="#d1762b" stroke-width="1.5"/>')
+                     'stroke-width="1.5" style="stroke:var(--orange)"/>')
     for t, value, sd in points:
         half = Z95 * (sd or 0)
         marks.append(f'<line x1="{x(t):.1f}" x2="{x(t):.1f}" y1="{y(value - half):.1f}" y2="{y(value + half):.1f}" '
-                     f'stroke="#1f6fb2" stroke-opacity=".45"/>'
-                     f'<circle cx="{x(t):.1f}" cy="{y(value):.1f}" r="2.6" fill="#1f6fb2"/>')
-    return (f'<svg viewBox="0 0 {WIDTH} {HEIGHT}" font-size="11" font-family="sans-serif" fill="#222" role="img">'
+                     f'stroke-opacity=".45" style="stroke:var(--blue)"/>'
+                     f'<circle cx="{x(t):.1f}" cy="{y(value):.1f}" r="2.6" style="fill:var(--blue)"/>')
+    return (f'<svg viewBox="0 0 {WIDTH} {HEIGHT}" font-size="11" font-family="sans-serif" style="fill:var(--ink)" role="img">'
             f'<title>{text(title)} over the date</title><text x="{LEFT}" y="15" font-weight="600">{text(title)}'
             f'{" (" + unit + ")" if unit else ""}</text><rect x="{LEFT}" y="{TOP}" width="{WIDTH - LEFT - RIGHT}" '
-            f'height="{HEIGHT - TOP - BOTTOM}" fill="none" stroke="#ccc"/>{"".join(marks)}</svg>')
+            f'height="{HEIGHT - TOP - BOTTOM}" style="fill:none;stroke:var(--line)"/>{"".join(marks)}</svg>')
 
 
 def drift_table(curves):
@@ -131,22 +149,21 @@ def case_table(rows):
             lines.append(f"<tr class=bad><td>{text(row['case'])}<td>{text(row['rig'])}<td class=date>{date}<td colspan=7>"
                          f"{text(row['fault'])}")
             continue
-        sizes = "<br>".join(
-            text(line["effect"] + (f" {line['parameter']} {figure(line['value'])} ± {figure(line['std_error'], 2)}"
-                                   if line.get("parameter") else "")) for line in row["effects"])
+        sizes = "<br>".join(text(size_of(line)) for line in row["effects"])
         name = f'<a href="results/{row["key"]}/report.html">{text(row["case"])}</a>'
-        verdict = row["verdict"] + (" (damaged recordings)" if row["exit_status"] == 3 else "")
+        verdict = row["verdict"].replace("-", " ") + (" (damaged recordings)" if row["exit_status"] == 3 else "")
         lines.append(
             f"<tr><td>{name}<td>{text(row['rig'])}<td class=date>{date}<td>{text(verdict)}<td>{sizes}"
             f"<td class=number>{figure(row['curvature_per_mm'])} ± {figure(row['curvature_sd_per_mm'], 2)}"
             f"<td class=number>{figure(row['noise_mm'], 3)}<td class=number>{figure(row['held_out_before_mm'], 3)}"
             f"<td class=number>{figure(row['held_out_after_mm'], 3)}<td class=number>{figure(row['seconds'], 3)}")
     return ("<table><tr><th>case<th>rig<th>date<th>verdict<th>effects, sizes<th>k, 1/mm<th>noise, mm<th>held out before, mm"
-            "<th>after, mm<th>s" + "".join(lines) + "</table>")
+            "<th>after, mm<th>time, s" + "".join(lines) + "</table>")
 
 
 def html(rows, title):
-    counts = collections.Counter("could not be diagnosed" if row["verdict"] is None else row["verdict"] for row in rows)
+    counts = collections.Counter("could not be diagnosed" if row["verdict"] is None else row["verdict"].replace("-", " ")
+                                 for row in rows)
     facts = "".join(f"<div><span>{text(name)}</span><b>{count}</b></div>" for name, count in sorted(counts.items()))
     rigs = collections.defaultdict(list)
     for row in rows:
