@@ -20,7 +20,7 @@ struct Prior {
   double bending_mm = 0;
   double bending_sd_mm = 0;
   double guide_mm = 0;
-  double bevel_mm = 3.5;  // length of the bevel: drawn back by this, it is out of what it cuts and pushes no more
+  double bevel_mm = 3.5;        // length of the bevel: drawn back by this, it is out of what it cuts and pushes no more
   double position_sd_mm = 0.3;  // tip at the entry point
   double tilt_sd_rad = 0.02;    // heading about body x and y
   double roll_sd_rad = 0.05;    // bevel about the heading
@@ -58,9 +58,8 @@ struct ReadingNoise {
 // not run again, and there are no effects beside them.
 struct NuisancePrior {
   double windup_sd_rad = 0;  // of the tip's lag at 100 mm inserted, which is not negative
-  double frame_sd_rad = 0;   // of each camera's frame about each axis
   double latency_sd_s = 0;   // of each camera
-  bool any() const { return windup_sd_rad > 0 || frame_sd_rad > 0 || latency_sd_s > 0; }
+  bool any() const { return windup_sd_rad > 0 || latency_sd_s > 0; }
 };
 
 struct Gate {

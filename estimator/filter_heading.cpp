@@ -120,11 +120,7 @@ Update NeedleFilter::update_heading(FilterState& state, const model::TipHeading&
   const bool of_shaft = is_of_shaft(measurement.camera);
   const std::optional<SeenHeading> of_motion = of_shaft ? seen_motion(state) : std::nullopt;
   if (of_shaft && !of_motion) return {};  // no model of what it sees
-  SeenHeading predicted = of_motion ? *of_motion : seen_heading(state);
-  if constexpr (kSize == kAllStates) {
-    const Eigen::Matrix3d frame = frame_of_camera(state, measurement.camera);
-    predicted = {frame * predicted.along, frame * predicted.by_error, frame * predicted.by_slip};
-  }
+  const SeenHeading predicted = of_motion ? *of_motion : seen_heading(state);
   const Angles angles = angles_of(measurement, predicted.along);
   const int rank = angles.seen.rank;
   if (rank == 0) return {};  // sees nothing: no rejection either
@@ -134,12 +130,7 @@ Update NeedleFilter::update_heading(FilterState& state, const model::TipHeading&
       Eigen::Matrix<double, 3, 10> by_state = Eigen::Matrix<double, 3, 10>::Zero();
       by_state.leftCols<6>() = angles.by_heading * predicted.by_error;
       by_state.middleCols<2>(7) = angles.by_heading * predicted.by_slip;
-      ByNuisance by_nuisance = ByNuisance::Zero();
-      if (measurement.camera >= 0 && measurement.camera < kCamerasInFrame)
-        by_nuisance.middleCols<3>(frame_of(measurement.camera)) =
-            -angles.by_heading * model::hat(predicted.along) *
-            model::right_jacobian_so3(-state.nuisance.mean.segment<3>(frame_of(measurement.camera)));
-      result = update_all(state, by_state, by_nuisance, angles.seen, angles.residual_rad, gate_);
+      result = update_all(state, by_state, ByNuisance::Zero(), angles.seen, angles.residual_rad, gate_);
     } else if (of_shaft) {
       Eigen::Matrix<double, 3, 9> by_state = Eigen::Matrix<double, 3, 9>::Zero();
       by_state.leftCols<6>() = angles.by_heading * predicted.by_error;

@@ -6,11 +6,8 @@
 // drho moves a stiff shaft's tip by r drho along e1 beside, r = K b^2 / 2 g (stiff_shaft.cpp): on the error of the pose
 // it is drho (r, 0, 0, 0, 0, 1), and so is what w errs by on the turn.
 //
-// Camera c reads exp(theta_c) (p - v tau_c) of a tip at p that moves at v: to first order in the latency tau. By theta
-// that goes with its left Jacobian: a turn of 0.02 rad about x has a turn about z move by 0.8 mm a radian what lies 80
-// mm deep. What two cameras see of theta_c is what turns out of their pictures once the needle is aside; a slope that
-// both share is told from the needle's own by the widths of the two beforehand alone. tau_c is seen where the rate
-// changes.
+// Camera c reads p - v tau_c of a tip at p that moves at v: to first order in the latency tau, which is seen where the
+// rate changes.
 #include <algorithm>
 #include <cmath>
 
@@ -89,10 +86,8 @@ void NeedleFilter::begin_nuisance(FilterState& state) const {
   nuisance.with_shared.setZero();
   nuisance.covariance.setZero();
   nuisance.covariance(kWindup, kWindup) = square(prior.windup_sd_rad);
-  for (int camera = 0; camera < kCamerasInFrame; ++camera) {
-    nuisance.covariance.diagonal().segment<3>(frame_of(camera)).setConstant(square(prior.frame_sd_rad));
+  for (int camera = 0; camera < kLateCameras; ++camera)
     nuisance.covariance(latency_of(camera), latency_of(camera)) = square(prior.latency_sd_s);
-  }
 }
 
 NeedleFilter::TipTurn NeedleFilter::follow_windup(FilterState& state, double insertion_mm, double rotation_rad) const {
@@ -127,22 +122,13 @@ void NeedleFilter::spread_turn(FilterState& state, double by_windup) const {
   nuisance.with_state.topRows<6>() += turn * nuisance.covariance.row(kWindup);
 }
 
-Eigen::Matrix3d NeedleFilter::frame_of_camera(const FilterState& state, int camera) const {
-  if (camera < 0 || camera >= kCamerasInFrame) return Eigen::Matrix3d::Identity();
-  return model::exp_so3(state.nuisance.mean.segment<3>(frame_of(camera)));
-}
-
 Eigen::Vector3d NeedleFilter::seen_by_camera(const FilterState& state, int camera, const Eigen::Vector3d& tip_mm,
                                              Eigen::Matrix<double, 3, kNuisance>& by_nuisance) const {
   by_nuisance.setZero();
-  if (camera < 0 || camera >= kCamerasInFrame) return tip_mm;
+  if (camera < 0 || camera >= kLateCameras) return tip_mm;
   const Nuisance& nuisance = state.nuisance;
-  const Eigen::Matrix3d frame = frame_of_camera(state, camera);
-  const Eigen::Vector3d seen_mm = frame * (tip_mm - nuisance.mean[latency_of(camera)] * nuisance.tip_velocity_mm_s);
-  by_nuisance.middleCols<3>(frame_of(camera)) =
-      -model::hat(seen_mm) * model::right_jacobian_so3(-nuisance.mean.segment<3>(frame_of(camera)));
-  by_nuisance.col(latency_of(camera)) = -frame * nuisance.tip_velocity_mm_s;
-  return seen_mm;
+  by_nuisance.col(latency_of(camera)) = -nuisance.tip_velocity_mm_s;
+  return tip_mm - nuisance.mean[latency_of(camera)] * nuisance.tip_velocity_mm_s;
 }
 
 }  // namespace bevel::estimator

@@ -125,9 +125,9 @@ class NeedleEstimator {
   bool past_begins_anew_ = false;  // then: the pose was reset meanwhile
   struct {
     double insertion_mm, rotation_rad;
-  } left_{};  // where the axes stood when it was
+  } left_{};                                 // where the axes stood when it was
   std::array<double, 2> forgotten_since_{};  // of cameras 0 and 1, since the last reading of each in it
-  double past_mm_ = 0;  // insertion and retraction in it
+  double past_mm_ = 0;                       // insertion and retraction in it
   double past_due_mm_ = kFirstRelinearisation_mm;
   Counters counters_;
   Update newest_update_;

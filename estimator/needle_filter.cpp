@@ -261,7 +261,6 @@ Update NeedleFilter::update_sized(FilterState& state, const model::TipMeasuremen
       if (stiff_ && pressing(state) < 1) at_mm = drawn_back_tip(state, by_state);
       ByNuisance by_nuisance;
       const Eigen::Vector3d seen_mm = seen_by_camera(state, measurement.camera, at_mm, by_nuisance);
-      by_state = frame_of_camera(state, measurement.camera) * by_state;
       return update_all(state, by_state, by_nuisance, seen, measurement.position_mm - seen_mm, gate_);
     } else {
       if constexpr (kOwn<kSize> == 10)

@@ -228,7 +228,6 @@ class NeedleFilter {
   TipTurn follow_windup(FilterState& state, double insertion_mm, double rotation_rad) const;
   void spread_turn(FilterState& state, double by_windup) const;
   void begin_nuisance(FilterState& state) const;
-  Eigen::Matrix3d frame_of_camera(const FilterState& state, int camera) const;
   Eigen::Vector3d seen_by_camera(const FilterState& state, int camera, const Eigen::Vector3d& tip_mm,
                                  Eigen::Matrix<double, 3, kNuisance>& by_nuisance) const;
   Eigen::Matrix3d seen_shift(const FilterState& state) const;

@@ -1,19 +1,16 @@
 #pragma once
 // What a rig does that its file does not say, as slowly known states behind the filter's own (filter_nuisance.cpp):
 //   0      wind-up: lag of the tip's roll at 100 mm inserted (rad), as torsional_windup of the library
-//   1 - 3  rotation vector (rad) by which camera 0's frame is off {A}: a tip at p is read at exp(theta) p
-//   4      by how much camera 0's stamps are late (s), beside what the model file says
-//   5 - 8  the same of camera 1
+//   1, 2   by how much the stamps of cameras 0 and 1 are late (s), beside what the model file says
 // One that the prior gives no width is held at zero. Not in use where none has any: the plain filter bit for bit.
 #include <Eigen/Core>
 
 namespace bevel::estimator {
 
-inline constexpr int kNuisance = 9;
+inline constexpr int kNuisance = 3;
 inline constexpr int kWindup = 0;
-inline constexpr int kCamerasInFrame = 2;  // of number 0 and 1
-inline constexpr int frame_of(int camera) { return 1 + 4 * camera; }
-inline constexpr int latency_of(int camera) { return 4 + 4 * camera; }
+inline constexpr int kLateCameras = 2;  // of number 0 and 1
+inline constexpr int latency_of(int camera) { return 1 + camera; }
 
 using ByNuisance = Eigen::Matrix<double, 3, kNuisance>;  // derivative of what a camera sees
 

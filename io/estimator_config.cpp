@@ -47,7 +47,6 @@ void read_estimator_config(Section section, estimator::EstimatorConfig& config) 
 
   Section nuisance = section.section("nuisance", optional);
   nuisance.read("windup_sd_rad", config.nuisance.windup_sd_rad, optional, in_range(0, 2));
-  nuisance.read("frame_sd_rad", config.nuisance.frame_sd_rad, optional, in_range(0, 0.1));
   nuisance.read("latency_sd_s", config.nuisance.latency_sd_s, optional, in_range(0, 0.1));
 
   Section gate = section.section("gate", optional);

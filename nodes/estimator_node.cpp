@@ -62,7 +62,6 @@ std::string describe(const estimator::InnovationWatch& innovations) {
 }
 
 std::string describe(const estimator::Nuisance& nuisance) {
-  constexpr double kDegrees = 180 / std::numbers::pi;
   std::string text;
   std::array<char, 160> one{};
   const auto sd = [&nuisance](int i) { return std::sqrt(nuisance.covariance(i, i)); };
@@ -71,15 +70,7 @@ std::string describe(const estimator::Nuisance& nuisance) {
     std::snprintf(one.data(), one.size(), "wind-up %.2f +- %.2f rad at 100 mm", nuisance.mean[w], sd(w));
     add();
   }
-  for (int camera = 0; camera < estimator::kCamerasInFrame; ++camera) {
-    if (const int f = estimator::frame_of(camera); sd(f) > 0) {
-      const Eigen::Vector3d turned = kDegrees * nuisance.mean.segment<3>(f);
-      std::snprintf(one.data(), one.size(),
-                    "frame of camera %d turned by %.1f +- %.1f, %.1f +- %.1f, %.1f +- %.1f degrees about x, y, z",
-                    camera, turned.x(), kDegrees * sd(f), turned.y(), kDegrees * sd(f + 1), turned.z(),
-                    kDegrees * sd(f + 2));
-      add();
-    }
+  for (int camera = 0; camera < estimator::kLateCameras; ++camera) {
     if (const int l = estimator::latency_of(camera); sd(l) > 0) {
       std::snprintf(one.data(), one.size(), "camera %d late by %.0f +- %.0f ms", camera, 1e3 * nuisance.mean[l],
                     1e3 * sd(l));

@@ -324,9 +324,8 @@ void read_rig(Section s, const std::filesystem::path& folder, RigConfig& c) {
   l.read("rotation_max_rad", c.limit_switches[stepper::kRotation].max_unit, optional, beyond);
 }
 
-// What the filter has states of: of cameras 0 and 1, and of frames where the two show each other's.
+// What the filter has states of: of cameras 0 and 1.
 void check_states_of_cameras(Section s, const SystemConfig& c) {
-  const auto has = [&c](int camera) { return std::ranges::count(c.cameras, camera, &CameraViewConfig::camera) > 0; };
   Section noise = s.section("reading_noise", optional), nuisance = s.section("nuisance", optional);
   const estimator::NuisancePrior& told = c.estimator.nuisance;
   const std::string has_more = "is above 0, and there is a camera ",
@@ -335,13 +334,8 @@ void check_states_of_cameras(Section s, const SystemConfig& c) {
     if (camera.camera <= 1) continue;
     const std::string why = has_more + std::to_string(camera.camera) + of_two;
     if (c.estimator.reading.correlated_share > 0) noise.fail("correlated_share", why + "errors have states");
-    if (told.frame_sd_rad > 0) nuisance.fail("frame_sd_rad", why + "frames have states");
     if (told.latency_sd_s > 0) nuisance.fail("latency_sd_s", why + "latencies have states");
   }
-  if (told.frame_sd_rad > 0 && !(has(0) && has(1)))
-    nuisance.fail("frame_sd_rad",
-                  "is above 0, and one camera cannot tell its frame's turn from the needle's own slope; "
-                  "allowed: with a [[camera]] 0 and a [[camera]] 1");
 }
 
 }  // namespace
@@ -395,7 +389,7 @@ SystemConfig load_system_config(const std::string& path) {
     throw io::ConfigError({path + ": [estimator.prior] bending_mm: a stiff shaft is estimated without [[effect]]s; " +
                            std::string(c.estimator.effects.front().effect->name()) + " is one"});
   if (c.estimator.nuisance.any() && !c.estimator.effects.empty())
-    throw io::ConfigError({path + ": [estimator.nuisance]: wind-up, frames and latencies are estimated without " +
+    throw io::ConfigError({path + ": [estimator.nuisance]: wind-up and latencies are estimated without " +
                            "[[effect]]s; " + std::string(c.estimator.effects.front().effect->name()) + " is one"});
   return c;
 }

@@ -57,7 +57,7 @@ TEST(NeedleEstimator, AllocatesNothingInAStepWithSharedErrors) {
 }
 
 TEST(NeedleEstimator, AllocatesNothingInAStepWithNuisanceStates) {
-  const NuisancePrior nuisance{.windup_sd_rad = 0.4, .frame_sd_rad = 0.02, .latency_sd_s = 0.02};
+  const NuisancePrior nuisance{.windup_sd_rad = 0.4, .latency_sd_s = 0.02};
   expect_no_allocation(0, 0.02, 0, nuisance);
   expect_no_allocation(5, 0.02, 0.8, nuisance);
 }

@@ -31,10 +31,10 @@ BENCHMARK(BM_predict_update);
 void BM_predict_update_coloured(benchmark::State& bench) { run_predict_update(bench, coloured_config()); }
 BENCHMARK(BM_predict_update_coloured);
 
-// With wind-up, frames and latencies as nine more.
+// With wind-up and latencies as three more.
 void BM_predict_update_nuisance(benchmark::State& bench) {
   EstimatorConfig config = testing::agar_config();
-  config.nuisance = {.windup_sd_rad = 0.4, .frame_sd_rad = 0.02, .latency_sd_s = 0.02};
+  config.nuisance = {.windup_sd_rad = 0.4, .latency_sd_s = 0.02};
   run_predict_update(bench, config);
 }
 BENCHMARK(BM_predict_update_nuisance);

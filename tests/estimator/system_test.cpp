@@ -111,16 +111,11 @@ TEST_F(SystemFile, StatesOfTheRigAreRefusedWhereTheyMeanNothing) {
     return "";
   };
   const auto names = [](const std::string& text) { return HasSubstr("nuisance." + text); };
-  EXPECT_EQ(fault_of("windup_sd_rad = 0.4\nframe_sd_rad = 0.02\nlatency_sd_s = 0.02", 2), "");
+  EXPECT_EQ(fault_of("windup_sd_rad = 0.4\nlatency_sd_s = 0.02", 2), "");
   EXPECT_EQ(fault_of("windup_sd_rad = 0.4\nlatency_sd_s = 0.02", 1), "");
   EXPECT_EQ(fault_of("windup_sd_rad = 0.4", 3), "");
-  for (const std::size_t count : {0, 1})
-    EXPECT_THAT(fault_of("frame_sd_rad = 0.02", count),
-                AllOf(names("frame_sd_rad"), HasSubstr("allowed: with a [[camera]] 0 and a [[camera]] 1")));
-  EXPECT_THAT(fault_of("frame_sd_rad = 0.02", 3), AllOf(names("frame_sd_rad"), HasSubstr("there is a camera 2")));
   EXPECT_THAT(fault_of("latency_sd_s = 0.02", 3), AllOf(names("latency_sd_s"), HasSubstr("there is a camera 2")));
   EXPECT_THAT(fault_of("windup_sd_rad = -0.4", 2), AllOf(names("windup_sd_rad"), HasSubstr("0")));
-  EXPECT_THAT(fault_of("frame_sd_rad = 0.2", 2), AllOf(names("frame_sd_rad"), HasSubstr("0.1")));
   EXPECT_THAT(fault_of("latency_sd_s = 20", 2), AllOf(names("latency_sd_s"), HasSubstr("0.1")));
   EXPECT_THAT(fault_of("windup_rad = 0.4", 2), names("windup_rad"));
   EXPECT_THAT(fault_of("windup_sd_rad = 0.4", 2, kWindup), HasSubstr("torsional_windup is one"));

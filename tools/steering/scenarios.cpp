@@ -151,7 +151,6 @@ Trial kinematic(const Kinematic& kind, std::uint64_t seed) {
   trial.rig.cameras.outlier_share = kind.outlier_share;
   trial.rig.cameras.turned_rad = kind.camera_turned_rad * Eigen::Vector3d(std::cos(angle), std::sin(angle), 0);
   trial.believed.estimator.nuisance = kind.told;
-  if (kind.told.frame_sd_rad > 0) prior.tilt_sd_rad = trial.believed.estimator.entry_slope_sd_rad;
   trial.needle = {.bicycle = truth, .effects = effects, .roll_rad = roll_rad};
   trial.rig.make_plant = [needle = trial.needle] {
     return std::make_unique<rig::KinematicPlant>(needle.bicycle, needle.effects, needle.roll_rad, model::OwnValues{},
@@ -265,14 +264,8 @@ const std::vector<Scenario>& scenarios() {
       scenario<Kinematic>(Row::table, "camera-turned",
                           "both cameras' frame turned by 2 degrees about an axis across the needle",
                           {.camera_turned_rad = 2 * kDegree_rad}, kinematic),
-      scenario<Kinematic>(Row::apart, "camera-turned-state",
-                          "the same, frames as states of the filter, 0 +- 2 degrees beforehand",
-                          {.camera_turned_rad = 2 * kDegree_rad, .told = {.frame_sd_rad = 2 * kDegree_rad}}, kinematic),
       scenario<Kinematic>(Row::apart, "camera-turned-5", "both cameras' frame turned by 5 degrees",
                           {.camera_turned_rad = 5 * kDegree_rad}, kinematic),
-      scenario<Kinematic>(Row::apart, "camera-turned-5-state",
-                          "the same, frames as states of the filter, 0 +- 5 degrees beforehand",
-                          {.camera_turned_rad = 5 * kDegree_rad, .told = {.frame_sd_rad = 5 * kDegree_rad}}, kinematic),
       scenario<Kinematic>(Row::apart, "late", "both cameras' stamps late by 50 ms, unknown", {.camera_late_s = 0.05},
                           kinematic),
       scenario<Kinematic>(Row::apart, "late-state",
@@ -280,8 +273,6 @@ const std::vector<Scenario>& scenarios() {
                           {.camera_late_s = 0.05, .told = {.latency_sd_s = 0.05}}, kinematic),
       scenario<Kinematic>(Row::apart, "windup-in-vain", "the model's needle, wind-up as a state, 0 +- 0.4 rad",
                           {.told = {.windup_sd_rad = kToldWindup_rad}}, kinematic),
-      scenario<Kinematic>(Row::apart, "frames-in-vain", "the model's needle, frames as states, 0 +- 2 degrees",
-                          {.told = {.frame_sd_rad = 2 * kDegree_rad}}, kinematic),
       scenario<Kinematic>(Row::apart, "late-in-vain", "the model's needle, latencies as states, 0 +- 50 ms",
                           {.told = {.latency_sd_s = 0.05}}, kinematic),
       scenario<Beam>(Row::apart, "beam-any-windup-in-vain",
