@@ -226,6 +226,16 @@ ArrowSolution solve_at(const VectorXd& nuisance_sd, const Fit& fit, std::vector<
   return solve_about(fit, blocks, curve, std::move(covariance_of));
 }
 
+Fit carried_to(Layout layout, const Fit& from) {
+  Fit out(std::move(layout));
+  out.scales = from.scales;
+  out.shared = out.layout.shared_from(from.layout, from.shared);
+  for (const VectorXd& local : from.local) out.local.push_back(out.layout.local_from(from.layout, local));
+  out.curve_values = from.curve_values;
+  out.valid = from.valid;
+  return out;
+}
+
 std::vector<VectorXd> inputs_about(const Fit& fit) {
   std::vector<VectorXd> out;
   const Likelihood& likelihood = *fit.likelihood;

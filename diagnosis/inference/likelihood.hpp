@@ -99,6 +99,8 @@ struct Fit {
   bool valid = false;
 };
 
+// The unknowns and scales of a fit under another layout, effect by effect; what it lacked from the start. Not fitted.
+Fit carried_to(Layout layout, const Fit& from);
 // System::by_inputs() of a fit, per recording; empty: nothing.
 std::vector<Eigen::VectorXd> inputs_about(const Fit& fit);
 // The same readings and noise with them; itself where there is nothing.

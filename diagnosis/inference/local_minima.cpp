@@ -183,10 +183,7 @@ Fit replaced(const Likelihood& likelihood, const CurveColumns& curve, const Fit&
   const auto place = [&](std::size_t one) {
     return static_cast<std::size_t>(std::ranges::find(both.set(), one) - both.set().begin());
   };
-  Fit now(both);
-  now.scales = from.scales;
-  now.shared = both.shared_from(from.layout, from.shared);
-  for (const auto& local : from.local) now.local.push_back(both.local_from(from.layout, local));
+  Fit now = carried_to(both, from);
   const auto& joining = system.effects()[effect].parameters;
   Index next = 0;
   for (std::size_t p = 0; p < joining.size(); ++p)
@@ -207,13 +204,7 @@ Fit replaced(const Likelihood& likelihood, const CurveColumns& curve, const Fit&
     now = fit(likelihood, both, now.shared, now.local, now.scales, curve, rules);
     if (!now.valid) break;
   }
-  Fit out(Layout(system, with(without(from.layout.set(), leaving), effect)));
-  out.scales = now.scales;
-  out.curve_values = now.curve_values;
-  out.shared = out.layout.shared_from(both, now.shared);
-  for (const auto& local : now.local) out.local.push_back(out.layout.local_from(both, local));
-  out.valid = now.valid;
-  return out;
+  return carried_to(Layout(system, with(without(from.layout.set(), leaving), effect)), now);
 }
 
 std::vector<double> log_costs_of_dropping(const Fit& fit) {

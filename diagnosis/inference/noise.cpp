@@ -7,6 +7,8 @@
 #include <cmath>
 #include <limits>
 
+#include "diagnosis/inference/minimum.hpp"
+
 namespace bevel::inference {
 namespace {
 
@@ -96,22 +98,6 @@ class Correlations {
   double ar1_, frame_s_;
   std::vector<double> by_frames_;
 };
-
-// Where a function with one minimum in [low, high] is least, to within `width`.
-template <class Function>
-double minimum_of(double low, double high, double width, Function&& f) {
-  constexpr double kGolden = 0.6180339887498949;
-  double a = high - kGolden * (high - low), b = low + kGolden * (high - low);
-  double fa = f(a), fb = f(b);
-  while (high - low > width) {
-    if (fa < fb) {
-      high = b, b = a, fb = fa, a = high - kGolden * (high - low), fa = f(a);
-    } else {
-      low = a, a = b, fa = fb, b = low + kGolden * (high - low), fb = f(b);
-    }
-  }
-  return 0.5 * (low + high);
-}
 
 // Errors of readings against what their neighbours (and the curve) predict, squared in standard deviations. The noise
 // is taken as of first order: neighbours are enough to tell an outlier.

@@ -5,6 +5,7 @@
 #include <cmath>
 #include <limits>
 
+#include "diagnosis/inference/minimum.hpp"
 #include "diagnosis/inference/recording_rows.hpp"
 
 namespace bevel::inference {
@@ -99,18 +100,10 @@ void maximise(const std::vector<const Series*>& series, const std::vector<Matrix
     sigma = std::sqrt(std::max(squares / std::max(count, 1.0), 1e-18));
     return 2 * count * std::log(sigma) + logs;
   };
-  constexpr double kGolden = 0.6180339887498949, kWidth = 0.003;
-  double sigma = 0, low = 0, high = kLargestAr1;
-  double a = high - kGolden * (high - low), b = low + kGolden * (high - low);
-  double at_a = deviance_at(a, sigma), at_b = deviance_at(b, sigma);
-  while (high - low > kWidth) {
-    if (at_a < at_b) {
-      high = b, b = a, at_b = at_a, a = high - kGolden * (high - low), at_a = deviance_at(a, sigma);
-    } else {
-      low = a, a = b, at_a = at_b, b = low + kGolden * (high - low), at_b = deviance_at(b, sigma);
-    }
-  }
-  noise.own_ar1[channel] = low == 0 ? 0 : 0.5 * (low + high);
+  constexpr double kWidth = 0.003;
+  double sigma = 0;
+  const double found = minimum_of(0, kLargestAr1, kWidth, [&](double ar1) { return deviance_at(ar1, sigma); });
+  noise.own_ar1[channel] = found <= 0.5 * kWidth ? 0 : found;  // nothing was found to lie above it
   deviance_at(noise.own_ar1[channel], noise.sigma[channel]);
 }
 

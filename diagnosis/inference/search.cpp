@@ -31,6 +31,10 @@ double Visited::log_posterior() const {
   return log_sum(both);
 }
 
+bool Visited::is_likelier_with_curve() const { return at->fit_with_curve && log_with_curve > log_without_curve; }
+
+const Fit& Visited::likelier_fit() const { return is_likelier_with_curve() ? *at->fit_with_curve : at->fit; }
+
 double Search::log_prior(const ModelSet& set) const {
   double sum = 0;
   for (const std::size_t e : set) sum += log_prior_odds(e);
@@ -57,17 +61,19 @@ double Search::log_not_visited() const {
   return log_sum(logs);
 }
 
-Search::Job Search::job_from(const Fit& fit, std::size_t effect, const StartPoint& start) const {
-  Job job{.set = with(fit.layout.set(), effect),
-          .layout = Layout(system_, with(fit.layout.set(), effect)),
-          .shared = {},
-          .local = {},
+Search::Job Search::job_at(const Fit& fit) {
+  return {.set = fit.layout.set(),
+          .layout = fit.layout,
+          .shared = fit.shared,
+          .local = fit.local,
           .nuisance_sd = fit.scales.nuisance_sd};
-  job.shared = job.layout.shared_from(fit.layout, fit.shared);
+}
+
+Search::Job Search::job_from(const Fit& fit, std::size_t effect, const StartPoint& start) const {
+  Job job = job_at(carried_to(Layout(system_, with(fit.layout.set(), effect)), fit));
   const auto member = static_cast<std::size_t>(std::find(job.set.begin(), job.set.end(), effect) - job.set.begin());
   const auto& parameters = system_.effects()[effect].parameters;
   for (std::size_t r = 0; r < fit.local.size(); ++r) {
-    job.local.push_back(job.layout.local_from(fit.layout, fit.local[r]));
     Index shared = 0, local = 0;
     for (std::size_t p = 0; p < parameters.size(); ++p) {
       if (parameters[p].scope == Scope::shared) {
@@ -152,7 +158,7 @@ void Search::expand(const ModelSet& set) {
             jobs.push_back(job_from(about, one.effect, start)), jobs.back().beside_curve = beside == Beside::curve;
       }
     };
-    if (here.at->fit_with_curve && here.log_with_curve > here.log_without_curve) {
+    if (here.is_likelier_with_curve()) {
       const auto by = with_inputs_of(*here.at->fit_with_curve, likelihood_);
       const auto [beside_curve, more] = moved_to(by, *here.at->fit_with_curve, *discrepancy_);
       const CurveColumns curve = discrepancy_->columns(*by, beside_curve.scales.curves);
@@ -177,14 +183,7 @@ void Search::expand(const ModelSet& set) {
       if (known->second.log_without_curve > promised - rules_.optimism || !from_larger_.insert(smaller).second)
         continue;
     }
-    Job job{.set = smaller,
-            .layout = Layout(system_, smaller),
-            .shared = {},
-            .local = {},
-            .nuisance_sd = fit.scales.nuisance_sd};
-    job.shared = job.layout.shared_from(fit.layout, fit.shared);
-    for (const auto& local : fit.local) job.local.push_back(job.layout.local_from(fit.layout, local));
-    jobs.push_back(std::move(job));
+    jobs.push_back(job_at(carried_to(Layout(system_, smaller), fit)));
   }
   for (Job& job : swaps(here)) jobs.push_back(std::move(job));
   evaluate_all(std::move(jobs));
@@ -194,19 +193,16 @@ void Search::expand(const ModelSet& set) {
 // smaller set alone would be fitted, and what sets them apart is little. Promised is the difference between the two, by
 // one linear model.
 std::vector<Search::Job> Search::swaps(const Visited& here) {
-  const bool beside_curve = here.at->fit_with_curve && here.log_with_curve > here.log_without_curve;
-  const Fit& fit = beside_curve ? *here.at->fit_with_curve : here.at->fit;
+  const bool beside_curve = here.is_likelier_with_curve();
+  const Fit& fit = here.likelier_fit();
   const double log_here = beside_curve ? here.log_with_curve : here.log_without_curve, best = best_log();
   const auto own = with_inputs_of(fit, likelihood_);
+  const CurveColumns curve = discrepancy_->columns(*own, fit.scales.curves);
   std::vector<Job> out;
-  for (const std::size_t member : here.set) {
+  for (std::size_t place = 0; place < here.set.size(); ++place) {
+    const std::size_t member = here.set[place];
     const ModelSet rest = without(here.set, member);
-    Fit about{Layout(system_, rest)};
-    about.scales = fit.scales;
-    about.curve_values = fit.curve_values;
-    about.shared = about.layout.shared_from(fit.layout, fit.shared);
-    for (const auto& local : fit.local) about.local.push_back(about.layout.local_from(fit.layout, local));
-    const CurveColumns curve = beside_curve ? discrepancy_->columns(*own, fit.scales.curves) : CurveColumns{};
+    const Fit about = carried_to(Layout(system_, rest), fit);
     const auto list = proposals_->beside(Marginal(*own, about, curve, likelihood_.get()), rules_.starts);
     const auto leaves = std::ranges::find(list, member, &Proposal::effect);
     if (leaves == list.end()) continue;
@@ -226,17 +222,11 @@ std::vector<Search::Job> Search::swaps(const Visited& here) {
       job.beside_curve = beside_curve;
       const auto many = [](const Unknown& u) { return u.parameter != nullptr && has_many_minima(*u.parameter); };
       if (!std::ranges::any_of(about.layout.shared(), many) || !system_.allows(with(here.set, one.effect))) continue;
-      const auto place = static_cast<std::size_t>(std::ranges::find(here.set, member) - here.set.begin());
       const Fit there = replaced(*own, curve, fit, place, one.effect, one.starts.front().shared);
       if (there.valid) job.shared = there.shared, job.local = there.local;
     }
   }
   return out;
-}
-
-const Fit& Search::likeliest_fit() const {
-  const Visited& best = this->best();
-  return best.log_with_curve > best.log_without_curve ? *best.at->fit_with_curve : best.at->fit;
 }
 
 Marginal Search::base_marginal() const { return {*likelihood_, visited_.at({}).at->fit, {}}; }
@@ -290,16 +280,11 @@ void Search::look_with_less_spread() {
   const double best = best_log();
   for (const auto& [set, one] : visited_) {
     if (one.log_posterior() < best - rules_.window) continue;
-    const bool beside_curve = one.at->fit_with_curve && one.log_with_curve > one.log_without_curve;
-    const Fit& fit = beside_curve ? *one.at->fit_with_curve : one.at->fit;
+    const Fit& fit = one.likelier_fit();
     for (Index g = 0; g < fit.scales.nuisance_sd.size(); ++g) {
       if (fit.scales.nuisance_sd[g] == 0) continue;
-      jobs.push_back({.set = set,
-                      .layout = fit.layout,
-                      .shared = fit.shared,
-                      .local = fit.local,
-                      .nuisance_sd = fit.scales.nuisance_sd,
-                      .beside_curve = beside_curve});
+      jobs.push_back(job_at(fit));
+      jobs.back().beside_curve = one.is_likelier_with_curve();
       jobs.back().nuisance_sd[g] = 0;
     }
   }

@@ -34,6 +34,8 @@ struct Visited {
   std::shared_ptr<const Evaluated> at;
   double log_without_curve = 0, log_with_curve = 0;  // log of prior x evidence
   double log_posterior() const;
+  bool is_likelier_with_curve() const;
+  const Fit& likelier_fit() const;
 };
 
 class Search {
@@ -77,9 +79,10 @@ class Search {
   std::vector<Job> swaps(const Visited& here);
   void keep(const ModelSet& set, const std::shared_ptr<const Evaluated>& at);
   void evaluate_all(std::vector<Job> jobs);
+  static Job job_at(const Fit& fit);
   Job job_from(const Fit& fit, std::size_t effect, const StartPoint& start) const;
   double best_log() const;
-  const Fit& likeliest_fit() const;
+  const Fit& likeliest_fit() const { return best().likelier_fit(); }
   bool is_visited(const ModelSet& set) const { return visited_.contains(set); }
 
   void look_around();

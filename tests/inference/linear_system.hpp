@@ -6,14 +6,14 @@
 #include <random>
 
 #include "diagnosis/inference/noise.hpp"
-#include "diagnosis/inference/system.hpp"
+#include "tests/inference/held_system.hpp"
 
 namespace bevel::inference::testing {
 
 // One channel, `count` readings a recording at 10 Hz; base: offset and slope; effects: a parabola, a step; a nuisance
 // that adds a cosine; one curve of the reading by time, and where something depends on it one by a sawtooth of 0.9 s,
 // whose rise the first cannot follow.
-class LinearSystem final : public System {
+class LinearSystem final : public HeldSystem {
  public:
   static constexpr int kCount = 60;
   double sigma = 0.1;
@@ -66,14 +66,6 @@ class LinearSystem final : public System {
 
   void least_size(std::size_t effect, double least) { effects_[effect].parameters[0].lower = least; }
 
-  const Dataset& data() const override { return data_; }
-  const std::vector<Parameter>& base() const override { return base_; }
-  const std::vector<Effect>& effects() const override { return effects_; }
-  const std::vector<Nuisance>& nuisances() const override { return nuisances_; }
-  const std::vector<NuisanceGroup>& nuisance_groups() const override { return groups_; }
-  const std::vector<Curve>& curves() const override { return curves_; }
-  bool allows(const ModelSet&) const override { return true; }
-
   static Eigen::MatrixXd design(const ModelSet& set) {
     Eigen::MatrixXd out(kCount, 2 + static_cast<Eigen::Index>(set.size()));
     for (int i = 0; i < kCount; ++i) {
@@ -116,12 +108,6 @@ class LinearSystem final : public System {
  private:
   static double parabola_of(double t) { return (t - 3) * (t - 3) / 9; }
   static double sawtooth(double t) { return t / 0.9 - std::floor(t / 0.9); }
-  Dataset data_;
-  std::vector<Parameter> base_;
-  std::vector<Effect> effects_;
-  std::vector<Nuisance> nuisances_;
-  std::vector<NuisanceGroup> groups_;
-  std::vector<Curve> curves_;
 };
 
 // Recording after recording.

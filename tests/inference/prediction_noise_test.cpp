@@ -8,6 +8,8 @@
 #include <cstdio>
 #include <random>
 
+#include "tests/inference/held_system.hpp"
+
 namespace bevel::inference {
 namespace {
 
@@ -19,7 +21,7 @@ constexpr int kStops = 21;
 constexpr std::size_t kRecordings = 5;
 
 // An offset and a slope that all recordings share in each of two channels; each has an offset and a slope of its own.
-class TwoChannels final : public System {
+class TwoChannels final : public testing::HeldSystem {
  public:
   static constexpr double kWhite = 0.08, kDrifting = 0.5, kAr1 = 0.9;
 
@@ -72,13 +74,6 @@ class TwoChannels final : public System {
       for (int i = 0; i < kStops; ++i) out(c * kStops + i, c) = 1, out(c * kStops + i, 2 + c) = i / (kStops - 1.0);
     return out;
   }
-  const Dataset& data() const override { return data_; }
-  const std::vector<Parameter>& base() const override { return base_; }
-  const std::vector<Effect>& effects() const override { return effects_; }
-  const std::vector<Nuisance>& nuisances() const override { return nuisances_; }
-  const std::vector<NuisanceGroup>& nuisance_groups() const override { return groups_; }
-  const std::vector<Curve>& curves() const override { return curves_; }
-  bool allows(const ModelSet&) const override { return true; }
   bool predict(const ModelSet&, std::size_t, const VectorXd& shared, const VectorXd& local, bool derivatives,
                Prediction& out) const override {
     out.reading = columns() * (shared + local);
@@ -86,14 +81,6 @@ class TwoChannels final : public System {
     return true;
   }
   MatrixXd by_curves(std::size_t, const VectorXd&) const override { return MatrixXd::Zero(2 * kStops, 0); }
-
- private:
-  Dataset data_;
-  std::vector<Parameter> base_;
-  std::vector<Effect> effects_;
-  std::vector<Nuisance> nuisances_;
-  std::vector<NuisanceGroup> groups_;
-  std::vector<Curve> curves_;
 };
 
 struct Share {

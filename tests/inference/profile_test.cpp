@@ -90,7 +90,7 @@ TEST(Profile, AtABoundIsTheTruncatedNormalAndTheOthersMoveWithIt) {
 
 // y = (1 + gain) slope (1 + feed) t, and a step where (1 + feed) t passes a place: gain and feed are one path, but for
 // where the step is.
-class TwoScales final : public System {
+class TwoScales final : public testing::HeldSystem {
  public:
   static constexpr double kFeed = 0.3, kPlace = 4, kSize = 2, kSigma = 0.01, kWidth = 0.01;
   TwoScales() {
@@ -126,13 +126,6 @@ class TwoScales final : public System {
     const double passed = (t - place / (1 + feed)) / kWidth;
     return (1 + gain) * slope * (1 + feed) * t + size / (1 + std::exp(-passed));
   }
-  const Dataset& data() const override { return data_; }
-  const std::vector<Parameter>& base() const override { return base_; }
-  const std::vector<Effect>& effects() const override { return effects_; }
-  const std::vector<Nuisance>& nuisances() const override { return nuisances_; }
-  const std::vector<NuisanceGroup>& nuisance_groups() const override { return groups_; }
-  const std::vector<Curve>& curves() const override { return curves_; }
-  bool allows(const ModelSet&) const override { return true; }
   bool predict(const ModelSet& set, std::size_t r, const VectorXd& shared, const VectorXd&, bool derivatives,
                Prediction& out) const override {
     const auto& times = data_.recordings[r].series[0].time_s;
@@ -161,14 +154,6 @@ class TwoScales final : public System {
     return true;
   }
   MatrixXd by_curves(std::size_t, const VectorXd&) const override { return {}; }
-
- private:
-  Dataset data_;
-  std::vector<Parameter> base_;
-  std::vector<Effect> effects_;
-  std::vector<Nuisance> nuisances_;
-  std::vector<NuisanceGroup> groups_;
-  std::vector<Curve> curves_;
 };
 
 TEST(Replaced, AStepFollowsWhereOneScaleTakesTheOthersPlace) {

@@ -99,10 +99,9 @@ struct Kinematic {
   bool obstacle = false;
   bool way_point = false;
   bool retract = false;
-  double camera_turned_rad = 0;  // of both, about a drawn axis across the needle
-  double camera_late_s = 0;      // of both
-  // States of the filter; frames beside slopes of insertions of half a degree.
-  estimator::NuisancePrior told{};
+  double camera_turned_rad = 0;     // of both, about a drawn axis across the needle
+  double camera_late_s = 0;         // of both
+  estimator::NuisancePrior told{};  // states of the filter
   bool by_flips = false;
 };
 Trial kinematic(const Kinematic& kind, std::uint64_t seed) {

@@ -1,0 +1,26 @@
+#pragma once
+// A system that holds what it is made of; what it predicts is left to each.
+#include "diagnosis/inference/system.hpp"
+
+namespace bevel::inference::testing {
+
+class HeldSystem : public System {
+ public:
+  const Dataset& data() const override { return data_; }
+  const std::vector<Parameter>& base() const override { return base_; }
+  const std::vector<Effect>& effects() const override { return effects_; }
+  const std::vector<Nuisance>& nuisances() const override { return nuisances_; }
+  const std::vector<NuisanceGroup>& nuisance_groups() const override { return groups_; }
+  const std::vector<Curve>& curves() const override { return curves_; }
+  bool allows(const ModelSet&) const override { return true; }
+
+ protected:
+  Dataset data_;
+  std::vector<Parameter> base_;
+  std::vector<Effect> effects_;
+  std::vector<Nuisance> nuisances_;
+  std::vector<NuisanceGroup> groups_;
+  std::vector<Curve> curves_;
+};
+
+}  // namespace bevel::inference::testing
