@@ -74,20 +74,18 @@ GridEvidence over_nuisances(const Fit& fit, const CurveColumns& curve, const Nui
     if (fit.layout.shared()[static_cast<std::size_t>(i)].parameter->prior.form != Prior::Form::normal)
       not_normal.push_back(i);
   const double here = solve_about(fit, blocks, curve, not_normal).least;
-  std::vector<double> logs;
-  for (Index k = 0; k < grid.log_prior.size(); ++k) {
+  VectorXd logs = over_likely(likelihood.system(), fit.scales.nuisance_sd, [&](Index k) {
     const ArrowSolution solution = solve_at(grid.standard_deviations.col(k), fit, blocks, curve, not_normal);
-    logs.push_back(solution.valid ? -0.5 * (fit.cost + solution.least - here + solution.log_volume_ratio) +
-                                        log_density_ratios(fit, solution.covariance) + grid.log_prior[k]
-                                  : -std::numeric_limits<double>::infinity());
-    if (grid.standard_deviations.col(k) == fit.scales.nuisance_sd) out.log_here = logs.back();
-  }
-  out.best = std::max_element(logs.begin(), logs.end()) - logs.begin();
-  out.log_promised = logs[static_cast<std::size_t>(out.best)];
-  for (double& log : logs) log = std::min(log, out.log_here);
-  const double all = log_sum(logs);
-  out.weights.resize(grid.log_prior.size());
-  for (Index k = 0; k < out.weights.size(); ++k) out.weights[k] = std::exp(logs[static_cast<std::size_t>(k)] - all);
+    const double log = solution.valid ? -0.5 * (fit.cost + solution.least - here + solution.log_volume_ratio) +
+                                            log_density_ratios(fit, solution.covariance) + grid.log_prior[k]
+                                      : -std::numeric_limits<double>::infinity();
+    if (grid.standard_deviations.col(k) == fit.scales.nuisance_sd) out.log_here = log;
+    return log;
+  });
+  out.log_promised = logs.maxCoeff(&out.best);
+  logs = logs.cwiseMin(out.log_here);
+  const double all = log_sum(std::span<const double>(logs.data(), static_cast<std::size_t>(logs.size())));
+  out.weights = (logs.array() - all).exp();
   const double constant = likelihood.log_weights() + log_prior_of_instants(likelihood, fit, curve);
   out.log_here += constant;
   out.log_promised += constant;
@@ -192,26 +190,6 @@ std::vector<LessSpread> with_less_spread(const Likelihood& likelihood, const Fit
       const double to_none = less == values.front() ? std::log(static_cast<double>(values.size() - 1)) : 0.0;
       one.log_change = log_of(one.fit) - here + to_none;
       out.push_back(std::move(one));
-    }
-  }
-  return out;
-}
-
-NuisanceGrid nuisance_grid(const System& system) {
-  const auto& groups = system.nuisance_groups();
-  Index count = 1;
-  for (const auto& group : groups) count *= static_cast<Index>(group.standard_deviations.size());
-  NuisanceGrid out{.standard_deviations = MatrixXd(static_cast<Index>(groups.size()), count),
-                   .log_prior = VectorXd::Zero(count)};
-  for (Index k = 0; k < count; ++k) {
-    Index rest = k;
-    for (std::size_t g = 0; g < groups.size(); ++g) {
-      const auto& values = groups[g].standard_deviations;
-      const std::size_t which = static_cast<std::size_t>(rest) % values.size();
-      out.standard_deviations(static_cast<Index>(g), k) = values[which];
-      if (values.size() > 1)
-        out.log_prior[k] -= std::log(which == 0 ? 2.0 : 2.0 * static_cast<double>(values.size() - 1));
-      rest /= static_cast<Index>(values.size());
     }
   }
   return out;

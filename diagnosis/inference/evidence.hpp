@@ -5,6 +5,7 @@
 #include <limits>
 
 #include "diagnosis/inference/discrepancy.hpp"
+#include "diagnosis/inference/nuisance_grid.hpp"
 
 namespace bevel::inference {
 
@@ -22,13 +23,6 @@ struct Evaluated {
   bool with_discrepancy = false;  // whether that was asked
   bool valid = false;
 };
-
-// Every combination of the groups' standard deviations, one column each, and the logarithms of their probabilities.
-struct NuisanceGrid {
-  Eigen::MatrixXd standard_deviations;
-  Eigen::VectorXd log_prior;
-};
-NuisanceGrid nuisance_grid(const System& system);
 
 // Starting values; nuisance_sd is where the standard deviations begin. Without a discrepancy. The noise is fitted too;
 // `likelihood` is where it begins. Once the evidence is so low, it is left as it is.

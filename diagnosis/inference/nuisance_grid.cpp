@@ -1,0 +1,75 @@
+#include "diagnosis/inference/nuisance_grid.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+namespace bevel::inference {
+
+using Eigen::Index;
+
+namespace {
+constexpr double kFarBelow = 12;  // the likeliest, in the logarithm
+}
+
+NuisanceGrid nuisance_grid(const System& system) {
+  const auto& groups = system.nuisance_groups();
+  Index count = 1;
+  for (const auto& group : groups) count *= static_cast<Index>(group.standard_deviations.size());
+  NuisanceGrid out{.standard_deviations = Eigen::MatrixXd(static_cast<Index>(groups.size()), count),
+                   .log_prior = Eigen::VectorXd::Zero(count)};
+  for (Index k = 0; k < count; ++k) {
+    Index rest = k;
+    for (std::size_t g = 0; g < groups.size(); ++g) {
+      const auto& values = groups[g].standard_deviations;
+      const std::size_t which = static_cast<std::size_t>(rest) % values.size();
+      out.standard_deviations(static_cast<Index>(g), k) = values[which];
+      if (values.size() > 1)
+        out.log_prior[k] -= std::log(which == 0 ? 2.0 : 2.0 * static_cast<double>(values.size() - 1));
+      rest /= static_cast<Index>(values.size());
+    }
+  }
+  return out;
+}
+
+Eigen::VectorXd over_likely(const System& system, const Eigen::VectorXd& start,
+                            const std::function<double(Index)>& log_at) {
+  const auto& groups = system.nuisance_groups();
+  std::vector<Index> sizes;
+  Index count = 1, first = 0;
+  for (std::size_t g = 0; g < groups.size(); ++g) {
+    const auto& values = groups[g].standard_deviations;
+    const auto at = std::find(values.begin(), values.end(), start[static_cast<Index>(g)]);
+    if (at != values.end()) first += count * (at - values.begin());
+    sizes.push_back(static_cast<Index>(values.size()));
+    count *= sizes.back();
+  }
+  constexpr double kNever = -std::numeric_limits<double>::infinity();
+  Eigen::VectorXd out = Eigen::VectorXd::Constant(count, kNever);
+  std::vector<bool> asked(static_cast<std::size_t>(count));
+  std::vector<Index> next{first};
+  asked[static_cast<std::size_t>(first)] = true;
+  double most = kNever;
+  while (!next.empty()) {
+    for (const Index k : next) out[k] = log_at(k), most = std::max(most, out[k]);
+    // What came too low before may not be so far below one that is known only now.
+    next.clear();
+    for (Index k = 0; k < count; ++k) {
+      if (!asked[static_cast<std::size_t>(k)] || !(out[k] > most - kFarBelow)) continue;
+      Index stride = 1;
+      for (const Index size : sizes) {
+        const Index which = k / stride % size;
+        for (const Index step : {Index{-1}, Index{1}}) {
+          const Index beside = k + step * stride;
+          if (which + step < 0 || which + step >= size || asked[static_cast<std::size_t>(beside)]) continue;
+          asked[static_cast<std::size_t>(beside)] = true;
+          next.push_back(beside);
+        }
+        stride *= size;
+      }
+    }
+  }
+  return out;
+}
+
+}  // namespace bevel::inference

@@ -1,0 +1,23 @@
+#pragma once
+// Combinations of the standard deviations that the groups of nuisances may have.
+#include <functional>
+
+#include "diagnosis/inference/system.hpp"
+
+namespace bevel::inference {
+
+// Every combination of the groups' standard deviations, one column each, and the logarithms of their probabilities.
+struct NuisanceGrid {
+  Eigen::MatrixXd standard_deviations;
+  Eigen::VectorXd log_prior;
+};
+NuisanceGrid nuisance_grid(const System& system);
+
+// A logarithm for each combination of nuisance_grid(), by `log_at` of its column; -infinity for those that have no
+// share: only neighbours (one group's next standard deviation, either way) of what comes within exp(-12) of the
+// likeliest are asked for, beginning with `start`, one of the grid. Of a density with one peak nothing is missed that
+// counts.
+Eigen::VectorXd over_likely(const System& system, const Eigen::VectorXd& start,
+                            const std::function<double(Eigen::Index)>& log_at);
+
+}  // namespace bevel::inference
