@@ -179,6 +179,7 @@ Findings diagnose(const RecordedCase& recorded, const model::NeedleParameters& m
   for (const auto& channel : recorded.channels) {
     findings.channels.push_back(channel.name);
     findings.units.emplace_back(channel.unit());
+    findings.scatter.push_back(channel.scatter);
   }
   Stages stages(options, findings.times);
 

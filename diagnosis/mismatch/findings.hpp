@@ -159,7 +159,8 @@ struct VariationEstimate {
 };
 
 // What one insertion has of its own, as a deviation from what all share: curvature as a share of the needle's, the
-// heading about x and y and the bevel's roll at the entry in rad, registration in x and y in mm.
+// heading about x and y and the bevel's roll at the entry in rad, registration in x and y (where depths were read by
+// hand, z) in mm.
 struct InsertionValue {
   std::string name;   // as in model::OwnValues: "curvature_relative", "tilt_x_rad", ...
   std::string group;  // of VariationEstimate::name
@@ -235,6 +236,7 @@ struct Findings {
   std::vector<Location> where;
   inference::Noise noise;
   std::vector<std::string> channels, units;  // in the order of noise.sigma
+  std::vector<ScatterNearEntry> scatter{};   // the same; noise is that deep down
   std::vector<VariationEstimate> variation;
   std::vector<InsertionValues> insertions;  // in the order of the recordings
   HeldOut held_out;

@@ -102,7 +102,7 @@ bool NeedleSystem::follow(const ModelSet& set, const model::Motion& motion, int 
   effects[0].effect = &entry_variation();
   for (std::size_t i = 0; i < 3; ++i) effects[0].parameters[i] = unknown(local[kTiltX + static_cast<Index>(i)]);
   if (columns) *columns = {};
-  Index next_shared = base_size(), next_local = kVariations;
+  Index next_shared = base_size(), next_local = own_size();
   const bool acts = acts_in(recording);
   for (const std::size_t e : set) {
     const int changed = changed_parameter(e);
@@ -146,7 +146,7 @@ bool NeedleSystem::tip_path(const ModelSet& set, const model::Motion& motion, in
                             const VectorXd& local, std::span<const DiscrepancyValues> discrepancy,
                             model::OpenLoop& out) const {
   if (!follow(set, motion, recording, shared, local, discrepancy, nullptr, out)) return false;
-  for (auto& position : out.position_mm) position.head<2>() += local.segment<2>(kEntryX);
+  for (auto& position : out.position_mm) position.head(registrations()) += local.segment(kEntryX, registrations());
   if (common_at_mm_.empty()) return true;
   for (std::size_t i = 0; i < motion.at.size(); ++i) {
     const auto weights = model::weights_at(common_at_mm_, false, motion.nodes[motion.at[i]].insertion_mm);
@@ -171,25 +171,25 @@ bool NeedleSystem::predict(const ModelSet& set, std::size_t r, const VectorXd& s
               derivatives ? &columns : nullptr, path))
     return false;
   out.reading = rows_of(r, path, false);
-  MatrixXd entry = MatrixXd::Zero(out.reading.size(), 2);
+  MatrixXd entry = MatrixXd::Zero(out.reading.size(), registrations());
   Index row = 0;
   for (std::size_t c = 0; c < recorded_.channels.size(); ++c)
     for (std::size_t i = 0; i < data_.recordings[r].series[c].time_s.size(); ++i, ++row)
-      if (!recorded_.channels[c].heading) entry.row(row) = recorded_.channels[c].axis.head<2>().transpose();
-  out.reading += entry * local.segment<2>(kEntryX);
+      if (!recorded_.channels[c].heading) entry.row(row) = recorded_.channels[c].axis.head(registrations()).transpose();
+  out.reading += entry * local.segment(kEntryX, registrations());
   const Index common = base_size() - kBaseParameters;
   if (common > 0) out.reading += common_columns_[r] * shared.segment(kBaseParameters, common);
   if (!derivatives) return true;
   MatrixXd all = rows_of(r, path, true);  // by the recording's own needle
   const double own = 1 + local[kOwnCurvature];
   const double k = needle_in(set, static_cast<int>(r), shared, local).curvature_per_mm;
-  out.by_local = MatrixXd::Zero(all.rows(), kVariations + static_cast<Index>(columns.local.size()));
+  out.by_local = MatrixXd::Zero(all.rows(), own_size() + static_cast<Index>(columns.local.size()));
   out.by_local.col(kOwnCurvature) = k / own * all.col(kCurvature);
   out.by_local.middleCols(kTiltX, 3) = all.middleCols(kBaseParameters, 3);
-  out.by_local.middleCols(kEntryX, 2) = entry;
+  out.by_local.middleCols(kEntryX, registrations()) = entry;
   for (std::size_t i = 0; i < columns.local.size(); ++i)
     if (columns.local[i] != Columns::kNone)
-      out.by_local.col(kVariations + static_cast<Index>(i)) = all.col(columns.local[i]);
+      out.by_local.col(own_size() + static_cast<Index>(i)) = all.col(columns.local[i]);
   out.by_shared = MatrixXd::Zero(all.rows(), base_size() + static_cast<Index>(columns.shared.size()));
   const double k_shared = shared[kCurvature];
   out.by_shared.col(kCurvature) = (k_shared != 0 ? k / k_shared : own) * all.col(kCurvature);

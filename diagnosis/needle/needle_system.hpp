@@ -18,8 +18,8 @@ namespace bevel::diagnosis {
 // bound.
 enum BaseParameter : int { kCurvature, kU, kLambda2, kBaseParameters };
 // What insertions have of their own: curvature as a share of the needle's, the heading's rotation vector at the entry
-// (rad), the bevel's roll there (rad), registration (mm).
-enum Variation : int { kOwnCurvature, kTiltX, kTiltY, kRoll, kEntryX, kEntryY, kVariations };
+// (rad), the bevel's roll there (rad), registration across the axis (mm); where depths were read by hand, along it too.
+enum Variation : int { kOwnCurvature, kTiltX, kTiltY, kRoll, kEntryX, kEntryY, kVariations, kEntryZ = kVariations };
 
 // Physics that the model in use has already: held as it is in every prediction.
 struct KnownPhysics {
@@ -92,6 +92,9 @@ class NeedleSystem final : public inference::System {
   // The needle of a recording: its own curvature, and what changed.
   model::NeedleParameters needle_in(const inference::ModelSet& set, int recording, const Eigen::VectorXd& shared,
                                     const Eigen::VectorXd& local) const;
+  // kEntryX and kEntryY, and kEntryZ where it is unknown.
+  Eigen::Index registrations() const { return own_size() - kEntryX; }
+  Eigen::Index own_size() const { return static_cast<Eigen::Index>(nuisances_.size()); }
   Eigen::Index base_size() const { return static_cast<Eigen::Index>(base_.size()); }
 
   RecordedCase recorded_;

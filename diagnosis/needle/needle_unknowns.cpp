@@ -53,12 +53,15 @@ const std::array<const model::Effect*, kBaseParameters>& needle_changes() {
 }
 
 // What the field reports of repeated insertions: curvature 10 to 40 % in tissue, a few in gelatin; entry angles of
-// 0.2 to 0.7 degrees; registration of some tenths of a millimetre; a bevel set by hand to a few degrees.
-std::vector<inference::NuisanceGroup> variation_groups() {
-  return {{"curvature", "relative", {0, 0.02, 0.05, 0.12, 0.3}},
-          {"entry_angle", "rad", {0, 0.003, 0.007, 0.015, 0.03}},
-          {"entry_point", "mm", {0, 0.05, 0.12, 0.3, 0.8}},
-          {"roll", "rad", {0, 0.015, 0.04, 0.1}}};
+// 0.2 to 0.7 degrees; registration of some tenths of a millimetre; a bevel set by hand to a few degrees. Where depths
+// are read by hand, so is where they begin: off by up to a millimetre, each time.
+std::vector<inference::NuisanceGroup> variation_groups(bool by_hand) {
+  std::vector<inference::NuisanceGroup> out{{"curvature", "relative", {0, 0.02, 0.05, 0.12, 0.3}},
+                                            {"entry_angle", "rad", {0, 0.003, 0.007, 0.015, 0.03}},
+                                            {"entry_point", "mm", {0, 0.05, 0.12, 0.3, 0.8}},
+                                            {"roll", "rad", {0, 0.015, 0.04, 0.1}}};
+  if (by_hand) out.push_back({"entry_depth", "mm", {0, 0.1, 0.3, 1}});
+  return out;
 }
 
 double reach_of(const model::EffectParameter& p) {
@@ -144,7 +147,7 @@ NeedleSystem::NeedleSystem(RecordedCase recorded, const model::NeedleParameters&
       model_(model),
       known_(std::move(known)),
       data_(data_of(recorded_)),
-      groups_(variation_groups()),
+      groups_(variation_groups(!recorded_.has_clock)),
       two_groups_(recorded_.two_groups()),
       headings_(recorded_.has_headings()) {
   if (known_.elsewhere.size() > kMostKnown)
@@ -173,6 +176,7 @@ NeedleSystem::NeedleSystem(RecordedCase recorded, const model::NeedleParameters&
             .prior = inference::normal_prior(model.lambda2, kLambda2Width)}};
   nuisances_ = {{"curvature_relative", 0}, {"tilt_x_rad", 1}, {"tilt_y_rad", 1},
                 {"roll_rad", 3},           {"entry_x_mm", 2}, {"entry_y_mm", 2}};
+  if (!recorded_.has_clock) nuisances_.push_back({"entry_z_mm", 4});
   add_effects_of_library();
   if (two_groups_) add_common_errors();
   std::vector<const model::Motion*> motions;

@@ -9,6 +9,7 @@
 #include <sstream>
 #include <stdexcept>
 
+#include "diagnosis/needle/scatter_near_entry.hpp"
 #include "diagnosis/statistics/median.hpp"
 #include "model/effects/covariates.hpp"
 
@@ -302,6 +303,7 @@ RecordedCase make_case(std::vector<RawRecording> raw) {
       for (double& sd : recording.series[c].relative_sd) sd /= recorded.channels[c].claimed_sd;
   }
   recorded.frame_s = median(periods);
+  if (!recorded.has_clock) widen_near_entry(recorded);
   return recorded;
 }
 

@@ -1,6 +1,7 @@
 #pragma once
 // The recordings of one rig, as the mismatch tool sees them: the base's motion, and for each camera axis a series of
 // readings. Everything later works on these.
+#include <cmath>
 #include <string>
 #include <vector>
 
@@ -8,6 +9,13 @@
 #include "model/effects/open_loop.hpp"
 
 namespace bevel::diagnosis {
+
+// Variance of a channel's readings over that deep down: 1 + excess exp(-depth / length).
+struct ScatterNearEntry {
+  double excess = 0;
+  double length_mm = 0;  // 0: as good everywhere
+  double sd_at_entry() const { return length_mm > 0 ? std::sqrt(1 + excess) : 1; }
+};
 
 // One direction in which one camera (or sensor) sees the tip's position, or the heading's unit vector. The information
 // matrix gives them: its eigenvectors of nonzero information; of a heading, of its x and y components.
@@ -17,6 +25,7 @@ struct Channel {
   std::string name;       // "tip.y"; "tip[2].(0.71 0 0.71)" for a second camera or an oblique axis; "heading.x"
   double claimed_sd = 0;  // median of what the messages say, in the channel's unit
   bool heading = false;
+  ScatterNearEntry scatter{};                                  // in the readings' claimed standard deviations already
   const char* unit() const { return heading ? "rad" : "mm"; }  // a small component of a unit vector is an angle
 };
 
@@ -53,7 +62,8 @@ struct RawRecording {
   bool changed = false;
 };
 
-// Where one recording has no clock, none has: each different time of its readings is one stop, evenly apart.
+// Where one recording has no clock, none has: each different time of its readings is one stop, evenly apart, and the
+// needle was guided by hand (scatter_near_entry.hpp).
 // Throws std::invalid_argument, naming the recording and what is wrong: no usable tip measurement, no motion, clocks of
 // camera and axes apart, fewer than two recordings, recordings of different rigs (cameras that see other axes, or frame
 // periods or claimed noise that differ more than threefold).

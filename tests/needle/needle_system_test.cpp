@@ -54,8 +54,14 @@ Setting setting_of(const NeedleSystem& system, const std::vector<std::string>& l
 
 class Derivatives : public ::testing::TestWithParam<std::vector<std::string>> {};
 
-void expect_derivatives(const SimulatedRig& rig, const std::vector<std::string>& labels) {
-  const NeedleSystem system(record_case(rig, 1), rig.needle);
+RecordedCase without_clock(const SimulatedRig& rig, std::uint64_t seed) {
+  auto raw = record(rig, seed);
+  for (auto& recording : raw) recording.has_clock = false;
+  return make_case(std::move(raw));
+}
+
+void expect_derivatives(const SimulatedRig& rig, const std::vector<std::string>& labels, bool has_clock = true) {
+  const NeedleSystem system(has_clock ? record_case(rig, 1) : without_clock(rig, 1), rig.needle);
   const Setting at = setting_of(system, labels);
   inference::Prediction here, up, down;
   ASSERT_TRUE(system.predict(at.set, 1, at.shared, at.local, true, here));
@@ -94,6 +100,11 @@ TEST(NeedleDerivatives, OfWhatHeadingsShowAndOfWhatChanged) {
   expect_derivatives({.heading_sd_rad = 0.004}, {"sensor_tilt", "cutting_angle"});
   expect_derivatives({.changed_from = 1}, {"curvature_per_mm", "layer"});
   expect_derivatives({.changed_from = 1}, {"lambda1_per_rad", "lambda2"});
+}
+
+TEST(NeedleDerivatives, WhereDepthsWereReadByHand) {
+  expect_derivatives({}, {"layer"}, false);
+  expect_derivatives({.heading_sd_rad = 0.004, .changed_from = 1}, {"sensor_tilt"}, false);
 }
 
 // In the first group nothing acts, and a needle's change is what it says in the second.
@@ -186,6 +197,30 @@ TEST(NeedleSystem, RegistrationShiftsEveryReading) {
     for (std::size_t i = 0; i < system.data().recordings[0].series[c].time_s.size(); ++i, ++row)
       EXPECT_NEAR(shifted.reading[row] - plain.reading[row],
                   0.3 * system.recorded().channels[c].axis.x() - 0.2 * system.recorded().channels[c].axis.y(), 1e-12);
+}
+
+// Where depths were read by hand, along the axis too; of the tip's path as of the readings.
+TEST(NeedleSystem, RegistrationAlongTheAxisWhereDepthsWereReadByHand) {
+  const SimulatedRig rig;
+  EXPECT_EQ(NeedleSystem(record_case(rig, 2), rig.needle).nuisances().size(), kVariations);
+  const NeedleSystem system(without_clock(rig, 2), rig.needle);
+  ASSERT_EQ(system.nuisances()[kEntryZ].name, "entry_z_mm");
+  const inference::Layout layout(system, {});
+  inference::Prediction plain, shifted;
+  VectorXd local = layout.local_start();
+  model::OpenLoop path, shifted_path;
+  const auto& motion = system.recorded().recordings[0].motion;
+  ASSERT_TRUE(system.predict({}, 0, layout.shared_start(), local, false, plain));
+  ASSERT_TRUE(system.tip_path({}, motion, 0, layout.shared_start(), local, {}, path));
+  local[kEntryZ] = 0.4;
+  ASSERT_TRUE(system.predict({}, 0, layout.shared_start(), local, false, shifted));
+  ASSERT_TRUE(system.tip_path({}, motion, 0, layout.shared_start(), local, {}, shifted_path));
+  Index row = 0;
+  for (std::size_t c = 0; c < system.recorded().channels.size(); ++c)
+    for (std::size_t i = 0; i < system.data().recordings[0].series[c].time_s.size(); ++i, ++row)
+      EXPECT_NEAR(shifted.reading[row] - plain.reading[row], 0.4 * system.recorded().channels[c].axis.z(), 1e-12);
+  for (std::size_t i = 0; i < path.position_mm.size(); ++i)
+    EXPECT_LT((shifted_path.position_mm[i] - path.position_mm[i] - Eigen::Vector3d(0, 0, 0.4)).norm(), 1e-12);
 }
 
 TEST(NeedleSystem, KindsOfOneEffectAreNeverTogether) {

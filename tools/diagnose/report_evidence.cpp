@@ -218,19 +218,30 @@ std::string what_is_left(const Checks& c) {
   return "What is left is " + left + "; the verdict does not rest on this.";
 }
 
+std::string near_entry(const Findings& f, std::size_t channel) {
+  if (channel >= f.scatter.size() || !(f.scatter[channel].length_mm > 0)) return "the same";
+  return number(f.scatter[channel].sd_at_entry(), 2) + " times as much, for some " +
+         number(f.scatter[channel].length_mm, 2) + " mm";
+}
+
 }  // namespace
 
 void add_noise_and_checks(report::Page& page, const Findings& f) {
   page.heading("Noise and checks");
   std::vector<std::vector<std::string>> rows;
   for (std::size_t c = 0; c < f.channels.size() && c < f.noise.sigma.size(); ++c)
-    rows.push_back({f.channels[c], measured(f.noise.sigma[c])});
+    rows.push_back({f.channels[c], measured(f.noise.sigma[c]), near_entry(f, c)});
   page.paragraph(
       "Noise of one reading, fitted beside what was found. Successive readings, " + number(1 / f.noise.frame_s, 3) +
       " a second, correlate by " + number(f.noise.ar1, 2) +
       (f.noise.ar2 != 0 ? " (and those two apart, given the one between, by " + number(f.noise.ar2, 2) + ")" : "") +
       "; " + percent(f.noise.outlier_share) + " of them are outliers.");
-  page.table({"channel", "standard deviation (mm)"}, rows);
+  const bool near = std::ranges::any_of(f.scatter, [](const auto& one) { return one.length_mm > 0; });
+  if (!near)
+    for (auto& row : rows) row.pop_back();
+  page.table(near ? std::vector<std::string>{"channel", "standard deviation (mm; rad)", "near the entry"}
+                  : std::vector<std::string>{"channel", "standard deviation (mm)"},
+             rows);
   const auto& c = f.checks;
   page.table(
       {"check of the final model", "found", "passed if"},

@@ -256,6 +256,10 @@ std::string verdict_json(const Findings& f, const Provenance& made_of) {
                 {"channels", f.channels},
                 {"units", f.units},
                 {"frame_s", figure(f.noise.frame_s)}};
+  for (std::size_t c = 0; c < f.scatter.size(); ++c)
+    if (const auto& scatter = f.scatter[c]; scatter.length_mm > 0)
+      j["noise"]["near_entry"][f.channels[c]] = {{"sd_factor", figure(scatter.sd_at_entry())},
+                                                 {"length_mm", figure(scatter.length_mm)}};
   j["fit"] = as_json(f.held_out, f);
   j["detectable"] = detectable_json(f.detectable);
   j["next_experiment"] = experiment_json(f.next_experiment);
