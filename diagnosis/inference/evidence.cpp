@@ -56,7 +56,7 @@ struct GridEvidence {
   double log_here = -std::numeric_limits<double>::infinity();      // at the standard deviations of the fit
   double log_promised = -std::numeric_limits<double>::infinity();  // at the best of the grid, by the linear model
   double log_mean = -std::numeric_limits<double>::infinity();      // over the grid
-  Index best = 0;
+  VectorXd promised;                                               // of each combination, by the linear model
   VectorXd weights;
 };
 
@@ -82,7 +82,8 @@ GridEvidence over_nuisances(const Fit& fit, const CurveColumns& curve, const Nui
     if (grid.standard_deviations.col(k) == fit.scales.nuisance_sd) out.log_here = log;
     return log;
   });
-  out.log_promised = logs.maxCoeff(&out.best);
+  out.promised = logs;
+  out.log_promised = logs.maxCoeff();
   logs = logs.cwiseMin(out.log_here);
   const double all = log_sum(std::span<const double>(logs.data(), static_cast<std::size_t>(logs.size())));
   out.weights = (logs.array() - all).exp();
@@ -119,14 +120,30 @@ struct Settled {
   Fit fit;
   GridEvidence over;
 };
+
+// The combination that promises most, of those where no fit was made; here: where none promises more.
+Index next_spread(const VectorXd& promised, const std::set<Index>& tried, Index here) {
+  Index best = here;
+  for (Index k = 0; k < promised.size(); ++k)
+    if (promised[k] > promised[best] && !tried.contains(k)) best = k;
+  return best;
+}
+
+Index column_of(const NuisanceGrid& grid, const VectorXd& nuisance_sd) {
+  for (Index k = 0; k < grid.log_prior.size(); ++k)
+    if (grid.standard_deviations.col(k) == nuisance_sd) return k;
+  return 0;
+}
+
 // Fit, noise (with what the inputs leave open) and the nuisances' standard deviations in turn, until none changes.
 Settled settle(const Likelihood& likelihood, const Discrepancy* discrepancy, const Layout& layout, VectorXd shared,
                std::vector<VectorXd> local, Scales scales, const NuisanceGrid& grid, double give_up_below) {
   auto now = std::make_shared<const Likelihood>(likelihood);
   CurveColumns curve;
   Settled best{.fit = Fit(layout), .over = {}};
-  std::vector<VectorXd> inputs;
-  bool noise_moved = false, settled = false;
+  std::vector<VectorXd> inputs, inputs_of_best;
+  std::set<Index> tried;
+  bool noise_moved = false, spread_moved = false, settled = false;
   for (int pass = 0; pass < kRefits; ++pass) {
     if (discrepancy) curve = discrepancy->columns(*now, scales.curves);
     // What will move with the noise need not be known to the end.
@@ -142,23 +159,39 @@ Settled settle(const Likelihood& likelihood, const Discrepancy* discrepancy, con
     one.fit.likelihood = now;
     one.over = over_nuisances(one.fit, curve, grid);
     const bool better = one.over.log_here > best.over.log_here + kWorthARefit;
-    if (one.over.log_here > best.over.log_here) best = one;
+    // The linear model promised what is not there: back to the likeliest, and to what that promises next.
+    const bool lost = spread_moved && one.over.log_here < best.over.log_here;
+    if (one.over.log_here > best.over.log_here) best = one, inputs_of_best = inputs;
     // Not before the noise had its turn: what a wrong model leaves passes for noise.
-    if (pass > 1 && one.over.log_promised < give_up_below) break;
-    if (!better && !noise_moved && settled) break;
-    // The noise first, then what differs between recordings: by a wrong noise they do not differ.
-    const Noise noise = noise_about(one.fit, curve);
-    auto open = inputs_about(one.fit);
-    noise_moved = !alike(noise, now->noise()) || !alike(open, inputs, *now);
-    if (noise_moved) {
-      inputs = std::move(open);
-      now = std::make_shared<const Likelihood>(likelihood, noise, inputs);
-    } else if (grid.standard_deviations.col(one.over.best) != scales.nuisance_sd) {
-      scales.nuisance_sd = grid.standard_deviations.col(one.over.best);
-    } else if (!settled) {
-      settled = true;
+    if (pass > 1 && best.over.log_promised < give_up_below) break;
+    if (lost) {
+      one = best, inputs = inputs_of_best;
+      now = one.fit.likelihood;
+      scales = one.fit.scales;
+      noise_moved = settled = false;
     } else {
-      break;
+      if (!better && !noise_moved && settled) break;
+      // The noise first, then what differs between recordings: by a wrong noise they do not differ.
+      const Noise noise = noise_about(one.fit, curve);
+      auto open = inputs_about(one.fit);
+      noise_moved = !alike(noise, now->noise()) || !alike(open, inputs, *now);
+      if (noise_moved) {
+        inputs = std::move(open);
+        now = std::make_shared<const Likelihood>(likelihood, noise, inputs);
+      }
+    }
+    spread_moved = false;
+    if (!noise_moved) {
+      const Index here = column_of(grid, scales.nuisance_sd);
+      tried.insert(here);
+      if (const Index next = next_spread(one.over.promised, tried, here); next != here) {
+        scales.nuisance_sd = grid.standard_deviations.col(next);
+        spread_moved = true;
+      } else if (!settled) {
+        settled = true;
+      } else {
+        break;
+      }
     }
     shared = one.fit.shared;
     local = one.fit.local;
