@@ -54,7 +54,9 @@ std::string base_lines(const ImportedRecording& r) {
   if (r.has_clock) out += text("; longest gap %.4g s, longest step %.4g mm", gap_s, step_mm);
   out += text("\n  depth    %.4g to %.4g mm", depth_mm.lowest, depth_mm.highest);
   if (r.has_clock) out += text(", fastest %.4g mm/s", fastest_mm_s);
-  if (std::abs(r.actuators.front().insertion_mm) > 1) out += "; does not begin at 0, which is the entry point";
+  // A tenth of a millimetre, in all readings alike, is more than their noise leaves open.
+  if (std::abs(r.actuators.front().insertion_mm) > 0.01)
+    out += text("; begins at %.4g mm, not at 0: that is taken for the entry point", r.actuators.front().insertion_mm);
   out += text("\n  turning  %.4g rad in all (%.4g turns), from %.4g to %.4g rad", turned_rad,
               turned_rad / (2 * std::numbers::pi), angle_rad.lowest, angle_rad.highest);
   if (r.has_clock) out += text(", fastest %.4g rad/s", fastest_rad_s);

@@ -151,12 +151,12 @@ void StepperNode::step(const Now& now) {
   enable_if_wanted(report);
   note_latch();
   if (report.sampled_ns > published_ns_) publish(report);
-  status_.report(stepper::to_string(report.state), reason(report.stop));
+  status_.report(stepper::to_string(report.state), reason(report));
 }
 
-std::string StepperNode::reason(const stepper::Stop& stop) const {
-  if (stop.reason == stepper::StopReason::none) return refusal_.empty() ? words_.refusal() : refusal_;
-  return stepper::describe(stop) + (detail_.empty() ? "" : ": " + detail_);
+std::string StepperNode::reason(const stepper::AxesReport& report) const {
+  if (report.stop.reason == stepper::StopReason::none) return refusal_.empty() ? words_.refusal() : refusal_;
+  return stepper::describe(report.stop, report.stop_unconfirmed) + (detail_.empty() ? "" : ": " + detail_);
 }
 
 void StepperNode::end() { stop(stepper::StopReason::ending); }

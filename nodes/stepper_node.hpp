@@ -40,7 +40,7 @@ class StepperNode {
   void note_latch();
   void enable_if_wanted(const stepper::AxesReport& report);
   void publish(const stepper::AxesReport& report);
-  std::string reason(const stepper::Stop& stop) const;
+  std::string reason(const stepper::AxesReport& report) const;
 
   stepper::StepperConfig config_;
   LcmPort port_;

@@ -5,6 +5,7 @@
 #include <functional>
 
 #include "report/drawing.hpp"
+#include "report/label_place.hpp"
 
 namespace bevel::report {
 namespace {
@@ -67,6 +68,42 @@ void draw_series(Drawing& drawing, Panel& panel, const Series& s, const std::str
   }
 }
 
+// What of a series a name should not lie over. A band is its two edges: on its colour a name is read well.
+void add_edges(const Series& s, const Panel& panel, std::vector<Edge>& edges) {
+  const auto add = [&](Point from, Point to) {
+    if (std::isfinite(from.x + from.y + to.x + to.y)) edges.emplace_back(from, to);
+  };
+  for (std::size_t i = 0; i < s.x.size(); ++i) {
+    const Point here = panel.at(s.x[i], s.y[i]);
+    const bool ranged = s.kind == Series::Kind::bars || s.kind == Series::Kind::band;
+    if (s.kind == Series::Kind::points || ranged) add(here, ranged ? panel.at(s.x[i], s.y_high[i]) : here);
+    if (s.kind == Series::Kind::points || s.kind == Series::Kind::bars || i == 0) continue;
+    const Point before = panel.at(s.x[i - 1], s.y[i - 1]);
+    if (s.kind == Series::Kind::step) {
+      add(before, {here.x, before.y});
+      add({here.x, before.y}, here);
+    } else {
+      add(before, here);
+      if (ranged) add(panel.at(s.x[i - 1], s.y_high[i - 1]), panel.at(s.x[i], s.y_high[i]));
+    }
+  }
+}
+
+// The names of the references, each where nothing is drawn, if there is such a place on its line.
+void name_references(Drawing& drawing, const Panel& panel, const Box& plot, const Figure& figure) {
+  std::vector<Edge> edges;
+  for (const Series& s : figure.series) add_edges(s, panel, edges);
+  for (const Reference& r : figure.references) {
+    if (r.label.empty()) continue;
+    const bool level = r.axis == Reference::Axis::horizontal;
+    const Point on = level ? panel.at(range_of_x(figure).first, r.at) : panel.at(r.at, range_of_y(figure).first);
+    const Box place = least_crossed(places_on(plot, level, level ? on.y : on.x, width_of(r.label, 11)), edges);
+    drawing.text({place.left, place.bottom() - 2}, r.label, {.size = 11, .colour = ink::kSoft});
+    edges.push_back({{place.left, place.top}, {place.right(), place.bottom()}});
+    edges.push_back({{place.left, place.bottom()}, {place.right(), place.top}});
+  }
+}
+
 // Rows of names as wide as the picture; gives the height that they take.
 double draw_legend(Drawing* drawing, const std::vector<Key>& keys, double left, double width) {
   double x = left, y = 14;
@@ -112,12 +149,9 @@ std::string figure_svg(const Figure& whole, double width_px) {
     const Point from = level ? panel.at(x_low, r.at) : panel.at(r.at, y_low);
     const Point to = level ? panel.at(x_high, r.at) : panel.at(r.at, y_high);
     drawing.line(from, to, {.colour = ink::kSoft, .width = 1, .dashes = "3,3"});
-    if (level)
-      drawing.text({to.x - 4, to.y - 4}, r.label, {.anchor = Lettering::Anchor::end, .size = 11, .colour = ink::kSoft});
-    else
-      drawing.text({to.x + 5, to.y + 13}, r.label, {.size = 11, .colour = ink::kSoft});
   }
   for (std::size_t i = 0; i < figure.series.size(); ++i) draw_series(drawing, panel, figure.series[i], inks[i]);
+  name_references(drawing, panel, box, figure);
   drawing.unclip();
   return drawing.svg();
 }

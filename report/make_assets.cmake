@@ -4,7 +4,7 @@ foreach(name IN ITEMS page_css page_js)
   if(name STREQUAL page_css)
     set(files third_party/uplot/uPlot.min.css report/page/report.css)
   else()
-    set(files third_party/uplot/uPlot.iife.min.js report/page/report.js)
+    set(files third_party/uplot/uPlot.iife.min.js report/page/label_place.js report/page/report.js)
   endif()
   set(text "")
   if(name STREQUAL page_js)  # pages are handed on, and what they hold of others' with its licence

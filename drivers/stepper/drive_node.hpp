@@ -47,6 +47,10 @@ class DriveNode {
 
   Phase phase() const { return phase_; }
   bool configured() const { return phase_ == Phase::operational && job_ == script_.size(); }
+  // Its statusword since then says that it obeys a stop. Silence says nothing.
+  bool confirms_stop(std::int64_t since_ns) const {
+    return phase_ == Phase::operational && status_pdo_ns_ > since_ns && state() != cia402::State::operation_enabled;
+  }
   cia402::State state() const { return cia402::decode(statusword_); }
   std::uint16_t statusword() const { return statusword_; }
   bool says_limit() const { return (statusword_ & cia402::kInternalLimit) != 0; }  // a switch's, or its own

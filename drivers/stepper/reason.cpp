@@ -76,11 +76,14 @@ const char* to_string(StopReason reason) {
   return "unknown";
 }
 
-std::string describe(const Stop& stop) {
+std::string describe(const Stop& stop, std::array<bool, 2> unconfirmed) {
   std::ostringstream text;
   if (stop.axis >= 0) text << (stop.axis == 0 ? "insertion: " : "rotation: ");
   text << to_string(stop.reason);
   if (stop.code != 0) text << " (0x" << std::hex << std::uppercase << stop.code << ')';
+  if (unconfirmed[0] || unconfirmed[1])
+    text << "; " << (unconfirmed[0] ? unconfirmed[1] ? "both drives" : "the insertion's drive" : "the rotation's drive")
+         << " did not confirm the stop: our heartbeat was ended, on which drives stop by themselves";
   return text.str();
 }
 

@@ -1,6 +1,7 @@
 // Why the axes were stopped.
 #pragma once
 
+#include <array>
 #include <cstdint>
 #include <string>
 
@@ -53,6 +54,9 @@ struct Stop {
 };
 
 const char* to_string(StopReason reason);
-std::string describe(const Stop& stop);  // one line for the operator; allocates, so not on the control path
+// unconfirmed: axes whose drive was stopped by ending our heartbeat.
+std::string describe(
+    const Stop& stop,
+    std::array<bool, 2> unconfirmed = {});  // one line for the operator; allocates, so not on the control path
 
 }  // namespace bevel::stepper

@@ -62,6 +62,7 @@ EnableAnswer StepperDriver::enable() {
 void StepperDriver::disable() {
   enable_wanted_ = false;
   if (state_ == DriverState::enabled) state_ = DriverState::ready;
+  if (!latched()) stopped_ns_ = last_step_ns_;
   for (auto& shaper : shapers_) shaper.reset();
 }
 
@@ -77,7 +78,7 @@ bool StepperDriver::rearm() {
   const bool listen_first = silent_ || stop_.reason == StopReason::foreign_master || !bus_.is_open();
   state_ = listen_first ? DriverState::off : DriverState::configuring;
   state_since_ns_ = listen_since_ns_ = last_step_ns_;
-  silent_ = false;
+  silent_ = withhold_heartbeat_ = false;
   reset_faults_ = true;
   stop_ = {};
   for (auto& node : nodes_) node.restart();
@@ -101,6 +102,9 @@ void StepperDriver::latch(const Stop& stop) {
     for (std::size_t axis = 0; axis < kAxes; ++axis) stopped_from_unit_s_.at(axis) = nodes_.at(axis).rate_unit_s();
     judged_.fill(state_ != DriverState::enabled);
     held_back_.fill(false);
+    stopped_ns_ = last_step_ns_;
+    for (std::size_t axis = 0; axis < kAxes; ++axis)
+      stop_confirmed_.at(axis) = nodes_.at(axis).state() != cia402::State::operation_enabled;
   }
   for (auto& shaper : shapers_) shaper.reset();
   if (latched()) {
@@ -109,7 +113,8 @@ void StepperDriver::latch(const Stop& stop) {
     stop_ = stop;
     state_ = DriverState::stopped;
   }
-  if (is_fault(stop.reason)) state_ = DriverState::fault;
+  // That they miss our heartbeat is what we wanted.
+  if (is_fault(stop.reason) && !withhold_heartbeat_) state_ = DriverState::fault;
 }
 
 void StepperDriver::on_trouble(const Stop& trouble) {
@@ -244,6 +249,7 @@ void StepperDriver::step(std::int64_t now_ns, const std::optional<MotionSetpoint
       break;
     case DriverState::stopped:
     case DriverState::fault:
+      supervise_stop(now_ns);
       judge_rest(now_ns);
       ask_why(now_ns);
       break;
@@ -293,7 +299,7 @@ void StepperDriver::run_ready(std::int64_t now_ns) {
     if (state == cia402::State::fault || state == cia402::State::fault_reaction)
       return latch({StopReason::drive_fault, static_cast<int>(axis), nodes_.at(axis).error_code()});
   }
-  if (!enable_wanted_) return;
+  if (!enable_wanted_) return supervise_disabling(now_ns);
   if (all_in(cia402::State::operation_enabled)) {
     state_ = DriverState::enabled;
     fresh_setpoint_ns_ = shaped_ns_ = now_ns;
@@ -349,7 +355,7 @@ void StepperDriver::transmit(std::int64_t now_ns) {
   send_commands(now_ns);
   if (out_.send(cia301::sync(), now_ns))
     for (auto& node : nodes_) node.on_sync(now_ns);
-  if (now_ns >= next_heartbeat_ns_ &&
+  if (!withhold_heartbeat_ && now_ns >= next_heartbeat_ns_ &&
       out_.send(cia301::heartbeat(config_.master_id, cia301::NmtState::operational), now_ns))
     next_heartbeat_ns_ = now_ns + config_.master_heartbeat_ns;
 }

@@ -5,7 +5,9 @@
 //   ready --enable()--> enabled --disable()--> ready
 //   ready, enabled --(any trouble)--> stopped or fault, latched: quick stop on both axes until rearm()
 //
-// Nothing moves without enable(), nothing recovers from a latched stop without rearm() and enable().
+// Nothing moves without enable(), nothing recovers from a latched stop without rearm() and enable(). A drive that goes
+// on saying that it is enabled, or says nothing, after a stop has perhaps not heard it: our heartbeat ends then, on
+// which every drive stops by itself.
 #pragma once
 
 #include <array>
@@ -57,7 +59,8 @@ struct DriverCounters {
   std::uint64_t sdo_ignored = 0;
   std::uint64_t bus_errors = 0;
   std::uint64_t purges = 0;
-  std::uint64_t later_stops = 0;  // troubles after the one that is latched
+  std::uint64_t later_stops = 0;          // troubles after the one that is latched
+  std::uint64_t heartbeats_withheld = 0;  // stops that a drive did not confirm
 };
 
 struct AxesReport {
@@ -69,6 +72,8 @@ struct AxesReport {
   double rotation_rate_rad_s = 0.0;
   std::array<bool, kAxes> position_trusted{};
   std::array<std::uint16_t, kAxes> error_code{};  // last EMCY code or 0x603F
+  std::array<bool, kAxes>
+      stop_unconfirmed{};  // in stopped and fault: our heartbeat ended, so that the drive stops itself
   DriverState state = DriverState::off;
   Stop stop{};  // latched in stopped and fault; in off and configuring what stands in the way, if known
   DriverCounters counters{};
@@ -120,6 +125,8 @@ class StepperDriver {
   void shape(std::int64_t now_ns, const std::array<double, kAxes>& rates);
   void supervise_motion(std::int64_t now_ns);
   void judge_rest(std::int64_t now_ns);
+  void supervise_stop(std::int64_t now_ns);
+  void supervise_disabling(std::int64_t now_ns);
   void ask_why(std::int64_t now_ns);
   std::array<double, kAxes> wanted_rates(std::int64_t now_ns, const std::optional<MotionSetpoint>& setpoint);
   void transmit(std::int64_t now_ns);
@@ -142,9 +149,11 @@ class StepperDriver {
   Stop stop_{};
   bool silent_ = false;  // another master was there first: not a frame from us
   bool enable_wanted_ = false;
-  bool reset_faults_ = false;  // rearm() was called
+  bool reset_faults_ = false;        // rearm() was called
+  bool withhold_heartbeat_ = false;  // a drive did not confirm the stop: its own watch over us is to stop it
   std::int64_t last_step_ns_ = 0;
-  std::int64_t shaped_ns_ = 0;  // when the rates were last shaped
+  std::int64_t shaped_ns_ = 0;   // when the rates were last shaped
+  std::int64_t stopped_ns_ = 0;  // when the stop was latched, or the axes were disabled
   std::int64_t state_since_ns_ = 0;
   std::int64_t listen_since_ns_ = 0;
   std::int64_t enable_since_ns_ = 0;
@@ -155,6 +164,7 @@ class StepperDriver {
   // Of a stop: how fast each axis was, whether it has come to rest since, and whether it was behind then.
   std::array<double, kAxes> stopped_from_unit_s_{};
   std::array<bool, kAxes> judged_{}, held_back_{};
+  std::array<bool, kAxes> stop_confirmed_{};
   std::array<bool, kAxes> command_waits_{};  // for the echo of the one before
   std::array<bool, kAxes> at_limit_{};       // what the statuswords said last
   DriverCounters counters_;

@@ -113,6 +113,27 @@ void StepperDriver::ask_why(std::int64_t now_ns) {
   for (auto& node : nodes_) node.read_error_code(now_ns, out_);
 }
 
+// Whether each drive that was enabled says that it obeys, within the time that its answers may take.
+void StepperDriver::supervise_stop(std::int64_t now_ns) {
+  for (std::size_t axis = 0; axis < kAxes; ++axis)
+    if (nodes_.at(axis).confirms_stop(stopped_ns_)) stop_confirmed_.at(axis) = true;
+  const bool confirmed = std::ranges::all_of(stop_confirmed_, [](bool each) { return each; });
+  if (confirmed || withhold_heartbeat_ || now_ns - stopped_ns_ <= config_.tpdo_timeout_ns) return;
+  withhold_heartbeat_ = true;
+  ++counters_.heartbeats_withheld;
+}
+
+// Disabled, each drive has its ramp's time to leave "operation enabled".
+void StepperDriver::supervise_disabling(std::int64_t now_ns) {
+  for (std::size_t axis = 0; axis < kAxes; ++axis) {
+    const AxisConfig& limits = config_.axes.at(axis);
+    const auto ramp_ns = std::llround(1e9 * limits.rate_limit_unit_s / limits.acceleration_unit_s2);
+    const bool late = now_ns - stopped_ns_ > config_.tpdo_timeout_ns + ramp_ns;
+    if (late && nodes_.at(axis).state() == cia402::State::operation_enabled)
+      return latch({StopReason::not_following, static_cast<int>(axis), 0});
+  }
+}
+
 // Once an axis rests after a stop: is it where it should be, or was it held back?
 void StepperDriver::judge_rest(std::int64_t now_ns) {
   for (std::size_t axis = 0; axis < kAxes; ++axis) {

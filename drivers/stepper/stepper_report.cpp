@@ -43,6 +43,7 @@ AxesReport StepperDriver::report() const {
     report.status.at(axis) = status_of(node);
     report.position_trusted.at(axis) = node.position_trusted();
     report.error_code.at(axis) = node.error_code();
+    report.stop_unconfirmed.at(axis) = latched() && withhold_heartbeat_ && !stop_confirmed_.at(axis);
     report.counters.missed_pdos += node.counters().missed_pdos;
     report.counters.malformed += node.counters().malformed;
     report.counters.sdo_ignored += node.sdo_ignored();

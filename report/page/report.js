@@ -159,11 +159,16 @@ class Chart {
         c.setLineDash([]);
       }
       for (const s of this.spec.series) if (!s.off) this.drawSeries(c, scale, s, px);
-      for (const r of this.spec.references || []) {  // over the curves, with a rim of the ground to stand out from them
-        const { left, top, width } = u.bbox;
-        const at = u.valToPos(r.at, r.level ? 'y' : 'x', true);
-        const place = [r.level ? left + width - 4 * scale : at + 5 * scale, r.level ? at - 4 * scale : top + 13 * scale];
-        c.textAlign = r.level ? 'right' : 'left';
+      const labels = [];
+      const edges = this.spec.series.flatMap(s => s.off ? [] : labelPlace.edgesOf(s, px));
+      for (const r of this.spec.references || []) {  // with a rim of the ground, should there be no place without a curve
+        if (!r.label) continue;
+        const at = u.valToPos(r.at, r.level ? 'y' : 'x', true), wide = c.measureText(r.label).width;
+        const box = labelPlace.leastCrossed(labelPlace.placesOn(u.bbox, r.level, at, wide, scale), edges, scale);
+        edges.push([[box.left, box.top], [box.right, box.bottom]], [[box.left, box.bottom], [box.right, box.top]]);
+        labels.push({ text: r.label, ...box });
+        const place = [box.left, box.bottom - 2 * scale];
+        c.textAlign = 'left';
         c.lineWidth = 3 * scale;
         c.lineJoin = 'round';
         c.strokeStyle = inkOf('ground');
@@ -171,6 +176,7 @@ class Chart {
         c.strokeText(r.label, ...place);
         c.fillText(r.label, ...place);
       }
+      c.canvas.dataset.labels = JSON.stringify(labels);  // where they stand, for who looks
     });
   }
 

@@ -1,43 +1,23 @@
 // A bad line by the kernel itself: the driver on one end of a vxcan pair, the drives on the other, and netem between
 // them. (On a vcan netem changes nothing: what its sockets hear never passes a queue.) Run through on_can.sh.
-#include <gmock/gmock.h>
-
-#include <chrono>
-#include <cmath>
 #include <cstdlib>
-#include <memory>
 #include <string>
-#include <thread>
 
-#include "rig/drives/simulated_drive.hpp"
-#include "tests/drives/driven_by_can.hpp"
+#include "tests/drives/driven_line.hpp"
 
 namespace bevel::test {
 namespace {
 
 const std::string kDriverEnd = "bevelx0", kDriveEnd = "bevelx1";
 
-class Vxcan : public testing::Test {
+class Vxcan : public DrivenLine {
  protected:
   void SetUp() override {
     if (!ip("link add " + kDriverEnd + " type vxcan peer name " + kDriveEnd) || !ip("link set " + kDriverEnd + " up") ||
         !ip("link set " + kDriveEnd + " up"))
       GTEST_SKIP() << "SKIPPED: this kernel has no vxcan, or it is not permitted to add one";
-    if (!spoil(kDriverEnd, "loss 0%") || !spoil(kDriveEnd, "loss 0%"))
-      GTEST_SKIP() << "SKIPPED: this kernel has no netem, or there is no tc";
-    insertion_bus_ = can::open_bus(kDriveEnd);
-    rotation_bus_ = can::open_bus(kDriveEnd);
-    insertion = std::make_unique<rig::SimulatedDrive>(
-        *insertion_bus_, rig::SimulatedDriveConfig{1, patient().axes[0].counts_per_unit, 0.004, {}, {}});
-    rotation = std::make_unique<rig::SimulatedDrive>(
-        *rotation_bus_, rig::SimulatedDriveConfig{2, patient().axes[1].counts_per_unit, 0.004, {}, {}});
-    master = std::make_unique<DrivenByCan>(patient(), kDriverEnd);
-    ASSERT_TRUE(run_until([&] { return state() == DriverState::ready; })) << describe(stop());
-    ASSERT_EQ(master->driver.enable(), stepper::EnableAnswer::accepted);
-    ASSERT_TRUE(run_until([&] { return state() == DriverState::enabled; })) << describe(stop());
-    master->insertion_rate_mm_s = 5.0;
-    master->rotation_rate_rad_s = 2.0;
-    ASSERT_TRUE(run_until([&] { return insertion->position_unit() > 2.0; })) << describe(stop());
+    if (!repair()) GTEST_SKIP() << "SKIPPED: this kernel has no netem, or there is no tc";
+    start(kDriverEnd, kDriveEnd);
   }
   void TearDown() override { ip("link del " + kDriverEnd); }
 
@@ -47,52 +27,7 @@ class Vxcan : public testing::Test {
            0;
   }
   static bool spoil_both(const std::string& how) { return spoil(kDriverEnd, how) && spoil(kDriveEnd, how); }
-
-  template <typename Condition>
-  bool run_until(Condition condition, int limit_ms = 10'000) {
-    for (const std::int64_t end_ns = clock_.now_ns() + limit_ms * kMs; !condition();) {
-      const std::int64_t now_ns = clock_.pass();
-      if (now_ns > end_ns) return false;
-      insertion->step(now_ns);
-      rotation->step(now_ns);
-      master->step(now_ns);
-      std::this_thread::sleep_for(std::chrono::milliseconds(1));
-    }
-    return true;
-  }
-  void run_ms(int ms) {
-    run_until([] { return false; }, ms);
-  }
-  bool at_rest() const { return insertion->velocity_unit_s() == 0.0 && rotation->velocity_unit_s() == 0.0; }
-  DriverState state() const { return master->driver.report().state; }
-  stepper::Stop stop() const { return master->driver.report().stop; }
-
-  // Stopped for good: the line repaired, the commands still fresh, and nothing moves.
-  void expect_latched_at_rest() {
-    EXPECT_TRUE(run_until([this] { return state() >= DriverState::stopped; }, 3000));
-    EXPECT_TRUE(run_until([this] { return at_rest(); }, 3000)) << describe(stop());
-    ASSERT_TRUE(spoil_both("loss 0%"));
-    run_ms(300);
-    const double rests_mm = insertion->position_unit();
-    run_ms(1000);
-    EXPECT_GE(state(), DriverState::stopped);
-    EXPECT_NEAR(insertion->position_unit(), rests_mm, 1e-3);
-  }
-  // Borne: on its way, and the driver knows where.
-  void expect_borne() {
-    const double before_mm = insertion->position_unit();
-    run_ms(3000);
-    EXPECT_EQ(state(), DriverState::enabled) << describe(stop());
-    EXPECT_GT(insertion->position_unit(), before_mm + 10.0);
-    EXPECT_NEAR(master->driver.report().insertion_mm, insertion->position_unit(), 1.0);
-  }
-
-  Clock clock_;
-  std::unique_ptr<can::Bus> insertion_bus_, rotation_bus_;
-
- public:
-  std::unique_ptr<rig::SimulatedDrive> insertion, rotation;
-  std::unique_ptr<DrivenByCan> master;
+  bool repair() override { return spoil_both("loss 0%"); }
 };
 
 TEST_F(Vxcan, AFewFramesLostAreBorne) {

@@ -213,6 +213,14 @@ TEST_F(PlainCsv, ReadsBackIntact) {
   EXPECT_EQ(back.actuators.front().utime, 1'700'000'000'000'000);
 }
 
+// Whatever reads a log takes the needle to be at the entry point where the log begins.
+TEST_F(PlainCsv, ADepthThatDoesNotBeginAtZeroIsSaid) {
+  EXPECT_THAT(import(csv()).out, Not(HasSubstr("begins at")));
+  const test::Said said = import(csv([](int i, auto& cells) { cells[2] = std::to_string(0.12 + 0.5 * i); }));
+  EXPECT_EQ(said.status, 0) << said.err;
+  EXPECT_THAT(said.out, HasSubstr("begins at 0.12 mm, not at 0"));
+}
+
 TEST_F(PlainCsv, AHeadingsColumnsBecomeATipHeadingEachAndComeBackInTheExport) {
   const std::string with_heading =
       file("heading.toml",

@@ -106,6 +106,31 @@ def test_fold(page):
     page.until("document.querySelector('[data-figure=\"5\"]').className.includes('drawn')", "drawn when unfolded")
 
 
+# In the page: how many pixels of the canvas, in the box of a reference's name, have a colour of the page's.
+PIXELS = """
+window.pixels = (n, name) => {
+  const canvas = document.querySelector(`[data-figure="${n}"] canvas`), box = JSON.parse(canvas.dataset.labels)[0];
+  const probe = document.createElement('canvas').getContext('2d', { willReadFrequently: true });
+  probe.fillStyle = getComputedStyle(document.documentElement).getPropertyValue('--' + name).trim();
+  probe.fillRect(0, 0, 1, 1);
+  const ink = probe.getImageData(0, 0, 1, 1).data;
+  probe.clearRect(0, 0, 300, 150);
+  probe.drawImage(canvas, -Math.round(box.left), -Math.round(box.top));
+  const seen = probe.getImageData(0, 0, box.right - box.left, box.bottom - box.top).data;
+  let count = 0;
+  for (let i = 0; i < seen.length; i += 4)
+    if (seen[i + 3] > 128 && [0, 1, 2].every(j => Math.abs(seen[i + j] - ink[j]) < 40)) ++count;
+  return count;
+};
+"""
+
+
+def test_names_on_lines(page):
+    page.evaluate(PIXELS)
+    expect(page.evaluate("pixels(5, 'soft')") > 10, "the name of the line is not where it says")
+    expect(page.evaluate("pixels(5, 'blue')") == 0, "the name of the line lies over the curve")
+
+
 def test_quiet(page, address):
     expect(page.errors == [], f"scripts complain: {page.errors}")
     expect(page.requests == [address], f"the page asks for more than itself: {page.requests}")
@@ -145,7 +170,8 @@ def main():
             page.prefer("light")
             page.open(address)
             page.evaluate(HELP)
-            for test in (test_reading_and_links, test_zoom, test_linked_by_reading, test_hiding, test_colours_and_paper, test_fold):
+            for test in (test_reading_and_links, test_zoom, test_linked_by_reading, test_hiding, test_colours_and_paper, test_fold,
+                         test_names_on_lines):
                 test(page)
                 print("ok:", test.__name__)
             test_quiet(page, address)

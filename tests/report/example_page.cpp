@@ -59,7 +59,10 @@ Page example_page() {
   page.heading("In space").space({.paths = {path}, .link = "time"}, "A path.");
   page.heading("Linked by reading").figures({against("one", 1), against("other", -3)}, 2, "Two panels.");
   page.folded("more", [](Page& inside) {
-    inside.figure(Figure{}.step("folded", {1, 2, 3}, {1, 4, 9}), "Not drawn before it is unfolded.");
+    Figure folded = Figure{}.step("folded", {1, 2, 3}, {1, 4, 9}, Colour::blue);
+    // Its name would stand at the right end, where the step to 9 is.
+    folded.references.push_back({Reference::Axis::horizontal, 6.0, "limit of the steps"});
+    inside.figure(folded, "Not drawn before it is unfolded.");
   });
   return page;
 }

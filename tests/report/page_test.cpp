@@ -13,6 +13,7 @@
 #include "report/assets.hpp"
 #include "report/figure_svg.hpp"
 #include "report/html_text.hpp"
+#include "report/label_place.hpp"
 #include "report/page.hpp"
 #include "tests/report/example_page.hpp"
 
@@ -149,6 +150,38 @@ TEST(ReportFigure, still_picture_holds_every_kind) {
   for (const char* part : {"frequency (Hz)", ">steps<", ">dashed<", ">bars<", ">dots<", ">limit<", "var(--span)"})
     EXPECT_THAT(svg, HasSubstr(part));
   EXPECT_FALSE(std::regex_search(svg, std::regex("nan|inf")));
+}
+
+// A curve through where the name would stand, on both sides of the line: it stands lower down. The svg says where.
+TEST(ReportFigure, a_name_on_a_line_keeps_clear_of_the_curves) {
+  const auto place = [](const std::vector<double>& y) {
+    Figure figure = Figure{}.line("curve", {0, 48, 52, 100}, y);
+    figure.x_range = {0, 100}, figure.y_range = {0, 1};
+    figure.references.push_back({Reference::Axis::vertical, 50.0, "from here"});
+    const std::string svg = figure_svg(figure, 832);
+    std::smatch at;
+    if (!std::regex_search(svg, at, std::regex("x=\"([0-9.]+)\" y=\"([0-9.]+)\"[^>]*>from here<"))) return Point{};
+    return Point{std::stod(at[1]), std::stod(at[2])};
+  };
+  const Point free = place({0.1, 0.1, 0.1, 0.1}), lower = place({0.97, 0.97, 0.97, 0.97}),
+              left = place({0, 0, 0.97, 0.97});
+  EXPECT_GT(free.y, 0);
+  EXPECT_GE(lower.y, free.y + 13);
+  EXPECT_EQ(lower.x, free.x);
+  EXPECT_LT(left.x, free.x) << "on the other side, where it is as high";
+  EXPECT_EQ(left.y, free.y);
+}
+
+TEST(ReportFigure, an_edge_crosses_a_box_if_any_of_it_is_inside) {
+  const Box box{10, 10, 20, 10};
+  EXPECT_TRUE(crosses(box, {{0, 15}, {40, 15}}));
+  EXPECT_TRUE(crosses(box, {{15, 15}, {16, 16}}));
+  EXPECT_TRUE(crosses(box, {{15, 15}, {15, 15}}));
+  EXPECT_TRUE(crosses(box, {{0, 0}, {40, 30}}));
+  EXPECT_FALSE(crosses(box, {{0, 0}, {40, 5}}));
+  EXPECT_FALSE(crosses(box, {{0, 15}, {9, 15}}));
+  EXPECT_FALSE(crosses(box, {{0, 21}, {5, 40}}));
+  EXPECT_FALSE(crosses(box, {{35, 15}, {35, 15}}));
 }
 
 TEST(ReportFigure, a_gap_breaks_a_line_and_a_band_and_a_lone_sample_is_a_bar) {
