@@ -33,7 +33,7 @@ double depth_of(const Recording& recording, std::size_t message) {
 }
 
 Rows rows_of(const RecordedCase& recorded, std::size_t c) {
-  const Index own = recorded.channels[c].heading ? 2 : 3;
+  const Index own = recorded.channels[c].heading ? 1 : 2;
   Index count = 0;
   for (const Recording& recording : recorded.recordings)
     count += static_cast<Index>(recording.series[c].measured.size());
@@ -61,7 +61,7 @@ Rows rows_of(const RecordedCase& recorded, std::size_t c) {
             weight * at.weight[k];
     }
   }
-  // The shared path and the recordings' parabolas have parabolas in common: a basis of all of it.
+  // The shared path and the recordings' lines have lines in common: a basis of all of it.
   const Eigen::ColPivHouseholderQR<MatrixXd> qr(out.free);
   out.free = qr.householderQ() * MatrixXd::Identity(count, qr.rank());
   return out;
