@@ -10,7 +10,6 @@ namespace bevel::camera {
 namespace {
 
 constexpr int kMinRows = 8;
-constexpr double kLeastVariance_px2 = 1e-6;
 constexpr double kTukey = 4.685;  // 95 % efficient for Gaussian residuals
 
 double bilinear(const cv::Mat& m, double x, double y) {
