@@ -18,8 +18,9 @@ constexpr double kNegligible = -30;  // log weight, of the likeliest's 0
 }  // namespace
 
 TargetTrack::TargetTrack(const TargetMotion& motion) : motion_(motion) {
-  for (double hz = kSlowest_hz; hz <= kFastest_hz; hz *= kFrequencyStep)
-    breaths_.emplace_back().frequency_rad_s = 2 * std::numbers::pi * hz;
+  const int steps = static_cast<int>(std::log(kFastest_hz / kSlowest_hz) / std::log(kFrequencyStep));
+  for (int i = 0; i <= steps; ++i)
+    breaths_.emplace_back().frequency_rad_s = 2 * std::numbers::pi * kSlowest_hz * std::pow(kFrequencyStep, i);
   restart();
 }
 

@@ -190,7 +190,7 @@ Views conceal_in_kinematics(Truth& truth, Setting& setting, Random& random, int 
 Views conceal_in_beam(Truth& truth, Setting& setting, Random& random, int edition) {
   truth.beam_config = draw_beam(random);
   const model::BeamPlantConfig& beam = *truth.beam_config;
-  const Views seen = views_of(setting, beam);
+  Views seen = views_of(setting, beam);
   const BaseNeedle anywhere{0.002, truth.needle.wheelbase_mm, 0.1, 0.05};
   const Refit refit = refit_base(setting, seen, anywhere, {});
   truth.needle = refit.needle;

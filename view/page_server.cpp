@@ -104,11 +104,11 @@ struct PageServer::Impl {
     });
     server.Get(R"(/picture/(\d{1,9})/(\d{1,18}))",
                [this](const httplib::Request& request, httplib::Response& response) {
-                 std::string jpeg = picture(std::stoi(request.matches[1]), std::stoll(request.matches[2]));
+                 const std::string jpeg = picture(std::stoi(request.matches[1]), std::stoll(request.matches[2]));
                  if (jpeg.empty())
                    response.status = 404;
                  else
-                   response.set_content(std::move(jpeg), "image/jpeg");
+                   response.set_content(jpeg, "image/jpeg");
                });
     server.Get("/events", [this](const httplib::Request&, httplib::Response& response) {
       if (pages.fetch_add(1) >= kMostPages) {

@@ -11,11 +11,13 @@ using Eigen::VectorXd;
 
 namespace {
 
-constexpr double kNegligible = 20;                            // of chi2: values beyond have no part in an integral
-constexpr double kFirstStep = 0.1;                            // of what is near
-constexpr double kGrowth = 1.15;                              // of the steps
-constexpr int kMostSteps = 60;                                // to each side
-constexpr double kWidestStep_s = 0.2, kFinestStep_s = 0.004;  // of an instant that follows
+constexpr double kNegligible = 20;  // of chi2: values beyond have no part in an integral
+constexpr double kFirstStep = 0.1;  // of what is near
+constexpr double kGrowth = 1.15;    // of the steps
+constexpr int kMostSteps = 60;      // to each side
+// Of an instant that follows: its steps, each half of the one before, down to 6 ms; and the earliest it goes to.
+constexpr double kWidestStep_s = 0.2, kEarliest_s = 0.004;
+constexpr int kSteps = 6;
 
 }  // namespace
 
@@ -79,9 +81,10 @@ double Profile::following_instants(Index which, double value, VectorXd& shared, 
       if (!(local[r][at] > 0)) continue;
       VectorXd trial = local[r];
       double least = chi2(r, shared, trial);
-      for (double step_s = kWidestStep_s; step_s > kFinestStep_s; step_s *= 0.5)
+      for (int halvings = 0; halvings < kSteps; ++halvings)
         for (const double direction : {-1.0, 1.0}) {
-          trial[at] = std::clamp(local[r][at] + direction * step_s, kFinestStep_s, layout.upper(i, r));
+          const double step_s = std::ldexp(direction * kWidestStep_s, -halvings);
+          trial[at] = std::clamp(local[r][at] + step_s, kEarliest_s, layout.upper(i, r));
           if (const double there = chi2(r, shared, trial); there < least) least = there, local[r] = trial;
         }
     }

@@ -146,7 +146,7 @@ std::vector<Trace> make_traces(const NeedleSystem& system, const inference::Read
       model::OpenLoop out;
       if (!system.tip_path(fit.layout.set(), recording.motion, static_cast<int>(r), fit.shared, fit.local[r],
                            model.discrepancy, out))
-        return nowhere;
+        out.position_mm = nowhere;
       return out.position_mm;
     };
     trace.before_mm = predicted(before);

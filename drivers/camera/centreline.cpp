@@ -10,7 +10,6 @@ namespace bevel::camera {
 namespace {
 
 constexpr int kMinRows = 8;
-constexpr double kLeastVariance_px2 = 1e-6;
 constexpr double kTukey = 4.685;  // 95 % efficient for Gaussian residuals
 
 double bilinear(const cv::Mat& m, double x, double y) {
@@ -221,16 +220,17 @@ std::vector<double> mean_dark_across(const cv::Mat& patch, const Centreline& lin
   const int rows = std::max(1, cvRound(to_px - from_px));
   const int furthest = std::max(reach_px, side + 3 * kSideHalf_px + 1);
   std::vector<double> gray(static_cast<size_t>(2 * furthest + 1), 0.0);
+  double* const middle = gray.data() + furthest;
   for (int i = 0; i < rows; ++i) {
     const cv::Point2d p = line.along(row, from_px + (i + 0.5) * (to_px - from_px) / rows);
     const double slope = line.slope(p.y);
     const double length = std::hypot(1.0, slope);
     for (int k = -furthest; k <= furthest; ++k) {
       const double off = (across_px + k) / length;
-      gray[static_cast<size_t>(k + furthest)] += bilinear(patch, p.x + off, p.y - off * slope) / rows;
+      middle[k] += bilinear(patch, p.x + off, p.y - off * slope) / rows;
     }
   }
-  const auto gray_at = [&](int k) { return gray[static_cast<size_t>(k + furthest)]; };
+  const auto gray_at = [&](int k) { return middle[k]; };
   const Beside sides = beside(gray_at, side);
   const Background under = background(sides, sides, side);
   std::vector<double> dark;

@@ -10,7 +10,7 @@ namespace {
 class Across {
  public:
   Across(const std::vector<double>& dark, double blur_px)
-      : dark_(dark), reach_(static_cast<int>(dark.size() / 2)), blur_px_(blur_px) {}
+      : reach_(static_cast<int>(dark.size() / 2)), middle_(dark.data() + reach_), blur_px_(blur_px) {}
 
   struct Fit {
     double height = 0.0;
@@ -55,7 +55,7 @@ class Across {
   }
 
  private:
-  double dark_at(int k) const { return dark_[static_cast<size_t>(k + reach_)]; }
+  double dark_at(int k) const { return middle_[k]; }
   double shape(int k, double offset_px) const {
     const double z = (k - offset_px) / blur_px_;
     return std::exp(-0.5 * z * z);
@@ -64,8 +64,8 @@ class Across {
     return shape(k, offset_px) * (k - offset_px) / (blur_px_ * blur_px_);
   }
 
-  const std::vector<double>& dark_;
   int reach_;
+  const double* middle_;  // of the darkness across, which reaches as far to either side
   double blur_px_;
 };
 
@@ -100,7 +100,8 @@ LineLocation locate_line(const std::vector<double>& dark, double blur_px, double
   };
   double at = best_of(posterior);
   if (!std::isfinite(at)) return line;
-  for (double step = step_px; step > 0.02; step *= 0.5) {
+  for (int halvings = 0; halvings < 5; ++halvings) {  // to 0.03 pixels
+    const double step = std::ldexp(step_px, -halvings);
     const double left = posterior(at - step), middle = posterior(at), right = posterior(at + step);
     const double bend = left - 2.0 * middle + right;
     if (bend < 0.0) at += std::clamp(0.5 * (left - right) / bend, -1.0, 1.0) * step;

@@ -49,7 +49,8 @@ class StickSlip final : public Effect {
   static std::vector<double> starts() {
     constexpr double kWay_mm = 90;
     std::vector<double> all;
-    for (double count = 300; count >= 23; count -= count > 120 ? 0.5 : 0.25) all.push_back(kWay_mm / count);
+    for (int quarters = 4 * 300; quarters >= 4 * 23; quarters -= quarters > 4 * 120 ? 2 : 1)
+      all.push_back(kWay_mm / (0.25 * quarters));
     return all;
   }
 };

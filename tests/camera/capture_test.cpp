@@ -123,7 +123,7 @@ class RecordedDevice : public CaptureDevice {
     int64_t timestamp_us;
     uint8_t shade;
     uint32_t flags = kMonotonic;
-    size_t bytes = 64 * 48;
+    size_t bytes = size_t{64} * 48;
   };
   explicit RecordedDevice(std::deque<std::vector<One>> wakings) : wakings_(std::move(wakings)) {}
   ~RecordedDevice() override { EXPECT_TRUE(lent_.empty()) << "buffers were kept"; }

@@ -58,10 +58,10 @@ TEST(LineLocation, VarianceIsThatOfTheErrors) {
 // What a centre of gravity cannot do: darkness of 6 of 255 over five pixels beside a line of 25.
 TEST(LineLocation, APaleShadeBesideTheLineHardlyMovesIt) {
   auto dark = made(0.0, 25.0);
-  for (int k = 5; k <= 9; ++k) dark[static_cast<size_t>(k + kReach_px)] += 6.0;
+  double* const middle = dark.data() + kReach_px;
+  for (int k = 5; k <= 9; ++k) middle[k] += 6.0;
   double sum = 0.0, moment = 0.0;
-  for (int k = -kReach_px; k <= kReach_px; ++k)
-    sum += dark[static_cast<size_t>(k + kReach_px)], moment += k * dark[static_cast<size_t>(k + kReach_px)];
+  for (int k = -kReach_px; k <= kReach_px; ++k) sum += middle[k], moment += k * middle[k];
   const LineLocation line = locate_line(dark, kBlur_px, kPrior_px);
   ASSERT_TRUE(line.found);
   EXPECT_GT(moment / sum, 1.2);

@@ -25,8 +25,11 @@ void draw(const std::string& file, const cv::Mat& gray, const std::vector<PathTi
   for (const auto& [model, colour] :
        {std::pair{PathModel::agar, cv::Scalar(0, 0, 255)}, {PathModel::bicycle, cv::Scalar(0, 200, 0)}}) {
     const PathFit fit = fit_path(known, model);
-    for (double z = tips.front().depth_mm; z < tips.back().depth_mm; z += 1.0)
+    const int steps = cvCeil(tips.back().depth_mm - tips.front().depth_mm);
+    for (int i = 0; i < steps; ++i) {
+      const double z = tips.front().depth_mm + i;
       cv::line(out, place(fit.aside_mm(z), z), place(fit.aside_mm(z + 1.0), z + 1.0), colour, 1, cv::LINE_AA);
+    }
   }
   for (const PathTip& t : tips) cv::circle(out, place(t.aside_mm, t.depth_mm), 3, {0, 220, 255}, 1, cv::LINE_AA);
   cv::imwrite(file, out);

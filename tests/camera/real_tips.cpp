@@ -124,10 +124,10 @@ double slope_of(const std::vector<std::array<double, 3>>& rows, double without_f
 Headings compare_headings(const std::vector<SeenFrame>& axis) {
   Headings h;
   std::vector<std::array<double, 3>> rows;  // folder, direction of the path, tangent less that
-  double folders = 0.0;
+  int folders = 0;
   const auto a_step = [](const cv::Point2d& d) { return std::abs(cv::norm(d) / kRealPxPerMm - kStep_mm) < 1.5; };
   for (size_t i = 1; i + 1 < axis.size(); ++i) {
-    if (axis[i - 1].folder != axis[i].folder) folders += 1.0;
+    if (axis[i - 1].folder != axis[i].folder) ++folders;
     if (axis[i - 1].folder != axis[i].folder || axis[i + 1].folder != axis[i].folder) continue;
     const camera::TipResult &before = axis[i - 1].tip, &tip = axis[i].tip, &after = axis[i + 1].tip;
     constexpr auto ok = camera::TipStatus::ok;
@@ -136,7 +136,7 @@ Headings compare_headings(const std::vector<SeenFrame>& axis) {
     const cv::Point2d d = after.tip_px - before.tip_px;
     const double path_rad = std::atan2(d.x, d.y);
     const double off_rad = std::atan2(tip.direction_px[0], tip.direction_px[1]) - path_rad;
-    rows.push_back({folders, path_rad, off_rad});
+    rows.push_back({static_cast<double>(folders), path_rad, off_rad});
     h.off_mean_rad += off_rad, h.off_rms_rad += off_rad * off_rad, h.claimed_rad += tip.direction_variance_rad2;
   }
   h.tips = static_cast<int>(rows.size());
@@ -150,7 +150,7 @@ Headings compare_headings(const std::vector<SeenFrame>& axis) {
   for (auto& r : slipping) r[2] = -(0.22 * r[1] - 0.49 * r[1] * std::abs(r[1]));
   h.agar_by_direction = slope_of(slipping, -1.0);
   std::vector<double> without;
-  for (double f = 0.0; f <= folders; f += 1.0) without.push_back(slope_of(rows, f));
+  for (int folder = 0; folder <= folders; ++folder) without.push_back(slope_of(rows, folder));
   double mean = 0.0, spread = 0.0;
   for (const double w : without) mean += w / static_cast<double>(without.size());
   for (const double w : without) spread += (w - mean) * (w - mean);

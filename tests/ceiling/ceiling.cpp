@@ -17,7 +17,6 @@ namespace bevel::ceiling {
 using Eigen::Index;
 using Eigen::VectorXd;
 using inference::ModelSet;
-using inference::Scope;
 using inference::Search;
 using nlohmann::json;
 namespace fs = std::filesystem;

@@ -32,8 +32,9 @@ TargetTrack watched(const Truth& truth, double until_s, double noise_sd_mm, unsi
   std::mt19937_64 rng(seed);
   std::normal_distribution<double> noise(0, noise_sd_mm);
   TargetTrack track({.reading_sd_mm = kReading_sd_mm});
-  for (double t_s = 0; t_s <= until_s; t_s += 1e-6 * kReading_us)
-    track.observe(at(t_s), truth(t_s) + Eigen::Vector3d(noise(rng), noise(rng), noise(rng)));
+  for (std::int64_t after_us = 0; after_us <= std::llround(1e6 * until_s); after_us += kReading_us)
+    track.observe(kStart_utime + after_us,
+                  truth(1e-6 * static_cast<double>(after_us)) + Eigen::Vector3d(noise(rng), noise(rng), noise(rng)));
   return track;
 }
 

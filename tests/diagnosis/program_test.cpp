@@ -109,7 +109,7 @@ TEST_F(Program, FindsAConcealedEffectAndWritesAllThreeFiles) {
   EXPECT_TRUE(steered["as_it_stands"]["arrived"] == 0 ||
               steered["as_it_stands"]["median_mm"].get<double>() > steered["found"]["median_mm"].get<double>())
       << steered;
-  EXPECT_EQ(steered["as_it_stands"]["arrived"] == 8, steered["as_it_stands"]["stopped_by"] == "");
+  EXPECT_EQ(steered["as_it_stands"]["arrived"] == 8, steered["as_it_stands"]["stopped_by"].get<std::string>().empty());
   EXPECT_THAT(said.out, HasSubstr("steered in simulation to targets"));
 
   // The same input: the same verdict, whatever the number of threads.

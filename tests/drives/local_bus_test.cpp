@@ -54,7 +54,8 @@ TEST_F(LocalBusTest, ManyFramesComeInTheirOrderAndNoneFromBeforeALoss) {
       ASSERT_EQ(a->send({0x181, 1, {i}}), SendResult::sent);
       hub_->service();
     }
-    for (std::uint8_t i = 0; i < (round == 0 ? kFrames : 3); ++i) {
+    const std::uint8_t expected = round == 0 ? kFrames : 3;
+    for (std::uint8_t i = 0; i < expected; ++i) {
       const auto heard = b->receive();
       ASSERT_EQ(heard.kind, Reception::Kind::frame);
       EXPECT_EQ(heard.frame.data[0], i);

@@ -269,7 +269,8 @@ TEST(DriveSupervision, WhichLimitItWas) {
     ASSERT_TRUE(bench.enable());
     bench.move(rate_mm_s, 0.0);
     ASSERT_TRUE(bench.run_until([&] { return bench.reason() == StopReason::travel_limit; }, 1000));
-    EXPECT_TRUE(bench.run_until([&] { return bench.reason() == wanted; }, 50)) << describe(bench.report().stop);
+    EXPECT_TRUE(bench.run_until([&, reason = wanted] { return bench.reason() == reason; }, 50))
+        << describe(bench.report().stop);
   }
 }
 

@@ -199,7 +199,8 @@ TEST(Puncture, StallsAtTheMembraneAndCatchesUp) {
   const AugmentedNeedle needle(straight, {effect});
   int on_the_way = 0;
   AugmentedState state = needle.entry({});
-  for (double base_mm = 0.01; base_mm < 30; base_mm += 0.01) {
+  for (int i = 1; i < 3000; ++i) {
+    const double base_mm = 0.01 * i;
     ASSERT_TRUE(needle.advance(state, {base_mm / 10, base_mm, 0}));
     const double share = (base_mm - kDepth_mm - kBreaks_mm) / 0.4;
     const double sd_mm = share > 0 && share < 1 ? std::sqrt(share * (1 - share)) * (kBreaks_mm + 0.4) : 0;

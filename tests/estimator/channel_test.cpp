@@ -56,10 +56,10 @@ Far far_off(const EstimatorConfig& config, rig::Plant& plant) {
   FilterState state = filter.initial();
   Far far;
   for (const auto& [legs, largest] : {std::pair(&kIn, &far.in_mm), {&kBack, &far.back_mm}, {&kAgain, &far.again_mm}})
-    testing::follow(*legs, [&](double mm, double rad) {
+    testing::follow(*legs, [&, error_mm = largest](double mm, double rad) {
       plant.advance(mm, rad, 0.01);
       filter.predict(state, mm, rad);
-      *largest = std::max(*largest, (filter.tip_pose(state).p_mm - plant.tip().p_mm).norm());
+      *error_mm = std::max(*error_mm, (filter.tip_pose(state).p_mm - plant.tip().p_mm).norm());
     });
   return far;
 }

@@ -313,7 +313,7 @@ TEST(NeedleEstimator, AnActuatorStateThatFindsTheHistoryFullOfWaitingMeasurement
   estimator.add(a);
   // More measurements than there is room for, all newer than the axes: the oldest of them go, the anchor stays.
   for (int i = 1; i <= 40; ++i)
-    estimator.add(testing::measure({0, 0, 0.1 * i}, a.utime + 1000 * i, i, 0, {1, 1, 1}, 0.1, rng));
+    estimator.add(testing::measure({0, 0, 0.1 * i}, a.utime + std::int64_t{1000} * i, i, 0, {1, 1, 1}, 0.1, rng));
   EXPECT_EQ(estimator.estimate(a.utime).state.measurement_utime, 0);
   a.utime += 40'000;
   a.insertion_mm = 4;

@@ -96,14 +96,14 @@ void frames(int runs, std::uint64_t seed) {
   };
   std::printf("%d insertions a row, seed %llu; lags 1 2 3 4 6 8 10 15 20 30 60 frames\n", runs,
               static_cast<unsigned long long>(seed));
-  for (const Row& row : {Row{10, 30, 0.6, false, 0}, Row{5, 30, 0.6, false, 0}, Row{20, 30, 0.6, false, 0},
-                         Row{10, 60, 0.6, false, 0}, Row{10, 15, 0.6, false, 0}, Row{10, 30, 0, false, 0},
-                         Row{5, 30, 8, true, 0}, Row{10, 30, 0.6, false, 4}}) {
+  for (const Row& row :
+       {Row{10, 30, 0.6, false, 0}, Row{5, 30, 0.6, false, 0}, Row{20, 30, 0.6, false, 0}, Row{10, 60, 0.6, false, 0},
+        Row{10, 15, 0.6, false, 0}, Row{10, 30, 0, false, 0}, Row{5, 30, 8, true, 0}, Row{10, 30, 0.6, false, 4}}) {
     RenderedPlan plan;
     plan.rate_mm_s = row.mm_s, plan.frame_rate_hz = row.hz, plan.rotation_rate_rad_s = row.rad_s;
     plan.one_way = row.one_way, plan.rest_s = row.rest_s;
     std::mt19937_64 rng(seed);
-    Alike y, z, x, z1, across_cameras;
+    Alike y, z, x, z1;
     double both = 0, z_square = 0, z1_square = 0;
     for (int run = 0; run < runs; ++run) {
       const Drawn drawn = draw_rendered(exact_model().prior, plan, rng);
@@ -156,11 +156,11 @@ struct Sums {
   void print(const char* name) const {
     const auto rms = [this](int i) { return std::sqrt(squares[i] / runs); };
     const auto sd = [this](int i) { return std::sqrt(claimed[i] / runs); };
-    std::printf("  %-46s NEES: all %.3f pose %.3f parameters %.3f | NIS %.3f rejected %.0f | tip %.4f mm, "
-                "roll %.3f (%.3f) k %.2e (%.2e, %+.2f sd) l1 %.3f (%.3f) l2 %.4f (%.4f)  rerun %d\n",
-                name, nees / runs, pose / runs, parameters / runs, nis / std::max(axes, 1.0), rejected,
-                std::sqrt(tip2 / runs), rms(5), sd(5), rms(6), sd(6), k_by_sd / runs, rms(7), sd(7), rms(8), sd(8),
-                relinearised / std::max(runs, 1));
+    std::printf(
+        "  %-46s NEES: all %.3f pose %.3f parameters %.3f | NIS %.3f rejected %.0f | tip %.4f mm, "
+        "roll %.3f (%.3f) k %.2e (%.2e, %+.2f sd) l1 %.3f (%.3f) l2 %.4f (%.4f)  rerun %d\n",
+        name, nees / runs, pose / runs, parameters / runs, nis / std::max(axes, 1.0), rejected, std::sqrt(tip2 / runs),
+        rms(5), sd(5), rms(6), sd(6), k_by_sd / runs, rms(7), sd(7), rms(8), sd(8), relinearised / std::max(runs, 1));
     std::fflush(stdout);
   }
 };

@@ -43,20 +43,27 @@ class WatchedClient {
     begin_download(object, input.take<std::uint32_t>(), size_bytes);
   }
 
-  void send() {
+  /// Sends what the client has to send, each frame through `put`: where an abort is still owed, it and then the
+  /// request.
+  template <class Put>
+  void send(Put&& put) {
     const auto frame = client.frame_to_send();
     const Status before = client.status();
     const bool aborts = frame && frame->data[0] == 0x80;
     if (frame) BEVEL_MUST(frame->id == 0x600U + kNode && frame->size == 8);
     if (frame && !owes_abort_) BEVEL_MUST(object_of(*frame) == object_ && aborts == (before != Status::to_send));
+    if (frame) put(*frame);
     client.sent(now_ns);
     if (std::exchange(owes_abort_, false)) {
       BEVEL_MUST(client.status() == before);
-      return send();
+      return send(put);
     }
     BEVEL_MUST(client.status() == (before == Status::to_send ? Status::waiting : before));
     BEVEL_MUST(!client.frame_to_send());  // one request, or one abort
     if (before == Status::to_send) sent_ns_ = now_ns;
+  }
+  void send() {
+    send([](const Frame&) {});
   }
   void cancel() {
     client.cancel();
@@ -153,8 +160,7 @@ void arbitrary_server(Input input) {
         watched.begin(input, false);
         break;
       case 3:
-        if (watched.client.status() == Status::to_send) request = watched.client.frame_to_send();
-        watched.send();
+        watched.send([&](const Frame& frame) { request = frame; });
         break;
       case 4:
         watched.answer(some_answer(input, request));
@@ -181,10 +187,13 @@ void simulated_server(Input input) {
   config.node_id = kNode;
   rig::SimulatedDrive drive(*drive_bus, config);
   WatchedClient watched;
+  Frame request;
   const auto transfer = [&] {
-    const auto request = watched.client.frame_to_send();
-    BEVEL_MUST(bus->send(*request) == can::SendResult::sent);
-    watched.send();
+    // Before the request goes the abort of a text, if one was met where a number was asked for.
+    watched.send([&](const Frame& frame) {
+      request = frame;
+      BEVEL_MUST(bus->send(frame) == can::SendResult::sent);
+    });
     watched.now_ns += 1'000'000;
     drive.step(watched.now_ns);
     for (can::Reception r = bus->receive(); r.kind != can::Reception::Kind::nothing; r = bus->receive())
@@ -195,7 +204,6 @@ void simulated_server(Input input) {
   while (!input.empty()) {
     const bool upload = input.byte() % 2 == 0;
     watched.begin(input, upload);
-    const Frame request = *watched.client.frame_to_send();
     if (!transfer() || upload) continue;
     const ObjectAddress object = object_of(request);
     const unsigned bytes = 4 - (request.data[0] >> 2 & 3U);

@@ -18,6 +18,7 @@ using Eigen::MatrixXd;
 using Eigen::VectorXd;
 
 constexpr int kStops = 21;
+constexpr Index kReadings = Index{2} * kStops;  // two channels
 constexpr std::size_t kRecordings = 5;
 
 // An offset and a slope that all recordings share in each of two channels; each has an offset and a slope of its own.
@@ -69,7 +70,7 @@ class TwoChannels final : public testing::HeldSystem {
     }
   }
   static MatrixXd columns() {
-    MatrixXd out = MatrixXd::Zero(2 * kStops, 4);
+    MatrixXd out = MatrixXd::Zero(kReadings, 4);
     for (int c = 0; c < 2; ++c)
       for (int i = 0; i < kStops; ++i) out(c * kStops + i, c) = 1, out(c * kStops + i, 2 + c) = i / (kStops - 1.0);
     return out;
@@ -80,7 +81,7 @@ class TwoChannels final : public testing::HeldSystem {
     if (derivatives) out.by_shared = out.by_local = columns();
     return true;
   }
-  MatrixXd by_curves(std::size_t, const VectorXd&) const override { return MatrixXd::Zero(2 * kStops, 0); }
+  MatrixXd by_curves(std::size_t, const VectorXd&) const override { return MatrixXd::Zero(kReadings, 0); }
 };
 
 struct Share {

@@ -35,7 +35,7 @@ io::Recording make_recording(int seconds) {
   std::mt19937 random(1);
   std::normal_distribution<double> normal;
   for (int i = 0; i < 100 * seconds; ++i) {
-    const std::int64_t utime = 1'700'000'000'000'000 + 10'000 * i;
+    const std::int64_t utime = 1'700'000'000'000'000 + std::int64_t{10'000} * i;
     r.arrivals.push_back({io::Arrival::Channel::actuator, r.actuators.size()});
     // Moves that axes can make from one reading to the next.
     r.actuators.push_back(

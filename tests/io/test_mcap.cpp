@@ -39,12 +39,9 @@ struct Got {
 };
 Got read_all(std::string_view file) {
   Got got;
-  got.damage = mcap::read(file, {.on_message =
-                                     [&](const mcap::Message& m) {
-                                       got.messages.emplace_back(m.topic, m.sequence, m.data);
-                                     },
-                                 .on_attachment =
-                                     [&](const mcap::Attachment& a) { got.attachments.emplace_back(a.data); }});
+  got.damage = mcap::read(
+      file, {.on_message = [&](const mcap::Message& m) { got.messages.emplace_back(m.topic, m.sequence, m.data); },
+             .on_attachment = [&](const mcap::Attachment& a) { got.attachments.emplace_back(a.data); }});
   return got;
 }
 
@@ -175,7 +172,7 @@ TEST_F(McapFile, ADamagedChunkCostsItselfAndIsCounted) {
   Recording r;
   for (int i = 0; i < 5000; ++i) {
     r.arrivals.push_back({Arrival::Channel::actuator, r.actuators.size()});
-    r.actuators.push_back({1'700'000'000'000'000 + 10'000 * i, i, {2, 2}, 1e-3 * i, 0.1, 1e-4 * i, 0.01});
+    r.actuators.push_back({1'700'000'000'000'000 + std::int64_t{10'000} * i, i, {2, 2}, 1e-3 * i, 0.1, 1e-4 * i, 0.01});
   }
   std::string file = exported(r);
   file[file.size() / 2] ^= 1;
@@ -208,12 +205,11 @@ TEST_F(McapFile, AnyGoodJsonIsReadAndAnyOtherIsNamed) {
   const auto import = [&](const std::vector<std::string>& commands) {
     mcap::Writer file(path("rec.mcap"));
     const auto channel = file.add_channel("MOTION_COMMAND", "bevel.motion_command", "{}");
-    for (std::uint32_t i = 0; i < commands.size(); ++i) file.write(channel, i, 1000 * i, commands[i]);
+    for (std::uint32_t i = 0; i < commands.size(); ++i) file.write(channel, i, std::uint64_t{1000} * i, commands[i]);
     file.close();
     return import_mcap_file(path("rec.mcap"));
   };
-  const std::string as_written =
-      R"({"utime":5,"seq":0,"mode":1,"insertion_rate_mm_s":0.1,"rotation_rate_rad_s":-0.0})";
+  const std::string as_written = R"({"utime":5,"seq":0,"mode":1,"insertion_rate_mm_s":0.1,"rotation_rate_rad_s":-0.0})";
   const std::string otherwise =
       R"({ "rotation_rate_rad_s": -0.0, "insertion_rate_mm_s": 1e-1, "mode": 1, "seq": 0, "utime": 5 })";
   const ImportedMcap both = import({as_written, otherwise});
@@ -238,7 +234,8 @@ TEST_F(McapFile, AnyGoodJsonIsReadAndAnyOtherIsNamed) {
     EXPECT_THAT(one.faults, HasSubstr(why)) << json;
     EXPECT_THAT(one.faults, HasSubstr("message 1 of MOTION_COMMAND")) << json;
     EXPECT_EQ(one.recording.commands.size(), 1U) << json;
-    EXPECT_THAT([&] { import({json}); }, ThrowsMessage<std::runtime_error>(HasSubstr("no message that can be used")));
+    const auto alone = [&, message = json] { import({message}); };
+    EXPECT_THAT(alone, ThrowsMessage<std::runtime_error>(HasSubstr("no message that can be used")));
   }
 }
 

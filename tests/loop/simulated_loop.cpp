@@ -74,7 +74,7 @@ tip_measurement_t SimulatedLoop::picture(const Eigen::Vector3d& tip, int which) 
   std::normal_distribution<double> noise(0, 0.2);
   for (const int axis : {which == 0 ? 1 : 0, 2}) {
     m.position_mm[axis] = tip[axis] + noise(rng);
-    m.information_per_mm2[4 * axis] = 1 / (0.2 * 0.2);
+    m.information_per_mm2[std::ptrdiff_t{4} * axis] = 1 / (0.2 * 0.2);
   }
   return m;
 }
@@ -162,7 +162,7 @@ std::string SimulatedLoop::arm(const Eigen::Vector3d& target) {
 }
 
 std::string SimulatedLoop::steer_to(const Eigen::Vector3d& target) {
-  if (const std::string failure = arm(target); !failure.empty()) return failure;
+  if (std::string failure = arm(target); !failure.empty()) return failure;
   say(nodes::Word::start, target);
   if (state() != controller::State::steering) return "not steering: " + std::string(controller::to_string(reason()));
   return "";

@@ -164,7 +164,7 @@ int print(const std::string& name, std::vector<Outcome> all) {
   if (!miss_mm.empty()) {
     const auto n = static_cast<double>(miss_mm.size());
     std::ranges::sort(miss_mm);
-    const auto at = [&](double share) { return miss_mm[static_cast<std::size_t>(share * (n - 1) + 0.5)]; };
+    const auto at = [&](double share) { return miss_mm[static_cast<std::size_t>(std::lround(share * (n - 1)))]; };
     mean_mm /= n;
     const double sd_mm = std::sqrt(std::max(0.0, squares_mm2 - n * mean_mm * mean_mm) / std::max(n - 1, 1.0));
     std::printf("%.2f | %.2f +- %.2f | %.2f | %.2f | %.1f | %.1f | %.2f | %.2f |", at(0.5), mean_mm, sd_mm, at(0.95),

@@ -293,7 +293,8 @@ TEST(NeedleCurves, ShiftReadingsAndAdvanceTheTip) {
 TEST(NeedleCurves, WeightsAddUpToOne) {
   inference::Curve line{.component = "", .unit = "", .covariate = "", .at = {0, 1, 3, 4}};
   inference::Curve circle{.component = "", .unit = "", .covariate = "", .at = {0, 1.5, 3.1, 4.7}, .periodic = true};
-  for (double x = -2; x < 9; x += 0.13) {
+  for (int i = -15; i < 70; ++i) {  // before the first point to beyond the last
+    const double x = 0.13 * i;
     EXPECT_NEAR(weights_at(line, x).sum(), 1, 1e-12);
     EXPECT_NEAR(weights_at(circle, x).sum(), 1, 1e-12);
     EXPECT_LT((weights_at(circle, x) - weights_at(circle, x + 2 * std::numbers::pi)).norm(), 1e-9);

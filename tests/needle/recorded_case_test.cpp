@@ -105,7 +105,7 @@ TEST(Channels, AnObliqueInformationOfAllAxesIsReadByTheirMarginals) {
   const Eigen::Matrix3d turn = Eigen::AngleAxisd(std::numbers::pi / 6, Eigen::Vector3d::UnitZ()).toRotationMatrix();
   const Eigen::Matrix3d information = turn * diagonal(100, 25, 4) * turn.transpose();
   const Eigen::Matrix3d covariance = information.inverse();
-  const auto recorded = make_case(with_information([&](auto) { return information; }));
+  const auto recorded = make_case(with_information([&](auto) -> const Eigen::Matrix3d& { return information; }));
   EXPECT_THAT(names_of(recorded), ::testing::ElementsAre("tip.x", "tip.y", "tip.z"));
   for (int i = 0; i < 3; ++i)
     EXPECT_NEAR(recorded.channels[static_cast<std::size_t>(i)].claimed_sd, std::sqrt(covariance(i, i)), 1e-9);
@@ -137,7 +137,7 @@ TEST(Channels, ACameraThatSeesNoDepthHasTwo) {
   // It looks along (1 1 0)/sqrt 2.
   const Eigen::Vector3d depth = Eigen::Vector3d(1, 1, 0).normalized();
   const Eigen::Matrix3d information = 25 * (Eigen::Matrix3d::Identity() - depth * depth.transpose());
-  const auto recorded = make_case(with_information([&](auto) { return information; }));
+  const auto recorded = make_case(with_information([&](auto) -> const Eigen::Matrix3d& { return information; }));
   ASSERT_EQ(recorded.channels.size(), 2U);
   for (const auto& channel : recorded.channels) {
     EXPECT_NEAR(channel.axis.dot(depth), 0, 1e-9);

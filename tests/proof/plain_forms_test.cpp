@@ -60,7 +60,10 @@ class PlainForms : public ::testing::Test {
   PlainForms() : motion_(follow(script())) {
     const double last_s = motion_.duration_s();
     std::vector<std::int64_t> utimes;
-    for (double t = 0.5; t < last_s; t += kFrame_s) times_s_.push_back(t), utimes.push_back(std::llround(1e6 * t));
+    for (int i = 0; 0.5 + i * kFrame_s < last_s; ++i) {
+      times_s_.push_back(0.5 + i * kFrame_s);
+      utimes.push_back(std::llround(1e6 * times_s_.back()));
+    }
     std::vector<model::ActuatorState> actuators(motion_.size());
     for (std::size_t i = 0; i < motion_.size(); ++i) {
       actuators[i].utime = static_cast<std::int64_t>(1000 * i);

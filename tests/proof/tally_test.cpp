@@ -31,7 +31,7 @@ TEST(Intervals, FiftyNineNulls) {
   EXPECT_EQ(clopper_pearson_upper95({0, 0}), 1.0);
 }
 
-TrialScore trial(std::vector<std::string> expected, std::vector<std::string> named, double sigmas = 20) {
+TrialScore trial(const std::vector<std::string>& expected, const std::vector<std::string>& named, double sigmas = 20) {
   TrialScore s;
   s.expected = expected;
   s.named = named;

@@ -126,8 +126,8 @@ TEST(Visibility, TheRefitFollowsTheEdgeOfTheDomain) {
     near.lambda2 += change;
     near.lambda1_per_rad = near.lambda2 * near.lambda2 / 6.28318 + 1e-3;
     double best = 1e300;
-    for (double k = 0.92; k < 1.08; k += 0.004) {
-      near.curvature_per_mm = k * refit.needle.curvature_per_mm;
+    for (int i = -20; i <= 20; ++i) {
+      near.curvature_per_mm = (1 + 0.004 * i) * refit.needle.curvature_per_mm;
       best = std::min(best, whitened_difference(setting, seen, views_of(setting, near, {})).norm());
     }
     EXPECT_GT(best, refit.sigmas - 0.01) << change;

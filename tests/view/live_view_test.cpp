@@ -21,7 +21,7 @@ needle_state_t needle(double s, double z_mm) {
   m.position_mm[2] = z_mm;
   m.orientation_wxyz[0] = 1;
   m.curvature_per_mm = 0.004;
-  for (int i = 0; i < 9; ++i) m.covariance[10 * i] = 0.01 * (i + 1);
+  for (std::size_t i = 0; i < 9; ++i) m.covariance[10 * i] = 0.01 * static_cast<double>(i + 1);
   return m;
 }
 
@@ -39,7 +39,8 @@ tip_measurement_t tip(double s, int camera) {
   m.position_mm[0] = 1.5;
   m.position_mm[1] = 2.5;
   m.position_mm[2] = 3.5;
-  m.information_per_mm2[4 * (camera == 0 ? 1 : 0)] = 20;  // camera 0 sees y and z, camera 1 x and z
+  const std::size_t across = camera == 0 ? 1 : 0;  // camera 0 sees y and z, camera 1 x and z
+  m.information_per_mm2[4 * across] = 20;
   m.information_per_mm2[8] = 20;
   return m;
 }

@@ -45,7 +45,7 @@ int main() {
     needle.curvature_per_mm = 0.0047;
     needle.lambda1_per_rad = 0.49;
     needle.lambda2 = 0.22;
-    for (int i = 0; i < 9; ++i) needle.covariance[10 * i] = i < 3 ? 0.04 : 1e-6;
+    for (std::size_t i = 0; i < 9; ++i) needle.covariance[10 * i] = i < 3 ? 0.04 : 1e-6;
     picture.on(needle, at);
     actuator_state_t axes{};
     axes.utime = at.utime;

@@ -82,7 +82,7 @@ Figures figures_of(const std::vector<Insertion>& all) {
   if (miss_mm.empty()) return f;
   const auto n = static_cast<double>(miss_mm.size());
   std::ranges::sort(miss_mm);
-  const auto at = [&](double share) { return miss_mm[static_cast<std::size_t>(share * (n - 1) + 0.5)]; };
+  const auto at = [&](double share) { return miss_mm[static_cast<std::size_t>(std::lround(share * (n - 1)))]; };
   f.median_mm = at(0.5), f.at_95_mm = at(0.95), f.worst_mm = miss_mm.back();
   for (const double m : miss_mm) f.mean_mm += m / n;
   for (const double m : miss_mm) f.sd_mm += (m - f.mean_mm) * (m - f.mean_mm);
