@@ -20,7 +20,8 @@ constexpr int kSharedKnots = 8;     // of the path that recordings share
 constexpr double kFewestPerColumn = 2;
 // A guide lets go within a stop or two; tissue holds a shaft after some tens of millimetres.
 constexpr std::array kLengths_mm{3.0, 6.0, 12.0, 25.0, 50.0};
-constexpr double kLargestLogExcess = 6;  // a standard deviation of twenty times that deep down
+constexpr double kLargestLogExcess =
+    4.6;  // a standard deviation of ten times that deep down: the most that is reported
 
 // All of a channel's readings, in the claimed standard deviations deep down, and what may be anything.
 struct Rows {
@@ -33,7 +34,7 @@ double depth_of(const Recording& recording, std::size_t message) {
 }
 
 Rows rows_of(const RecordedCase& recorded, std::size_t c) {
-  const Index own = recorded.channels[c].heading ? 1 : 2;
+  const Index own = recorded.channels[c].heading ? 2 : 3;
   Index count = 0;
   for (const Recording& recording : recorded.recordings)
     count += static_cast<Index>(recording.series[c].measured.size());
@@ -61,7 +62,7 @@ Rows rows_of(const RecordedCase& recorded, std::size_t c) {
             weight * at.weight[k];
     }
   }
-  // The shared path and the recordings' lines have lines in common: a basis of all of it.
+  // The shared path and the recordings' parabolas have parabolas in common: a basis of all of it.
   const Eigen::ColPivHouseholderQR<MatrixXd> qr(out.free);
   out.free = qr.householderQ() * MatrixXd::Identity(count, qr.rank());
   return out;

@@ -5,9 +5,9 @@
 
 namespace bevel::diagnosis {
 
-// For each channel the likeliest by restricted maximum likelihood, beside a line of each recording (of headings, a
-// constant: what a turned entry and a registration do) and a path that all recordings of a group share, none of them a
-// needle's; where chance would bring as much of a gain once in 1000, it is none.
+// For each channel the likeliest by restricted maximum likelihood, beside a parabola of each recording (of headings, a
+// line) and a path that all recordings of a group share, none of them a needle's; where chance would bring as much of a
+// gain once in 1000, it is none.
 std::vector<ScatterNearEntry> find_scatter_near_entry(const RecordedCase& recorded);
 
 // Channels with theirs, and the claimed standard deviations multiplied by it.
