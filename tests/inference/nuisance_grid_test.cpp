@@ -1,0 +1,83 @@
+// Combinations of standard deviations: that those with a share are found from any of them, and few others asked for.
+#include "diagnosis/inference/nuisance_grid.hpp"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <random>
+
+#include "tests/inference/held_system.hpp"
+
+namespace bevel::inference {
+namespace {
+
+using Eigen::Index;
+using Eigen::VectorXd;
+
+class Grouped final : public testing::HeldSystem {
+ public:
+  Grouped() {
+    groups_ = {{"a", "mm", {0, 0.02, 0.05, 0.12, 0.3}},
+               {"b", "mm", {0, 0.003, 0.007, 0.015, 0.03}},
+               {"c", "rad", {0, 0.05, 0.12, 0.3, 0.8}},
+               {"d", "rad", {0, 0.015, 0.04, 0.1}}};
+  }
+  bool predict(const ModelSet&, std::size_t, const VectorXd&, const VectorXd&, bool, Prediction&) const override {
+    return false;
+  }
+  Eigen::MatrixXd by_curves(std::size_t, const VectorXd&) const override { return {}; }
+};
+
+TEST(NuisanceGrid, PriorsAddUpToOne) {
+  const NuisanceGrid grid = nuisance_grid(Grouped());
+  ASSERT_EQ(grid.log_prior.size(), 500);
+  EXPECT_NEAR(grid.log_prior.array().exp().sum(), 1, 1e-12);
+}
+
+// A density with one peak over the places of the groups' values, from the farthest corners: all of its mass but
+// exp(-12).
+TEST(NuisanceGrid, WhatHasAShareIsFoundFromAnyStart) {
+  const Grouped system;
+  const NuisanceGrid grid = nuisance_grid(system);
+  std::mt19937 random(1);
+  std::uniform_real_distribution<double> place(0, 4), width(0.3, 1);
+  const Index sizes[] = {5, 5, 5, 4};
+  for (int trial = 0; trial < 50; ++trial) {
+    const double at[] = {place(random), place(random), place(random), 0.75 * place(random)};
+    const double sd = width(random);
+    int asked = 0;
+    const auto log_at = [&](Index k) {
+      double squares = 0;
+      for (std::size_t g = 0; g < 4; k /= sizes[g], ++g)
+        squares += std::pow(static_cast<double>(k % sizes[g]) - at[g], 2);
+      return -0.5 * squares / (sd * sd);
+    };
+    for (const Index start : {Index{0}, Index{499}, Index{257}}) {
+      asked = 0;
+      const VectorXd found = over_likely(system, grid.standard_deviations.col(start), [&](Index k) {
+        ++asked;
+        return log_at(k);
+      });
+      VectorXd all(500);
+      for (Index k = 0; k < 500; ++k) all[k] = log_at(k);
+      const double most = all.maxCoeff();
+      EXPECT_EQ(found.maxCoeff(), most) << "trial " << trial << ", from " << start;
+      double missed = 0;
+      for (Index k = 0; k < 500; ++k) {
+        if (std::isfinite(found[k])) {
+          EXPECT_EQ(found[k], all[k]);
+        } else {
+          missed += std::exp(all[k] - most);
+        }
+      }
+      EXPECT_LT(missed, 500 * std::exp(-12.0));
+      EXPECT_LE(asked, 500);
+    }
+    if (sd < 0.5) {
+      EXPECT_LT(asked, 400) << "trial " << trial;
+    }
+  }
+}
+
+}  // namespace
+}  // namespace bevel::inference
