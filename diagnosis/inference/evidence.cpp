@@ -74,14 +74,14 @@ GridEvidence over_nuisances(const Fit& fit, const CurveColumns& curve, const Nui
     if (fit.layout.shared()[static_cast<std::size_t>(i)].parameter->prior.form != Prior::Form::normal)
       not_normal.push_back(i);
   const double here = solve_about(fit, blocks, curve, not_normal).least;
-  VectorXd logs = over_likely(likelihood.system(), fit.scales.nuisance_sd, [&](Index k) {
+  const Index start = column_of(likelihood.system(), fit.scales.nuisance_sd);
+  VectorXd logs = over_likely(likelihood.system(), start, [&](Index k) {
     const ArrowSolution solution = solve_at(grid.standard_deviations.col(k), fit, blocks, curve, not_normal);
-    const double log = solution.valid ? -0.5 * (fit.cost + solution.least - here + solution.log_volume_ratio) +
-                                            log_density_ratios(fit, solution.covariance) + grid.log_prior[k]
-                                      : -std::numeric_limits<double>::infinity();
-    if (grid.standard_deviations.col(k) == fit.scales.nuisance_sd) out.log_here = log;
-    return log;
+    return solution.valid ? -0.5 * (fit.cost + solution.least - here + solution.log_volume_ratio) +
+                                log_density_ratios(fit, solution.covariance) + grid.log_prior[k]
+                          : -std::numeric_limits<double>::infinity();
   });
+  out.log_here = logs[start];
   out.promised = logs;
   out.log_promised = logs.maxCoeff();
   logs = logs.cwiseMin(out.log_here);
@@ -127,12 +127,6 @@ Index next_spread(const VectorXd& promised, const std::set<Index>& tried, Index 
   for (Index k = 0; k < promised.size(); ++k)
     if (promised[k] > promised[best] && !tried.contains(k)) best = k;
   return best;
-}
-
-Index column_of(const NuisanceGrid& grid, const VectorXd& nuisance_sd) {
-  for (Index k = 0; k < grid.log_prior.size(); ++k)
-    if (grid.standard_deviations.col(k) == nuisance_sd) return k;
-  return 0;
 }
 
 // Fit, noise (with what the inputs leave open) and the nuisances' standard deviations in turn, until none changes.
@@ -182,7 +176,7 @@ Settled settle(const Likelihood& likelihood, const Discrepancy* discrepancy, con
     }
     spread_moved = false;
     if (!noise_moved) {
-      const Index here = column_of(grid, scales.nuisance_sd);
+      const Index here = column_of(likelihood.system(), scales.nuisance_sd);
       tried.insert(here);
       if (const Index next = next_spread(one.over.promised, tried, here); next != here) {
         scales.nuisance_sd = grid.standard_deviations.col(next);

@@ -32,23 +32,30 @@ NuisanceGrid nuisance_grid(const System& system) {
   return out;
 }
 
-Eigen::VectorXd over_likely(const System& system, const Eigen::VectorXd& start,
-                            const std::function<double(Index)>& log_at) {
+Index column_of(const System& system, const Eigen::VectorXd& nuisance_sd) {
   const auto& groups = system.nuisance_groups();
-  std::vector<Index> sizes;
-  Index count = 1, first = 0;
+  Index column = 0, stride = 1;
   for (std::size_t g = 0; g < groups.size(); ++g) {
     const auto& values = groups[g].standard_deviations;
-    const auto at = std::find(values.begin(), values.end(), start[static_cast<Index>(g)]);
-    if (at != values.end()) first += count * (at - values.begin());
-    sizes.push_back(static_cast<Index>(values.size()));
+    const auto at = std::find(values.begin(), values.end(), nuisance_sd[static_cast<Index>(g)]);
+    if (at != values.end()) column += stride * (at - values.begin());
+    stride *= static_cast<Index>(values.size());
+  }
+  return column;
+}
+
+Eigen::VectorXd over_likely(const System& system, Index start, const std::function<double(Index)>& log_at) {
+  std::vector<Index> sizes;
+  Index count = 1;
+  for (const auto& group : system.nuisance_groups()) {
+    sizes.push_back(static_cast<Index>(group.standard_deviations.size()));
     count *= sizes.back();
   }
   constexpr double kNever = -std::numeric_limits<double>::infinity();
   Eigen::VectorXd out = Eigen::VectorXd::Constant(count, kNever);
   std::vector<bool> asked(static_cast<std::size_t>(count));
-  std::vector<Index> next{first};
-  asked[static_cast<std::size_t>(first)] = true;
+  std::vector<Index> next{start};
+  asked[static_cast<std::size_t>(start)] = true;
   double most = kNever;
   while (!next.empty()) {
     for (const Index k : next) out[k] = log_at(k), most = std::max(most, out[k]);

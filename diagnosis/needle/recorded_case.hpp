@@ -14,7 +14,8 @@ namespace bevel::diagnosis {
 struct ScatterNearEntry {
   double excess = 0;
   double length_mm = 0;  // 0: as good everywhere
-  double sd_at_entry() const { return length_mm > 0 ? std::sqrt(1 + excess) : 1; }
+  double variance_at(double depth_mm) const { return length_mm > 0 ? 1 + excess * std::exp(-depth_mm / length_mm) : 1; }
+  double sd_at_entry() const { return std::sqrt(variance_at(0)); }
 };
 
 // One direction in which one camera (or sensor) sees the tip's position, or the heading's unit vector. The information

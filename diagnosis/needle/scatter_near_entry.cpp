@@ -70,8 +70,8 @@ Rows rows_of(const RecordedCase& recorded, std::size_t c) {
 
 // Minus twice the restricted log-likelihood, with the standard deviation deep down at its best.
 double deviance(const Rows& rows, const ScatterNearEntry& scatter) {
-  VectorXd weight = VectorXd::Ones(rows.reading.size());
-  if (scatter.length_mm > 0) weight = (1 + scatter.excess * (-rows.depth_mm.array() / scatter.length_mm).exp()).rsqrt();
+  const VectorXd weight =
+      rows.depth_mm.unaryExpr([&](double depth_mm) { return 1 / std::sqrt(scatter.variance_at(depth_mm)); });
   const Eigen::HouseholderQR<MatrixXd> qr(weight.asDiagonal() * rows.free);
   const VectorXd rotated = qr.householderQ().transpose() * weight.cwiseProduct(rows.reading).eval();
   const Index left = rotated.size() - rows.free.cols();
@@ -107,8 +107,7 @@ void widen_near_entry(RecordedCase& recorded) {
     for (Recording& recording : recorded.recordings) {
       Series& series = recording.series[c];
       for (std::size_t i = 0; i < series.relative_sd.size(); ++i)
-        series.relative_sd[i] *=
-            std::sqrt(1 + scatter[c].excess * std::exp(-depth_of(recording, series.message[i]) / scatter[c].length_mm));
+        series.relative_sd[i] *= std::sqrt(scatter[c].variance_at(depth_of(recording, series.message[i])));
     }
   }
 }

@@ -53,8 +53,9 @@ TEST(NuisanceGrid, WhatHasAShareIsFoundFromAnyStart) {
       return -0.5 * squares / (sd * sd);
     };
     for (const Index start : {Index{0}, Index{499}, Index{257}}) {
+      EXPECT_EQ(column_of(system, grid.standard_deviations.col(start)), start);
       asked = 0;
-      const VectorXd found = over_likely(system, grid.standard_deviations.col(start), [&](Index k) {
+      const VectorXd found = over_likely(system, column_of(system, grid.standard_deviations.col(start)), [&](Index k) {
         ++asked;
         return log_at(k);
       });

@@ -228,20 +228,20 @@ std::string near_entry(const Findings& f, std::size_t channel) {
 
 void add_noise_and_checks(report::Page& page, const Findings& f) {
   page.heading("Noise and checks");
+  const bool near = std::ranges::any_of(f.scatter, [](const auto& one) { return one.length_mm > 0; });
+  std::vector<std::string> head{"channel", "standard deviation (mm)"};
+  if (near) head = {"channel", "standard deviation (mm; rad)", "near the entry"};
   std::vector<std::vector<std::string>> rows;
-  for (std::size_t c = 0; c < f.channels.size() && c < f.noise.sigma.size(); ++c)
-    rows.push_back({f.channels[c], measured(f.noise.sigma[c]), near_entry(f, c)});
+  for (std::size_t c = 0; c < f.channels.size() && c < f.noise.sigma.size(); ++c) {
+    rows.push_back({f.channels[c], measured(f.noise.sigma[c])});
+    if (near) rows.back().push_back(near_entry(f, c));
+  }
   page.paragraph(
       "Noise of one reading, fitted beside what was found. Successive readings, " + number(1 / f.noise.frame_s, 3) +
       " a second, correlate by " + number(f.noise.ar1, 2) +
       (f.noise.ar2 != 0 ? " (and those two apart, given the one between, by " + number(f.noise.ar2, 2) + ")" : "") +
       "; " + percent(f.noise.outlier_share) + " of them are outliers.");
-  const bool near = std::ranges::any_of(f.scatter, [](const auto& one) { return one.length_mm > 0; });
-  if (!near)
-    for (auto& row : rows) row.pop_back();
-  page.table(near ? std::vector<std::string>{"channel", "standard deviation (mm; rad)", "near the entry"}
-                  : std::vector<std::string>{"channel", "standard deviation (mm)"},
-             rows);
+  page.table(head, rows);
   const auto& c = f.checks;
   page.table(
       {"check of the final model", "found", "passed if"},
