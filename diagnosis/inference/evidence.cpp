@@ -19,6 +19,8 @@ namespace {
 
 constexpr double kWorthARefit = 0.2;     // of log evidence
 constexpr double kWhileUnsettled = 0.5;  // of a fit's cost
+constexpr double kOnTheWay = 0;          // below the likeliest standard deviations: only where they are is asked
+constexpr double kWithAShare = 6;        // in the logarithm: what lies below it, and not beside, has none
 constexpr int kRefits = 12;              // with the standard deviations and the curve at their likeliest
 constexpr double kLikelyCurve = 3;       // log Bayes factor from which a curve is fitted
 constexpr double kNegligible = 20;       // of chi2: readings beyond it have no part in an integral
@@ -63,7 +65,7 @@ struct GridEvidence {
 // Over the grid of the nuisances' standard deviations, about one mode. The mode's own cost is that of the nonlinear
 // model; the linear one says how it changes over the grid, and what it promises elsewhere counts for no more than what
 // was found here (settle() goes and looks).
-GridEvidence over_nuisances(const Fit& fit, const CurveColumns& curve, const NuisanceGrid& grid) {
+GridEvidence over_nuisances(const Fit& fit, const CurveColumns& curve, const NuisanceGrid& grid, double far_below) {
   GridEvidence out;
   const Likelihood& likelihood = *fit.likelihood;
   auto blocks = linearise(likelihood, fit, curve);
@@ -75,7 +77,7 @@ GridEvidence over_nuisances(const Fit& fit, const CurveColumns& curve, const Nui
       not_normal.push_back(i);
   const double here = solve_about(fit, blocks, curve, not_normal).least;
   const Index start = column_of(likelihood.system(), fit.scales.nuisance_sd);
-  VectorXd logs = over_likely(likelihood.system(), start, [&](Index k) {
+  VectorXd logs = over_likely(likelihood.system(), start, far_below, [&](Index k) {
     const ArrowSolution solution = solve_at(grid.standard_deviations.col(k), fit, blocks, curve, not_normal);
     return solution.valid ? -0.5 * (fit.cost + solution.least - here + solution.log_volume_ratio) +
                                 log_density_ratios(fit, solution.covariance) + grid.log_prior[k]
@@ -151,7 +153,7 @@ Settled settle(const Likelihood& likelihood, const Discrepancy* discrepancy, con
       if (pass < 2) scan_shapes(*now, curve, one.fit);
     }
     one.fit.likelihood = now;
-    one.over = over_nuisances(one.fit, curve, grid);
+    one.over = over_nuisances(one.fit, curve, grid, kOnTheWay);
     const bool better = one.over.log_here > best.over.log_here + kWorthARefit;
     // The linear model promised what is not there: back to the likeliest, and to what that promises next.
     const bool lost = spread_moved && one.over.log_here < best.over.log_here;
@@ -190,6 +192,9 @@ Settled settle(const Likelihood& likelihood, const Discrepancy* discrepancy, con
     shared = one.fit.shared;
     local = one.fit.local;
   }
+  if (!best.fit.valid) return best;
+  if (discrepancy) curve = discrepancy->columns(*best.fit.likelihood, best.fit.scales.curves);
+  best.over = over_nuisances(best.fit, curve, grid, kWithAShare);
   return best;
 }
 

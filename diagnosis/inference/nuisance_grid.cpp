@@ -8,10 +8,6 @@ namespace bevel::inference {
 
 using Eigen::Index;
 
-namespace {
-constexpr double kFarBelow = 12;  // the likeliest, in the logarithm
-}
-
 NuisanceGrid nuisance_grid(const System& system) {
   const auto& groups = system.nuisance_groups();
   Index count = 1;
@@ -44,7 +40,8 @@ Index column_of(const System& system, const Eigen::VectorXd& nuisance_sd) {
   return column;
 }
 
-Eigen::VectorXd over_likely(const System& system, Index start, const std::function<double(Index)>& log_at) {
+Eigen::VectorXd over_likely(const System& system, Index start, double far_below,
+                            const std::function<double(Index)>& log_at) {
   std::vector<Index> sizes;
   Index count = 1;
   for (const auto& group : system.nuisance_groups()) {
@@ -62,7 +59,7 @@ Eigen::VectorXd over_likely(const System& system, Index start, const std::functi
     // What came too low before may not be so far below one that is known only now.
     next.clear();
     for (Index k = 0; k < count; ++k) {
-      if (!asked[static_cast<std::size_t>(k)] || !(out[k] > most - kFarBelow)) continue;
+      if (!asked[static_cast<std::size_t>(k)] || !(out[k] >= most - far_below)) continue;
       Index stride = 1;
       for (const Index size : sizes) {
         const Index which = k / stride % size;
