@@ -37,6 +37,29 @@ const EntryVariation& entry_variation() {
   return effect;
 }
 
+// Bends it more and more the deeper it is, toward +x and +y of {A}: what an insertion by hand has of its own.
+class BendGradient final : public model::Effect {
+ public:
+  BendGradient()
+      : Effect({.name = "bend_gradient",
+                .meaning = "insertions bend away from each other",
+                .covariate = model::Covariate::depth_mm,
+                .parameters = {{.name = "x_per_mm_per_100mm", .lower = -1, .upper = 1, .none = 0, .starts = {0}},
+                               {.name = "y_per_mm_per_100mm", .lower = -1, .upper = 1, .none = 0, .starts = {0}}}}) {}
+  void curvature(model::Parameters p, const model::LegView& leg, model::EffectMemory& /*memory*/,
+                 model::Dual2& kappa_per_mm) const override {
+    constexpr double kPer_mm = 100;
+    const double middle_mm = 0.5 * (leg.from.insertion_mm + leg.to.insertion_mm) - leg.entry.insertion_mm;
+    const double share = middle_mm / kPer_mm;
+    const model::Dual2 pull = leg.lateral_in_body({p[1] * -share, p[0] * share});
+    for (std::size_t i = 0; i < 2; ++i) kappa_per_mm[i] += pull[i];
+  }
+};
+const BendGradient& bend_gradient() {
+  static const BendGradient effect;
+  return effect;
+}
+
 }  // namespace
 
 bool NeedleSystem::acts_in(int recording) const {
@@ -95,12 +118,17 @@ model::NeedleParameters NeedleSystem::needle_in(const ModelSet& set, int recordi
 bool NeedleSystem::follow(const ModelSet& set, const model::Motion& motion, int recording, const VectorXd& shared,
                           const VectorXd& local, std::span<const DiscrepancyValues> discrepancy, Columns* columns,
                           model::OpenLoop& path) const {
-  // Columns: the needle's three, tilt and roll, then the effects' in the order of the set.
+  // Columns: the needle's three, tilt and roll, by hand the bend, then the effects' in the order of the set.
   int column = kBaseParameters;
   const auto unknown = [&](double value) { return model::Dual::unknown(value, columns ? column++ : -1); };
   std::vector<model::ActiveEffect> effects(1);
   effects[0].effect = &entry_variation();
   for (std::size_t i = 0; i < 3; ++i) effects[0].parameters[i] = unknown(local[kTiltX + static_cast<Index>(i)]);
+  if (by_hand()) {
+    model::ActiveEffect& bend = effects.emplace_back();
+    bend.effect = &bend_gradient();
+    for (std::size_t i = 0; i < 2; ++i) bend.parameters[i] = unknown(local[kBendX + static_cast<Index>(i)]);
+  }
   if (columns) *columns = {};
   Index next_shared = base_size(), next_local = own_size();
   const bool acts = acts_in(recording);
@@ -186,6 +214,7 @@ bool NeedleSystem::predict(const ModelSet& set, std::size_t r, const VectorXd& s
   out.by_local = MatrixXd::Zero(all.rows(), own_size() + static_cast<Index>(columns.local.size()));
   out.by_local.col(kOwnCurvature) = k / own * all.col(kCurvature);
   out.by_local.middleCols(kTiltX, 3) = all.middleCols(kBaseParameters, 3);
+  if (by_hand()) out.by_local.middleCols(kBendX, 2) = all.middleCols(kBaseParameters + 3, 2);
   out.by_local.middleCols(kEntryX, registrations()) = entry;
   for (std::size_t i = 0; i < columns.local.size(); ++i)
     if (columns.local[i] != Columns::kNone)

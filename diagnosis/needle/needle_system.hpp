@@ -18,8 +18,21 @@ namespace bevel::diagnosis {
 // bound.
 enum BaseParameter : int { kCurvature, kU, kLambda2, kBaseParameters };
 // What insertions have of their own: curvature as a share of the needle's, the heading's rotation vector at the entry
-// (rad), the bevel's roll there (rad), registration across the axis (mm); where depths were read by hand, along it too.
-enum Variation : int { kOwnCurvature, kTiltX, kTiltY, kRoll, kEntryX, kEntryY, kVariations, kEntryZ = kVariations };
+// (rad), the bevel's roll there (rad), registration across the axis (mm); guided by hand also registration along it, and
+// a curvature toward +x and +y of {A} that grows with depth from none at the entry (/mm per 100 mm).
+enum Variation : int {
+  kOwnCurvature,
+  kTiltX,
+  kTiltY,
+  kRoll,
+  kEntryX,
+  kEntryY,
+  kVariations,
+  kEntryZ = kVariations,
+  kBendX,
+  kBendY,
+  kVariationsByHand
+};
 
 // Physics that the model in use has already: held as it is in every prediction.
 struct KnownPhysics {
@@ -92,8 +105,9 @@ class NeedleSystem final : public inference::System {
   // The needle of a recording: its own curvature, and what changed.
   model::NeedleParameters needle_in(const inference::ModelSet& set, int recording, const Eigen::VectorXd& shared,
                                     const Eigen::VectorXd& local) const;
+  bool by_hand() const { return !recorded_.has_clock; }
   // kEntryX and kEntryY, and kEntryZ where it is unknown.
-  Eigen::Index registrations() const { return own_size() - kEntryX; }
+  Eigen::Index registrations() const { return (by_hand() ? kEntryZ : kEntryY) + 1 - kEntryX; }
   Eigen::Index own_size() const { return static_cast<Eigen::Index>(nuisances_.size()); }
   Eigen::Index base_size() const { return static_cast<Eigen::Index>(base_.size()); }
 

@@ -54,13 +54,17 @@ const std::array<const model::Effect*, kBaseParameters>& needle_changes() {
 
 // What the field reports of repeated insertions: curvature 10 to 40 % in tissue, a few in gelatin; entry angles of
 // 0.2 to 0.7 degrees; registration of some tenths of a millimetre; a bevel set by hand to a few degrees. Where depths
-// are read by hand, so is where they begin: off by up to a millimetre, each time.
+// are read by hand, so is where they begin: off by up to a millimetre, each time. And a hand that guides a needle leads
+// it away from its path as it goes, by some tenths of a millimetre in 100 mm (a gradient of 1e-4: 0.17 mm).
 std::vector<inference::NuisanceGroup> variation_groups(bool by_hand) {
   std::vector<inference::NuisanceGroup> out{{"curvature", "relative", {0, 0.02, 0.05, 0.12, 0.3}},
                                             {"entry_angle", "rad", {0, 0.003, 0.007, 0.015, 0.03}},
                                             {"entry_point", "mm", {0, 0.05, 0.12, 0.3, 0.8}},
                                             {"roll", "rad", {0, 0.015, 0.04, 0.1}}};
-  if (by_hand) out.push_back({"entry_depth", "mm", {0, 0.1, 0.3, 1}});
+  if (by_hand) {
+    out.push_back({"entry_depth", "mm", {0, 0.1, 0.3, 1}});
+    out.push_back({"bend_gradient", "per_mm_per_100mm", {0, 1e-5, 3e-5, 1e-4, 3e-4}});
+  }
   return out;
 }
 
@@ -147,7 +151,7 @@ NeedleSystem::NeedleSystem(RecordedCase recorded, const model::NeedleParameters&
       model_(model),
       known_(std::move(known)),
       data_(data_of(recorded_)),
-      groups_(variation_groups(!recorded_.has_clock)),
+      groups_(variation_groups(by_hand())),
       two_groups_(recorded_.two_groups()),
       headings_(recorded_.has_headings()) {
   if (known_.elsewhere.size() > kMostKnown)
@@ -176,7 +180,10 @@ NeedleSystem::NeedleSystem(RecordedCase recorded, const model::NeedleParameters&
             .prior = inference::normal_prior(model.lambda2, kLambda2Width)}};
   nuisances_ = {{"curvature_relative", 0}, {"tilt_x_rad", 1}, {"tilt_y_rad", 1},
                 {"roll_rad", 3},           {"entry_x_mm", 2}, {"entry_y_mm", 2}};
-  if (!recorded_.has_clock) nuisances_.push_back({"entry_z_mm", 4});
+  if (by_hand())
+    nuisances_.insert(nuisances_.end(), {{"entry_z_mm", 4},
+                                         {"bend_gradient_x_per_mm_per_100mm", 5},
+                                         {"bend_gradient_y_per_mm_per_100mm", 5}});
   add_effects_of_library();
   if (two_groups_) add_common_errors();
   std::vector<const model::Motion*> motions;
@@ -254,7 +261,7 @@ int NeedleSystem::changed_parameter(std::size_t effect) const {
 }
 
 bool NeedleSystem::allows(const ModelSet& set) const {
-  std::size_t columns = kBaseParameters + 3;  // and tilt and roll of each insertion
+  std::size_t columns = kBaseParameters + (by_hand() ? 5 : 3);  // and tilt, roll and bend of each insertion
   for (std::size_t i = 0; i < set.size(); ++i) {
     columns += effects_[set[i]].parameters.size();
     for (std::size_t j = 0; j < i; ++j)

@@ -48,7 +48,9 @@ Setting setting_of(const NeedleSystem& system, const std::vector<std::string>& l
   }
   out.local = layout.local_start();
   out.local.head<kVariations>() << 0.04, 0.01, -0.008, 0.05, 0.2, -0.1;
-  for (Index i = kVariations; i < out.local.size(); ++i) out.local[i] = 2.03;
+  const auto nuisances = static_cast<Index>(system.nuisances().size());
+  if (nuisances == kVariationsByHand) out.local.segment<3>(kEntryZ) << 0.3, 1e-4, -2e-4;
+  for (Index i = nuisances; i < out.local.size(); ++i) out.local[i] = 2.03;
   return out;
 }
 
@@ -221,6 +223,31 @@ TEST(NeedleSystem, RegistrationAlongTheAxisWhereDepthsWereReadByHand) {
       EXPECT_NEAR(shifted.reading[row] - plain.reading[row], 0.4 * system.recorded().channels[c].axis.z(), 1e-12);
   for (std::size_t i = 0; i < path.position_mm.size(); ++i)
     EXPECT_LT((shifted_path.position_mm[i] - path.position_mm[i] - Eigen::Vector3d(0, 0, 0.4)).norm(), 1e-12);
+}
+
+// A bicycle that does not bend by itself: headings lean by g s^2 / 2, the tip is off by g s^3 / 6, whatever its roll.
+TEST(NeedleSystem, BendsMoreTheDeeperItIsWhereItWasGuidedByHand) {
+  const SimulatedRig rig{.heading_sd_rad = 0.004};
+  const NeedleSystem system(without_clock(rig, 2), rig.needle);
+  ASSERT_EQ(system.nuisances().size(), kVariationsByHand);
+  const inference::Layout layout(system, {});
+  VectorXd shared = layout.shared_start(), local = layout.local_start();
+  shared[kCurvature] = 0, shared[kU] = 0, shared[kLambda2] = 0;
+  local[kRoll] = 1.1;
+  model::Motion motion{.nodes = {}, .at = {}};
+  for (int i = 0; i <= 200; ++i) {
+    motion.nodes.push_back({.time_s = 0.1 * i, .insertion_mm = 0.5 * i, .rotation_rad = 0});
+    motion.at.push_back(static_cast<std::size_t>(i));
+  }
+  model::OpenLoop path;
+  local[kBendX] = 2e-4, local[kBendY] = -1e-4;
+  ASSERT_TRUE(system.tip_path({}, motion, -1, shared, local, {}, path));
+  for (const std::size_t i : {50U, 120U, 200U}) {
+    const double s_mm = motion.nodes[i].insertion_mm;
+    const Eigen::Vector2d gradient_per_mm2(2e-6, -1e-6);
+    EXPECT_LT((path.position_mm[i].head(2) - std::pow(s_mm, 3) / 6 * gradient_per_mm2).norm(), 1e-4) << s_mm;
+    EXPECT_LT((path.heading[i].head(2) - s_mm * s_mm / 2 * gradient_per_mm2).norm(), 1e-5) << s_mm;
+  }
 }
 
 TEST(NeedleSystem, KindsOfOneEffectAreNeverTogether) {
