@@ -6,6 +6,7 @@
 #include <limits>
 #include <set>
 
+#include "diagnosis/inference/error_spread.hpp"
 #include "diagnosis/inference/local_minima.hpp"
 #include "diagnosis/inference/log_sum.hpp"
 
@@ -96,18 +97,6 @@ GridEvidence over_nuisances(const Fit& fit, const CurveColumns& curve, const Nui
   return out;
 }
 
-// The likeliest noise for what a fit leaves.
-Noise noise_about(const Fit& fit, const CurveColumns& curve) {
-  const Likelihood& likelihood = *fit.likelihood;
-  Errors errors;
-  for (std::size_t r = 0; r < likelihood.recordings(); ++r) {
-    VectorXd all = likelihood.errors(fit.layout, r, fit.shared, fit.local[r]);
-    if (curve) all -= curve.raw[r] * fit.curve_values;
-    errors.push_back(by_channel(likelihood.data().recordings[r], all));
-  }
-  return refine_noise(likelihood.data(), errors, likelihood.noise());
-}
-
 bool alike(const std::vector<VectorXd>& a, const std::vector<VectorXd>& b, const Likelihood& likelihood) {
   constexpr double kShare = 0.2;  // of the noise
   if (a.size() != b.size()) return false;
@@ -168,7 +157,7 @@ Settled settle(const Likelihood& likelihood, const Discrepancy* discrepancy, con
     } else {
       if (!better && !noise_moved && settled) break;
       // The noise first, then what differs between recordings: by a wrong noise they do not differ.
-      const Noise noise = noise_about(one.fit, curve);
+      const Noise noise = noise_beside(one.fit, curve);
       auto open = inputs_about(one.fit);
       noise_moved = !alike(noise, now->noise()) || !alike(open, inputs, *now);
       if (noise_moved) {

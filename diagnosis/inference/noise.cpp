@@ -30,30 +30,26 @@ struct Whitened {
   double log_terms = 0;  // log|V| + log|X^T V^-1 X|, for sigma = 1
 };
 
-Whitened project(const Series& series, const Eigen::VectorXd& error, const Eigen::MatrixXd* basis, const Noise& noise) {
+Whitened project(const Series& series, const Eigen::VectorXd& error, const Eigen::MatrixXd& basis, const Noise& noise) {
   const Whitening whitening = make_whitening(series, noise, 1.0);
   Eigen::VectorXd e = error;
   whiten(whitening, e);
   Whitened out;
   out.dof = static_cast<double>(e.size());
   for (double weight : whitening.weight) out.log_terms -= 2 * std::log(weight);
-  if (basis) {
-    Eigen::MatrixXd X = *basis;
-    whiten(whitening, X);
-    const Eigen::HouseholderQR<Eigen::MatrixXd> qr(X);
-    const Eigen::VectorXd rotated = qr.householderQ().transpose() * e;
-    out.rss = rotated.tail(rotated.size() - X.cols()).squaredNorm();
-    out.dof -= static_cast<double>(X.cols());
-    for (Eigen::Index i = 0; i < X.cols(); ++i)
-      out.log_terms += 2 * std::log(std::max(std::abs(qr.matrixQR()(i, i)), 1e-12));
-  } else {
-    out.rss = e.squaredNorm();
-  }
+  Eigen::MatrixXd X = basis;
+  whiten(whitening, X);
+  const Eigen::HouseholderQR<Eigen::MatrixXd> qr(X);
+  const Eigen::VectorXd rotated = qr.householderQ().transpose() * e;
+  out.rss = rotated.tail(rotated.size() - X.cols()).squaredNorm();
+  out.dof -= static_cast<double>(X.cols());
+  for (Eigen::Index i = 0; i < X.cols(); ++i)
+    out.log_terms += 2 * std::log(std::max(std::abs(qr.matrixQR()(i, i)), 1e-12));
   return out;
 }
 
 // Minus twice the restricted log-likelihood at this ar1, with each channel's sigma at its best.
-double deviance(const Dataset& data, const Errors& errors, const std::vector<std::vector<Eigen::MatrixXd>>* bases,
+double deviance(const Dataset& data, const Errors& errors, const std::vector<std::vector<Eigen::MatrixXd>>& bases,
                 Noise& noise) {
   double sum = 0;
   noise.sigma.assign(data.claimed_sd.size(), 0);
@@ -62,7 +58,7 @@ double deviance(const Dataset& data, const Errors& errors, const std::vector<std
     for (std::size_t r = 0; r < data.recordings.size(); ++r) {
       const Series& series = data.recordings[r].series[c];
       if (series.time_s.empty()) continue;
-      const Whitened one = project(series, errors[r][c], bases ? &(*bases)[r][c] : nullptr, noise);
+      const Whitened one = project(series, errors[r][c], bases[r][c], noise);
       total.rss += one.rss;
       total.dof += one.dof;
       total.log_terms += one.log_terms;
@@ -263,7 +259,7 @@ Noise estimate_noise(const Dataset& data, const Errors& errors, bool second_orde
   const auto at = [&](double ar1, double ar2) {
     noise.ar1 = ar1;
     noise.ar2 = ar2;
-    return deviance(data, errors, &bases, noise);
+    return deviance(data, errors, bases, noise);
   };
   // The deviance in ar1 has one minimum: a coarse scan, then golden-section steps.
   const auto best_ar1 = [&](double ar2) {
@@ -354,11 +350,50 @@ Calibration calibrate_noise(const Dataset& data, const Errors& errors) {
   return out;
 }
 
-Noise refine_noise(const Dataset& data, const Errors& errors, const Noise& start) {
+ExpectedErrors::ExpectedErrors(Eigen::MatrixXd columns) : columns_(std::move(columns)) {
+  const Eigen::Index n = columns_.rows();
+  square_ = columns_.rowwise().squaredNorm();
+  with_last_ = with_one_before_ = Eigen::VectorXd::Zero(n);
+  for (Eigen::Index i = 1; i < n; ++i) with_last_[i] = columns_.row(i).dot(columns_.row(i - 1));
+  for (Eigen::Index i = 2; i < n; ++i) with_one_before_[i] = columns_.row(i).dot(columns_.row(i - 2));
+}
+
+double ExpectedErrors::whitened_squares(const Whitening& whitening) const {
+  if (!whitening.gain.empty()) {  // what is carried on is no reading
+    Eigen::MatrixXd white = columns_;
+    whiten(whitening, white);
+    return white.squaredNorm();
+  }
+  double sum = 0;
+  for (Eigen::Index i = 0; i < square_.size(); ++i) {
+    const auto at = static_cast<std::size_t>(i);
+    const double a = whitening.carry[at], b = whitening.carry2[at];
+    double square = square_[i];
+    if (i > 0) square += a * (a * square_[i - 1] - 2 * with_last_[i]);
+    if (i > 1) square += b * (b * square_[i - 2] - 2 * with_one_before_[i] + 2 * a * with_last_[i - 1]);
+    sum += square * whitening.weight[at] * whitening.weight[at];
+  }
+  return sum;
+}
+
+Noise refine_noise(const Dataset& data, const std::vector<std::vector<ExpectedErrors>>& errors, const Noise& start) {
   Noise noise = start;
   const auto at = [&](double ar1) {
     noise.ar1 = ar1;
-    return deviance(data, errors, nullptr, noise);
+    double deviance = 0;
+    for (std::size_t c = 0; c < data.claimed_sd.size(); ++c) {
+      double squares = 0, count = 0;
+      for (std::size_t r = 0; r < data.recordings.size(); ++r) {
+        const Whitening whitening = make_whitening(data.recordings[r].series[c], noise, 1.0);
+        squares += errors[r][c].whitened_squares(whitening);
+        count += static_cast<double>(whitening.weight.size());
+        for (const double weight : whitening.weight) deviance -= 2 * std::log(weight);
+      }
+      const double variance = std::max(squares / std::max(count, 1.0), 1e-18);
+      noise.sigma[c] = std::sqrt(variance);
+      deviance += count * std::log(variance);
+    }
+    return deviance;
   };
   constexpr double kWidth = 0.002;
   const double found = minimum_of(0, kLargestAr1, kWidth, at);

@@ -1,7 +1,7 @@
 #pragma once
 // The sensors' noise: autocorrelated, of first order or second, one standard deviation per channel, and a share of
 // outliers. It begins as what a flexible curve leaves of the residuals, so that missing physics does not pass for
-// noise; the evidence of each set then fits it anew (refine_noise). Source: restricted maximum likelihood, Harville
+// noise; the evidence of each set then fits it anew (refine_noise, error_spread.hpp). Source: restricted maximum likelihood, Harville
 // 1977, JASA 72; AR(1) over gaps as an Ornstein-Uhlenbeck process, AR(2) by its partial correlations (Barndorff-Nielsen
 // and Schou 1973, J. Multivar. Anal. 3).
 #include <span>
@@ -76,8 +76,22 @@ Calibration calibrate_noise(const Dataset& data, const Errors& errors);
 // Deviation and autocorrelation alone, beside the curve. With second_order, ar2 too, where the readings ask for it.
 Noise estimate_noise(const Dataset& data, const Errors& errors, bool second_order = true);
 
-// The likeliest noise of errors that are taken as they are, of the order that it begins with.
-Noise refine_noise(const Dataset& data, const Errors& errors, const Noise& start);
+// Errors of a series that are not known for sure, by the expectations of their squares and of the products of neighbours:
+// what an expectation of whitened squares needs.
+class ExpectedErrors {
+ public:
+  ExpectedErrors() = default;
+  // The expected product of two rows is the sum over the columns of theirs: the likeliest errors, and what each
+  // direction in which they are uncertain does to them in one standard deviation.
+  explicit ExpectedErrors(Eigen::MatrixXd columns);
+  double whitened_squares(const Whitening& whitening) const;
+
+ private:
+  Eigen::MatrixXd columns_;
+  Eigen::VectorXd square_, with_last_, with_one_before_;
+};
+// The likeliest noise of such errors, per recording and channel, of the order that it begins with.
+Noise refine_noise(const Dataset& data, const std::vector<std::vector<ExpectedErrors>>& errors, const Noise& start);
 // So near that nothing depends on the difference.
 bool alike(const Noise& a, const Noise& b);
 

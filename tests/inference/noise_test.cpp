@@ -155,11 +155,14 @@ TEST(Noise, AboutAModelIsTheLikeliest) {
   start.frame_s = made.data.frame_s;
   start.ar1 = 0.95;
   start.sigma = {1, 1};
-  const Noise found = refine_noise(made.data, made.errors, start);
+  std::vector<std::vector<ExpectedErrors>> errors(made.errors.size());
+  for (std::size_t r = 0; r < errors.size(); ++r)
+    for (const auto& one : made.errors[r]) errors[r].emplace_back(one);
+  const Noise found = refine_noise(made.data, errors, start);
   EXPECT_NEAR(found.ar1, 0.6, 0.03);
   EXPECT_NEAR(found.sigma[0], 0.1, 0.006);
   EXPECT_NEAR(found.sigma[1], 0.25, 0.015);
-  EXPECT_TRUE(alike(found, refine_noise(made.data, made.errors, found)));
+  EXPECT_TRUE(alike(found, refine_noise(made.data, errors, found)));
 }
 
 }  // namespace
