@@ -1,8 +1,9 @@
 #pragma once
-// What the errors of a model may be, given its readings: those at the mode, and what the spread of the unknowns about it
-// does to them. A fit bends toward the readings, so its residuals are smaller than the errors are: the noise for which
-// the readings are likeliest, all else integrated out, is that of the expected squares (expectation and maximisation,
-// Dempster, Laird and Rubin 1977, J. R. Stat. Soc. B 39; for variance components Laird and Ware 1982, Biometrics 38).
+// What the errors of a model may be, given its readings: those at the mode, and what the spread of the unknowns about
+// it does to them. A fit bends toward the readings, so its residuals are smaller than the errors are: the noise for
+// which the readings are likeliest, all else integrated out, is that of the expected squares (expectation and
+// maximisation, Dempster, Laird and Rubin 1977, J. R. Stat. Soc. B 39; for variance components Laird and Ware 1982,
+// Biometrics 38).
 #include "diagnosis/inference/likelihood.hpp"
 
 namespace bevel::inference {

@@ -1,9 +1,9 @@
 #pragma once
 // The sensors' noise: autocorrelated, of first order or second, one standard deviation per channel, and a share of
 // outliers. It begins as what a flexible curve leaves of the residuals, so that missing physics does not pass for
-// noise; the evidence of each set then fits it anew (refine_noise, error_spread.hpp). Source: restricted maximum likelihood, Harville
-// 1977, JASA 72; AR(1) over gaps as an Ornstein-Uhlenbeck process, AR(2) by its partial correlations (Barndorff-Nielsen
-// and Schou 1973, J. Multivar. Anal. 3).
+// noise; the evidence of each set then fits it anew (refine_noise, error_spread.hpp). Source: restricted maximum
+// likelihood, Harville 1977, JASA 72; AR(1) over gaps as an Ornstein-Uhlenbeck process, AR(2) by its partial
+// correlations (Barndorff-Nielsen and Schou 1973, J. Multivar. Anal. 3).
 #include <span>
 #include <vector>
 
@@ -76,8 +76,8 @@ Calibration calibrate_noise(const Dataset& data, const Errors& errors);
 // Deviation and autocorrelation alone, beside the curve. With second_order, ar2 too, where the readings ask for it.
 Noise estimate_noise(const Dataset& data, const Errors& errors, bool second_order = true);
 
-// Errors of a series that are not known for sure, by the expectations of their squares and of the products of neighbours:
-// what an expectation of whitened squares needs.
+// Errors of a series that are not known for sure, by the expectations of their squares and of the products of
+// neighbours: what an expectation of whitened squares needs.
 class ExpectedErrors {
  public:
   ExpectedErrors() = default;

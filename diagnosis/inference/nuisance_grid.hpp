@@ -15,10 +15,10 @@ NuisanceGrid nuisance_grid(const System& system);
 // Which of its columns this is; each is one of its group's standard deviations.
 Eigen::Index column_of(const System& system, const Eigen::VectorXd& nuisance_sd);
 
-// A logarithm for each combination of nuisance_grid(), by `log_at` of its column; -infinity for those that were not asked
-// for: only neighbours (one group's next standard deviation, either way) of what comes within exp(-far_below) of the
-// likeliest are, beginning with `start`, a column too. Of a density with one peak nothing is missed that counts; with 0
-// the way to the likeliest, and what lies beside it.
+// A logarithm for each combination of nuisance_grid(), by `log_at` of its column; -infinity for those that were not
+// asked for: only neighbours (one group's next standard deviation, either way) of what comes within exp(-far_below) of
+// the likeliest are, beginning with `start`, a column too. Of a density with one peak nothing is missed that counts;
+// with 0 the way to the likeliest, and what lies beside it.
 Eigen::VectorXd over_likely(const System& system, Eigen::Index start, double far_below,
                             const std::function<double(Eigen::Index)>& log_at);
 

@@ -18,8 +18,8 @@ namespace bevel::diagnosis {
 // bound.
 enum BaseParameter : int { kCurvature, kU, kLambda2, kBaseParameters };
 // What insertions have of their own: curvature as a share of the needle's, the heading's rotation vector at the entry
-// (rad), the bevel's roll there (rad), registration across the axis (mm); guided by hand also registration along it, and
-// a curvature toward +x and +y of {A} that grows with depth from none at the entry (/mm per 100 mm).
+// (rad), the bevel's roll there (rad), registration across the axis (mm); guided by hand also registration along it,
+// and a curvature toward +x and +y of {A} that grows with depth from none at the entry (/mm per 100 mm).
 enum Variation : int {
   kOwnCurvature,
   kTiltX,

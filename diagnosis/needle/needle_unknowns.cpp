@@ -181,9 +181,9 @@ NeedleSystem::NeedleSystem(RecordedCase recorded, const model::NeedleParameters&
   nuisances_ = {{"curvature_relative", 0}, {"tilt_x_rad", 1}, {"tilt_y_rad", 1},
                 {"roll_rad", 3},           {"entry_x_mm", 2}, {"entry_y_mm", 2}};
   if (by_hand())
-    nuisances_.insert(nuisances_.end(), {{"entry_z_mm", 4},
-                                         {"bend_gradient_x_per_mm_per_100mm", 5},
-                                         {"bend_gradient_y_per_mm_per_100mm", 5}});
+    nuisances_.insert(
+        nuisances_.end(),
+        {{"entry_z_mm", 4}, {"bend_gradient_x_per_mm_per_100mm", 5}, {"bend_gradient_y_per_mm_per_100mm", 5}});
   add_effects_of_library();
   if (two_groups_) add_common_errors();
   std::vector<const model::Motion*> motions;

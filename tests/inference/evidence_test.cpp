@@ -3,6 +3,7 @@
 
 #include <Eigen/QR>
 
+#include "diagnosis/inference/error_spread.hpp"
 #include "diagnosis/inference/evidence.hpp"
 #include "diagnosis/inference/local_minima.hpp"
 #include "diagnosis/inference/log_sum.hpp"
@@ -321,6 +322,43 @@ TEST(TwoCurves, TheVisibleSizeIsThatOfTheirSum) {
   EXPECT_GT(std::abs(expected - std::hypot(made.discrepancy.visible_size(1, values.head(6)),
                                            made.discrepancy.visible_size(0, values.tail(6)))),
             0.01 * expected);  // they are not at right angles
+}
+
+// Each round of fit and noise is likelier than the last, until none is; and it is more than what the fit leaves.
+TEST(NoiseBeside, IsTheLikeliestWithAllElseIntegratedOut) {
+  for (const std::uint64_t seed : {2U, 3U, 4U}) {
+    const LinearSystem system(2, seed, 0.3, 0.2, 0);
+    const ModelSet set{0, 1};
+    const Layout layout(system, set);
+    const std::vector<VectorXd> local(2, layout.local_start());
+    const VectorXd y = all_readings(system);
+    const auto log_density = [&](const Noise& noise) { return log_normal(y, covariance_of(system, set, noise, 0.2)); };
+    Noise noise = white(system);
+    noise.sigma[0] = 0.04, noise.ar1 = 0.6;
+    double before = log_density(noise), squares = 0;
+    for (int round = 0; round < 60; ++round) {
+      const auto likelihood = std::make_shared<const Likelihood>(system, Readings(2), noise);
+      Fit at = fit(*likelihood, layout, layout.shared_start(), local,
+                   {.nuisance_sd = VectorXd::Constant(1, 0.2), .curves = {}}, {});
+      at.likelihood = likelihood;
+      squares = 0;
+      for (std::size_t r = 0; r < 2; ++r)
+        squares += likelihood->errors(layout, r, at.shared, at.local[r]).squaredNorm();
+      noise = noise_beside(at, {});
+      const double now = log_density(noise);
+      EXPECT_GT(now, before - 2e-3) << "seed " << seed << ", round " << round;  // the search for ar1 ends at 0.002
+      before = now;
+    }
+    for (const double factor : {0.97, 1.03}) {
+      Noise other = noise;
+      other.sigma[0] *= factor;
+      EXPECT_LT(log_density(other), before) << "seed " << seed;
+      other = noise;
+      other.ar1 = std::max(0.0, noise.ar1 + factor - 1);
+      EXPECT_LT(log_density(other), before + 1e-3) << "seed " << seed;
+    }
+    EXPECT_GT(noise.sigma[0], std::sqrt(squares / static_cast<double>(y.size()))) << "seed " << seed;
+  }
 }
 
 TEST(HeldOut, OfALinearModelIsTheConditionalDensity) {

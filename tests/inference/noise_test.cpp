@@ -143,6 +143,32 @@ TEST(Noise, WithoutItsOutliersTheRestIsLeft) {
   }
 }
 
+// Of second order, over gaps, and with errors of their own in some readings.
+TEST(ExpectedErrors, AreWhitenedAsTheirColumnsAre) {
+  std::mt19937_64 random(11);
+  std::normal_distribution<double> normal;
+  Series series;
+  double time_s = 0;
+  for (int i = 0; i < 40; ++i) {
+    time_s += i % 7 == 3 ? 0.5 : 0.1;
+    series.time_s.push_back(time_s);
+    series.relative_sd.push_back(1 + 0.2 * (i % 3));
+  }
+  const Eigen::MatrixXd columns = Eigen::MatrixXd::NullaryExpr(40, 5, [&] { return normal(random); });
+  const ExpectedErrors errors(columns);
+  const auto check = [&](double ar1, double ar2) {
+    Noise noise;
+    noise.frame_s = 0.1, noise.ar1 = ar1, noise.ar2 = ar2;
+    const Whitening whitening = make_whitening(series, noise, 0.3);
+    Eigen::MatrixXd white = columns;
+    whiten(whitening, white);
+    EXPECT_NEAR(errors.whitened_squares(whitening), white.squaredNorm(), 1e-9 * white.squaredNorm());
+  };
+  check(0, 0), check(0.7, 0), check(0.7, 0.2), check(0.5, -0.4);
+  for (int i = 0; i < 40; ++i) series.input_sd.push_back(i % 5 == 0 ? 0.8 : 0);
+  check(0.7, 0);
+}
+
 TEST(Noise, AboutAModelIsTheLikeliest) {
   Made made = make(0.6, 0, 0.05, 3);
   for (std::size_t r = 0; r < made.errors.size(); ++r)
