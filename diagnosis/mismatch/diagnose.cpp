@@ -176,6 +176,7 @@ Findings diagnose(const RecordedCase& recorded, const model::NeedleParameters& m
   Findings findings;
   findings.model_file = model;
   findings.two_groups = recorded.two_groups();
+  findings.stop_s = recorded.has_clock ? 0 : recorded.frame_s;
   for (const auto& channel : recorded.channels) {
     findings.channels.push_back(channel.name);
     findings.units.emplace_back(channel.unit());

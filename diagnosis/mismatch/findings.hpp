@@ -226,7 +226,8 @@ struct StageTime {
 struct Findings {
   Verdict verdict = Verdict::nothing_missing;
   bool two_groups = false;  // what is said is of what the second has and the first has not
-  std::string sentence;     // what was found, in one
+  double stop_s = 0;     // logs without a clock: by how much "times" of neighbouring stops are apart; 0: they have one
+  std::string sentence;  // what was found, in one
   std::vector<FoundEffect> effects;
   std::vector<Explanation> explanations;  // the likeliest first
   double nothing_probability = 0;         // of no effect, and no discrepancy of any consequence

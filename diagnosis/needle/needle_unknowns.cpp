@@ -63,7 +63,7 @@ std::vector<inference::NuisanceGroup> variation_groups(bool by_hand) {
                                             {"roll", "rad", {0, 0.015, 0.04, 0.1}}};
   if (by_hand) {
     out.push_back({"entry_depth", "mm", {0, 0.1, 0.3, 1}});
-    out.push_back({"bend_gradient", "per_mm_per_100mm", {0, 1e-5, 3e-5, 1e-4, 3e-4}});
+    out.push_back({"bend_gradient", "1/mm per 100 mm", {0, 1e-5, 3e-5, 1e-4, 3e-4}});
   }
   return out;
 }

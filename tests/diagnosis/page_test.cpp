@@ -160,6 +160,23 @@ TEST(Page, what_is_left_may_be_less_than_the_noise_or_only_correlated) {
   EXPECT_THAT(left(1, 0.001), HasSubstr("What is left is correlated from reading to reading; the verdict"));
 }
 
+// No picture of a log without a clock is against time, or against what would need one.
+TEST(Page, draws_stops_where_there_is_no_clock) {
+  auto findings = made_up(Verdict::effects_found);
+  const char* by_time[] = {"time (s)", "time in the recording", "speed of insertion", "time since stop",
+                           ", over time."};
+  const std::string with_clock = report_html(findings, {});
+  findings.stop_s = 0.1;
+  const std::string without = report_html(findings, {});
+  for (const char* text : by_time) {
+    EXPECT_THAT(with_clock, HasSubstr(text));
+    EXPECT_THAT(without, Not(HasSubstr(text)));
+  }
+  EXPECT_THAT(without, HasSubstr("rec03.lcm, tip.y: stops 31 to 50"));
+  EXPECT_THAT(without, HasSubstr("rec03.lcm, stop by stop."));
+  EXPECT_THAT(without, HasSubstr("inserted length"));
+}
+
 TEST(Page, next_experiment_says_how_many_recordings_it_takes) {
   auto findings = made_up(Verdict::effects_found);
   ASSERT_TRUE(findings.next_experiment);

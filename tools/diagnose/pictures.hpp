@@ -23,9 +23,13 @@ struct Residuals {
 };
 Residuals residuals_of(const diagnosis::Findings& findings, const diagnosis::Trace& trace, std::size_t channel);
 std::string residual_unit(const diagnosis::Findings& findings, std::size_t channel);
+// Of pictures and tables: seconds, or of a log without a clock the number of the stop.
+std::string time_label(const diagnosis::Findings& findings);
+std::string time_span(const diagnosis::Findings& findings, const diagnosis::Location& where);
 
-// One channel against time, depth, speed, roll, time since stop, since reversal; all recordings together. Panels in
-// which a reading is known by its number: pointing at it in one shows it in all.
+// One channel against time, depth, speed, roll, time since stop, since reversal (without a clock against depth, roll
+// and since reversal); all recordings together. Panels in which a reading is known by its number: pointing at it in one
+// shows it in all.
 std::vector<report::Figure> residual_panels(const diagnosis::Findings& findings, std::size_t channel);
 // One recording over time: every channel's residuals, below them what the base did.
 std::vector<report::Figure> recording_panels(const diagnosis::Findings& findings, std::size_t trace);

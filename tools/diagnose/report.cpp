@@ -257,7 +257,8 @@ void add_variation(report::Page& page, const Findings& f) {
   if (!picture.empty())
     page.picture(picture,
                  "What each insertion has of its own, beside what all share: its curvature as a share of the "
-                 "needle's, the heading about x and y and the bevel's roll at the entry, and where it entered. An "
+                 "needle's, the heading about x and y and the bevel's roll at the entry, and where it entered; by "
+                 "hand, how it bends away with depth. An "
                  "insertion far outside the band is one to look at.");
 }
 
@@ -269,9 +270,8 @@ void add_location(report::Page& page, const Findings& f) {
       "and what came before it?");
   std::vector<std::vector<std::string>> rows;
   for (const auto& w : f.where)
-    rows.push_back({w.log, w.channel, number(w.from_s) + " to " + number(w.to_s),
-                    w.covariate.empty() ? "-" : span_of(w), percent(w.share)});
-  page.table({"recording", "channel", "time (s)", "there", "share of the mismatch"}, rows);
+    rows.push_back({w.log, w.channel, time_span(f, w), w.covariate.empty() ? "-" : span_of(w), percent(w.share)});
+  page.table({"recording", "channel", time_label(f), "there", "share of the mismatch"}, rows);
   const auto panels = located_panels(f, 2);
   if (!panels.empty())
     page.figures(panels, static_cast<int>(panels.size() / 3),
@@ -369,7 +369,9 @@ void add_recordings(report::Page& page, const Findings& f) {
   std::size_t at = 0;
   const auto add = [&](report::Page& to, std::size_t until) {
     for (; at < std::min(until, all.size()); ++at)
-      to.figures(all[at], 1, all[at].front().link.substr(std::string_view("time of ").size()) + ", over time.");
+      to.figures(all[at], 1,
+                 all[at].front().link.substr(std::string_view("time of ").size()) +
+                     (f.stop_s > 0 ? ", stop by stop." : ", over time."));
   };
   page.heading("Recording by recording");
   page.paragraph(

@@ -121,6 +121,16 @@ const char* name_of_after(const Findings& findings) {
   return findings.verdict == Verdict::nothing_missing ? "needle refitted" : "after";
 }
 
+// Logs without a clock are drawn by the number of the stop.
+double shown_time(const Findings& findings, double time_s) {
+  return findings.stop_s > 0 ? std::round(time_s / findings.stop_s) : time_s;
+}
+std::vector<double> shown_times(const Findings& findings, const Trace& trace, const std::vector<std::size_t>& use) {
+  std::vector<double> out = at(trace.time_s, use);
+  for (double& time_s : out) time_s = shown_time(findings, time_s);
+  return out;
+}
+
 // Over time: residuals as dots.
 Figure over_time(const Findings& findings, const Trace& trace, std::size_t channel, const Residuals& r) {
   const std::vector<std::size_t> use = shown_of(r.before, r.after, kMostOfOne);
@@ -129,38 +139,44 @@ Figure over_time(const Findings& findings, const Trace& trace, std::size_t chann
   figure.y_label = residual_label(findings, channel);
   figure.height_px = 110;
   figure.references.push_back({report::Reference::Axis::horizontal, 0, ""});
-  const std::vector<double> time_s = at(trace.time_s, use);
-  if (findings.verdict != Verdict::nothing_missing) figure.points("before", time_s, at(r.before, use), kBefore);
-  figure.points(name_of_after(findings), time_s, at(r.after, use), kAfter);
+  const std::vector<double> time = shown_times(findings, trace, use);
+  if (findings.verdict != Verdict::nothing_missing) figure.points("before", time, at(r.before, use), kBefore);
+  figure.points(name_of_after(findings), time, at(r.after, use), kAfter);
   for (const auto& where : findings.where)
     if (where.log == trace.log && where.channel == findings.channels[channel])
-      figure.spans.push_back({where.from_s, where.to_s});
+      figure.spans.push_back({shown_time(findings, where.from_s), shown_time(findings, where.to_s)});
   return figure;
 }
 
-Figure of_the_base(const Trace& trace, const char* name, const char* label, double Covariates::*quantity) {
+Figure of_the_base(const Findings& findings, const Trace& trace, const char* name, const char* label,
+                   double Covariates::*quantity) {
   Figure figure;
   std::vector<double> values;
   for (const auto& taken : trace.covariates) values.push_back(taken.*quantity);
   const std::vector<std::size_t> use = report::thinned(values, kMostOfOne);
   figure.y_label = label;
   figure.height_px = 70;
-  figure.line(name, at(trace.time_s, use), at(values, use), Colour::grey);
+  figure.line(name, shown_times(findings, trace, use), at(values, use), Colour::grey);
   return figure;
 }
 
 // All over one stretch of time, so that they line up, and linked.
-void set_time(std::vector<Figure>& panels, const Trace& trace, const std::string& link) {
-  const double last_s = trace.time_s.back(), first_s = trace.time_s.front();
-  const double room_s = last_s > first_s ? 0.02 * (last_s - first_s) : 1;
+void set_time(std::vector<Figure>& panels, const Findings& findings, const Trace& trace, const std::string& link) {
+  const double last = shown_time(findings, trace.time_s.back()), first = shown_time(findings, trace.time_s.front());
+  const double room = last > first ? 0.02 * (last - first) : 1;
   for (Figure& panel : panels) {
-    panel.x_range = {first_s - room_s, last_s + room_s};
+    panel.x_range = {first - room, last + room};
     panel.link = link;
   }
-  if (!panels.empty()) panels.back().x_label = "time (s)";
+  if (!panels.empty()) panels.back().x_label = time_label(findings);
 }
 
 }  // namespace
+
+std::string time_label(const Findings& findings) { return findings.stop_s > 0 ? "stop" : "time (s)"; }
+std::string time_span(const Findings& findings, const Location& where) {
+  return number(shown_time(findings, where.from_s)) + " to " + number(shown_time(findings, where.to_s));
+}
 
 Residuals residuals_of(const Findings& findings, const Trace& trace, std::size_t channel) {
   const int axis = coordinate_of(findings.channels[channel]);
@@ -178,7 +194,7 @@ Residuals residuals_of(const Findings& findings, const Trace& trace, std::size_t
 }
 
 std::string residual_unit(const Findings& findings, std::size_t channel) {
-  return coordinate_of(findings.channels[channel]) < 0 ? "standard deviations" : "mm";
+  return coordinate_of(findings.channels[channel]) < 0 ? "s.d." : "mm";
 }
 
 std::vector<Figure> residual_panels(const Findings& findings, std::size_t channel) {
@@ -196,6 +212,7 @@ std::vector<Figure> residual_panels(const Findings& findings, std::size_t channe
   const std::vector<std::size_t> shown = shown_of(before, after, kMostReadings);
   const auto y_range = residual_range(before, after);
   for (const Against& against : kAgainst) {
+    if (findings.stop_s > 0 && model::needs_clock(against.covariate)) continue;
     const auto stays = [&](std::size_t i) { return !against.at_rest_only || taken_at[i][against.covariate] > 0; };
     std::vector<double> x, y_before, y_after, dot_x, dot_before, dot_after, reading;
     for (std::size_t i = 0; i < taken_at.size(); ++i) {
@@ -251,9 +268,9 @@ std::vector<Figure> recording_panels(const Findings& findings, std::size_t which
     if (!shown_of(r.before, r.after, kMostOfOne).empty()) panels.push_back(over_time(findings, trace, c, r));
   }
   if (panels.empty() || trace.covariates.size() != trace.time_s.size()) return {};
-  panels.push_back(of_the_base(trace, "inserted", "depth (mm)", &Covariates::depth_mm));
-  panels.push_back(of_the_base(trace, "turned", "roll (rad)", &Covariates::roll_rad));
-  set_time(panels, trace, "time of " + trace.log);
+  panels.push_back(of_the_base(findings, trace, "inserted", "depth (mm)", &Covariates::depth_mm));
+  panels.push_back(of_the_base(findings, trace, "turned", "roll (rad)", &Covariates::roll_rad));
+  set_time(panels, findings, trace, "time of " + trace.log);
   return panels;
 }
 
@@ -269,12 +286,13 @@ std::vector<Figure> located_panels(const Findings& findings, std::size_t most) {
     const Residuals r = residuals_of(findings, *trace, c);
     if (shown_of(r.before, r.after, kMostOfOne).empty() || trace->covariates.size() != trace->time_s.size()) continue;
     std::vector<Figure> column{over_time(findings, *trace, c, r),
-                               of_the_base(*trace, "inserted", "depth (mm)", &Covariates::depth_mm),
-                               of_the_base(*trace, "turned", "roll (rad)", &Covariates::roll_rad)};
+                               of_the_base(findings, *trace, "inserted", "depth (mm)", &Covariates::depth_mm),
+                               of_the_base(findings, *trace, "turned", "roll (rad)", &Covariates::roll_rad)};
     column.front().title =
-        where.log + ", " + where.channel + ": " + number(where.from_s) + " to " + number(where.to_s) + " s";
-    for (Figure& panel : column) panel.spans = {{where.from_s, where.to_s}};
-    set_time(column, *trace, "worst span " + std::to_string(i + 1));
+        where.log + ", " + where.channel + ": " +
+        (findings.stop_s > 0 ? "stops " + time_span(findings, where) : time_span(findings, where) + " s");
+    for (Figure& panel : column) panel.spans = {{shown_time(findings, where.from_s), shown_time(findings, where.to_s)}};
+    set_time(column, findings, *trace, "worst span " + std::to_string(i + 1));
     columns.push_back(std::move(column));
   }
   std::vector<Figure> panels;  // row by row
