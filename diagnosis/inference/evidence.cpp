@@ -20,11 +20,12 @@ namespace {
 
 constexpr double kWorthARefit = 0.2;     // of log evidence
 constexpr double kWhileUnsettled = 0.5;  // of a fit's cost
-constexpr double kOnTheWay = 0;          // below the likeliest standard deviations: only where they are is asked
-constexpr double kWithAShare = 6;        // in the logarithm: what lies below it, and not beside, has none
-constexpr int kRefits = 12;              // with the standard deviations and the curve at their likeliest
-constexpr double kLikelyCurve = 3;       // log Bayes factor from which a curve is fitted
-constexpr double kNegligible = 20;       // of chi2: readings beyond it have no part in an integral
+// Spreads are looked at beside those whose log posterior is no farther below the likeliest's.
+constexpr double kOnTheWay = 0;     // while fit and noise still move
+constexpr double kWithAShare = 6;   // where they end
+constexpr int kRefits = 12;         // with the standard deviations and the curve at their likeliest
+constexpr double kLikelyCurve = 3;  // log Bayes factor from which a curve is fitted
+constexpr double kNegligible = 20;  // of chi2: readings beyond it have no part in an integral
 
 double beta_binomial(int happened, int recordings) {
   // Not std::lgamma: it writes its sign into a global of the C library, from every thread.

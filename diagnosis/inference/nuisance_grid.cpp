@@ -56,6 +56,7 @@ Eigen::VectorXd over_likely(const System& system, Index start, double far_below,
   double most = kNever;
   while (!next.empty()) {
     for (const Index k : next) out[k] = log_at(k), most = std::max(most, out[k]);
+    if (most == kNever) break;
     // What came too low before may not be so far below one that is known only now.
     next.clear();
     for (Index k = 0; k < count; ++k) {
