@@ -12,8 +12,7 @@ using Eigen::MatrixXd;
 using Eigen::VectorXd;
 
 namespace {
-constexpr int kSteps = 3;       // of the noise, about one fit; the next fit goes on
-constexpr double kHeld = 1e18;  // precision of what is taken as it stands
+constexpr int kSteps = 3;  // of the noise, about one fit; the next fit goes on
 }  // namespace
 
 std::vector<RawRows> raw_rows(const Fit& fit, const CurveColumns& curve) {
@@ -79,9 +78,7 @@ Noise noise_beside(const Fit& fit, const CurveColumns& curve) {
   const Dataset& data = fit.likelihood->data();
   const Pulls pulls = pulls_of(fit.layout, fit.shared, fit.curve_values, curve.covariance);
   VectorXd precision = local_precision_of(fit.layout, fit.scales);
-  const auto free = free_locals(fit.layout);
-  for (std::size_t i = 0; i < free.size(); ++i)
-    if (fit.layout.is_scanned(static_cast<std::size_t>(free[i]))) precision[static_cast<Index>(i)] = kHeld;
+  hold_scanned(fit.layout, precision);
   ArrowRules rules;
   rules.held = fit.held;
   std::vector<ArrowBlock> blocks(raw.size());

@@ -136,6 +136,13 @@ Pulls pulls_of(const Layout& layout, const VectorXd& shared, const VectorXd& cur
   return out;
 }
 
+void hold_scanned(const Layout& layout, VectorXd& precision) {
+  constexpr double kHeld = 1e18;
+  const auto free = free_locals(layout);
+  for (std::size_t i = 0; i < free.size(); ++i)
+    if (layout.is_scanned(static_cast<std::size_t>(free[i]))) precision[static_cast<Index>(i)] = kHeld;
+}
+
 VectorXd local_precision_of(const Layout& layout, const Scales& scales) {
   const auto free = free_locals(layout);
   VectorXd out(static_cast<Index>(free.size()));

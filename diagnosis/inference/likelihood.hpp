@@ -138,6 +138,8 @@ Pulls pulls_of(const Layout& layout, const Eigen::VectorXd& shared, const Eigen:
 // Local unknowns in the arrow: all but instants, in order; their priors' precision and centre.
 std::vector<Eigen::Index> free_locals(const Layout& layout);
 Eigen::VectorXd local_precision_of(const Layout& layout, const Scales& scales);
+// Of such a precision: what is scanned (a phase) taken as it stands.
+void hold_scanned(const Layout& layout, Eigen::VectorXd& precision);
 Eigen::VectorXd nuisance_centre(const Layout& layout, const Eigen::VectorXd& local);
 // One recording of them, with the columns that it is made of: local unknowns, then shared ones and the curve's values.
 struct LinearRecording {

@@ -93,7 +93,7 @@ Noise prediction_noise(const LinearModel& model, const CurveColumns& curve) {
   Noise noise = fit.likelihood->noise();
   if (raw.empty()) return noise;
   const std::size_t channels = noise.sigma.size();
-  noise.own_ar1.assign(channels, 0);
+  noise.own_ar1.assign(channels, 0);  // from a high one the steps are too small to leave it
   Pulls pulls = pulls_with_mean(pulls_of(fit.layout, fit.shared, fit.curve_values, curve.covariance), model.mean);
   ArrowRules rules{.held = fit.held, .covariance_of = std::vector<Index>{}};
   // To begin with they may differ by all that is tried: the noise is what that leaves, and not the other way.

@@ -41,7 +41,6 @@ namespace {
 
 constexpr double kLikely = 1e-4;  // share of a combination of standard deviations, given all recordings
 constexpr double kShare = 1e-3;   // and given the others
-constexpr double kHeld = 1e18;    // precision of what is taken as it stands
 constexpr double kTogether_s = 1e-9;
 
 // Unknowns: shared, the curves' values, the nuisances' mean if it is one, the recording's own.
@@ -99,7 +98,6 @@ std::vector<FromOthers> from_others(LinearModel& model, const CurveColumns& curv
                                     std::size_t recording, double share = kShare) {
   const Fit& fit = *model.fit;
   Pulls pulls = pulls_with_mean(pulls_of(fit.layout, fit.shared, fit.curve_values, curve.covariance), model.mean);
-  const auto free = free_locals(fit.layout);
   ArrowRules rules{.held = fit.held, .covariance_of = std::vector<Index>{}};
   rules.used.assign(model.blocks.size(), true);
   if (recording < model.blocks.size()) rules.used[recording] = false;
@@ -115,8 +113,7 @@ std::vector<FromOthers> from_others(LinearModel& model, const CurveColumns& curv
     one.shared = solve(model.blocks, pulls.precision, pulls.centre, rules);
     if (!one.shared.valid) continue;
     one.log_evidence = spreads.log_prior[k] - 0.5 * (one.shared.least + one.shared.log_volume_ratio);
-    for (std::size_t i = 0; i < free.size(); ++i)
-      if (fit.layout.is_scanned(static_cast<std::size_t>(free[i]))) one.own_precision[static_cast<Index>(i)] = kHeld;
+    hold_scanned(fit.layout, one.own_precision);
     one.spread = k;
     most = std::max(most, one.log_evidence);
     out.push_back(std::move(one));
