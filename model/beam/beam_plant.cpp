@@ -84,46 +84,44 @@ void BeamPlant::advance(double insertion_increment_mm, double rotation_increment
 }
 
 void BeamPlant::step(double insertion_mm, double rotation_rad, double dt_s) {
-  const double from_z_mm = depth_mm_;
-  const Lateral from_mm = tip_mm_;
-  depth_mm_ = next_depth_mm(insertion_mm);
+  const double from_mm = fed_mm_;
+  const Lateral from_aside_mm = tip_aside_mm_;
   fed_mm_ += insertion_mm;
   base_roll_rad_ += rotation_rad;
-  windup_.follow(base_roll_rad_, depth_mm_);
+  windup_.follow(base_roll_rad_, fed_mm_);
 
-  bent_ = depth_mm_ > beam_.clamp_mm();
+  bent_ = fed_mm_ > beam_.clamp_mm();
   if (!bent_) {  // inside the guide
-    tip_mm_ = tip_slope_ = Lateral{};
+    tip_aside_mm_ = tip_angle_rad_ = Lateral{};
+    tip_mm_ = {0.0, 0.0, fed_mm_};
     return;
   }
   // The piece of tissue reached in this step has no spring yet: its stretch is only of the order of the step.
-  const double settled_mm = cut_.settled_mm(depth_mm_);
-  beam_.set_tip(depth_mm_, std::min(settled_mm_, settled_mm));
+  const double settled_mm = cut_.settled_mm(fed_mm_);
+  beam_.set_tip(fed_mm_, std::min(settled_mm_, settled_mm));
   settled_mm_ = settled_mm;
   cut_.add_springs(beam_, dt_s);
-  beam_.add_force(depth_mm_, std::polar(bevel_force_N(), tip_roll_rad()) * Lateral(0.0, -1.0));
+  beam_.add_force(fed_mm_, std::polar(bevel_force_N(), tip_roll_rad()) * Lateral(0.0, -1.0));
   beam_.solve();
   cut_.relax(beam_, dt_s);
-  tip_mm_ = beam_.displacement_mm(depth_mm_);
-  tip_slope_ = beam_.slope(depth_mm_);
-  cut_.cut(from_z_mm, from_mm, depth_mm_, tip_mm_);
-}
-
-double BeamPlant::next_depth_mm(double insertion_mm) const {
-  if (!config_.feed_is_arc_length || !bent_) return fed_mm_ + insertion_mm;
-  return fed_mm_ - beam_.foreshortening_mm() + insertion_mm / std::sqrt(1.0 + std::norm(tip_slope_));
+  tip_aside_mm_ = beam_.displacement_mm(fed_mm_);
+  tip_angle_rad_ = beam_.slope(fed_mm_);
+  tip_mm_ = config_.feed_is_arc_length ? beam_.tip_along_shaft_mm()
+                                       : Eigen::Vector3d(tip_aside_mm_.real(), tip_aside_mm_.imag(), fed_mm_);
+  cut_.cut(from_mm, from_aside_mm, fed_mm_, tip_aside_mm_);
 }
 
 double BeamPlant::bevel_force_N() const {
   // Only the part of the bevel's face that meets uncut tissue pushes: all of it at the front, none of it a bevel's
   // length behind, and during entry the part that is already in.
-  const double behind_mm = std::max(0.0, cut_.front_mm() - depth_mm_);
-  const double pressing = (std::min(depth_mm_, config_.bevel_length_mm) - behind_mm) / config_.bevel_length_mm;
+  const double behind_mm = std::max(0.0, cut_.front_mm() - fed_mm_);
+  const double pressing = (std::min(fed_mm_, config_.bevel_length_mm) - behind_mm) / config_.bevel_length_mm;
   return config_.bevel_force_N * std::clamp(pressing, 0.0, 1.0);
 }
 
 Eigen::Vector3d BeamPlant::tip_heading() const {
-  return Eigen::Vector3d(tip_slope_.real(), tip_slope_.imag(), 1.0).normalized();
+  if (config_.feed_is_arc_length) return turned_from_axis(tip_angle_rad_);
+  return Eigen::Vector3d(tip_angle_rad_.real(), tip_angle_rad_.imag(), 1.0).normalized();
 }
 
 Eigen::Matrix3d BeamPlant::tip_rotation() const {
@@ -133,14 +131,25 @@ Eigen::Matrix3d BeamPlant::tip_rotation() const {
 
 std::vector<Eigen::Vector3d> BeamPlant::shaft_polyline_mm(std::size_t points) const {
   require(points >= 2, "points", static_cast<double>(points), "at least 2");
+  constexpr double kPiece_mm = 1.0;
   std::vector<Eigen::Vector3d> line(points);
-  const double start_mm = std::min(beam_.clamp_mm(), depth_mm_);
+  const double start_mm = std::min(beam_.clamp_mm(), fed_mm_);
+  const double spacing_mm = (fed_mm_ - start_mm) / static_cast<double>(points - 1);
+  const double pieces = std::max(1.0, std::ceil(spacing_mm / kPiece_mm));
+  Eigen::Vector3d at_mm(0.0, 0.0, start_mm);
   for (std::size_t i = 0; i < points; ++i) {
-    const double share = static_cast<double>(i) / static_cast<double>(points - 1);
-    const double z_mm = start_mm + share * (depth_mm_ - start_mm);
-    const Lateral w = bent_ ? beam_.displacement_mm(z_mm) : Lateral{};
-    line[i] = {w.real(), w.imag(), z_mm};
+    const double along_mm = start_mm + spacing_mm * static_cast<double>(i);
+    if (!config_.feed_is_arc_length) {
+      const Lateral w = bent_ ? beam_.displacement_mm(along_mm) : Lateral{};
+      line[i] = {w.real(), w.imag(), along_mm};
+      continue;
+    }
+    line[i] = at_mm;
+    for (double piece = 0.5; piece < pieces && i + 1 < points; ++piece)
+      at_mm += spacing_mm / pieces *
+               turned_from_axis(bent_ ? beam_.slope(along_mm + spacing_mm * piece / pieces) : Lateral{});
   }
+  line.back() = tip_mm_;
   return line;
 }
 

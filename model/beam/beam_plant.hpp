@@ -7,6 +7,10 @@
 //   tip has cut. At each moment the shape is the equilibrium (quasi-static, small slopes)
 //       EI w'''' + k (w - cut) = 0,   w = w' = 0 at the guide,   w'' = 0 and EI w''' = -F at the tip.
 //   The tip cuts where it is: cut(L) = w(L) at the moment when the tip first reaches depth L.
+//   Here z is the length along the shaft and w' the angle by which its tangent is turned from {A}'s axis, so that a
+//   bent needle bends on as it began: tissue has no direction of its own, and a path that is cut steadily is a circle.
+//   (With z as the depth and w' as a slope its curvature would fall with the cube of the heading's cosine.) The sum of
+//   the unit tangents is the shaft in space. A turn of the heading out of the plane in which it lies is taken as small.
 // Frames and signs
 //   {A}: origin at the entry point, z into the tissue; w = x + i y. {B} on the tip: e3 the shaft's tangent, e1 and e2
 //   turned by the tip's roll phi. The bevel force points to -e2: F = -i |F| exp(i phi), so phi = 0 bends toward -y.
@@ -17,8 +21,8 @@
 //   Over 130 mm, 2-100 kPa and 0.2-1 N deflect the tip by 3.5-42 mm with the guide 15 mm off the tissue, and by 2.8-33
 //   mm with the guide on it; the best circle through the entry point errs by 0.1-1.1 mm.
 // Source: Euler-Bernoulli beam on a Winkler foundation, Hetenyi, "Beams on Elastic Foundation", 1946.
-// Limits: slopes are small in the bending (above 0.5 the curvature is overstated), the shaft does not pull along its
-// axis on the tissue, tissue does not couple neighbouring springs.
+// Limits: the shaft lies near the path it has cut, the shaft does not pull along its axis on the tissue, tissue does
+// not couple neighbouring springs.
 #include <Eigen/Core>
 #include <cstddef>
 #include <vector>
@@ -38,7 +42,7 @@ struct BeamPlantConfig {
   double bevel_length_mm = 3.5;          // the force falls to none as the tip backs off the uncut tissue by this
   double guide_gap_mm = 15.0;            // from the guide's mouth to the tissue; the shaft is free in between
   double windup_at_100mm_rad = 0.0;      // lag of the tip's roll at 100 mm inserted, see windup.hpp; 0 = stiff shaft
-  bool feed_is_arc_length = true;        // a bent shaft reaches less deep than it was fed; false: depth = feed
+  bool feed_is_arc_length = true;        // false: small slopes, z is the depth, which is what is fed
   double max_depth_mm = 200.0;           // room is kept for this depth
   double element_length_mm = 2.0;        // of the beam's elements
   double cell_length_mm = 0.5;           // of the tissue's memory
@@ -59,7 +63,7 @@ class BeamPlant {
   // the plant is then unchanged.
   void advance(double insertion_increment_mm, double rotation_increment_rad, double dt_s);
 
-  [[nodiscard]] Eigen::Vector3d tip_position_mm() const { return {tip_mm_.real(), tip_mm_.imag(), depth_mm_}; }  // {A}
+  [[nodiscard]] const Eigen::Vector3d& tip_position_mm() const { return tip_mm_; }  // {A}
   [[nodiscard]] Eigen::Vector3d tip_heading() const;   // unit tangent of the shaft at the tip, {A}
   [[nodiscard]] Eigen::Matrix3d tip_rotation() const;  // R_AB: columns e1, e2, e3 of {B} in {A}
   [[nodiscard]] double tip_roll_rad() const { return windup_.tip_roll_rad(); }
@@ -68,12 +72,12 @@ class BeamPlant {
   [[nodiscard]] double bevel_force_N() const;              // acting now
   [[nodiscard]] const CutPath& cut_path() const { return cut_; }
 
-  // For drawing: `points` >= 2 points in {A}, mm, evenly spaced in depth from the guide's mouth to the tip. Allocates.
+  // For drawing: `points` >= 2 points in {A}, mm, evenly spaced along the shaft from the guide's mouth to the tip.
+  // Allocates.
   [[nodiscard]] std::vector<Eigen::Vector3d> shaft_polyline_mm(std::size_t points) const;
 
  private:
   void step(double insertion_mm, double rotation_rad, double dt_s);
-  [[nodiscard]] double next_depth_mm(double insertion_mm) const;
 
   BeamPlantConfig config_;
   HermiteBeam beam_;
@@ -83,9 +87,8 @@ class BeamPlant {
   double settled_mm_ = 0.0;  // down to here the springs of the problem last solved were what they will be
   double base_roll_rad_ = 0.0;
   double fed_mm_ = 0.0;
-  double depth_mm_ = 0.0;
-  Lateral tip_mm_;
-  Lateral tip_slope_;
+  Eigen::Vector3d tip_mm_ = Eigen::Vector3d::Zero();
+  Lateral tip_aside_mm_, tip_angle_rad_;  // w and w' there
 };
 
 }  // namespace bevel::model

@@ -33,6 +33,12 @@ Lateral combine(const std::array<double, 4>& weights, const std::array<Lateral, 
 
 }  // namespace
 
+Eigen::Vector3d turned_from_axis(Lateral angle_rad) {
+  const double angle = std::abs(angle_rad);
+  const double share = angle > 1e-6 ? std::sin(angle) / angle : 1.0;
+  return {share * angle_rad.real(), share * angle_rad.imag(), std::cos(angle)};
+}
+
 HermiteBeam::HermiteBeam(double bending_stiffness_N_mm2, double element_length_mm, double free_span_mm,
                          double max_tip_mm)
     : bending_stiffness_N_mm2_(bending_stiffness_N_mm2),
@@ -119,13 +125,14 @@ Lateral HermiteBeam::slope(double z_mm) const {
   return combine(shape_slope(at.xi, at.length_mm), unknowns(at.element));
 }
 
-double HermiteBeam::foreshortening_mm() const {
-  const auto stretch = [](Lateral slope) { return std::sqrt(1.0 + std::norm(slope)) - 1.0; };
-  double sum_mm = 0.0;
+Eigen::Vector3d HermiteBeam::tip_along_shaft_mm() const {
+  Eigen::Vector3d sum_mm(0, 0, nodes_mm_.front());
   for (std::size_t e = 0; e < elements_; ++e) {  // Simpson's rule
     const double h = right_mm(e) - nodes_mm_[e];
     const auto u = unknowns(e);
-    sum_mm += h / 6.0 * (stretch(u[1]) + 4.0 * stretch(combine(shape_slope(0.5, h), u)) + stretch(u[3]));
+    sum_mm +=
+        h / 6.0 *
+        (turned_from_axis(u[1]) + 4.0 * turned_from_axis(combine(shape_slope(0.5, h), u)) + turned_from_axis(u[3]));
   }
   return sum_mm;
 }

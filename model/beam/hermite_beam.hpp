@@ -9,6 +9,7 @@
 // free span evenly; right of it they have the nominal length; the last one ends at the tip and is 0.5 to 1.5 long.
 //
 // One use: set_tip, any add_spring / add_force, solve, then displacement / slope. Nothing allocates after construction.
+#include <Eigen/Core>
 #include <array>
 #include <complex>
 #include <cstddef>
@@ -20,6 +21,9 @@
 namespace bevel::model {
 
 using Lateral = std::complex<double>;  // x + i y in {A}
+
+// The unit vector that is turned from {A}'s axis toward this direction, by its length (rad).
+Eigen::Vector3d turned_from_axis(Lateral angle_rad);
 
 class HermiteBeam {
  public:
@@ -49,8 +53,9 @@ class HermiteBeam {
   [[nodiscard]] Lateral displacement_mm(double z_mm) const;
   [[nodiscard]] Lateral slope(double z_mm) const;
 
-  // Arc length of the solved shape minus its depth, mm (>= 0); the slopes are not taken as small here.
-  [[nodiscard]] double foreshortening_mm() const;
+  // Where the tip is if z is taken as the length along the shaft and w' as the angle by which it is turned from {A}'s
+  // axis, about the axis across both: the shaft's unit tangents summed from the clamp on. mm, {A}.
+  [[nodiscard]] Eigen::Vector3d tip_along_shaft_mm() const;
 
  private:
   struct Place {

@@ -4,6 +4,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <Eigen/Geometry>
 #include <cmath>
 #include <limits>
 #include <numbers>
@@ -86,6 +87,29 @@ TEST(BeamPlant, SteadySteeringHasTheClosedFormCurvatureAndSlip) {
   EXPECT_NEAR((2.0 * y1 - y0 - y2) / 100.0, curvature, 1e-3 * curvature);
   const double slip = 0.2 / (2.0 * 1.6e4 * lambda * lambda);
   EXPECT_NEAR(tangent - (y2 - y0) / 20.0, slip, 1e-2 * slip);
+}
+
+// Tissue has no direction of its own: deep down the path is the circle of the closed form, whichever way the needle has
+// come to point.
+TEST(BeamPlant, ABentNeedleBendsOnAsItBegan) {
+  BeamPlantConfig config;
+  config.foundation_modulus_kPa = 100.0;
+  config.bevel_force_N = 2.0;
+  config.max_depth_mm = 450.0;
+  const double lambda = std::pow(0.1 / (4.0 * 1.6e4), 0.25);
+  const double curvature = 2.0 / (1.6e4 * lambda);
+  BeamPlant plant(config);
+  std::vector<Eigen::Vector3d> tips;
+  for (int i = 0; i < 44; ++i) {
+    plant.advance(10.0, 0.0, 0.0);
+    tips.push_back(plant.tip_position_mm());
+  }
+  for (std::size_t i = 20; i + 1 < tips.size(); ++i) {
+    const Eigen::Vector3d a = tips[i] - tips[i - 1], b = tips[i + 1] - tips[i];
+    const double through_three = 2.0 * a.cross(b).norm() / (a.norm() * b.norm() * (a + b).norm());
+    EXPECT_NEAR(through_three, curvature, 1e-3 * curvature) << 10 * (i + 1) << " mm";
+  }
+  EXPECT_GT(plant.tip_heading().y() * plant.tip_heading().y(), 0.9);  // it has come to point far aside
 }
 
 TEST(BeamPlant, FeedIsArcLengthOfTheShaft) {
