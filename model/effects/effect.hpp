@@ -55,8 +55,8 @@ struct EffectParameter {
   double largest_seen = std::numeric_limits<double>::infinity();  // the largest value that they bring about
   double usual = std::numeric_limits<double>::quiet_NaN();        // where a model file does not say; NaN: it has to
   // Standard uncertainty, in the parameter's unit, that this form of the effect adds to a value found by it (JCGM 100,
-  // 4.3: one that no repetition shows). 0: none is known.
-  double form_sd = 0;
+  // 4.3: one that no repetition shows); the same as a share of the value. 0: none is known.
+  double form_sd = 0, form_share = 0;
 };
 // Starts from first to last, evenly: as close as the effect is narrow, or a fit never finds it.
 std::vector<double> starts_every(double step, double first, double last);
@@ -74,9 +74,10 @@ std::span<const Covariate> all_covariates();
 
 // What an effect remembers between legs of one insertion. Slopes come with it.
 struct EffectMemory {
-  static constexpr std::size_t kSlots = 4;
+  static constexpr std::size_t kSlots = 4, kNumbers = 6;
   std::array<Dual, kSlots> slot;
-  int phase = 0;  // 0 until it has seen a leg
+  std::array<double, kNumbers> number{};  // what no unknown moves much
+  int phase = 0;                          // 0 until it has seen a leg
 };
 
 // The base, as the encoders say, at the ends of a leg; t counts from the start of the recording.

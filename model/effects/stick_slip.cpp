@@ -22,7 +22,8 @@ class StickSlip final : public Effect {
                                 .none = 0,
                                 .starts = starts(),
                                 .reported = 3,
-                                .shape = true}},
+                                .shape = true,
+                                .form_share = kOfScrew}},
                 .sudden = true}) {}
 
   void axes(Parameters p, const LegView& leg, EffectMemory& memory, Dual& insertion_mm,
@@ -41,6 +42,8 @@ class StickSlip final : public Effect {
   }
 
  private:
+  // Jumps are counted along the base, and a screw that is off by 0.01 mm in 100 mm is off in all recordings alike.
+  static constexpr double kOfScrew = 1e-4;
   static constexpr double kShortest_mm = 1e-6;
   static constexpr double kCatchUp_mm = 0.02;
   // A fit finds a length only from one that gives about as many jumps on the way: in 90 mm, to a quarter of a jump.

@@ -1,3 +1,6 @@
+#include <algorithm>
+#include <cmath>
+
 #include "model/effects/effect.hpp"
 
 namespace bevel::model {
@@ -20,10 +23,14 @@ namespace {
 //     heading:  theta + slope h u
 //     g = (sinh x cosh x - sin x cos x) / (cosh^2 x + cos^2 x),  h = (sinh^2 x + sin^2 x) / (cosh^2 x + cos^2 x).
 //   That is the beam for small slopes; between guide and tissue the shaft bends as if it were held there too, which is
-//   the same to the fifth power of guide / bending. The force is taken to act on the way back too, which it does for no
-//   more than the bevel's length. The other two parameters have no part. Beams of finite slopes, in tissue of which a
-//   part relaxes, come out as other values of the two: by what 18 of them did, beyond the noise, each has its form_sd.
-// Memory: the offset, and the heading's own tilt toward the bevel.
+//   the same to the fifth power of guide / bending. Of the bevel's face only what meets uncut tissue pushes: the force
+//   comes up over its length at the entry, and goes as the tip is drawn back by as much. There the tip is off its path
+//   by radius g (u force - u cut), of what pushes now and of what has cut there: springs and shaft are those of then.
+//   Drawn back, the tip lies in the channel it has cut: turning there turns the force to come and not the path, until
+//   the tip is at the channel's end again. (How it was turned on the way in is not remembered: exact where the part
+//   that is drawn back was cut without turning.) The other two parameters have no part. In tissue of which a part
+//   relaxes, beams come out as other values of the two: by what 18 of them did, beyond the noise, each has its form_sd.
+// Memory: the offset, and the heading's own tilt toward the bevel; where the tip is in its channel.
 class TipSwing final : public Effect {
  public:
   TipSwing()
@@ -50,36 +57,73 @@ class TipSwing final : public Effect {
                   .usual = 0,
                   .form_sd = 1.3}}}) {}
 
-  void curvature(Parameters p, const LegView& leg, EffectMemory& /*memory*/, Dual2& kappa_per_mm) const override {
+  void axes(Parameters p, const LegView& leg, EffectMemory& memory, Dual& insertion_mm,
+            Dual& rotation_rad) const override {
+    if (p[2].value <= kShortest_mm) return;
+    auto& [front_mm, behind_mm, due_rad, force, force_before, due_before_rad] = memory.number;
+    if (memory.phase == 0) {
+      memory.phase = 1;
+      front_mm = leg.entry.insertion_mm;
+    }
+    front_mm = std::max(front_mm, insertion_mm.value);
+    behind_mm = front_mm - insertion_mm.value;
+    const double in_mm = std::min(insertion_mm.value - leg.entry.insertion_mm, kBevel_mm);
+    force_before = force, due_before_rad = due_rad;
+    force = std::clamp((in_mm - behind_mm) / kBevel_mm, 0.0, 1.0);
+    due_rad = 0;
+    if (behind_mm > kAtFront_mm) {
+      due_rad = rotation_rad.value - leg.tip_rotation_rad.value;
+      rotation_rad = leg.tip_rotation_rad;
+    }
+  }
+  void curvature(Parameters p, const LegView& leg, EffectMemory& memory, Dual2& kappa_per_mm) const override {
     if (p[2].value <= kShortest_mm) return;
     const End end = end_at((depth_halfway(leg) + p[3]) / p[2]);
-    for (Dual& k : kappa_per_mm) k = k * end.g * end.h;
+    for (Dual& k : kappa_per_mm) k = k * end.g * end.h * cut_by(leg, memory, 0.5);
   }
   void settle(Parameters p, const LegView& leg, EffectMemory& memory) const override {
     const double side = leg.curvature_per_mm.value < 0 ? -1 : 1;
-    Dual of_turn_mm = p[0], kept = 1;  // what a turn within the leg leaves at its end; what is left of all before
-    Dual2 body;                        // what the offset grows by, in {B} at the start of the leg
+    Dual kept = 1;  // what is left of all before
+    Dual2 body;     // what the offset grows by, in {B} at the start of the leg
     if (p[2].value > kShortest_mm) {
-      const End end = end_at((depth_halfway(leg) + p[3]) / p[2]);
-      const Dual slope = 0.5 * side * leg.curvature_per_mm * p[2];
+      const auto deep = [&](double share) {
+        return (leg.tip_depth_mm + share * leg.insertion_mm * leg.heading_z + p[3]) / p[2];
+      };
+      const End end = end_at(deep(0.5));
+      const Dual slope = 0.5 * side * leg.curvature_per_mm * p[2], radius_mm = side * slope * p[2];
       const Dual2 toward = leg.toward_bevel();
-      for (std::size_t i = 0; i < 2; ++i) body[i] = 2.0 * slope * end.h * leg.insertion_mm * toward[i];
-      memory.slot[2] -= 1.5 * slope * slope * end.h * end.h * leg.insertion_mm;
-      // The first touch bends what lies free before the tissue; until then there is no force to turn.
-      if (memory.phase == 0 && leg.insertion_mm.value > 0) {
-        memory.phase = 1;
-        body[1] -= side * slope * p[2] * end_at(p[3] / p[2]).g;
+      const double cut_before = cut_by(leg, memory, 0), cut = cut_by(leg, memory, 1), by = cut_by(leg, memory, 0.5);
+      for (std::size_t i = 0; i < 2; ++i) body[i] = 2.0 * by * slope * end.h * leg.insertion_mm * toward[i];
+      memory.slot[2] -= 1.5 * by * by * slope * slope * end.h * end.h * leg.insertion_mm;
+      // The path is cut where the tip is: it has the turns, at rest too, and the force that comes up. From (0, -1).
+      const Dual cut_sin = cut * sin(leg.rotation_rad), cut_cos = cut * cos(leg.rotation_rad);
+      body[0] += radius_mm * end.g * cut_sin;
+      body[1] -= radius_mm * end.g * (cut_cos - cut_before);
+      // Behind its end the tip is off the path by what the force lacks of that which has cut there.
+      const auto& [front_mm, behind_mm, due_rad, force, force_before, due_before_rad] = memory.number;
+      const bool was_behind = force_before < cut_before || due_before_rad != 0;
+      if (was_behind) {
+        const Dual g = radius_mm * end_at(deep(0)).g;
+        body[0] -= g * (force_before * std::sin(due_before_rad));
+        body[1] += g * (force_before * std::cos(due_before_rad) - cut_before);
       }
-      of_turn_mm = memory.phase == 0 ? Dual(0) : slope * p[2] * end.g;
-      memory.slot[kTilt] = side * slope * end.h;
-    } else if (leg.insertion_mm.value > 0) {
-      const Dual x = leg.insertion_mm / p[1];
-      kept = exp(-x);
-      of_turn_mm = p[0] * (x.value > 1e-3 ? (1.0 - kept) / x : 1.0 - 0.5 * x);
+      if (force < cut || due_rad != 0) {
+        const Dual g = radius_mm * end_at(deep(1)).g, turned = leg.rotation_rad + due_rad;
+        body[0] += g * (force * sin(turned) - cut_sin);
+        body[1] -= g * (force * cos(turned) - cut_cos);
+      }
+      memory.slot[kTilt] = side * slope * end.h * force;
+    } else {
+      Dual of_turn_mm = p[0];  // what a turn within the leg leaves at its end
+      if (leg.insertion_mm.value > 0) {
+        const Dual x = leg.insertion_mm / p[1];
+        kept = exp(-x);
+        of_turn_mm = p[0] * (x.value > 1e-3 ? (1.0 - kept) / x : 1.0 - 0.5 * x);
+      }
+      // By which the direction toward the bevel turned: from (0, -1).
+      const Dual2 turned_by = {sin(leg.rotation_rad), 1.0 - cos(leg.rotation_rad)};
+      for (std::size_t i = 0; i < 2; ++i) body[i] = side * of_turn_mm * turned_by[i];
     }
-    // By which the direction toward the bevel turned: from (0, -1).
-    const Dual2 turned_by = {sin(leg.rotation_rad), 1.0 - cos(leg.rotation_rad)};
-    for (std::size_t i = 0; i < 2; ++i) body[i] += side * of_turn_mm * turned_by[i];
     const Dual3 world = leg.in_world(body);
     for (std::size_t i = 0; i < 3; ++i) memory.slot[i] = memory.slot[i] * kept + world[i];
   }
@@ -96,10 +140,19 @@ class TipSwing final : public Effect {
 
  private:
   static constexpr double kShortest_mm = 1e-6;
-  static constexpr double kDeep = 15;  // bending lengths, from where on nothing changes
+  static constexpr double kDeep = 15;         // bending lengths, from where on nothing changes
+  static constexpr double kBevel_mm = 3.5;    // of an 18 gauge needle, along the shaft
+  static constexpr double kAtFront_mm = 0.1;  // nearer to the channel's end than this a turn turns the path
   static constexpr std::size_t kTilt = 3;
 
   static Dual depth_halfway(const LegView& leg) { return leg.tip_depth_mm + 0.5 * leg.insertion_mm * leg.heading_z; }
+  // How much of the force cut the tissue that the tip is at.
+  // share: of the leg, from its start.
+  static double cut_by(const LegView& leg, const EffectMemory& memory, double share) {
+    const auto& [front_mm, behind_mm, due_rad, force, force_before, due_before_rad] = memory.number;
+    const double in_mm = front_mm - behind_mm - (1 - share) * leg.insertion_mm.value - leg.entry.insertion_mm;
+    return std::clamp(in_mm / kBevel_mm, 0.0, 1.0);
+  }
   struct End {
     Dual g, h;
   };

@@ -76,7 +76,9 @@ TEST_P(TipSwingOfABeam, IsThatOfItsMechanics) {
   NeedleParameters needle = bicycle();
   needle.curvature_per_mm = config.bevel_force_N / (EI * lambda_per_mm);
 
-  const Script script{{4, 10, 0}, {1, 0, pi}, {2, 10, 0}, {1, 0, -pi / 2}, {2, 10, 0}, {2, 10, 2}, {1, 10, 0}};
+  // The last but one: drawn back, turned in the channel, and on through it.
+  const Script script{{4, 10, 0},   {1, 0, pi},    {2, 10, 0},   {1, 0, -pi / 2}, {2, 10, 0},
+                      {1.5, -8, 0}, {0.8, 0, 2.5}, {2.5, 10, 0}, {1, 10, 2},      {1, 10, 0}};
   const Motion motion = script.fine(0.01);
   BeamPlant plant(config);
   std::vector<Vector3d> measured{plant.tip_position_mm()}, headings{plant.tip_heading()};
