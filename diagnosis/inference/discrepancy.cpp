@@ -165,12 +165,14 @@ std::vector<CurveFactor> Discrepancy::scan(const Marginal& beside) const {
       const Eigen::SelfAdjointEigenSolver<MatrixXd> eigen(inner);
       const VectorXd turned = eigen.eigenvectors().transpose() * (root.matrixU() * pull);
       for (const double scale : kCurveScales) {
-        double log_factor = 0;
+        CurveFactor one{.prior = {k, scale, length}, .visible = {}};
         for (Index i = 0; i < turned.size(); ++i) {
-          const double widened = 1 + scale * scale * std::max(0.0, eigen.eigenvalues()[i]);
-          log_factor += 0.5 * (scale * scale * turned[i] * turned[i] / widened - std::log(widened));
+          const double seen = scale * scale * std::max(0.0, eigen.eigenvalues()[i]);
+          const double squared_mean = scale * scale * turned[i] * turned[i] / (1 + seen);
+          one.log_bayes_factor += 0.5 * (squared_mean - std::log1p(seen));
+          one.visible.add(seen / (1 + seen), squared_mean);
         }
-        out.push_back({{k, scale, length}, log_factor});
+        out.push_back(std::move(one));
       }
     }
   }

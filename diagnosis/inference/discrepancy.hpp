@@ -5,6 +5,7 @@
 #include <span>
 
 #include "diagnosis/inference/marginal.hpp"
+#include "diagnosis/inference/squared_size.hpp"
 
 namespace bevel::inference {
 
@@ -15,6 +16,8 @@ inline constexpr double kCurveLengths[] = {1.0, 0.2};
 struct CurveFactor {
   CurvePrior prior;
   double log_bayes_factor = 0;  // against none, or none more
+  // What of it the unknowns beside it do not absorb, squared, in variances of the noise, summed over all readings.
+  SquaredSize visible;
 };
 
 class Discrepancy {

@@ -70,7 +70,8 @@ void scan_local(const Likelihood& likelihood, const Layout& layout, const Vector
 
 bool has_scanned(const Layout& layout) { return layout.local().size() > layout.system().nuisances().size(); }
 
-// Distance to the farther of the neighbours in the grid.
+}  // namespace
+
 double grid_spacing(const Parameter& p, double value) {
   auto starts = p.starts;
   std::sort(starts.begin(), starts.end());
@@ -78,8 +79,6 @@ double grid_spacing(const Parameter& p, double value) {
   const auto upper = above == starts.end() ? above - 1 : (above == starts.begin() ? above + 1 : above);
   return *upper - *(upper - 1);
 }
-
-}  // namespace
 
 bool has_many_minima(const Parameter& parameter) {
   return (std::isnan(parameter.none) || parameter.shape) && parameter.starts.size() >= kGrid && !parameter.periodic;

@@ -11,6 +11,9 @@ inline constexpr double kInstantSpacing_s = 0.3;
 // Of a shared parameter: its starts are a grid (a depth, a jump).
 bool has_many_minima(const Parameter& parameter);
 
+// Of its starts: from a value's neighbour to the next.
+double grid_spacing(const Parameter& parameter, double value);
+
 // Whether a member of the set happens at instants.
 bool has_instant(const Layout& layout, int member);
 

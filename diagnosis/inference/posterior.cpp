@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <boost/math/distributions/normal.hpp>
 #include <cmath>
+#include <numeric>
 #include <set>
 #include <stdexcept>
 
@@ -24,11 +25,6 @@ constexpr double kNegligible = 1e-3;  // share of a posterior that is not worth 
 constexpr double kShare = 0.02;       // of a model, given the others, that a prediction takes part of
 constexpr double kFarBehind = 15;     // log posterior: what no recording that is left out brings back
 
-bool near_bound(const Parameter& p, double value, double sd) {
-  constexpr double kNear = 3;  // standard deviations
-  return !p.periodic && (value - kNear * sd <= p.lower || value + kNear * sd >= p.upper);
-}
-
 ArrowSolution solve_without(const Fit& fit, const std::vector<ArrowBlock>& blocks, const CurveColumns& curve,
                             std::size_t recording) {
   const Pulls pulls = pulls_of(fit.layout, fit.shared, fit.curve_values, curve.covariance);
@@ -41,18 +37,50 @@ ArrowSolution solve_without(const Fit& fit, const std::vector<ArrowBlock>& block
 
 }  // namespace
 
-double visible_sigmas_of_curve(const Search& search, const Fit& fit) {
+namespace {
+
+// A fit's curve values, their covariance, and the form in them whose square root is their visible size.
+struct VisibleCurve {
+  VectorXd values;
+  MatrixXd covariance, square;
+};
+std::optional<VisibleCurve> visible_curve(const Search& search, const Fit& fit) {
   const CurveColumns curve = curve_of(search, fit);
   const auto blocks = linearise(*fit.likelihood, fit, curve);
-  if (blocks.empty()) return 0;
-  const ArrowSolution solution = solve_about(fit, blocks, curve, std::vector<Index>{});
-  if (!solution.valid) return 0;
-  const MatrixXd& information = solution.information;
+  if (blocks.empty()) return {};
   const Index shared = fit.shared.size(), values = fit.curve_values.size();
+  std::vector<Index> of_curve(static_cast<std::size_t>(values));
+  std::iota(of_curve.begin(), of_curve.end(), shared);
+  const ArrowSolution solution = solve_about(fit, blocks, curve, of_curve);
+  if (!solution.valid) return {};
+  const MatrixXd& information = solution.information;
   const MatrixXd across = information.topRightCorner(shared, values);
-  const MatrixXd visible = information.bottomRightCorner(values, values) - curve.covariance.inverse() -
-                           across.transpose() * information.topLeftCorner(shared, shared).ldlt().solve(across);
-  return std::sqrt(std::max(0.0, fit.curve_values.dot(visible * fit.curve_values)));
+  return VisibleCurve{.values = fit.curve_values,
+                      .covariance = solution.covariance.bottomRightCorner(values, values),
+                      .square = information.bottomRightCorner(values, values) - curve.covariance.inverse() -
+                                across.transpose() * information.topLeftCorner(shared, shared).ldlt().solve(across)};
+}
+
+}  // namespace
+
+double visible_sigmas_of_curve(const Search& search, const Fit& fit) {
+  const auto curve = visible_curve(search, fit);
+  return curve ? std::sqrt(std::max(0.0, curve->values.dot(curve->square * curve->values))) : 0;
+}
+
+double probability_visible(const Search& search, const Evaluated& at, double sigmas) {
+  if (at.fit_with_curve) {
+    const auto curve = visible_curve(search, *at.fit_with_curve);
+    return curve ? SquaredSize(curve->values, curve->covariance, curve->square).above(sigmas * sigmas) : 0;
+  }
+  double sum = 0, all = 0;
+  for (const CurveFactor& one : at.curves) {
+    const double share = std::exp(one.log_bayes_factor - at.curves.front().log_bayes_factor);
+    if (share < kNegligible) break;  // the likeliest first
+    all += share;
+    sum += share * one.visible.above(sigmas * sigmas);
+  }
+  return all > 0 ? sum / all : 0;
 }
 
 Posterior posterior_of(const Search& search, double visible_sigmas) {
@@ -68,9 +96,8 @@ Posterior posterior_of(const Search& search, double visible_sigmas) {
     std::set<std::string> names;
     for (const std::size_t e : set) names.insert(effects[e].name);
     for (const auto& name : names) out.inclusion[name] += share.probability;
-    if (one.at->fit_with_curve && share.with_discrepancy > 0 &&
-        visible_sigmas_of_curve(search, *one.at->fit_with_curve) > visible_sigmas)
-      share.unknown = share.with_discrepancy;
+    if (share.with_discrepancy > kNegligible * kNegligible)
+      share.unknown = share.with_discrepancy * probability_visible(search, *one.at, visible_sigmas);
     out.discrepancy += share.unknown;
     if (set.empty()) out.nothing += share.probability - share.unknown;
     out.sets.push_back(share);
@@ -143,17 +170,19 @@ Unknowns::Unknowns(const Search& search) : search_(&search) {
                 .mean = fit.shared,
                 .sd = fit.shared,
                 .nuisance_sd = nuisance_sd,
-                .along = {},
-                .sd_beside = {}};
+                .along = {}};
       for (Index i = 0; i < fit.shared.size(); ++i) {
         part.mean[i] += solution.shared[i];
-        part.sd[i] = std::sqrt(std::max(0.0, solution.covariance(i, i)));
+        // Where the readings say nothing about it here, it may be anywhere within its bounds.
+        const Parameter& p = *fit.layout.shared()[static_cast<std::size_t>(i)].parameter;
+        part.sd[i] =
+            std::min(std::sqrt(std::max(0.0, solution.covariance(i, i))), (p.upper - p.lower) / std::sqrt(12.0));
       }
       if (weight > kShare && !first) {
         look_along(fit, curve, solution.covariance, part);
         first = part;
       } else if (first) {
-        part.along = first->along, part.at_bound = first->at_bound, part.sd_beside = first->sd_beside;
+        part.along = first->along;
       }
       parts_.push_back(std::move(part));
     }
@@ -173,19 +202,21 @@ void Unknowns::look_along(const Fit& fit, const CurveColumns& curve, const Matri
     const Unknown& unknown = fit.layout.shared()[static_cast<std::size_t>(i)];
     if (unknown.member < 0) continue;
     const Parameter& p = *unknown.parameter;
-    const bool bound = near_bound(p, fit.shared[i], part.sd[i]);
-    if (!bound && !has_many_minima(p) && !has_instant(fit.layout, unknown.member)) continue;
-    if (!profile) profile.emplace(*fit.likelihood, curve, fit);
-    if (!profile->valid()) return;
-    part.along[i] = posterior_along(*profile, i, part.sd[i] > 0 ? part.sd[i] : kOfHeld * (p.upper - p.lower));
-    if (bound && part.at_bound < 0) part.at_bound = i;
+    if (has_instant(fit.layout, unknown.member)) {
+      if (!profile) profile.emplace(*fit.likelihood, curve, fit);
+      if (!profile->valid()) return;
+      part.along[i] = posterior_along(*profile, i, part.sd[i] > 0 ? part.sd[i] : kOfHeld * (p.upper - p.lower));
+    } else if (!p.periodic) {
+      const bool held = !(covariance(i, i) > 0), many = has_many_minima(p);
+      double near = held ? kOfHeld * (p.upper - p.lower) : part.sd[i];
+      if (many) near = std::min(near, grid_spacing(p, fit.shared[i]));
+      const VectorXd by_this = held || many ? VectorXd::Unit(fit.shared.size(), i)
+                                            : VectorXd(covariance.col(i).head(fit.shared.size()) / covariance(i, i));
+      if (auto along = posterior_by_refits(*fit.likelihood, curve, fit, i, by_this, near, !held && !many);
+          !along.empty())
+        part.along[i] = std::move(along);
+    }
   }
-  part.sd_beside = part.sd;
-  if (part.at_bound < 0 || !(part.sd[part.at_bound] > 0)) return;
-  const Index bound = part.at_bound;
-  for (Index i = 0; i < part.sd.size(); ++i)
-    part.sd_beside[i] = std::sqrt(
-        std::max(0.0, covariance(i, i) - covariance(i, bound) * covariance(i, bound) / covariance(bound, bound)));
 }
 
 Mixture Unknowns::of(int effect, std::size_t parameter) const {
@@ -204,9 +235,6 @@ Mixture Unknowns::of(int effect, std::size_t parameter) const {
     if (const auto own = part.along.find(i); own != part.along.end()) {
       for (const ProfileStep& one : own->second)
         out.parts.push_back({part.weight * one.weight, one.middle, one.width / std::sqrt(12.0)});
-    } else if (part.at_bound >= 0) {
-      for (const ProfileStep& one : part.along.at(part.at_bound))
-        out.parts.push_back({part.weight * one.weight, one.shared[i], part.sd_beside[i]});
     } else {
       out.parts.push_back({part.weight, part.mean[i], part.sd[i]});
     }

@@ -31,6 +31,9 @@ Posterior posterior_of(const Search& search, double visible_sigmas);
 // Of a fit with a curve: its values, as far as the set's own unknowns and what the recordings have of their own do not
 // take their place, in standard deviations of the autocorrelated noise, root of the sum of squares over all readings.
 double visible_sigmas_of_curve(const Search& search, const Fit& fit);
+// That it is above this many, given the discrepancy: by what is known of the fitted curves' values, or, where none was
+// likely enough to be fitted, of every curve by the linear model.
+double probability_visible(const Search& search, const Evaluated& at, double sigmas);
 
 // The curves of a fit with some, whitened by the fit's own noise; none for a fit without.
 CurveColumns curve_of(const Search& search, const Fit& fit);
@@ -49,7 +52,7 @@ struct Mixture {
 };
 
 // Posteriors of shared unknowns: by the linear models about the modes, and along the likelihood where an unknown has
-// many local minima or a bound is near.
+// many local minima or the likelihood is no parabola.
 class Unknowns {
  public:
   explicit Unknowns(const Search& search);
@@ -64,8 +67,6 @@ class Unknowns {
     const Layout* layout = nullptr;
     Eigen::VectorXd mean, sd, nuisance_sd;
     std::map<Eigen::Index, std::vector<ProfileStep>> along;
-    Eigen::Index at_bound = -1;  // the one of those that is near a bound; with it the others move
-    Eigen::VectorXd sd_beside;   // with that one held
   };
   static void look_along(const Fit& fit, const CurveColumns& curve, const Eigen::MatrixXd& covariance, Part& part);
 

@@ -18,6 +18,11 @@ constexpr int kMostSteps = 60;      // to each side
 // Of an instant that follows: its steps, each half of the one before, down to 6 ms; and the earliest it goes to.
 constexpr double kWidestStep_s = 0.2, kEarliest_s = 0.004;
 constexpr int kSteps = 6;
+// Of refits: where the parabola is tried, and by how much of it the rise may be off there; the root's rise in a step,
+// at least and at most; where nothing is left, also where the model has no value; fits to each side.
+constexpr double kTried_sd = 2, kOffParabola = 0.25;
+constexpr double kLeastRise = 0.4, kMostRise = 1.2, kNothingLeft = 3.5;
+constexpr int kMostRefits = 24, kBetween = 6;
 
 }  // namespace
 
@@ -102,7 +107,7 @@ std::vector<ProfileStep> posterior_along(const Profile& profile, Index which, do
   std::vector<ProfileStep> out;
   for (const double direction : {-1.0, 1.0}) {
     double width = kFirstStep * near, edge = mode, before = 1;
-    VectorXd shared = at_mode, shared_before = at_mode;
+    VectorXd shared = at_mode;
     local = fit.local;
     for (int i = 0; i < kMostSteps; ++i, width *= kGrowth) {
       const double end = std::clamp(edge + direction * width, p.lower, p.upper);
@@ -111,14 +116,59 @@ std::vector<ProfileStep> posterior_along(const Profile& profile, Index which, do
       const double now = std::exp(-0.5 * std::clamp(cost - least, -kNegligible, 1e3));
       out.push_back({.weight = 0.5 * (before + now) * std::abs(end - edge),
                      .middle = 0.5 * (edge + end),
-                     .width = std::abs(end - edge),
-                     .shared = 0.5 * (shared_before + shared)});
-      edge = end, before = now, shared_before = shared;
+                     .width = std::abs(end - edge)});
+      edge = end, before = now;
       if (now < std::exp(-0.5 * kNegligible)) break;
     }
   }
   double sum = 0;
   for (const ProfileStep& one : out) sum += one.weight;
+  for (ProfileStep& one : out) one.weight /= sum;
+  return out;
+}
+
+std::vector<ProfileStep> posterior_by_refits(const Likelihood& likelihood, const CurveColumns& curve, const Fit& fit,
+                                             Index which, const VectorXd& by_which, double near, bool parabola) {
+  const Parameter& p = *fit.layout.shared()[static_cast<std::size_t>(which)].parameter;
+  // From a fit nearby: the others moved with it by the linear model.
+  const auto fitted_at = [&](const Fit& from, double value) {
+    const VectorXd shared = from.shared + (value - from.shared[which]) * by_which;
+    return inference::fit(likelihood, fit.layout, shared, from.local, fit.scales, curve, {.fixed = {which}});
+  };
+  const auto root_of = [&](const Fit& there) {
+    return there.valid ? std::min(std::sqrt(std::max(0.0, there.cost - fit.cost)), kNothingLeft) : kNothingLeft;
+  };
+  const auto is_parabola = [&](double direction) {
+    const double value = std::clamp(fit.shared[which] + direction * kTried_sd * near, p.lower, p.upper);
+    const double away = (value - fit.shared[which]) / near, root = root_of(fitted_at(fit, value));
+    return std::abs(root * root - away * away) <= kOffParabola * away * away;
+  };
+  if (parabola && is_parabola(-1) && is_parabola(1)) return {};
+  std::vector<ProfileStep> out;
+  double sum = 0;
+  for (const double direction : {-1.0, 1.0}) {
+    Fit from = fit;
+    double root = 0, step = near;
+    for (int i = 0; i < kMostRefits && root < kNothingLeft; ++i) {
+      const double begin = from.shared[which], end = std::clamp(begin + direction * step, p.lower, p.upper);
+      if (end == begin) break;
+      Fit there = fitted_at(from, end);
+      const double risen = root_of(there);
+      if (risen - root > kMostRise && i + 1 < kMostRefits) {
+        step *= 0.5;
+        continue;
+      }
+      for (int k = 0; k < kBetween; ++k) {
+        const double share = (k + 0.5) / kBetween, at = root + share * (risen - root);
+        const double width = std::abs(end - begin) / kBetween;
+        out.push_back(
+            {.weight = std::exp(-0.5 * at * at) * width, .middle = begin + share * (end - begin), .width = width});
+        sum += out.back().weight;
+      }
+      if (risen - root < kLeastRise) step *= 2;
+      root = risen, from = std::move(there);
+    }
+  }
   for (ProfileStep& one : out) one.weight /= sum;
   return out;
 }

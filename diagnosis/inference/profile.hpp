@@ -1,6 +1,6 @@
 #pragma once
-// The likelihood along one shared unknown, all else following by the linear model about a fit: where it has many local
-// minima, is cut off by a bound or is no parabola, this is what says how well the unknown is known.
+// The likelihood along one shared unknown, all else following: where it has many local minima, is cut off by a bound or
+// is no parabola, this is what says how well the unknown is known.
 #include "diagnosis/inference/likelihood.hpp"
 
 namespace bevel::inference {
@@ -31,12 +31,19 @@ class Profile {
   bool valid_ = false;
 };
 
-// The posterior density of one shared unknown, in steps within its bounds: the weight of each (sum 1), its middle, and
-// all shared unknowns there; outwards from the mode for as long as anything is left. near: about a standard deviation.
+// The posterior density of one shared unknown, in steps within its bounds: the weight of each (sum 1) and its middle;
+// outwards from the mode for as long as anything is left. near: about a standard deviation.
 struct ProfileStep {
   double weight = 0, middle = 0, width = 0;
-  Eigen::VectorXd shared;
 };
 std::vector<ProfileStep> posterior_along(const Profile& profile, Eigen::Index which, double near);
+
+// The same with all else fitted anew at each step, so that a curved ridge is followed; between steps the signed root of
+// the rise in cost is a line (Bates and Watts 1988, Nonlinear Regression Analysis, 6.1). by_which: how the others move
+// with it to begin with. parabola: empty where two standard deviations (near) to either side are what the linear model
+// says.
+std::vector<ProfileStep> posterior_by_refits(const Likelihood& likelihood, const CurveColumns& curve, const Fit& fit,
+                                             Eigen::Index which, const Eigen::VectorXd& by_which, double near,
+                                             bool parabola);
 
 }  // namespace bevel::inference

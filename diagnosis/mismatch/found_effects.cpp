@@ -33,7 +33,8 @@ FoundParameter shared_parameter(const NeedleSystem& system, const inference::Unk
   out.std_error = std::sqrt(mixture.sd() * mixture.sd() + off * off);
   out.ci95 = {std::min(mixture.quantile(0.025), out.value), std::max(mixture.quantile(0.975), out.value)};
   // What the form adds is no part of the readings' own evidence.
-  if (const double form_sd = system.parameter(layout.set()[member], p).form_sd; form_sd > 0) {
+  const model::EffectParameter& form = system.parameter(layout.set()[member], p);
+  if (const double form_sd = std::hypot(form.form_sd, form.form_share * out.value); form_sd > 0) {
     out.std_error = std::hypot(out.std_error, form_sd);
     out.ci95 = {out.value - std::hypot(out.value - out.ci95[0], k95 * form_sd),
                 out.value + std::hypot(out.ci95[1] - out.value, k95 * form_sd)};
@@ -41,7 +42,7 @@ FoundParameter shared_parameter(const NeedleSystem& system, const inference::Unk
   if (!parameter.periodic)
     for (double& end : out.ci95) end = std::clamp(end, parameter.lower, parameter.upper);
   // The same but for whole turns: the one that is meant.
-  const double turned = model::meant(system.parameter(layout.set()[member], p), out.value) - out.value;
+  const double turned = model::meant(form, out.value) - out.value;
   out.value += turned;
   for (double& end : out.ci95) end += turned;
   const auto& held = model.fit->held;

@@ -39,9 +39,23 @@ Normal posterior_of(const LinearSystem& system) {
 }
 
 struct Moments {
-  double step = 0, step_sd = 0, parabola = 0;
+  double step = 0, step_sd = 0;
 };
-Moments moments_along_the_step(const LinearSystem& system) {
+Moments moments_of(const std::vector<ProfileStep>& steps) {
+  Moments out;
+  double square = 0;
+  for (const ProfileStep& one : steps) {
+    out.step += one.weight * one.middle;
+    square += one.weight * (one.middle * one.middle + one.width * one.width / 12);
+  }
+  out.step_sd = std::sqrt(square - out.step * out.step);
+  return out;
+}
+struct AlongTheStep {
+  Moments by_profile, by_refits;
+  bool parabola = false;  // nothing is to be refitted
+};
+AlongTheStep moments_along_the_step(const LinearSystem& system) {
   const Likelihood likelihood(system, Readings(system.data().recordings.size()), white(system));
   const Layout layout(system, {0, 1});
   const std::vector<VectorXd> local(system.data().recordings.size(), layout.local_start());
@@ -49,28 +63,38 @@ Moments moments_along_the_step(const LinearSystem& system) {
                         {.nuisance_sd = VectorXd::Zero(1), .curves = {}}, {}, {.tolerance = 1e-9});
   const CurveColumns none;
   const Profile profile(likelihood, none, there);
-  Moments out;
-  double square = 0;
-  for (const ProfileStep& one : posterior_along(profile, kStep, 0.02)) {
-    out.step += one.weight * one.middle;
-    square += one.weight * (one.middle * one.middle + one.width * one.width / 12);
-    out.parabola += one.weight * one.shared[kParabola];
-  }
-  out.step_sd = std::sqrt(square - out.step * out.step);
-  return out;
+  const VectorXd alone = VectorXd::Unit(there.shared.size(), kStep);
+  return {.by_profile = moments_of(posterior_along(profile, kStep, 0.02)),
+          .by_refits = moments_of(posterior_by_refits(likelihood, none, there, kStep, alone, 0.02, false)),
+          .parabola = posterior_by_refits(likelihood, none, there, kStep, alone, 0.02, true).empty()};
 }
 
 TEST(Profile, OfALinearModelIsTheNormalPosterior) {
   const LinearSystem system(4, 7, 0.3, 0, 0);
   const Normal expected = posterior_of(system);
-  const Moments found = moments_along_the_step(system);
   const double sd = std::sqrt(expected.covariance(kStep, kStep));
-  EXPECT_NEAR(found.step, expected.mean[kStep], 0.02 * sd);
-  EXPECT_NEAR(found.step_sd, sd, 0.02 * sd);
-  EXPECT_NEAR(found.parabola, expected.mean[kParabola], 0.02 * std::sqrt(expected.covariance(kParabola, kParabola)));
+  const AlongTheStep along = moments_along_the_step(system);
+  for (const Moments& found : {along.by_profile, along.by_refits}) {
+    EXPECT_NEAR(found.step, expected.mean[kStep], 0.02 * sd);
+    EXPECT_NEAR(found.step_sd, sd, 0.02 * sd);
+  }
 }
 
-TEST(Profile, AtABoundIsTheTruncatedNormalAndTheOthersMoveWithIt) {
+// Two standard deviations away the cost of a linear model is four more, if it is told how far a deviation is.
+TEST(Profile, NothingIsRefittedOfALinearModel) {
+  const LinearSystem system(4, 7, 0.3, 0, 0);
+  const Likelihood likelihood(system, Readings(4), white(system));
+  const Layout layout(system, {0, 1});
+  const Fit there = fit(likelihood, layout, layout.shared_start(), std::vector<VectorXd>(4, layout.local_start()),
+                        {.nuisance_sd = VectorXd::Zero(1), .curves = {}}, {}, {.tolerance = 1e-9});
+  const Normal expected = posterior_of(system);
+  const double sd = std::sqrt(expected.covariance(kStep, kStep));
+  const VectorXd by_step = expected.covariance.col(kStep) / (sd * sd);
+  EXPECT_TRUE(posterior_by_refits(likelihood, {}, there, kStep, by_step, sd, true).empty());
+  EXPECT_FALSE(posterior_by_refits(likelihood, {}, there, kStep, by_step, 1.3 * sd, true).empty());
+}
+
+TEST(Profile, AtABoundIsTheTruncatedNormal) {
   for (const double beyond_sds : {-0.5, 1.0, 2.5}) {
     LinearSystem system(4, 7, 0.3, 0, 0);
     const Normal free = posterior_of(system);
@@ -78,13 +102,12 @@ TEST(Profile, AtABoundIsTheTruncatedNormalAndTheOthersMoveWithIt) {
     system.least_size(1, free.mean[kStep] + beyond_sds * sd);
     const boost::math::normal normal;
     const double hazard = boost::math::pdf(normal, beyond_sds) / boost::math::cdf(complement(normal, beyond_sds));
-    const double step = free.mean[kStep] + sd * hazard;
-    const double parabola =
-        free.mean[kParabola] + free.covariance(kParabola, kStep) / (sd * sd) * (step - free.mean[kStep]);
-    const Moments found = moments_along_the_step(system);
-    EXPECT_NEAR(found.step, step, 0.02 * sd) << beyond_sds;
-    EXPECT_NEAR(found.parabola, parabola, 0.02 * sd) << beyond_sds;
-    EXPECT_NEAR(found.step_sd, sd * std::sqrt(1 + beyond_sds * hazard - hazard * hazard), 0.03 * sd) << beyond_sds;
+    const AlongTheStep along = moments_along_the_step(system);
+    EXPECT_FALSE(along.parabola) << beyond_sds;
+    for (const Moments& found : {along.by_profile, along.by_refits}) {
+      EXPECT_NEAR(found.step, free.mean[kStep] + sd * hazard, 0.03 * sd) << beyond_sds;
+      EXPECT_NEAR(found.step_sd, sd * std::sqrt(1 + beyond_sds * hazard - hazard * hazard), 0.03 * sd) << beyond_sds;
+    }
   }
 }
 
@@ -93,7 +116,7 @@ TEST(Profile, AtABoundIsTheTruncatedNormalAndTheOthersMoveWithIt) {
 class TwoScales final : public testing::HeldSystem {
  public:
   static constexpr double kFeed = 0.3, kPlace = 4, kSize = 2, kSigma = 0.01, kWidth = 0.01;
-  TwoScales() {
+  explicit TwoScales(double size = kSize) {
     data_.claimed_sd = {kSigma};
     data_.frame_s = 0.02;
     Series series;
@@ -105,10 +128,10 @@ class TwoScales final : public testing::HeldSystem {
       series.relative_sd.push_back(1);
     }
     for (const double t : series.time_s)
-      series.measured.push_back(reading(t, 1, 0, kFeed, kPlace, kSize) + normal(random));
+      series.measured.push_back(reading(t, 1, 0, kFeed, kPlace, size) + normal(random));
     data_.recordings = {{.series = {series}, .messages = 300, .duration_s = 6}};
     base_ = {{.name = "slope", .lower = 0.1, .upper = 10, .none = 0, .starts = {}, .prior = normal_prior(1, 0.001)}};
-    const auto size = [](const char* name) {
+    const auto share = [](const char* name) {
       return Parameter{
           .name = name, .lower = -0.9, .upper = 5, .none = 0, .starts = {0.1}, .prior = normal_prior(0, 1)};
     };
@@ -119,7 +142,7 @@ class TwoScales final : public testing::HeldSystem {
                     .starts = {1, 2, 3, 4, 5, 6},
                     .prior = normal_prior(4, 3)};
     effects_ = {
-        {"gain", "gain", {size("gain")}}, {"feed", "feed", {size("feed")}}, {"step", "step", {place, size("size")}}};
+        {"gain", "gain", {share("gain")}}, {"feed", "feed", {share("feed")}}, {"step", "step", {place, share("size")}}};
   }
   static double reading(double t, double slope, double gain, double feed, double place, double size) {
     // Without a width no derivative says anything of its place.
@@ -190,6 +213,34 @@ TEST(Search, WeighsBothNamesOfOnePathBesideAStep) {
   // One path: their evidence differs by the prior of the step's place alone.
   EXPECT_NEAR(visited.at({0, 2}).log_posterior(), visited.at({1, 2}).log_posterior(), 0.5);
   EXPECT_GT(visited.at({1, 2}).log_posterior(), search.best().log_posterior() - 1);
+}
+
+// Gain and feed without a step are one path: only (1 + gain) (1 + feed) is known, and the priors decide along that
+// hyperbola. The closed form: feed = known / (1 + gain) - 1, cost gain^2 + feed^2.
+TEST(Profile, FollowsACurvedRidge) {
+  const TwoScales system(0);
+  Noise noise;
+  noise.sigma = {TwoScales::kSigma};
+  noise.frame_s = 0.02;
+  const Likelihood likelihood(system, Readings(1), noise);
+  const Layout layout(system, {0, 1});
+  const Fit there = fit(likelihood, layout, VectorXd{{1, 0.1, 0.1}}, std::vector<VectorXd>(1, VectorXd::Zero(0)),
+                        {.nuisance_sd = VectorXd::Zero(0), .curves = {}}, {}, {.tolerance = 1e-9});
+  ASSERT_TRUE(there.valid);
+  const double known = (1 + there.shared[1]) * (1 + there.shared[2]);
+  EXPECT_NEAR(known, 1 + TwoScales::kFeed, 0.01);
+  const Moments found = moments_of(posterior_by_refits(likelihood, {}, there, 1, VectorXd{{0, 1, -1}}, 0.5, true));
+  double sum = 0, first = 0, second = 0;
+  const double least = std::pow(there.shared[1], 2) + std::pow(there.shared[2], 2);
+  for (double gain = -0.7; gain < 5; gain += 1e-3) {
+    const double feed = known / (1 + gain) - 1;
+    if (feed < -0.9 || feed > 5) continue;
+    const double weight = std::exp(-0.5 * (gain * gain + feed * feed - least));
+    sum += weight, first += weight * gain, second += weight * gain * gain;
+  }
+  const double mean = first / sum, sd = std::sqrt(second / sum - mean * mean);
+  EXPECT_NEAR(found.step, mean, 0.05 * sd);
+  EXPECT_NEAR(found.step_sd, sd, 0.05 * sd);
 }
 
 TEST(Fit, KeepsWhatIsFixed) {
