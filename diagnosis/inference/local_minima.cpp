@@ -3,7 +3,9 @@
 #include <Eigen/Cholesky>
 #include <algorithm>
 #include <cmath>
+#include <functional>
 #include <limits>
+#include <map>
 
 #include "diagnosis/inference/profile.hpp"
 
@@ -18,6 +20,7 @@ namespace {
 constexpr int kFiner = 5;
 constexpr int kPhases = 12;
 constexpr int kScans = 4;
+constexpr std::size_t kJumps = 3;        // in a recording, at which an instant is tried
 constexpr double kInstantWidth_s = 0.1;  // of an instant's posterior, while it is not known yet
 constexpr std::size_t kGrid = 5;         // starts from which on a parameter is taken to have many local minima
 constexpr int kSteps = 10;               // of a scan, to each side
@@ -29,7 +32,25 @@ constexpr int kWaypoints = 10;      // from one effect to another
 // What an instant has to bring in a recording to be taken for one, in chi2: its expected odds.
 double instant_cost(double duration_s) { return 2 * std::log(kHappensNot / kHappens * duration_s / kInstantWidth_s); }
 
-// Every phase and instant of the recordings from first to last at the best of a grid, all else as it is.
+// Just before the readings that are least expected from those before them, the worst first: with autocorrelated noise
+// any wrong instant costs two such jumps, wherever it is, and a grid goes past the one that costs none.
+std::vector<double> before_jumps(const SeriesSet& data, const VectorXd& white, double frame_s) {
+  if (white.size() != data.rows()) return {};  // the model has no value there
+  std::map<double, double> squares;
+  Index row = 0;
+  for (const Series& series : data.series)
+    for (const double time_s : series.time_s) squares[time_s] += white[row] * white[row], ++row;
+  std::vector<std::pair<double, double>> worst;
+  for (const auto& [time_s, square] : squares) worst.emplace_back(square, time_s);
+  const auto most = std::min(kJumps, worst.size());
+  std::partial_sort(worst.begin(), worst.begin() + static_cast<std::ptrdiff_t>(most), worst.end(), std::greater<>());
+  std::vector<double> out;
+  for (std::size_t i = 0; i < most; ++i) out.push_back(worst[i].second - 0.5 * frame_s);
+  return out;
+}
+
+// Every phase and instant of the recordings from first to last at the best of a grid, all else as it is; an instant
+// also where the readings jump if it did not happen.
 void scan_local(const Likelihood& likelihood, const Layout& layout, const VectorXd& shared,
                 std::vector<VectorXd>& local, std::size_t first, std::size_t last) {
   Residuals residuals;
@@ -52,7 +73,13 @@ void scan_local(const Likelihood& likelihood, const Layout& layout, const Vector
         const double there = cost_at(value);
         if (there < least) least = there, best = value;
       };
-      if (instant) try_at(0);
+      if (instant) {
+        try_at(0);
+        // The residuals are those of what was tried last.
+        for (const double at_s :
+             before_jumps(likelihood.data().recordings[r], residuals.white, likelihood.data().frame_s))
+          if (at_s > lower && at_s < upper) try_at(at_s);
+      }
       const int count =
           instant ? std::max(4, static_cast<int>(std::lround((upper - lower) / kInstantSpacing_s))) : kPhases;
       for (int k = 0; k < count; ++k) try_at(lower + (upper - lower) * (k + 0.5) / count);

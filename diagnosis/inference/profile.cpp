@@ -139,9 +139,10 @@ std::vector<ProfileStep> posterior_by_refits(const Likelihood& likelihood, const
     return there.valid ? std::min(std::sqrt(std::max(0.0, there.cost - fit.cost)), kNothingLeft) : kNothingLeft;
   };
   const auto is_parabola = [&](double direction) {
-    const double value = std::clamp(fit.shared[which] + direction * kTried_sd * near, p.lower, p.upper);
-    const double away = (value - fit.shared[which]) / near, root = root_of(fitted_at(fit, value));
-    return std::abs(root * root - away * away) <= kOffParabola * away * away;
+    const double value = fit.shared[which] + direction * kTried_sd * near;
+    if (value < p.lower || value > p.upper) return false;  // what is cut off is no normal density
+    const double root = root_of(fitted_at(fit, value));
+    return std::abs(root * root - kTried_sd * kTried_sd) <= kOffParabola * kTried_sd * kTried_sd;
   };
   if (parabola && is_parabola(-1) && is_parabola(1)) return {};
   std::vector<ProfileStep> out;

@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <boost/math/distributions/chi_squared.hpp>
 #include <boost/math/distributions/non_central_chi_squared.hpp>
+#include <boost/math/distributions/normal.hpp>
 #include <cmath>
 
 namespace bevel::inference {
@@ -27,6 +28,7 @@ void SquaredSize::add(double weight, double squared_mean) {
 }
 
 double SquaredSize::above(double value) const {
+  constexpr double kManyDegrees = 1e4;  // from where on it is a normal one, to a hundredth
   const auto& [c1, c2, c3, c4] = cumulants_;
   if (!(c2 > 0)) return 0;
   const double skewness = c3 / std::pow(c2, 1.5), kurtosis = c4 / (c2 * c2);  // over sqrt(8) and 12
@@ -34,6 +36,8 @@ double SquaredSize::above(double value) const {
   const double a = both ? 1 / (skewness - std::sqrt(skewness * skewness - kurtosis)) : 1 / skewness;
   const double noncentrality = both ? skewness * a * a * a - a * a : 0;
   const double degrees = both ? a * a - 2 * noncentrality : 1 / (skewness * skewness);
+  if (degrees + noncentrality > kManyDegrees)
+    return boost::math::cdf(boost::math::complement(boost::math::normal(c1, std::sqrt(2 * c2)), value));
   const double there = (value - c1) / std::sqrt(c2) * a + degrees + noncentrality;
   if (!(there > 0)) return 1;
   if (noncentrality > 0)
