@@ -160,7 +160,8 @@ std::string describe_distribution() {
          "Scaled to 4 to 60 standard deviations in half of the cases.\n\n" +
          table(false) +
          "| beam | modulus 3 to 20 kPa (log-uniform), force 0.7 to 1.2 N, guide gap 0.5 to 10, in half of the cases 10 "
-         "to 40 % of the tissue relaxes in 1 to 6 s | the shaft as a beam in elastic tissue that remembers its cut |\n"
+         "to 40 % of the tissue relaxes in 1 to 6 s | the shaft as a beam in elastic tissue that remembers its cut, "
+         "written along the shaft (up to the eighteenth trial about the insertion axis, with slopes for angles) |\n"
          "\nThe truth about a beam in elastic tissue is tip_swing, bending_mm = (4 EI / modulus)^(1/4) and guide_mm, "
          "as "
          "visible as what the closest bicycle (k, lambda1, lambda2 refitted to the noise-free paths, ell drawn as "

@@ -100,6 +100,7 @@ struct Kinematic {
   bool way_point = false;
   bool retract = false;
   double camera_turned_rad = 0;     // of both, about a drawn axis across the needle
+  double told_slope_sd_rad = 0;     // by how much insertions' entry slopes differ; 0: the default
   double camera_late_s = 0;         // of both
   estimator::NuisancePrior told{};  // states of the filter
   bool by_flips = false;
@@ -150,6 +151,7 @@ Trial kinematic(const Kinematic& kind, std::uint64_t seed) {
   trial.rig.cameras.outlier_share = kind.outlier_share;
   trial.rig.cameras.turned_rad = kind.camera_turned_rad * Eigen::Vector3d(std::cos(angle), std::sin(angle), 0);
   trial.believed.estimator.nuisance = kind.told;
+  if (kind.told_slope_sd_rad > 0) trial.believed.estimator.entry_slope_sd_rad = kind.told_slope_sd_rad;
   trial.needle = {.bicycle = truth, .effects = effects, .roll_rad = roll_rad};
   trial.rig.make_plant = [needle = trial.needle] {
     return std::make_unique<rig::KinematicPlant>(needle.bicycle, needle.effects, needle.roll_rad, model::OwnValues{},
@@ -263,6 +265,12 @@ const std::vector<Scenario>& scenarios() {
       scenario<Kinematic>(Row::table, "camera-turned",
                           "both cameras' frame turned by 2 degrees about an axis across the needle",
                           {.camera_turned_rad = 2 * kDegree_rad}, kinematic),
+      scenario<Kinematic>(Row::apart, "camera-turned-good-guide",
+                          "the same, told that insertions' own slopes differ by 0.2 degrees",
+                          {.camera_turned_rad = 2 * kDegree_rad, .told_slope_sd_rad = 0.2 * kDegree_rad}, kinematic),
+      scenario<Kinematic>(Row::apart, "good-guide",
+                          "the frame as it should be, told that insertions' own slopes differ by 0.2 degrees",
+                          {.told_slope_sd_rad = 0.2 * kDegree_rad}, kinematic),
       scenario<Kinematic>(Row::apart, "camera-turned-5", "both cameras' frame turned by 5 degrees",
                           {.camera_turned_rad = 5 * kDegree_rad}, kinematic),
       scenario<Kinematic>(Row::apart, "late", "both cameras' stamps late by 50 ms, unknown", {.camera_late_s = 0.05},
