@@ -172,7 +172,7 @@ std::vector<CurveFactor> Discrepancy::scan(const Marginal& beside) const {
           one.log_bayes_factor += 0.5 * (squared_mean - std::log1p(seen));
           one.visible.add(seen / (1 + seen), squared_mean);
         }
-        out.push_back(std::move(one));
+        out.push_back(one);
       }
     }
   }

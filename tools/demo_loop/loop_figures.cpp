@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <cstdio>
+#include <map>
 #include <numbers>
 #include <stdexcept>
 
@@ -36,12 +37,15 @@ double rate_hz(std::size_t count, std::int64_t first_utime, std::int64_t last_ut
 void measure_latencies(const std::string& log_path, LoopFigures& f) {
   const io::FileBytes file(log_path);
   io::LogReader reader(file.bytes());
-  std::vector<double> to_measurement, to_command, periods;
+  std::vector<double> to_measurement, to_command, on_to_command, periods;
   std::int64_t newest_used = 0, answered = 0, last_command = 0;
+  std::map<std::int64_t, std::int64_t> arrived;  // of measurements: when, by what they were captured at
   while (const auto event = reader.next()) {
     if (event->channel == io::channel::kTipMeasurement) {
-      if (const auto m = io::checked_decode<tip_measurement_t>(event->data.data(), event->data.size()))
+      if (const auto m = io::checked_decode<tip_measurement_t>(event->data.data(), event->data.size())) {
         to_measurement.push_back(static_cast<double>(event->timestamp_us - m->utime) * 1e-3);
+        arrived[m->utime] = event->timestamp_us;
+      }
     } else if (event->channel == io::channel::kNeedleState) {
       if (const auto m = io::checked_decode<needle_state_t>(event->data.data(), event->data.size()))
         newest_used = m->measurement_utime;
@@ -50,11 +54,17 @@ void measure_latencies(const std::string& log_path, LoopFigures& f) {
       last_command = event->timestamp_us;
       if (newest_used <= answered) continue;
       answered = newest_used;
+      // At rest nothing is answered: the period alone commands.
+      const auto m = io::checked_decode<motion_command_t>(event->data.data(), event->data.size());
+      if (!m || (m->insertion_rate_mm_s == 0 && m->rotation_rate_rad_s == 0)) continue;
       to_command.push_back(static_cast<double>(event->timestamp_us - newest_used) * 1e-3);
+      if (const auto at = arrived.find(newest_used); at != arrived.end())
+        on_to_command.push_back(static_cast<double>(event->timestamp_us - at->second) * 1e-3);
     }
   }
   f.camera_to_measurement_ms = percentiles(std::move(to_measurement));
   f.camera_to_command_ms = percentiles(std::move(to_command));
+  f.measurement_to_command_ms = percentiles(std::move(on_to_command));
   f.command_period_ms = percentiles(std::move(periods));
 }
 
@@ -137,7 +147,8 @@ std::string to_text(const LoopFigures& f) {
                 "rates      commands %.1f Hz, estimates %.1f Hz, measurements %.1f Hz (%lld, %lld not usable, %lld "
                 "messages refused)\n"
                 "latency    camera to measurement p50 %.1f ms, p99 %.1f ms (%zu)\n"
-                "           camera to command     p50 %.1f ms, p99 %.1f ms (%zu)\n"
+                "           camera to command     p50 %.1f ms, p99 %.1f ms (%zu, in motion)\n"
+                "           measurement to command p50 %.2f ms, p99 %.2f ms (%zu)\n"
                 "period     of commands           p50 %.2f ms, p99 %.2f ms (%zu)\n",
                 f.targeting_error_mm, f.target_mm.x(), f.target_mm.y(), f.target_mm.z(), f.estimator_error_end_mm,
                 f.estimator_error_rms_mm, f.estimator_error_max_mm, f.curvature_per_mm, f.curvature_sd_per_mm,
@@ -148,6 +159,7 @@ std::string to_text(const LoopFigures& f) {
                 static_cast<long long>(f.measurements_unusable), static_cast<long long>(f.rejected_messages),
                 f.camera_to_measurement_ms.p50, f.camera_to_measurement_ms.p99, f.camera_to_measurement_ms.count,
                 f.camera_to_command_ms.p50, f.camera_to_command_ms.p99, f.camera_to_command_ms.count,
+                f.measurement_to_command_ms.p50, f.measurement_to_command_ms.p99, f.measurement_to_command_ms.count,
                 f.command_period_ms.p50, f.command_period_ms.p99, f.command_period_ms.count);
   return text;
 }

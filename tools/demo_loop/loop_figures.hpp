@@ -30,7 +30,9 @@ struct LoopFigures {
   double command_rate_hz = 0, estimate_rate_hz = 0, measurement_rate_hz = 0;
   Percentiles command_period_ms;
   Percentiles camera_to_measurement_ms;  // capture to arrival of TIP_MEASUREMENT
-  Percentiles camera_to_command_ms;      // capture to arrival of the first command made after an estimate that used it
+  // In motion: capture to arrival of the first command made after an estimate that used it, and of that what is not the
+  // camera's, from the newest measurement it used on.
+  Percentiles camera_to_command_ms, measurement_to_command_ms;
   std::int64_t measurements = 0, measurements_unusable = 0, rejected_messages = 0;
 };
 

@@ -160,7 +160,8 @@ void add_tables(report::Page& page, const LoopFigures& f) {
   };
   page.table({"time (ms)", "median", "99 %", "count"},
              {times("from capture to measurement", f.camera_to_measurement_ms),
-              times("from capture to the command that used it", f.camera_to_command_ms),
+              times("in motion, from capture to the command that used it", f.camera_to_command_ms),
+              times("of that, from measurement to command", f.measurement_to_command_ms),
               times("between commands", f.command_period_ms)},
              text("A second: %.0f commands, %.0f estimates, ", f.command_rate_hz, f.estimate_rate_hz) +
                  text("%.0f measurements. ", f.measurement_rate_hz) + std::to_string(f.measurements_unusable) + " of " +
