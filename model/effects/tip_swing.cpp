@@ -146,8 +146,7 @@ class TipSwing final : public Effect {
   static constexpr std::size_t kTilt = 3;
 
   static Dual depth_halfway(const LegView& leg) { return leg.tip_depth_mm + 0.5 * leg.insertion_mm * leg.heading_z; }
-  // How much of the force cut the tissue that the tip is at.
-  // share: of the leg, from its start.
+  // How much of the force cut the tissue that the tip is at; share: of the leg, from its start.
   static double cut_by(const LegView& leg, const EffectMemory& memory, double share) {
     const auto& [front_mm, behind_mm, due_rad, force, force_before, due_before_rad] = memory.number;
     const double in_mm = front_mm - behind_mm - (1 - share) * leg.insertion_mm.value - leg.entry.insertion_mm;
