@@ -18,6 +18,7 @@ model::AugmentedState NeedleFilter::augmented(const FilterState& state) const {
   augmented.tip_rotation_rad = effects.tip_rotation_rad;
   for (std::size_t i = 0; i < config_.effects.size(); ++i) {
     for (std::size_t k = 0; k < model::EffectMemory::kSlots; ++k) augmented.memory[i].slot[k] = effects.slot[i][k];
+    augmented.memory[i].number = effects.number[i];
     augmented.memory[i].phase = effects.phase[i];
   }
   return augmented;
@@ -48,6 +49,7 @@ bool NeedleFilter::predict_with_effects(FilterState& state, const model::BaseMot
   effects.tip_rotation_rad = moved.tip_rotation_rad.value;
   for (std::size_t i = 0; i < config_.effects.size(); ++i) {
     for (std::size_t k = 0; k < model::EffectMemory::kSlots; ++k) effects.slot[i][k] = moved.memory[i].slot[k].value;
+    effects.number[i] = moved.memory[i].number;
     effects.phase[i] = moved.memory[i].phase;
   }
   return true;

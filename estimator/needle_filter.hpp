@@ -31,6 +31,7 @@ struct EffectState {
   model::BaseMotion entry, base;
   double tip_insertion_mm = 0, tip_rotation_rad = 0;
   std::array<std::array<double, model::EffectMemory::kSlots>, model::kMaxEffects> slot{};
+  std::array<std::array<double, model::EffectMemory::kNumbers>, model::kMaxEffects> number{};
   std::array<int, model::kMaxEffects> phase{};
 };
 

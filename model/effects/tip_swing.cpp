@@ -61,14 +61,17 @@ class TipSwing final : public Effect {
             Dual& rotation_rad) const override {
     if (p[2].value <= kShortest_mm) return;
     auto& [front_mm, behind_mm, due_rad, force, force_before, due_before_rad] = memory.number;
-    if (memory.phase == 0) {
+    const double depth_mm = leg.tip_depth_mm.value;
+    if (memory.phase == 0) {  // from the entry on, or from where it is looked at first: there it cuts
       memory.phase = 1;
-      front_mm = leg.entry.insertion_mm;
+      front_mm = leg.from.insertion_mm;
+      force = std::clamp(depth_mm / kBevel_mm, 0.0, 1.0);
     }
+    const double by_mm = insertion_mm.value - (front_mm - behind_mm);
     front_mm = std::max(front_mm, insertion_mm.value);
     behind_mm = front_mm - insertion_mm.value;
-    const double in_mm = std::min(insertion_mm.value - leg.entry.insertion_mm, kBevel_mm);
     force_before = force, due_before_rad = due_rad;
+    const double in_mm = std::min(depth_mm + by_mm * leg.heading_z.value, kBevel_mm);
     force = std::clamp((in_mm - behind_mm) / kBevel_mm, 0.0, 1.0);
     due_rad = 0;
     if (behind_mm > kAtFront_mm) {
@@ -76,10 +79,10 @@ class TipSwing final : public Effect {
       rotation_rad = leg.tip_rotation_rad;
     }
   }
-  void curvature(Parameters p, const LegView& leg, EffectMemory& memory, Dual2& kappa_per_mm) const override {
+  void curvature(Parameters p, const LegView& leg, EffectMemory& /*memory*/, Dual2& kappa_per_mm) const override {
     if (p[2].value <= kShortest_mm) return;
     const End end = end_at((depth_halfway(leg) + p[3]) / p[2]);
-    for (Dual& k : kappa_per_mm) k = k * end.g * end.h * cut_by(leg, memory, 0.5);
+    for (Dual& k : kappa_per_mm) k = k * end.g * end.h * cut_by(leg, 0.5);
   }
   void settle(Parameters p, const LegView& leg, EffectMemory& memory) const override {
     const double side = leg.curvature_per_mm.value < 0 ? -1 : 1;
@@ -92,7 +95,7 @@ class TipSwing final : public Effect {
       const End end = end_at(deep(0.5));
       const Dual slope = 0.5 * side * leg.curvature_per_mm * p[2], radius_mm = side * slope * p[2];
       const Dual2 toward = leg.toward_bevel();
-      const double cut_before = cut_by(leg, memory, 0), cut = cut_by(leg, memory, 1), by = cut_by(leg, memory, 0.5);
+      const double cut_before = cut_by(leg, 0), cut = cut_by(leg, 1), by = cut_by(leg, 0.5);
       for (std::size_t i = 0; i < 2; ++i) body[i] = 2.0 * by * slope * end.h * leg.insertion_mm * toward[i];
       memory.slot[2] -= 1.5 * by * by * slope * slope * end.h * end.h * leg.insertion_mm;
       // The path is cut where the tip is: it has the turns, at rest too, and the force that comes up. From (0, -1).
@@ -147,9 +150,8 @@ class TipSwing final : public Effect {
 
   static Dual depth_halfway(const LegView& leg) { return leg.tip_depth_mm + 0.5 * leg.insertion_mm * leg.heading_z; }
   // How much of the force cut the tissue that the tip is at; share: of the leg, from its start.
-  static double cut_by(const LegView& leg, const EffectMemory& memory, double share) {
-    const auto& [front_mm, behind_mm, due_rad, force, force_before, due_before_rad] = memory.number;
-    const double in_mm = front_mm - behind_mm - (1 - share) * leg.insertion_mm.value - leg.entry.insertion_mm;
+  static double cut_by(const LegView& leg, double share) {
+    const double in_mm = leg.tip_depth_mm.value + share * leg.insertion_mm.value * leg.heading_z.value;
     return std::clamp(in_mm / kBevel_mm, 0.0, 1.0);
   }
   struct End {

@@ -2,6 +2,7 @@
 // effect in the model and not without.
 #include <gtest/gtest.h>
 
+#include <cmath>
 #include <iostream>
 
 #include "estimator/needle_estimator.hpp"
@@ -96,6 +97,37 @@ TEST(EstimatorEffects, InnovationsAreInTheirBandWithTheEffectAndNotWithout) {
               << " without, band [" << known.lowest() << ", " << known.highest() << "], seed " << kSeed << "\n";
     EXPECT_TRUE(known.in_band()) << one.effect->name();
     EXPECT_GT(left_out.mean(), left_out.highest()) << one.effect->name();
+  }
+}
+
+// Without a reading the filter goes where the model goes: what each effect remembers is kept from step to step. The
+// needle is drawn back, turned and inserted again.
+TEST(EstimatorEffects, WithoutReadingsTheFilterFollowsTheModel) {
+  for (const model::Effect* one : model::all_effects()) {
+    model::ActiveEffect active{.effect = one, .parameters = {}};
+    const auto& parameters = one->parameters();
+    const std::uint32_t kind = one->variants().back();
+    for (std::size_t i = 0; i < parameters.size(); ++i) {
+      const double usual = model::value_if_unsaid(parameters[i]);
+      active.parameters[i] = (kind >> i & 1U) != 0 ? parameters[i].starts.front() : std::isnan(usual) ? 0 : usual;
+    }
+    const NeedleFilter filter(config_with({active}));
+    FilterState state = filter.initial();
+    const model::AugmentedNeedle needle(filter.config().prior.needle, {active});
+    model::AugmentedState expected = needle.entry({});
+    model::BaseMotion base;
+    for (int i = 0; i < 800; ++i) {
+      const double insertion_mm = i < 400 ? 0.1 : i < 500 ? -0.1 : i < 560 ? 0 : 0.1;
+      const double rotation_rad = (i >= 200 && i < 300) || (i >= 500 && i < 560) ? 0.03 : 0;
+      filter.predict(state, insertion_mm, rotation_rad, 0.01);
+      base = {base.time_s + 0.01, base.insertion_mm + insertion_mm, base.rotation_rad + rotation_rad};
+      ASSERT_TRUE(needle.advance(expected, base));
+      if (i % 50 != 0) continue;
+      model::TipReading reading{Eigen::Vector3d::Zero(), model::PointColumns(3, 0)};
+      needle.point(expected, reading);
+      needle.through_cameras(reading);
+      ASSERT_LT((filter.seen_position_mm(state) - reading.position_mm).norm(), 1e-9) << one->name() << ", step " << i;
+    }
   }
 }
 
