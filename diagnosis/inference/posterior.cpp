@@ -35,10 +35,6 @@ ArrowSolution solve_without(const Fit& fit, const std::vector<ArrowBlock>& block
   return solve(blocks, pulls.precision, pulls.centre, rules);
 }
 
-}  // namespace
-
-namespace {
-
 // A fit's curve values, their covariance, and the form in them whose square root is their visible size.
 struct VisibleCurve {
   VectorXd values;

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <utility>
 
 namespace bevel::inference {
 
@@ -23,6 +24,13 @@ constexpr int kSteps = 6;
 constexpr double kTried_sd = 2, kOffParabola = 0.25;
 constexpr double kLeastRise = 0.4, kMostRise = 1.2, kNothingLeft = 3.5;
 constexpr int kMostRefits = 24, kBetween = 6;
+
+std::vector<ProfileStep> of_sum_one(std::vector<ProfileStep> steps) {
+  double sum = 0;
+  for (const ProfileStep& one : steps) sum += one.weight;
+  for (ProfileStep& one : steps) one.weight /= sum;
+  return steps;
+}
 
 }  // namespace
 
@@ -121,10 +129,7 @@ std::vector<ProfileStep> posterior_along(const Profile& profile, Index which, do
       if (now < std::exp(-0.5 * kNegligible)) break;
     }
   }
-  double sum = 0;
-  for (const ProfileStep& one : out) sum += one.weight;
-  for (ProfileStep& one : out) one.weight /= sum;
-  return out;
+  return of_sum_one(std::move(out));
 }
 
 std::vector<ProfileStep> posterior_by_refits(const Likelihood& likelihood, const CurveColumns& curve, const Fit& fit,
@@ -146,7 +151,6 @@ std::vector<ProfileStep> posterior_by_refits(const Likelihood& likelihood, const
   };
   if (parabola && is_parabola(-1) && is_parabola(1)) return {};
   std::vector<ProfileStep> out;
-  double sum = 0;
   for (const double direction : {-1.0, 1.0}) {
     Fit from = fit;
     double root = 0, step = near;
@@ -164,14 +168,12 @@ std::vector<ProfileStep> posterior_by_refits(const Likelihood& likelihood, const
         const double width = std::abs(end - begin) / kBetween;
         out.push_back(
             {.weight = std::exp(-0.5 * at * at) * width, .middle = begin + share * (end - begin), .width = width});
-        sum += out.back().weight;
       }
       if (risen - root < kLeastRise) step *= 2;
       root = risen, from = std::move(there);
     }
   }
-  for (ProfileStep& one : out) one.weight /= sum;
-  return out;
+  return of_sum_one(std::move(out));
 }
 
 }  // namespace bevel::inference

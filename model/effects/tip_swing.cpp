@@ -81,7 +81,7 @@ class TipSwing final : public Effect {
   }
   void curvature(Parameters p, const LegView& leg, EffectMemory& /*memory*/, Dual2& kappa_per_mm) const override {
     if (p[2].value <= kShortest_mm) return;
-    const End end = end_at((depth_halfway(leg) + p[3]) / p[2]);
+    const End end = end_at(bending_lengths(p, leg, 0.5));
     for (Dual& k : kappa_per_mm) k = k * end.g * end.h * cut_by(leg, 0.5);
   }
   void settle(Parameters p, const LegView& leg, EffectMemory& memory) const override {
@@ -89,10 +89,7 @@ class TipSwing final : public Effect {
     Dual kept = 1;  // what is left of all before
     Dual2 body;     // what the offset grows by, in {B} at the start of the leg
     if (p[2].value > kShortest_mm) {
-      const auto deep = [&](double share) {
-        return (leg.tip_depth_mm + share * leg.insertion_mm * leg.heading_z + p[3]) / p[2];
-      };
-      const End end = end_at(deep(0.5));
+      const End end = end_at(bending_lengths(p, leg, 0.5));
       const Dual slope = 0.5 * side * leg.curvature_per_mm * p[2], radius_mm = side * slope * p[2];
       const Dual2 toward = leg.toward_bevel();
       const double cut_before = cut_by(leg, 0), cut = cut_by(leg, 1), by = cut_by(leg, 0.5);
@@ -104,17 +101,15 @@ class TipSwing final : public Effect {
       body[1] -= radius_mm * end.g * (cut_cos - cut_before);
       // Behind its end the tip is off the path by what the force lacks of that which has cut there.
       const auto& [front_mm, behind_mm, due_rad, force, force_before, due_before_rad] = memory.number;
-      const bool was_behind = force_before < cut_before || due_before_rad != 0;
-      if (was_behind) {
-        const Dual g = radius_mm * end_at(deep(0)).g;
-        body[0] -= g * (force_before * std::sin(due_before_rad));
-        body[1] += g * (force_before * std::cos(due_before_rad) - cut_before);
-      }
-      if (force < cut || due_rad != 0) {
-        const Dual g = radius_mm * end_at(deep(1)).g, turned = leg.rotation_rad + due_rad;
-        body[0] += g * (force * sin(turned) - cut_sin);
-        body[1] -= g * (force * cos(turned) - cut_cos);
-      }
+      const auto off_path = [&](double sign, double share, double pushes, const Dual& turned, const Dual& cuts_sin,
+                                const Dual& cuts_cos) {
+        const Dual g = sign * radius_mm * end_at(bending_lengths(p, leg, share)).g;
+        body[0] += g * (pushes * sin(turned) - cuts_sin);
+        body[1] -= g * (pushes * cos(turned) - cuts_cos);
+      };
+      if (force_before < cut_before || due_before_rad != 0)
+        off_path(-1, 0, force_before, due_before_rad, 0, cut_before);
+      if (force < cut || due_rad != 0) off_path(1, 1, force, leg.rotation_rad + due_rad, cut_sin, cut_cos);
       memory.slot[kTilt] = side * slope * end.h * force;
     } else {
       Dual of_turn_mm = p[0];  // what a turn within the leg leaves at its end
@@ -148,8 +143,11 @@ class TipSwing final : public Effect {
   static constexpr double kAtFront_mm = 0.1;  // nearer to the channel's end than this a turn turns the path
   static constexpr std::size_t kTilt = 3;
 
-  static Dual depth_halfway(const LegView& leg) { return leg.tip_depth_mm + 0.5 * leg.insertion_mm * leg.heading_z; }
-  // How much of the force cut the tissue that the tip is at; share: of the leg, from its start.
+  // From the guide to the tip; share: of the leg, from its start.
+  static Dual bending_lengths(Parameters p, const LegView& leg, double share) {
+    return (leg.tip_depth_mm + share * leg.insertion_mm * leg.heading_z + p[3]) / p[2];
+  }
+  // How much of the force cut the tissue that the tip is at.
   static double cut_by(const LegView& leg, double share) {
     const double in_mm = leg.tip_depth_mm.value + share * leg.insertion_mm.value * leg.heading_z.value;
     return std::clamp(in_mm / kBevel_mm, 0.0, 1.0);
