@@ -1,6 +1,7 @@
 #pragma once
 // The noise to begin with and the outliers: what a flexible curve leaves beside the base alone.
 #include "diagnosis/inference/likelihood.hpp"
+#include "diagnosis/inference/outliers.hpp"
 
 namespace bevel::inference {
 

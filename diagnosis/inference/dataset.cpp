@@ -21,6 +21,7 @@ Dataset without(const Dataset& data, const Readings& readings) {
         kept.measured.push_back(series.measured[i]);
         kept.relative_sd.push_back(series.relative_sd[i]);
         if (!series.input_sd.empty()) kept.input_sd.push_back(series.input_sd[i]);
+        if (!series.precision.empty()) kept.precision.push_back(series.precision[i]);
       }
       series = std::move(kept);
     }

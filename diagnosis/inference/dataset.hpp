@@ -15,6 +15,8 @@ struct Series {
   // Standard deviation by what the model's inputs are not known to, of each reading by itself, in standard deviations
   // of the channel's noise. Empty: none.
   std::vector<double> input_sd;
+  // Of each reading's innovation where the noise has heavy tails (heavy_tails.hpp), relative to normal noise. Empty: 1.
+  std::vector<double> precision;
 };
 
 struct SeriesSet {
@@ -39,6 +41,9 @@ struct Dataset {
     return count;
   }
 };
+
+// Values of all readings, per recording and channel.
+using ByReading = std::vector<std::vector<std::vector<double>>>;
 
 // Readings by their message, per recording.
 using Readings = std::vector<std::vector<std::size_t>>;

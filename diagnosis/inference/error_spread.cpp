@@ -1,7 +1,9 @@
 #include "diagnosis/inference/error_spread.hpp"
 
 #include <Eigen/Cholesky>
+#include <cmath>
 #include <limits>
+#include <numeric>
 
 #include "diagnosis/inference/recording_rows.hpp"
 
@@ -71,33 +73,118 @@ std::vector<ExpectedErrors> expected_errors(const RawRows& raw, const SeriesSet&
   return out;
 }
 
-Noise noise_beside(const Fit& fit, const CurveColumns& curve) {
-  Noise noise = fit.likelihood->noise();
-  const auto raw = raw_rows(fit, curve);
-  if (raw.empty()) return noise;
-  const Dataset& data = fit.likelihood->data();
-  const Pulls pulls = pulls_of(fit.layout, fit.shared, fit.curve_values, curve.covariance);
-  VectorXd precision = local_precision_of(fit.layout, fit.scales);
-  hold_scanned(fit.layout, precision);
-  ArrowRules rules;
-  rules.held = fit.held;
-  std::vector<ArrowBlock> blocks(raw.size());
-  std::vector<std::vector<ExpectedErrors>> errors(raw.size());
-  for (int step = 0; step < kSteps; ++step) {
-    for (std::size_t r = 0; r < raw.size(); ++r) {
-      blocks[r] = block_by(raw[r], data.recordings[r], noise);
-      blocks[r].precision = precision;
-      blocks[r].centre = nuisance_centre(fit.layout, fit.local[r]);
+namespace {
+
+using ByChannel = std::vector<std::vector<ExpectedErrors>>;
+
+ByReading precision_in(const Dataset& data) {
+  ByReading out;
+  for (const SeriesSet& set : data.recordings) {
+    auto& own = out.emplace_back();
+    for (const Series& series : set.series) own.push_back(series.precision);
+  }
+  return out;
+}
+
+// How heavy the tails are, and each innovation's precision by its expected square.
+void refine_tails(const ByChannel& errors, Dataset& data, Noise& noise) {
+  std::vector<double> squares;
+  for (std::size_t r = 0; r < errors.size(); ++r)
+    for (std::size_t c = 0; c < errors[r].size(); ++c) {
+      Series& series = data.recordings[r].series[c];
+      series.precision.clear();
+      const VectorXd own = errors[r][c].whitened_squares(make_whitening(series, noise.of(c), noise.sigma[c]));
+      squares.insert(squares.end(), own.begin(), own.end());
     }
-    const ArrowSolution solution = solve(blocks, pulls.precision, pulls.centre, rules);
-    if (!solution.valid) break;
-    for (std::size_t r = 0; r < raw.size(); ++r)
-      errors[r] = expected_errors(raw[r], data.recordings[r], blocks[r], solution, r);
+  // The deviation is that of all; how it is shared among the channels, the weights say.
+  const double mean = std::accumulate(squares.begin(), squares.end(), 0.0) / static_cast<double>(squares.size());
+  for (double& square : squares) square /= mean;
+  for (double& sigma : noise.sigma) sigma *= std::sqrt(mean);
+  noise.tails = likeliest_tails(squares);
+  if (noise.tails.degrees == 0) return;
+  std::size_t next = 0;
+  for (SeriesSet& set : data.recordings)
+    for (Series& series : set.series)
+      while (series.precision.size() < series.time_s.size())
+        series.precision.push_back(precision_of(squares[next++], noise.tails));
+}
+
+}  // namespace
+
+bool alike(const NoiseBeside& a, const Likelihood& b) {
+  constexpr double kMeanShare = 0.02;  // of a precision
+  if (!alike(a.noise, b.noise()) || a.noise.tails.degrees != b.noise().tails.degrees) return false;
+  double change = 0, count = 0;
+  for (std::size_t r = 0; r < a.precision.size(); ++r)
+    for (std::size_t c = 0; c < a.precision[r].size(); ++c) {
+      const auto& now = a.precision[r][c];
+      const auto& before = b.data().recordings[r].series[c].precision;
+      for (std::size_t i = 0; i < now.size(); ++i) change += std::abs(now[i] - (before.empty() ? 1 : before[i]));
+      count += static_cast<double>(now.size());
+    }
+  return change <= kMeanShare * count;
+}
+
+namespace {
+
+// Of all recordings by a noise; none outside the model's domain.
+class ErrorsBeside {
+ public:
+  ErrorsBeside(const Fit& fit, const CurveColumns& curve)
+      : fit_(&fit),
+        raw_(raw_rows(fit, curve)),
+        pulls_(pulls_of(fit.layout, fit.shared, fit.curve_values, curve.covariance)),
+        precision_(local_precision_of(fit.layout, fit.scales)) {
+    hold_scanned(fit.layout, precision_);
+  }
+  ByChannel by(const Dataset& data, const Noise& noise) const {
+    std::vector<ArrowBlock> blocks(raw_.size());
+    for (std::size_t r = 0; r < raw_.size(); ++r) {
+      blocks[r] = block_by(raw_[r], data.recordings[r], noise);
+      blocks[r].precision = precision_;
+      blocks[r].centre = nuisance_centre(fit_->layout, fit_->local[r]);
+    }
+    if (blocks.empty()) return {};
+    ArrowRules rules;
+    rules.held = fit_->held;
+    const ArrowSolution solution = solve(blocks, pulls_.precision, pulls_.centre, rules);
+    if (!solution.valid) return {};
+    ByChannel out;
+    for (std::size_t r = 0; r < raw_.size(); ++r)
+      out.push_back(expected_errors(raw_[r], data.recordings[r], blocks[r], solution, r));
+    return out;
+  }
+
+ private:
+  const Fit* fit_;
+  std::vector<RawRows> raw_;
+  Pulls pulls_;
+  VectorXd precision_;
+};
+
+}  // namespace
+
+NoiseBeside noise_beside(const Fit& fit, const CurveColumns& curve) {
+  Noise noise = fit.likelihood->noise();
+  Dataset data = fit.likelihood->data();
+  const ErrorsBeside errors(fit, curve);
+  for (int step = 0; step < kSteps; ++step) {
+    const ByChannel now = errors.by(data, noise);
+    if (now.empty()) break;
     const Noise before = noise;
-    noise = refine_noise(data, errors, before);
+    noise = refine_noise(data, now, before);
+    if (noise.tails.degrees > 0) refine_tails(now, data, noise);
     if (alike(noise, before)) break;
   }
-  return noise;
+  return {.noise = noise, .precision = precision_in(data)};
+}
+
+NoiseBeside tails_beside(const Fit& fit, const CurveColumns& curve) {
+  Noise noise = fit.likelihood->noise();
+  Dataset data = fit.likelihood->data();
+  const ByChannel errors = ErrorsBeside(fit, curve).by(data, noise);
+  if (!errors.empty()) refine_tails(errors, data, noise);
+  return {.noise = noise, .precision = precision_in(data)};
 }
 
 }  // namespace bevel::inference

@@ -22,7 +22,15 @@ std::vector<ExpectedErrors> expected_errors(const RawRows& raw, const SeriesSet&
                                             const ArrowSolution& solution, std::size_t recording);
 
 // The likeliest noise beside a fit at its standard deviations; of the order that the fit's has, and its own where the
-// model cannot follow.
-Noise noise_beside(const Fit& fit, const CurveColumns& curve);
+// model cannot follow. precision: of each innovation, where it has heavy tails; else empty.
+struct NoiseBeside {
+  Noise noise;
+  ByReading precision;
+};
+NoiseBeside noise_beside(const Fit& fit, const CurveColumns& curve);
+// Of a fit by normal noise: the same noise, if its tails are heavy with those.
+NoiseBeside tails_beside(const Fit& fit, const CurveColumns& curve);
+// Whether it is as good as that of a likelihood.
+bool alike(const NoiseBeside& a, const Likelihood& b);
 
 }  // namespace bevel::inference

@@ -56,6 +56,14 @@ double log_density_ratios(const Fit& fit, const MatrixXd& covariance) {
   return sum;
 }
 
+// At the mode squares count in full; what follows from its neighbourhood, by their information (heavy_tails.hpp).
+double beyond_information(const Likelihood& likelihood, const std::vector<ArrowBlock>& blocks) {
+  const double information = likelihood.information();
+  double squares = 0;
+  for (const ArrowBlock& block : blocks) squares += block.ww;
+  return 0.5 * (1 / information - 1) * (information * static_cast<double>(likelihood.data().rows()) - squares);
+}
+
 struct GridEvidence {
   double log_here = -std::numeric_limits<double>::infinity();      // at the standard deviations of the fit
   double log_promised = -std::numeric_limits<double>::infinity();  // at the best of the grid, by the linear model
@@ -91,7 +99,8 @@ GridEvidence over_nuisances(const Fit& fit, const CurveColumns& curve, const Nui
   logs = logs.cwiseMin(out.log_here);
   const double all = log_sum(std::span<const double>(logs.data(), static_cast<std::size_t>(logs.size())));
   out.weights = (logs.array() - all).exp();
-  const double constant = likelihood.log_weights() + log_prior_of_instants(likelihood, fit, curve);
+  const double constant =
+      likelihood.log_weights() + log_prior_of_instants(likelihood, fit, curve) + beyond_information(likelihood, blocks);
   out.log_here += constant;
   out.log_promised += constant;
   out.log_mean = all + constant;
@@ -158,12 +167,12 @@ Settled settle(const Likelihood& likelihood, const Discrepancy* discrepancy, con
     } else {
       if (!better && !noise_moved && settled) break;
       // The noise first, then what differs between recordings: by a wrong noise they do not differ.
-      const Noise noise = noise_beside(one.fit, curve);
+      const NoiseBeside noise = noise_beside(one.fit, curve);
       auto open = inputs_about(one.fit);
-      noise_moved = !alike(noise, now->noise()) || !alike(open, inputs, *now);
+      noise_moved = !alike(noise, *now) || !alike(open, inputs, *now);
       if (noise_moved) {
         inputs = std::move(open);
-        now = std::make_shared<const Likelihood>(likelihood, noise, inputs);
+        now = std::make_shared<const Likelihood>(likelihood, noise.noise, inputs, noise.precision);
       }
     }
     spread_moved = false;

@@ -44,6 +44,15 @@ Likelihood::Likelihood(const Likelihood& other, Noise noise, const std::vector<V
   set_noise(std::move(noise), inputs);
 }
 
+Likelihood::Likelihood(const Likelihood& other, Noise noise, const std::vector<VectorXd>& inputs,
+                       const ByReading& precision)
+    : Likelihood(other) {
+  for (std::size_t r = 0; r < data_.recordings.size(); ++r)
+    for (std::size_t c = 0; c < data_.recordings[r].series.size(); ++c)
+      data_.recordings[r].series[c].precision = precision.empty() ? std::vector<double>{} : precision[r][c];
+  set_noise(std::move(noise), inputs);
+}
+
 void Likelihood::set_noise(Noise noise, const std::vector<VectorXd>& inputs) {
   for (std::size_t r = 0; r < data_.recordings.size(); ++r) {
     auto& series = data_.recordings[r].series;
@@ -54,12 +63,18 @@ void Likelihood::set_noise(Noise noise, const std::vector<VectorXd>& inputs) {
       for (const double sd : own[c]) series[c].input_sd.push_back(sd / noise.sigma[c]);
   }
   noise_ = std::move(noise);
+  information_ = 1;
   log_weights_ = VectorXd::Zero(static_cast<Index>(data_.recordings.size()));
   whitening_.assign(data_.recordings.size(), {});
   for (std::size_t r = 0; r < data_.recordings.size(); ++r)
     for (std::size_t c = 0; c < data_.recordings[r].series.size(); ++c) {
       whitening_[r].push_back(make_whitening(data_.recordings[r].series[c], noise_.of(c), noise_.sigma[c]));
-      for (const double weight : whitening_[r].back().weight) log_weights_[static_cast<Index>(r)] += std::log(weight);
+      double& sum = log_weights_[static_cast<Index>(r)];
+      for (const double weight : whitening_[r].back().weight) sum += std::log(weight);
+      for (const double precision : data_.recordings[r].series[c].precision) {
+        sum += log_density_beyond(precision, noise_.tails);
+        information_ = information_of(noise_.tails);
+      }
     }
 }
 

@@ -49,13 +49,18 @@ class Likelihood {
              const std::vector<Eigen::VectorXd>& inputs = {});
   // The same readings with another noise.
   Likelihood(const Likelihood& other, Noise noise, const std::vector<Eigen::VectorXd>& inputs = {});
+  // With other precisions of the innovations (Series::precision); {}: normal noise of the same deviation.
+  Likelihood(const Likelihood& other, Noise noise, const std::vector<Eigen::VectorXd>& inputs,
+             const ByReading& precision);
 
   const System& system() const { return *system_; }
   const Dataset& data() const { return data_; }
   const Noise& noise() const { return noise_; }
+  double information() const { return information_; }  // of its innovations' precision (heavy_tails.hpp)
   const Readings& outliers() const { return outliers_; }
   std::size_t recordings() const { return data_.recordings.size(); }
-  // Sum of the logarithms of the whitened readings' weights: minus half of log det of the noise's covariance.
+  // Sum of the logarithms of the whitened readings' weights: minus half of log det of the noise's covariance; with
+  // heavy tails, and what a density has beyond that of its precision.
   double log_weights() const { return log_weights_.sum(); }
   double log_weights(std::size_t recording) const { return log_weights_[static_cast<Eigen::Index>(recording)]; }
 
@@ -82,6 +87,7 @@ class Likelihood {
   std::vector<std::vector<Whitening>> whitening_;  // per recording and channel
   std::vector<Eigen::VectorXd> measured_;          // per recording
   Eigen::VectorXd log_weights_;                    // per recording
+  double information_ = 1;
 };
 
 // The mode of a set of effects, and the likelihood about it.

@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "diagnosis/inference/dataset.hpp"
+#include "diagnosis/inference/heavy_tails.hpp"
 
 namespace bevel::inference {
 
@@ -15,6 +16,7 @@ struct Noise {
   std::vector<double> sigma;  // per channel, of one reading (the process's own)
   double ar1 = 0;             // correlation of readings one frame apart
   double ar2 = 0;             // of readings two frames apart, given the one between; 0: of first order
+  Tails tails{};              // of the innovations
   double outlier_share = 0;   // of messages
   double frame_s = 1.0 / 30;
   std::vector<double> own_ar1{};  // per channel, where each has one of its own, of first order; empty: ar1, ar2 of all
@@ -66,13 +68,6 @@ using Errors = std::vector<std::vector<Eigen::VectorXd>>;
 Eigen::MatrixXd spline_basis(const Series& series, double knot_s);
 inline constexpr double kKnot_s = 1.0;
 
-struct Calibration {
-  Noise noise;
-  std::vector<std::vector<std::size_t>> outliers;  // per recording: readings (indices into motion.at), ascending
-};
-
-// errors: of the model in use, of which a flexible curve is taken out.
-Calibration calibrate_noise(const Dataset& data, const Errors& errors);
 // Deviation and autocorrelation alone, beside the curve. With second_order, ar2 too, where the readings ask for it.
 Noise estimate_noise(const Dataset& data, const Errors& errors, bool second_order = true);
 
@@ -84,7 +79,7 @@ class ExpectedErrors {
   // The expected product of two rows is the sum over the columns of theirs: the likeliest errors, and what each
   // direction in which they are uncertain does to them in one standard deviation.
   explicit ExpectedErrors(Eigen::MatrixXd columns);
-  double whitened_squares(const Whitening& whitening) const;
+  Eigen::VectorXd whitened_squares(const Whitening& whitening) const;  // of each row
 
  private:
   Eigen::MatrixXd columns_;

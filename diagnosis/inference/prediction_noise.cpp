@@ -38,7 +38,7 @@ void maximise(const Dataset& data, const std::vector<std::vector<ExpectedErrors>
     double squares = 0, count = 0, logs = 0;
     for (std::size_t r = 0; r < errors.size(); ++r) {
       const Whitening whitening = make_whitening(data.recordings[r].series[channel], one, 1.0);
-      squares += errors[r][channel].whitened_squares(whitening);
+      squares += errors[r][channel].whitened_squares(whitening).sum();
       count += static_cast<double>(whitening.weight.size());
       for (const double weight : whitening.weight) logs -= 2 * std::log(weight);
     }

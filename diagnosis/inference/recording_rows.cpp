@@ -93,6 +93,7 @@ WhiteReadings RecordingRows::rest_alone(const MatrixXd& A, const VectorXd& error
       later.time_s.push_back(series.time_s[i]);
       later.relative_sd.push_back(series.relative_sd[i]);
       if (!series.input_sd.empty()) later.input_sd.push_back(series.input_sd[i]);
+      if (!series.precision.empty()) later.precision.push_back(series.precision[i]);
     }
     const auto count = static_cast<Index>(later.time_s.size());
     const Whitening whitening = make_whitening(later, noise.of(c), noise.sigma[c]);

@@ -3,9 +3,11 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <set>
 #include <stdexcept>
 
 #include "diagnosis/inference/calibrate.hpp"
+#include "diagnosis/inference/error_spread.hpp"
 #include "diagnosis/inference/local_minima.hpp"
 #include "diagnosis/inference/log_sum.hpp"
 #include "diagnosis/parallel.hpp"
@@ -18,13 +20,21 @@ bool near(const Noise& a, const Noise& b) {
   constexpr double kShare = 0.1, kCorrelation = 0.05;
   for (std::size_t c = 0; c < a.sigma.size(); ++c)
     if (std::abs(std::log(a.sigma[c] / b.sigma[c])) > kShare) return false;
-  return std::abs(a.ar1 - b.ar1) < kCorrelation;
+  return std::abs(a.ar1 - b.ar1) < kCorrelation && (a.tails.degrees > 0) == (b.tails.degrees > 0);
 }
 
 using Eigen::Index;
 using Eigen::VectorXd;
 
 }  // namespace
+
+Search::Search(const System& system, const SearchRules& rules) : system_(system), rules_(rules) {
+  std::set<std::string> names;
+  for (const Effect& effect : system.effects()) names.insert(effect.name);
+  curve_rules_ = {
+      .log_prior_odds = rules.log_prior_odds_effect + std::log(std::max(1.0, static_cast<double>(names.size()))),
+      .most = rules.most_curves};
+}
 
 double Visited::log_posterior() const {
   const double both[] = {log_without_curve, log_with_curve};
@@ -88,9 +98,9 @@ Search::Job Search::job_from(const Fit& fit, std::size_t effect, const StartPoin
 
 Visited Search::weighed(const ModelSet& set, const std::shared_ptr<const Evaluated>& at) const {
   Visited one{.set = set, .at = at};
-  const double odds = rules_.curves.log_prior_odds;
+  const double odds = curve_rules_.log_prior_odds;
   double share = 0;  // of no curve, against any number
-  for (std::size_t n = 0; n <= rules_.curves.most; ++n) share += std::exp(odds * static_cast<double>(n));
+  for (std::size_t n = 0; n <= curve_rules_.most; ++n) share += std::exp(odds * static_cast<double>(n));
   one.log_without_curve = log_prior(set) + at->log_evidence - std::log(share);
   one.log_with_curve = at->with_discrepancy ? one.log_without_curve + odds + at->log_bayes_factor_curve
                                             : -std::numeric_limits<double>::infinity();
@@ -114,7 +124,7 @@ void Search::evaluate_all(std::vector<Job> jobs) {
     auto one = evaluate(*likelihood_, job.layout, job.shared, job.local, job.nuisance_sd,
                         best - rules_.window - rules_.doubt - log_prior(job.set));
     if (one.valid && (job.beside_curve || log_prior(job.set) + one.log_evidence > best - rules_.curve_window))
-      add_discrepancy(*likelihood_, *discrepancy_, rules_.curves, one);
+      add_discrepancy(*likelihood_, *discrepancy_, curve_rules_, one);
     results[i] = std::make_shared<const Evaluated>(std::move(one));
   });
   for (std::size_t i = 0; i < jobs.size(); ++i)
@@ -235,29 +245,56 @@ double Search::best_log() const { return visited_.empty() ? 0 : best().log_poste
 
 void Search::run(const Readings& outliers, const Noise& noise, const Progress& progress) {
   progress_ = progress;
-  const Layout nothing(system_, {});
   const Fit tempered = tempered_base(system_, outliers, noise);
-  VectorXd shared = tempered.shared;
-  std::vector<VectorXd> local = tempered.local;
-  VectorXd nuisance_sd = middle_nuisance_sd(system_);
-  Noise reference = noise;
+  Start start{.shared = tempered.shared, .local = tempered.local, .nuisance_sd = middle_nuisance_sd(system_)};
+  look_in_rounds(std::make_shared<const Likelihood>(system_, outliers, noise), start, {});
+  // Whether the noise has heavy tails only the likeliest set can say: what jumps is no noise, once it has a name.
+  if (const auto heavy = with_heavy_tails(likeliest_fit())) {
+    std::vector<Job> jobs;
+    const double best = best_log();
+    for (const auto& [set, one] : visited_) {
+      if (set.empty() || one.log_posterior() < best - rules_.curve_window) continue;
+      jobs.push_back(job_at(one.likelier_fit()));
+      jobs.back().beside_curve = one.is_likelier_with_curve();
+    }
+    visited_.clear();
+    fits_ = 0;
+    look_in_rounds(heavy, start, std::move(jobs));
+  }
+  look_with_less_spread();
+}
+
+std::shared_ptr<const Likelihood> Search::with_heavy_tails(const Fit& fit) const {
+  const CurveColumns curve = discrepancy_->columns(*fit.likelihood, fit.scales.curves);
+  const NoiseBeside noise = tails_beside(fit, curve);
+  if (noise.noise.tails.degrees == 0) return nullptr;
+  return std::make_shared<const Likelihood>(*fit.likelihood, noise.noise, std::vector<VectorXd>{}, noise.precision);
+}
+
+// By the noise of a reference and its innovations' precision, at first; known: sets to be weighed before any is sought.
+void Search::look_in_rounds(std::shared_ptr<const Likelihood> reference, Start& start, std::vector<Job> known) {
+  const Layout nothing(system_, {});
+  const auto without_inputs = [](const Likelihood& by) { return std::make_shared<const Likelihood>(by, by.noise()); };
+  bool anew = known.empty();
   for (std::size_t round = 0; round < rules_.rounds; ++round) {
-    likelihood_ = std::make_shared<const Likelihood>(system_, outliers, reference);
-    Evaluated base = evaluate(*likelihood_, nothing, shared, local, nuisance_sd);
+    likelihood_ = reference;
+    Evaluated base = evaluate(*likelihood_, nothing, start.shared, start.local, start.nuisance_sd);
     if (!base.valid) throw std::domain_error("the model cannot follow the recordings");
     discrepancy_ = std::make_unique<const Discrepancy>(*likelihood_, base.fit);
-    add_discrepancy(*likelihood_, *discrepancy_, rules_.curves, base);
-    shared = base.fit.shared, local = base.fit.local, nuisance_sd = base.fit.scales.nuisance_sd;
-    if (round == 0) {
+    add_discrepancy(*likelihood_, *discrepancy_, curve_rules_, base);
+    start = {.shared = base.fit.shared, .local = base.fit.local, .nuisance_sd = base.fit.scales.nuisance_sd};
+    if (anew) {
       // A curve takes up most of what is missing: the noise beside it is nearer to the truth.
-      if (base.fit_with_curve)
-        reference = base.fit_with_curve->likelihood->noise();
-      else
-        reference = base.fit.likelihood->noise();
-      likelihood_ = std::make_shared<const Likelihood>(system_, outliers, reference);
+      likelihood_ = reference = without_inputs(*(base.fit_with_curve ? *base.fit_with_curve : base.fit).likelihood);
       discrepancy_ = std::make_unique<const Discrepancy>(*likelihood_, base.fit);
     }
-    const Fit about = round == 0 ? base.fit : likeliest_fit();
+    if (!known.empty()) {
+      keep({}, std::make_shared<const Evaluated>(base));
+      evaluate_all(std::move(known));
+      known.clear();
+    }
+    const Fit about = anew ? base.fit : likeliest_fit();
+    anew = false;
     proposals_ = std::make_unique<const Proposals>(*likelihood_, about, rules_.threads);
     keep({}, std::make_shared<const Evaluated>(base));
     expanded_.clear();
@@ -267,10 +304,9 @@ void Search::run(const Readings& outliers, const Noise& noise, const Progress& p
     swapped_.clear();
     look_around();
     const Fit& likeliest = likeliest_fit();
-    if (near(likeliest.likelihood->noise(), reference) && likeliest.layout.set() == about.layout.set()) break;
-    reference = likeliest.likelihood->noise();
+    if (near(likeliest.likelihood->noise(), reference->noise()) && likeliest.layout.set() == about.layout.set()) break;
+    reference = without_inputs(*likeliest.likelihood);
   }
-  look_with_less_spread();
 }
 
 // Noise and spread are fitted in turn, each by the other: what one took at first the other does not get back. The
@@ -326,7 +362,7 @@ void Search::look_around() {
     const auto at = visited_.at(set).at;
     if (!at->with_discrepancy) {
       auto with = std::make_shared<Evaluated>(*at);
-      add_discrepancy(*likelihood_, *discrepancy_, rules_.curves, *with);
+      add_discrepancy(*likelihood_, *discrepancy_, curve_rules_, *with);
       keep(set, with);
     }
     expand(set);

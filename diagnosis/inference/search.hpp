@@ -21,9 +21,9 @@ struct SearchRules {
   std::size_t starts = 2;      // of an effect, that are fitted
   std::size_t foremost = 2;    // proposals beside a set that are fitted though they do not come near
   std::size_t pairs = 8;
-  std::size_t most_fits = 90;           // in all
+  std::size_t most_fits = 90;           // in all, and as many again by noise with heavy tails
   double log_prior_odds_effect = -5.0;  // of one effect being in the model, against not; its kinds share it
-  CurveRules curves{};                  // of a discrepancy
+  std::size_t most_curves = 2;          // of a discrepancy
   std::size_t rounds = 3;
   int threads = 2;
 };
@@ -40,7 +40,7 @@ struct Visited {
 
 class Search {
  public:
-  Search(const System& system, const SearchRules& rules) : system_(system), rules_(rules) {}
+  Search(const System& system, const SearchRules& rules);
 
   // Told what is looked around next, and how many fits are done of how many; may throw to stop.
   using Progress = std::function<void(const std::string&)>;
@@ -63,6 +63,8 @@ class Search {
   double log_not_visited() const;
   double log_prior(const ModelSet& set) const;
   double log_prior_odds(std::size_t effect) const;  // of this kind of the effect, against not
+  // Of a discrepancy: what nobody has named is as likely to be missing as what somebody has, all names together.
+  const CurveRules& curve_rules() const { return curve_rules_; }
   // A set that was evaluated, with its share in the posterior.
   Visited weighed(const ModelSet& set, const std::shared_ptr<const Evaluated>& at) const;
 
@@ -81,15 +83,25 @@ class Search {
   void evaluate_all(std::vector<Job> jobs);
   static Job job_at(const Fit& fit);
   Job job_from(const Fit& fit, std::size_t effect, const StartPoint& start) const;
+  // Null: its noise is normal.
+  std::shared_ptr<const Likelihood> with_heavy_tails(const Fit& fit) const;
   double best_log() const;
   const Fit& likeliest_fit() const { return best().likelier_fit(); }
   bool is_visited(const ModelSet& set) const { return visited_.contains(set); }
 
+  // The base alone, from where it is fitted.
+  struct Start {
+    Eigen::VectorXd shared;
+    std::vector<Eigen::VectorXd> local;
+    Eigen::VectorXd nuisance_sd;
+  };
+  void look_in_rounds(std::shared_ptr<const Likelihood> reference, Start& start, std::vector<Job> known);
   void look_around();
   void look_with_less_spread();
 
   const System& system_;
   SearchRules rules_;
+  CurveRules curve_rules_;
   std::shared_ptr<const Likelihood> likelihood_;  // for what is linear; each set is judged by its own noise
   std::unique_ptr<const Discrepancy> discrepancy_;
   std::unique_ptr<const Proposals> proposals_;

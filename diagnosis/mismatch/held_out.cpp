@@ -153,10 +153,29 @@ Fit refit_without(const inference::Search& search, const Fit& whole, std::size_t
   return out;
 }
 
+// Which innovations will be large nobody knows beforehand: predictions are by normal noise of the same deviation.
+std::shared_ptr<const Likelihood> by_normal_noise(const Fit& fit) {
+  inference::Noise noise = fit.likelihood->noise();
+  if (noise.tails.degrees == 0) return fit.likelihood;
+  noise.tails = {};
+  return std::make_shared<const Likelihood>(*fit.likelihood, noise, inputs_about(fit), inference::ByReading{});
+}
+
+// Log density by normal noise less that by the fit's own.
+double normal_beyond(const inference::Search& search, Fit fit, const Fit& judge, std::size_t r, double log_density) {
+  if (judge.likelihood->noise().tails.degrees == 0) return 0;
+  fit.likelihood = judge.likelihood;
+  fit.scales.nuisance_sd = judge.scales.nuisance_sd;
+  const auto curve = curve_of(search, fit);
+  const auto blocks = linearise(*fit.likelihood, fit, curve);
+  const auto own = blocks.empty() ? std::nullopt : predictive_of(fit, blocks, curve, r);
+  return own ? log_density - own->log_density : std::numeric_limits<double>::quiet_NaN();
+}
+
 // refitted: without the recording; judge: by whose noise and variation chi2 and density are.
 Sums sums_of(const NeedleSystem& system, const inference::Search& search, Fit fit, const Fit& judge, std::size_t r) {
   Sums out;
-  fit.likelihood = judge.likelihood;
+  fit.likelihood = by_normal_noise(judge);
   fit.scales.nuisance_sd = judge.scales.nuisance_sd;
   const auto curve = curve_of(search, fit);
   VectorXd errors = fit.likelihood->errors(fit.layout, r, fit.shared, new_insertion(fit, r).local[r]);
@@ -188,14 +207,15 @@ std::optional<inference::Forecasts> forecast_of(const inference::Search& search,
   constexpr double kKnown = 1.0 / 3;
   const double until_s = inference::time_of_share(whole.likelihood->data().recordings[r], kKnown);
   Fit begun = refit_without(search, whole, new_insertion(others, r), r, until_s);
-  others.likelihood = whole.likelihood;
+  const auto likelihood = by_normal_noise(whole);
+  others.likelihood = likelihood;
   auto curve = curve_of(search, others);
   const auto spreads = likely_part(nuisance_grid(search.system()), nuisance_weights_of(search, whole));
   inference::LinearModel before{&others, linearise(*others.likelihood, others, curve)};
   if (before.blocks.empty()) return std::nullopt;
   double about_zero = 0;
   if (varied) {
-    about_zero = log_evidence_of_others(before, curve, spreads, r) + log_weights_without(*whole.likelihood, r);
+    about_zero = log_evidence_of_others(before, curve, spreads, r) + log_weights_without(*likelihood, r);
     others.likelihood = varied->likelihood;
     curve = curve_of(search, others);
     before.blocks = linearise(*others.likelihood, others, curve);
@@ -212,6 +232,7 @@ std::optional<inference::Forecasts> forecast_of(const inference::Search& search,
 }
 
 std::optional<Varied> varied_about(const inference::Search& search, Fit fit) {
+  fit.likelihood = by_normal_noise(fit);
   auto curve = curve_of(search, fit);
   auto blocks = linearise(*fit.likelihood, fit, curve);
   if (blocks.empty()) return std::nullopt;
@@ -264,7 +285,8 @@ Sums noise_floor(const NeedleSystem& system, const Likelihood& likelihood, std::
 
 HeldOut hold_out(const NeedleSystem& system, const inference::Search& search, const Fit& judge) {
   HeldOut out;
-  const Likelihood& likelihood = *judge.likelihood;
+  const auto by_normal = by_normal_noise(judge);
+  const Likelihood& likelihood = *by_normal;
   const Fit& base = search.visited().at({}).at->fit;
   const auto selected = leave_out_selection(search);
   std::vector<Sums> file, before, after, floor;
@@ -278,7 +300,9 @@ HeldOut hold_out(const NeedleSystem& system, const inference::Search& search, co
     file.push_back(as_it_stands(system, likelihood, r));
     before.push_back(sums_of(system, search, alone_refitted, judge, r));
     after.push_back(sums_of(system, search, found_refitted, found, r));
-    after.back().log_density = selected[r].log_density + constant_of(after.back().count);
+    const double constant = constant_of(after.back().count);
+    after.back().log_density = selected[r].log_density + constant +
+                               normal_beyond(search, found_refitted, found, r, after.back().log_density - constant);
     floor.push_back(noise_floor(system, likelihood, r));
     HeldOutRecording one{.log = recording.name,
                          .before = figures_of({before.back()}),

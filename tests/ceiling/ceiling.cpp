@@ -164,7 +164,7 @@ Judged judge(const Search& search, const GeneratorSystem& system, const std::vec
   const inference::Likelihood likelihood(system, search.likelihood().outliers(), search.likelihood().noise());
   auto at = inference::evaluate(likelihood, layout, shared, local, beginning.nuisance_sd);
   if (!at.valid) return {};
-  inference::add_discrepancy(likelihood, search.discrepancy(), search.rules().curves, at);
+  inference::add_discrepancy(likelihood, search.discrepancy(), search.curve_rules(), at);
   Judged out{.valid = true};
   out.log_prior_ratio = log_prior_ratio(system, at.fit, visible);
   const auto weighed = search.weighed(set, std::make_shared<const inference::Evaluated>(at));

@@ -48,7 +48,7 @@ Evaluated evaluate_set(const LinearSystem& system, const ModelSet& set, const Di
   const Layout layout(system, set);
   const std::vector<VectorXd> local(system.data().recordings.size(), layout.local_start());
   Evaluated out = evaluate(likelihood, layout, layout.shared_start(), local, VectorXd::Constant(1, 0.2));
-  if (discrepancy) add_discrepancy(likelihood, *discrepancy, {}, out);
+  if (discrepancy) add_discrepancy(likelihood, *discrepancy, {.log_prior_odds = -4}, out);
   return out;
 }
 
@@ -251,7 +251,7 @@ TEST(TwoCurves, TheNextIsWeighedBesideTheFirstAsTwoNormalDensitiesSay) {
 TEST(TwoCurves, AreAddedOneAfterTheOtherByTheRatiosOfNormalDensities) {
   const TwoCurves made;
   Evaluated one = evaluate_set(made.system, {}), both = one;
-  add_discrepancy(made.likelihood, made.discrepancy, {.most = 1}, one);
+  add_discrepancy(made.likelihood, made.discrepancy, {.log_prior_odds = -4, .most = 1}, one);
   add_discrepancy(made.likelihood, made.discrepancy, {.log_prior_odds = -4, .most = 2}, both);
   ASSERT_EQ(one.log_factors.size(), 1U);
   ASSERT_EQ(both.log_factors.size(), 2U);
@@ -299,7 +299,7 @@ TEST(TwoCurves, WhereOneIsEnoughThereIsOne) {
     const Likelihood likelihood(system, Readings(4), white(system));
     Evaluated at = evaluate_set(system, {});
     const Discrepancy discrepancy(likelihood, at.fit);
-    add_discrepancy(likelihood, discrepancy, {}, at);
+    add_discrepancy(likelihood, discrepancy, {.log_prior_odds = -4}, at);
     ASSERT_TRUE(at.fit_with_curve.has_value()) << "seed " << seed;
     EXPECT_EQ(at.fit_with_curve->scales.curves.size(), 1U) << "seed " << seed;
     EXPECT_EQ(at.log_bayes_factor_curve, at.log_factors[0]);
@@ -344,7 +344,7 @@ TEST(NoiseBeside, IsTheLikeliestWithAllElseIntegratedOut) {
       squares = 0;
       for (std::size_t r = 0; r < 2; ++r)
         squares += likelihood->errors(layout, r, at.shared, at.local[r]).squaredNorm();
-      noise = noise_beside(at, {});
+      noise = noise_beside(at, {}).noise;
       const double now = log_density(noise);
       EXPECT_GT(now, before - 2e-3) << "seed " << seed << ", round " << round;  // the search for ar1 ends at 0.002
       before = now;

@@ -13,7 +13,7 @@ namespace bevel::inference::testing {
 // One channel, `count` readings a recording at 10 Hz; base: offset and slope; effects: a parabola, a step; a nuisance
 // that adds a cosine; one curve of the reading by time, and where something depends on it one by a sawtooth of 0.9 s,
 // whose rise the first cannot follow.
-class LinearSystem final : public HeldSystem {
+class LinearSystem : public HeldSystem {
  public:
   static constexpr int kCount = 60;
   double sigma = 0.1;

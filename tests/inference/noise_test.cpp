@@ -3,7 +3,7 @@
 
 #include <random>
 
-#include "diagnosis/inference/noise.hpp"
+#include "diagnosis/inference/outliers.hpp"
 
 namespace bevel::inference {
 namespace {
@@ -162,7 +162,7 @@ TEST(ExpectedErrors, AreWhitenedAsTheirColumnsAre) {
     const Whitening whitening = make_whitening(series, noise, 0.3);
     Eigen::MatrixXd white = columns;
     whiten(whitening, white);
-    EXPECT_NEAR(errors.whitened_squares(whitening), white.squaredNorm(), 1e-9 * white.squaredNorm());
+    EXPECT_NEAR(errors.whitened_squares(whitening).sum(), white.squaredNorm(), 1e-9 * white.squaredNorm());
   };
   check(0, 0), check(0.7, 0), check(0.7, 0.2), check(0.5, -0.4);
   for (int i = 0; i < 40; ++i) series.input_sd.push_back(i % 5 == 0 ? 0.8 : 0);

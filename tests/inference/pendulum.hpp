@@ -18,6 +18,7 @@ struct TruePendulum {
   double dry_friction = 0, scale = 1, knock_rad_s = 0;
   double magnet = 0;           // a torque about 0.4 rad, on no list
   double start_sd_rad = 0.01;  // between recordings
+  double tail_degrees = 0;     // of Student's t, of the same standard deviation; 0: normal noise
 };
 
 class Pendulum final : public System {
@@ -70,6 +71,11 @@ class Pendulum final : public System {
 
     std::mt19937_64 random(seed);
     std::normal_distribution<double> normal;
+    const double degrees = truth.tail_degrees;
+    const auto noise = [&] {
+      return degrees > 0 ? std::student_t_distribution<double>(degrees)(random) * std::sqrt((degrees - 2) / degrees)
+                         : normal(random);
+    };
     data_.claimed_sd = {kSigma_rad};
     data_.frame_s = kFrame_s;
     for (std::size_t r = 0; r < recordings; ++r) {
@@ -85,7 +91,7 @@ class Pendulum final : public System {
       for (int i = 0; i < kReadings; ++i) {
         series.message.push_back(static_cast<std::size_t>(i));
         series.time_s.push_back(kFrame_s * i);
-        series.measured.push_back(angle[i] + kSigma_rad * normal(random));
+        series.measured.push_back(angle[i] + kSigma_rad * noise());
         series.relative_sd.push_back(1);
       }
       data_.recordings.push_back({.series = {std::move(series)}, .messages = kReadings, .duration_s = duration_s});

@@ -79,6 +79,21 @@ TEST(PendulumTest, AKnockIsFoundInTheRecordingsThatHaveIt) {
   }
 }
 
+// Whether the noise has heavy tails is asked beside the likeliest set: a knock's readings are none.
+TEST(PendulumTest, HeavyTailsAreOfTheNoise) {
+  for (std::uint64_t seed = 1; seed <= 3; ++seed) {
+    const Found nothing = find({.tail_degrees = 3}, seed);
+    EXPECT_EQ(nothing.set, ModelSet{}) << "seed " << seed;
+    EXPECT_FALSE(nothing.curve) << "seed " << seed;
+    EXPECT_GT(nothing.fit.likelihood->noise().tails.degrees, 0) << "seed " << seed;
+  }
+  const Found friction = find({.dry_friction = 0.25, .tail_degrees = 3}, 21);
+  EXPECT_EQ(friction.set, ModelSet{Pendulum::kDryFriction});
+  EXPECT_GT(friction.fit.likelihood->noise().tails.degrees, 0);
+  EXPECT_NEAR(friction.fit.shared[2], 0.25, 0.03);
+  EXPECT_EQ(find({.knock_rad_s = 0.5}, 31).fit.likelihood->noise().tails.degrees, 0);
+}
+
 TEST(PendulumTest, TwoEffects) {
   TruePendulum truth;
   truth.dry_friction = 0.3;

@@ -240,6 +240,9 @@ void add_noise_and_checks(report::Page& page, const Findings& f) {
       "Noise of one reading, fitted beside what was found. Successive readings, " + number(1 / f.noise.frame_s, 3) +
       " a second, correlate by " + number(f.noise.ar1, 2) +
       (f.noise.ar2 != 0 ? " (and those two apart, given the one between, by " + number(f.noise.ar2, 2) + ")" : "") +
+      (f.noise.tails.degrees > 0
+           ? "; its tails are heavy, those of Student's t with " + number(f.noise.tails.degrees) + " degrees of freedom"
+           : "") +
       "; " + percent(f.noise.outlier_share) + " of them are outliers.");
   page.table(head, rows);
   const auto& c = f.checks;

@@ -252,6 +252,7 @@ std::string verdict_json(const Findings& f, const Provenance& made_of) {
   j["noise"] = {{"sigma_mm", figures(f.noise.sigma)},
                 {"ar1", figure(f.noise.ar1)},
                 {"ar2", figure(f.noise.ar2)},
+                {"tail_degrees", figure(f.noise.tails.degrees)},
                 {"outlier_share", figure(f.noise.outlier_share)},
                 {"channels", f.channels},
                 {"units", f.units},
