@@ -1,6 +1,7 @@
 #include "diagnosis/mismatch/decision.hpp"
 
 #include <algorithm>
+#include <cmath>
 #include <set>
 
 namespace bevel::diagnosis {
@@ -29,6 +30,8 @@ ChosenModel model_of(const Search& search, const Fit& fit, double log_posterior)
     out.discrepancy.push_back({curves[i].curve, fit.curve_values.segment(at[i], at[i + 1] - at[i])});
   return out;
 }
+
+double consequence_sigmas(const inference::SearchRules& rules) { return std::sqrt(-2 * rules.log_prior_odds_effect); }
 
 Decision decide(const Search& search, const Posterior& posterior) {
   const double something = 1 - posterior.nothing;

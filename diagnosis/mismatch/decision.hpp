@@ -11,9 +11,11 @@
 
 namespace bevel::diagnosis {
 
-// From so many standard deviations of the noise, summed over the recordings, an effect or a discrepancy counts as
-// visible. A smaller discrepancy is an error of form that the intervals carry, and of no consequence.
+// From so many standard deviations of the noise, summed over the recordings, an effect counts as visible.
 inline constexpr double kVisibleSigmas = 5.0;
+// And a discrepancy as one of consequence: half its square makes up for the prior odds of an effect, so that a smaller
+// one would not be named if it had a name. That is an error of form, which the intervals carry.
+double consequence_sigmas(const inference::SearchRules& rules);
 
 // A model to write, to draw and to compare with: one mode of the posterior. Lives as long as the search.
 struct ChosenModel {

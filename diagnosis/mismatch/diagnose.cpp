@@ -198,7 +198,7 @@ Findings diagnose(const RecordedCase& recorded, const model::NeedleParameters& m
   search.run(calibration.outliers, calibration.noise, [&](const std::string& set) {
     if (options.progress) options.progress("comparing sets of effects: beside " + set);
   });
-  const inference::Posterior posterior = posterior_of(search, kVisibleSigmas);
+  const inference::Posterior posterior = posterior_of(search, consequence_sigmas(rules));
   const Decision decision = decide(search, posterior);
   findings.verdict = decision.verdict;
   list_explanations(search, posterior, findings);
