@@ -47,7 +47,7 @@ std::vector<Explanation> explanations_of(const Search& search) {
     out.push_back({names, label, one.log_without_curve, &one, false});
     if (!std::isfinite(one.log_with_curve)) continue;
     const auto& fit = one.at->fit_with_curve;
-    if (fit && inference::visible_sigmas_of_curve(search, *fit) > diagnosis::kVisibleSigmas) {
+    if (fit && inference::visible_sigmas_of_curve(search, *fit) > diagnosis::consequence_sigmas(search.rules())) {
       names.push_back("unknown");
       std::ranges::sort(names);
     }
@@ -202,7 +202,7 @@ json compare(const fs::path& folder, const json& campaign, const json& score, in
   const auto calibration = inference::calibrate(needle);
   Search search(needle, {.threads = threads});
   search.run(calibration.outliers, calibration.noise);
-  const auto posterior = inference::posterior_of(search, diagnosis::kVisibleSigmas);
+  const auto posterior = inference::posterior_of(search, diagnosis::consequence_sigmas(search.rules()));
   const auto decision = diagnosis::decide(search, posterior);
   Answer said;
   for (const std::size_t e : decision.model.fit->layout.set()) said.push_back(needle.effects()[e].name);

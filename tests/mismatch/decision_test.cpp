@@ -33,7 +33,7 @@ struct Decide : ::testing::Test {
 };
 
 TEST_F(Decide, NamesWhatIsThere) {
-  const Decision decision = decide(search, posterior_of(search, kVisibleSigmas));
+  const Decision decision = decide(search, posterior_of(search, consequence_sigmas(search.rules())));
   EXPECT_EQ(decision.verdict, Verdict::effects_found);
   EXPECT_EQ(set_of(decision), ModelSet{Pendulum::kDryFriction});
 }
