@@ -377,12 +377,12 @@ void add_discrepancy(const Likelihood& likelihood, const Discrepancy& discrepanc
   out.nuisance_weights_with_curve = with.over.weights;
   double log_evidence = with.over.log_mean;
   while (out.log_factors.size() < rules.most &&
-         add_curve(likelihood, discrepancy, rules.log_prior_odds, out, log_evidence)) {
+         add_curve(likelihood, discrepancy, rules.log_prior_odds_more, out, log_evidence)) {
   }
   // Over their number, each more with its prior odds.
   out.log_bayes_factor_curve = out.log_factors.back();
   for (std::size_t i = out.log_factors.size() - 1; i > 0; --i) {
-    const double terms[] = {0, rules.log_prior_odds + out.log_bayes_factor_curve};
+    const double terms[] = {0, rules.log_prior_odds_more + out.log_bayes_factor_curve};
     out.log_bayes_factor_curve = out.log_factors[i - 1] + log_sum(terms);
   }
 }

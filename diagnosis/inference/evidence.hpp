@@ -31,7 +31,8 @@ Evaluated evaluate(const Likelihood& likelihood, const Layout& layout, const Eig
                    double give_up_below = -std::numeric_limits<double>::infinity());
 
 struct CurveRules {
-  double log_prior_odds;  // of a curve, against none; of one more, against no more
+  double log_prior_odds;       // of a curve, against none
+  double log_prior_odds_more;  // of one more, against no more
   std::size_t most = 2;
 };
 // The discrepancy's part, added to a set that was evaluated without: the likeliest curve, then beside it the next, for

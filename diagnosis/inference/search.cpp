@@ -33,6 +33,7 @@ Search::Search(const System& system, const SearchRules& rules) : system_(system)
   for (const Effect& effect : system.effects()) names.insert(effect.name);
   curve_rules_ = {
       .log_prior_odds = rules.log_prior_odds_effect + std::log(std::max(1.0, static_cast<double>(names.size()))),
+      .log_prior_odds_more = rules.log_prior_odds_effect,
       .most = rules.most_curves};
 }
 
@@ -99,8 +100,9 @@ Search::Job Search::job_from(const Fit& fit, std::size_t effect, const StartPoin
 Visited Search::weighed(const ModelSet& set, const std::shared_ptr<const Evaluated>& at) const {
   Visited one{.set = set, .at = at};
   const double odds = curve_rules_.log_prior_odds;
-  double share = 0;  // of no curve, against any number
-  for (std::size_t n = 0; n <= curve_rules_.most; ++n) share += std::exp(odds * static_cast<double>(n));
+  double share = 1;  // of no curve, against any number
+  for (std::size_t n = 0; n < curve_rules_.most; ++n)
+    share += std::exp(odds + curve_rules_.log_prior_odds_more * static_cast<double>(n));
   one.log_without_curve = log_prior(set) + at->log_evidence - std::log(share);
   one.log_with_curve = at->with_discrepancy ? one.log_without_curve + odds + at->log_bayes_factor_curve
                                             : -std::numeric_limits<double>::infinity();

@@ -63,7 +63,8 @@ class Search {
   double log_not_visited() const;
   double log_prior(const ModelSet& set) const;
   double log_prior_odds(std::size_t effect) const;  // of this kind of the effect, against not
-  // Of a discrepancy: what nobody has named is as likely to be missing as what somebody has, all names together.
+  // Of a discrepancy: what nobody has named is as likely to be missing as what somebody has, all names together; one
+  // more curve is as likely as one more effect.
   const CurveRules& curve_rules() const { return curve_rules_; }
   // A set that was evaluated, with its share in the posterior.
   Visited weighed(const ModelSet& set, const std::shared_ptr<const Evaluated>& at) const;

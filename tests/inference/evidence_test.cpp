@@ -48,7 +48,7 @@ Evaluated evaluate_set(const LinearSystem& system, const ModelSet& set, const Di
   const Layout layout(system, set);
   const std::vector<VectorXd> local(system.data().recordings.size(), layout.local_start());
   Evaluated out = evaluate(likelihood, layout, layout.shared_start(), local, VectorXd::Constant(1, 0.2));
-  if (discrepancy) add_discrepancy(likelihood, *discrepancy, {.log_prior_odds = -4}, out);
+  if (discrepancy) add_discrepancy(likelihood, *discrepancy, {.log_prior_odds = -4, .log_prior_odds_more = -4}, out);
   return out;
 }
 
@@ -251,8 +251,9 @@ TEST(TwoCurves, TheNextIsWeighedBesideTheFirstAsTwoNormalDensitiesSay) {
 TEST(TwoCurves, AreAddedOneAfterTheOtherByTheRatiosOfNormalDensities) {
   const TwoCurves made;
   Evaluated one = evaluate_set(made.system, {}), both = one;
-  add_discrepancy(made.likelihood, made.discrepancy, {.log_prior_odds = -4, .most = 1}, one);
-  add_discrepancy(made.likelihood, made.discrepancy, {.log_prior_odds = -4, .most = 2}, both);
+  add_discrepancy(made.likelihood, made.discrepancy, {.log_prior_odds = -4, .log_prior_odds_more = -4, .most = 1}, one);
+  add_discrepancy(made.likelihood, made.discrepancy, {.log_prior_odds = -4, .log_prior_odds_more = -4, .most = 2},
+                  both);
   ASSERT_EQ(one.log_factors.size(), 1U);
   ASSERT_EQ(both.log_factors.size(), 2U);
   // What a first is worth does not depend on whether there may be a second.
@@ -299,7 +300,7 @@ TEST(TwoCurves, WhereOneIsEnoughThereIsOne) {
     const Likelihood likelihood(system, Readings(4), white(system));
     Evaluated at = evaluate_set(system, {});
     const Discrepancy discrepancy(likelihood, at.fit);
-    add_discrepancy(likelihood, discrepancy, {.log_prior_odds = -4}, at);
+    add_discrepancy(likelihood, discrepancy, {.log_prior_odds = -4, .log_prior_odds_more = -4}, at);
     ASSERT_TRUE(at.fit_with_curve.has_value()) << "seed " << seed;
     EXPECT_EQ(at.fit_with_curve->scales.curves.size(), 1U) << "seed " << seed;
     EXPECT_EQ(at.log_bayes_factor_curve, at.log_factors[0]);
