@@ -21,12 +21,12 @@ ArrowBlock block_by(const RawRows& raw, const SeriesSet& set, const Noise& noise
 std::vector<ExpectedErrors> expected_errors(const RawRows& raw, const SeriesSet& set, const ArrowBlock& block,
                                             const ArrowSolution& solution, std::size_t recording);
 
-// The likeliest noise beside a fit at its standard deviations; of the order that the fit's has, and its own where the
-// model cannot follow. precision: of each innovation, where it has heavy tails; else empty.
 struct NoiseBeside {
   Noise noise;
-  ByReading precision;
+  ByReading precision;  // of each innovation, where it has heavy tails; else empty
 };
+// The likeliest noise beside a fit at its standard deviations; of the order that the fit's has, and its own where the
+// model cannot follow.
 NoiseBeside noise_beside(const Fit& fit, const CurveColumns& curve);
 // Of a fit by normal noise: the same noise, if its tails are heavy with those.
 NoiseBeside tails_beside(const Fit& fit, const CurveColumns& curve);

@@ -6,7 +6,7 @@ namespace bevel::inference {
 
 struct Calibration {
   Noise noise;
-  std::vector<std::vector<std::size_t>> outliers;  // per recording: readings (indices into motion.at), ascending
+  Readings outliers;  // ascending
 };
 
 // errors: of the model in use, of which a flexible curve is taken out.

@@ -1,7 +1,7 @@
 // Noise with heavy tails: found where it is, and the likelihood, the evidence and the errors of Student's t.
 #include <gtest/gtest.h>
 
-#include <Eigen/Eigenvalues>
+#include <Eigen/Cholesky>
 #include <boost/math/distributions/normal.hpp>
 #include <boost/math/distributions/students_t.hpp>
 #include <random>
