@@ -138,6 +138,10 @@ CovariateWords words_of(model::Covariate covariate) {
       return {"since_stop", "s", "the time since a stop"};
     case model::Covariate::since_reversal_mm:
       return {"since_reversal", "mm", "the depth since the last turn"};
+    case model::Covariate::turned_rad:
+      return {"turned", "rad", "the turning since the entry"};
+    case model::Covariate::withdrawn_mm:
+      return {"withdrawn", "mm", "how far the needle is drawn back"};
     case model::Covariate::roll_rad:
       return {"roll", "rad", "roll"};
   }

@@ -9,6 +9,7 @@
 #include "diagnosis/inference/forms.hpp"
 #include "diagnosis/inference/noise.hpp"
 #include "diagnosis/needle/recorded_case.hpp"
+#include "model/effects/covariates.hpp"
 #include "model/effects/discrepancy.hpp"
 
 namespace bevel::diagnosis {
@@ -203,7 +204,7 @@ struct SteeredToTargets {
 struct Trace {
   std::string log;
   std::vector<double> time_s;  // one per reading
-  std::vector<Covariates> covariates;
+  std::vector<model::Covariates> covariates;
   std::vector<Eigen::Vector3d> measured_mm, model_file_mm, before_mm, after_mm;
   std::vector<char> outlier;  // 1: taken for one
   // Whitened residuals per channel (NaN where the channel has no reading): of the base refit, and of what was found.

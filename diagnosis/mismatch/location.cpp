@@ -59,10 +59,7 @@ Begin begin_of(const NeedleSystem& system, const Fit& fit, std::size_t r) {
 model::Covariate covariate_of(const NeedleSystem& system, const Fit& fit) {
   if (!fit.layout.set().empty()) return system.physics(fit.layout.set().front()).covariate();
   if (!fit.scales.curves.empty())  // of the likeliest, if there are several
-    for (int i = 0; i <= static_cast<int>(model::Covariate::roll_rad); ++i)
-      if (model::name_of(static_cast<model::Covariate>(i)) ==
-          system.curves()[fit.scales.curves.front().curve].covariate)
-        return static_cast<model::Covariate>(i);
+    return system.needle_curve(fit.scales.curves.front().curve).covariate;
   return model::Covariate::time_s;
 }
 
@@ -78,7 +75,7 @@ std::vector<Location> locate(const NeedleSystem& system, const ChosenModel& befo
     if (system.recorded().two_groups() && !recording.changed) continue;
     const auto white_before = white_of(before, r);
     const auto white_after = white_of(after, r);
-    const auto covariates = find_covariates(recording.motion);
+    const auto covariates = model::find_covariates(recording.motion.nodes);
     const Begin begin = begin_of(system, *after.fit, r);
     Location best;
     double most = 0;
@@ -104,10 +101,10 @@ std::vector<Location> locate(const NeedleSystem& system, const ChosenModel& befo
       best.range = {low, high};
       if (begin.at_s > 0) best.from_s = begin.at_s;
       if (begin.depth_mm >= 0) {
-        best.range = {begin.depth_mm, std::max(begin.depth_mm, covariates.back().depth_mm)};
+        best.range = {begin.depth_mm, std::max(begin.depth_mm, covariates.back()[model::Covariate::depth_mm])};
         for (const auto& at : covariates)
-          if (at.depth_mm >= begin.depth_mm) {
-            best.from_s = at.time_s;
+          if (at[model::Covariate::depth_mm] >= begin.depth_mm) {
+            best.from_s = at[model::Covariate::time_s];
             break;
           }
       }
@@ -130,7 +127,7 @@ std::vector<Trace> make_traces(const NeedleSystem& system, const inference::Read
     const Recording& recording = system.recorded().recordings[r];
     Trace trace;
     trace.log = recording.name;
-    const auto covariates = find_covariates(recording.motion);
+    const auto covariates = model::find_covariates(recording.motion.nodes);
     for (const std::size_t node : recording.motion.at) {
       trace.time_s.push_back(recording.motion.nodes[node].time_s);
       trace.covariates.push_back(covariates[node]);

@@ -15,8 +15,8 @@ bool follow(const NeedleSystem& system, const ModelledTip& model, std::size_t r,
 
 // The first of the readings that are as deep as any.
 std::size_t deepest_reading(const model::Motion& motion) {
-  const auto covariates = find_covariates(motion);
-  const auto at = std::ranges::max_element(motion.at, {}, [&](std::size_t node) { return covariates[node].depth_mm; });
+  const auto at =
+      std::ranges::max_element(motion.at, {}, [&](std::size_t node) { return motion.nodes[node].insertion_mm; });
   return static_cast<std::size_t>(at - motion.at.begin());
 }
 

@@ -11,21 +11,31 @@ namespace {
 
 using model::Covariate;
 
-constexpr int kValues = 8;                // of a curve
+constexpr int kValues = 12;               // of a curve
 constexpr double kLeastVariation = 0.05;  // of a covariate, in its unit
 constexpr double kLeastRoll_rad = 0.2;
 
-// Evenly over the middle 98 % of what the covariate takes; false if it hardly varies.
-bool find_places(const std::vector<const model::Motion*>& motions, Covariate covariate, inference::Curve& curve) {
+std::vector<double> values_of(const std::vector<std::vector<model::Covariates>>& recordings, Covariate covariate) {
   std::vector<double> values;
-  for (const model::Motion* motion : motions) {
-    model::CovariateTracker tracker(motion->nodes.front());
-    for (std::size_t i = 1; i < motion->nodes.size(); ++i) {
-      tracker.advance(motion->nodes[i - 1], motion->nodes[i]);
-      values.push_back(tracker[covariate]);
-    }
-  }
+  for (const auto& nodes : recordings)
+    for (std::size_t i = 1; i < nodes.size(); ++i) values.push_back(nodes[i][covariate]);
   std::sort(values.begin(), values.end());
+  return values;
+}
+
+// The roll says the same as the turning since the entry: all begin at one roll, and none turns more than once.
+bool within_a_turn(const std::vector<std::vector<model::Covariates>>& recordings) {
+  const auto roll = values_of(recordings, Covariate::roll_rad), turned = values_of(recordings, Covariate::turned_rad);
+  const double begin = roll.front() - turned.front();
+  return roll.back() - roll.front() <= 2 * std::numbers::pi && std::ranges::all_of(recordings, [&](const auto& nodes) {
+           return std::abs(nodes.front()[Covariate::roll_rad] - begin) < kLeastRoll_rad;
+         });
+}
+
+// Evenly over the middle 98 % of what the covariate takes; false if it hardly varies.
+bool find_places(const std::vector<std::vector<model::Covariates>>& recordings, Covariate covariate,
+                 inference::Curve& curve) {
+  const std::vector<double> values = values_of(recordings, covariate);
   const double low = values[values.size() / 100];
   const double high = values[values.size() - 1 - values.size() / 100];
   curve.periodic = covariate == Covariate::roll_rad;
@@ -63,9 +73,12 @@ class CurveEffect final : public model::ComponentEffect {
 
 std::vector<NeedleCurve> find_curves(const std::vector<const model::Motion*>& motions) {
   std::vector<NeedleCurve> out;
+  std::vector<std::vector<model::Covariates>> recordings;
+  for (const model::Motion* motion : motions) recordings.push_back(model::find_covariates(motion->nodes));
+  const bool roll_says = within_a_turn(recordings);
   for (const Covariate covariate : model::all_covariates()) {
     inference::Curve curve;
-    if (!find_places(motions, covariate, curve)) continue;
+    if ((covariate == Covariate::turned_rad && roll_says) || !find_places(recordings, covariate, curve)) continue;
     curve.covariate = model::name_of(covariate);
     for (const auto& info : model::discrepancy_components()) {
       curve.component = info.meaning;

@@ -76,7 +76,8 @@ class NeedleSystem final : public inference::System {
   const model::Effect& physics(std::size_t effect) const { return *physics_[effect]; }
   // The library's parameter behind one of an effect's.
   const model::EffectParameter& parameter(std::size_t effect, std::size_t parameter) const;
-  // One of curves(), with values, as a model file carries it.
+  // What is behind one of curves(); with values, as a model file carries it.
+  const NeedleCurve& needle_curve(std::size_t curve) const { return needle_curves_[curve]; }
   model::DiscrepancyCurve model_curve(std::size_t curve, std::vector<double> values,
                                       std::vector<double> std_errors) const {
     return to_model(needle_curves_[curve], std::move(values), std::move(std_errors));

@@ -11,7 +11,6 @@
 
 #include "diagnosis/needle/scatter_near_entry.hpp"
 #include "diagnosis/statistics/median.hpp"
-#include "model/effects/covariates.hpp"
 
 namespace bevel::diagnosis {
 namespace {
@@ -305,43 +304,6 @@ RecordedCase make_case(std::vector<RawRecording> raw) {
   recorded.frame_s = median(periods);
   if (!recorded.has_clock) widen_near_entry(recorded);
   return recorded;
-}
-
-double Covariates::operator[](model::Covariate covariate) const {
-  switch (covariate) {
-    case model::Covariate::time_s:
-      return time_s;
-    case model::Covariate::depth_mm:
-      return depth_mm;
-    case model::Covariate::speed_mm_s:
-      return speed_mm_s;
-    case model::Covariate::turn_rate_rad_s:
-      return turn_rate_rad_s;
-    case model::Covariate::since_stop_s:
-      return since_stop_s;
-    case model::Covariate::since_reversal_mm:
-      return since_reversal_mm;
-    case model::Covariate::roll_rad:
-      return roll_rad;
-  }
-  return time_s;
-}
-
-std::vector<Covariates> find_covariates(const model::Motion& motion) {
-  std::vector<Covariates> all;
-  model::CovariateTracker tracker(motion.nodes.front());
-  for (std::size_t i = 0; i < motion.nodes.size(); ++i) {
-    if (i > 0) tracker.advance(motion.nodes[i - 1], motion.nodes[i]);
-    Covariates at{.time_s = motion.nodes[i].time_s,
-                  .depth_mm = motion.nodes[i].insertion_mm,
-                  .speed_mm_s = tracker[model::Covariate::speed_mm_s],
-                  .turn_rate_rad_s = tracker[model::Covariate::turn_rate_rad_s],
-                  .since_stop_s = tracker[model::Covariate::since_stop_s],
-                  .since_reversal_mm = tracker[model::Covariate::since_reversal_mm],
-                  .roll_rad = motion.nodes[i].rotation_rad};
-    all.push_back(at);
-  }
-  return all;
 }
 
 }  // namespace bevel::diagnosis

@@ -70,14 +70,4 @@ struct RawRecording {
 // periods or claimed noise that differ more than threefold).
 RecordedCase make_case(std::vector<RawRecording> raw);
 
-// What a reading was taken at, for tables and pictures.
-struct Covariates {
-  double time_s = 0, depth_mm = 0, speed_mm_s = 0, turn_rate_rad_s = 0, since_stop_s = 0, since_reversal_mm = 0,
-         roll_rad = 0;
-  double operator[](model::Covariate covariate) const;
-};
-// One per node of the motion. depth is the base's insertion; since_stop counts seconds from the moment at which
-// insertion last ended (0 while inserting), since_reversal the insertion since the last change of roll.
-std::vector<Covariates> find_covariates(const model::Motion& motion);
-
 }  // namespace bevel::diagnosis

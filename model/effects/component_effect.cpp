@@ -79,10 +79,10 @@ void ComponentEffect::offset(Parameters /*p*/, const EffectMemory& memory, doubl
     position_mm[static_cast<std::size_t>(axis())] += memory.slot[0];
 }
 
-// The third slot keeps what the covariate needs to remember, of which no covariate needs both.
 CovariateTracker ComponentEffect::tracked(const LegView& leg, const EffectMemory& memory) const {
-  const double kept = memory.slot[2].value;
-  CovariateTracker tracker = memory.phase == 0 ? CovariateTracker(leg.entry) : CovariateTracker(kept, kept);
+  CovariateTracker tracker = memory.phase == 0
+                                 ? CovariateTracker(leg.entry)
+                                 : CovariateTracker(leg.entry, {memory.number[0], memory.number[1], memory.number[2]});
   tracker.advance(leg.from, leg.to);
   return tracker;
 }
@@ -90,7 +90,7 @@ CovariateTracker ComponentEffect::tracked(const LegView& leg, const EffectMemory
 Dual ComponentEffect::value(Parameters p, const LegView& leg, EffectMemory& memory) const {
   const CovariateTracker tracker = tracked(leg, memory);
   memory.phase = 1;
-  memory.slot[2].value = covariate() == Covariate::since_stop_s ? tracker.stopped_s() : tracker.turned_mm();
+  memory.number = {tracker.history().moved_s, tracker.history().turned_mm, tracker.history().deepest_mm};
   return value_at(p, tracker[covariate()]);
 }
 

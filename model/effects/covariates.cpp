@@ -1,5 +1,6 @@
 #include "model/effects/covariates.hpp"
 
+#include <algorithm>
 #include <cmath>
 
 namespace bevel::model {
@@ -8,19 +9,33 @@ constexpr double kMoving_mm_s = 0.05;
 constexpr double kTurning_rad_s = 0.02;
 }  // namespace
 
-CovariateTracker::CovariateTracker(const BaseMotion& entry) : stopped_s_(entry.time_s), turned_mm_(entry.insertion_mm) {
-  advance(entry, entry);
-}
-
 void CovariateTracker::advance(const BaseMotion& from, const BaseMotion& to) {
   const double dt_s = to.time_s - from.time_s;
   const double speed_mm_s = dt_s > 0 ? std::abs(to.insertion_mm - from.insertion_mm) / dt_s : 0;
   const double turn_rate_rad_s = dt_s > 0 ? std::abs(to.rotation_rad - from.rotation_rad) / dt_s : 0;
-  if (speed_mm_s > kMoving_mm_s) stopped_s_ = to.time_s;
-  if (turn_rate_rad_s > kTurning_rad_s) turned_mm_ = to.insertion_mm;
-  value_ = {to.time_s,       to.insertion_mm,        speed_mm_s,
-            turn_rate_rad_s, to.time_s - stopped_s_, to.insertion_mm - turned_mm_,
-            to.rotation_rad};
+  if (speed_mm_s > kMoving_mm_s) history_.moved_s = to.time_s;
+  if (turn_rate_rad_s > kTurning_rad_s) history_.turned_mm = to.insertion_mm;
+  history_.deepest_mm = std::max(history_.deepest_mm, to.insertion_mm);
+  // In the order of Covariate.
+  now_.value = {to.time_s,
+                to.insertion_mm,
+                speed_mm_s,
+                turn_rate_rad_s,
+                to.time_s - history_.moved_s,
+                to.insertion_mm - history_.turned_mm,
+                to.rotation_rad,
+                to.rotation_rad - entry_turned_rad_,
+                history_.deepest_mm - to.insertion_mm};
+}
+
+std::vector<Covariates> find_covariates(std::span<const BaseMotion> nodes) {
+  CovariateTracker tracker(nodes.front());
+  std::vector<Covariates> all{tracker.now()};
+  for (std::size_t i = 1; i < nodes.size(); ++i) {
+    tracker.advance(nodes[i - 1], nodes[i]);
+    all.push_back(tracker.now());
+  }
+  return all;
 }
 
 }  // namespace bevel::model

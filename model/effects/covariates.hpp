@@ -1,24 +1,44 @@
 #pragma once
-// What a discrepancy is looked at against, from the base's motion alone.
+// What a discrepancy is looked at against, and what a reading was taken at: from the base's motion alone.
 #include "model/effects/effect.hpp"
 
 namespace bevel::model {
 
-// Follows the base from leg to leg. depth is the base's insertion; since_stop counts seconds from the moment at which
-// insertion last ended (0 while inserting), since_reversal the insertion since the shaft last turned.
+// depth is the base's insertion; since_stop counts seconds from the moment at which insertion last ended (0 while
+// inserting), since_reversal the insertion since the shaft last turned; turned is the shaft's turning since the entry,
+// turns counted; withdrawn how far the base is drawn back from the deepest that it was.
+struct Covariates {
+  std::array<double, kCovariates> value{};
+  double operator[](Covariate covariate) const { return value[static_cast<std::size_t>(covariate)]; }
+};
+
+// Follows the base from leg to leg.
 class CovariateTracker {
  public:
-  explicit CovariateTracker(const BaseMotion& entry);
-  // Taken up again: when the insertion last moved, and where the shaft last turned.
-  CovariateTracker(double stopped_s, double turned_mm) : stopped_s_(stopped_s), turned_mm_(turned_mm) {}
-  double stopped_s() const { return stopped_s_; }
-  double turned_mm() const { return turned_mm_; }
+  // What of an insertion so far the next leg needs to know.
+  struct History {
+    double moved_s = 0;    // when the insertion last moved
+    double turned_mm = 0;  // where the shaft last turned
+    double deepest_mm = 0;
+  };
+  explicit CovariateTracker(const BaseMotion& entry)
+      : CovariateTracker(entry, {entry.time_s, entry.insertion_mm, entry.insertion_mm}) {}
+  CovariateTracker(const BaseMotion& entry, const History& history)
+      : entry_turned_rad_(entry.rotation_rad), history_(history) {
+    advance(entry, entry);
+  }
   void advance(const BaseMotion& from, const BaseMotion& to);
-  double operator[](Covariate covariate) const { return value_[static_cast<std::size_t>(covariate)]; }
+  const History& history() const { return history_; }
+  const Covariates& now() const { return now_; }
+  double operator[](Covariate covariate) const { return now_[covariate]; }
 
  private:
-  std::array<double, 7> value_{};  // in the order of Covariate
-  double stopped_s_, turned_mm_;
+  double entry_turned_rad_;
+  History history_;
+  Covariates now_;
 };
+
+// One per node of a motion, of which the first is the entry.
+std::vector<Covariates> find_covariates(std::span<const BaseMotion> nodes);
 
 }  // namespace bevel::model

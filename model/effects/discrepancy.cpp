@@ -88,9 +88,11 @@ class Discrepancy final : public ComponentEffect {
         break;
       case Covariate::depth_mm:
       case Covariate::since_reversal_mm:
+      case Covariate::withdrawn_mm:
         moved = std::abs(leg.base_insertion_mm());
         break;
       case Covariate::roll_rad:
+      case Covariate::turned_rad:
         moved = std::abs(leg.base_rotation_rad());
         break;
       case Covariate::speed_mm_s:

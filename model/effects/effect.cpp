@@ -38,6 +38,10 @@ std::string_view name_of(Covariate covariate) {
       return "since_reversal_mm";
     case Covariate::roll_rad:
       return "roll_rad";
+    case Covariate::turned_rad:
+      return "turned_rad";
+    case Covariate::withdrawn_mm:
+      return "withdrawn_mm";
   }
   return "time_s";
 }
@@ -48,9 +52,10 @@ bool needs_clock(Covariate covariate) {
 }
 
 std::span<const Covariate> all_covariates() {
-  static constexpr std::array kAll = {Covariate::time_s,          Covariate::depth_mm,     Covariate::speed_mm_s,
-                                      Covariate::turn_rate_rad_s, Covariate::since_stop_s, Covariate::since_reversal_mm,
-                                      Covariate::roll_rad};
+  static constexpr std::array<Covariate, kCovariates> kAll = {
+      Covariate::time_s,          Covariate::depth_mm,     Covariate::speed_mm_s,
+      Covariate::turn_rate_rad_s, Covariate::since_stop_s, Covariate::since_reversal_mm,
+      Covariate::roll_rad,        Covariate::turned_rad,   Covariate::withdrawn_mm};
   return kAll;
 }
 

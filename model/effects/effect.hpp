@@ -67,7 +67,18 @@ double meant(const EffectParameter& parameter, double value);
 inline constexpr double kNoNone = std::numeric_limits<double>::quiet_NaN();
 
 // Against what the effect is to be looked at: where it shows.
-enum class Covariate { time_s, depth_mm, speed_mm_s, turn_rate_rad_s, since_stop_s, since_reversal_mm, roll_rad };
+enum class Covariate {
+  time_s,
+  depth_mm,
+  speed_mm_s,
+  turn_rate_rad_s,
+  since_stop_s,
+  since_reversal_mm,
+  roll_rad,
+  turned_rad,
+  withdrawn_mm
+};
+inline constexpr std::size_t kCovariates = 9;
 std::string_view name_of(Covariate covariate);
 bool needs_clock(Covariate covariate);  // time, speed, rate, rest: unknown where only the order of readings is
 std::span<const Covariate> all_covariates();

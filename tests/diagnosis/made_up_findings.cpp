@@ -21,10 +21,10 @@ Trace trace_of(int recording, const model::NeedleParameters& needle, const std::
   const model::Motion motion = script_of(recording).recorded();
   Trace trace;
   trace.log = "rec0" + std::to_string(recording + 1) + ".lcm";
-  const auto covariates = find_covariates(motion);
+  const auto covariates = model::find_covariates(motion.nodes);
   for (const std::size_t i : motion.at) {
     trace.covariates.push_back(covariates[i]);
-    trace.time_s.push_back(covariates[i].time_s);
+    trace.time_s.push_back(covariates[i][model::Covariate::time_s]);
   }
   const auto truth = path_of(needle, effects, motion);
   trace.before_mm = path_of(needle, {}, motion);

@@ -58,8 +58,10 @@ double value_at(const model::Effect& effect, const Values& values, model::Covari
     leg.to.insertion_mm = place, leg.from.insertion_mm = place - kStep;
   }
   if (covariate == model::Covariate::since_reversal_mm) leg.to.rotation_rad = 0;
+  if (covariate == model::Covariate::withdrawn_mm) leg.to.insertion_mm = -place, leg.from.insertion_mm = -place + kStep;
   if (covariate == model::Covariate::time_s) leg.to.time_s = place, leg.from.time_s = place - kStep;
-  if (covariate == model::Covariate::roll_rad) leg.to.rotation_rad = place, leg.from.rotation_rad = place - kStep;
+  if (covariate == model::Covariate::roll_rad || covariate == model::Covariate::turned_rad)
+    leg.to.rotation_rad = place, leg.from.rotation_rad = place - kStep;
   model::Dual insertion, rotation;
   model::Dual2 kappa;
   model::Dual3 point;

@@ -5,18 +5,14 @@
 #include <gtest/gtest.h>
 
 #include <map>
-
 #include <numbers>
 
 #include "diagnosis/inference/search.hpp"
 #include "diagnosis/needle/curves.hpp"
-#include "model/effects/covariates.hpp"
 #include "tests/needle/simulated_rig.hpp"
 
 namespace bevel::diagnosis {
 namespace {
-
-using model::CovariateTracker;
 
 using Eigen::Index;
 using Eigen::MatrixXd;
@@ -271,78 +267,6 @@ TEST(NeedleSystem, KindsOfOneEffectShareItsPriorOdds) {
              both = effect_named(system, "camera_rotation (about_x) (about_y)"), layer = effect_named(system, "layer");
   EXPECT_NEAR(search.log_prior({about_x}), -5 - std::log(3), 1e-12);
   EXPECT_NEAR(search.log_prior(inference::with({both}, layer)), -10 - std::log(3), 1e-12);
-}
-
-// Each component once, where its form is plain: a reading is off by the curve's value; an advance is the integral.
-TEST(NeedleCurves, ShiftReadingsAndAdvanceTheTip) {
-  const SimulatedRig rig;
-  const NeedleSystem system(record_case(rig, 4), rig.needle);
-  const inference::Layout layout(system, {});
-  const MatrixXd C = system.by_curves(0, layout.shared_start());
-  const auto& recording = system.recorded().recordings[0];
-  Index first = 0;
-  int checked = 0;
-  for (const auto& curve : system.curves()) {
-    const auto count = static_cast<Index>(curve.at.size());
-    if (curve.covariate == "depth_mm" && curve.component == "reading along x") {
-      CovariateTracker tracker(recording.motion.nodes.front());
-      std::vector<VectorXd> weights = {weights_at(curve, tracker[model::Covariate::depth_mm])};
-      for (std::size_t i = 1; i < recording.motion.nodes.size(); ++i) {
-        tracker.advance(recording.motion.nodes[i - 1], recording.motion.nodes[i]);
-        weights.push_back(weights_at(curve, tracker[model::Covariate::depth_mm]));
-      }
-      Index row = 0;
-      for (std::size_t c = 0; c < system.recorded().channels.size(); ++c)
-        for (const std::size_t reading : recording.series[c].message) {
-          const std::size_t node = recording.motion.at[reading];
-          if (node > 0) {
-            EXPECT_LT(
-                (C.row(row).segment(first, count).transpose() - system.recorded().channels[c].axis.x() * weights[node])
-                    .norm(),
-                1e-9);
-          }
-          ++row;
-        }
-      ++checked;
-    }
-    if (curve.component == "advance of the tip" && curve.covariate == "depth_mm") {
-      // All values one: the tip advances twice as fast. The last reading moves by what was inserted, along the heading.
-      const VectorXd moved = C.middleCols(first, count).rowwise().sum();
-      EXPECT_GT(moved.norm(), 1);
-      ++checked;
-    }
-    first += count;
-  }
-  EXPECT_EQ(checked, 2);
-  EXPECT_EQ(first, C.cols());
-}
-
-TEST(NeedleCurves, WeightsAddUpToOne) {
-  inference::Curve line{.component = "", .unit = "", .covariate = "", .at = {0, 1, 3, 4}};
-  inference::Curve circle{.component = "", .unit = "", .covariate = "", .at = {0, 1.5, 3.1, 4.7}, .periodic = true};
-  for (int i = -15; i < 70; ++i) {  // before the first point to beyond the last
-    const double x = 0.13 * i;
-    EXPECT_NEAR(weights_at(line, x).sum(), 1, 1e-12);
-    EXPECT_NEAR(weights_at(circle, x).sum(), 1, 1e-12);
-    EXPECT_LT((weights_at(circle, x) - weights_at(circle, x + 2 * std::numbers::pi)).norm(), 1e-9);
-  }
-  EXPECT_EQ(weights_at(line, 2), (VectorXd(4) << 0, 0.5, 0.5, 0).finished());
-}
-
-TEST(Covariates, FollowTheBase) {
-  CovariateTracker tracker({0, 5, 0});  // the entry at 5 mm
-  EXPECT_EQ(tracker[model::Covariate::since_reversal_mm], 0);
-  tracker.advance({0, 5, 0}, {1, 15, 0});
-  EXPECT_EQ(tracker[model::Covariate::speed_mm_s], 10);
-  EXPECT_EQ(tracker[model::Covariate::since_reversal_mm], 10);  // since the entry, where it never turned
-  EXPECT_EQ(tracker[model::Covariate::since_stop_s], 0);
-  tracker.advance({1, 15, 0}, {2, 15, 1});
-  EXPECT_EQ(tracker[model::Covariate::turn_rate_rad_s], 1);
-  EXPECT_EQ(tracker[model::Covariate::since_stop_s], 1);
-  EXPECT_EQ(tracker[model::Covariate::since_reversal_mm], 0);
-  CovariateTracker again(tracker.stopped_s(), tracker.turned_mm());
-  again.advance({2, 15, 1}, {2.5, 20, 1});
-  EXPECT_EQ(again[model::Covariate::since_reversal_mm], 5);
 }
 
 // A jump's length is no amplitude: between two of the grid's starts, readings are no multiple of either's.

@@ -244,25 +244,5 @@ TEST(BadInput, MixedRigs) {
               AllOf(HasSubstr("different rigs"), HasSubstr("a reading of tip.x every")));
 }
 
-TEST(Covariates, OfAMotionMadeByHand) {
-  // 2 s in at 5 mm/s, 1 s of rest, half a second of turning by 1 rad, 1 s in at 10 mm/s; a node every half second.
-  model::Motion motion;
-  motion.nodes = {{0, 0, 0},    {0.5, 2.5, 0}, {1, 5, 0},    {1.5, 7.5, 0}, {2, 10, 0},
-                  {2.5, 10, 0}, {3, 10, 0},    {3.5, 10, 1}, {4, 15, 1},    {4.5, 20, 1}};
-  const auto at = find_covariates(motion);
-  ASSERT_EQ(at.size(), motion.nodes.size());
-  for (std::size_t i = 0; i < at.size(); ++i) {
-    EXPECT_EQ(at[i].time_s, motion.nodes[i].time_s);
-    EXPECT_EQ(at[i].depth_mm, motion.nodes[i].insertion_mm);
-    EXPECT_EQ(at[i].roll_rad, motion.nodes[i].rotation_rad);
-    EXPECT_NEAR(at[i].speed_mm_s, i == 0 || (i > 4 && i < 8) ? 0 : i < 8 ? 5 : 10, 1e-12) << i;
-    EXPECT_NEAR(at[i].turn_rate_rad_s, i == 7 ? 2 : 0, 1e-12) << i;
-    EXPECT_NEAR(at[i].since_stop_s, i > 4 && i < 8 ? 0.5 * static_cast<double>(i - 4) : 0, 1e-12) << i;
-    EXPECT_NEAR(at[i].since_reversal_mm, i < 7 ? motion.nodes[i].insertion_mm : motion.nodes[i].insertion_mm - 10,
-                1e-12)
-        << i;
-  }
-}
-
 }  // namespace
 }  // namespace bevel::diagnosis::testing

@@ -118,9 +118,10 @@ std::optional<MovedAtDepth> moved_at_depth(const diagnosis::Findings& f) {
   std::size_t count = 0;
   for (const auto& trace : f.traces) {
     if (trace.covariates.empty()) continue;
-    const auto at = std::ranges::max_element(trace.covariates, {}, &diagnosis::Covariates::depth_mm);
+    const auto depth_mm = [](const model::Covariates& at) { return at[model::Covariate::depth_mm]; };
+    const auto at = std::ranges::max_element(trace.covariates, {}, depth_mm);
     const auto i = static_cast<std::size_t>(at - trace.covariates.begin());
-    moved.depth_mm = {std::min(moved.depth_mm[0], at->depth_mm), std::max(moved.depth_mm[1], at->depth_mm)};
+    moved.depth_mm = {std::min(moved.depth_mm[0], depth_mm(*at)), std::max(moved.depth_mm[1], depth_mm(*at))};
     from_file += (trace.after_mm[i] - trace.model_file_mm[i]).squaredNorm();
     from_refitted += (trace.after_mm[i] - trace.before_mm[i]).squaredNorm();
     ++count;

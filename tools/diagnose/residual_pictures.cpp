@@ -63,7 +63,7 @@ struct Against {
   model::Covariate covariate;
   const char* title;
   const char* label;
-  bool at_rest_only = false;
+  bool above_zero_only = false;
 };
 constexpr Against kAgainst[] = {{model::Covariate::time_s, "time in the recording", "s"},
                                 {model::Covariate::depth_mm, "inserted length", "mm"},
@@ -71,7 +71,8 @@ constexpr Against kAgainst[] = {{model::Covariate::time_s, "time in the recordin
                                 {model::Covariate::turn_rate_rad_s, "rate of turning", "rad/s"},
                                 {model::Covariate::roll_rad, "roll of the base", "rad"},
                                 {model::Covariate::since_stop_s, "time since stop, at rest", "s", true},
-                                {model::Covariate::since_reversal_mm, "insertion since last turn", "mm"}};
+                                {model::Covariate::since_reversal_mm, "insertion since last turn", "mm"},
+                                {model::Covariate::withdrawn_mm, "drawn back from the deepest", "mm", true}};
 
 // So that the panel tells of the bulk, and zero is in it; a point outside is cut off.
 std::pair<double, double> residual_range(const std::vector<double>& before, const std::vector<double>& after) {
@@ -149,10 +150,10 @@ Figure over_time(const Findings& findings, const Trace& trace, std::size_t chann
 }
 
 Figure of_the_base(const Findings& findings, const Trace& trace, const char* name, const char* label,
-                   double Covariates::*quantity) {
+                   model::Covariate quantity) {
   Figure figure;
   std::vector<double> values;
-  for (const auto& taken : trace.covariates) values.push_back(taken.*quantity);
+  for (const auto& taken : trace.covariates) values.push_back(taken[quantity]);
   const std::vector<std::size_t> use = report::thinned(values, kMostOfOne);
   figure.y_label = label;
   figure.height_px = 70;
@@ -199,7 +200,7 @@ std::string residual_unit(const Findings& findings, std::size_t channel) {
 
 std::vector<Figure> residual_panels(const Findings& findings, std::size_t channel) {
   std::vector<double> before, after;
-  std::vector<Covariates> taken_at;
+  std::vector<model::Covariates> taken_at;
   for (const auto& trace : findings.traces) {
     const Residuals r = residuals_of(findings, trace, channel);
     before.insert(before.end(), r.before.begin(), r.before.end());
@@ -213,7 +214,7 @@ std::vector<Figure> residual_panels(const Findings& findings, std::size_t channe
   const auto y_range = residual_range(before, after);
   for (const Against& against : kAgainst) {
     if (findings.stop_s > 0 && model::needs_clock(against.covariate)) continue;
-    const auto stays = [&](std::size_t i) { return !against.at_rest_only || taken_at[i][against.covariate] > 0; };
+    const auto stays = [&](std::size_t i) { return !against.above_zero_only || taken_at[i][against.covariate] > 0; };
     std::vector<double> x, y_before, y_after, dot_x, dot_before, dot_after, reading;
     for (std::size_t i = 0; i < taken_at.size(); ++i) {
       if (!stays(i)) continue;
@@ -268,8 +269,8 @@ std::vector<Figure> recording_panels(const Findings& findings, std::size_t which
     if (!shown_of(r.before, r.after, kMostOfOne).empty()) panels.push_back(over_time(findings, trace, c, r));
   }
   if (panels.empty() || trace.covariates.size() != trace.time_s.size()) return {};
-  panels.push_back(of_the_base(findings, trace, "inserted", "depth (mm)", &Covariates::depth_mm));
-  panels.push_back(of_the_base(findings, trace, "turned", "roll (rad)", &Covariates::roll_rad));
+  panels.push_back(of_the_base(findings, trace, "inserted", "depth (mm)", model::Covariate::depth_mm));
+  panels.push_back(of_the_base(findings, trace, "turned", "roll (rad)", model::Covariate::roll_rad));
   set_time(panels, findings, trace, "time of " + trace.log);
   return panels;
 }
@@ -286,8 +287,8 @@ std::vector<Figure> located_panels(const Findings& findings, std::size_t most) {
     const Residuals r = residuals_of(findings, *trace, c);
     if (shown_of(r.before, r.after, kMostOfOne).empty() || trace->covariates.size() != trace->time_s.size()) continue;
     std::vector<Figure> column{over_time(findings, *trace, c, r),
-                               of_the_base(findings, *trace, "inserted", "depth (mm)", &Covariates::depth_mm),
-                               of_the_base(findings, *trace, "turned", "roll (rad)", &Covariates::roll_rad)};
+                               of_the_base(findings, *trace, "inserted", "depth (mm)", model::Covariate::depth_mm),
+                               of_the_base(findings, *trace, "turned", "roll (rad)", model::Covariate::roll_rad)};
     column.front().title =
         where.log + ", " + where.channel + ": " +
         (findings.stop_s > 0 ? "stops " + time_span(findings, where) : time_span(findings, where) + " s");
