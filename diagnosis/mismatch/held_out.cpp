@@ -153,13 +153,25 @@ Fit refit_without(const inference::Search& search, const Fit& whole, std::size_t
   return out;
 }
 
-// Which innovations will be large nobody knows beforehand: predictions are by normal noise of the same deviation.
-std::shared_ptr<const Likelihood> by_normal_noise(const Fit& fit) {
-  inference::Noise noise = fit.likelihood->noise();
-  if (noise.tails.degrees == 0) return fit.likelihood;
-  noise.tails = {};
-  return std::make_shared<const Likelihood>(*fit.likelihood, noise, inputs_about(fit), inference::ByReading{});
-}
+// Which innovations will be large nobody knows beforehand: predictions are by normal noise of the same deviation, once
+// for each fit.
+class NormalNoise {
+ public:
+  const std::shared_ptr<const Likelihood>& of(const Fit& fit) {
+    auto& known = known_[&fit];
+    if (!known) known = made(fit);
+    return known;
+  }
+
+ private:
+  static std::shared_ptr<const Likelihood> made(const Fit& fit) {
+    inference::Noise noise = fit.likelihood->noise();
+    if (noise.tails.degrees == 0) return fit.likelihood;
+    noise.tails = {};
+    return std::make_shared<const Likelihood>(*fit.likelihood, noise, inputs_about(fit), inference::ByReading{});
+  }
+  std::map<const Fit*, std::shared_ptr<const Likelihood>> known_;
+};
 
 // Log density by normal noise less that by the fit's own.
 double normal_beyond(const inference::Search& search, Fit fit, const Fit& judge, std::size_t r, double log_density) {
@@ -173,9 +185,10 @@ double normal_beyond(const inference::Search& search, Fit fit, const Fit& judge,
 }
 
 // refitted: without the recording; judge: by whose noise and variation chi2 and density are.
-Sums sums_of(const NeedleSystem& system, const inference::Search& search, Fit fit, const Fit& judge, std::size_t r) {
+Sums sums_of(const NeedleSystem& system, const inference::Search& search, NormalNoise& normal, Fit fit,
+             const Fit& judge, std::size_t r) {
   Sums out;
-  fit.likelihood = by_normal_noise(judge);
+  fit.likelihood = normal.of(judge);
   fit.scales.nuisance_sd = judge.scales.nuisance_sd;
   const auto curve = curve_of(search, fit);
   VectorXd errors = fit.likelihood->errors(fit.layout, r, fit.shared, new_insertion(fit, r).local[r]);
@@ -202,12 +215,12 @@ double log_weights_without(const Likelihood& likelihood, std::size_t r) {
 
 // By the noise and the variation of the model itself, as it would be used. whole: the fit of all recordings, others:
 // without this one; varied: null: about zero, by the noise of the fit.
-std::optional<inference::Forecasts> forecast_of(const inference::Search& search, const Fit& whole, Fit others,
-                                                const Varied* varied, std::size_t r) {
+std::optional<inference::Forecasts> forecast_of(const inference::Search& search, NormalNoise& normal, const Fit& whole,
+                                                Fit others, const Varied* varied, std::size_t r) {
   constexpr double kKnown = 1.0 / 3;
   const double until_s = inference::time_of_share(whole.likelihood->data().recordings[r], kKnown);
   Fit begun = refit_without(search, whole, new_insertion(others, r), r, until_s);
-  const auto likelihood = by_normal_noise(whole);
+  const auto& likelihood = normal.of(whole);
   others.likelihood = likelihood;
   auto curve = curve_of(search, others);
   const auto spreads = likely_part(nuisance_grid(search.system()), nuisance_weights_of(search, whole));
@@ -231,8 +244,9 @@ std::optional<inference::Forecasts> forecast_of(const inference::Search& search,
   return out;
 }
 
-std::optional<Varied> varied_about(const inference::Search& search, Fit fit) {
-  fit.likelihood = by_normal_noise(fit);
+std::optional<Varied> varied_about(const inference::Search& search, NormalNoise& normal, const Fit& whole) {
+  Fit fit = whole;
+  fit.likelihood = normal.of(whole);
   auto curve = curve_of(search, fit);
   auto blocks = linearise(*fit.likelihood, fit, curve);
   if (blocks.empty()) return std::nullopt;
@@ -285,8 +299,8 @@ Sums noise_floor(const NeedleSystem& system, const Likelihood& likelihood, std::
 
 HeldOut hold_out(const NeedleSystem& system, const inference::Search& search, const Fit& judge) {
   HeldOut out;
-  const auto by_normal = by_normal_noise(judge);
-  const Likelihood& likelihood = *by_normal;
+  NormalNoise normal;
+  const Likelihood& likelihood = *normal.of(judge);
   const Fit& base = search.visited().at({}).at->fit;
   const auto selected = leave_out_selection(search);
   std::vector<Sums> file, before, after, floor;
@@ -298,8 +312,8 @@ HeldOut hold_out(const NeedleSystem& system, const inference::Search& search, co
     const Fit& found = *selected[r].fit;
     const Fit alone_refitted = refit_without(search, base, r), found_refitted = refit_without(search, found, r);
     file.push_back(as_it_stands(system, likelihood, r));
-    before.push_back(sums_of(system, search, alone_refitted, judge, r));
-    after.push_back(sums_of(system, search, found_refitted, found, r));
+    before.push_back(sums_of(system, search, normal, alone_refitted, judge, r));
+    after.push_back(sums_of(system, search, normal, found_refitted, found, r));
     const double constant = constant_of(after.back().count);
     after.back().log_density = selected[r].log_density + constant +
                                normal_beyond(search, found_refitted, found, r, after.back().log_density - constant);
@@ -322,15 +336,16 @@ HeldOut hold_out(const NeedleSystem& system, const inference::Search& search, co
     };
     std::vector<inference::Forecasts> models;
     std::vector<double> probabilities;
-    if (auto forecast = forecast_of(search, base, alone_refitted, nullptr, r)) models.push_back(std::move(*forecast));
+    if (auto forecast = forecast_of(search, normal, base, alone_refitted, nullptr, r))
+      models.push_back(std::move(*forecast));
     one.predicted_before = note(models, {1}, predicted_before);
     models.clear();
     for (const auto& share : selected[r].shares) {
       const bool likeliest = share.fit == &found;
-      if (!varied.contains(share.fit)) varied[share.fit] = varied_about(search, *share.fit);
+      if (!varied.contains(share.fit)) varied[share.fit] = varied_about(search, normal, *share.fit);
       const auto& about = varied[share.fit];
       if (!about) continue;
-      if (auto forecast = forecast_of(search, *share.fit,
+      if (auto forecast = forecast_of(search, normal, *share.fit,
                                       likeliest ? found_refitted : refit_without(search, *share.fit, r), &*about, r)) {
         probabilities.push_back(std::log(share.probability) + forecast->log_others);
         models.push_back(std::move(*forecast));
