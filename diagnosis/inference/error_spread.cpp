@@ -75,8 +75,6 @@ std::vector<ExpectedErrors> expected_errors(const RawRows& raw, const SeriesSet&
 
 namespace {
 
-using ByChannel = std::vector<std::vector<ExpectedErrors>>;
-
 ByReading precision_in(const Dataset& data) {
   ByReading out;
   for (const SeriesSet& set : data.recordings) {
@@ -87,7 +85,7 @@ ByReading precision_in(const Dataset& data) {
 }
 
 // How heavy the tails are, and each innovation's precision by its expected square.
-void refine_tails(const ByChannel& errors, Dataset& data, Noise& noise) {
+void refine_tails(const ErrorsByChannel& errors, Dataset& data, Noise& noise) {
   std::vector<double> squares;
   for (std::size_t r = 0; r < errors.size(); ++r)
     for (std::size_t c = 0; c < errors[r].size(); ++c) {
@@ -113,7 +111,7 @@ void refine_tails(const ByChannel& errors, Dataset& data, Noise& noise) {
 
 bool alike(const NoiseBeside& a, const Likelihood& b) {
   constexpr double kMeanShare = 0.02;  // of a precision
-  if (!alike(a.noise, b.noise()) || a.noise.tails.degrees != b.noise().tails.degrees) return false;
+  if (!alike(a.noise, b.noise())) return false;
   double change = 0, count = 0;
   for (std::size_t r = 0; r < a.precision.size(); ++r)
     for (std::size_t c = 0; c < a.precision[r].size(); ++c) {
@@ -137,7 +135,7 @@ class ErrorsBeside {
         precision_(local_precision_of(fit.layout, fit.scales)) {
     hold_scanned(fit.layout, precision_);
   }
-  ByChannel by(const Dataset& data, const Noise& noise) const {
+  ErrorsByChannel by(const Dataset& data, const Noise& noise) const {
     std::vector<ArrowBlock> blocks(raw_.size());
     for (std::size_t r = 0; r < raw_.size(); ++r) {
       blocks[r] = block_by(raw_[r], data.recordings[r], noise);
@@ -149,7 +147,7 @@ class ErrorsBeside {
     rules.held = fit_->held;
     const ArrowSolution solution = solve(blocks, pulls_.precision, pulls_.centre, rules);
     if (!solution.valid) return {};
-    ByChannel out;
+    ErrorsByChannel out;
     for (std::size_t r = 0; r < raw_.size(); ++r)
       out.push_back(expected_errors(raw_[r], data.recordings[r], blocks[r], solution, r));
     return out;
@@ -169,7 +167,7 @@ NoiseBeside noise_beside(const Fit& fit, const CurveColumns& curve) {
   Dataset data = fit.likelihood->data();
   const ErrorsBeside errors(fit, curve);
   for (int step = 0; step < kSteps; ++step) {
-    const ByChannel now = errors.by(data, noise);
+    const ErrorsByChannel now = errors.by(data, noise);
     if (now.empty()) break;
     const Noise before = noise;
     noise = refine_noise(data, now, before);
@@ -182,7 +180,7 @@ NoiseBeside noise_beside(const Fit& fit, const CurveColumns& curve) {
 NoiseBeside tails_beside(const Fit& fit, const CurveColumns& curve) {
   Noise noise = fit.likelihood->noise();
   Dataset data = fit.likelihood->data();
-  const ByChannel errors = ErrorsBeside(fit, curve).by(data, noise);
+  const ErrorsByChannel errors = ErrorsBeside(fit, curve).by(data, noise);
   if (!errors.empty()) refine_tails(errors, data, noise);
   return {.noise = noise, .precision = precision_in(data)};
 }

@@ -223,7 +223,7 @@ Eigen::VectorXd ExpectedErrors::whitened_squares(const Whitening& whitening) con
   return out;
 }
 
-Noise refine_noise(const Dataset& data, const std::vector<std::vector<ExpectedErrors>>& errors, const Noise& start) {
+Noise refine_noise(const Dataset& data, const ErrorsByChannel& errors, const Noise& start) {
   Noise noise = start;
   const double information = information_of(noise.tails);
   const auto at = [&](double ar1) {
@@ -252,6 +252,7 @@ Noise refine_noise(const Dataset& data, const std::vector<std::vector<ExpectedEr
 bool alike(const Noise& a, const Noise& b) {
   constexpr double kShare = 0.01, kCorrelation = 0.01;
   if (std::abs(a.ar1 - b.ar1) > kCorrelation || std::abs(a.ar2 - b.ar2) > kCorrelation) return false;
+  if (a.tails.degrees != b.tails.degrees) return false;
   for (std::size_t c = 0; c < a.sigma.size(); ++c)
     if (std::abs(a.sigma[c] - b.sigma[c]) > kShare * b.sigma[c]) return false;
   return true;

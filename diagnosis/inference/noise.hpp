@@ -85,8 +85,9 @@ class ExpectedErrors {
   Eigen::MatrixXd columns_;
   Eigen::VectorXd square_, with_last_, with_one_before_;
 };
-// The likeliest noise of such errors, per recording and channel, of the order that it begins with.
-Noise refine_noise(const Dataset& data, const std::vector<std::vector<ExpectedErrors>>& errors, const Noise& start);
+using ErrorsByChannel = std::vector<std::vector<ExpectedErrors>>;  // per recording and channel
+// The likeliest noise of such errors, of the order that it begins with.
+Noise refine_noise(const Dataset& data, const ErrorsByChannel& errors, const Noise& start);
 // So near that nothing depends on the difference.
 bool alike(const Noise& a, const Noise& b);
 

@@ -30,8 +30,7 @@ std::vector<RawRows> raw_of(const LinearModel& model, const CurveColumns& curve)
 }
 
 // The likeliest noise of one channel by such errors, recording after recording.
-void maximise(const Dataset& data, const std::vector<std::vector<ExpectedErrors>>& errors, std::size_t channel,
-              Noise& noise) {
+void maximise(const Dataset& data, const ErrorsByChannel& errors, std::size_t channel, Noise& noise) {
   const auto deviance_at = [&](double ar1, double& sigma) {
     Noise one = noise.of(channel);
     one.ar1 = ar1, one.ar2 = 0;
@@ -108,7 +107,7 @@ Noise prediction_noise(const LinearModel& model, const CurveColumns& curve) {
     }
     const ArrowSolution solution = solve_at_likeliest(model, blocks, pulls, rules, step > 0, nuisance_sd);
     if (!solution.valid) break;
-    std::vector<std::vector<ExpectedErrors>> errors;
+    ErrorsByChannel errors;
     for (std::size_t r = 0; r < raw.size(); ++r)
       errors.push_back(expected_errors(raw[r], data.recordings[r], blocks[r], solution, r));
     const Noise before = noise;
