@@ -182,6 +182,21 @@ void scan_about(const Likelihood& likelihood, const CurveColumns& curve, Index w
   if (again.valid && again.cost < fitted.cost) fitted = std::move(again);
 }
 
+// What comes again after a length comes again after twice of it: at half the length every second place is right. The
+// others first, with the length held, then all.
+void try_multiples(const Likelihood& likelihood, const CurveColumns& curve, Index which, Fit& fitted) {
+  const Parameter& p = *fitted.layout.shared()[static_cast<std::size_t>(which)].parameter;
+  const Fit from = fitted;
+  for (const double factor : {0.5, 2.0}) {
+    VectorXd shared = from.shared;
+    shared[which] = std::clamp(factor * shared[which], p.lower, p.upper);
+    const Fit held = fit(likelihood, from.layout, shared, from.local, from.scales, curve, {.fixed = {which}});
+    if (!held.valid) continue;
+    Fit again = fit(likelihood, from.layout, held.shared, held.local, from.scales, curve);
+    if (again.valid && again.cost < fitted.cost) fitted = std::move(again);
+  }
+}
+
 }  // namespace
 
 void scan_shapes(const Likelihood& likelihood, const CurveColumns& curve, Fit& fitted) {
@@ -190,6 +205,7 @@ void scan_shapes(const Likelihood& likelihood, const CurveColumns& curve, Fit& f
     const Parameter& p = *unknown.parameter;
     const auto which = static_cast<Index>(i);
     if (has_many_minima(p)) {
+      if (p.shape) try_multiples(likelihood, curve, which, fitted);
       double step = grid_spacing(p, fitted.shared[which]) / kSteps;
       for (int zoom = 0; zoom < kZooms; ++zoom, step /= kSteps)
         scan_about(likelihood, curve, which, step, kSteps, fitted);
