@@ -108,6 +108,24 @@ double DriveTrain::membrane(double advance_mm, double depth_mm) {
   return advance_mm - membrane_lag_mm_;
 }
 
+// Pushed, the shaft bows between its feeder and the entry, which is why others support it there (Webster, Memisevic and
+// Okamura 2005, "Design considerations for robotic needle steering", ICRA). A bow of amplitude w0 shortens a free
+// length l by w0^2 l P / (2 EI) under a push P (Timoshenko and Gere, initial curvature, P far below the buckling load);
+// where feeder and entry are out of line w0 grows with l, and P with the friction on the inserted length L: L l^3. What
+// pulls straightens it.
+double DriveTrain::bow(double advance_mm) {
+  if (physics_.bow_mm <= 0.0) return advance_mm;
+  constexpr double kFree_mm = 130.0;  // before the needle enters
+  constexpr double kTakeUp_mm = 2.0;
+  const double change_mm = advance_mm - last_unbowed_mm_;
+  last_unbowed_mm_ = advance_mm;
+  const double wanted = change_mm > 0.0 ? 1.0 : 0.0;
+  bowed_ = wanted + (bowed_ - wanted) * std::exp(-std::abs(change_mm) / kTakeUp_mm);
+  const double in_tissue = std::clamp(advance_mm / kFree_mm, 0.0, 1.0);
+  const double most = 0.25 * std::pow(0.75, 3);  // a quarter is in, three quarters are free
+  return advance_mm - physics_.bow_mm * bowed_ * in_tissue * std::pow(1.0 - in_tissue, 3) / most;
+}
+
 // Friction, so much per inserted length (Okamura, Simone and O'Leary 2004, IEEE Trans. Biomed. Eng. 51), presses the
 // shaft and the tissue about it together while it moves. Both give way and recover as two Kelvin bodies in series, one
 // quick and one slow.
@@ -146,6 +164,15 @@ double DriveTrain::first_friction_hold(double advance_mm) {
   return held_mm_;
 }
 
+// A grip by friction creeps by a share of the way that grows with its load (Johnson 1985, Contact Mechanics), here
+// the torque of the tissue on the inserted length. What has slipped does not come back.
+double DriveTrain::chuck(double roll_rad, double inserted_mm) {
+  if (physics_.chuck_slip_at_100mm <= 0.0) return roll_rad;
+  chuck_lost_rad_ += physics_.chuck_slip_at_100mm * inserted_mm / 100.0 * (roll_rad - last_chucked_rad_);
+  last_chucked_rad_ = roll_rad;
+  return roll_rad - chuck_lost_rad_;
+}
+
 DriveTrain::Tip DriveTrain::step(double time_s, double insertion_mm, double rotation_rad, double depth_mm) {
   const double lost = lost_share(time_s);
   const auto wave = [](double x, double phase) { return std::sin(x + phase) - std::sin(phase); };
@@ -156,11 +183,11 @@ DriveTrain::Tip DriveTrain::step(double time_s, double insertion_mm, double rota
                           ripple_.rotation_rad * wave(2.0 * rotation_rad, ripple_.rotation_phase_rad);
 
   const double fed_mm = feed(time_s, insertion_gear_.follow(base_mm));
-  double advance_mm = membrane(friction_hold(creep(fed_mm, std::max(fed_mm, 0.0))), depth_mm);
+  double advance_mm = membrane(friction_hold(creep(bow(fed_mm), std::max(fed_mm, 0.0))), depth_mm);
   advance_mm = first_friction_hold(advance_mm) + physics_.screw_mm_per_rad * rotation_rad;
 
-  const double geared_rad = rotation_gear_.follow(base_rad);
   const double inserted_mm = std::max(insertion_mm, 0.0);
+  const double geared_rad = chuck(rotation_gear_.follow(base_rad), inserted_mm);
   const double lag_rad = physics_.windup_lag_at_100mm_rad * std::pow(inserted_mm / 100.0, 2);
   play_rad_ = std::clamp(play_rad_, geared_rad - lag_rad, geared_rad + lag_rad);
   double roll_rad = play_rad_;

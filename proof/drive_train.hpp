@@ -56,9 +56,11 @@ class DriveTrain {
   double lost_share(double time_s) const;
   double feed(double time_s, double base_mm);
   double membrane(double advance_mm, double depth_mm);
+  double bow(double advance_mm);
   double creep(double advance_mm, double inserted_mm);
   double friction_hold(double advance_mm);
   double first_friction_hold(double advance_mm);
+  double chuck(double roll_rad, double inserted_mm);
 
   HiddenPhysics physics_;
   DriveRipple ripple_;
@@ -78,6 +80,10 @@ class DriveTrain {
   double creep_quick_mm_ = 0;
   double creep_slow_mm_ = 0;
   double last_fed_mm_ = 0;
+  double bowed_ = 0;  // share of the bow at this depth
+  double last_unbowed_mm_ = 0;
+  double chuck_lost_rad_ = 0;
+  double last_chucked_rad_ = 0;
 };
 
 }  // namespace bevel::proof

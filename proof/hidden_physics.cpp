@@ -84,6 +84,24 @@ std::vector<EffectKind> make_catalogue(int edition) {
                           {size("share_per_mm", &P::side_per_mm, 0.04, 0.12),
                            shape("direction_rad", &P::side_direction_rad, 0, 2 * std::numbers::pi)}},
                          {"axial_creep", false, {size("lag_at_100mm_mm", &P::creep_at_100mm_mm, 1.5, 5)}}});
+  if (edition < 4) return all;
+  all.insert(
+      all.end(),
+      {{"free_shaft_bow", false, {size("shortening_mm", &P::bow_mm, 0.6, 2.2)}},
+       {"chuck_slip", false, {size("share_at_100mm", &P::chuck_slip_at_100mm, 0.08, 0.3)}},
+       {"oblique_interface",
+        false,
+        {size("deflection_rad", &P::interface_rad, 0.015, 0.06), shape("depth_mm", &P::interface_depth_mm, 12, 40),
+         shape("toward_rad", &P::interface_toward_rad, 0, 2 * std::numbers::pi)}},
+       {"reloading",
+        false,
+        {size("share", &P::reloading_share, 0.3, 0.65), shape("tau_s", &P::reloading_tau_s, 0.8, 5),
+         shape("length_mm", &P::reloading_length_mm, 6, 20)}},
+       {"perspective",
+        false,
+        {signed_size("per_mm", &P::perspective_per_mm, 0.002, 0.005),
+         shape("centre_mm", &P::perspective_centre_mm, 20, 50)}},
+       {"stand_sway", false, {size("sway_mm", &P::sway_mm, 0.2, 0.8), shape("frequency_hz", &P::sway_hz, 1.2, 3)}}});
   return all;
 }
 
@@ -105,7 +123,7 @@ std::vector<double> draw_instants(Random& random, const std::vector<AxisMotion>&
 
 const std::vector<EffectKind>& catalogue(int edition) {
   static const std::array<std::vector<EffectKind>, kEditions> all{make_catalogue(1), make_catalogue(2),
-                                                                  make_catalogue(3)};
+                                                                  make_catalogue(3), make_catalogue(4)};
   return all.at(static_cast<std::size_t>(edition - 1));
 }
 

@@ -72,6 +72,19 @@ struct HiddenPhysics {
   double side_per_mm = 0;         // side_gradient: tissue is stiffer to one side
   double side_direction_rad = 0;  // of that side, from x to y
   double creep_at_100mm_mm = 0;   // axial_creep: friction presses the shaft together, at rest it recovers
+  // On no list, of the fourth edition
+  double bow_mm = 0;                // free_shaft_bow: the shaft bows between its feeder and the entry
+  double chuck_slip_at_100mm = 0;   // chuck_slip: the shaft slips in its chuck, the more the deeper it is turned
+  double interface_rad = 0;         // oblique_interface: where two tissues meet askew the tip is led aside
+  double interface_depth_mm = 0;    // on the insertion axis
+  double interface_toward_rad = 0;  // from x to y: where the interface lies deeper, and the tip is led
+  double reloading_share = 0;       // reloading: at rest tissue relaxes, the tip's load has to be cut up again
+  double reloading_tau_s = 2;
+  double reloading_length_mm = 8;
+  double perspective_per_mm = 0;  // perspective: what comes nearer to a camera reads larger
+  double perspective_centre_mm = 0;
+  double sway_mm = 0;  // stand_sway: starts and stops shake the camera's stand; at a step of 10 mm/s
+  double sway_hz = 2;
 };
 
 // One thing concealed, as the truth says it.
@@ -100,8 +113,9 @@ struct EffectKind {
 };
 
 // Of the distribution: the first is that of the campaigns up to the ninth. With the second stick_slip is on the list,
-// and others take its place off it; with the third a beam's stiff shaft is, as tip_swing.
-inline constexpr int kEditions = 3;
+// and others take its place off it; with the third a beam's stiff shaft is, as tip_swing; the fourth has six more that
+// are not.
+inline constexpr int kEditions = 4;
 inline constexpr int kBeamIsListed = 3;  // from this edition on
 const std::vector<EffectKind>& catalogue(int edition = kEditions);
 // What else may change between two groups of recordings: the needle's own parameters.

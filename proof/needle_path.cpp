@@ -52,6 +52,7 @@ class Tissue {
     const double share = physics_.departure;
     speed_mm_s += share * (std::abs(advance_mm) / step_s - speed_mm_s);
     turn_rad_s += share * (std::abs(roll_after_rad - roll_before_rad) / step_s - turn_rad_s);
+    reload(advance_mm, step_s);
     // A tip that sticks is at rest, whatever its base does.
     relax(advance_mm, physics_.stick_slip_mm > 0.0 ? std::abs(advance_mm) / step_s : speed_mm_s, roll_rad, step_s);
     if (std::abs(advance_mm) < 1e-12) return;
@@ -98,6 +99,18 @@ class Tissue {
       const double growth = 1.0 + 0.2 * physics_.departure * (advanced_mm_ / 50.0 - 0.5);
       omega += growth * tip.h.cross(Vector3d(physics_.bias_x_per_mm, physics_.bias_y_per_mm, 0));
     }
+    // Where one tissue meets another askew the tip slides along the interface before it is through: Mahvash and Dupont
+    // 2009, "Fast needle insertion to minimize tissue deformation and damage", ICRA (transitions drive it off course).
+    if (physics_.interface_rad != 0.0) {
+      constexpr double kSlope = 0.5;     // of the interface
+      constexpr double kWidth_mm = 1.5;  // of the transition
+      const Vector3d toward(std::cos(physics_.interface_toward_rad), std::sin(physics_.interface_toward_rad), 0);
+      const Vector3d across = Vector3d::UnitZ() - kSlope * toward;
+      const double sech = 1.0 / std::cosh((across.dot(tip.p) - physics_.interface_depth_mm) / kWidth_mm);
+      // One interface leads aside by its angle at whatever angle it is crossed, and back on the way back.
+      const double crossing_per_mm = 0.5 * sech * sech / kWidth_mm * across.dot(tip.h + f);
+      omega += physics_.interface_rad * crossing_per_mm * tip.h.cross(toward);
+    }
     return {tip.h + f, omega.cross(tip.h), omega.cross(tip.e1)};
   }
 
@@ -121,6 +134,7 @@ class Tissue {
                                           : (z > physics_.layer_depth_mm ? 1.0 : 0.0);
       factor *= 1.0 + (physics_.layer_ratio - 1.0) * share;
     }
+    if (physics_.reloading_share != 0.0) factor *= 1.0 - physics_.reloading_share * unloaded_;
     // The shaft's elasticity knows its length rather than the depth.
     factor *= 1.0 + physics_.curvature_per_100mm * ((1.0 - round) * z + round * advanced_mm_) / 100.0;
     if (physics_.fibre_share != 0.0)
@@ -163,6 +177,16 @@ class Tissue {
     return second_;
   }
 
+  // Tissue pressed on by the bevel relaxes in time, as all soft tissue does (Fung, Biomechanics), and cutting
+  // presses on fresh tissue: a Maxwell body that advance renews. The needle enters unloaded.
+  void reload(double advance_mm, double step_s) {
+    if (physics_.reloading_share == 0.0) return;
+    const double relaxed = step_s / physics_.reloading_tau_s;
+    const double renewed = std::max(advance_mm, 0.0) / physics_.reloading_length_mm;
+    const double rest = relaxed / (relaxed + renewed);
+    unloaded_ = rest + (unloaded_ - rest) * std::exp(-relaxed - renewed);
+  }
+
   // An elastic offset toward the bevel: builds while the tip cuts, goes at rest.
   void relax(double advance_mm, double speed_mm_s, double roll_rad, double step_s) {
     if (physics_.relaxation_mm <= 0.0) return;
@@ -186,31 +210,8 @@ class Tissue {
   Vector2d second_ = Vector2d::Zero();
   Vector2d offset_mm_ = Vector2d::Zero();
   bool recovering_ = false;
+  double unloaded_ = 1;  // share of the load on the bevel that has relaxed
 };
-
-Vector3d at(const TipPath& path, double time_s) {
-  const double place = std::clamp(time_s / kStep_s, 0.0, static_cast<double>(path.size() - 1));
-  const std::size_t before = std::min(static_cast<std::size_t>(place), path.size() - 2);
-  const double share = place - static_cast<double>(before);
-  return (1.0 - share) * path[before] + share * path[before + 1];
-}
-
-// The first camera, which looks along x and gives y and z.
-void distort(Vector3d& tip, const HiddenPhysics& physics) {
-  if (physics.refraction != 0.0) {
-    const double z = tip.z() - physics.refraction_centre_mm;
-    const double square = (tip.y() * tip.y() + z * z) / 2500.0;
-    const double stretch = 1.0 + physics.refraction * square * (1.0 + 0.15 * physics.departure * (square - 0.4));
-    tip.y() *= stretch;
-    tip.z() = physics.refraction_centre_mm + z * stretch;
-  }
-  const double c = std::cos(physics.camera_about_x_rad);
-  const double s = std::sin(physics.camera_about_x_rad);
-  const double y = physics.camera_ratio * (c * tip.y() + s * tip.z());
-  const double z = physics.camera_ratio * (c * tip.z() - s * tip.y());
-  tip.y() = y;
-  tip.z() = z;
-}
 
 }  // namespace
 
@@ -238,23 +239,6 @@ TipPath travel(const BaseNeedle& needle, const AxisMotion& motion, const HiddenP
     before = now;
   }
   return path;
-}
-
-Eigen::Matrix3Xd view(const TipPath& path, const std::vector<double>& times_s, const HiddenPhysics& physics) {
-  Eigen::Matrix3Xd seen(3, static_cast<Eigen::Index>(times_s.size()));
-  // The shutter is open for a while.
-  const double half_exposure_s = physics.latency_s > 0.0 ? 0.006 * physics.departure : 0.0;
-  LooseGear sag(30.0, 6.0);
-  for (std::size_t i = 0; i < times_s.size(); ++i) {
-    const double t = times_s[i] - physics.latency_s;
-    Eigen::Vector3d tip = 0.5 * at(path, t) + 0.25 * (at(path, t - half_exposure_s) + at(path, t + half_exposure_s));
-    const double z = tip.z();
-    distort(tip, physics);
-    if (physics.camera_hysteresis_mm != 0.0) tip.y() += physics.camera_hysteresis_mm * (z - sag.follow(z)) / 15.0;
-    tip.y() += physics.camera_drift_mm_per_s * times_s[i];
-    seen.col(static_cast<Eigen::Index>(i)) = tip;
-  }
-  return seen;
 }
 
 }  // namespace bevel::proof

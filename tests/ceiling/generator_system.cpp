@@ -34,7 +34,7 @@ constexpr int kStarts = 7;           // of what has many local minima; the engin
 // Depths, lengths and periods whose likelihood has many local minima.
 bool is_scanned(const std::string& effect, const std::string& parameter) {
   return parameter == "depth_mm" || parameter == "jump_mm" || parameter == "period_mm" ||
-         (effect == "tissue_motion" && parameter == "frequency_hz");
+         ((effect == "tissue_motion" || effect == "stand_sway") && parameter == "frequency_hz");
 }
 
 Parameter parameter_of(const std::string& effect, const ParameterRange& range) {
@@ -135,7 +135,7 @@ void GeneratorSystem::add_kinds() {
                                    .scope = Scope::phase,
                                    .periodic = true});
     }
-    if (label == "side_gradient") effect.parameters.back().periodic = true;
+    if (label == "side_gradient" || label == "oblique_interface") effect.parameters.back().periodic = true;
     effects_.push_back(std::move(effect));
     slots_.push_back(std::move(slots));
   };

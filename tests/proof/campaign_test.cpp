@@ -126,7 +126,7 @@ TEST_F(Campaign, DoesNotMixSeedsEditionsOrTools) {
   EXPECT_THAT([&] { run(other_seed); }, ThrowsMessage<std::runtime_error>(HasSubstr("seed 4, not 5")));
   CampaignOptions other_edition = o;
   other_edition.population.edition = 1;
-  EXPECT_THAT([&] { run(other_edition); }, ThrowsMessage<std::runtime_error>(HasSubstr("edition 3, not 1")));
+  EXPECT_THAT([&] { run(other_edition); }, ThrowsMessage<std::runtime_error>(HasSubstr("edition 4, not 1")));
   CampaignOptions nulls = o;
   nulls.population.nulls = true;
   EXPECT_THAT([&] { run(nulls); }, ThrowsMessage<std::runtime_error>(HasSubstr("holds trials with physics concealed")));

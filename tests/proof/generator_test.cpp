@@ -58,7 +58,7 @@ TEST(NeedlePath, EffectsOfNoSizeChangeNothing) {
   for (int i = 0; i < 140; ++i) times_s.push_back(0.05 * i);
   const Eigen::Matrix3Xd bare_view = view(bare, times_s, {});
   std::vector<EffectKind> kinds = catalogue(1);
-  kinds.insert(kinds.end(), catalogue(2).begin(), catalogue(2).end());
+  kinds.insert(kinds.end(), catalogue().begin(), catalogue().end());
   for (const EffectKind& kind : kinds) {
     if (std::string(kind.name) == "slip_direction") continue;  // has no size
     const ConcealedEffect effect = draw_effect(kind, random, motions);
