@@ -347,6 +347,33 @@ bool add_curve(const Likelihood& likelihood, const Discrepancy& discrepancy, dou
   return true;
 }
 
+// A curve to be fitted beside a set.
+struct Candidate {
+  CurvePrior prior;
+  double log_spread = 0;  // Integrated
+  VectorXd nuisance_sd;   // where the fit begins
+};
+
+// The likeliest beside the fit, and beside the same where insertions do not differ: what all recordings share looks
+// like insertions that differ more, and then another curve than the one that it is may stand out of what is left.
+std::vector<Candidate> candidates(const Likelihood& likelihood, const Discrepancy& discrepancy, const Fit& fit,
+                                  const std::vector<CurveFactor>& beside) {
+  std::vector<Candidate> out;
+  const auto add = [&](const std::vector<CurveFactor>& curves, const VectorXd& nuisance_sd) {
+    if (curves.empty() || curves.front().log_bayes_factor < kLikelyCurve) return;
+    const CurvePrior& prior = curves.front().prior;
+    if (std::ranges::none_of(out, [&](const Candidate& known) { return known.prior.curve == prior.curve; }))
+      out.push_back({.prior = prior, .log_spread = integrated(curves).log_spread, .nuisance_sd = nuisance_sd});
+  };
+  add(beside, fit.scales.nuisance_sd);
+  if (fit.scales.nuisance_sd.cwiseAbs().sum() > 0) {
+    Fit alike = fit;
+    alike.scales.nuisance_sd.setZero();
+    add(scan_beside(likelihood, discrepancy, alike), alike.scales.nuisance_sd);
+  }
+  return out;
+}
+
 }  // namespace
 
 void add_discrepancy(const Likelihood& likelihood, const Discrepancy& discrepancy, const CurveRules& rules,
@@ -354,14 +381,18 @@ void add_discrepancy(const Likelihood& likelihood, const Discrepancy& discrepanc
   out.with_discrepancy = true;
   out.curves = scan_beside(likelihood, discrepancy, out.fit);
   if (out.curves.empty()) return;
-  const Integrated all = integrated(out.curves);  // the rest of them, by the linear model
-  out.log_bayes_factor_curve = all.log_factor;
-  if (out.curves.front().log_bayes_factor < kLikelyCurve) return;
-  // The likeliest, where the model is nonlinear: about the mode that it moves to.
-  Scales scales = out.fit.scales;
-  scales.curves = {out.curves.front().prior};
-  Settled with = settle(*out.fit.likelihood, &discrepancy, out.fit.layout, out.fit.shared, out.fit.local, scales,
-                        nuisance_grid(likelihood.system()), -std::numeric_limits<double>::infinity());
+  out.log_bayes_factor_curve = integrated(out.curves).log_factor;
+  // The likeliest, where the model is nonlinear: about the mode that it moves to; the rest of them by the linear model.
+  Settled with{.fit = Fit(out.fit.layout), .over = {}};
+  double log_spread = 0;
+  for (const Candidate& one : candidates(likelihood, discrepancy, out.fit, out.curves)) {
+    const Scales scales{.nuisance_sd = one.nuisance_sd, .curves = {one.prior}};
+    Settled there = settle(*out.fit.likelihood, &discrepancy, out.fit.layout, out.fit.shared, out.fit.local, scales,
+                           nuisance_grid(likelihood.system()), -std::numeric_limits<double>::infinity());
+    if (!(there.over.log_mean + one.log_spread > with.over.log_mean + log_spread)) continue;
+    with = std::move(there);
+    log_spread = one.log_spread;
+  }
   if (!std::isfinite(with.over.log_mean)) return;
   // Beside the curve another local minimum may have been found: it counts without the curve too.
   Settled again = settle(*with.fit.likelihood, nullptr, out.fit.layout, with.fit.shared, with.fit.local,
@@ -372,7 +403,7 @@ void add_discrepancy(const Likelihood& likelihood, const Discrepancy& discrepanc
     out.log_evidence = again.over.log_mean;
     out.nuisance_weights = again.over.weights;
   }
-  out.log_factors = {with.over.log_mean + all.log_spread - out.log_evidence};
+  out.log_factors = {with.over.log_mean + log_spread - out.log_evidence};
   out.fit_with_curve = std::move(with.fit);
   out.nuisance_weights_with_curve = with.over.weights;
   double log_evidence = with.over.log_mean;

@@ -15,6 +15,8 @@
 namespace bevel::inference {
 namespace {
 
+constexpr double kSameMode = 0.1;  // log evidence
+
 // So near that what is promised beside one is not far from what is beside the other.
 bool near(const Noise& a, const Noise& b) {
   constexpr double kShare = 0.1, kCorrelation = 0.05;
@@ -120,15 +122,25 @@ void Search::keep(const ModelSet& set, const std::shared_ptr<const Evaluated>& a
 void Search::evaluate_all(std::vector<Job> jobs) {
   fits_ += jobs.size();
   const double best = best_log();
-  std::vector<std::shared_ptr<const Evaluated>> results(jobs.size());
+  std::vector<std::shared_ptr<Evaluated>> results(jobs.size());
   parallel_for(jobs.size(), rules_.threads, [&](std::size_t i) {
-    Job& job = jobs[i];
-    auto one = evaluate(*likelihood_, job.layout, job.shared, job.local, job.nuisance_sd,
-                        best - rules_.window - rules_.doubt - log_prior(job.set));
-    if (one.valid && (job.beside_curve || log_prior(job.set) + one.log_evidence > best - rules_.curve_window))
-      add_discrepancy(*likelihood_, *discrepancy_, curve_rules_, one);
-    results[i] = std::make_shared<const Evaluated>(std::move(one));
+    const Job& job = jobs[i];
+    results[i] = std::make_shared<Evaluated>(evaluate(*likelihood_, job.layout, job.shared, job.local, job.nuisance_sd,
+                                                      best - rules_.window - rules_.doubt - log_prior(job.set)));
   });
+  // Starts of one set often end in one mode: a discrepancy is looked for beside it once.
+  std::vector<std::size_t> asked;
+  for (std::size_t i = 0; i < jobs.size(); ++i) {
+    const Evaluated& one = *results[i];
+    const bool asks =
+        one.valid && (jobs[i].beside_curve || log_prior(jobs[i].set) + one.log_evidence > best - rules_.curve_window);
+    const auto same = [&](std::size_t k) {
+      return jobs[k].set == jobs[i].set && std::abs(results[k]->log_evidence - one.log_evidence) < kSameMode;
+    };
+    if (asks && std::ranges::none_of(asked, same)) asked.push_back(i);
+  }
+  parallel_for(asked.size(), rules_.threads,
+               [&](std::size_t k) { add_discrepancy(*likelihood_, *discrepancy_, curve_rules_, *results[asked[k]]); });
   for (std::size_t i = 0; i < jobs.size(); ++i)
     if (results[i]->valid) keep(jobs[i].set, results[i]);
 }
