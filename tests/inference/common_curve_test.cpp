@@ -1,0 +1,87 @@
+// What all recordings share looks like recordings that differ: a curve that is common, and a smaller one that stands
+// out beside what a wide spread leaves.
+#include <gtest/gtest.h>
+
+#include <random>
+
+#include "diagnosis/inference/evidence.hpp"
+#include "tests/inference/held_system.hpp"
+
+namespace bevel::inference {
+namespace {
+
+using Eigen::Index;
+using Eigen::MatrixXd;
+using Eigen::VectorXd;
+
+// y = level + (slope_r + a line over x) + a line over w(x) + white noise; the slope may be each recording's own.
+class CommonSlope final : public testing::HeldSystem {
+ public:
+  static constexpr Index kReadings = 60;
+  static constexpr std::size_t kRecordings = 12;
+  static constexpr double kSigma = 0.2, kSlope = 0.6, kWave = 0.06;
+  static double x(Index i) { return static_cast<double>(i) / (kReadings - 1); }
+  static double w(Index i) { return std::cos(6 * 3.14159265 * x(i)); }
+
+  explicit CommonSlope(unsigned seed) {
+    data_.claimed_sd = {kSigma};
+    data_.frame_s = 1;
+    std::mt19937_64 random(seed);
+    std::normal_distribution<double> normal;
+    for (std::size_t r = 0; r < kRecordings; ++r) {
+      Series series;
+      for (Index i = 0; i < kReadings; ++i) {
+        series.message.push_back(static_cast<std::size_t>(i));
+        series.time_s.push_back(static_cast<double>(i));
+        series.relative_sd.push_back(1);
+        series.measured.push_back(kSlope * x(i) + kWave * w(i) + kSigma * normal(random));
+      }
+      data_.recordings.push_back({.series = {series}, .messages = kReadings, .duration_s = kReadings});
+    }
+    base_ = {{.name = "level", .lower = -9, .upper = 9, .none = 0, .starts = {}, .prior = normal_prior(0, 1)}};
+    nuisances_ = {{"slope", 0}};
+    groups_ = {{"slope", "1", {0, 0.3, 0.6}}};
+    curves_ = {{.component = "reading", .unit = "1", .covariate = "x", .at = {0, 1}},
+               {.component = "reading", .unit = "1", .covariate = "w", .at = {-1, 1}}};
+  }
+  bool predict(const ModelSet&, std::size_t, const VectorXd& shared, const VectorXd& local, bool derivatives,
+               Prediction& out) const override {
+    VectorXd along(kReadings);
+    for (Index i = 0; i < kReadings; ++i) along[i] = x(i);
+    out.reading = VectorXd::Constant(kReadings, shared[0]) + local[0] * along;
+    if (!derivatives) return true;
+    out.by_shared = MatrixXd::Ones(kReadings, 1);
+    out.by_local = along;
+    return true;
+  }
+  MatrixXd by_curves(std::size_t, const VectorXd&) const override {
+    MatrixXd out(kReadings, 4);
+    for (Index i = 0; i < kReadings; ++i) out.row(i) << 1 - x(i), x(i), 0.5 * (1 - w(i)), 0.5 * (1 + w(i));
+    return out;
+  }
+};
+
+TEST(Discrepancy, IsLookedForWhereRecordingsDoNotDifferToo) {
+  for (unsigned seed = 1; seed <= 10; ++seed) {
+    SCOPED_TRACE("seed " + std::to_string(seed));
+    const CommonSlope system(seed);
+    Noise noise;
+    noise.sigma = {CommonSlope::kSigma};
+    noise.frame_s = 1;
+    const Likelihood likelihood(system, Readings(CommonSlope::kRecordings), noise);
+    const Layout layout(system, {});
+    const std::vector<VectorXd> local(CommonSlope::kRecordings, layout.local_start());
+    Evaluated at = evaluate(likelihood, layout, layout.shared_start(), local, VectorXd::Constant(1, 0.3));
+    ASSERT_TRUE(at.valid);
+    EXPECT_GT(at.fit.scales.nuisance_sd[0], 0);  // the slope passes for spread
+    const Discrepancy discrepancy(likelihood, at.fit);
+    add_discrepancy(likelihood, discrepancy, {.log_prior_odds = -2, .log_prior_odds_more = -5}, at);
+    ASSERT_TRUE(at.fit_with_curve);
+    EXPECT_EQ(system.curves()[at.curves.front().prior.curve].covariate, "w");  // beside the spread
+    EXPECT_EQ(system.curves()[at.fit_with_curve->scales.curves.front().curve].covariate, "x");
+    EXPECT_EQ(at.fit_with_curve->scales.nuisance_sd[0], 0);
+  }
+}
+
+}  // namespace
+}  // namespace bevel::inference
