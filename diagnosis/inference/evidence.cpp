@@ -1,203 +1,17 @@
 #include "diagnosis/inference/evidence.hpp"
 
 #include <algorithm>
-#include <boost/math/special_functions/beta.hpp>
 #include <cmath>
 #include <limits>
 #include <set>
 
-#include "diagnosis/inference/error_spread.hpp"
-#include "diagnosis/inference/local_minima.hpp"
 #include "diagnosis/inference/log_sum.hpp"
+#include "diagnosis/inference/settle.hpp"
 
 namespace bevel::inference {
 
 using Eigen::Index;
-using Eigen::MatrixXd;
 using Eigen::VectorXd;
-
-namespace {
-
-constexpr double kWorthARefit = 0.2;     // of log evidence
-constexpr double kWhileUnsettled = 0.5;  // of a fit's cost
-// Spreads are looked at beside those whose log posterior is no farther below the likeliest's.
-constexpr double kOnTheWay = 0;     // while fit and noise still move
-constexpr double kWithAShare = 6;   // where they end
-constexpr int kRefits = 12;         // with the standard deviations and the curve at their likeliest
-constexpr double kLikelyCurve = 3;  // log Bayes factor from which a curve is fitted
-constexpr double kNegligible = 20;  // of chi2: readings beyond it have no part in an integral
-
-double beta_binomial(int happened, int recordings) {
-  // Not std::lgamma: it writes its sign into a global of the C library, from every thread.
-  return std::log(boost::math::beta(kHappens + happened, kHappensNot + recordings - happened) /
-                  boost::math::beta(kHappens, kHappensNot));
-}
-
-double log_prior_of_instants(const Likelihood& likelihood, const Fit& fit, const CurveColumns& curve) {
-  double sum = 0;
-  for (std::size_t i = 0; i < fit.layout.local().size(); ++i) {
-    if (!fit.layout.is_instant(i)) continue;
-    int happened = 0;
-    for (std::size_t r = 0; r < fit.local.size(); ++r)
-      if (fit.local[r][static_cast<Index>(i)] > 0) {
-        ++happened;
-        sum += std::log(instant_posterior(likelihood, fit, curve, r, i).width_s / fit.layout.upper(i, r));
-      }
-    sum += beta_binomial(happened, static_cast<int>(fit.local.size()));
-  }
-  return sum;
-}
-
-double log_density_ratios(const Fit& fit, const MatrixXd& covariance) {
-  double sum = 0;
-  for (Index i = 0; i < fit.shared.size(); ++i)
-    sum += log_density_ratio(fit.layout.shared()[static_cast<std::size_t>(i)].parameter->prior, fit.shared[i],
-                             std::sqrt(std::max(covariance(i, i), 0.0)));
-  return sum;
-}
-
-// At the mode squares count in full; what follows from its neighbourhood, by their information (heavy_tails.hpp).
-double beyond_information(const Likelihood& likelihood, const std::vector<ArrowBlock>& blocks) {
-  const double information = likelihood.information();
-  double squares = 0;
-  for (const ArrowBlock& block : blocks) squares += block.ww;
-  return 0.5 * (1 / information - 1) * (information * static_cast<double>(likelihood.data().rows()) - squares);
-}
-
-struct GridEvidence {
-  double log_here = -std::numeric_limits<double>::infinity();      // at the standard deviations of the fit
-  double log_promised = -std::numeric_limits<double>::infinity();  // at the best of the grid, by the linear model
-  double log_mean = -std::numeric_limits<double>::infinity();      // over the grid
-  VectorXd promised;                                               // of each combination, by the linear model
-  VectorXd weights;
-};
-
-// Over the grid of the nuisances' standard deviations, about one mode. The mode's own cost is that of the nonlinear
-// model; the linear one says how it changes over the grid, and what it promises elsewhere counts for no more than what
-// was found here (settle() goes and looks).
-GridEvidence over_nuisances(const Fit& fit, const CurveColumns& curve, const NuisanceGrid& grid, double far_below) {
-  GridEvidence out;
-  const Likelihood& likelihood = *fit.likelihood;
-  auto blocks = linearise(likelihood, fit, curve);
-  if (blocks.empty()) return out;
-  // Of the shared unknowns' errors only those whose prior is not normal matter.
-  std::vector<Index> not_normal;
-  for (Index i = 0; i < fit.shared.size(); ++i)
-    if (fit.layout.shared()[static_cast<std::size_t>(i)].parameter->prior.form != Prior::Form::normal)
-      not_normal.push_back(i);
-  const double here = solve_about(fit, blocks, curve, not_normal).least;
-  const Index start = column_of(likelihood.system(), fit.scales.nuisance_sd);
-  VectorXd logs = over_likely(likelihood.system(), start, far_below, [&](Index k) {
-    const ArrowSolution solution = solve_at(grid.standard_deviations.col(k), fit, blocks, curve, not_normal);
-    return solution.valid ? -0.5 * (fit.cost + solution.least - here + solution.log_volume_ratio) +
-                                log_density_ratios(fit, solution.covariance) + grid.log_prior[k]
-                          : -std::numeric_limits<double>::infinity();
-  });
-  out.log_here = logs[start];
-  out.promised = logs;
-  out.log_promised = logs.maxCoeff();
-  logs = logs.cwiseMin(out.log_here);
-  const double all = log_sum(std::span<const double>(logs.data(), static_cast<std::size_t>(logs.size())));
-  out.weights = (logs.array() - all).exp();
-  const double constant =
-      likelihood.log_weights() + log_prior_of_instants(likelihood, fit, curve) + beyond_information(likelihood, blocks);
-  out.log_here += constant;
-  out.log_promised += constant;
-  out.log_mean = all + constant;
-  return out;
-}
-
-bool alike(const std::vector<VectorXd>& a, const std::vector<VectorXd>& b, const Likelihood& likelihood) {
-  constexpr double kShare = 0.2;  // of the noise
-  if (a.size() != b.size()) return false;
-  const auto& sigma = likelihood.noise().sigma;
-  const double least = *std::min_element(sigma.begin(), sigma.end());
-  for (std::size_t r = 0; r < a.size(); ++r)
-    if ((a[r] - b[r]).cwiseAbs().maxCoeff() > kShare * least) return false;
-  return true;
-}
-
-struct Settled {
-  Fit fit;
-  GridEvidence over;
-};
-
-// The combination that promises most, of those where no fit was made; here: where none promises more.
-Index next_spread(const VectorXd& promised, const std::set<Index>& tried, Index here) {
-  Index best = here;
-  for (Index k = 0; k < promised.size(); ++k)
-    if (promised[k] > promised[best] && !tried.contains(k)) best = k;
-  return best;
-}
-
-// Fit, noise (with what the inputs leave open) and the nuisances' standard deviations in turn, until none changes.
-Settled settle(const Likelihood& likelihood, const Discrepancy* discrepancy, const Layout& layout, VectorXd shared,
-               std::vector<VectorXd> local, Scales scales, const NuisanceGrid& grid, double give_up_below) {
-  auto now = std::make_shared<const Likelihood>(likelihood);
-  CurveColumns curve;
-  Settled best{.fit = Fit(layout), .over = {}};
-  std::vector<VectorXd> inputs, inputs_of_best;
-  std::set<Index> tried;
-  bool noise_moved = false, spread_moved = false, settled = false;
-  for (int pass = 0; pass < kRefits; ++pass) {
-    if (discrepancy) curve = discrepancy->columns(*now, scales.curves);
-    // What will move with the noise need not be known to the end.
-    const FitRules rules{.tolerance = settled ? FitRules{}.tolerance : kWhileUnsettled};
-    Settled one{.fit = fit(*now, layout, shared, local, scales, curve, rules), .over = {}};
-    if (!one.fit.valid) break;
-    // What has many local minima is scanned, with the rest as it now stands.
-    if (pass == 0 || noise_moved) {
-      scan_locals(*now, curve, one.fit);
-      doubt_instants(*now, curve, one.fit);
-      if (pass < 2) scan_shapes(*now, curve, one.fit);
-    }
-    one.fit.likelihood = now;
-    one.over = over_nuisances(one.fit, curve, grid, kOnTheWay);
-    const bool better = one.over.log_here > best.over.log_here + kWorthARefit;
-    // The linear model promised what is not there: back to the likeliest, and to what that promises next.
-    const bool lost = spread_moved && one.over.log_here < best.over.log_here;
-    if (one.over.log_here > best.over.log_here) best = one, inputs_of_best = inputs;
-    // Not before the noise had its turn: what a wrong model leaves passes for noise.
-    if (pass > 1 && best.over.log_promised < give_up_below) break;
-    if (lost) {
-      one = best, inputs = inputs_of_best;
-      now = one.fit.likelihood;
-      scales = one.fit.scales;
-      noise_moved = settled = false;
-    } else {
-      if (!better && !noise_moved && settled) break;
-      // The noise first, then what differs between recordings: by a wrong noise they do not differ.
-      const NoiseBeside noise = noise_beside(one.fit, curve);
-      auto open = inputs_about(one.fit);
-      noise_moved = !alike(noise, *now) || !alike(open, inputs, *now);
-      if (noise_moved) {
-        inputs = std::move(open);
-        now = std::make_shared<const Likelihood>(likelihood, noise.noise, inputs, noise.precision);
-      }
-    }
-    spread_moved = false;
-    if (!noise_moved) {
-      const Index here = column_of(likelihood.system(), scales.nuisance_sd);
-      tried.insert(here);
-      if (const Index next = next_spread(one.over.promised, tried, here); next != here) {
-        scales.nuisance_sd = grid.standard_deviations.col(next);
-        spread_moved = true;
-      } else if (!settled) {
-        settled = true;
-      } else {
-        break;
-      }
-    }
-    shared = one.fit.shared;
-    local = one.fit.local;
-  }
-  if (!best.fit.valid) return best;
-  if (discrepancy) curve = discrepancy->columns(*best.fit.likelihood, best.fit.scales.curves);
-  best.over = over_nuisances(best.fit, curve, grid, kWithAShare);
-  return best;
-}
-
-}  // namespace
 
 std::vector<LessSpread> with_less_spread(const Likelihood& likelihood, const Fit& fit) {
   std::vector<LessSpread> out;
@@ -222,56 +36,6 @@ std::vector<LessSpread> with_less_spread(const Likelihood& likelihood, const Fit
       one.log_change = log_of(one.fit) - here + to_none;
       out.push_back(std::move(one));
     }
-  }
-  return out;
-}
-
-InstantPosterior instant_posterior(const Likelihood& likelihood, const Fit& fit, const CurveColumns& curve,
-                                   std::size_t r, std::size_t local) {
-  const double duration_s = fit.layout.upper(local, r);
-  const double at_s = fit.local[r][static_cast<Index>(local)];
-  Residuals residuals;
-  VectorXd values = fit.local[r];
-  const auto chi2_at = [&](double value) {
-    values[static_cast<Index>(local)] = value;
-    if (!likelihood.evaluate(fit.layout, r, fit.shared, values, false, residuals))
-      return std::numeric_limits<double>::infinity();
-    if (curve) residuals.white -= curve.columns[r] * fit.curve_values;
-    return residuals.white.squaredNorm();
-  };
-  const double best = chi2_at(at_s);
-  // Outwards with growing steps until nothing is left; probabilities of the steps, in order of time.
-  std::vector<std::pair<double, double>> steps;
-  for (const double direction : {-1.0, 1.0}) {
-    double step_s = 0.002, away_s = 0, before = 1;
-    for (int i = 0; i < 60; ++i) {
-      away_s += step_s;
-      const double where_s = at_s + direction * away_s;
-      if (where_s <= 0 || where_s >= duration_s) break;
-      const double now = std::min(1.0, std::exp(-0.5 * (chi2_at(where_s) - best)));
-      steps.emplace_back(where_s - direction * 0.5 * step_s, 0.5 * step_s * (before + now));
-      before = now;
-      if (now < std::exp(-0.5 * kNegligible)) break;
-      step_s = std::min(step_s * 1.3, 0.1);
-    }
-    if (direction < 0) std::reverse(steps.begin(), steps.end());
-  }
-  InstantPosterior out;
-  double sum = 0, first = 0, second = 0;
-  for (const auto& [where_s, weight] : steps)
-    sum += weight, first += weight * where_s, second += weight * where_s * where_s;
-  out.width_s = std::max(sum, 1e-4);
-  if (!(sum > 0)) {
-    out.mean_s = out.low_s = out.high_s = at_s;
-    return out;
-  }
-  out.mean_s = first / sum;
-  out.sd_s = std::sqrt(std::max(0.0, second / sum - out.mean_s * out.mean_s));
-  double below = 0;
-  for (const auto& [where_s, weight] : steps) {
-    if (below < 0.025 * sum) out.low_s = where_s;
-    if (below < 0.975 * sum) out.high_s = where_s;
-    below += weight;
   }
   return out;
 }
@@ -305,6 +69,8 @@ Evaluated evaluate(const Likelihood& likelihood, const Layout& layout, const Vec
 }
 
 namespace {
+
+constexpr double kLikelyCurve = 3;  // log Bayes factor from which a curve is fitted
 
 // Of all curves of a scan together, each as likely beforehand: the likeliest's factor and what the rest adds to it.
 struct Integrated {

@@ -5,6 +5,7 @@
 #include <numbers>
 #include <set>
 
+#include "diagnosis/inference/instant_posterior.hpp"
 #include "diagnosis/inference/nuisances.hpp"
 #include "diagnosis/mismatch/moved_tip.hpp"
 
