@@ -13,15 +13,21 @@ namespace bevel::inference {
 using Eigen::Index;
 using Eigen::VectorXd;
 
+namespace {
+
+// Log evidence of a fit's linear model with these standard deviations, but for what does not depend on them.
+double log_with_spread(const Fit& fit, const VectorXd& nuisance_sd, std::vector<ArrowBlock>& blocks) {
+  const ArrowSolution solution = solve_at(nuisance_sd, fit, blocks, {}, std::vector<Index>{});
+  return -0.5 * (solution.least + solution.log_volume_ratio);
+}
+
+}  // namespace
+
 std::vector<LessSpread> with_less_spread(const Likelihood& likelihood, const Fit& fit) {
   std::vector<LessSpread> out;
   auto blocks = linearise(likelihood, fit, {});
   if (blocks.empty()) return out;
-  const auto log_of = [&](const Fit& about) {
-    const ArrowSolution solution = solve_at(about.scales.nuisance_sd, about, blocks, {}, std::vector<Index>{});
-    return -0.5 * (solution.least + solution.log_volume_ratio);
-  };
-  const double here = log_of(fit);
+  const double here = log_with_spread(fit, fit.scales.nuisance_sd, blocks);
   const auto& groups = likelihood.system().nuisance_groups();
   for (std::size_t g = 0; g < groups.size(); ++g) {
     const auto& values = groups[g].standard_deviations;
@@ -33,7 +39,7 @@ std::vector<LessSpread> with_less_spread(const Likelihood& likelihood, const Fit
       one.fit.scales.nuisance_sd[static_cast<Index>(g)] = less;
       // Of the grid's prior: none as likely as all others together.
       const double to_none = less == values.front() ? std::log(static_cast<double>(values.size() - 1)) : 0.0;
-      one.log_change = log_of(one.fit) - here + to_none;
+      one.log_change = log_with_spread(fit, one.fit.scales.nuisance_sd, blocks) - here + to_none;
       out.push_back(std::move(one));
     }
   }
@@ -71,6 +77,7 @@ Evaluated evaluate(const Likelihood& likelihood, const Layout& layout, const Vec
 namespace {
 
 constexpr double kLikelyCurve = 3;  // log Bayes factor from which a curve is fitted
+constexpr double kOfSpread = 0.5;   // of what spread gains: what a curve that may stand for it gains without
 
 // Of all curves of a scan together, each as likely beforehand: the likeliest's factor and what the rest adds to it.
 struct Integrated {
@@ -120,22 +127,27 @@ struct Candidate {
   VectorXd nuisance_sd;   // where the fit begins
 };
 
-// The likeliest beside the fit, and beside the same where insertions do not differ: what all recordings share looks
-// like insertions that differ more, and then another curve than the one that it is may stand out of what is left.
+// The likeliest beside the fit, and beside the same where recordings do not differ: what they all share looks like
+// recordings that differ more, and then another curve than the one that it is may stand out of what is left. So it may
+// be where a curve stands for much of what the spread is worth; where they do differ, no curve does.
 std::vector<Candidate> candidates(const Likelihood& likelihood, const Discrepancy& discrepancy, const Fit& fit,
                                   const std::vector<CurveFactor>& beside) {
   std::vector<Candidate> out;
-  const auto add = [&](const std::vector<CurveFactor>& curves, const VectorXd& nuisance_sd) {
-    if (curves.empty() || curves.front().log_bayes_factor < kLikelyCurve) return;
+  const auto add = [&](const std::vector<CurveFactor>& curves, const VectorXd& nuisance_sd, double least) {
+    if (curves.empty() || curves.front().log_bayes_factor < least) return;
     const CurvePrior& prior = curves.front().prior;
     if (std::ranges::none_of(out, [&](const Candidate& known) { return known.prior.curve == prior.curve; }))
       out.push_back({.prior = prior, .log_spread = integrated(curves).log_spread, .nuisance_sd = nuisance_sd});
   };
-  add(beside, fit.scales.nuisance_sd);
-  if (fit.scales.nuisance_sd.cwiseAbs().sum() > 0) {
+  add(beside, fit.scales.nuisance_sd, kLikelyCurve);
+  auto blocks = linearise(*fit.likelihood, fit, {});
+  if (fit.scales.nuisance_sd.cwiseAbs().sum() > 0 && !blocks.empty()) {
     Fit alike = fit;
     alike.scales.nuisance_sd.setZero();
-    add(scan_beside(likelihood, discrepancy, alike), alike.scales.nuisance_sd);
+    const double spread_gains =
+        log_with_spread(fit, fit.scales.nuisance_sd, blocks) - log_with_spread(fit, alike.scales.nuisance_sd, blocks);
+    add(scan_beside(likelihood, discrepancy, alike), alike.scales.nuisance_sd,
+        std::max(kLikelyCurve, kOfSpread * spread_gains));
   }
   return out;
 }
