@@ -10,6 +10,7 @@ namespace bevel::model {
 struct Covariates {
   std::array<double, kCovariates> value{};
   double operator[](Covariate covariate) const { return value[static_cast<std::size_t>(covariate)]; }
+  double& operator[](Covariate covariate) { return value[static_cast<std::size_t>(covariate)]; }
 };
 
 // Follows the base from leg to leg.

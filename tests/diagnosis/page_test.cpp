@@ -91,7 +91,7 @@ TEST(Page, says_by_how_much_the_tip_is_moved_at_depth) {
   const auto trace = [&](double deepest_mm, const Eigen::Vector3d& by_mm) {
     diagnosis::Trace t;
     for (const double depth_mm : {0.4 * deepest_mm, deepest_mm, 0.7 * deepest_mm}) {
-      t.covariates.push_back({.depth_mm = depth_mm});
+      t.covariates.emplace_back()[model::Covariate::depth_mm] = depth_mm;
       const bool at_end = depth_mm == deepest_mm;
       t.before_mm.push_back(Eigen::Vector3d::Constant(7));
       t.after_mm.push_back(t.before_mm.back() + (at_end ? by_mm : Eigen::Vector3d(90, 0, 0)));

@@ -79,7 +79,10 @@ TEST_F(Steered, ItIsSaidWhyNot) {
   EXPECT_EQ(why_not(), "the recordings have no clock");
   recorded.has_clock = true;
   for (auto& trace : findings.traces)
-    for (auto& at : trace.covariates) at.depth_mm = std::min(at.depth_mm, 20.0);
+    for (auto& at : trace.covariates) {
+      double& depth_mm = at[model::Covariate::depth_mm];
+      depth_mm = std::min(depth_mm, 20.0);
+    }
   EXPECT_EQ(why_not(), "the recordings reach 20 mm, and 30 are needed");
 }
 
