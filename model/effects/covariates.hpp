@@ -23,11 +23,12 @@ class CovariateTracker {
     double deepest_mm = 0;
   };
   explicit CovariateTracker(const BaseMotion& entry)
-      : CovariateTracker(entry, {entry.time_s, entry.insertion_mm, entry.insertion_mm}) {}
-  CovariateTracker(const BaseMotion& entry, const History& history)
-      : entry_turned_rad_(entry.rotation_rad), history_(history) {
+      : CovariateTracker(entry, {entry.time_s, entry.insertion_mm, entry.insertion_mm}) {
     advance(entry, entry);
   }
+  // Taken up again: the covariates are known after the next leg.
+  CovariateTracker(const BaseMotion& entry, const History& history)
+      : entry_turned_rad_(entry.rotation_rad), history_(history) {}
   void advance(const BaseMotion& from, const BaseMotion& to);
   const History& history() const { return history_; }
   const Covariates& now() const { return now_; }
