@@ -140,15 +140,15 @@ std::vector<Candidate> candidates(const Likelihood& likelihood, const Discrepanc
       out.push_back({.prior = prior, .log_spread = integrated(curves).log_spread, .nuisance_sd = nuisance_sd});
   };
   add(beside, fit.scales.nuisance_sd, kLikelyCurve);
+  if (fit.scales.nuisance_sd.isZero(0)) return out;
   auto blocks = linearise(*fit.likelihood, fit, {});
-  if (fit.scales.nuisance_sd.cwiseAbs().sum() > 0 && !blocks.empty()) {
-    Fit alike = fit;
-    alike.scales.nuisance_sd.setZero();
-    const double spread_gains =
-        log_with_spread(fit, fit.scales.nuisance_sd, blocks) - log_with_spread(fit, alike.scales.nuisance_sd, blocks);
-    add(scan_beside(likelihood, discrepancy, alike), alike.scales.nuisance_sd,
-        std::max(kLikelyCurve, kOfSpread * spread_gains));
-  }
+  if (blocks.empty()) return out;
+  Fit alike = fit;
+  alike.scales.nuisance_sd.setZero();
+  const double spread_gains =
+      log_with_spread(fit, fit.scales.nuisance_sd, blocks) - log_with_spread(fit, alike.scales.nuisance_sd, blocks);
+  add(scan_beside(likelihood, discrepancy, alike), alike.scales.nuisance_sd,
+      std::max(kLikelyCurve, kOfSpread * spread_gains));
   return out;
 }
 
