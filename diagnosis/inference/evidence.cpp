@@ -155,7 +155,7 @@ std::vector<Candidate> candidates(const Likelihood& likelihood, const Discrepanc
 }  // namespace
 
 void add_discrepancy(const Likelihood& likelihood, const Discrepancy& discrepancy, const CurveRules& rules,
-                     Evaluated& out) {
+                     Evaluated& out, double give_up_below) {
   out.with_discrepancy = true;
   out.curves = scan_beside(likelihood, discrepancy, out.fit);
   if (out.curves.empty()) return;
@@ -166,7 +166,7 @@ void add_discrepancy(const Likelihood& likelihood, const Discrepancy& discrepanc
   for (const Candidate& one : candidates(likelihood, discrepancy, out.fit, out.curves)) {
     const Scales scales{.nuisance_sd = one.nuisance_sd, .curves = {one.prior}};
     Settled there = settle(*out.fit.likelihood, &discrepancy, out.fit.layout, out.fit.shared, out.fit.local, scales,
-                           nuisance_grid(likelihood.system()), -std::numeric_limits<double>::infinity());
+                           nuisance_grid(likelihood.system()), give_up_below);
     if (!(there.over.log_mean + one.log_spread > with.over.log_mean + log_spread)) continue;
     with = std::move(there);
     log_spread = one.log_spread;
@@ -185,7 +185,7 @@ void add_discrepancy(const Likelihood& likelihood, const Discrepancy& discrepanc
   out.fit_with_curve = std::move(with.fit);
   out.nuisance_weights_with_curve = with.over.weights;
   double log_evidence = with.over.log_mean;
-  while (out.log_factors.size() < rules.most &&
+  while (log_evidence > give_up_below && out.log_factors.size() < rules.most &&
          add_curve(likelihood, discrepancy, rules.log_prior_odds_more, out, log_evidence)) {
   }
   // Over their number, each more with its prior odds.

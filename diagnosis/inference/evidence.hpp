@@ -36,9 +36,9 @@ struct CurveRules {
   std::size_t most = 2;
 };
 // The discrepancy's part, added to a set that was evaluated without: the likeliest curve, then beside it the next, for
-// as long as one more is likelier than not.
+// as long as one more is likelier than not. Once the evidence with a curve is so low, it is left as it is.
 void add_discrepancy(const Likelihood& likelihood, const Discrepancy& discrepancy, const CurveRules& rules,
-                     Evaluated& evaluated);
+                     Evaluated& evaluated, double give_up_below = -std::numeric_limits<double>::infinity());
 
 // The same mode sought again by the noise of another likelihood, and by how much its evidence is more there.
 std::pair<Fit, double> moved_to(const std::shared_ptr<const Likelihood>& likelihood, const Fit& from,

@@ -27,6 +27,7 @@ MatrixXd correlation_of(const Curve& curve, double length) {
 
 Likelihood::Likelihood(const System& system, const Readings& outliers, Noise noise, const std::vector<VectorXd>& inputs)
     : system_(&system),
+      memo_(std::make_shared<PredictionMemo>(system)),
       outliers_(outliers),
       data_(without(system.data(), outliers)),
       rows_(rows_left(system.data(), outliers)) {
@@ -106,14 +107,14 @@ VectorXd Likelihood::errors(const Layout& layout, std::size_t r, const VectorXd&
 
 bool Likelihood::evaluate(const Layout& layout, std::size_t r, const VectorXd& shared, const VectorXd& local,
                           bool derivatives, Residuals& out) const {
-  thread_local Prediction prediction;
-  if (!system_->predict(layout.set(), r, shared, local, derivatives, prediction)) return false;
-  MatrixXd white = measured_[r] - kept(r, prediction.reading);
+  const auto prediction = memo_->predict(layout.set(), r, shared, local, derivatives);
+  if (!prediction) return false;
+  MatrixXd white = measured_[r] - kept(r, prediction->reading);
   whiten_rows(r, white);
   out.white = white;
   if (derivatives) {
-    out.by_shared = whitened(r, prediction.by_shared);
-    out.by_local = whitened(r, prediction.by_local);
+    out.by_shared = whitened(r, prediction->by_shared);
+    out.by_local = whitened(r, prediction->by_local);
   }
   return out.white.allFinite();
 }

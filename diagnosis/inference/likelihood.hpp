@@ -11,6 +11,7 @@
 #include "diagnosis/inference/arrow.hpp"
 #include "diagnosis/inference/layout.hpp"
 #include "diagnosis/inference/noise.hpp"
+#include "diagnosis/inference/prediction_memo.hpp"
 
 namespace bevel::inference {
 
@@ -80,6 +81,7 @@ class Likelihood {
   void whiten_rows(std::size_t recording, Eigen::Ref<Eigen::MatrixXd> rows) const;
 
   const System* system_;
+  std::shared_ptr<PredictionMemo> memo_;  // shared by all copies: no noise changes a prediction
   Readings outliers_;
   Dataset data_;
   Noise noise_;

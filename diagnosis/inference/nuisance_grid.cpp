@@ -40,6 +40,16 @@ Index column_of(const System& system, const Eigen::VectorXd& nuisance_sd) {
   return column;
 }
 
+Index apart(const System& system, Index a, Index b) {
+  Index most = 0;
+  for (const auto& group : system.nuisance_groups()) {
+    const auto size = static_cast<Index>(group.standard_deviations.size());
+    most = std::max(most, std::abs(a % size - b % size));
+    a /= size, b /= size;
+  }
+  return most;
+}
+
 Eigen::VectorXd over_likely(const System& system, Index start, double far_below,
                             const std::function<double(Index)>& log_at) {
   std::vector<Index> sizes;

@@ -14,6 +14,8 @@ struct NuisanceGrid {
 NuisanceGrid nuisance_grid(const System& system);
 // Which of its columns this is; each is one of its group's standard deviations.
 Eigen::Index column_of(const System& system, const Eigen::VectorXd& nuisance_sd);
+// How far apart two of its columns are: steps of the group that differs most.
+Eigen::Index apart(const System& system, Eigen::Index a, Eigen::Index b);
 
 // A logarithm for each combination of nuisance_grid(), by `log_at` of its column; -infinity for those that were not
 // asked for: only neighbours (one group's next standard deviation, either way) of what comes within exp(-far_below) of

@@ -119,16 +119,52 @@ void Search::keep(const ModelSet& set, const std::shared_ptr<const Evaluated>& a
     visited_.insert_or_assign(set, std::move(one));
 }
 
+// Several starts of one set often end in one mode: fitted by the noise that all begin with, they show it, and one of
+// them is enough.
+void Search::drop_repeated(std::vector<Job>& jobs) const {
+  std::map<ModelSet, std::size_t> count;
+  for (const Job& job : jobs) ++count[job.set];
+  std::vector<double> cost(jobs.size());
+  parallel_for(jobs.size(), rules_.threads, [&](std::size_t i) {
+    Job& job = jobs[i];
+    if (count[job.set] < 2) return;
+    const Fit there =
+        fit(*likelihood_, job.layout, job.shared, job.local, {.nuisance_sd = job.nuisance_sd, .curves = {}}, {});
+    cost[i] = there.cost;
+    if (there.valid) job.shared = there.shared, job.local = there.local;
+  });
+  std::vector<Job> out;
+  std::vector<double> kept;
+  for (std::size_t i = 0; i < jobs.size(); ++i) {
+    const Job& job = jobs[i];
+    bool repeated = false;
+    for (std::size_t k = 0; k < out.size() && count[job.set] > 1; ++k)
+      if (out[k].set == job.set && out[k].nuisance_sd == job.nuisance_sd &&
+          std::abs(kept[k] - cost[i]) < 2 * kSameMode) {
+        out[k].beside_curve = out[k].beside_curve || job.beside_curve;
+        repeated = true;
+      }
+    if (!repeated) out.push_back(job), kept.push_back(cost[i]);
+  }
+  jobs = std::move(out);
+}
+
 void Search::evaluate_all(std::vector<Job> jobs) {
+  drop_repeated(jobs);
   fits_ += jobs.size();
-  const double best = best_log();
   std::vector<std::shared_ptr<Evaluated>> results(jobs.size());
+  const auto hopeless = [&](const Job& job) {
+    return best_log() - rules_.window - rules_.doubt - log_prior(job.set);
+  };
   parallel_for(jobs.size(), rules_.threads, [&](std::size_t i) {
     const Job& job = jobs[i];
-    results[i] = std::make_shared<Evaluated>(evaluate(*likelihood_, job.layout, job.shared, job.local, job.nuisance_sd,
-                                                      best - rules_.window - rules_.doubt - log_prior(job.set)));
+    results[i] = std::make_shared<Evaluated>(
+        evaluate(*likelihood_, job.layout, job.shared, job.local, job.nuisance_sd, hopeless(job)));
   });
-  // Starts of one set often end in one mode: a discrepancy is looked for beside it once.
+  for (std::size_t i = 0; i < jobs.size(); ++i)
+    if (results[i]->valid) keep(jobs[i].set, results[i]);
+  // Those that still end in one mode are asked for a discrepancy once.
+  const double best = best_log();
   std::vector<std::size_t> asked;
   for (std::size_t i = 0; i < jobs.size(); ++i) {
     const Evaluated& one = *results[i];
@@ -139,10 +175,13 @@ void Search::evaluate_all(std::vector<Job> jobs) {
     };
     if (asks && std::ranges::none_of(asked, same)) asked.push_back(i);
   }
-  parallel_for(asked.size(), rules_.threads,
-               [&](std::size_t k) { add_discrepancy(*likelihood_, *discrepancy_, curve_rules_, *results[asked[k]]); });
-  for (std::size_t i = 0; i < jobs.size(); ++i)
-    if (results[i]->valid) keep(jobs[i].set, results[i]);
+  std::vector<std::shared_ptr<Evaluated>> with(asked.size());
+  parallel_for(asked.size(), rules_.threads, [&](std::size_t k) {
+    with[k] = std::make_shared<Evaluated>(*results[asked[k]]);
+    add_discrepancy(*likelihood_, *discrepancy_, curve_rules_, *with[k],
+                    hopeless(jobs[asked[k]]) - curve_rules_.log_prior_odds);
+  });
+  for (std::size_t k = 0; k < asked.size(); ++k) keep(jobs[asked[k]].set, with[k]);
 }
 
 void Search::expand(const ModelSet& set) {

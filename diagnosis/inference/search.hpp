@@ -81,6 +81,7 @@ class Search {
   void expand(const ModelSet& set);
   std::vector<Job> swaps(const Visited& here);
   void keep(const ModelSet& set, const std::shared_ptr<const Evaluated>& at);
+  void drop_repeated(std::vector<Job>& jobs) const;
   void evaluate_all(std::vector<Job> jobs);
   static Job job_at(const Fit& fit);
   Job job_from(const Fit& fit, std::size_t effect, const StartPoint& start) const;

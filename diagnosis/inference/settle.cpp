@@ -107,13 +107,29 @@ bool alike(const std::vector<VectorXd>& a, const std::vector<VectorXd>& b, const
   return true;
 }
 
-// The combination that promises most, of those where no fit was made; here: where none promises more.
-Index next_spread(const VectorXd& promised, const std::set<Index>& tried, Index here) {
-  Index best = here;
-  for (Index k = 0; k < promised.size(); ++k)
-    if (promised[k] > promised[best] && !tried.contains(k)) best = k;
-  return best;
-}
+// Which spreads are looked at next. The linear model says what each combination promises; where it was wrong so many
+// steps of the grid away, it is asked for half as many (a trust region).
+class SpreadSearch {
+ public:
+  explicit SpreadSearch(const System& system) : system_(system) {}
+
+  void tried(Index spread) { tried_.insert(spread); }
+  void lost(Index spread, Index best) { reach_ = apart(system_, spread, best) / 2; }
+  void gained() { reach_ *= 2; }
+  // The one that promises most within reach, of those where no fit was made; here: where none promises enough more.
+  Index next(const VectorXd& promised, Index here) const {
+    Index best = here;
+    double most = promised[here] + kWorthARefit;
+    for (Index k = 0; k < promised.size(); ++k)
+      if (promised[k] > most && !tried_.contains(k) && apart(system_, k, here) <= reach_) best = k, most = promised[k];
+    return best;
+  }
+
+ private:
+  const System& system_;
+  std::set<Index> tried_;
+  Index reach_ = 64;  // farther than any two are
+};
 
 }  // namespace
 
@@ -123,7 +139,7 @@ Settled settle(const Likelihood& likelihood, const Discrepancy* discrepancy, con
   CurveColumns curve;
   Settled best{.fit = Fit(layout), .over = {}};
   std::vector<VectorXd> inputs, inputs_of_best;
-  std::set<Index> tried;
+  SpreadSearch spreads(likelihood.system());
   bool noise_moved = false, spread_moved = false, settled = false;
   for (int pass = 0; pass < kRefits; ++pass) {
     if (discrepancy) curve = discrepancy->columns(*now, scales.curves);
@@ -142,6 +158,8 @@ Settled settle(const Likelihood& likelihood, const Discrepancy* discrepancy, con
     const bool better = one.over.log_here > best.over.log_here + kWorthARefit;
     // The linear model promised what is not there: back to the likeliest, and to what that promises next.
     const bool lost = spread_moved && one.over.log_here < best.over.log_here;
+    const Index spread = column_of(likelihood.system(), scales.nuisance_sd);
+    spreads.tried(spread);
     if (one.over.log_here > best.over.log_here) best = one, inputs_of_best = inputs;
     // Not before the noise had its turn: what a wrong model leaves passes for noise.
     if (pass > 1 && best.over.log_promised < give_up_below) break;
@@ -149,9 +167,11 @@ Settled settle(const Likelihood& likelihood, const Discrepancy* discrepancy, con
       one = best, inputs = inputs_of_best;
       now = one.fit.likelihood;
       scales = one.fit.scales;
+      spreads.lost(spread, column_of(likelihood.system(), scales.nuisance_sd));
       noise_moved = settled = false;
     } else {
       if (!better && !noise_moved && settled) break;
+      if (spread_moved) spreads.gained();
       // The noise first, then what differs between recordings: by a wrong noise they do not differ.
       const NoiseBeside noise = noise_beside(one.fit, curve);
       auto open = inputs_about(one.fit);
@@ -164,8 +184,7 @@ Settled settle(const Likelihood& likelihood, const Discrepancy* discrepancy, con
     spread_moved = false;
     if (!noise_moved) {
       const Index here = column_of(likelihood.system(), scales.nuisance_sd);
-      tried.insert(here);
-      if (const Index next = next_spread(one.over.promised, tried, here); next != here) {
+      if (const Index next = spreads.next(one.over.promised, here); next != here) {
         scales.nuisance_sd = grid.standard_deviations.col(next);
         spread_moved = true;
       } else if (!settled) {

@@ -1,0 +1,41 @@
+#include "diagnosis/inference/prediction_memo.hpp"
+
+#include <algorithm>
+
+namespace bevel::inference {
+namespace {
+
+constexpr std::size_t kKept = 4;  // of a recording: two that a thread goes to and fro between, for each of two threads
+
+bool same(const Eigen::VectorXd& a, const Eigen::VectorXd& b) { return a.size() == b.size() && a == b; }
+
+}  // namespace
+
+PredictionMemo::PredictionMemo(const System& system) : system_(&system), recordings_(system.data().recordings.size()) {}
+
+std::shared_ptr<const Prediction> PredictionMemo::predict(const ModelSet& set, std::size_t recording,
+                                                          const Eigen::VectorXd& shared, const Eigen::VectorXd& local,
+                                                          bool derivatives) {
+  OfRecording& here = recordings_[recording];
+  // Without derivatives a path is cheap, and a scan does not come back to one.
+  if (derivatives) {
+    const std::scoped_lock lock(here.mutex);
+    const auto at = std::ranges::find_if(here.known, [&](const Known& one) {
+      return one.set == set && same(one.shared, shared) && same(one.local, local);
+    });
+    if (at != here.known.end()) {
+      std::rotate(here.known.begin(), at, at + 1);
+      return here.known.front().prediction;
+    }
+  }
+  const auto prediction = std::make_shared<Prediction>();
+  if (!system_->predict(set, recording, shared, local, derivatives, *prediction)) return nullptr;
+  if (derivatives) {
+    const std::scoped_lock lock(here.mutex);
+    if (here.known.size() == kKept) here.known.pop_back();
+    here.known.insert(here.known.begin(), {.set = set, .shared = shared, .local = local, .prediction = prediction});
+  }
+  return prediction;
+}
+
+}  // namespace bevel::inference
