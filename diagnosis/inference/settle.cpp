@@ -3,12 +3,12 @@
 #include <algorithm>
 #include <boost/math/special_functions/beta.hpp>
 #include <cmath>
-#include <set>
 
 #include "diagnosis/inference/error_spread.hpp"
 #include "diagnosis/inference/instant_posterior.hpp"
 #include "diagnosis/inference/local_minima.hpp"
 #include "diagnosis/inference/log_sum.hpp"
+#include "diagnosis/inference/spread_search.hpp"
 
 namespace bevel::inference {
 
@@ -18,8 +18,7 @@ using Eigen::VectorXd;
 
 namespace {
 
-constexpr double kWorthARefit = 0.2;     // of log evidence
-constexpr double kWhileUnsettled = 0.5;  // of a fit's cost
+constexpr double kWorthARefit = 0.2;  // of log evidence: what another spread has to promise
 // Spreads are looked at beside those whose log posterior is no farther below the likeliest's.
 constexpr double kOnTheWay = 0;    // while fit and noise still move
 constexpr double kWithAShare = 6;  // where they end
@@ -107,30 +106,6 @@ bool alike(const std::vector<VectorXd>& a, const std::vector<VectorXd>& b, const
   return true;
 }
 
-// Which spreads are looked at next. The linear model says what each combination promises; where it was wrong so many
-// steps of the grid away, it is asked for half as many (a trust region).
-class SpreadSearch {
- public:
-  explicit SpreadSearch(const System& system) : system_(system) {}
-
-  void tried(Index spread) { tried_.insert(spread); }
-  void lost(Index spread, Index best) { reach_ = apart(system_, spread, best) / 2; }
-  void gained() { reach_ *= 2; }
-  // The one that promises most within reach, of those where no fit was made; here: where none promises enough more.
-  Index next(const VectorXd& promised, Index here) const {
-    Index best = here;
-    double most = promised[here] + kWorthARefit;
-    for (Index k = 0; k < promised.size(); ++k)
-      if (promised[k] > most && !tried_.contains(k) && apart(system_, k, here) <= reach_) best = k, most = promised[k];
-    return best;
-  }
-
- private:
-  const System& system_;
-  std::set<Index> tried_;
-  Index reach_ = 64;  // farther than any two are
-};
-
 }  // namespace
 
 Settled settle(const Likelihood& likelihood, const Discrepancy* discrepancy, const Layout& layout, VectorXd shared,
@@ -140,12 +115,10 @@ Settled settle(const Likelihood& likelihood, const Discrepancy* discrepancy, con
   Settled best{.fit = Fit(layout), .over = {}};
   std::vector<VectorXd> inputs, inputs_of_best;
   SpreadSearch spreads(likelihood.system());
-  bool noise_moved = false, spread_moved = false, settled = false;
+  bool noise_moved = false, spread_moved = false;
   for (int pass = 0; pass < kRefits; ++pass) {
     if (discrepancy) curve = discrepancy->columns(*now, scales.curves);
-    // What will move with the noise need not be known to the end.
-    const FitRules rules{.tolerance = settled ? FitRules{}.tolerance : kWhileUnsettled};
-    Settled one{.fit = fit(*now, layout, shared, local, scales, curve, rules), .over = {}};
+    Settled one{.fit = fit(*now, layout, shared, local, scales, curve), .over = {}};
     if (!one.fit.valid) break;
     // What has many local minima is scanned, with the rest as it now stands.
     if (pass == 0 || noise_moved) {
@@ -155,7 +128,6 @@ Settled settle(const Likelihood& likelihood, const Discrepancy* discrepancy, con
     }
     one.fit.likelihood = now;
     one.over = over_nuisances(one.fit, curve, grid, kOnTheWay);
-    const bool better = one.over.log_here > best.over.log_here + kWorthARefit;
     // The linear model promised what is not there: back to the likeliest, and to what that promises next.
     const bool lost = spread_moved && one.over.log_here < best.over.log_here;
     const Index spread = column_of(likelihood.system(), scales.nuisance_sd);
@@ -168,9 +140,8 @@ Settled settle(const Likelihood& likelihood, const Discrepancy* discrepancy, con
       now = one.fit.likelihood;
       scales = one.fit.scales;
       spreads.lost(spread, column_of(likelihood.system(), scales.nuisance_sd));
-      noise_moved = settled = false;
+      noise_moved = false;
     } else {
-      if (!better && !noise_moved && settled) break;
       if (spread_moved) spreads.gained();
       // The noise first, then what differs between recordings: by a wrong noise they do not differ.
       const NoiseBeside noise = noise_beside(one.fit, curve);
@@ -184,14 +155,10 @@ Settled settle(const Likelihood& likelihood, const Discrepancy* discrepancy, con
     spread_moved = false;
     if (!noise_moved) {
       const Index here = column_of(likelihood.system(), scales.nuisance_sd);
-      if (const Index next = spreads.next(one.over.promised, here); next != here) {
-        scales.nuisance_sd = grid.standard_deviations.col(next);
-        spread_moved = true;
-      } else if (!settled) {
-        settled = true;
-      } else {
-        break;
-      }
+      const Index next = spreads.next(one.over.promised, here, kWorthARefit);
+      if (next == here) break;
+      scales.nuisance_sd = grid.standard_deviations.col(next);
+      spread_moved = true;
     }
     shared = one.fit.shared;
     local = one.fit.local;
