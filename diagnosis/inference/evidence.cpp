@@ -3,7 +3,6 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
-#include <set>
 
 #include "diagnosis/inference/log_sum.hpp"
 #include "diagnosis/inference/settle.hpp"
@@ -22,29 +21,6 @@ double log_with_spread(const Fit& fit, const VectorXd& nuisance_sd, std::vector<
 }
 
 }  // namespace
-
-std::vector<LessSpread> with_less_spread(const Likelihood& likelihood, const Fit& fit) {
-  std::vector<LessSpread> out;
-  auto blocks = linearise(likelihood, fit, {});
-  if (blocks.empty()) return out;
-  const double here = log_with_spread(fit, fit.scales.nuisance_sd, blocks);
-  const auto& groups = likelihood.system().nuisance_groups();
-  for (std::size_t g = 0; g < groups.size(); ++g) {
-    const auto& values = groups[g].standard_deviations;
-    const double now = fit.scales.nuisance_sd[static_cast<Index>(g)];
-    const auto at = std::find(values.begin(), values.end(), now);
-    if (at == values.end() || at == values.begin()) continue;
-    for (const double less : std::set<double>{*std::prev(at), values.front()}) {
-      LessSpread one{.fit = fit};
-      one.fit.scales.nuisance_sd[static_cast<Index>(g)] = less;
-      // Of the grid's prior: none as likely as all others together.
-      const double to_none = less == values.front() ? std::log(static_cast<double>(values.size() - 1)) : 0.0;
-      one.log_change = log_with_spread(fit, one.fit.scales.nuisance_sd, blocks) - here + to_none;
-      out.push_back(std::move(one));
-    }
-  }
-  return out;
-}
 
 std::pair<Fit, double> moved_to(const std::shared_ptr<const Likelihood>& likelihood, const Fit& from,
                                 const Discrepancy& discrepancy) {

@@ -44,13 +44,4 @@ void add_discrepancy(const Likelihood& likelihood, const Discrepancy& discrepanc
 std::pair<Fit, double> moved_to(const std::shared_ptr<const Likelihood>& likelihood, const Fit& from,
                                 const Discrepancy& discrepancy);
 
-// The same fit with one group of nuisances a step less spread, or not at all, for each group that is spread, and by how
-// much its evidence is more there (less, as a rule), by the linear model. What all recordings of a kind share looks
-// like a larger spread until it has a name: beside the spread that is left then, an effect may be worth much more.
-struct LessSpread {
-  Fit fit;
-  double log_change = 0;
-};
-std::vector<LessSpread> with_less_spread(const Likelihood& likelihood, const Fit& fit);
-
 }  // namespace bevel::inference

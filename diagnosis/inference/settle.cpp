@@ -124,7 +124,7 @@ Settled settle(const Likelihood& likelihood, const Discrepancy* discrepancy, con
     if (pass == 0 || noise_moved) {
       scan_locals(*now, curve, one.fit);
       doubt_instants(*now, curve, one.fit);
-      if (pass < 2) scan_shapes(*now, curve, one.fit);
+      if (pass == 0) scan_shapes(*now, curve, one.fit);
     }
     one.fit.likelihood = now;
     one.over = over_nuisances(one.fit, curve, grid, kOnTheWay);

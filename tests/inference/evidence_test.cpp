@@ -72,25 +72,7 @@ TEST(Evidence, OfALinearModelIsTheNormalDensityOfAllReadings) {
     }
 }
 
-// Two ways out of a local minimum: what a fit would be worth with less spread, and without one of its effects.
-TEST(Evidence, WithLessSpreadIsTheNormalDensityWithIt) {
-  for (const double nuisance_sd : {0.02, 0.2}) {
-    const LinearSystem system(4, 7, 0.3, nuisance_sd, 0);
-    const Evaluated at = evaluate_set(system, {0});
-    Fit wide = at.fit;
-    wide.scales.nuisance_sd[0] = 0.2;
-    const auto less = with_less_spread(*at.fit.likelihood, wide);
-    ASSERT_EQ(less.size(), 1U);
-    EXPECT_EQ(less[0].fit.scales.nuisance_sd[0], 0);
-    const Noise& noise = at.fit.likelihood->noise();
-    const VectorXd y = all_readings(system);
-    const double change =
-        log_normal(y, covariance_of(system, {0}, noise, 0.0)) - log_normal(y, covariance_of(system, {0}, noise, 0.2));
-    EXPECT_NEAR(less[0].log_change, change, 1e-6 * std::abs(change) + 1e-6);
-    EXPECT_TRUE(with_less_spread(*at.fit.likelihood, less[0].fit).empty());
-  }
-}
-
+// A way out of a local minimum.
 TEST(Evidence, WhatDroppingAnEffectCostsIsTheFallOfTheLikelihood) {
   const LinearSystem system(4, 7, 0.4, 0.2, 0);
   const auto likelihood = std::make_shared<const Likelihood>(system, Readings(4), white(system));
