@@ -153,9 +153,7 @@ void Search::evaluate_all(std::vector<Job> jobs) {
   drop_repeated(jobs);
   fits_ += jobs.size();
   std::vector<std::shared_ptr<Evaluated>> results(jobs.size());
-  const auto hopeless = [&](const Job& job) {
-    return best_log() - rules_.window - rules_.doubt - log_prior(job.set);
-  };
+  const auto hopeless = [&](const Job& job) { return best_log() - rules_.window - rules_.doubt - log_prior(job.set); };
   parallel_for(jobs.size(), rules_.threads, [&](std::size_t i) {
     const Job& job = jobs[i];
     results[i] = std::make_shared<Evaluated>(
