@@ -127,7 +127,7 @@ void Search::drop_repeated(std::vector<Job>& jobs) const {
   std::vector<double> cost(jobs.size());
   parallel_for(jobs.size(), rules_.threads, [&](std::size_t i) {
     Job& job = jobs[i];
-    if (count[job.set] < 2) return;
+    if (count.at(job.set) < 2) return;
     const Fit there =
         fit(*likelihood_, job.layout, job.shared, job.local, {.nuisance_sd = job.nuisance_sd, .curves = {}}, {});
     cost[i] = there.cost;
@@ -138,7 +138,7 @@ void Search::drop_repeated(std::vector<Job>& jobs) const {
   for (std::size_t i = 0; i < jobs.size(); ++i) {
     const Job& job = jobs[i];
     bool repeated = false;
-    for (std::size_t k = 0; k < out.size() && count[job.set] > 1; ++k)
+    for (std::size_t k = 0; k < out.size() && count.at(job.set) > 1; ++k)
       if (out[k].set == job.set && out[k].nuisance_sd == job.nuisance_sd &&
           std::abs(kept[k] - cost[i]) < 2 * kSameMode) {
         out[k].beside_curve = out[k].beside_curve || job.beside_curve;
