@@ -66,17 +66,19 @@ TEST(PredictionMemo, ThreadsSeeTheSameBits) {
   const Counting system(3);
   PredictionMemo memo(system);
   constexpr std::size_t kAsked = 3000;
+  constexpr int kThreads = 4;
   std::vector<int> wrong(kAsked);
-  parallel_for(kAsked, 4, [&](std::size_t i) {
+  parallel_for(kAsked, kThreads, [&](std::size_t i) {
     const std::size_t r = i % 3;
-    const VectorXd shared = one(0.1 * static_cast<double>(i / 3 % 7));
+    const VectorXd shared = one(0.1 * static_cast<double>(i / 3 % 2));
     Prediction expected;
     system.predict({0}, r, shared, one(0.5), true, expected);
     const auto found = memo.predict({0}, r, shared, one(0.5), true);
     wrong[i] = found->reading != expected.reading || found->by_shared != expected.by_shared;
   });
   EXPECT_EQ(std::count(wrong.begin(), wrong.end(), 0), static_cast<std::ptrdiff_t>(kAsked));
-  EXPECT_LT(system.count, static_cast<int>(2 * kAsked));
+  // Two values of each recording, each computed once, or by all threads that asked before it was known.
+  EXPECT_LE(system.count, static_cast<int>(kAsked) + 3 * 2 * kThreads);
 }
 
 }  // namespace
