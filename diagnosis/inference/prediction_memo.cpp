@@ -18,23 +18,28 @@ std::shared_ptr<const Prediction> PredictionMemo::predict(const ModelSet& set, s
                                                           bool derivatives) {
   OfRecording& here = recordings_[recording];
   // Without derivatives a path is cheap, and a scan does not come back to one.
-  if (derivatives) {
-    const std::scoped_lock lock(here.mutex);
+  if (!derivatives) {
+    const auto prediction = std::make_shared<Prediction>();
+    return system_->predict(set, recording, shared, local, false, *prediction) ? prediction : nullptr;
+  }
+  const auto find = [&]() -> std::shared_ptr<const Prediction> {
     const auto at = std::ranges::find_if(here.known, [&](const Known& one) {
       return one.set == set && same(one.shared, shared) && same(one.local, local);
     });
-    if (at != here.known.end()) {
-      std::rotate(here.known.begin(), at, at + 1);
-      return here.known.front().prediction;
-    }
+    if (at == here.known.end()) return nullptr;
+    std::rotate(here.known.begin(), at, at + 1);
+    return here.known.front().prediction;
+  };
+  {
+    const std::scoped_lock lock(here.mutex);
+    if (auto known = find()) return known;
   }
   const auto prediction = std::make_shared<Prediction>();
-  if (!system_->predict(set, recording, shared, local, derivatives, *prediction)) return nullptr;
-  if (derivatives) {
-    const std::scoped_lock lock(here.mutex);
-    if (here.known.size() == kKept) here.known.pop_back();
-    here.known.insert(here.known.begin(), {.set = set, .shared = shared, .local = local, .prediction = prediction});
-  }
+  if (!system_->predict(set, recording, shared, local, true, *prediction)) return nullptr;
+  const std::scoped_lock lock(here.mutex);
+  if (auto known = find()) return known;  // by another thread meanwhile
+  if (here.known.size() == kKept) here.known.pop_back();
+  here.known.insert(here.known.begin(), {.set = set, .shared = shared, .local = local, .prediction = prediction});
   return prediction;
 }
 
