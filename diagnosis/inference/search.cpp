@@ -140,7 +140,7 @@ void Search::drop_repeated(std::vector<Job>& jobs) const {
     bool repeated = false;
     for (std::size_t k = 0; k < out.size() && count.at(job.set) > 1; ++k)
       if (out[k].set == job.set && out[k].nuisance_sd == job.nuisance_sd &&
-          std::abs(kept[k] - cost[i]) < 2 * kSameMode) {
+          std::abs(kept[k] - cost[i]) < 2 * kSameMode) {  // costs are twice a logarithm
         out[k].beside_curve = out[k].beside_curve || job.beside_curve;
         repeated = true;
       }

@@ -16,7 +16,7 @@ class SpreadSearch {
   void tried(Eigen::Index spread) { tried_.insert(spread); }
   // A fit there is less likely than at the best known, though more was promised.
   void lost(Eigen::Index spread, Eigen::Index best) { reach_ = apart(system_, spread, best) / 2; }
-  // A fit as far away as it may be was the likelier.
+  // A fit was likelier than the best known, as promised.
   void gained() { reach_ *= 2; }
   // That which promises most, and more than `here` by least_gain, of those within reach where no fit was made; `here`:
   // none does. promised: a logarithm each.
