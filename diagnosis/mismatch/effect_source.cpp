@@ -142,6 +142,10 @@ CovariateWords words_of(model::Covariate covariate) {
       return {"turned", "rad", "the turning since the entry"};
     case model::Covariate::withdrawn_mm:
       return {"withdrawn", "mm", "how far the needle is drawn back"};
+    case model::Covariate::tip_x_mm:
+      return {"tip_x", "mm", "where the tip is along x"};
+    case model::Covariate::tip_y_mm:
+      return {"tip_y", "mm", "where the tip is along y"};
     case model::Covariate::roll_rad:
       return {"roll", "rad", "roll"};
   }

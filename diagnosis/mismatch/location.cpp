@@ -56,6 +56,17 @@ Begin begin_of(const NeedleSystem& system, const Fit& fit, std::size_t r) {
   return begin;
 }
 
+// At every node; where the tip is, at those of which there is a reading.
+std::vector<model::Covariates> covariates_of(const Recording& recording) {
+  auto all = model::find_covariates(recording.motion.nodes);
+  for (std::size_t i = 0; i < recording.motion.at.size(); ++i) {
+    model::Covariates& at = all[recording.motion.at[i]];
+    at[model::Covariate::tip_x_mm] = recording.position_mm[i].x();
+    at[model::Covariate::tip_y_mm] = recording.position_mm[i].y();
+  }
+  return all;
+}
+
 model::Covariate covariate_of(const NeedleSystem& system, const Fit& fit) {
   if (!fit.layout.set().empty()) return system.physics(fit.layout.set().front()).covariate();
   if (!fit.scales.curves.empty())  // of the likeliest, if there are several
@@ -75,7 +86,7 @@ std::vector<Location> locate(const NeedleSystem& system, const ChosenModel& befo
     if (system.recorded().two_groups() && !recording.changed) continue;
     const auto white_before = white_of(before, r);
     const auto white_after = white_of(after, r);
-    const auto covariates = model::find_covariates(recording.motion.nodes);
+    const auto covariates = covariates_of(recording);
     const Begin begin = begin_of(system, *after.fit, r);
     Location best;
     double most = 0;
@@ -98,7 +109,7 @@ std::vector<Location> locate(const NeedleSystem& system, const ChosenModel& befo
         const double x = covariates[recording.motion.at[series.message[i]]][covariate];
         low = std::min(low, x), high = std::max(high, x);
       }
-      best.range = {low, high};
+      best.range = low <= high ? std::array{low, high} : std::array{0.0, 0.0};  // no reading says where the tip is
       if (begin.at_s > 0) best.from_s = begin.at_s;
       if (begin.depth_mm >= 0) {
         best.range = {begin.depth_mm, std::max(begin.depth_mm, covariates.back()[model::Covariate::depth_mm])};
@@ -127,7 +138,7 @@ std::vector<Trace> make_traces(const NeedleSystem& system, const inference::Read
     const Recording& recording = system.recorded().recordings[r];
     Trace trace;
     trace.log = recording.name;
-    const auto covariates = model::find_covariates(recording.motion.nodes);
+    const auto covariates = covariates_of(recording);
     for (const std::size_t node : recording.motion.at) {
       trace.time_s.push_back(recording.motion.nodes[node].time_s);
       trace.covariates.push_back(covariates[node]);

@@ -15,10 +15,19 @@ constexpr int kValues = 12;               // of a curve
 constexpr double kLeastVariation = 0.05;  // of a covariate, in its unit
 constexpr double kLeastRoll_rad = 0.2;
 
+// Ascending.
 std::vector<double> values_of(const std::vector<std::vector<model::Covariates>>& recordings, Covariate covariate) {
   std::vector<double> values;
   for (const auto& nodes : recordings)
     for (std::size_t i = 1; i < nodes.size(); ++i) values.push_back(nodes[i][covariate]);
+  std::sort(values.begin(), values.end());
+  return values;
+}
+
+std::vector<double> values_of(const std::vector<Eigen::Vector3d>& seen_mm, Eigen::Index axis) {
+  std::vector<double> values;
+  for (const auto& tip_mm : seen_mm)
+    if (std::isfinite(tip_mm[axis])) values.push_back(tip_mm[axis]);
   std::sort(values.begin(), values.end());
   return values;
 }
@@ -32,10 +41,9 @@ bool within_a_turn(const std::vector<std::vector<model::Covariates>>& recordings
          });
 }
 
-// Evenly over the middle 98 % of what the covariate takes; false if it hardly varies.
-bool find_places(const std::vector<std::vector<model::Covariates>>& recordings, Covariate covariate,
-                 inference::Curve& curve) {
-  const std::vector<double> values = values_of(recordings, covariate);
+// Evenly over the middle 98 % of what the covariate takes (values, ascending); false if it hardly varies.
+bool find_places(const std::vector<double>& values, Covariate covariate, inference::Curve& curve) {
+  if (values.empty()) return false;
   const double low = values[values.size() / 100];
   const double high = values[values.size() - 1 - values.size() / 100];
   curve.periodic = covariate == Covariate::roll_rad;
@@ -71,14 +79,21 @@ class CurveEffect final : public model::ComponentEffect {
 
 }  // namespace
 
-std::vector<NeedleCurve> find_curves(const std::vector<const model::Motion*>& motions) {
+std::vector<NeedleCurve> find_curves(const std::vector<const model::Motion*>& motions,
+                                     const std::vector<Eigen::Vector3d>& seen_mm) {
   std::vector<NeedleCurve> out;
   std::vector<std::vector<model::Covariates>> recordings;
   for (const model::Motion* motion : motions) recordings.push_back(model::find_covariates(motion->nodes));
   const bool roll_says = within_a_turn(recordings);
+  const auto values = [&](Covariate covariate) {
+    if (covariate == Covariate::tip_x_mm) return values_of(seen_mm, 0);
+    if (covariate == Covariate::tip_y_mm) return values_of(seen_mm, 1);
+    return values_of(recordings, covariate);
+  };
   for (const Covariate covariate : model::all_covariates()) {
     inference::Curve curve;
-    if ((covariate == Covariate::turned_rad && roll_says) || !find_places(recordings, covariate, curve)) continue;
+    if ((covariate == Covariate::turned_rad && roll_says) || !find_places(values(covariate), covariate, curve))
+      continue;
     curve.covariate = model::name_of(covariate);
     for (const auto& info : model::discrepancy_components()) {
       curve.component = info.meaning;

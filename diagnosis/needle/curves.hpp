@@ -17,8 +17,10 @@ struct NeedleCurve {
   inference::Curve curve;
 };
 
-// Every pair of component and covariate that varies in these motions.
-std::vector<NeedleCurve> find_curves(const std::vector<const model::Motion*>& motions);
+// Every pair of component and covariate that varies in these recordings. seen_mm: where readings had the tip, in {A};
+// not a number where they do not say.
+std::vector<NeedleCurve> find_curves(const std::vector<const model::Motion*>& motions,
+                                     const std::vector<Eigen::Vector3d>& seen_mm);
 
 // Weights of a curve's values at a place of its covariate: linear between them, flat outside, round the circle.
 Eigen::VectorXd weights_at(const inference::Curve& curve, double x);

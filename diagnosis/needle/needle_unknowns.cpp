@@ -187,8 +187,12 @@ NeedleSystem::NeedleSystem(RecordedCase recorded, const model::NeedleParameters&
   add_effects_of_library();
   if (two_groups_) add_common_errors();
   std::vector<const model::Motion*> motions;
-  for (const auto& recording : recorded_.recordings) motions.push_back(&recording.motion);
-  needle_curves_ = find_curves(motions);
+  std::vector<Eigen::Vector3d> seen_mm;
+  for (const auto& recording : recorded_.recordings) {
+    motions.push_back(&recording.motion);
+    seen_mm.insert(seen_mm.end(), recording.position_mm.begin(), recording.position_mm.end());
+  }
+  needle_curves_ = find_curves(motions, seen_mm);
   if (!recorded_.has_clock)
     std::erase_if(needle_curves_, [](const NeedleCurve& curve) { return model::needs_clock(curve.covariate); });
   for (const NeedleCurve& curve : needle_curves_) {

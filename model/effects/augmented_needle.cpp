@@ -135,13 +135,15 @@ bool AugmentedNeedle::advance_with_effects(AugmentedState& state, const BaseMoti
   leg.to = to;
   leg.R = state.pose.R;
   leg.R_moves = columns_ > 0;
-  leg.tip_depth_mm.value = state.pose.p_mm.z();
+  const std::array<Dual*, 3> tip_mm = {&leg.tip_side_mm[0], &leg.tip_side_mm[1], &leg.tip_depth_mm};
+  for (int i = 0; i < 3; ++i) tip_mm[static_cast<std::size_t>(i)]->value = state.pose.p_mm[i];
   leg.heading_z.value = state.pose.R(2, 2);
   if (leg.R_moves) {
     for (int i = 0; i < 3; ++i) leg.R_body.row(i) = kNoSlope.matrix().transpose();
     leg.R_body.leftCols(columns_) = state.D.bottomRows<3>();
-    leg.tip_depth_mm.slopes().head(columns_) =
-        state.pose.R.row(2).lazyProduct(state.D.topRows<3>()).transpose().array();
+    for (int i = 0; i < 3; ++i)
+      tip_mm[static_cast<std::size_t>(i)]->slopes().head(columns_) =
+          state.pose.R.row(i).lazyProduct(state.D.topRows<3>()).transpose().array();
     // n = R^T z_A; its z moves by (n x delta)_z.
     leg.heading_z.slopes() =
         (state.pose.R(2, 0) * leg.R_body.row(1) - state.pose.R(2, 1) * leg.R_body.row(0)).transpose().array();

@@ -7,6 +7,8 @@ namespace {
 
 using Component = DiscrepancyComponent;
 
+constexpr double kStep_mm = 1e-3;  // for a slope by differences: far below any length on which a tissue changes
+
 constexpr std::array<DiscrepancyComponentInfo, 11> kComponents = {
     {{Component::curvature_bevel, "curvature_bevel", "curvature toward the bevel", "1/mm", 0.05},
      {Component::curvature_across, "curvature_across", "curvature across the bevel", "1/mm", 0.05},
@@ -87,11 +89,27 @@ CovariateTracker ComponentEffect::tracked(const LegView& leg, const EffectMemory
   return tracker;
 }
 
+Dual ComponentEffect::place_of(const CovariateTracker& tracker, const LegView& leg) const {
+  if (covariate() == Covariate::tip_x_mm) return leg.tip_side_mm[0];
+  if (covariate() == Covariate::tip_y_mm) return leg.tip_side_mm[1];
+  return tracker[covariate()];
+}
+
+Dual ComponentEffect::place(const LegView& leg, const EffectMemory& memory) const {
+  return place_of(tracked(leg, memory), leg);
+}
+
 Dual ComponentEffect::value(Parameters p, const LegView& leg, EffectMemory& memory) const {
   const CovariateTracker tracker = tracked(leg, memory);
   memory.phase = 1;
   memory.number = {tracker.history().moved_s, tracker.history().turned_mm, tracker.history().deepest_mm};
-  return value_at(p, tracker[covariate()]);
+  const Dual at = place_of(tracker, leg);
+  Dual out = value_at(p, at.value);
+  // A subclass knows its value at a number and not its slope there.
+  if (at.moves())
+    out += (value_at(p, at.value + kStep_mm).value - value_at(p, at.value - kStep_mm).value) / (2 * kStep_mm) *
+           (at - at.value);
+  return out;
 }
 
 // So much per mm or rad of the base, over all legs so far.

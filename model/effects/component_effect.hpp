@@ -1,6 +1,7 @@
 #pragma once
 // An effect in one component of the tip's motion or of the reading, as a function v of one covariate c. Over a leg in
-// which the base moves by ds mm and dR rad (frames: model/kinematics.hpp), c at its end:
+// which the base moves by ds mm and dR rad (frames: model/kinematics.hpp), c at its end, but the tip's place at its
+// start:
 //   curvature_bevel  kappa_x += v     curvature_across  kappa_y += v
 //   advance          ds_tip += v ds   advance_turning   ds_tip += v dR
 //   turning          dR_tip += v |ds| turning_turning   dR_tip += v dR
@@ -67,10 +68,11 @@ class ComponentEffect : public Effect {
                ? static_cast<int>(component_) - static_cast<int>(DiscrepancyComponent::x)
                : -1;
   }
-  // Of the covariate at the end of a leg. Before or after value(): the same leg twice changes nothing.
-  double place(const LegView& leg, const EffectMemory& memory) const { return tracked(leg, memory)[covariate()]; }
+  // Of the covariate. Before or after value(): the same leg twice changes nothing.
+  Dual place(const LegView& leg, const EffectMemory& memory) const;
 
  private:
+  Dual place_of(const CovariateTracker& tracker, const LegView& leg) const;
   CovariateTracker tracked(const LegView& leg, const EffectMemory& memory) const;
   Dual value(Parameters p, const LegView& leg, EffectMemory& memory) const;
   const Dual& summed(Parameters p, const LegView& leg, EffectMemory& memory, double base) const;

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 
 namespace bevel::model {
 namespace {
@@ -25,7 +26,9 @@ void CovariateTracker::advance(const BaseMotion& from, const BaseMotion& to) {
                 to.insertion_mm - history_.turned_mm,
                 to.rotation_rad,
                 to.rotation_rad - entry_turned_rad_,
-                history_.deepest_mm - to.insertion_mm};
+                history_.deepest_mm - to.insertion_mm,
+                std::numeric_limits<double>::quiet_NaN(),
+                std::numeric_limits<double>::quiet_NaN()};
 }
 
 std::vector<Covariates> find_covariates(std::span<const BaseMotion> nodes) {

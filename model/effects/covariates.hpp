@@ -1,12 +1,14 @@
 #pragma once
-// What a discrepancy is looked at against, and what a reading was taken at: from the base's motion alone.
+// What a discrepancy is looked at against, and what a reading was taken at: from the base's motion alone, but for where
+// the tip is.
 #include "model/effects/effect.hpp"
 
 namespace bevel::model {
 
 // depth is the base's insertion; since_stop counts seconds from the moment at which insertion last ended (0 while
 // inserting), since_reversal the insertion since the shaft last turned; turned is the shaft's turning since the entry,
-// turns counted; withdrawn how far the base is drawn back from the deepest that it was.
+// turns counted; withdrawn how far the base is drawn back from the deepest that it was. tip_x, tip_y: where the tip is
+// in {A}; not a number until somebody who knows puts it in.
 struct Covariates {
   std::array<double, kCovariates> value{};
   double operator[](Covariate covariate) const { return value[static_cast<std::size_t>(covariate)]; }

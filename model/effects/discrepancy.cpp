@@ -69,7 +69,7 @@ class Discrepancy final : public ComponentEffect {
 
  private:
   KnotWeights weights(const LegView& leg, const EffectMemory& memory) const {
-    return weights_at(curve_.at, curve_.periodic, place(leg, memory));
+    return weights_at(curve_.at, curve_.periodic, place(leg, memory).value);
   }
   double std_error(const KnotWeights& at) const {
     return at.weight[0] * curve_.std_errors[at.knot[0]] + at.weight[1] * curve_.std_errors[at.knot[1]];
@@ -94,6 +94,10 @@ class Discrepancy final : public ComponentEffect {
       case Covariate::roll_rad:
       case Covariate::turned_rad:
         moved = std::abs(leg.base_rotation_rad());
+        break;
+      case Covariate::tip_x_mm:
+      case Covariate::tip_y_mm:
+        moved = std::abs(leg.R(covariate() == Covariate::tip_x_mm ? 0 : 1, 2) * leg.base_insertion_mm());
         break;
       case Covariate::speed_mm_s:
       case Covariate::turn_rate_rad_s:

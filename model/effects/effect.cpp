@@ -42,6 +42,10 @@ std::string_view name_of(Covariate covariate) {
       return "turned_rad";
     case Covariate::withdrawn_mm:
       return "withdrawn_mm";
+    case Covariate::tip_x_mm:
+      return "tip_x_mm";
+    case Covariate::tip_y_mm:
+      return "tip_y_mm";
   }
   return "time_s";
 }
@@ -53,9 +57,9 @@ bool needs_clock(Covariate covariate) {
 
 std::span<const Covariate> all_covariates() {
   static constexpr std::array<Covariate, kCovariates> kAll = {
-      Covariate::time_s,          Covariate::depth_mm,     Covariate::speed_mm_s,
-      Covariate::turn_rate_rad_s, Covariate::since_stop_s, Covariate::since_reversal_mm,
-      Covariate::roll_rad,        Covariate::turned_rad,   Covariate::withdrawn_mm};
+      Covariate::time_s,       Covariate::depth_mm,          Covariate::speed_mm_s, Covariate::turn_rate_rad_s,
+      Covariate::since_stop_s, Covariate::since_reversal_mm, Covariate::roll_rad,   Covariate::turned_rad,
+      Covariate::withdrawn_mm, Covariate::tip_x_mm,          Covariate::tip_y_mm};
   return kAll;
 }
 

@@ -76,9 +76,11 @@ enum class Covariate {
   since_reversal_mm,
   roll_rad,
   turned_rad,
-  withdrawn_mm
+  withdrawn_mm,
+  tip_x_mm,
+  tip_y_mm
 };
-inline constexpr std::size_t kCovariates = 9;
+inline constexpr std::size_t kCovariates = 11;
 std::string_view name_of(Covariate covariate);
 bool needs_clock(Covariate covariate);  // time, speed, rate, rest: unknown where only the order of readings is
 std::span<const Covariate> all_covariates();
@@ -102,6 +104,7 @@ struct BaseMotion {
 struct LegView {
   BaseMotion entry, from, to;  // of the insertion, of this leg
   Dual tip_depth_mm;           // z of the tip at the start of the leg
+  Dual2 tip_side_mm;           // its x and y there
   Dual heading_z;              // cosine of the tilt there
   Eigen::Matrix3d R;           // orientation of {B} at the start, and its derivatives as body rotations:
   bool R_moves = false;        // with an unknown: then

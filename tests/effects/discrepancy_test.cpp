@@ -114,6 +114,58 @@ TEST(Discrepancy, ACurveIsIntegrated) {
                 1e-9);
 }
 
+// A straight needle at a slope a: the tip's place along x is a share of its way, so that an advance in proportion to
+// it, ds_tip = (1 + c x) ds, grows exponentially.
+TEST(Discrepancy, ACurveOverTheTipsPlaceFollowsTheTip) {
+  NeedleParameters straight = bicycle();
+  straight.curvature_per_mm = 0;
+  constexpr double kSlope_rad = 0.3, kShare_per_mm = 0.02, kEnd_mm = 50;
+  const Motion motion = Script{{5, kEnd_mm / 5, 0}}.fine();
+  const double rate_per_mm = kShare_per_mm * std::sin(kSlope_rad);
+  const double way_mm = std::expm1(rate_per_mm * kEnd_mm) / rate_per_mm;
+  for (const bool along_x : {true, false}) {
+    const auto entry = active("entry_angle", {along_x ? 0 : -kSlope_rad, along_x ? kSlope_rad : 0});
+    const Covariate covariate = along_x ? Covariate::tip_x_mm : Covariate::tip_y_mm;
+    const DiscrepancyCurve faster{
+        Component::advance, covariate, {-40, 40}, {-40 * kShare_per_mm, 40 * kShare_per_mm}, {0, 0}};
+    const auto path = path_of(straight, {entry, active_discrepancy(faster)}, motion);
+    EXPECT_NEAR(path.back().norm(), way_mm, 2e-3 * way_mm);  // the place is that at the start of a leg
+    EXPECT_NEAR(path.back()[along_x ? 0 : 1], path.back().norm() * std::sin(kSlope_rad), 1e-9);
+  }
+}
+
+// By the needle's own parameters: where the tip is moves with them, and with it what the curve says.
+TEST(Discrepancy, DerivativesOfACurveOverTheTipsPlaceAreThoseOfDifferences) {
+  const Motion motion = rich_script().recorded();
+  for (const auto& info : discrepancy_components())
+    for (const Covariate covariate : {Covariate::tip_x_mm, Covariate::tip_y_mm}) {
+      // One slope all the way: a difference over a knot would be of two.
+      const double steep = 2e-3 * info.largest;
+      const std::vector<ActiveEffect> curve = {
+          active_discrepancy({info.component, covariate, {-40, 40}, {-40 * steep, 40 * steep}, {0, 0}})};
+      const OpenLoop path = run(AugmentedNeedle(agar(), curve, 2, {.curvature = 0, .roll = 1}), motion);
+      for (const int column : {0, 1}) {
+        const double step = column == 0 ? 1e-7 : 1e-6;
+        const auto moved = [&](double by) {
+          NeedleParameters needle = agar();
+          std::vector<ActiveEffect> effects = curve;
+          if (column == 0) needle.curvature_per_mm += by;
+          if (column == 1) effects.push_back(active("bevel_offset", {by}));
+          return path_of(needle, effects, motion);
+        };
+        const auto above = moved(step), below = moved(-step);
+        double off = 0, size = 0;
+        for (std::size_t r = 0; r < above.size(); ++r) {
+          const Eigen::Vector3d difference = (above[r] - below[r]) / (2 * step);
+          const auto slope = path.jacobian.block<3, 1>(static_cast<Eigen::Index>(3 * r), column);
+          off = std::max(off, (difference - slope).norm());
+          size = std::max(size, difference.norm());
+        }
+        EXPECT_LT(off, 1e-4 * size) << info.name << " over " << name_of(covariate) << ", column " << column;
+      }
+    }
+}
+
 // By the values of its knots, about a curve that is not zero and beside another effect.
 TEST(Discrepancy, DerivativesByItsKnotsAreThoseOfDifferences) {
   const Motion motion = rich_script().recorded();

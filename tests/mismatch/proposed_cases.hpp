@@ -24,7 +24,8 @@ inline std::vector<ProposedForm> proposed_cases() {
   for (const Place& at : {Place{Component::curvature_bevel, Covariate::depth_mm, 0.5, 55},
                           Place{Component::advance, Covariate::depth_mm, 0.25, 60},
                           Place{Component::drift_across, Covariate::time_s, 0.125, 8},
-                          Place{Component::y, Covariate::since_reversal_mm, -3.5, 20}})
+                          Place{Component::y, Covariate::since_reversal_mm, -3.5, 20},
+                          Place{Component::curvature_across, Covariate::tip_y_mm, -2.5, 8}})
     for (const auto form : {inference::Form::step, inference::Form::ramp, inference::Form::power,
                             inference::Form::exponential, inference::Form::saturation, inference::Form::sinusoid}) {
       ProposedForm p;

@@ -59,6 +59,7 @@ double value_at(const model::Effect& effect, const Values& values, model::Covari
   }
   if (covariate == model::Covariate::since_reversal_mm) leg.to.rotation_rad = 0;
   if (covariate == model::Covariate::withdrawn_mm) leg.to.insertion_mm = -place, leg.from.insertion_mm = -place + kStep;
+  if (covariate == model::Covariate::tip_y_mm) leg.tip_side_mm[1] = place;
   if (covariate == model::Covariate::time_s) leg.to.time_s = place, leg.from.time_s = place - kStep;
   if (covariate == model::Covariate::roll_rad || covariate == model::Covariate::turned_rad)
     leg.to.rotation_rad = place, leg.from.rotation_rad = place - kStep;
@@ -70,7 +71,7 @@ double value_at(const model::Effect& effect, const Values& values, model::Covari
   effect.settle(p, leg, memory);
   effect.offset(p, memory, 0, point);
   if (const double along = insertion.value + rotation.value; along != 0) return along / kStep;
-  if (kappa[0].value != 0) return kappa[0].value;
+  if (kappa[0].value != 0 || kappa[1].value != 0) return kappa[0].value + kappa[1].value;
   return point[0].value != 0 ? point[0].value / kStep : point[1].value;
 }
 

@@ -15,6 +15,9 @@ namespace {
 using Eigen::Index;
 using Eigen::MatrixXd;
 using Eigen::VectorXd;
+using ::testing::Each;
+using ::testing::Field;
+using ::testing::Ne;
 
 // Each component once, where its form is plain: a reading is off by the curve's value; an advance is the integral.
 TEST(NeedleCurves, ShiftReadingsAndAdvanceTheTip) {
@@ -75,7 +78,8 @@ model::Motion turned_by(double from_rad, double turn_rad) {
   return motion;
 }
 bool has_curve(const std::vector<const model::Motion*>& motions, model::Covariate covariate) {
-  return std::ranges::any_of(find_curves(motions), [&](const NeedleCurve& one) { return one.covariate == covariate; });
+  return std::ranges::any_of(find_curves(motions, {}),
+                             [&](const NeedleCurve& one) { return one.covariate == covariate; });
 }
 
 TEST(NeedleCurves, TurningIsACovariateWhereTheRollSaysLess) {
@@ -94,6 +98,19 @@ TEST(NeedleCurves, DrawnBackIsACovariateWhereSomethingIs) {
   for (int i = 1; i <= 40; ++i) and_back.nodes.push_back({5 + 0.05 * i, 50 - 0.5 * i, 3});
   EXPECT_FALSE(has_curve({&in}, model::Covariate::withdrawn_mm));
   EXPECT_TRUE(has_curve({&in, &and_back}, model::Covariate::withdrawn_mm));
+}
+
+// Over where the tip was seen, along each axis along which it was.
+TEST(NeedleCurves, TheTipsPlaceIsACovariateWhereReadingsSayIt) {
+  const model::Motion in = turned_by(0, 3);
+  std::vector<Eigen::Vector3d> seen_mm;
+  for (int i = 0; i <= 100; ++i) seen_mm.emplace_back(std::nan(""), 0.1 * i - 4, i);
+  const auto curves = find_curves({&in}, seen_mm);
+  EXPECT_THAT(curves, Each(Field(&NeedleCurve::covariate, Ne(model::Covariate::tip_x_mm))));
+  const auto over_y = std::ranges::find(curves, model::Covariate::tip_y_mm, &NeedleCurve::covariate);
+  ASSERT_NE(over_y, curves.end());
+  EXPECT_NEAR(over_y->curve.at.front(), -3.9, 0.1);  // the middle 98 %
+  EXPECT_NEAR(over_y->curve.at.back(), 5.9, 0.1);
 }
 
 }  // namespace
