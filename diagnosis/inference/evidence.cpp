@@ -58,13 +58,13 @@ constexpr double kOfSpread = 0.5;   // of what spread gains: what a curve that m
 // Of all curves of a scan together, each as likely beforehand: the likeliest's factor and what the rest adds to it.
 struct Integrated {
   double log_factor = 0;
-  double log_spread = 0;  // log_factor less the likeliest's own
+  double log_others = 0;  // what the others add to the likeliest's own: log_factor less that
 };
 Integrated integrated(const std::vector<CurveFactor>& curves) {
   std::vector<double> logs;
   for (const auto& one : curves) logs.push_back(one.log_bayes_factor);
   const double mean = log_sum(logs) - std::log(static_cast<double>(logs.size()));
-  return {.log_factor = mean, .log_spread = mean - logs.front()};
+  return {.log_factor = mean, .log_others = mean - logs.front()};
 }
 
 // Every curve beside a fit, with what its set leaves open, by the noise that the curves were prepared with.
@@ -87,7 +87,7 @@ bool add_curve(const Likelihood& likelihood, const Discrepancy& discrepancy, dou
   scales.curves.push_back(more.front().prior);
   Settled with = settle(*here.likelihood, &discrepancy, here.layout, here.shared, here.local, scales,
                         nuisance_grid(likelihood.system()), -std::numeric_limits<double>::infinity());
-  const double log_factor = with.over.log_mean + all.log_spread - log_evidence;
+  const double log_factor = with.over.log_mean + all.log_others - log_evidence;
   if (!(log_factor + log_prior_odds > 0)) return false;
   log_evidence = with.over.log_mean;
   out.fit_with_curve = std::move(with.fit);
@@ -99,7 +99,7 @@ bool add_curve(const Likelihood& likelihood, const Discrepancy& discrepancy, dou
 // A curve to be fitted beside a set.
 struct Candidate {
   CurvePrior prior;
-  double log_spread = 0;  // Integrated
+  double log_others = 0;  // Integrated
   VectorXd nuisance_sd;   // where the fit begins
 };
 
@@ -113,7 +113,7 @@ std::vector<Candidate> candidates(const Likelihood& likelihood, const Discrepanc
     if (curves.empty() || curves.front().log_bayes_factor < least) return;
     const CurvePrior& prior = curves.front().prior;
     if (std::ranges::none_of(out, [&](const Candidate& known) { return known.prior.curve == prior.curve; }))
-      out.push_back({.prior = prior, .log_spread = integrated(curves).log_spread, .nuisance_sd = nuisance_sd});
+      out.push_back({.prior = prior, .log_others = integrated(curves).log_others, .nuisance_sd = nuisance_sd});
   };
   add(beside, fit.scales.nuisance_sd, kLikelyCurve);
   if (fit.scales.nuisance_sd.isZero(0)) return out;
@@ -138,14 +138,14 @@ void add_discrepancy(const Likelihood& likelihood, const Discrepancy& discrepanc
   out.log_bayes_factor_curve = integrated(out.curves).log_factor;
   // The likeliest, where the model is nonlinear: about the mode that it moves to; the rest of them by the linear model.
   Settled with{.fit = Fit(out.fit.layout), .over = {}};
-  double log_spread = 0;
+  double log_others = 0;
   for (const Candidate& one : candidates(likelihood, discrepancy, out.fit, out.curves)) {
     const Scales scales{.nuisance_sd = one.nuisance_sd, .curves = {one.prior}};
     Settled there = settle(*out.fit.likelihood, &discrepancy, out.fit.layout, out.fit.shared, out.fit.local, scales,
                            nuisance_grid(likelihood.system()), give_up_below);
-    if (!(there.over.log_mean + one.log_spread > with.over.log_mean + log_spread)) continue;
+    if (!(there.over.log_mean + one.log_others > with.over.log_mean + log_others)) continue;
     with = std::move(there);
-    log_spread = one.log_spread;
+    log_others = one.log_others;
   }
   if (!std::isfinite(with.over.log_mean)) return;
   // Beside the curve another local minimum may have been found: it counts without the curve too.
@@ -157,7 +157,7 @@ void add_discrepancy(const Likelihood& likelihood, const Discrepancy& discrepanc
     out.log_evidence = again.over.log_mean;
     out.nuisance_weights = again.over.weights;
   }
-  out.log_factors = {with.over.log_mean + log_spread - out.log_evidence};
+  out.log_factors = {with.over.log_mean + log_others - out.log_evidence};
   out.fit_with_curve = std::move(with.fit);
   out.nuisance_weights_with_curve = with.over.weights;
   double log_evidence = with.over.log_mean;

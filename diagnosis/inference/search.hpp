@@ -66,8 +66,8 @@ class Search {
   // Of a discrepancy: what nobody has named is as likely to be missing as what somebody has, all names together; one
   // more curve is as likely as one more effect.
   const CurveRules& curve_rules() const { return curve_rules_; }
-  // A set that was evaluated, with its share in the posterior.
-  Visited weighed(const ModelSet& set, const std::shared_ptr<const Evaluated>& at) const;
+  // A set that was evaluated, with its share in the posterior. It may be of another system: its prior comes with it.
+  Visited weighed(const ModelSet& set, double log_prior, const std::shared_ptr<const Evaluated>& at) const;
 
  private:
   struct Job {

@@ -167,7 +167,8 @@ Judged judge(const Search& search, const GeneratorSystem& system, const std::vec
   inference::add_discrepancy(likelihood, search.discrepancy(), search.curve_rules(), at);
   Judged out{.valid = true};
   out.log_prior_ratio = log_prior_ratio(system, at.fit, visible);
-  const auto weighed = search.weighed(set, std::make_shared<const inference::Evaluated>(at));
+  const double log_prior = log_prior_of(system, set, search.rules().log_prior_odds_effect);
+  const auto weighed = search.weighed(set, log_prior, std::make_shared<const inference::Evaluated>(at));
   out.log_without_curve = weighed.log_without_curve + out.log_prior_ratio;
   out.log_with_curve = weighed.log_with_curve + out.log_prior_ratio;
   return out;

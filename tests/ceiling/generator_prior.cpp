@@ -139,6 +139,16 @@ double log_ratio_of_instants(const inference::Fit& fit) {
 
 }  // namespace
 
+double log_prior_of(const GeneratorSystem& system, const inference::ModelSet& set, double log_prior_odds) {
+  double sum = 0;
+  for (const std::size_t e : set) {
+    const auto& all = system.effects();
+    const auto kinds = system.on_a_list(e) ? std::ranges::count(all, all[e].name, &inference::Effect::name) : 1;
+    sum += log_prior_odds - std::log(static_cast<double>(kinds));
+  }
+  return sum;
+}
+
 double log_prior_ratio(const GeneratorSystem& system, const inference::Fit& fit, const std::vector<Visible>& visible) {
   const auto blocks = inference::linearise(*fit.likelihood, fit, {});
   if (blocks.empty()) return -std::numeric_limits<double>::infinity();

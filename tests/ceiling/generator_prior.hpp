@@ -27,6 +27,10 @@ struct Visible {
   Eigen::VectorXd sigmas_per_unit;  // in the order of the effect's sizes
 };
 
+// Of a set, as Search::log_prior: log_prior_odds for each effect, of an effect on a list shared by its kinds. On no
+// list each is an effect of its own.
+double log_prior_of(const GeneratorSystem& system, const inference::ModelSet& set, double log_prior_odds);
+
 // Logarithm of the generator's prior over the flat ones of GeneratorSystem, averaged over the posterior about a fit by
 // those: sizes by their densities, instants by the generator's chance of one in a recording, and its time of it.
 double log_prior_ratio(const GeneratorSystem& system, const inference::Fit& fit, const std::vector<Visible>& visible);

@@ -6,6 +6,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include "tests/ceiling/trial_case.hpp"
+
 namespace bevel::ceiling {
 namespace {
 
@@ -83,6 +85,19 @@ TEST(GeneratorPrior, TwoSizesHaveMassOneAltogether) {
           radius * (largest / kRadii) * (M_PI / 2 / kAngles);
     }
   EXPECT_NEAR(4 * mass, 1, 0.01);
+}
+
+TEST(GeneratorPrior, AnEffectOnNoListHasTheOddsOfOneEffect) {
+  testing::NoiseFree made(31, false);
+  const auto needle = made.seen(proof::views_of(made.setting, made.trial.truth.needle, {}));
+  const GeneratorSystem system(needle, made.trial);
+  // More than the library has, whose own effects tell nothing of these.
+  ASSERT_GT(system.effects().size(), needle.effects().size());
+  for (std::size_t e = 0; e < system.effects().size(); ++e) {
+    const double kinds = system.effects()[e].name == "lost_steps" ? 2 : 1;
+    EXPECT_NEAR(log_prior_of(system, {e}, -5), -5 - std::log(kinds), 1e-12) << system.effects()[e].label;
+  }
+  EXPECT_NEAR(log_prior_of(system, {0, system.effects().size() - 1}, -5), -10, 1e-12);
 }
 
 }  // namespace

@@ -1,0 +1,110 @@
+#include <algorithm>
+#include <cmath>
+
+#include "diagnosis/inference/local_minima.hpp"
+#include "diagnosis/inference/search.hpp"
+
+namespace bevel::inference {
+
+void Search::expand(const ModelSet& set) {
+  expanded_.insert(set);
+  const Visited here = visited_.at(set);
+  if (progress_)
+    progress_(describe(system_, set) + "; " + std::to_string(fits_) + " fits done, nothing is begun after " +
+              std::to_string(rules_.most_fits));
+  std::vector<Job> jobs;
+  if (set.size() < rules_.largest) {
+    // What is promised is relative to this set by the reference's noise.
+    const auto own = with_inputs_of(here.at->fit, likelihood_);
+    const auto [plain, change] = moved_to(own, here.at->fit, *discrepancy_);
+    const double best = best_log();
+    const auto add = [&](const Fit& about, const std::vector<Proposal>& list, double from, bool beside_curve) {
+      std::size_t rank = 0;
+      for (const Proposal& one : list) {
+        // Far from its start an effect may bring much more than in proportion: the foremost are fitted in any case.
+        const bool foremost = rank++ < rules_.foremost && one.log_bayes_factor > -log_prior_odds(one.effect);
+        const ModelSet larger = with(set, one.effect);
+        const double promised = from + one.log_bayes_factor + log_prior_odds(one.effect);
+        auto& most = promised_.try_emplace(larger, promised).first->second;
+        most = std::max(most, promised);
+        const double doubtful = rules_.optimism + rules_.linear_error * std::max(0.0, one.log_bayes_factor);
+        if (!foremost && promised + doubtful < best - rules_.window) continue;
+        // A fit that fell far short of the promise may be in a local minimum: once more, from these starts.
+        const auto visited = visited_.find(larger);
+        if (visited != visited_.end() &&
+            (visited->second.log_posterior() > promised - doubtful || !refitted_.insert(larger).second))
+          continue;
+        for (const StartPoint& start : one.starts)
+          if (start.log_bayes_factor > one.starts.front().log_bayes_factor - rules_.window)
+            jobs.push_back(job_from(about, one.effect, start)), jobs.back().beside_curve = beside_curve;
+      }
+    };
+    if (here.is_likelier_with_curve()) {
+      const auto by = with_inputs_of(*here.at->fit_with_curve, likelihood_);
+      const auto [beside_curve, more] = moved_to(by, *here.at->fit_with_curve, *discrepancy_);
+      const CurveColumns curve = discrepancy_->columns(*by, beside_curve.scales.curves);
+      add(beside_curve, proposals_->beside(Marginal(*by, beside_curve, curve, likelihood_.get()), rules_.starts),
+          here.log_with_curve + more, true);
+    }
+    // Without the curve too: an effect may take its place.
+    add(plain, proposals_->beside(Marginal(*own, plain, {}, likelihood_.get()), rules_.starts),
+        here.log_without_curve + change, false);
+  }
+  // Smaller sets, from which swaps come. One that was visited already once more, if from here it is likelier even
+  // without what it gains by having fewer parameters: then it was in a local minimum.
+  const Fit& fit = here.at->fit;
+  const auto costs = log_costs_of_dropping(fit);
+  for (std::size_t m = 0; m < set.size(); ++m) {
+    const ModelSet smaller = without(set, set[m]);
+    if (const auto known = visited_.find(smaller); known != visited_.end()) {
+      const double promised = here.log_without_curve - costs[m] - log_prior_odds(set[m]);
+      if (known->second.log_without_curve > promised - rules_.optimism || !from_larger_.insert(smaller).second)
+        continue;
+    }
+    jobs.push_back(job_at(carried_to(Layout(system_, smaller), fit)));
+  }
+  for (Job& job : swaps(here)) jobs.push_back(std::move(job));
+  evaluate_all(std::move(jobs));
+}
+
+// Each member's place taken by another effect, with all else where it is: what two have in common is far from where the
+// smaller set alone would be fitted, and what sets them apart is little. Promised is the difference between the two, by
+// one linear model.
+std::vector<Search::Job> Search::swaps(const Visited& here) {
+  const bool beside_curve = here.is_likelier_with_curve();
+  const Fit& fit = here.likelier_fit();
+  const double log_here = beside_curve ? here.log_with_curve : here.log_without_curve, best = best_log();
+  const auto own = with_inputs_of(fit, likelihood_);
+  const CurveColumns curve = discrepancy_->columns(*own, fit.scales.curves);
+  std::vector<Job> out;
+  for (std::size_t place = 0; place < here.set.size(); ++place) {
+    const std::size_t member = here.set[place];
+    const ModelSet rest = without(here.set, member);
+    const Fit about = carried_to(Layout(system_, rest), fit);
+    const auto list = proposals_->beside(Marginal(*own, about, curve, likelihood_.get()), rules_.starts);
+    const auto leaves = std::ranges::find(list, member, &Proposal::effect);
+    if (leaves == list.end()) continue;
+    std::size_t rank = 0;
+    for (const Proposal& one : list) {
+      if (one.effect == member) continue;
+      const ModelSet swapped = with(rest, one.effect);
+      const double difference = one.log_bayes_factor - leaves->log_bayes_factor;
+      const double promised = log_here + difference + log_prior_odds(one.effect) - log_prior_odds(member);
+      const double doubtful = rules_.optimism + rules_.linear_error * std::max(0.0, leaves->log_bayes_factor);
+      if (rank++ >= rules_.foremost || promised + doubtful < best - rules_.window) break;
+      const auto visited = visited_.find(swapped);
+      if (visited != visited_.end() && visited->second.log_posterior() > best - rules_.window) continue;
+      if (!swapped_.insert(swapped).second || one.starts.empty()) continue;
+      out.push_back(job_from(about, one.effect, one.starts.front()));
+      Job& job = out.back();
+      job.beside_curve = beside_curve;
+      const auto many = [](const Unknown& u) { return u.parameter != nullptr && has_many_minima(*u.parameter); };
+      if (!std::ranges::any_of(about.layout.shared(), many) || !system_.allows(with(here.set, one.effect))) continue;
+      const Fit there = replaced(*own, curve, fit, place, one.effect, one.starts.front().shared);
+      if (there.valid) job.shared = there.shared, job.local = there.local;
+    }
+  }
+  return out;
+}
+
+}  // namespace bevel::inference
