@@ -15,8 +15,9 @@ using Eigen::VectorXd;
 
 namespace {
 
-// A curve that these recordings cannot show, as a mean square per reading.
-constexpr double kInvisible = 1e-14;
+// What the base absorbs but for this share of a curve's mean square, these recordings cannot show: it is rounding, of
+// columns in single precision.
+constexpr double kInvisible = 1e-6;
 
 // For rows in standard deviations of the noise, its autocorrelation left in.
 VectorXd one_per_deviation(const Likelihood& likelihood, std::size_t r) {
@@ -65,11 +66,13 @@ Discrepancy::Discrepancy(const Likelihood& likelihood, const Fit& base) : system
   rows_ = static_cast<double>(likelihood.data().rows());
   absorbed_ = JJ.completeOrthogonalDecomposition().solve(JC);
   absorbing_ = std::move(JC);
-  for (std::size_t k = 0; k < first_.size(); ++k)
-    visible_.emplace_back(
-        (CC.block(0, first_[k], size_[k], size_[k]) -
-         absorbing_.middleCols(first_[k], size_[k]).transpose() * absorbed_.middleCols(first_[k], size_[k])) /
-        rows_);
+  for (std::size_t k = 0; k < first_.size(); ++k) {
+    const MatrixXd square = CC.block(0, first_[k], size_[k], size_[k]);
+    const MatrixXd absorbed =
+        absorbing_.middleCols(first_[k], size_[k]).transpose() * absorbed_.middleCols(first_[k], size_[k]);
+    visible_.emplace_back((square - absorbed) / rows_);
+    if (!(visible_.back().trace() > kInvisible * square.trace() / rows_)) visible_.back().setZero();
+  }
 }
 
 MatrixXd Discrepancy::visible_together(std::size_t one, std::size_t other) const {
@@ -84,8 +87,8 @@ MatrixXd Discrepancy::visible_together(std::size_t one, std::size_t other) const
 
 MatrixXd Discrepancy::unit_covariance(std::size_t curve, double length) const {
   const MatrixXd correlation = correlation_of(system_->curves()[curve], length);
-  const double square = (correlation * visible_[curve]).trace();
-  return correlation / std::max(square, kInvisible);
+  // What cannot be seen beside this base, but could beside an earlier one, may have any size.
+  return visible_[curve].isZero(0) ? correlation : correlation / (correlation * visible_[curve]).trace();
 }
 
 std::vector<Index> Discrepancy::places(std::span<const CurvePrior> curves) const {
@@ -160,6 +163,10 @@ std::vector<CurveFactor> Discrepancy::scan(const Marginal& beside) const {
   for (std::size_t k = 0; k < first_.size(); ++k) {
     const auto& [square, pull] = curves[k];
     for (const double length : kCurveLengths) {
+      if (visible_[k].isZero(0)) {  // as likely as none
+        for (const double scale : kCurveScales) out.push_back({.prior = {k, scale, length}, .visible = {}});
+        continue;
+      }
       const Eigen::LLT<MatrixXd> root(unit_covariance(k, length));
       const MatrixXd inner = root.matrixU() * square * root.matrixL();
       const Eigen::SelfAdjointEigenSolver<MatrixXd> eigen(inner);

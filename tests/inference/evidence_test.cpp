@@ -181,6 +181,33 @@ TEST(Evidence, ADiscrepancyScaleIsTheSizeOfItsVisiblePart) {
   EXPECT_NEAR(square, 4, 0.2);
 }
 
+TEST(Evidence, ACurveOfWhichTheBaseAbsorbsAllButRoundingSaysNothing) {
+  LinearSystem system(4, 3, 0, 0.2, 0.4);
+  const auto scan_of = [](const LinearSystem& seen) {
+    const Likelihood likelihood(seen, Readings(4), white(seen));
+    const Layout layout(seen, {});
+    const std::vector<VectorXd> local(4, layout.local_start());
+    const Fit base = fit(likelihood, layout, layout.shared_start(), local,
+                         {.nuisance_sd = VectorXd::Constant(1, 0.2), .curves = {}});
+    const Discrepancy discrepancy(likelihood, base);
+    return discrepancy.scan(Marginal(likelihood, base, {}));
+  };
+  const auto alone = scan_of(system);
+  system.add_still_curve();
+  std::vector<CurveFactor> moving;
+  for (const CurveFactor& one : scan_of(system)) {
+    if (one.prior.curve == 0) {
+      moving.push_back(one);
+      continue;
+    }
+    EXPECT_EQ(one.log_bayes_factor, 0) << "scale " << one.prior.scale << ", length " << one.prior.length;
+    EXPECT_EQ(one.visible.mean(), 0);
+  }
+  ASSERT_EQ(moving.size(), alone.size());
+  for (std::size_t i = 0; i < alone.size(); ++i)
+    EXPECT_NEAR(moving[i].log_bayes_factor, alone[i].log_bayes_factor, 1e-6);
+}
+
 // Two curves: a parabola in time, and a wave along a sawtooth.
 struct TwoCurves {
   LinearSystem system{4, 3, 1.5, 0.2, 0, 0.5};

@@ -64,6 +64,11 @@ class LinearSystem : public HeldSystem {
     curves_.push_back(curve);
   }
 
+  // One curve more, over what stands still but for rounding: all of it is an offset.
+  void add_still_curve() {
+    curves_.push_back({.component = "reading", .unit = "mm", .covariate = "still", .at = curves_.front().at});
+    still_ = true;
+  }
   void least_size(std::size_t effect, double least) { effects_[effect].parameters[0].lower = least; }
 
   static Eigen::MatrixXd design(const ModelSet& set) {
@@ -97,7 +102,9 @@ class LinearSystem : public HeldSystem {
     Eigen::MatrixXd out = Eigen::MatrixXd::Zero(kCount, 6 * static_cast<int>(curves_.size()));
     for (int i = 0; i < kCount; ++i)
       for (std::size_t c = 0; c < curves_.size(); ++c) {
-        const double u = c == 0 ? 0.1 * i / 1.2 : sawtooth(0.1 * i) / 0.2;
+        const double u = still_ && c + 1 == curves_.size() ? 2.4 + 1e-12 * std::sin(i)
+                         : c == 0                          ? 0.1 * i / 1.2
+                                                           : sawtooth(0.1 * i) / 0.2;
         const int k = std::min(static_cast<int>(u), 4), first = 6 * static_cast<int>(c);
         out(i, first + k) = 1 - (u - k);
         out(i, first + k + 1) = u - k;
@@ -106,6 +113,7 @@ class LinearSystem : public HeldSystem {
   }
 
  private:
+  bool still_ = false;
   static double parabola_of(double t) { return (t - 3) * (t - 3) / 9; }
   static double sawtooth(double t) { return t / 0.9 - std::floor(t / 0.9); }
 };
