@@ -22,6 +22,25 @@ double log_with_spread(const Fit& fit, const VectorXd& nuisance_sd, std::vector<
 
 }  // namespace
 
+std::vector<WithoutSpread> without_spread(const Likelihood& likelihood, const Fit& fit) {
+  std::vector<WithoutSpread> out;
+  auto blocks = linearise(likelihood, fit, {});
+  if (blocks.empty()) return out;
+  const double here = log_with_spread(fit, fit.scales.nuisance_sd, blocks);
+  const auto& groups = likelihood.system().nuisance_groups();
+  for (std::size_t g = 0; g < groups.size(); ++g) {
+    const auto at = static_cast<Index>(g);
+    if (fit.scales.nuisance_sd[at] == 0) continue;
+    WithoutSpread one{.fit = fit};
+    one.fit.scales.nuisance_sd[at] = 0;
+    // Of the grid's prior: none is as likely as all others together.
+    const double to_none = std::log(static_cast<double>(groups[g].standard_deviations.size() - 1));
+    one.log_change = log_with_spread(fit, one.fit.scales.nuisance_sd, blocks) - here + to_none;
+    out.push_back(std::move(one));
+  }
+  return out;
+}
+
 std::pair<Fit, double> moved_to(const std::shared_ptr<const Likelihood>& likelihood, const Fit& from,
                                 const Discrepancy& discrepancy) {
   const auto curve_of = [&](const Likelihood& by) { return discrepancy.columns(by, from.scales.curves); };

@@ -44,4 +44,13 @@ void add_discrepancy(const Likelihood& likelihood, const Discrepancy& discrepanc
 std::pair<Fit, double> moved_to(const std::shared_ptr<const Likelihood>& likelihood, const Fit& from,
                                 const Discrepancy& discrepancy);
 
+// The same fit where one group of nuisances does not differ, for each group that does, and by how much its evidence is
+// more there (less, as a rule), by the linear model. What some recordings share looks like a spread until it has a name:
+// beside what spread is left then, an effect may be worth much more.
+struct WithoutSpread {
+  Fit fit;
+  double log_change = 0;
+};
+std::vector<WithoutSpread> without_spread(const Likelihood& likelihood, const Fit& fit);
+
 }  // namespace bevel::inference

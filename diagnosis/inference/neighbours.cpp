@@ -1,5 +1,6 @@
 #include <algorithm>
 #include <cmath>
+#include <limits>
 
 #include "diagnosis/inference/local_minima.hpp"
 #include "diagnosis/inference/search.hpp"
@@ -18,15 +19,19 @@ void Search::expand(const ModelSet& set) {
     const auto own = with_inputs_of(here.at->fit, likelihood_);
     const auto [plain, change] = moved_to(own, here.at->fit, *discrepancy_);
     const double best = best_log();
-    const auto add = [&](const Fit& about, const std::vector<Proposal>& list, double from, bool beside_curve) {
+    enum class Beside { as_it_is, curve, less_spread };
+    const auto add = [&](const Fit& about, const std::vector<Proposal>& list, double from, Beside beside) {
       std::size_t rank = 0;
       for (const Proposal& one : list) {
         // Far from its start an effect may bring much more than in proportion: the foremost are fitted in any case.
-        const bool foremost = rank++ < rules_.foremost && one.log_bayes_factor > -log_prior_odds(one.effect);
+        const bool foremost = beside != Beside::less_spread && rank++ < rules_.foremost &&
+                              one.log_bayes_factor > -log_prior_odds(one.effect);
         const ModelSet larger = with(set, one.effect);
         const double promised = from + one.log_bayes_factor + log_prior_odds(one.effect);
-        auto& most = promised_.try_emplace(larger, promised).first->second;
+        auto& most = promised_.try_emplace(larger, -std::numeric_limits<double>::infinity()).first->second;
+        const bool nothing_new = beside == Beside::less_spread && promised < most + rules_.optimism;
         most = std::max(most, promised);
+        if (nothing_new) continue;
         const double doubtful = rules_.optimism + rules_.linear_error * std::max(0.0, one.log_bayes_factor);
         if (!foremost && promised + doubtful < best - rules_.window) continue;
         // A fit that fell far short of the promise may be in a local minimum: once more, from these starts.
@@ -36,7 +41,7 @@ void Search::expand(const ModelSet& set) {
           continue;
         for (const StartPoint& start : one.starts)
           if (start.log_bayes_factor > one.starts.front().log_bayes_factor - rules_.window)
-            jobs.push_back(job_from(about, one.effect, start)), jobs.back().beside_curve = beside_curve;
+            jobs.push_back(job_from(about, one.effect, start)), jobs.back().beside_curve = beside == Beside::curve;
       }
     };
     if (here.is_likelier_with_curve()) {
@@ -44,11 +49,14 @@ void Search::expand(const ModelSet& set) {
       const auto [beside_curve, more] = moved_to(by, *here.at->fit_with_curve, *discrepancy_);
       const CurveColumns curve = discrepancy_->columns(*by, beside_curve.scales.curves);
       add(beside_curve, proposals_->beside(Marginal(*by, beside_curve, curve, likelihood_.get()), rules_.starts),
-          here.log_with_curve + more, true);
+          here.log_with_curve + more, Beside::curve);
     }
     // Without the curve too: an effect may take its place.
     add(plain, proposals_->beside(Marginal(*own, plain, {}, likelihood_.get()), rules_.starts),
-        here.log_without_curve + change, false);
+        here.log_without_curve + change, Beside::as_it_is);
+    for (const WithoutSpread& less : without_spread(*own, plain))
+      add(less.fit, proposals_->beside(Marginal(*own, less.fit, {}, likelihood_.get()), rules_.starts),
+          here.log_without_curve + change + less.log_change, Beside::less_spread);
   }
   // Smaller sets, from which swaps come. One that was visited already once more, if from here it is likelier even
   // without what it gains by having fewer parameters: then it was in a local minimum.

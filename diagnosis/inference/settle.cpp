@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <boost/math/special_functions/beta.hpp>
 #include <cmath>
+#include <limits>
 
 #include "diagnosis/inference/error_spread.hpp"
 #include "diagnosis/inference/instant_posterior.hpp"
@@ -116,6 +117,7 @@ Settled settle(const Likelihood& likelihood, const Discrepancy* discrepancy, con
   std::vector<VectorXd> inputs, inputs_of_best;
   SpreadSearch spreads(likelihood.system());
   bool noise_moved = false, spread_moved = false;
+  double most_promised = -std::numeric_limits<double>::infinity();
   for (int pass = 0; pass < kRefits; ++pass) {
     if (discrepancy) curve = discrepancy->columns(*now, scales.curves);
     Settled one{.fit = fit(*now, layout, shared, local, scales, curve), .over = {}};
@@ -130,8 +132,10 @@ Settled settle(const Likelihood& likelihood, const Discrepancy* discrepancy, con
     const Index spread = column_of(likelihood.system(), scales.nuisance_sd);
     spreads.tried(spread);
     if (one.over.log_here > best.over.log_here) best = one, inputs_of_best = inputs;
-    // Not before the noise had its turn: what a wrong model leaves passes for noise.
-    if (pass > 1 && best.over.log_promised < give_up_below) break;
+    // Not before the noise had its turn: what a wrong model leaves passes for noise. And by any noise that it had: what
+    // the noise took at first the spread is promised only when it has given it back.
+    most_promised = std::max(most_promised, one.over.log_promised);
+    if (pass > 1 && most_promised < give_up_below) break;
     if (lost) {
       one = best, inputs = inputs_of_best;
       now = one.fit.likelihood;

@@ -1,0 +1,116 @@
+// What some recordings share looks like recordings that differ, until it has a name; and what recordings differ by
+// looks like noise, until they may.
+#include <gtest/gtest.h>
+
+#include <limits>
+#include <random>
+
+#include "diagnosis/inference/search.hpp"
+#include "tests/inference/held_system.hpp"
+
+namespace bevel::inference {
+namespace {
+
+using Eigen::Index;
+using Eigen::MatrixXd;
+using Eigen::VectorXd;
+
+// y = level + (slope_r + size g_r) x + white noise: g_r is -1 in one half of the recordings and 1 in the other, slope_r
+// each recording's own, normal about zero.
+class HalvesDiffer final : public testing::HeldSystem {
+ public:
+  static constexpr Index kReadings = 60;
+  static constexpr double kSigma = 0.005;
+  static double x(Index i) { return static_cast<double>(i) / (kReadings - 1); }
+
+  HalvesDiffer(std::size_t recordings, double size, double slope_sd, unsigned seed) {
+    data_.claimed_sd = {kSigma};
+    data_.frame_s = 1;
+    std::mt19937_64 random(seed);
+    std::normal_distribution<double> normal;
+    for (std::size_t r = 0; r < recordings; ++r) {
+      Series series;
+      const double slope = slope_sd * normal(random) + size * half_of(r);
+      for (Index i = 0; i < kReadings; ++i) {
+        series.message.push_back(static_cast<std::size_t>(i));
+        series.time_s.push_back(static_cast<double>(i));
+        series.relative_sd.push_back(1);
+        series.measured.push_back(slope * x(i) + kSigma * normal(random));
+      }
+      data_.recordings.push_back({.series = {series}, .messages = kReadings, .duration_s = kReadings});
+    }
+    base_ = {{.name = "level", .lower = -9, .upper = 9, .none = 0, .starts = {}, .prior = normal_prior(0, 1)}};
+    effects_ = {
+        {.name = "halves",
+         .label = "halves",
+         .parameters = {
+             {.name = "size", .lower = -20, .upper = 20, .none = 0, .starts = {0.5}, .prior = normal_prior(0, 5)}}}};
+    nuisances_ = {{"slope", 0}};
+    groups_ = {{"slope", "1", {0, 0.03, 0.1, 0.3}}};
+  }
+  bool predict(const ModelSet& set, std::size_t r, const VectorXd& shared, const VectorXd& local, bool derivatives,
+               Prediction& out) const override {
+    VectorXd along(kReadings);
+    for (Index i = 0; i < kReadings; ++i) along[i] = x(i);
+    const double slope = local[0] + (set.empty() ? 0 : half_of(r) * shared[1]);
+    out.reading = VectorXd::Constant(kReadings, shared[0]) + slope * along;
+    if (!derivatives) return true;
+    out.by_shared = MatrixXd::Ones(kReadings, shared.size());
+    if (!set.empty()) out.by_shared.col(1) = half_of(r) * along;
+    out.by_local = along;
+    return true;
+  }
+  MatrixXd by_curves(std::size_t, const VectorXd&) const override { return MatrixXd(kReadings, 0); }
+
+ private:
+  static double half_of(std::size_t r) { return r % 2 == 0 ? -1 : 1; }
+};
+
+Noise white() {
+  Noise noise;
+  noise.sigma = {HalvesDiffer::kSigma};
+  noise.frame_s = 1;
+  return noise;
+}
+
+TEST(HiddenInSpread, AnEffectIsLookedForWhereRecordingsDoNotDifferToo) {
+  constexpr std::size_t kRecordings = 6;
+  for (unsigned seed = 1; seed <= 10; ++seed) {
+    SCOPED_TRACE("seed " + std::to_string(seed));
+    const HalvesDiffer system(kRecordings, 0.1, 0, seed);
+    Search search(system, {.threads = 1});
+    search.run(Readings(kRecordings), white());
+    const Visited& nothing = search.visited().at({});
+    EXPECT_GT(nothing.at->fit.scales.nuisance_sd[0], 0);  // it passes for spread
+    // Beside that spread it is not worth its prior odds.
+    const Fit& fit = nothing.at->fit;
+    const auto beside = search.proposals().beside(Marginal(*fit.likelihood, fit, {}), 1);
+    ASSERT_EQ(beside.size(), 1U);
+    EXPECT_LT(beside.front().log_bayes_factor, -search.log_prior_odds(0) - search.rules().window);
+    EXPECT_EQ(search.best().set, ModelSet{0});
+    EXPECT_EQ(search.best().at->fit.scales.nuisance_sd[0], 0);
+  }
+}
+
+TEST(HiddenInSpread, ASetIsNotGivenUpWhileTheNoiseHoldsWhatRecordingsDifferBy) {
+  constexpr std::size_t kRecordings = 6;
+  for (unsigned seed = 1; seed <= 10; ++seed) {
+    SCOPED_TRACE("seed " + std::to_string(seed));
+    const HalvesDiffer system(kRecordings, 0, 0.1, seed);
+    const Likelihood likelihood(system, Readings(kRecordings), white());
+    const Layout layout(system, {});
+    const std::vector<VectorXd> local(kRecordings, layout.local_start());
+    const auto evaluated = [&](double give_up_below) {
+      return evaluate(likelihood, layout, layout.shared_start(), local, VectorXd::Zero(1), give_up_below);
+    };
+    const Evaluated whole = evaluated(-std::numeric_limits<double>::infinity());
+    ASSERT_TRUE(whole.valid);
+    EXPECT_GT(whole.fit.scales.nuisance_sd[0], 0);
+    // As far below the likeliest as a search gives up; the noise to begin with is not quite the likeliest.
+    constexpr double kDoubt = 12;
+    EXPECT_NEAR(evaluated(whole.log_evidence - kDoubt).log_evidence, whole.log_evidence, 1e-6);
+  }
+}
+
+}  // namespace
+}  // namespace bevel::inference
