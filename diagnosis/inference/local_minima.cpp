@@ -49,16 +49,16 @@ std::vector<double> before_jumps(const SeriesSet& data, const VectorXd& white, d
   return out;
 }
 
-// Every phase and instant of each recording at the best of a grid, all else as it is; an instant also where the
-// readings jump if it did not happen.
+// Every phase and instant of the recordings from first to last at the best of a grid, all else as it is; an instant
+// also where the readings jump if it did not happen.
 void scan_local(const Likelihood& likelihood, const Layout& layout, const VectorXd& shared,
-                std::vector<VectorXd>& local) {
+                std::vector<VectorXd>& local, std::size_t first, std::size_t last) {
   Residuals residuals;
   for (std::size_t i = 0; i < layout.local().size(); ++i) {
     if (!layout.is_scanned(i)) continue;
     const bool instant = layout.is_instant(i);
     const auto at = static_cast<Index>(i);
-    for (std::size_t r = 0; r < local.size(); ++r) {
+    for (std::size_t r = first; r < last; ++r) {
       const double lower = layout.local()[i].parameter->lower, upper = layout.upper(i, r);
       const double cost = instant ? instant_cost(upper) : 0;
       VectorXd trial = local[r];
@@ -114,12 +114,38 @@ bool has_many_minima(const Parameter& parameter) {
 void scan_locals(const Likelihood& likelihood, const CurveColumns& curve, Fit& fitted) {
   for (int scan = 0; scan < kScans && has_scanned(fitted.layout); ++scan) {
     auto scanned = fitted.local;
-    scan_local(likelihood, fitted.layout, fitted.shared, scanned);
+    scan_local(likelihood, fitted.layout, fitted.shared, scanned, 0, scanned.size());
     if (scanned == fitted.local) return;
     Fit again = fit(likelihood, fitted.layout, fitted.shared, scanned, fitted.scales, curve);
     const bool better = again.valid && again.cost < fitted.cost;
     if (again.valid) fitted = std::move(again);
     if (!better) return;
+  }
+}
+
+// Each instant in turn taken out, all else fitted anew: kept out, or put elsewhere in its recording, where it is not
+// missed. What a scan finds beside parameters that are still off may hold them there.
+void doubt_instants(const Likelihood& likelihood, const CurveColumns& curve, Fit& fitted) {
+  const Layout& layout = fitted.layout;
+  for (std::size_t i = 0; i < layout.local().size(); ++i) {
+    if (!layout.is_instant(i)) continue;
+    for (std::size_t r = 0; r < fitted.local.size(); ++r) {
+      if (!(fitted.local[r][static_cast<Index>(i)] > 0)) continue;
+      auto local = fitted.local;
+      local[r][static_cast<Index>(i)] = 0;
+      Fit without = fit(likelihood, layout, fitted.shared, local, fitted.scales, curve);
+      if (!without.valid) continue;
+      scan_local(likelihood, layout, without.shared, without.local, r, r + 1);
+      Fit again = fit(likelihood, layout, without.shared, without.local, fitted.scales, curve);
+      const auto happened = [&](const Fit& f) {
+        return std::count_if(f.local.begin(), f.local.end(),
+                             [&](const VectorXd& l) { return l[static_cast<Index>(i)] > 0; });
+      };
+      const double cost = instant_cost(layout.upper(i, r));
+      if (again.valid && again.cost + cost * static_cast<double>(happened(again)) <
+                             fitted.cost + cost * static_cast<double>(happened(fitted)))
+        fitted = std::move(again);
+    }
   }
 }
 

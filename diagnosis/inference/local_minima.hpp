@@ -20,6 +20,10 @@ bool has_instant(const Layout& layout, int member);
 // Every phase and instant at the best of a grid, all else as it is, again and again until that helps no more.
 void scan_locals(const Likelihood& likelihood, const CurveColumns& curve, Fit& fitted);
 
+// Each instant in turn taken out, all else fitted anew: kept out where it is not missed. What a scan finds beside
+// parameters that are still off may hold them there.
+void doubt_instants(const Likelihood& likelihood, const CurveColumns& curve, Fit& fitted);
+
 // Each shared parameter that has many local minima along a finer grid about where it is, and the size of what happens
 // at instants, all else following by the linear model, and the instants too.
 void scan_shapes(const Likelihood& likelihood, const CurveColumns& curve, Fit& fitted);

@@ -123,7 +123,10 @@ Settled settle(const Likelihood& likelihood, const Discrepancy* discrepancy, con
     Settled one{.fit = fit(*now, layout, shared, local, scales, curve), .over = {}};
     if (!one.fit.valid) break;
     // What has many local minima is scanned, with the rest as it now stands.
-    if (pass == 0 || noise_moved) scan_locals(*now, curve, one.fit);
+    if (pass == 0 || noise_moved) {
+      scan_locals(*now, curve, one.fit);
+      doubt_instants(*now, curve, one.fit);
+    }
     if (pass == 0) scan_shapes(*now, curve, one.fit);
     one.fit.likelihood = now;
     one.over = over_nuisances(one.fit, curve, grid, kOnTheWay);
