@@ -85,8 +85,8 @@ MatrixXd Discrepancy::visible_together(std::size_t one, std::size_t other) const
   return out / rows_;
 }
 
-MatrixXd Discrepancy::unit_covariance(std::size_t curve, const Kernel& kernel) const {
-  const MatrixXd correlation = correlation_of(system_->curves()[curve], kernel);
+MatrixXd Discrepancy::unit_covariance(std::size_t curve, double length) const {
+  const MatrixXd correlation = correlation_of(system_->curves()[curve], length);
   // What cannot be seen beside this base, but could beside an earlier one, may have any size.
   return visible_[curve].isZero(0) ? correlation : correlation / (correlation * visible_[curve]).trace();
 }
@@ -111,8 +111,8 @@ CurveColumns Discrepancy::columns(const Likelihood& likelihood, std::span<const 
   }
   out.covariance = MatrixXd::Zero(at.back(), at.back());
   for (std::size_t i = 0; i < curves.size(); ++i) {
-    const auto& [k, scale, kernel] = curves[i];
-    out.covariance.block(at[i], at[i], size_[k], size_[k]) = scale * scale * unit_covariance(k, kernel);
+    const auto& [k, scale, length] = curves[i];
+    out.covariance.block(at[i], at[i], size_[k], size_[k]) = scale * scale * unit_covariance(k, length);
   }
   return out;
 }
@@ -162,17 +162,17 @@ std::vector<CurveFactor> Discrepancy::scan(const Marginal& beside) const {
   const auto curves = added(beside);
   for (std::size_t k = 0; k < first_.size(); ++k) {
     const auto& [square, pull] = curves[k];
-    for (const Kernel& kernel : kCurveKernels) {
+    for (const double length : kCurveLengths) {
       if (visible_[k].isZero(0)) {  // as likely as none
-        for (const double scale : kCurveScales) out.push_back({.prior = {k, scale, kernel}, .visible = {}});
+        for (const double scale : kCurveScales) out.push_back({.prior = {k, scale, length}, .visible = {}});
         continue;
       }
-      const Eigen::LLT<MatrixXd> root(unit_covariance(k, kernel));
+      const Eigen::LLT<MatrixXd> root(unit_covariance(k, length));
       const MatrixXd inner = root.matrixU() * square * root.matrixL();
       const Eigen::SelfAdjointEigenSolver<MatrixXd> eigen(inner);
       const VectorXd turned = eigen.eigenvectors().transpose() * (root.matrixU() * pull);
       for (const double scale : kCurveScales) {
-        CurveFactor one{.prior = {k, scale, kernel}, .visible = {}};
+        CurveFactor one{.prior = {k, scale, length}, .visible = {}};
         for (Index i = 0; i < turned.size(); ++i) {
           const double seen = scale * scale * std::max(0.0, eigen.eigenvalues()[i]);
           const double squared_mean = scale * scale * turned[i] * turned[i] / (1 + seen);

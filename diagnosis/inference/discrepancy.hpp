@@ -9,12 +9,9 @@
 
 namespace bevel::inference {
 
-// Scales and kernels that are integrated over.
+// Scales and lengths that are integrated over.
 inline constexpr double kCurveScales[] = {0.25, 0.5, 1, 2, 4, 8, 16, 32, 64};
-inline constexpr Kernel kCurveKernels[] = {{Kernel::Form::exponential, 1.0},
-                                           {Kernel::Form::exponential, 0.2},
-                                           {Kernel::Form::matern, 0.6},
-                                           {Kernel::Form::matern, 0.2}};
+inline constexpr double kCurveLengths[] = {1.0, 0.2};
 
 struct CurveFactor {
   CurvePrior prior;
@@ -32,19 +29,19 @@ class Discrepancy {
   CurveColumns columns(const Likelihood& likelihood, std::span<const CurvePrior> curves) const;
   // Where the values of each of several curves begin among those of all, and at the end how many there are.
   std::vector<Eigen::Index> places(std::span<const CurvePrior> curves) const;
-  // All curves at all scales, with all kernels, beside a fit (with its own curves integrated out, if it has any), by
-  // the linear model and the noise that this was made with: the likeliest first.
+  // All curves at all scales and lengths beside a fit (with its own curves integrated out, if it has any), by the
+  // linear model and the noise that this was made with: the likeliest first.
   std::vector<CurveFactor> scan(const Marginal& beside) const;
   // The likelihood of each curve's values beside a fit.
   std::vector<Marginal::Added> added(const Marginal& beside) const;
-  std::size_t choices() const { return first_.size() * std::size(kCurveScales) * std::size(kCurveKernels); }
+  std::size_t choices() const { return first_.size() * std::size(kCurveScales) * std::size(kCurveLengths); }
   // The root mean square over the readings, in standard deviations of the noise, of the part of a sum of curves, by all
   // their values, that the base's own parameters do not absorb.
   double visible_size(std::span<const CurvePrior> curves, const Eigen::VectorXd& values) const;
   double visible_size(std::size_t curve, const Eigen::VectorXd& values) const;
 
  private:
-  Eigen::MatrixXd unit_covariance(std::size_t curve, const Kernel& kernel) const;
+  Eigen::MatrixXd unit_covariance(std::size_t curve, double length) const;
   // Mean product over readings of the visible parts of two curves, as a bilinear form.
   Eigen::MatrixXd visible_together(std::size_t one, std::size_t other) const;
 

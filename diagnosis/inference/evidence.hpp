@@ -1,7 +1,7 @@
 #pragma once
 // The evidence of a set of effects: the integral of likelihood times prior over everything unknown. By Laplace's method
 // in what is nonlinear, exactly in what is linear about the mode; over grids for the standard deviations of the
-// nuisances and for each of the discrepancy's curves, their scales and kernels.
+// nuisances and for each of the discrepancy's curves, their scales and lengths.
 #include <limits>
 
 #include "diagnosis/inference/discrepancy.hpp"
@@ -45,8 +45,8 @@ std::pair<Fit, double> moved_to(const std::shared_ptr<const Likelihood>& likelih
                                 const Discrepancy& discrepancy);
 
 // The same fit where one group of nuisances does not differ, for each group that does, and by how much its evidence is
-// more there (less, as a rule), by the linear model. What some recordings share looks like a spread until it has a
-// name: beside what spread is left then, an effect may be worth much more.
+// more there (less, as a rule), by the linear model. What some recordings share looks like a spread until it has a name:
+// beside what spread is left then, an effect may be worth much more.
 struct WithoutSpread {
   Fit fit;
   double log_change = 0;

@@ -12,21 +12,15 @@ using Eigen::Index;
 using Eigen::MatrixXd;
 using Eigen::VectorXd;
 
-MatrixXd correlation_of(const Curve& curve, const Kernel& kernel) {
+MatrixXd correlation_of(const Curve& curve, double length) {
   const auto n = static_cast<Index>(curve.at.size());
   const double range = curve.periodic ? 2 * std::numbers::pi : curve.at.back() - curve.at.front();
   MatrixXd out(n, n);
   for (Index i = 0; i < n; ++i)
     for (Index j = 0; j < n; ++j) {
       double apart = std::abs(curve.at[static_cast<std::size_t>(i)] - curve.at[static_cast<std::size_t>(j)]) / range;
-      if (kernel.form == Kernel::Form::exponential) {
-        if (curve.periodic) apart = std::min(apart, 1 - apart);
-        out(i, j) = std::exp(-apart / kernel.length);
-      } else {
-        if (curve.periodic) apart = std::sin(std::numbers::pi * apart) / std::numbers::pi;
-        const double d = std::numbers::sqrt3 * apart / kernel.length;
-        out(i, j) = (1 + d) * std::exp(-d);
-      }
+      if (curve.periodic) apart = std::min(apart, 1 - apart);
+      out(i, j) = std::exp(-apart / length);
     }
   return out;
 }

@@ -15,26 +15,16 @@
 
 namespace bevel::inference {
 
-// How a curve's values hang together at a distance of d lengths, lengths as a share of the covariate's range:
-// exponential, exp(-d), as rough as what comes in jumps; or Matern's of order 3/2, (1 + sqrt(3) d) exp(-sqrt(3) d),
-// once differentiable (Rasmussen and Williams 2006, eq. 4.17). The distance of two angles is along the circle for the
-// first, for the second, which would not be a covariance there, across it.
-struct Kernel {
-  enum class Form { exponential, matern };
-  Form form = Form::exponential;
-  double length = 0;
-  bool operator==(const Kernel&) const = default;
-};
-
-// Covariance of a curve's values: scale^2 times the kernel. The scale is the root mean square over all readings of what
-// such a curve does to them beside the base's own parameters, in standard deviations of the noise.
+// Covariance of a curve's values: scale^2 exp(-|distance| / length), lengths as a share of the covariate's range. The
+// scale is the root mean square over all readings of what such a curve does to them beside the base's own parameters,
+// in standard deviations of the noise.
 struct CurvePrior {
   std::size_t curve = 0;
   double scale = 0;
-  Kernel kernel;
+  double length = 0;
   bool operator==(const CurvePrior&) const = default;
 };
-Eigen::MatrixXd correlation_of(const Curve& curve, const Kernel& kernel);
+Eigen::MatrixXd correlation_of(const Curve& curve, double length);
 
 // Standard deviation of a nuisance that does not vary, relative or in its unit. Smaller ones cost digits: where the
 // mode is elsewhere, the least square is a difference of numbers of its precision.

@@ -52,8 +52,8 @@ struct NuisanceGroup {
   std::vector<double> standard_deviations;
 };
 
-// A component of the discrepancy as a function of one covariate, by its values at `at`; zero mean. periodic: the
-// covariate is an angle and `at` divides its circle.
+// A component of the discrepancy as a function of one covariate, by its values at `at`; zero mean, covariance
+// exp(-|distance| / length). periodic: the covariate is an angle and `at` divides its circle.
 struct Curve {
   std::string component, unit, covariate;
   std::vector<double> at;

@@ -1,7 +1,6 @@
 // The evidence against closed forms: of a model linear in everything it is a normal density of all readings together.
 #include <gtest/gtest.h>
 
-#include <Eigen/Eigenvalues>
 #include <Eigen/QR>
 
 #include "diagnosis/inference/error_spread.hpp"
@@ -153,27 +152,11 @@ TEST(Evidence, OfADiscrepancyIsTheRatioOfTwoNormalDensities) {
     const MatrixXd covariance = discrepancy.columns(likelihood, {&one.prior, 1}).covariance;
     const double with = log_normal(y, covariance_of(system, {}, white(system), 0.2, covariance));
     EXPECT_NEAR(one.log_bayes_factor, with - without, 1e-3 * std::abs(with - without) + 0.02)  // in float
-        << "scale " << one.prior.scale << ", length " << one.prior.kernel.length;
+        << "scale " << one.prior.scale << ", length " << one.prior.length;
   }
   EXPECT_GT(factors.front().log_bayes_factor, 5);  // a bump of 4 sigma, 0.7 s wide
   for (std::size_t i = 1; i < factors.size(); ++i)
     EXPECT_GE(factors[i - 1].log_bayes_factor, factors[i].log_bayes_factor);
-}
-
-TEST(Evidence, AKernelIsACovarianceAsSmoothAsItSays) {
-  for (const bool periodic : {false, true})
-    for (const Kernel& kernel : kCurveKernels) {
-      SCOPED_TRACE("length " + std::to_string(kernel.length));
-      constexpr int kCount = 64;  // finely, about a circle or along a line
-      Curve curve{.component = "reading", .unit = "1", .covariate = "x", .at = {}, .periodic = periodic};
-      for (int i = 0; i < kCount; ++i) curve.at.push_back(2 * M_PI * i / (periodic ? kCount : kCount - 1));
-      const MatrixXd correlation = correlation_of(curve, kernel);
-      EXPECT_EQ(correlation.diagonal(), VectorXd::Ones(kCount));
-      EXPECT_GT(Eigen::SelfAdjointEigenSolver<MatrixXd>(correlation).eigenvalues().minCoeff(), 0);
-      // Of what is once differentiable mean square differences go with the square of a small distance.
-      const double power = std::log2((1 - correlation(0, 2)) / (1 - correlation(0, 1)));
-      EXPECT_NEAR(power, kernel.form == Kernel::Form::matern ? 2 : 1, 0.25);
-    }
 }
 
 TEST(Evidence, ADiscrepancyScaleIsTheSizeOfItsVisiblePart) {
@@ -185,7 +168,7 @@ TEST(Evidence, ADiscrepancyScaleIsTheSizeOfItsVisiblePart) {
       fit(likelihood, layout, layout.shared_start(), local, {.nuisance_sd = VectorXd::Constant(1, 0.2), .curves = {}});
   const Discrepancy discrepancy(likelihood, base);
   // Drawn from the prior of scale 2: in the mean twice the noise, squared.
-  const CurvePrior prior{.curve = 0, .scale = 2, .kernel = {.length = 0.2}};
+  const CurvePrior prior{.curve = 0, .scale = 2, .length = 0.2};
   const MatrixXd root = discrepancy.columns(likelihood, {&prior, 1}).covariance.llt().matrixL();
   std::mt19937_64 random(5);
   std::normal_distribution<double> normal;
@@ -217,7 +200,7 @@ TEST(Evidence, ACurveOfWhichTheBaseAbsorbsAllButRoundingSaysNothing) {
       moving.push_back(one);
       continue;
     }
-    EXPECT_EQ(one.log_bayes_factor, 0) << "scale " << one.prior.scale << ", length " << one.prior.kernel.length;
+    EXPECT_EQ(one.log_bayes_factor, 0) << "scale " << one.prior.scale << ", length " << one.prior.length;
     EXPECT_EQ(one.visible.mean(), 0);
   }
   ASSERT_EQ(moving.size(), alone.size());
@@ -253,7 +236,7 @@ struct TwoCurves {
 
 TEST(TwoCurves, TheNextIsWeighedBesideTheFirstAsTwoNormalDensitiesSay) {
   const TwoCurves made;
-  const CurvePrior first{.curve = 0, .scale = 2, .kernel = {.length = 0.2}};
+  const CurvePrior first{.curve = 0, .scale = 2, .length = 0.2};
   Scales scales{.nuisance_sd = VectorXd::Constant(1, 0.2), .curves = {first}};
   const Layout layout(made.system, {});
   const auto columns = made.discrepancy.columns(made.likelihood, scales.curves);
@@ -269,7 +252,7 @@ TEST(TwoCurves, TheNextIsWeighedBesideTheFirstAsTwoNormalDensitiesSay) {
   for (const CurveFactor& one : factors) {
     const double expected = log_density({first, one.prior}) - without;
     EXPECT_NEAR(one.log_bayes_factor, expected, 1e-3 * std::abs(expected) + 0.02)
-        << "curve " << one.prior.curve << ", scale " << one.prior.scale << ", length " << one.prior.kernel.length;
+        << "curve " << one.prior.curve << ", scale " << one.prior.scale << ", length " << one.prior.length;
   }
   EXPECT_EQ(factors.front().prior.curve, 1U);
 }
@@ -335,8 +318,8 @@ TEST(TwoCurves, WhereOneIsEnoughThereIsOne) {
 
 TEST(TwoCurves, TheVisibleSizeIsThatOfTheirSum) {
   const TwoCurves made;
-  const std::vector<CurvePrior> curves = {{.curve = 1, .scale = 2, .kernel = {.length = 0.2}},
-                                          {.curve = 0, .scale = 1, .kernel = {.length = 1}}};
+  const std::vector<CurvePrior> curves = {{.curve = 1, .scale = 2, .length = 0.2},
+                                          {.curve = 0, .scale = 1, .length = 1}};
   VectorXd values(12);
   values << 0.3, -0.1, 0.2, 0.5, -0.4, 0.1, 1, 0.6, -0.2, -0.5, 0.1, 0.4;
   VectorXd in_order(12);  // as the columns are
