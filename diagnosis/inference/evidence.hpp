@@ -45,8 +45,8 @@ std::pair<Fit, double> moved_to(const std::shared_ptr<const Likelihood>& likelih
                                 const Discrepancy& discrepancy);
 
 // The same fit where one group of nuisances does not differ, for each group that does, and by how much its evidence is
-// more there (less, as a rule), by the linear model. What some recordings share looks like a spread until it has a name:
-// beside what spread is left then, an effect may be worth much more.
+// more there (less, as a rule), by the linear model. What some recordings share looks like a spread until it has a
+// name: beside what spread is left then, an effect may be worth much more.
 struct WithoutSpread {
   Fit fit;
   double log_change = 0;
