@@ -24,6 +24,7 @@ double log_with_spread(const Fit& fit, const VectorXd& nuisance_sd, std::vector<
 
 std::vector<WithoutSpread> without_spread(const Likelihood& likelihood, const Fit& fit) {
   std::vector<WithoutSpread> out;
+  if (fit.scales.nuisance_sd.isZero(0)) return out;
   auto blocks = linearise(likelihood, fit, {});
   if (blocks.empty()) return out;
   const double here = log_with_spread(fit, fit.scales.nuisance_sd, blocks);

@@ -2,6 +2,7 @@
 #include <cmath>
 #include <limits>
 
+#include "diagnosis/inference/error_spread.hpp"
 #include "diagnosis/inference/local_minima.hpp"
 #include "diagnosis/inference/search.hpp"
 

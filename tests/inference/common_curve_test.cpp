@@ -29,14 +29,9 @@ class CommonSlope final : public testing::HeldSystem {
     std::mt19937_64 random(seed);
     std::normal_distribution<double> normal;
     for (std::size_t r = 0; r < kRecordings; ++r) {
-      Series series;
-      for (Index i = 0; i < kReadings; ++i) {
-        series.message.push_back(static_cast<std::size_t>(i));
-        series.time_s.push_back(static_cast<double>(i));
-        series.relative_sd.push_back(1);
-        series.measured.push_back(kSlope * x(i) + kWave * w(i) + kSigma * normal(random));
-      }
-      data_.recordings.push_back({.series = {series}, .messages = kReadings, .duration_s = kReadings});
+      std::vector<double> measured;
+      for (Index i = 0; i < kReadings; ++i) measured.push_back(kSlope * x(i) + kWave * w(i) + kSigma * normal(random));
+      add_recording(measured, data_.frame_s);
     }
     base_ = {{.name = "level", .lower = -9, .upper = 9, .none = 0, .starts = {}, .prior = normal_prior(0, 1)}};
     nuisances_ = {{"slope", 0}};

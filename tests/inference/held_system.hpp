@@ -1,5 +1,7 @@
 #pragma once
 // A system that holds what it is made of; what it predicts is left to each.
+#include <span>
+
 #include "diagnosis/inference/system.hpp"
 
 namespace bevel::inference::testing {
@@ -15,6 +17,20 @@ class HeldSystem : public System {
   bool allows(const ModelSet&) const override { return true; }
 
  protected:
+  // Of one channel, evenly spaced.
+  void add_recording(std::span<const double> measured, double spacing_s) {
+    Series series;
+    for (std::size_t i = 0; i < measured.size(); ++i) {
+      series.message.push_back(i);
+      series.time_s.push_back(spacing_s * static_cast<double>(i));
+      series.relative_sd.push_back(1);
+      series.measured.push_back(measured[i]);
+    }
+    data_.recordings.push_back({.series = {std::move(series)},
+                                .messages = measured.size(),
+                                .duration_s = spacing_s * static_cast<double>(measured.size())});
+  }
+
   Dataset data_;
   std::vector<Parameter> base_;
   std::vector<Effect> effects_;

@@ -26,22 +26,15 @@ class LinearSystem : public HeldSystem {
     data_.claimed_sd = {sigma};
     data_.frame_s = 0.1;
     for (std::size_t r = 0; r < recordings; ++r) {
-      SeriesSet set;
-      set.messages = kCount;
-      set.duration_s = 0.1 * kCount;
-      Series series;
+      std::vector<double> measured;
       const double own = nuisance_sd * normal(random);
       for (int i = 0; i < kCount; ++i) {
         const double t = 0.1 * i;
-        series.message.push_back(static_cast<std::size_t>(i));
-        series.time_s.push_back(t);
-        series.relative_sd.push_back(1);
-        series.measured.push_back(0.3 + 0.2 * t + parabola * parabola_of(t) + own * std::cos(t) +
-                                  bump * std::exp(-4 * (t - 3) * (t - 3)) + by_sawtooth * std::sin(6 * sawtooth(t)) +
-                                  sigma * normal(random));
+        measured.push_back(0.3 + 0.2 * t + parabola * parabola_of(t) + own * std::cos(t) +
+                           bump * std::exp(-4 * (t - 3) * (t - 3)) + by_sawtooth * std::sin(6 * sawtooth(t)) +
+                           sigma * normal(random));
       }
-      set.series.push_back(std::move(series));
-      data_.recordings.push_back(std::move(set));
+      add_recording(measured, data_.frame_s);
     }
     base_ = {{.name = "offset", .lower = -10, .upper = 10, .none = 0, .starts = {}, .prior = normal_prior(0, 1)},
              {.name = "slope", .lower = -10, .upper = 10, .none = 0, .starts = {}, .prior = normal_prior(0, 1)}};

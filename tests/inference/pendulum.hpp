@@ -9,7 +9,7 @@
 #include <cmath>
 #include <random>
 
-#include "diagnosis/inference/system.hpp"
+#include "tests/inference/held_system.hpp"
 
 namespace bevel::inference::testing {
 
@@ -21,7 +21,7 @@ struct TruePendulum {
   double tail_degrees = 0;     // of Student's t, of the same standard deviation; 0: normal noise
 };
 
-class Pendulum final : public System {
+class Pendulum final : public HeldSystem {
  public:
   static constexpr int kReadings = 160;
   static constexpr double kFrame_s = 0.05, kSigma_rad = 0.01;
@@ -86,25 +86,12 @@ class Pendulum final : public System {
       if (truth.knock_rad_s != 0 && r % 3 == 1)
         u.knock_rad_s = truth.knock_rad_s, u.knock_s = 2.3 + 0.4 * static_cast<double>(r);
       u.start_rad = truth.start_sd_rad * normal(random);
-      Series series;
+      std::vector<double> measured;
       const Eigen::VectorXd angle = simulate(r, u);
-      for (int i = 0; i < kReadings; ++i) {
-        series.message.push_back(static_cast<std::size_t>(i));
-        series.time_s.push_back(kFrame_s * i);
-        series.measured.push_back(angle[i] + kSigma_rad * noise());
-        series.relative_sd.push_back(1);
-      }
-      data_.recordings.push_back({.series = {std::move(series)}, .messages = kReadings, .duration_s = duration_s});
+      for (int i = 0; i < kReadings; ++i) measured.push_back(angle[i] + kSigma_rad * noise());
+      add_recording(measured, kFrame_s);
     }
   }
-
-  const Dataset& data() const override { return data_; }
-  const std::vector<Parameter>& base() const override { return base_; }
-  const std::vector<Effect>& effects() const override { return effects_; }
-  const std::vector<Nuisance>& nuisances() const override { return nuisances_; }
-  const std::vector<NuisanceGroup>& nuisance_groups() const override { return groups_; }
-  const std::vector<Curve>& curves() const override { return curves_; }
-  bool allows(const ModelSet&) const override { return true; }
 
   bool predict(const ModelSet& set, std::size_t r, const Eigen::VectorXd& shared, const Eigen::VectorXd& local,
                bool derivatives, Prediction& out) const override {
@@ -187,13 +174,6 @@ class Pendulum final : public System {
     }
     return out;
   }
-
-  Dataset data_;
-  std::vector<Parameter> base_;
-  std::vector<Effect> effects_;
-  std::vector<Nuisance> nuisances_;
-  std::vector<NuisanceGroup> groups_;
-  std::vector<Curve> curves_;
 };
 
 }  // namespace bevel::inference::testing
