@@ -27,16 +27,12 @@ std::vector<WithoutSpread> without_spread(const Likelihood& likelihood, const Fi
   if (fit.scales.nuisance_sd.isZero(0)) return out;
   auto blocks = linearise(likelihood, fit, {});
   if (blocks.empty()) return out;
-  const double here = log_with_spread(fit, fit.scales.nuisance_sd, blocks);
-  const auto& groups = likelihood.system().nuisance_groups();
-  for (std::size_t g = 0; g < groups.size(); ++g) {
-    const auto at = static_cast<Index>(g);
-    if (fit.scales.nuisance_sd[at] == 0) continue;
+  const double here = log_with_spread(fit, fit.scales.nuisance_sd, blocks) +
+                      log_prior_of_spread(likelihood.system(), fit.scales.nuisance_sd);
+  for (const VectorXd& less : less_spread(fit.scales.nuisance_sd)) {
     WithoutSpread one{.fit = fit};
-    one.fit.scales.nuisance_sd[at] = 0;
-    // Of the grid's prior: none is as likely as all others together.
-    const double to_none = std::log(static_cast<double>(groups[g].standard_deviations.size() - 1));
-    one.log_change = log_with_spread(fit, one.fit.scales.nuisance_sd, blocks) - here + to_none;
+    one.fit.scales.nuisance_sd = less;
+    one.log_change = log_with_spread(fit, less, blocks) + log_prior_of_spread(likelihood.system(), less) - here;
     out.push_back(std::move(one));
   }
   return out;

@@ -18,13 +18,29 @@ NuisanceGrid nuisance_grid(const System& system) {
     Index rest = k;
     for (std::size_t g = 0; g < groups.size(); ++g) {
       const auto& values = groups[g].standard_deviations;
-      const std::size_t which = static_cast<std::size_t>(rest) % values.size();
-      out.standard_deviations(static_cast<Index>(g), k) = values[which];
-      if (values.size() > 1)
-        out.log_prior[k] -= std::log(which == 0 ? 2.0 : 2.0 * static_cast<double>(values.size() - 1));
+      out.standard_deviations(static_cast<Index>(g), k) = values[static_cast<std::size_t>(rest) % values.size()];
       rest /= static_cast<Index>(values.size());
     }
+    out.log_prior[k] = log_prior_of_spread(system, out.standard_deviations.col(k));
   }
+  return out;
+}
+
+double log_prior_of_spread(const System& system, const Eigen::VectorXd& nuisance_sd) {
+  constexpr double kDiffer = 0.5;
+  double share = kDiffer;
+  for (const auto& group : system.nuisance_groups()) share /= static_cast<double>(group.standard_deviations.size());
+  return std::log(nuisance_sd.isZero(0) ? 1 - kDiffer + share : share);
+}
+
+std::vector<Eigen::VectorXd> less_spread(const Eigen::VectorXd& nuisance_sd) {
+  std::vector<Eigen::VectorXd> out;
+  for (Index g = 0; g < nuisance_sd.size(); ++g) {
+    if (nuisance_sd[g] == 0) continue;
+    out.push_back(nuisance_sd);
+    out.back()[g] = 0;
+  }
+  if (out.size() > 1) out.emplace_back(Eigen::VectorXd::Zero(nuisance_sd.size()));
   return out;
 }
 
@@ -53,16 +69,18 @@ Index apart(const System& system, Index a, Index b) {
 Eigen::VectorXd over_likely(const System& system, Index start, double far_below,
                             const std::function<double(Index)>& log_at) {
   std::vector<Index> sizes;
-  Index count = 1;
+  Index count = 1, middle = 0;
   for (const auto& group : system.nuisance_groups()) {
     sizes.push_back(static_cast<Index>(group.standard_deviations.size()));
+    middle += count * (sizes.back() / 2);
     count *= sizes.back();
   }
   constexpr double kNever = -std::numeric_limits<double>::infinity();
   Eigen::VectorXd out = Eigen::VectorXd::Constant(count, kNever);
   std::vector<bool> asked(static_cast<std::size_t>(count));
-  std::vector<Index> next{start};
-  asked[static_cast<std::size_t>(start)] = true;
+  std::vector<Index> next;
+  for (const Index k : {start, Index{0}, middle})
+    if (!asked[static_cast<std::size_t>(k)]) next.push_back(k), asked[static_cast<std::size_t>(k)] = true;
   double most = kNever;
   while (!next.empty()) {
     for (const Index k : next) out[k] = log_at(k), most = std::max(most, out[k]);

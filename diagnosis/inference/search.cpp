@@ -259,11 +259,10 @@ void Search::look_with_less_spread() {
   for (const auto& [set, one] : visited_) {
     if (one.log_posterior() < best - rules_.window) continue;
     const Fit& fit = one.likelier_fit();
-    for (Index g = 0; g < fit.scales.nuisance_sd.size(); ++g) {
-      if (fit.scales.nuisance_sd[g] == 0) continue;
+    for (const VectorXd& less : less_spread(fit.scales.nuisance_sd)) {
       jobs.push_back(job_at(fit));
       jobs.back().beside_curve = one.is_likelier_with_curve();
-      jobs.back().nuisance_sd[g] = 0;
+      jobs.back().nuisance_sd = less;
     }
   }
   evaluate_all(std::move(jobs));

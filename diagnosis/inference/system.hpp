@@ -48,7 +48,7 @@ struct Nuisance {
 };
 struct NuisanceGroup {
   std::string name, unit;
-  // The first is 0, the recordings do not differ, with probability one half; the others share the rest.
+  // The first is 0: in this way the recordings do not differ.
   std::vector<double> standard_deviations;
 };
 

@@ -32,6 +32,43 @@ TEST(NuisanceGrid, PriorsAddUpToOne) {
   const NuisanceGrid grid = nuisance_grid(Grouped());
   ASSERT_EQ(grid.log_prior.size(), 500);
   EXPECT_NEAR(grid.log_prior.array().exp().sum(), 1, 1e-12);
+  EXPECT_NEAR(std::exp(grid.log_prior[0]), 0.5 + 0.5 / 500, 1e-12);
+  for (Index k = 1; k < 500; ++k) EXPECT_NEAR(std::exp(grid.log_prior[k]), 0.5 / 500, 1e-12);
+}
+
+TEST(NuisanceGrid, LessSpreadIsWithoutOneGroupOrWithoutAll) {
+  EXPECT_TRUE(less_spread(Eigen::Vector3d::Zero()).empty());
+  const auto of_one = less_spread(Eigen::Vector3d(0, 2, 0));
+  ASSERT_EQ(of_one.size(), 1U);
+  EXPECT_TRUE(of_one.front().isZero(0));
+  const auto of_two = less_spread(Eigen::Vector3d(1, 0, 3));
+  ASSERT_EQ(of_two.size(), 3U);
+  EXPECT_EQ(of_two[0], Eigen::Vector3d(0, 0, 3));
+  EXPECT_EQ(of_two[1], Eigen::Vector3d(1, 0, 0));
+  EXPECT_TRUE(of_two[2].isZero(0));
+}
+
+// A peak where recordings differ in every way, beside that where they differ in none, with much less between.
+TEST(NuisanceGrid, BothPeaksAreFound) {
+  const Grouped system;
+  const Index sizes[] = {5, 5, 5, 4};
+  constexpr Index kPeak = 2 + 5 * (2 + 5 * (2 + 5 * 1));
+  const auto log_at = [&](Index k) {
+    if (k == 0) return -1.0;
+    double squares = 0;
+    Index peak = kPeak;
+    for (const Index size : sizes) {
+      squares += std::pow(static_cast<double>(k % size - peak % size), 2);
+      k /= size, peak /= size;
+    }
+    return -squares / 0.3;
+  };
+  for (const Index start : {Index{0}, kPeak, Index{499}})
+    for (const double far_below : {0.0, 6.0}) {
+      const VectorXd found = over_likely(system, start, far_below, log_at);
+      EXPECT_EQ(found[0], -1) << start;
+      EXPECT_EQ(found[kPeak], 0) << start;
+    }
 }
 
 // A density with one peak over the places of the groups' values, from the farthest corners: all of its mass but what is

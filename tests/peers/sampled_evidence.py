@@ -102,10 +102,12 @@ class Integral:
         self.shared, self.own, recordings = len(drawn), len(case["local"]), case["recordings"]
         rest = combination
         self.sd, self.log_constant = [], 0.0
-        for grid in case["groups"]:  # the first of a grid has one half, the others share the rest
+        for grid in case["groups"]:
             rest, which = divmod(rest, len(grid))
             self.sd.append(grid[which])
-            self.log_constant -= np.log(2 if which == 0 else 2 * (len(grid) - 1)) if len(grid) > 1 else 0
+        # None differ with one half, else each of a grid's values is as likely.
+        share = 0.5 / np.prod([len(grid) for grid in case["groups"]])
+        self.log_constant += np.log(share if any(self.sd) else 0.5 + share)
         self.nuisances, self.instants, self.scale, start = [], [], [], []
         for i, one in enumerate(case["local"]):
             happened = 0
