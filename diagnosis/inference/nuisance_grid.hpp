@@ -26,8 +26,8 @@ Eigen::Index apart(const System& system, Eigen::Index a, Eigen::Index b);
 // A logarithm for each combination of nuisance_grid(), by `log_at` of its column; -infinity for those that were not
 // asked for: only neighbours (one group's next standard deviation, either way) of what comes within exp(-far_below) of
 // the likeliest are, beginning with `start`, a column too, with no spread, and with the middle of each. Of a density
-// with one peak beside that at no spread nothing is missed that counts; with 0 the way to the likeliest, and what lies
-// beside it.
+// with one peak beside that at no spread nothing is missed that counts; with 0 the way up from the likeliest
+// of these, and what lies beside its end.
 Eigen::VectorXd over_likely(const System& system, Eigen::Index start, double far_below,
                             const std::function<double(Eigen::Index)>& log_at);
 

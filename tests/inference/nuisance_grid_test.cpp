@@ -63,12 +63,11 @@ TEST(NuisanceGrid, BothPeaksAreFound) {
     }
     return -squares / 0.3;
   };
-  for (const Index start : {Index{0}, kPeak, Index{499}})
-    for (const double far_below : {0.0, 6.0}) {
-      const VectorXd found = over_likely(system, start, far_below, log_at);
-      EXPECT_EQ(found[0], -1) << start;
-      EXPECT_EQ(found[kPeak], 0) << start;
-    }
+  for (const Index start : {Index{0}, kPeak, Index{499}}) {
+    const VectorXd found = over_likely(system, start, 6, log_at);
+    EXPECT_EQ(found[0], -1) << start;
+    EXPECT_EQ(found[kPeak], 0) << start;
+  }
 }
 
 // A density with one peak over the places of the groups' values, from the farthest corners: all of its mass but what is
