@@ -296,9 +296,11 @@ EffectSource effect_source(const ProposedForm& p) {
 
 std::optional<EffectSource> proposed_effect(const Findings& findings) {
   if (findings.verdict != Verdict::unknown_effect || findings.proposals.empty()) return std::nullopt;
-  return effect_source(
-      *std::max_element(findings.proposals.begin(), findings.proposals.end(),
-                        [](const auto& a, const auto& b) { return a.log_bayes_factor < b.log_bayes_factor; }));
+  // Of the discrepancy that shows most: a small one beside it may follow its form as well.
+  const auto rank = [&](const ProposedForm& one) {
+    return std::pair(findings.discrepancies.at(one.discrepancy).visible_size, one.log_bayes_factor);
+  };
+  return effect_source(*std::ranges::max_element(findings.proposals, {}, rank));
 }
 
 }  // namespace bevel::diagnosis

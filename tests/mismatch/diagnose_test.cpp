@@ -169,8 +169,11 @@ TEST(Diagnose, WhatIsOnNoListIsADiscrepancyWithItsErrors) {
   };
   const Findings found = findings_of(rig, 4);
   EXPECT_EQ(found.verdict, Verdict::unknown_effect) << found.sentence;
-  ASSERT_EQ(found.discrepancies.size(), 1U);
+  // A curve of twelve values, straight between them, leaves a twelfth of such a wave, which may be a second one.
+  ASSERT_FALSE(found.discrepancies.empty());
   const Discrepancy& one = found.discrepancies[0];
+  for (std::size_t d = 1; d < found.discrepancies.size(); ++d)
+    EXPECT_LT(found.discrepancies[d].visible_size, one.visible_size / 6);
   EXPECT_EQ(one.curve.values.size(), one.curve.at.size());
   EXPECT_EQ(one.curve.std_errors.size(), one.curve.at.size());
   for (const double error : one.curve.std_errors) EXPECT_GT(error, 0);
