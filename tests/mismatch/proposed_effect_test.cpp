@@ -221,8 +221,15 @@ TEST(ProposedEffect, IsThereForAnUnknownEffectAlone) {
   findings.proposals = {proposed_cases()[4], proposed_cases()[0]};
   EXPECT_FALSE(proposed_effect(findings));
   findings.verdict = Verdict::unknown_effect;
+  findings.discrepancies.resize(2);
+  findings.discrepancies[0].visible_size = 2;
+  findings.discrepancies[1].visible_size = 0.2;
+  // Of two forms of one discrepancy the likelier, and of two discrepancies that which shows more.
+  findings.proposals[0].log_bayes_factor = 3, findings.proposals[1].log_bayes_factor = 1;
   ASSERT_TRUE(proposed_effect(findings));
   EXPECT_EQ(proposed_effect(findings)->name, effect_source(proposed_cases()[4]).name);
+  findings.proposals[0].discrepancy = 1;
+  EXPECT_EQ(proposed_effect(findings)->name, effect_source(proposed_cases()[0]).name);
   findings.proposals.clear();
   EXPECT_FALSE(proposed_effect(findings));
 }
