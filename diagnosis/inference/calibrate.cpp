@@ -4,19 +4,12 @@
 #include <cmath>
 #include <stdexcept>
 
+#include "diagnosis/inference/nuisance_grid.hpp"
+
 namespace bevel::inference {
 
 using Eigen::Index;
 using Eigen::VectorXd;
-
-VectorXd middle_nuisance_sd(const System& system) {
-  VectorXd out(static_cast<Index>(system.nuisance_groups().size()));
-  for (Index g = 0; g < out.size(); ++g) {
-    const auto& values = system.nuisance_groups()[static_cast<std::size_t>(g)].standard_deviations;
-    out[g] = values[values.size() / 2];
-  }
-  return out;
-}
 
 namespace {
 

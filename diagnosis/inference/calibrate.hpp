@@ -14,7 +14,4 @@ Fit tempered_base(const System& system, const Readings& outliers, const Noise& n
 // recordings.
 Calibration calibrate(const System& system);
 
-// The middle of each group's standard deviations.
-Eigen::VectorXd middle_nuisance_sd(const System& system);
-
 }  // namespace bevel::inference

@@ -44,8 +44,8 @@ void add_discrepancy(const Likelihood& likelihood, const Discrepancy& discrepanc
 std::pair<Fit, double> moved_to(const std::shared_ptr<const Likelihood>& likelihood, const Fit& from,
                                 const Discrepancy& discrepancy);
 
-// The same fit where one group of nuisances does not differ, for each group that does, and by how much its evidence is
-// more there (less, as a rule), by the linear model. What some recordings share looks like a spread until it has a
+// The same fit with less_spread(), each way, and by how much its evidence, the prior of the spread with it, is more
+// there (less, as a rule), by the linear model. What some recordings share looks like a spread until it has a
 // name: beside what spread is left then, an effect may be worth much more.
 struct WithoutSpread {
   Fit fit;

@@ -33,6 +33,15 @@ double log_prior_of_spread(const System& system, const Eigen::VectorXd& nuisance
   return std::log(nuisance_sd.isZero(0) ? 1 - kDiffer + share : share);
 }
 
+Eigen::VectorXd middle_nuisance_sd(const System& system) {
+  Eigen::VectorXd out(static_cast<Index>(system.nuisance_groups().size()));
+  for (Index g = 0; g < out.size(); ++g) {
+    const auto& values = system.nuisance_groups()[static_cast<std::size_t>(g)].standard_deviations;
+    out[g] = values[values.size() / 2];
+  }
+  return out;
+}
+
 std::vector<Eigen::VectorXd> less_spread(const Eigen::VectorXd& nuisance_sd) {
   std::vector<Eigen::VectorXd> out;
   for (Index g = 0; g < nuisance_sd.size(); ++g) {
@@ -69,17 +78,16 @@ Index apart(const System& system, Index a, Index b) {
 Eigen::VectorXd over_likely(const System& system, Index start, double far_below,
                             const std::function<double(Index)>& log_at) {
   std::vector<Index> sizes;
-  Index count = 1, middle = 0;
+  Index count = 1;
   for (const auto& group : system.nuisance_groups()) {
     sizes.push_back(static_cast<Index>(group.standard_deviations.size()));
-    middle += count * (sizes.back() / 2);
     count *= sizes.back();
   }
   constexpr double kNever = -std::numeric_limits<double>::infinity();
   Eigen::VectorXd out = Eigen::VectorXd::Constant(count, kNever);
   std::vector<bool> asked(static_cast<std::size_t>(count));
   std::vector<Index> next;
-  for (const Index k : {start, Index{0}, middle})
+  for (const Index k : {start, Index{0}, column_of(system, middle_nuisance_sd(system))})
     if (!asked[static_cast<std::size_t>(k)]) next.push_back(k), asked[static_cast<std::size_t>(k)] = true;
   double most = kNever;
   while (!next.empty()) {

@@ -16,6 +16,8 @@ NuisanceGrid nuisance_grid(const System& system);
 // group's standard deviation is any of its values, 0 among them. What differs between repetitions differs in most
 // ways: that all stay alike in every way but one is what something else would make of them.
 double log_prior_of_spread(const System& system, const Eigen::VectorXd& nuisance_sd);
+// The middle of each group's values.
+Eigen::VectorXd middle_nuisance_sd(const System& system);
 // The same with one group at none, for each that is not, and, of several, with all of them at none.
 std::vector<Eigen::VectorXd> less_spread(const Eigen::VectorXd& nuisance_sd);
 // Which of its columns this is; each is one of its group's standard deviations.

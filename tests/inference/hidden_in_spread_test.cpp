@@ -5,7 +5,6 @@
 #include <limits>
 #include <random>
 
-#include "diagnosis/inference/calibrate.hpp"
 #include "diagnosis/inference/search.hpp"
 #include "tests/inference/held_system.hpp"
 

@@ -8,7 +8,6 @@
 #include <iostream>
 #include <nlohmann/json.hpp>
 
-#include "diagnosis/inference/calibrate.hpp"
 #include "diagnosis/inference/evidence.hpp"
 #include "diagnosis/inference/proposals.hpp"
 #include "diagnosis/needle/needle_system.hpp"
