@@ -9,7 +9,7 @@ using Component = DiscrepancyComponent;
 
 constexpr double kStep_mm = 1e-3;  // for a slope by differences: far below any length on which a tissue changes
 
-constexpr std::array<DiscrepancyComponentInfo, 11> kComponents = {
+constexpr std::array<DiscrepancyComponentInfo, 13> kComponents = {
     {{Component::curvature_bevel, "curvature_bevel", "curvature toward the bevel", "1/mm", 0.05},
      {Component::curvature_across, "curvature_across", "curvature across the bevel", "1/mm", 0.05},
      {Component::advance, "advance", "advance of the tip", "mm per mm", 5},
@@ -18,6 +18,8 @@ constexpr std::array<DiscrepancyComponentInfo, 11> kComponents = {
      {Component::turning_turning, "turning_turning", "turning of the tip with turning", "rad per rad", 5},
      {Component::drift_bevel, "drift_bevel", "sideways drift toward the bevel", "mm per mm", 5},
      {Component::drift_across, "drift_across", "sideways drift across the bevel", "mm per mm", 5},
+     {Component::pull_x, "pull_x", "sideways pull along x", "1/mm", 0.05},
+     {Component::pull_y, "pull_y", "sideways pull along y", "1/mm", 0.05},
      {Component::x, "x", "reading along x", "mm", 100},
      {Component::y, "y", "reading along y", "mm", 100},
      {Component::z, "z", "reading along z", "mm", 100}}};
@@ -59,6 +61,14 @@ void ComponentEffect::axes(Parameters p, const LegView& leg, EffectMemory& memor
 void ComponentEffect::curvature(Parameters p, const LegView& leg, EffectMemory& memory, Dual2& kappa_per_mm) const {
   if (component_ == Component::curvature_bevel) kappa_per_mm[0] += value(p, leg, memory);
   if (component_ == Component::curvature_across) kappa_per_mm[1] += value(p, leg, memory);
+  if (!pulls()) return;
+  const Dual2 pull = pull_in_body(leg, value(p, leg, memory));
+  for (std::size_t i = 0; i < 2; ++i) kappa_per_mm[i] += pull[i];
+}
+
+Dual2 ComponentEffect::pull_in_body(const LegView& leg, const Dual& v) const {
+  // As a rotation vector (-y, x): the heading moves by kappa x e3.
+  return leg.lateral_in_body(component_ == Component::pull_x ? Dual2{Dual(0), v} : Dual2{-v, Dual(0)});
 }
 
 void ComponentEffect::settle(Parameters p, const LegView& leg, EffectMemory& memory) const {

@@ -6,6 +6,7 @@
 //   advance          ds_tip += v ds   advance_turning   ds_tip += v dR
 //   turning          dR_tip += v |ds| turning_turning   dR_tip += v dR
 //   drift_bevel, drift_across         the tip is carried aside by v ds_tip, toward body -y, toward body x
+//   pull_x, pull_y   the heading turns toward +x_A, +y_A by v ds_tip, wherever the bevel points
 //   x, y, z          the reading is off by v
 // A subclass states v: a curve (discrepancy.hpp), or an equation that bevel-diagnose proposed
 // (docs/adding-an-effect.md).
@@ -24,6 +25,8 @@ enum class DiscrepancyComponent {
   turning_turning,
   drift_bevel,
   drift_across,
+  pull_x,
+  pull_y,
   x,
   y,
   z
@@ -62,6 +65,11 @@ class ComponentEffect : public Effect {
   bool drifts() const {
     return component_ == DiscrepancyComponent::drift_bevel || component_ == DiscrepancyComponent::drift_across;
   }
+  bool pulls() const {
+    return component_ == DiscrepancyComponent::pull_x || component_ == DiscrepancyComponent::pull_y;
+  }
+  // Curvature in {B} of a pull of v.
+  Dual2 pull_in_body(const LegView& leg, const Dual& v) const;
   // Of the reading, 0 to 2; -1 where the component is one of the motion. Such an effect keeps v in its first slot.
   int axis() const {
     return component_ >= DiscrepancyComponent::x

@@ -46,6 +46,11 @@ class Discrepancy final : public ComponentEffect {
     // adds up to error^2 h^2, and to no more than error^2 (all the way so far)^2 where the covariate stands still.
     const double together = std::min(length_of(at, leg, step), std::abs(from + to - 2 * entry));
     const double added = error * error * together * step;
+    if (pulls()) {
+      const Dual2 share = pull_in_body(leg, 1);
+      for (std::size_t i = 0; i < 2; ++i) variance[3 + i] += added * share[i].value * share[i].value;
+      return;
+    }
     const int row = kRow.at(static_cast<std::size_t>(component()));
     variance[static_cast<std::size_t>(row)] += added;
     // Who is further in has bent further too.

@@ -58,6 +58,8 @@ TEST(Discrepancy, AConstantIsAnEquivalentMotion) {
     };
     EXPECT_LT(distance(Component::curvature_bevel, 8e-4, path_of(more, {}, motion)), 1e-9);
     EXPECT_LT(distance(Component::curvature_across, 1.5e-3, path_of(turned, {bevel}, motion)), 1e-9);
+    EXPECT_LT(distance(Component::pull_x, 8e-4, path_of(agar(), {active("lateral_bias", {8e-4, 0})}, motion)), 1e-9);
+    EXPECT_LT(distance(Component::pull_y, 8e-4, path_of(agar(), {active("lateral_bias", {0, 8e-4})}, motion)), 1e-9);
     EXPECT_LT(distance(Component::advance, 0.04, path_of(agar(), {}, advanced)), 1e-9);
     EXPECT_LT(distance(Component::advance, 0.04, path_of(agar(), {active("insertion_scale", {1.04})}, motion)), 1e-9);
     EXPECT_LT(distance(Component::turning, 0.02, path_of(agar(), {}, twisted)), 1e-9);
@@ -285,15 +287,20 @@ TEST(PredictionSpread, OfACurvesErrorsIsThatOfDraws) {
     bend.values.push_back(1e-4 * i);
     bend.std_errors.push_back(2e-4 + 2e-5 * i);
   }
+  DiscrepancyCurve pull = bend;
+  pull.component = Component::pull_y;
   const DiscrepancyCurve shift{Component::x, Covariate::time_s, {0, 6}, {0, 0.5}, {0.05, 0.2}};
-  const auto expected = reading_covariances(agar(), {}, {bend, shift}, {}, motion);
-  const auto centre = path_of(agar(), {active_discrepancy(bend), active_discrepancy(shift)}, motion);
+  const std::vector<DiscrepancyCurve> curves = {bend, pull, shift};
+  const auto expected = reading_covariances(agar(), {}, curves, {}, motion);
+  std::vector<ActiveEffect> middle;
+  for (const DiscrepancyCurve& curve : curves) middle.push_back(active_discrepancy(curve));
+  const auto centre = path_of(agar(), middle, motion);
   std::vector<Eigen::Vector3d> drawn(motion.at.size(), Eigen::Vector3d::Zero());
   std::mt19937_64 random(5);
   std::normal_distribution<double> normal;
   for (int d = 0; d < kDraws; ++d) {
     std::vector<ActiveEffect> active;
-    for (DiscrepancyCurve curve : {bend, shift}) {
+    for (DiscrepancyCurve curve : curves) {
       for (std::size_t i = 0; i < curve.at.size(); ++i) curve.values[i] += curve.std_errors[i] * normal(random);
       active.push_back(active_discrepancy(curve));
     }
