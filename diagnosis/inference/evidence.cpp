@@ -83,6 +83,14 @@ Integrated integrated(const std::vector<CurveFactor>& curves) {
   return {.log_factor = mean, .log_others = mean - logs.front()};
 }
 
+// Of those among them that are not fitted: what they promise is little, and the linear model is right about it.
+double log_factor_of_unlikely(const std::vector<CurveFactor>& curves) {
+  std::vector<double> logs;
+  for (const auto& one : curves)
+    if (one.log_bayes_factor < kLikelyCurve) logs.push_back(one.log_bayes_factor);
+  return log_sum(logs) - std::log(static_cast<double>(curves.size()));
+}
+
 // Every curve beside a fit, with what its set leaves open, by the noise that the curves were prepared with.
 std::vector<CurveFactor> scan_beside(const Likelihood& likelihood, const Discrepancy& discrepancy, const Fit& fit) {
   const auto by = with_inputs_of(fit, {std::shared_ptr<const void>(), &likelihood});  // not owned: no longer than here
@@ -151,7 +159,8 @@ void add_discrepancy(const Likelihood& likelihood, const Discrepancy& discrepanc
   out.with_discrepancy = true;
   out.curves = scan_beside(likelihood, discrepancy, out.fit);
   if (out.curves.empty()) return;
-  out.log_bayes_factor_curve = integrated(out.curves).log_factor;
+  out.log_bayes_factor_curve = log_factor_of_unlikely(out.curves);
+  const double least = out.log_evidence + out.log_bayes_factor_curve;
   // The likeliest, where the model is nonlinear: about the mode that it moves to; the rest of them by the linear model.
   Settled with{.fit = Fit(out.fit.layout), .over = {}};
   double log_others = 0;
@@ -163,7 +172,7 @@ void add_discrepancy(const Likelihood& likelihood, const Discrepancy& discrepanc
     with = std::move(there);
     log_others = one.log_others;
   }
-  if (!std::isfinite(with.over.log_mean)) return;
+  if (!(with.over.log_mean + log_others > least)) return;
   // Beside the curve another local minimum may have been found: it counts without the curve too.
   Settled again = settle(*with.fit.likelihood, nullptr, out.fit.layout, with.fit.shared, with.fit.local,
                          {.nuisance_sd = with.fit.scales.nuisance_sd, .curves = {}}, nuisance_grid(likelihood.system()),

@@ -2,7 +2,9 @@
 
 #include <algorithm>
 #include <cmath>
+#include <functional>
 #include <limits>
+#include <numeric>
 #include <set>
 #include <stdexcept>
 
@@ -160,10 +162,14 @@ void Search::evaluate_all(std::vector<Job> jobs) {
   });
   for (std::size_t i = 0; i < jobs.size(); ++i)
     if (results[i]->valid) keep(jobs[i].set, results[i]);
-  // Those that still end in one mode are asked for a discrepancy once.
+  // Those that still end in one mode are asked for a discrepancy once, the likeliest of them.
   const double best = best_log();
-  std::vector<std::size_t> asked;
-  for (std::size_t i = 0; i < jobs.size(); ++i) {
+  std::vector<std::size_t> order(jobs.size()), asked;
+  std::iota(order.begin(), order.end(), std::size_t{0});
+  std::ranges::stable_sort(order, std::greater{}, [&](std::size_t i) {
+    return results[i]->valid ? results[i]->log_evidence : -std::numeric_limits<double>::infinity();
+  });
+  for (const std::size_t i : order) {
     const Evaluated& one = *results[i];
     const bool asks =
         one.valid && (jobs[i].beside_curve || log_prior(jobs[i].set) + one.log_evidence > best - rules_.curve_window);
