@@ -93,21 +93,29 @@ void keep_best(std::vector<StartPoint>& starts, std::size_t count) {
 // own parameters, and these may have been fitted away.
 std::vector<Fit> views_of(const Fit& about) {
   std::vector<Fit> out{about};
-  const auto& unknowns = about.layout.shared();
-  bool far = false;
   Fit at_prior = about;
-  for (std::size_t i = 0; i < unknowns.size(); ++i) {
-    const Prior& prior = unknowns[i].parameter->prior;
-    if (unknowns[i].member >= 0 || prior.form != Prior::Form::normal) continue;
-    double& value = at_prior.shared[static_cast<Index>(i)];
-    far = far || std::abs(value - prior.middle) * std::sqrt(precision_of(prior)) > 1;
-    value = prior.middle;
-  }
-  if (far) out.push_back(std::move(at_prior));
+  at_prior.shared = with_base_at_prior(about.layout, about.shared);
+  const VectorXd off = about.shared - at_prior.shared;
+  for (Index i = 0; i < off.size(); ++i)
+    if (off[i] != 0 && std::abs(off[i]) * std::sqrt(precision_of(
+                                              about.layout.shared()[static_cast<std::size_t>(i)].parameter->prior)) >
+                           1) {
+      out.push_back(std::move(at_prior));
+      break;
+    }
   return out;
 }
 
 }  // namespace
+
+VectorXd with_base_at_prior(const Layout& layout, VectorXd shared) {
+  for (std::size_t i = 0; i < layout.shared().size(); ++i) {
+    const Unknown& unknown = layout.shared()[i];
+    if (unknown.member < 0 && unknown.parameter->prior.form == Prior::Form::normal)
+      shared[static_cast<Index>(i)] = unknown.parameter->prior.middle;
+  }
+  return shared;
+}
 
 Proposals::Proposals(const Likelihood& likelihood, const Fit& about, int threads) : system_(&likelihood.system()) {
   candidates_.resize(system_->effects().size());
@@ -119,8 +127,6 @@ Proposals::Proposals(const Likelihood& likelihood, const Fit& about, int threads
 Proposals::Candidate Proposals::make_candidate(const Likelihood& likelihood, std::span<const Fit> views,
                                                std::size_t e) const {
   const Effect& effect = system_->effects()[e];
-  // A grid of starts takes its time from one view.
-  if (std::ranges::any_of(effect.parameters, has_many_minima)) views = views.first(1);
   Candidate out;
   for (std::size_t p = 0; p < effect.parameters.size(); ++p) {
     const Parameter& parameter = effect.parameters[p];
@@ -129,6 +135,8 @@ Proposals::Candidate Proposals::make_candidate(const Likelihood& likelihood, std
     else if (is_size(parameter))
       out.amplitudes.push_back(p);
   }
+  // A grid in every recording takes its time from one view.
+  if (out.local >= 0) views = views.first(1);
   if (!system_->allows({e})) return out;
   ModelSet rest = without(views.front().layout.set(), e);
   if (!system_->allows(with(rest, e))) rest.clear();
@@ -177,8 +185,9 @@ Proposals::Candidate Proposals::make_candidate(const Likelihood& likelihood, std
     out.columns.push_back(likelihood.whitened(r, raw).cast<float>());
   }
   for (Index s = 0; s < seen; ++s)
-    out.signatures.push_back(
-        {starts[static_cast<std::size_t>(s) % starts.size()], out.local >= 0 ? s : s * out.width()});
+    out.signatures.push_back({.values = starts[static_cast<std::size_t>(s) % starts.size()],
+                              .first = out.local >= 0 ? s : s * out.width(),
+                              .base_at_prior = static_cast<std::size_t>(s) >= starts.size()});
   return out;
 }
 
@@ -217,7 +226,10 @@ Proposal Proposals::judge(const Candidate& candidate, std::size_t e, const Margi
     const auto across = XZ.middleRows(signature.first, width);
     MatrixXd square = XX.middleCols(signature.first, width) - across * beside.covariance() * across.transpose();
     const VectorXd pull = Xw.segment(signature.first, width);
-    StartPoint start{.shared = shared_part(effect, signature.values), .local = {}, .log_bayes_factor = kNever};
+    StartPoint start{.shared = shared_part(effect, signature.values),
+                     .local = {},
+                     .log_bayes_factor = kNever,
+                     .base_at_prior = signature.base_at_prior};
     if (candidate.amplitudes.empty()) {
       start.log_bayes_factor = pull[0] - 0.5 * square(0, 0);
     } else {

@@ -11,6 +11,7 @@ struct StartPoint {
   Eigen::VectorXd shared;              // of the effect's shared parameters, in their order
   std::vector<Eigen::VectorXd> local;  // of its others, per recording
   double log_bayes_factor = 0;
+  bool base_at_prior = false;  // it was seen with the base where its prior has it
 };
 
 struct Proposal {
@@ -32,6 +33,9 @@ struct Reach {
   Eigen::MatrixXd cosine;            // between visible parts
 };
 
+// The base's parameters of normal prior, where that has them.
+Eigen::VectorXd with_base_at_prior(const Layout& layout, Eigen::VectorXd shared);
+
 class Proposals {
  public:
   // About a fit of any set: what its members do is there when the others are added, as far as they are allowed beside
@@ -49,6 +53,7 @@ class Proposals {
   struct Signature {
     Eigen::VectorXd values;  // the effect's parameters at this start
     Eigen::Index first = 0;  // column; as many as the effect has amplitudes
+    bool base_at_prior = false;
   };
   struct Candidate {
     std::vector<std::size_t> amplitudes;
