@@ -160,7 +160,9 @@ void add_discrepancy(const Likelihood& likelihood, const Discrepancy& discrepanc
   out.curves = scan_beside(likelihood, discrepancy, out.fit);
   if (out.curves.empty()) return;
   out.log_bayes_factor_curve = log_factor_of_unlikely(out.curves);
-  const double least = out.log_evidence + out.log_bayes_factor_curve;
+  const bool stands_out = out.curves.front().log_bayes_factor >= kLikelyCurve;
+  const double least =
+      stands_out ? -std::numeric_limits<double>::infinity() : out.log_evidence + out.log_bayes_factor_curve;
   // The likeliest, where the model is nonlinear: about the mode that it moves to; the rest of them by the linear model.
   Settled with{.fit = Fit(out.fit.layout), .over = {}};
   double log_others = 0;
