@@ -83,7 +83,8 @@ Integrated integrated(const std::vector<CurveFactor>& curves) {
   return {.log_factor = mean, .log_others = mean - logs.front()};
 }
 
-// Of those among them that are not fitted: what they promise is little, and the linear model is right about it.
+// Of those among a scan's curves that stand out nowhere: what they promise is little, and the linear model is right
+// about it.
 double log_factor_of_unlikely(const std::vector<CurveFactor>& curves) {
   std::vector<double> logs;
   for (const auto& one : curves)
@@ -160,6 +161,7 @@ void add_discrepancy(const Likelihood& likelihood, const Discrepancy& discrepanc
   out.curves = scan_beside(likelihood, discrepancy, out.fit);
   if (out.curves.empty()) return;
   out.log_bayes_factor_curve = log_factor_of_unlikely(out.curves);
+  // Where none stands out, a fit that comes to less was given up, or is in another local minimum.
   const bool stands_out = out.curves.front().log_bayes_factor >= kLikelyCurve;
   const double least =
       stands_out ? -std::numeric_limits<double>::infinity() : out.log_evidence + out.log_bayes_factor_curve;

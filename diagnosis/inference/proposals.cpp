@@ -88,21 +88,26 @@ void keep_best(std::vector<StartPoint>& starts, std::size_t count) {
   if (starts.size() > count) starts.resize(count);
 }
 
+bool is_normal_of_base(const Unknown& unknown) {
+  return unknown.member < 0 && unknown.parameter->prior.form == Prior::Form::normal;
+}
+
 // The fits from which an effect is looked at: this one, and, where what is missing drove the base a standard deviation
 // from its prior, the same with the base where the prior has it. What an effect does may be in proportion to the base's
 // own parameters, and these may have been fitted away.
 std::vector<Fit> views_of(const Fit& about) {
   std::vector<Fit> out{about};
-  Fit at_prior = about;
-  at_prior.shared = with_base_at_prior(about.layout, about.shared);
-  const VectorXd off = about.shared - at_prior.shared;
-  for (Index i = 0; i < off.size(); ++i)
-    if (off[i] != 0 && std::abs(off[i]) * std::sqrt(precision_of(
-                                              about.layout.shared()[static_cast<std::size_t>(i)].parameter->prior)) >
-                           1) {
-      out.push_back(std::move(at_prior));
-      break;
-    }
+  bool far = false;
+  for (std::size_t i = 0; i < about.layout.shared().size(); ++i) {
+    const Unknown& unknown = about.layout.shared()[i];
+    if (!is_normal_of_base(unknown)) continue;
+    const Prior& prior = unknown.parameter->prior;
+    far = far || std::abs(about.shared[static_cast<Index>(i)] - prior.middle) * std::sqrt(precision_of(prior)) > 1;
+  }
+  if (far) {
+    out.push_back(about);
+    out.back().shared = with_base_at_prior(about.layout, about.shared);
+  }
   return out;
 }
 
@@ -111,8 +116,7 @@ std::vector<Fit> views_of(const Fit& about) {
 VectorXd with_base_at_prior(const Layout& layout, VectorXd shared) {
   for (std::size_t i = 0; i < layout.shared().size(); ++i) {
     const Unknown& unknown = layout.shared()[i];
-    if (unknown.member < 0 && unknown.parameter->prior.form == Prior::Form::normal)
-      shared[static_cast<Index>(i)] = unknown.parameter->prior.middle;
+    if (is_normal_of_base(unknown)) shared[static_cast<Index>(i)] = unknown.parameter->prior.middle;
   }
   return shared;
 }
