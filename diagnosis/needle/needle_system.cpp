@@ -51,7 +51,7 @@ class BendGradient final : public model::Effect {
     constexpr double kPer_mm = 100;
     const double middle_mm = 0.5 * (leg.from.insertion_mm + leg.to.insertion_mm) - leg.entry.insertion_mm;
     const double share = middle_mm / kPer_mm;
-    const model::Dual2 pull = leg.lateral_in_body({p[1] * -share, p[0] * share});
+    const model::Dual2 pull = leg.curvature_toward({p[0] * share, p[1] * share});
     for (std::size_t i = 0; i < 2; ++i) kappa_per_mm[i] += pull[i];
   }
 };

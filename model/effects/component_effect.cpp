@@ -67,8 +67,7 @@ void ComponentEffect::curvature(Parameters p, const LegView& leg, EffectMemory& 
 }
 
 Dual2 ComponentEffect::pull_in_body(const LegView& leg, const Dual& v) const {
-  // As a rotation vector (-y, x): the heading moves by kappa x e3.
-  return leg.lateral_in_body(component_ == Component::pull_x ? Dual2{Dual(0), v} : Dual2{-v, Dual(0)});
+  return leg.curvature_toward(component_ == Component::pull_x ? Dual2{v, Dual(0)} : Dual2{Dual(0), v});
 }
 
 void ComponentEffect::settle(Parameters p, const LegView& leg, EffectMemory& memory) const {

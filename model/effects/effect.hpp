@@ -122,6 +122,9 @@ struct LegView {
   double turn_rate_rad_s() const { return duration_s() > 0 ? std::abs(base_rotation_rad()) / duration_s() : 0; }
   // A vector of {A} seen in {B} halfway through the leg's own rotation.
   Dual2 lateral_in_body(const Dual2& world) const;
+  // Curvature in {B} by which the heading turns toward +x and +y of {A} by so much per mm. As a rotation vector that is
+  // (-y, x): the heading moves by kappa x e3 = (kappa_y, -kappa_x).
+  Dual2 curvature_toward(const Dual2& world) const { return lateral_in_body({-world[1], world[0]}); }
   // A lateral vector of {B} at the start of the leg, as its x and y in {A}; all of it.
   Dual2 lateral_in_world(const Dual2& body) const;
   Dual3 in_world(const Dual2& body) const;

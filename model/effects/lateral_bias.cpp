@@ -4,8 +4,7 @@ namespace bevel::model {
 namespace {
 
 // A curvature fixed in the world (gravity, a gradient in the tissue): the heading turns toward +x_A by x_per_mm and
-// toward +y_A by y_per_mm. As a rotation vector that is (-y, x), since the heading moves by kappa x e3 = (kappa_y,
-// -kappa_x).
+// toward +y_A by y_per_mm.
 class LateralBias final : public Effect {
  public:
   LateralBias()
@@ -22,7 +21,7 @@ class LateralBias final : public Effect {
                      .reported = 0.002}}}) {}
 
   void curvature(Parameters p, const LegView& leg, EffectMemory& /*memory*/, Dual2& kappa_per_mm) const override {
-    const Dual2 pull = leg.lateral_in_body({-p[1], p[0]});
+    const Dual2 pull = leg.curvature_toward({p[0], p[1]});
     for (std::size_t i = 0; i < 2; ++i) kappa_per_mm[i] += pull[i];
   }
 };
