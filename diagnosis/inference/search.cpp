@@ -275,6 +275,25 @@ void Search::look_with_less_spread() {
   evaluate_all(std::move(jobs));
 }
 
+const ModelSet* next_to_expand(const std::map<ModelSet, Visited>& visited, const std::set<ModelSet>& expanded,
+                               double window) {
+  const ModelSet* top = nullptr;
+  double best = -std::numeric_limits<double>::infinity(), best_without = best;
+  for (const auto& [set, one] : visited) {
+    if (one.log_posterior() > best) best = one.log_posterior(), top = &set;
+    best_without = std::max(best_without, one.log_without_curve);
+  }
+  const ModelSet* next = nullptr;
+  double least_below = std::numeric_limits<double>::infinity();
+  for (const auto& [set, one] : visited) {
+    if (expanded.contains(set)) continue;
+    const bool subset = set.size() + 1 == top->size() && std::ranges::includes(*top, set);
+    const double below = subset ? 0 : std::min(best - one.log_posterior(), best_without - one.log_without_curve);
+    if (below <= window && below < least_below) next = &set, least_below = below;
+  }
+  return next;
+}
+
 void Search::look_around() {
   expand({});
   // Pairs of which neither by itself comes near.
@@ -295,16 +314,7 @@ void Search::look_around() {
   }
   evaluate_all(std::move(jobs));
   while (fits_ < rules_.most_fits) {
-    const double best = best_log();
-    const ModelSet top = this->best().set;
-    const ModelSet* next = nullptr;
-    double next_log = -std::numeric_limits<double>::infinity();
-    for (const auto& [set, one] : visited_) {
-      if (expanded_.contains(set)) continue;
-      const bool subset = std::includes(top.begin(), top.end(), set.begin(), set.end()) && set.size() + 1 == top.size();
-      const double log = subset ? best : one.log_posterior();
-      if (log >= best - rules_.window && log > next_log) next = &set, next_log = log;
-    }
+    const ModelSet* next = next_to_expand(visited_, expanded_, rules_.window);
     if (!next) break;
     const ModelSet set = *next;
     const auto at = visited_.at(set).at;
