@@ -6,6 +6,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include "diagnosis/parallel.hpp"
+
 namespace bevel::inference {
 
 using Eigen::Index;
@@ -41,27 +43,32 @@ Discrepancy::Discrepancy(const Likelihood& likelihood, const Fit& base) : system
   // Normal equations of the columns and the base's sensitivities, both in deviations.
   const auto n = static_cast<Index>(system_->base().size());
   MatrixXd JJ = MatrixXd::Zero(n, n), JC = MatrixXd::Zero(n, columns), CC = MatrixXd::Zero(largest, columns);
-  Prediction prediction;
-  for (std::size_t r = 0; r < likelihood.recordings(); ++r) {
+  const std::size_t recordings = likelihood.recordings();
+  per_sd_.resize(recordings), raw_.resize(recordings), white_.resize(recordings), square_.resize(recordings);
+  std::vector<MatrixXd> by_curves(recordings), by_base(recordings);
+  parallel_for(recordings, [&](std::size_t r) {
     const MatrixXd raw = likelihood.kept(r, system_->by_curves(r, base.shared.head(n)));
+    Prediction prediction;
     system_->predict({}, r, base.shared.head(n), base.local[r], true, prediction);
-    per_sd_.push_back(one_per_deviation(likelihood, r));
-    const MatrixXd C = per_sd_.back().asDiagonal() * raw;
-    const MatrixXd J = per_sd_.back().asDiagonal() * likelihood.kept(r, prediction.by_shared);
+    per_sd_[r] = one_per_deviation(likelihood, r);
+    by_curves[r] = per_sd_[r].asDiagonal() * raw;
+    by_base[r] = per_sd_[r].asDiagonal() * likelihood.kept(r, prediction.by_shared);
+    raw_[r] = raw.cast<float>();
+    white_[r] = likelihood.whitened(r, raw).cast<float>();
+    square_[r] = MatrixXf::Zero(largest, columns);
+    for (std::size_t k = 0; k < first_.size(); ++k) {
+      const auto part = white_[r].middleCols(first_[k], size_[k]);
+      square_[r].block(0, first_[k], size_[k], size_[k]).noalias() = part.transpose() * part;
+    }
+  });
+  for (std::size_t r = 0; r < recordings; ++r) {
+    const MatrixXd &C = by_curves[r], &J = by_base[r];
     JJ += J.transpose() * J;
     JC += J.transpose() * C;
     for (std::size_t k = 0; k < first_.size(); ++k) {
       const auto part = C.middleCols(first_[k], size_[k]);
       CC.block(0, first_[k], size_[k], size_[k]) += part.transpose() * part;
     }
-    raw_.push_back(raw.cast<float>());
-    white_.push_back(likelihood.whitened(r, raw).cast<float>());
-    MatrixXf square = MatrixXf::Zero(largest, columns);
-    for (std::size_t k = 0; k < first_.size(); ++k) {
-      const auto part = white_.back().middleCols(first_[k], size_[k]);
-      square.block(0, first_[k], size_[k], size_[k]).noalias() = part.transpose() * part;
-    }
-    square_.push_back(std::move(square));
   }
   rows_ = static_cast<double>(likelihood.data().rows());
   absorbed_ = JJ.completeOrthogonalDecomposition().solve(JC);

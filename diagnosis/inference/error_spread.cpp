@@ -6,6 +6,7 @@
 #include <numeric>
 
 #include "diagnosis/inference/recording_rows.hpp"
+#include "diagnosis/parallel.hpp"
 
 namespace bevel::inference {
 
@@ -137,19 +138,19 @@ class ErrorsBeside {
   }
   ErrorsByChannel by(const Dataset& data, const Noise& noise) const {
     std::vector<ArrowBlock> blocks(raw_.size());
-    for (std::size_t r = 0; r < raw_.size(); ++r) {
+    parallel_for(raw_.size(), [&](std::size_t r) {
       blocks[r] = block_by(raw_[r], data.recordings[r], noise);
       blocks[r].precision = precision_;
       blocks[r].centre = nuisance_centre(fit_->layout, fit_->local[r]);
-    }
+    });
     if (blocks.empty()) return {};
     ArrowRules rules;
     rules.held = fit_->held;
     const ArrowSolution solution = solve(blocks, pulls_.precision, pulls_.centre, rules);
     if (!solution.valid) return {};
-    ErrorsByChannel out;
-    for (std::size_t r = 0; r < raw_.size(); ++r)
-      out.push_back(expected_errors(raw_[r], data.recordings[r], blocks[r], solution, r));
+    ErrorsByChannel out(raw_.size());
+    parallel_for(raw_.size(),
+                 [&](std::size_t r) { out[r] = expected_errors(raw_[r], data.recordings[r], blocks[r], solution, r); });
     return out;
   }
 

@@ -2,9 +2,12 @@
 
 #include <Eigen/LU>
 #include <algorithm>
+#include <atomic>
 #include <cmath>
 #include <limits>
 #include <numbers>
+
+#include "diagnosis/parallel.hpp"
 
 namespace bevel::inference {
 
@@ -197,13 +200,17 @@ namespace {
 
 bool make_blocks(const Likelihood& likelihood, const Fit& fit, const CurveColumns& curve,
                  std::vector<ArrowBlock>& blocks) {
-  LinearRecording recording;
   blocks.resize(likelihood.recordings());
-  for (std::size_t r = 0; r < likelihood.recordings(); ++r) {
-    if (!linearise(likelihood, fit, curve, r, recording)) return false;
-    blocks[r] = std::move(recording.block);
-  }
-  return true;
+  std::atomic<bool> valid = true;
+  parallel_for(likelihood.recordings(), [&](std::size_t r) {
+    LinearRecording recording;
+    if (!valid) return;
+    if (linearise(likelihood, fit, curve, r, recording))
+      blocks[r] = std::move(recording.block);
+    else
+      valid = false;
+  });
+  return valid;
 }
 
 // Squared residuals and the priors' pulls.

@@ -8,6 +8,7 @@
 #include <map>
 
 #include "diagnosis/inference/profile.hpp"
+#include "diagnosis/parallel.hpp"
 
 namespace bevel::inference {
 
@@ -53,12 +54,13 @@ std::vector<double> before_jumps(const SeriesSet& data, const VectorXd& white, d
 // also where the readings jump if it did not happen.
 void scan_local(const Likelihood& likelihood, const Layout& layout, const VectorXd& shared,
                 std::vector<VectorXd>& local, std::size_t first, std::size_t last) {
-  Residuals residuals;
   for (std::size_t i = 0; i < layout.local().size(); ++i) {
     if (!layout.is_scanned(i)) continue;
     const bool instant = layout.is_instant(i);
     const auto at = static_cast<Index>(i);
-    for (std::size_t r = first; r < last; ++r) {
+    parallel_for(last - first, [&](std::size_t k) {
+      const std::size_t r = first + k;
+      Residuals residuals;
       const double lower = layout.local()[i].parameter->lower, upper = layout.upper(i, r);
       const double cost = instant ? instant_cost(upper) : 0;
       VectorXd trial = local[r];
@@ -82,16 +84,16 @@ void scan_local(const Likelihood& likelihood, const Layout& layout, const Vector
       }
       const int count =
           instant ? std::max(4, static_cast<int>(std::lround((upper - lower) / kInstantSpacing_s))) : kPhases;
-      for (int k = 0; k < count; ++k) try_at(lower + (upper - lower) * (k + 0.5) / count);
+      for (int j = 0; j < count; ++j) try_at(lower + (upper - lower) * (j + 0.5) / count);
       double spacing_s = kInstantSpacing_s;
       for (int finer = 0; finer < 2 && instant && best > 0; ++finer) {
         spacing_s /= kFiner;
         const double middle = best;
-        for (int k = -kFiner; k <= kFiner; ++k)
-          if (const double at_s = middle + k * spacing_s; at_s > lower && at_s < upper) try_at(at_s);
+        for (int j = -kFiner; j <= kFiner; ++j)
+          if (const double at_s = middle + j * spacing_s; at_s > lower && at_s < upper) try_at(at_s);
       }
       local[r][at] = best;
-    }
+    });
   }
 }
 

@@ -291,7 +291,7 @@ std::vector<LeftOutSelection> leave_out_selection(const Search& search) {
     if (one.at->fit_with_curve && one.log_with_curve > best - kFarBehind)
       models.push_back({one.log_with_curve, &*one.at->fit_with_curve, {}});
   }
-  parallel_for(models.size(), search.rules().threads, [&](std::size_t m) {
+  parallel_for(models.size(), [&](std::size_t m) {
     const Fit& fit = *models[m].fit;
     const CurveColumns curve = curve_of(search, fit);
     const auto blocks = linearise(*fit.likelihood, fit, curve);

@@ -121,11 +121,10 @@ VectorXd with_base_at_prior(const Layout& layout, VectorXd shared) {
   return shared;
 }
 
-Proposals::Proposals(const Likelihood& likelihood, const Fit& about, int threads) : system_(&likelihood.system()) {
+Proposals::Proposals(const Likelihood& likelihood, const Fit& about) : system_(&likelihood.system()) {
   candidates_.resize(system_->effects().size());
   const auto views = views_of(about);
-  parallel_for(candidates_.size(), threads,
-               [&](std::size_t e) { candidates_[e] = make_candidate(likelihood, views, e); });
+  parallel_for(candidates_.size(), [&](std::size_t e) { candidates_[e] = make_candidate(likelihood, views, e); });
 }
 
 Proposals::Candidate Proposals::make_candidate(const Likelihood& likelihood, std::span<const Fit> views,
@@ -196,14 +195,18 @@ Proposals::Candidate Proposals::make_candidate(const Likelihood& likelihood, std
 }
 
 std::vector<Proposal> Proposals::beside(const Marginal& marginal, std::size_t starts) const {
-  std::vector<Proposal> out;
-  if (!marginal.valid()) return out;
+  if (!marginal.valid()) return {};
+  std::vector<std::size_t> joining;
   for (std::size_t e = 0; e < candidates_.size(); ++e) {
     if (contains(marginal.set(), e) || candidates_[e].signatures.empty()) continue;
-    if (!system_->allows(with(marginal.set(), e))) continue;
-    out.push_back(candidates_[e].local >= 0 ? judge_local(candidates_[e], e, marginal, starts)
-                                            : judge(candidates_[e], e, marginal, starts));
+    if (system_->allows(with(marginal.set(), e))) joining.push_back(e);
   }
+  std::vector<Proposal> out(joining.size());
+  parallel_for(joining.size(), [&](std::size_t i) {
+    const Candidate& candidate = candidates_[joining[i]];
+    out[i] = candidate.local >= 0 ? judge_local(candidate, joining[i], marginal, starts)
+                                  : judge(candidate, joining[i], marginal, starts);
+  });
   std::stable_sort(out.begin(), out.end(),
                    [](const auto& a, const auto& b) { return a.log_bayes_factor > b.log_bayes_factor; });
   return out;

@@ -40,7 +40,7 @@ class Proposals {
  public:
   // About a fit of any set: what its members do is there when the others are added, as far as they are allowed beside
   // each other.
-  Proposals(const Likelihood& likelihood, const Fit& about, int threads);
+  Proposals(const Likelihood& likelihood, const Fit& about);
 
   // Every effect that may join the set of a fit, the likeliest first.
   std::vector<Proposal> beside(const Marginal& fit, std::size_t starts) const;

@@ -127,7 +127,7 @@ void Search::drop_repeated(std::vector<Job>& jobs) const {
   std::map<ModelSet, std::size_t> count;
   for (const Job& job : jobs) ++count[job.set];
   std::vector<double> cost(jobs.size());
-  parallel_for(jobs.size(), rules_.threads, [&](std::size_t i) {
+  parallel_for(jobs.size(), [&](std::size_t i) {
     Job& job = jobs[i];
     if (count.at(job.set) < 2) return;
     const Fit there =
@@ -156,7 +156,7 @@ void Search::evaluate_all(std::vector<Job> jobs) {
   fits_ += jobs.size();
   std::vector<std::shared_ptr<Evaluated>> results(jobs.size());
   const auto hopeless = [&](const Job& job) { return best_log() - rules_.window - rules_.doubt - log_prior(job.set); };
-  parallel_for(jobs.size(), rules_.threads, [&](std::size_t i) {
+  parallel_for(jobs.size(), [&](std::size_t i) {
     const Job& job = jobs[i];
     results[i] = std::make_shared<Evaluated>(
         evaluate(*likelihood_, job.layout, job.shared, job.local, job.nuisance_sd, hopeless(job)));
@@ -180,7 +180,7 @@ void Search::evaluate_all(std::vector<Job> jobs) {
     if (asks && std::ranges::none_of(asked, same)) asked.push_back(i);
   }
   std::vector<std::shared_ptr<Evaluated>> with(asked.size());
-  parallel_for(asked.size(), rules_.threads, [&](std::size_t k) {
+  parallel_for(asked.size(), [&](std::size_t k) {
     with[k] = std::make_shared<Evaluated>(*results[asked[k]]);
     add_discrepancy(*likelihood_, *discrepancy_, curve_rules_, *with[k],
                     hopeless(jobs[asked[k]]) - curve_rules_.log_prior_odds);
@@ -194,6 +194,7 @@ double Search::best_log() const { return visited_.empty() ? 0 : best().log_poste
 
 void Search::run(const Readings& outliers, const Noise& noise, const Progress& progress) {
   progress_ = progress;
+  const Crew crew(rules_.threads);
   const Fit tempered = tempered_base(system_, outliers, noise);
   Start start{.shared = tempered.shared, .local = tempered.local, .nuisance_sd = middle_nuisance_sd(system_)};
   look_in_rounds(std::make_shared<const Likelihood>(system_, outliers, noise), start, {});
@@ -244,7 +245,7 @@ void Search::look_in_rounds(std::shared_ptr<const Likelihood> reference, Start& 
     }
     const Fit about = anew ? base.fit : likeliest_fit();
     anew = false;
-    proposals_ = std::make_unique<const Proposals>(*likelihood_, about, rules_.threads);
+    proposals_ = std::make_unique<const Proposals>(*likelihood_, about);
     keep({}, std::make_shared<const Evaluated>(base));
     expanded_.clear();
     promised_.clear();

@@ -13,6 +13,7 @@
 #include "diagnosis/mismatch/location.hpp"
 #include "diagnosis/mismatch/reach.hpp"
 #include "diagnosis/mismatch/sentence.hpp"
+#include "diagnosis/parallel.hpp"
 
 namespace bevel::diagnosis {
 
@@ -194,6 +195,7 @@ Findings diagnose(const RecordedCase& recorded, const model::NeedleParameters& m
   inference::SearchRules rules;
   rules.threads = options.threads;
   rules.largest = options.largest_set;
+  const Crew crew(rules.threads);
   inference::Search search(system, rules);
   search.run(calibration.outliers, calibration.noise, [&](const std::string& set) {
     if (options.progress) options.progress("comparing sets of effects: beside " + set);

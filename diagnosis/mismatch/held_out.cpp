@@ -8,6 +8,7 @@
 #include <set>
 
 #include "diagnosis/inference/prediction_noise.hpp"
+#include "diagnosis/parallel.hpp"
 
 namespace bevel::diagnosis {
 
@@ -157,11 +158,10 @@ Fit refit_without(const inference::Search& search, const Fit& whole, std::size_t
 // for each fit.
 class NormalNoise {
  public:
-  const std::shared_ptr<const Likelihood>& of(const Fit& fit) {
-    auto& known = known_[&fit];
-    if (!known) known = made(fit);
-    return known;
+  explicit NormalNoise(const std::set<const Fit*>& fits) {
+    for (const Fit* fit : fits) known_[fit] = made(*fit);
   }
+  const std::shared_ptr<const Likelihood>& of(const Fit& fit) const { return known_.at(&fit); }
 
  private:
   static std::shared_ptr<const Likelihood> made(const Fit& fit) {
@@ -185,7 +185,7 @@ double normal_beyond(const inference::Search& search, Fit fit, const Fit& judge,
 }
 
 // refitted: without the recording; judge: by whose noise and variation chi2 and density are.
-Sums sums_of(const NeedleSystem& system, const inference::Search& search, NormalNoise& normal, Fit fit,
+Sums sums_of(const NeedleSystem& system, const inference::Search& search, const NormalNoise& normal, Fit fit,
              const Fit& judge, std::size_t r) {
   Sums out;
   fit.likelihood = normal.of(judge);
@@ -215,8 +215,8 @@ double log_weights_without(const Likelihood& likelihood, std::size_t r) {
 
 // By the noise and the variation of the model itself, as it would be used. whole: the fit of all recordings, others:
 // without this one; varied: null: about zero, by the noise of the fit.
-std::optional<inference::Forecasts> forecast_of(const inference::Search& search, NormalNoise& normal, const Fit& whole,
-                                                Fit others, const Varied* varied, std::size_t r) {
+std::optional<inference::Forecasts> forecast_of(const inference::Search& search, const NormalNoise& normal,
+                                                const Fit& whole, Fit others, const Varied* varied, std::size_t r) {
   constexpr double kKnown = 1.0 / 3;
   const double until_s = inference::time_of_share(whole.likelihood->data().recordings[r], kKnown);
   Fit begun = refit_without(search, whole, new_insertion(others, r), r, until_s);
@@ -244,7 +244,7 @@ std::optional<inference::Forecasts> forecast_of(const inference::Search& search,
   return out;
 }
 
-std::optional<Varied> varied_about(const inference::Search& search, NormalNoise& normal, const Fit& whole) {
+std::optional<Varied> varied_about(const inference::Search& search, const NormalNoise& normal, const Fit& whole) {
   Fit fit = whole;
   fit.likelihood = normal.of(whole);
   auto curve = curve_of(search, fit);
@@ -295,69 +295,88 @@ Sums noise_floor(const NeedleSystem& system, const Likelihood& likelihood, std::
   return out;
 }
 
+// One recording, predicted from the others.
+struct LeftOutRecording {
+  Sums file, before, after, floor;
+  std::optional<inference::Forecasts> predicted_before, predicted_after;
+};
+
+using VariedOfFit = std::map<const Fit*, std::optional<Varied>>;
+
+LeftOutRecording leave_out(const NeedleSystem& system, const inference::Search& search, const NormalNoise& normal,
+                           const VariedOfFit& varied, const inference::LeftOutSelection& selected, const Fit& judge,
+                           std::size_t r) {
+  LeftOutRecording out;
+  const Likelihood& likelihood = *normal.of(judge);
+  const Fit &base = search.visited().at({}).at->fit, &found = *selected.fit;
+  const Fit alone_refitted = refit_without(search, base, r), found_refitted = refit_without(search, found, r);
+  out.file = as_it_stands(system, likelihood, r);
+  out.before = sums_of(system, search, normal, alone_refitted, judge, r);
+  out.after = sums_of(system, search, normal, found_refitted, found, r);
+  const double constant = constant_of(out.after.count);
+  out.after.log_density = selected.log_density + constant +
+                          normal_beyond(search, found_refitted, found, r, out.after.log_density - constant);
+  out.floor = noise_floor(system, likelihood, r);
+  if (auto forecast = forecast_of(search, normal, base, alone_refitted, nullptr, r))
+    out.predicted_before = inference::averaged({std::move(*forecast)}, {1});
+  std::vector<inference::Forecasts> models;
+  std::vector<double> probabilities;
+  for (const auto& share : selected.shares) {
+    const auto& about = varied.at(share.fit);
+    if (!about) continue;
+    const Fit refitted = share.fit == &found ? found_refitted : refit_without(search, *share.fit, r);
+    if (auto forecast = forecast_of(search, normal, *share.fit, refitted, &*about, r)) {
+      probabilities.push_back(std::log(share.probability) + forecast->log_others);
+      models.push_back(std::move(*forecast));
+    }
+  }
+  if (models.empty()) return out;
+  const double most = std::ranges::max(probabilities);
+  for (double& weight : probabilities) weight = std::exp(weight - most);
+  out.predicted_after = inference::averaged(models, probabilities);
+  return out;
+}
+
 }  // namespace
 
 HeldOut hold_out(const NeedleSystem& system, const inference::Search& search, const Fit& judge) {
-  HeldOut out;
-  NormalNoise normal;
-  const Likelihood& likelihood = *normal.of(judge);
-  const Fit& base = search.visited().at({}).at->fit;
   const auto selected = leave_out_selection(search);
+  std::set<const Fit*> fits = {&judge, &search.visited().at({}).at->fit};
+  VariedOfFit varied;
+  for (const auto& one : selected) {
+    fits.insert(one.fit);
+    for (const auto& share : one.shares) fits.insert(share.fit), varied[share.fit];
+  }
+  const NormalNoise normal(fits);
+  for (auto& [fit, about] : varied) about = varied_about(search, normal, *fit);
+  std::vector<std::size_t> asked;
+  for (std::size_t r = 0; r < selected.size(); ++r)
+    if (!system.recorded().two_groups() || system.recorded().recordings[r].changed) asked.push_back(r);
+  std::vector<LeftOutRecording> all(asked.size());
+  parallel_for(asked.size(), [&](std::size_t i) {
+    all[i] = leave_out(system, search, normal, varied, selected[asked[i]], judge, asked[i]);
+  });
+  HeldOut out;
   std::vector<Sums> file, before, after, floor;
   InsertionSums predicted_before(system), predicted_after(system);
-  std::map<const Fit*, std::optional<Varied>> varied;
-  for (std::size_t r = 0; r < likelihood.recordings(); ++r) {
-    const Recording& recording = system.recorded().recordings[r];
-    if (system.recorded().two_groups() && !recording.changed) continue;
-    const Fit& found = *selected[r].fit;
-    const Fit alone_refitted = refit_without(search, base, r), found_refitted = refit_without(search, found, r);
-    file.push_back(as_it_stands(system, likelihood, r));
-    before.push_back(sums_of(system, search, normal, alone_refitted, judge, r));
-    after.push_back(sums_of(system, search, normal, found_refitted, found, r));
-    const double constant = constant_of(after.back().count);
-    after.back().log_density = selected[r].log_density + constant +
-                               normal_beyond(search, found_refitted, found, r, after.back().log_density - constant);
-    floor.push_back(noise_floor(system, likelihood, r));
-    HeldOutRecording one{.log = recording.name,
-                         .before = figures_of({before.back()}),
-                         .after = figures_of({after.back()}),
-                         .predicted_before = {},
-                         .predicted_after = {}};
-    const auto& rows = likelihood.data().recordings[r];
-    const auto note = [&](const std::vector<inference::Forecasts>& models, const std::vector<double>& probabilities,
-                          InsertionSums& sums) {
+  for (std::size_t i = 0; i < asked.size(); ++i) {
+    const LeftOutRecording& one = all[i];
+    file.push_back(one.file), before.push_back(one.before), after.push_back(one.after), floor.push_back(one.floor);
+    const auto noted = [&](const std::optional<inference::Forecasts>& predicted, InsertionSums& sums) {
       InsertionSums own(system);
-      if (!models.empty()) {
-        const auto all = averaged(models, probabilities);
-        own.add(rows, all);
-        sums.add(rows, all);
+      if (predicted) {
+        const auto& rows = normal.of(judge)->data().recordings[asked[i]];
+        own.add(rows, *predicted);
+        sums.add(rows, *predicted);
       }
       return own.figures();
     };
-    std::vector<inference::Forecasts> models;
-    std::vector<double> probabilities;
-    if (auto forecast = forecast_of(search, normal, base, alone_refitted, nullptr, r))
-      models.push_back(std::move(*forecast));
-    one.predicted_before = note(models, {1}, predicted_before);
-    models.clear();
-    for (const auto& share : selected[r].shares) {
-      const bool likeliest = share.fit == &found;
-      if (!varied.contains(share.fit)) varied[share.fit] = varied_about(search, normal, *share.fit);
-      const auto& about = varied[share.fit];
-      if (!about) continue;
-      if (auto forecast = forecast_of(search, normal, *share.fit,
-                                      likeliest ? found_refitted : refit_without(search, *share.fit, r), &*about, r)) {
-        probabilities.push_back(std::log(share.probability) + forecast->log_others);
-        models.push_back(std::move(*forecast));
-      }
-    }
-    if (!probabilities.empty()) {
-      const double most = std::ranges::max(probabilities);
-      for (double& weight : probabilities) weight = std::exp(weight - most);
-    }
-    one.predicted_after = note(models, probabilities, predicted_after);
-    out.recordings.push_back(std::move(one));
-    out.gain += after.back().log_density - before.back().log_density;
+    out.recordings.push_back({.log = system.recorded().recordings[asked[i]].name,
+                              .before = figures_of({one.before}),
+                              .after = figures_of({one.after}),
+                              .predicted_before = noted(one.predicted_before, predicted_before),
+                              .predicted_after = noted(one.predicted_after, predicted_after)});
+    out.gain += one.after.log_density - one.before.log_density;
   }
   out.as_it_stands = figures_of(file);
   out.before = figures_of(before);

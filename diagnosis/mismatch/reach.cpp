@@ -46,7 +46,7 @@ void find_reach(const NeedleSystem& system, const inference::Search& search, con
   for (const std::size_t e : reach.effects) findings.confusion_names.push_back(system.effects()[e].label);
   findings.confusion = reach.cosine;
   const Imagined nothing = imagined(*base.fit, base);
-  parallel_for(findings.detectable.size(), search.rules().threads, [&](std::size_t i) {
+  parallel_for(findings.detectable.size(), [&](std::size_t i) {
     DetectableSize& one = findings.detectable[i];
     if (one.size < one.typical) return;
     one.experiment = experiments.best(with_effect(system, nothing, reach.sizes[i].effect), nothing).script;

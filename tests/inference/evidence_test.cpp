@@ -412,7 +412,7 @@ TEST(Proposals, OfALinearModelAreExact) {
   const std::vector<VectorXd> local(4, layout.local_start());
   const Fit base =
       fit(*likelihood, layout, layout.shared_start(), local, {.nuisance_sd = VectorXd::Constant(1, 0.2), .curves = {}});
-  const Proposals proposals(*likelihood, base, 2);
+  const Proposals proposals(*likelihood, base);
   const auto found = proposals.beside(Marginal(*likelihood, base, {}), 1);
   ASSERT_EQ(found.size(), 2U);
   const VectorXd y = all_readings(system);
