@@ -6,6 +6,7 @@
 #include <cstddef>
 #include <exception>
 #include <mutex>
+#include <system_error>
 #include <thread>
 #include <utility>
 #include <vector>
@@ -20,6 +21,10 @@ class Crew {
   ~Crew() { current() = before_; }
   Crew(const Crew&) = delete;
   Crew& operator=(const Crew&) = delete;
+
+ private:
+  template <class Work>
+  friend void parallel_for(std::size_t count, Work&& work);
 
   static Crew*& current() {
     thread_local Crew* crew = nullptr;
@@ -39,7 +44,6 @@ class Crew {
   bool begin() { return !begun_.exchange(true); }
   void end() { begun_ = false; }
 
- private:
   std::atomic<int> spare_;
   std::atomic<bool> begun_ = false;
   Crew* before_;
@@ -67,12 +71,16 @@ void parallel_for(std::size_t count, Work&& work) {
   const std::size_t hired = crew != nullptr && count > 1 ? crew->hire(count - 1) : 0;
   const bool outermost = hired > 0 && crew->begin();
   std::vector<std::thread> others;
-  for (std::size_t t = 0; t < hired; ++t)
-    others.emplace_back([&] {
-      Crew::current() = crew;
-      run();
-      crew->dismiss_one();
-    });
+  try {
+    while (others.size() < hired)
+      others.emplace_back([&] {
+        Crew::current() = crew;
+        run();
+        crew->dismiss_one();
+      });
+  } catch (const std::system_error&) {  // the system has no more threads: fewer do it
+    for (std::size_t t = others.size(); t < hired; ++t) crew->dismiss_one();
+  }
   run();
   if (outermost) crew->dismiss_one();  // nothing to do until the others have ended
   for (auto& other : others) other.join();
@@ -83,7 +91,7 @@ void parallel_for(std::size_t count, Work&& work) {
 // With a crew of its own.
 template <class Work>
 void parallel_for(std::size_t count, int threads, Work&& work) {
-  const Crew crew(threads);
+  Crew crew(threads);
   parallel_for(count, std::forward<Work>(work));
 }
 

@@ -194,7 +194,7 @@ double Search::best_log() const { return visited_.empty() ? 0 : best().log_poste
 
 void Search::run(const Readings& outliers, const Noise& noise, const Progress& progress) {
   progress_ = progress;
-  const Crew crew(rules_.threads);
+  Crew crew(rules_.threads);
   const Fit tempered = tempered_base(system_, outliers, noise);
   Start start{.shared = tempered.shared, .local = tempered.local, .nuisance_sd = middle_nuisance_sd(system_)};
   look_in_rounds(std::make_shared<const Likelihood>(system_, outliers, noise), start, {});

@@ -195,7 +195,7 @@ Findings diagnose(const RecordedCase& recorded, const model::NeedleParameters& m
   inference::SearchRules rules;
   rules.threads = options.threads;
   rules.largest = options.largest_set;
-  const Crew crew(rules.threads);
+  Crew crew(rules.threads);
   inference::Search search(system, rules);
   search.run(calibration.outliers, calibration.noise, [&](const std::string& set) {
     if (options.progress) options.progress("comparing sets of effects: beside " + set);

@@ -43,7 +43,7 @@ TEST(ParallelFor, ThrowsTheFirstFailureOnceNobodyWorksAnyMore) {
 TEST(ParallelFor, PiecesOfPiecesAreDoneOnceByNoMoreThanTheCrew) {
   for (const int threads : {1, 2, 3, 5}) {
     SCOPED_TRACE(threads);
-    const Crew crew(threads);
+    Crew crew(threads);
     constexpr std::size_t kPieces = 7, kParts = 11;
     std::vector<std::vector<int>> done(kPieces, std::vector<int>(kParts, 0));
     std::atomic<int> at_work{0}, most{0};
@@ -65,7 +65,7 @@ TEST(ParallelFor, PiecesOfPiecesAreDoneOnceByNoMoreThanTheCrew) {
 // The last piece is long: its parts are done by those that have nothing to do any more.
 TEST(ParallelFor, WhoIsDoneHelpsTheOthers) {
   constexpr int kThreads = 3;
-  const Crew crew(kThreads);
+  Crew crew(kThreads);
   std::set<std::thread::id> seen;
   std::mutex mutex;
   parallel_for(kThreads, [&](std::size_t i) {
