@@ -85,7 +85,7 @@ inference::Evaluated best_of(const inference::Likelihood& likelihood, const infe
   inference::Evaluated best =
       evaluate(likelihood, nothing, nothing.shared_start(), {likelihood.recordings(), nothing.local_start()},
                inference::middle_nuisance_sd(system));
-  const inference::Proposals proposals(likelihood, best.fit, 1);
+  const inference::Proposals proposals(likelihood, best.fit);
   for (const std::size_t effect : set) {
     const inference::Fit from = best.fit;
     const inference::Layout layout(system, inference::with(from.layout.set(), effect));
