@@ -234,4 +234,8 @@ Dual AugmentedNeedle::latency_s() const {
   return sum;
 }
 
+bool AugmentedNeedle::is_sudden() const {
+  return std::ranges::any_of(effects_, [](const ActiveEffect& one) { return one.effect->sudden(); });
+}
+
 }  // namespace bevel::model

@@ -75,6 +75,8 @@ class AugmentedNeedle {
   std::array<double, 3> blur_mm2(const AugmentedState& state) const;
   // By how much readings are late; zero without camera_latency.
   Dual latency_s() const;
+  // Whether an effect may put a jump into the path.
+  bool is_sudden() const;
 
   const NeedleParameters& needle() const { return needle_; }
   std::span<const ActiveEffect> effects() const { return effects_; }

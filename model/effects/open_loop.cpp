@@ -95,20 +95,35 @@ Place place_of(const Motion& motion, std::size_t node, const Dual& latency_s) {
           .moves = time_s > motion.nodes.front().time_s};
 }
 
-// A vector of the nodes as a reading shows it.
-void look(const Place& place, const std::vector<Eigen::Vector3d>& nodes, const Eigen::MatrixXd& jacobian,
+void resize(OpenLoop::Track& track, std::size_t count, Eigen::Index columns) {
+  track.value.resize(count);
+  track.jacobian.resize(static_cast<Eigen::Index>(3 * count), columns);
+}
+
+void store(const Eigen::Vector3d& value, const PointColumns& D, std::size_t at, OpenLoop::Track& track) {
+  track.value[at] = value;
+  if (D.cols() > 0) track.jacobian.middleRows<3>(static_cast<Eigen::Index>(3 * at)) = D;
+}
+
+// A vector of the nodes as a reading shows it; late: as it is there itself, null where the nodes' mean will do.
+void look(const Place& place, const OpenLoop::Track& nodes, const OpenLoop::Track* late, std::size_t reading,
           const Dual& latency_s, Eigen::Vector3d& value, PointColumns& D) {
-  const auto D_of = [&](std::size_t i) { return jacobian.middleRows<3>(static_cast<Eigen::Index>(3 * i)); };
-  D.resize(3, jacobian.cols());
+  const auto D_of = [](const OpenLoop::Track& track, std::size_t i) {
+    return track.jacobian.middleRows<3>(static_cast<Eigen::Index>(3 * i));
+  };
+  D.resize(3, nodes.jacobian.cols());
   if (place.from == place.to) {
-    value = nodes[place.to];
-    if (D.cols() > 0) D = D_of(place.to);
+    value = nodes.value[place.to];
+    if (D.cols() > 0) D = D_of(nodes, place.to);
     return;
   }
-  const Eigen::Vector3d step = nodes[place.to] - nodes[place.from];
-  value = nodes[place.from] + place.share * step;
+  const Eigen::Vector3d step = nodes.value[place.to] - nodes.value[place.from];
+  value = late != nullptr ? late->value[reading] : Eigen::Vector3d(nodes.value[place.from] + place.share * step);
   if (D.cols() == 0) return;
-  D = (1 - place.share) * D_of(place.from) + place.share * D_of(place.to);
+  if (late != nullptr)
+    D = D_of(*late, reading);
+  else
+    D = (1 - place.share) * D_of(nodes, place.from) + place.share * D_of(nodes, place.to);
   if (place.moves) D -= step / place.span_s * latency_s.slope().head(D.cols()).matrix().transpose();
 }
 
@@ -116,32 +131,43 @@ void look(const Place& place, const std::vector<Eigen::Vector3d>& nodes, const E
 
 bool predict(const AugmentedNeedle& needle, const Motion& motion, OpenLoop& out, bool headings) {
   const Eigen::Index columns = needle.columns();
-  const std::size_t count = motion.nodes.size();
-  out.node_position_mm.resize(count);
-  out.node_jacobian.resize(static_cast<Eigen::Index>(3 * count), columns);
-  out.node_heading.resize(headings ? count : 0);
-  out.node_heading_jacobian.resize(headings ? static_cast<Eigen::Index>(3 * count) : 0, columns);
-  out.node_blur_mm2.resize(columns == 0 ? count : 0);
-  AugmentedState state = needle.entry(motion.nodes.front());
-  TipReading reading;
-  HeadingReading heading;
-  for (std::size_t i = 0; i < count; ++i) {
-    if (i > 0 && !needle.advance(state, motion.nodes[i])) return false;
-    needle.point(state, reading);
-    out.node_position_mm[i] = reading.position_mm;
-    if (columns > 0)
-      out.node_jacobian.middleRows<3>(static_cast<Eigen::Index>(3 * i)) = reading.D;
-    else
-      out.node_blur_mm2[i] = needle.blur_mm2(state);
-    if (!headings) continue;
-    needle.heading(state, heading);
-    out.node_heading[i] = heading.direction;
-    if (columns > 0) out.node_heading_jacobian.middleRows<3>(static_cast<Eigen::Index>(3 * i)) = heading.D;
-  }
-
+  const auto& nodes = motion.nodes;
+  const std::size_t count = nodes.size(), readings = motion.at.size();
   const Dual latency_s = needle.latency_s();
   const bool late = latency_s.value != 0 || (latency_s.slope() != 0).any();
-  const std::size_t readings = motion.at.size();
+  // Between its nodes a tip that jumps is before the jump or after it.
+  const bool jumps = latency_s.value > 0 && needle.is_sudden();
+  resize(out.node_position_mm, count, columns);
+  resize(out.node_heading, headings ? count : 0, columns);
+  resize(out.late_position_mm, jumps ? readings : 0, columns);
+  resize(out.late_heading, jumps && headings ? readings : 0, columns);
+  out.node_blur_mm2.resize(columns == 0 ? count : 0);
+  AugmentedState state = needle.entry(nodes.front());
+  TipReading reading;
+  HeadingReading heading;
+  const auto read = [&](std::size_t at, OpenLoop::Track& position, OpenLoop::Track& direction) {
+    needle.point(state, reading);
+    store(reading.position_mm, reading.D, at, position);
+    if (!headings) return;
+    needle.heading(state, heading);
+    store(heading.direction, heading.D, at, direction);
+  };
+  const auto is_between = [&](const Place& place) { return place.share > 0 && place.share < 1; };
+  std::size_t next = 0;
+  for (std::size_t i = 0; i < count; ++i) {
+    for (; jumps && next < readings; ++next) {
+      const Place place = motion.at[next] > 0 ? place_of(motion, motion.at[next], latency_s) : Place{};
+      if (place.to > i) break;
+      if (place.to < i || !is_between(place)) continue;
+      const BaseMotion there = between(nodes[i - 1], nodes[i], nodes[motion.at[next]].time_s - latency_s.value);
+      if (!needle.advance(state, there)) return false;
+      read(next, out.late_position_mm, out.late_heading);
+    }
+    if (i > 0 && !needle.advance(state, nodes[i])) return false;
+    read(i, out.node_position_mm, out.node_heading);
+    if (columns == 0) out.node_blur_mm2[i] = needle.blur_mm2(state);
+  }
+
   out.position_mm.resize(readings);
   out.jacobian.resize(static_cast<Eigen::Index>(3 * readings), columns);
   out.blur_mm2.resize(columns == 0 ? readings : 0);
@@ -150,7 +176,9 @@ bool predict(const AugmentedNeedle& needle, const Motion& motion, OpenLoop& out,
   for (std::size_t r = 0; r < readings; ++r) {
     const std::size_t node = motion.at[r];
     const Place place = late && node > 0 ? place_of(motion, node, latency_s) : Place{.from = node, .to = node};
-    look(place, out.node_position_mm, out.node_jacobian, latency_s, reading.position_mm, reading.D);
+    const bool own = jumps && is_between(place);
+    look(place, out.node_position_mm, own ? &out.late_position_mm : nullptr, r, latency_s, reading.position_mm,
+         reading.D);
     needle.through_cameras(reading);
     out.position_mm[r] = reading.position_mm;
     if (columns > 0)
@@ -158,7 +186,7 @@ bool predict(const AugmentedNeedle& needle, const Motion& motion, OpenLoop& out,
     else
       out.blur_mm2[r] = out.node_blur_mm2[place.to];
     if (!headings) continue;
-    look(place, out.node_heading, out.node_heading_jacobian, latency_s, heading.direction, heading.D);
+    look(place, out.node_heading, own ? &out.late_heading : nullptr, r, latency_s, heading.direction, heading.D);
     needle.through_frame(heading);
     out.heading[r] = heading.direction;
     if (columns > 0) out.heading_jacobian.middleRows<3>(static_cast<Eigen::Index>(3 * r)) = heading.D;

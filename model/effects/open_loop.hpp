@@ -31,13 +31,19 @@ struct OpenLoop {
   std::vector<Eigen::Vector3d> heading;
   Eigen::MatrixXd heading_jacobian;
 
-  // Room for predict(), kept from one call to the next.
-  std::vector<Eigen::Vector3d> node_position_mm, node_heading;
-  Eigen::MatrixXd node_jacobian, node_heading_jacobian;
+  // Room for predict(), kept from one call to the next: vectors and their derivatives, of the nodes and, where the tip
+  // jumps between nodes, of late readings.
+  struct Track {
+    std::vector<Eigen::Vector3d> value;
+    Eigen::MatrixXd jacobian;  // 3 rows each
+  };
+  Track node_position_mm, node_heading, late_position_mm, late_heading;
   std::vector<std::array<double, 3>> node_blur_mm2;
 };
 
-// False where the tip leaves the domain of the slip law. A late camera sees the path between two nodes as straight.
+// False where the tip leaves the domain of the slip law. A late camera sees the path between two nodes as straight, but
+// where effects are sudden, which put a jump there; sensitivities by the latency are means over the leg in any case:
+// the path's own would be none where a tip is held, and without end where it jumps.
 bool predict(const AugmentedNeedle& needle, const Motion& motion, OpenLoop& out, bool headings = false);
 
 }  // namespace bevel::model

@@ -65,6 +65,21 @@ TEST(CameraLatency, IsRightBetweenTheLegsOfARecording) {
   EXPECT_LT(largest_distance_mm(late, path_of(agar(), {}, make_motion(samples, earlier))), 0.02);
 }
 
+// A tip that jumps between two nodes is before its jump or after it.
+TEST(CameraLatency, IsRightBetweenTheLegsWhereTheTipJumps) {
+  const Script script = rich_script();
+  const std::vector<ActiveEffect> jumps = {active("stick_slip", {1.3})};
+  const auto late = path_of(agar(), {jumps[0], active("camera_latency", {0.1234})}, script.recorded());
+  const auto samples = script.actuators(0.01);
+  std::vector<std::int64_t> earlier;
+  for (std::size_t i = 0; i < late.size(); ++i)
+    earlier.push_back(samples.front().utime + 33'333 * static_cast<std::int64_t>(i) - 123'400);
+  const auto there = path_of(agar(), jumps, make_motion(samples, earlier));
+  std::size_t apart = 0;
+  for (std::size_t i = 0; i < late.size(); ++i) apart += (late[i] - there[i]).norm() > 0.05 ? 1 : 0;
+  EXPECT_LE(apart, 1) << "of " << late.size();
+}
+
 TEST(CameraLatency, LeavesTheEntryWhereItIs) {
   const auto late = path_of(agar(), {active("camera_latency", {0.5})}, Script{{0.4, 10, 0}}.recorded());
   for (const auto& p : late) EXPECT_EQ(p, Vector3d::Zero());
