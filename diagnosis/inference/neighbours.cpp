@@ -53,8 +53,11 @@ void Search::expand(const ModelSet& set) {
           here.log_with_curve + more, Beside::curve);
     }
     // Without the curve too: an effect may take its place.
-    add(plain, proposals_->beside(Marginal(*own, plain, {}, likelihood_.get()), rules_.starts),
-        here.log_without_curve + change, Beside::as_it_is);
+    const Marginal marginal(*own, plain, {}, likelihood_.get());
+    auto list = proposals_->beside(marginal, rules_.starts);
+    // What takes up the mean of steps is a member; the base alone has none.
+    if (!set.empty()) proposals_->look_with_others_moved(*likelihood_, plain, marginal, rules_.starts, list);
+    add(plain, list, here.log_without_curve + change, Beside::as_it_is);
     for (const WithoutSpread& less : without_spread(*own, plain))
       add(less.fit, proposals_->beside(Marginal(*own, less.fit, {}, likelihood_.get()), rules_.starts),
           here.log_without_curve + change + less.log_change, Beside::less_spread);

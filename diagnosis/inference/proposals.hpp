@@ -12,6 +12,8 @@ struct StartPoint {
   std::vector<Eigen::VectorXd> local;  // of its others, per recording
   double log_bayes_factor = 0;
   bool base_at_prior = false;  // it was seen with the base where its prior has it
+  // Of the shared unknowns of the fit that it joins, beside it, if it was seen with them there; empty: where they are.
+  Eigen::VectorXd beside{};
 };
 
 struct Proposal {
@@ -44,6 +46,11 @@ class Proposals {
 
   // Every effect that may join the set of a fit, the likeliest first.
   std::vector<Proposal> beside(const Marginal& fit, std::size_t starts) const;
+  // Of those, anew, what is no multiple of itself at another size (steps of a length, again and again), with the shared
+  // unknowns of the fit where the linear model has them beside each of its starts: what took up the steps' mean, as a
+  // latency does, shifts them, too, and steps that are elsewhere are not seen. by: whitens the columns (Marginal).
+  void look_with_others_moved(const Likelihood& by, const Fit& fit, const Marginal& beside, std::size_t starts,
+                              std::vector<Proposal>& proposals) const;
   // Pairs beside the base, by their joint estimate, the likeliest first.
   std::vector<std::pair<double, ModelSet>> pairs(const Marginal& base, std::size_t count) const;
   // Of effects in the middle of their starts; what happens at an instant, in the middle of every recording.
@@ -73,6 +80,8 @@ class Proposals {
   };
   Candidate make_candidate(const Likelihood& likelihood, std::span<const Fit> views, std::size_t effect) const;
   Proposal judge(const Candidate& candidate, std::size_t effect, const Marginal& beside, std::size_t starts) const;
+  // Where the linear model has the shared unknowns beside each signature, as steps: shared x signatures.
+  static Eigen::MatrixXd steps_beside(const Candidate& candidate, const Marginal& beside);
   Proposal judge_local(const Candidate& candidate, std::size_t effect, const Marginal& beside,
                        std::size_t starts) const;
   std::size_t nearest_signature(const Proposal& proposal) const;
