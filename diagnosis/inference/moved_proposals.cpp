@@ -12,7 +12,8 @@ using Eigen::VectorXd;
 
 namespace {
 
-// A fit's shared unknowns a step away, within their bounds.
+// A fit's shared unknowns a step away, within their bounds. Not by Layout::clamp(), which turns a direction by whole
+// periods: the linear model is multiplied by the step.
 VectorXd moved(const Fit& fit, const VectorXd& step) {
   VectorXd shared = fit.shared + step.head(fit.shared.size());
   for (Index i = 0; i < shared.size(); ++i) {
@@ -58,20 +59,16 @@ void Proposals::look_with_others_moved(const Likelihood& by, const Fit& fit, con
       anew.signatures.push_back({.values = one.values, .first = static_cast<Index>(anew.signatures.size())});
     }
     const Layout layout(*system_, with(fit.layout.set(), proposal.effect));
-    const auto& set = layout.set();
-    const auto member = static_cast<std::size_t>(std::ranges::find(set, proposal.effect) - set.begin());
     anew.columns.resize(by.recordings());
     parallel_for(by.recordings(), [&](std::size_t r) {
-      const VectorXd local = layout.local_from(fit.layout, fit.local[r]);
       MatrixXd raw = MatrixXd::Zero(paths[r].reading.size(), static_cast<Index>(others.size()));
       Prediction there;
       for (const Signature& one : anew.signatures) {
         const VectorXd& beside_it = others[static_cast<std::size_t>(one.first)];
-        VectorXd shared = layout.shared_from(fit.layout, beside_it);
-        for (Index p = 0; p < one.values.size(); ++p)
-          shared[layout.find_shared(member, static_cast<std::size_t>(p))] = one.values[p];
+        const auto [shared, local] =
+            unknowns_with(layout, fit.layout, beside_it, fit.local[r], proposal.effect, one.values);
         // Less what the linear model itself says of the others' steps: the rest is the effect's own.
-        if (system_->predict(set, r, shared, local, false, there))
+        if (system_->predict(layout.set(), r, shared, local, false, there))
           raw.col(one.first) = there.reading - paths[r].reading - paths[r].by_shared * (beside_it - fit.shared);
       }
       anew.columns[r] = by.whitened(r, raw).cast<float>();

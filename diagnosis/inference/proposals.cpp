@@ -47,20 +47,6 @@ std::vector<VectorXd> starts_of(const Effect& effect) {
   return out;
 }
 
-// Shared and local unknowns of a fit with one effect more, at these values of its parameters.
-std::pair<VectorXd, VectorXd> unknowns_with(const Layout& layout, const Fit& about, std::size_t r, std::size_t effect,
-                                            const VectorXd& values) {
-  VectorXd shared = layout.shared_from(about.layout, about.shared);
-  VectorXd local = layout.local_from(about.layout, about.local[r]);
-  const auto member =
-      static_cast<std::size_t>(std::find(layout.set().begin(), layout.set().end(), effect) - layout.set().begin());
-  for (Index p = 0; p < values.size(); ++p) {
-    if (const int i = layout.find_shared(member, static_cast<std::size_t>(p)); i >= 0) shared[i] = values[p];
-    if (const int i = layout.find_local(member, static_cast<std::size_t>(p)); i >= 0) local[i] = values[p];
-  }
-  return {shared, local};
-}
-
 // Sizes as shares of the start, back to parameters; false for one beyond a bound at which the effect vanishes.
 bool apply_shares(const Effect& effect, const std::vector<std::size_t>& amplitudes, const VectorXd& shares,
                   VectorXd& values) {
@@ -112,6 +98,19 @@ std::vector<Fit> views_of(const Fit& about) {
 }
 
 }  // namespace
+
+std::pair<VectorXd, VectorXd> unknowns_with(const Layout& layout, const Layout& from, const VectorXd& from_shared,
+                                            const VectorXd& from_local, std::size_t effect, const VectorXd& values) {
+  VectorXd shared = layout.shared_from(from, from_shared);
+  VectorXd local = layout.local_from(from, from_local);
+  const auto member =
+      static_cast<std::size_t>(std::find(layout.set().begin(), layout.set().end(), effect) - layout.set().begin());
+  for (Index p = 0; p < values.size(); ++p) {
+    if (const int i = layout.find_shared(member, static_cast<std::size_t>(p)); i >= 0) shared[i] = values[p];
+    if (const int i = layout.find_local(member, static_cast<std::size_t>(p)); i >= 0) local[i] = values[p];
+  }
+  return {shared, local};
+}
 
 VectorXd with_base_at_prior(const Layout& layout, VectorXd shared) {
   for (std::size_t i = 0; i < layout.shared().size(); ++i) {
@@ -180,7 +179,7 @@ Proposals::Candidate Proposals::make_candidate(const Likelihood& likelihood, std
             for (std::size_t a = 0; a < out.amplitudes.size(); ++a)
               if (static_cast<Index>(a) != c)
                 values[static_cast<Index>(out.amplitudes[a])] = effect.parameters[out.amplitudes[a]].none;
-          const auto [shared, local] = unknowns_with(layout, view, r, e, values);
+          const auto [shared, local] = unknowns_with(layout, view.layout, view.shared, view.local[r], e, values);
           if (system_->predict(layout.set(), r, shared, local, false, prediction))
             raw.col(column) = prediction.reading - path;
         }

@@ -35,6 +35,11 @@ struct Reach {
   Eigen::MatrixXd cosine;            // between visible parts
 };
 
+// Unknowns of one recording, shared and its own, under a layout with one effect more, at these values of its
+// parameters.
+std::pair<Eigen::VectorXd, Eigen::VectorXd> unknowns_with(const Layout& layout, const Layout& from,
+                                                          const Eigen::VectorXd& shared, const Eigen::VectorXd& local,
+                                                          std::size_t effect, const Eigen::VectorXd& values);
 // The base's parameters of normal prior, where that has them.
 Eigen::VectorXd with_base_at_prior(const Layout& layout, Eigen::VectorXd shared);
 

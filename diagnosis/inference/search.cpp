@@ -84,9 +84,8 @@ Search::Job Search::job_at(const Fit& fit) {
 }
 
 Search::Job Search::job_from(const Fit& fit, std::size_t effect, const StartPoint& start) const {
-  Fit about = fit;
-  if (start.beside.size() > 0) about.shared = start.beside;
-  Job job = job_at(carried_to(Layout(system_, with(fit.layout.set(), effect)), about));
+  Job job = job_at(carried_to(Layout(system_, with(fit.layout.set(), effect)), fit));
+  if (start.beside.size() > 0) job.shared = job.layout.shared_from(fit.layout, start.beside);
   if (start.base_at_prior) job.shared = with_base_at_prior(job.layout, std::move(job.shared));
   const auto member = static_cast<std::size_t>(std::find(job.set.begin(), job.set.end(), effect) - job.set.begin());
   const auto& parameters = system_.effects()[effect].parameters;

@@ -152,15 +152,12 @@ bool predict(const AugmentedNeedle& needle, const Motion& motion, OpenLoop& out,
     needle.heading(state, heading);
     store(heading.direction, heading.D, at, direction);
   };
-  const auto is_between = [&](const Place& place) { return place.share > 0 && place.share < 1; };
+  const auto seen_s = [&](std::size_t r) { return nodes[motion.at[r]].time_s - latency_s.value; };
   std::size_t next = 0;
   for (std::size_t i = 0; i < count; ++i) {
-    for (; jumps && next < readings; ++next) {
-      const Place place = motion.at[next] > 0 ? place_of(motion, motion.at[next], latency_s) : Place{};
-      if (place.to > i) break;
-      if (place.to < i || !is_between(place)) continue;
-      const BaseMotion there = between(nodes[i - 1], nodes[i], nodes[motion.at[next]].time_s - latency_s.value);
-      if (!needle.advance(state, there)) return false;
+    for (; jumps && i > 0 && next < readings && seen_s(next) < nodes[i].time_s; ++next) {
+      if (!(seen_s(next) > nodes[i - 1].time_s)) continue;  // a node's own
+      if (!needle.advance(state, between(nodes[i - 1], nodes[i], seen_s(next)))) return false;
       read(next, out.late_position_mm, out.late_heading);
     }
     if (i > 0 && !needle.advance(state, nodes[i])) return false;
@@ -176,7 +173,7 @@ bool predict(const AugmentedNeedle& needle, const Motion& motion, OpenLoop& out,
   for (std::size_t r = 0; r < readings; ++r) {
     const std::size_t node = motion.at[r];
     const Place place = late && node > 0 ? place_of(motion, node, latency_s) : Place{.from = node, .to = node};
-    const bool own = jumps && is_between(place);
+    const bool own = jumps && place.share > 0 && place.share < 1;
     look(place, out.node_position_mm, own ? &out.late_position_mm : nullptr, r, latency_s, reading.position_mm,
          reading.D);
     needle.through_cameras(reading);

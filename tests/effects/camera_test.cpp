@@ -55,14 +55,19 @@ TEST(CameraLatency, ShowsThePathAsItWas) {
   EXPECT_GT(largest_distance_mm(late, path_of(agar(), {}, script.fine())), 1);
 }
 
+// The same motion, each reading where it is 0.1234 s before.
+Motion seen_earlier(const Script& script, std::size_t readings) {
+  const auto samples = script.actuators(0.01);
+  std::vector<std::int64_t> earlier;
+  for (std::size_t i = 0; i < readings; ++i)
+    earlier.push_back(samples.front().utime + 33'333 * static_cast<std::int64_t>(i) - 123'400);
+  return make_motion(samples, earlier);
+}
+
 TEST(CameraLatency, IsRightBetweenTheLegsOfARecording) {
   const Script script = rich_script();
   const auto late = path_of(agar(), {active("camera_latency", {0.1234})}, script.recorded());
-  const auto samples = script.actuators(0.01);
-  std::vector<std::int64_t> earlier;
-  for (std::size_t i = 0; i < late.size(); ++i)
-    earlier.push_back(samples.front().utime + 33'333 * static_cast<std::int64_t>(i) - 123'400);
-  EXPECT_LT(largest_distance_mm(late, path_of(agar(), {}, make_motion(samples, earlier))), 0.02);
+  EXPECT_LT(largest_distance_mm(late, path_of(agar(), {}, seen_earlier(script, late.size()))), 0.02);
 }
 
 // A tip that jumps between two nodes is before its jump or after it.
@@ -70,11 +75,7 @@ TEST(CameraLatency, IsRightBetweenTheLegsWhereTheTipJumps) {
   const Script script = rich_script();
   const std::vector<ActiveEffect> jumps = {active("stick_slip", {1.3})};
   const auto late = path_of(agar(), {jumps[0], active("camera_latency", {0.1234})}, script.recorded());
-  const auto samples = script.actuators(0.01);
-  std::vector<std::int64_t> earlier;
-  for (std::size_t i = 0; i < late.size(); ++i)
-    earlier.push_back(samples.front().utime + 33'333 * static_cast<std::int64_t>(i) - 123'400);
-  const auto there = path_of(agar(), jumps, make_motion(samples, earlier));
+  const auto there = path_of(agar(), jumps, seen_earlier(script, late.size()));
   std::size_t apart = 0;
   for (std::size_t i = 0; i < late.size(); ++i) apart += (late[i] - there[i]).norm() > 0.05 ? 1 : 0;
   EXPECT_LE(apart, 1) << "of " << late.size();
