@@ -21,13 +21,17 @@ namespace {
 // columns in single precision.
 constexpr double kInvisible = 1e-6;
 
-// For rows in standard deviations of the noise, its autocorrelation left in.
+// For the system's rows in standard deviations of the noise, its autocorrelation left in.
 VectorXd one_per_deviation(const Likelihood& likelihood, std::size_t r) {
-  std::vector<double> out;
+  const Index rows = likelihood.system().data().recordings[r].rows();
+  const VectorXd kept = likelihood.kept(r, VectorXd::LinSpaced(rows, 0, static_cast<double>(rows - 1)));
+  VectorXd out = VectorXd::Zero(rows);
+  Index next = 0;
   const auto& series = likelihood.data().recordings[r].series;
   for (std::size_t c = 0; c < series.size(); ++c)
-    for (const double relative : series[c].relative_sd) out.push_back(1 / (likelihood.noise().sigma[c] * relative));
-  return Eigen::Map<const VectorXd>(out.data(), static_cast<Index>(out.size()));
+    for (const double relative : series[c].relative_sd)
+      out[static_cast<Index>(std::lround(kept[next++]))] = 1 / (likelihood.noise().sigma[c] * relative);
+  return out;
 }
 
 }  // namespace
@@ -47,12 +51,12 @@ Discrepancy::Discrepancy(const Likelihood& likelihood, const Fit& base) : system
   per_sd_.resize(recordings), raw_.resize(recordings), white_.resize(recordings), square_.resize(recordings);
   std::vector<MatrixXd> by_curves(recordings), by_base(recordings);
   parallel_for(recordings, [&](std::size_t r) {
-    const MatrixXd raw = likelihood.kept(r, system_->by_curves(r, base.shared.head(n)));
+    const MatrixXd raw = system_->by_curves(r, base.shared.head(n));
     Prediction prediction;
     system_->predict({}, r, base.shared.head(n), base.local[r], true, prediction);
     per_sd_[r] = one_per_deviation(likelihood, r);
     by_curves[r] = per_sd_[r].asDiagonal() * raw;
-    by_base[r] = per_sd_[r].asDiagonal() * likelihood.kept(r, prediction.by_shared);
+    by_base[r] = per_sd_[r].asDiagonal() * prediction.by_shared;
     raw_[r] = raw.cast<float>();
     white_[r] = likelihood.whitened(r, raw).cast<float>();
     square_[r] = MatrixXf::Zero(largest, columns);
@@ -104,24 +108,30 @@ std::vector<Index> Discrepancy::places(std::span<const CurvePrior> curves) const
   return out;
 }
 
-CurveColumns Discrepancy::columns(const Likelihood& likelihood, std::span<const CurvePrior> curves) const {
+CurveColumns Discrepancy::columns(const Likelihood& likelihood, std::span<const CurvePrior> curves,
+                                  std::shared_ptr<const CurveTangent> tangent) const {
   CurveColumns out;
   if (curves.empty()) return out;
   const auto at = places(curves);
   for (std::size_t r = 0; r < raw_.size(); ++r) {
-    MatrixXd& raw = out.raw.emplace_back(raw_[r].rows(), at.back());
-    for (std::size_t i = 0; i < curves.size(); ++i) {
+    MatrixXd raw(raw_[r].rows(), at.back());
+    for (std::size_t i = 0; i < curves.size() && !tangent; ++i) {
       const std::size_t k = curves[i].curve;
       raw.middleCols(at[i], size_[k]) = raw_[r].middleCols(first_[k], size_[k]).cast<double>();
     }
-    out.columns.push_back(likelihood.whitened(r, raw));
+    out.raw.push_back(likelihood.kept(r, tangent ? tangent->by_values[r] : raw));
+    out.columns.push_back(likelihood.whitened(r, out.raw.back()));
   }
   out.covariance = MatrixXd::Zero(at.back(), at.back());
-  for (std::size_t i = 0; i < curves.size(); ++i) {
-    const auto& [k, scale, length] = curves[i];
-    out.covariance.block(at[i], at[i], size_[k], size_[k]) = scale * scale * unit_covariance(k, length);
-  }
+  for (std::size_t i = 0; i < curves.size(); ++i) set_prior(curves, i, curves[i], out.covariance);
+  out.tangent = std::move(tangent);
   return out;
+}
+
+void Discrepancy::set_prior(std::span<const CurvePrior> curves, std::size_t which, const CurvePrior& prior,
+                            MatrixXd& covariance) const {
+  const Index at = places(curves)[which], size = size_[prior.curve];
+  covariance.block(at, at, size, size) = prior.scale * prior.scale * unit_covariance(prior.curve, prior.length);
 }
 
 double Discrepancy::visible_size(std::size_t curve, const VectorXd& values) const {

@@ -25,8 +25,17 @@ class Discrepancy {
   // About a fit of the base alone.
   Discrepancy(const Likelihood& likelihood, const Fit& base);
 
-  // Side by side, whitened by the noise of this likelihood, which may be another. None of none.
-  CurveColumns columns(const Likelihood& likelihood, std::span<const CurvePrior> curves) const;
+  // Side by side, whitened by the noise of this likelihood, which may be another, about a tangent's values or none.
+  // None of none.
+  CurveColumns columns(const Likelihood& likelihood, std::span<const CurvePrior> curves,
+                       std::shared_ptr<const CurveTangent> tangent = nullptr) const;
+  // Those of a fit.
+  CurveColumns columns(const Likelihood& likelihood, const Fit& fit) const {
+    return columns(likelihood, fit.scales.curves, fit.tangent);
+  }
+  // The block of one of several curves in their values' covariance, by a prior.
+  void set_prior(std::span<const CurvePrior> curves, std::size_t which, const CurvePrior& prior,
+                 Eigen::MatrixXd& covariance) const;
   // Where the values of each of several curves begin among those of all, and at the end how many there are.
   std::vector<Eigen::Index> places(std::span<const CurvePrior> curves) const;
   // All curves at all scales and lengths beside a fit (with its own curves integrated out, if it has any), by the
@@ -47,11 +56,11 @@ class Discrepancy {
 
   const System* system_;
   std::vector<Eigen::Index> first_, size_;    // columns of each curve
-  std::vector<Eigen::MatrixXf> raw_, white_;  // per recording, of all curves
+  std::vector<Eigen::MatrixXf> raw_, white_;  // per recording, of all curves; raw_: with the outliers
   std::vector<Eigen::MatrixXf> square_;       // per recording: inner products within each curve, side by side
   std::vector<Eigen::MatrixXd> visible_;      // per curve: mean square over readings, as a quadratic form
-  std::vector<Eigen::VectorXd> per_sd_;       // per recording: of its rows, 1 / standard deviation of the noise
-  Eigen::MatrixXd absorbed_, absorbing_;      // by the base's parameters: (J'J)^-1 J'C and J'C, of all curves
+  std::vector<Eigen::VectorXd> per_sd_;  // per recording: of its rows, 1 / standard deviation of the noise; outliers: 0
+  Eigen::MatrixXd absorbed_, absorbing_;  // by the base's parameters: (J'J)^-1 J'C and J'C, of all curves
   double rows_ = 0;
 };
 

@@ -4,6 +4,7 @@
 #include <cmath>
 #include <limits>
 
+#include "diagnosis/inference/curved_fit.hpp"
 #include "diagnosis/inference/log_sum.hpp"
 #include "diagnosis/inference/settle.hpp"
 
@@ -40,7 +41,7 @@ std::vector<WithoutSpread> without_spread(const Likelihood& likelihood, const Fi
 
 std::pair<Fit, double> moved_to(const std::shared_ptr<const Likelihood>& likelihood, const Fit& from,
                                 const Discrepancy& discrepancy) {
-  const auto curve_of = [&](const Likelihood& by) { return discrepancy.columns(by, from.scales.curves); };
+  const auto curve_of = [&](const Likelihood& by) { return discrepancy.columns(by, from); };
   const auto log_evidence = [&](const Fit& at, const CurveColumns& curve) {
     const auto blocks = linearise(*at.likelihood, at, curve);
     if (blocks.empty()) return -std::numeric_limits<double>::infinity();
@@ -68,8 +69,9 @@ Evaluated evaluate(const Likelihood& likelihood, const Layout& layout, const Vec
 
 namespace {
 
-constexpr double kLikelyCurve = 3;  // log Bayes factor from which a curve is fitted
-constexpr double kOfSpread = 0.5;   // of what spread gains: what a curve that may stand for it gains without
+constexpr double kLikelyCurve = 3;    // log Bayes factor from which a curve is fitted
+constexpr double kOfLikeliest = 0.5;  // of what the likeliest curve gains: what that of another component does
+constexpr double kOfSpread = 0.5;     // of what spread gains: what a curve that may stand for it gains without
 
 // Of all curves of a scan together, each as likely beforehand: the likeliest's factor and what the rest adds to it.
 struct Integrated {
@@ -95,7 +97,7 @@ double log_factor_of_unlikely(const std::vector<CurveFactor>& curves) {
 // Every curve beside a fit, with what its set leaves open, by the noise that the curves were prepared with.
 std::vector<CurveFactor> scan_beside(const Likelihood& likelihood, const Discrepancy& discrepancy, const Fit& fit) {
   const auto by = with_inputs_of(fit, {std::shared_ptr<const void>(), &likelihood});  // not owned: no longer than here
-  return discrepancy.scan(Marginal(*by, fit, discrepancy.columns(*by, fit.scales.curves), &likelihood));
+  return discrepancy.scan(Marginal(*by, fit, discrepancy.columns(*by, fit), &likelihood));
 }
 
 // One more curve beside those that a set has; whether it is likelier than none more. log_evidence: with those it has.
@@ -110,8 +112,16 @@ bool add_curve(const Likelihood& likelihood, const Discrepancy& discrepancy, dou
   if (all.log_factor + log_prior_odds < 0) return false;
   Scales scales = here.scales;
   scales.curves.push_back(more.front().prior);
-  Settled with = settle(*here.likelihood, &discrepancy, here.layout, here.shared, here.local, scales,
-                        nuisance_grid(likelihood.system()), -std::numeric_limits<double>::infinity());
+  std::shared_ptr<const CurveTangent> tangent;
+  if (here.tangent) {
+    VectorXd values = VectorXd::Zero(discrepancy.places(scales.curves).back());
+    values.head(here.curve_values.size()) = here.curve_values;
+    tangent = make_tangent(likelihood.system(), {here.layout.set(), here.shared, here.local},
+                           values_by_curve(discrepancy, scales.curves, values));
+  }
+  Settled with =
+      settle(*here.likelihood, &discrepancy, here.layout, here.shared, here.local, scales,
+             nuisance_grid(likelihood.system()), -std::numeric_limits<double>::infinity(), std::move(tangent));
   const double log_factor = with.over.log_mean + all.log_others - log_evidence;
   if (!(log_factor + log_prior_odds > 0)) return false;
   log_evidence = with.over.log_mean;
@@ -125,7 +135,9 @@ bool add_curve(const Likelihood& likelihood, const Discrepancy& discrepancy, dou
 struct Candidate {
   CurvePrior prior;
   double log_others = 0;  // Integrated
-  VectorXd nuisance_sd;   // where the fit begins
+  const Fit* from;        // where the fit begins
+  VectorXd nuisance_sd;
+  double promised = std::numeric_limits<double>::infinity();  // log Bayes factor by the linear model about none
 };
 
 // The likeliest beside the fit, and beside the same where recordings do not differ: what they all share looks like
@@ -134,11 +146,16 @@ struct Candidate {
 std::vector<Candidate> candidates(const Likelihood& likelihood, const Discrepancy& discrepancy, const Fit& fit,
                                   const std::vector<CurveFactor>& beside) {
   std::vector<Candidate> out;
-  const auto add = [&](const std::vector<CurveFactor>& curves, const VectorXd& nuisance_sd, double least) {
+  const auto add = [&](const std::vector<CurveFactor>& curves, const VectorXd& nuisance_sd, double least,
+                       double more = 0) {
     if (curves.empty() || curves.front().log_bayes_factor < least) return;
     const CurvePrior& prior = curves.front().prior;
     if (std::ranges::none_of(out, [&](const Candidate& known) { return known.prior.curve == prior.curve; }))
-      out.push_back({.prior = prior, .log_others = integrated(curves).log_others, .nuisance_sd = nuisance_sd});
+      out.push_back({.prior = prior,
+                     .log_others = integrated(curves).log_others,
+                     .from = &fit,
+                     .nuisance_sd = nuisance_sd,
+                     .promised = curves.front().log_bayes_factor + more});
   };
   add(beside, fit.scales.nuisance_sd, kLikelyCurve);
   if (fit.scales.nuisance_sd.isZero(0)) return out;
@@ -149,14 +166,68 @@ std::vector<Candidate> candidates(const Likelihood& likelihood, const Discrepanc
   const double spread_gains =
       log_with_spread(fit, fit.scales.nuisance_sd, blocks) - log_with_spread(fit, alike.scales.nuisance_sd, blocks);
   add(scan_beside(likelihood, discrepancy, alike), alike.scales.nuisance_sd,
-      std::max(kLikelyCurve, kOfSpread * spread_gains));
+      std::max(kLikelyCurve, kOfSpread * spread_gains), -spread_gains);
+  return out;
+}
+
+// The likeliest of each component but those that are known, where the linear model about none, which is wrong here,
+// does not say much less of it than of the likeliest.
+std::vector<CurvePrior> of_other_components(const System& system, const std::vector<CurveFactor>& curves,
+                                            const std::vector<Candidate>& known) {
+  const auto component = [&](std::size_t curve) { return system.curves()[curve].component; };
+  std::vector<CurvePrior> out;
+  const auto has = [&](const CurvePrior& prior) {
+    return [&](const auto& one) { return component(one) == component(prior.curve); };
+  };
+  for (const CurveFactor& one : curves) {
+    if (one.log_bayes_factor < std::max(kLikelyCurve, kOfLikeliest * curves.front().log_bayes_factor)) break;
+    if (std::ranges::none_of(known, has(one.prior), [](const Candidate& c) { return c.prior.curve; }) &&
+        std::ranges::none_of(out, has(one.prior), &CurvePrior::curve))
+      out.push_back(one.prior);
+  }
+  return out;
+}
+
+// One curve beside a set, where the model is nonlinear: about the mode that it moves to.
+struct WithCurve {
+  Settled settled;
+  double log_others = 0;  // of the scales and lengths, and the other curves, that were not fitted
+  double log_evidence() const { return settled.over.log_mean + log_others; }
+};
+
+WithCurve settle_with(const Likelihood& likelihood, const Discrepancy& discrepancy, const Fit& set,
+                      const Candidate& one, std::size_t choices, double give_up_below) {
+  const Fit& from = *one.from;
+  std::shared_ptr<const CurveTangent> tangent;
+  if (from.curve_values.size() > 0)
+    tangent = make_tangent(likelihood.system(), {from.layout.set(), from.shared, from.local},
+                           values_by_curve(discrepancy, from.scales.curves, from.curve_values));
+  const Scales scales{.nuisance_sd = one.nuisance_sd, .curves = {one.prior}};
+  const Likelihood& by = from.likelihood ? *from.likelihood : *set.likelihood;
+  WithCurve out{.settled = settle(by, &discrepancy, set.layout, from.shared, from.local, scales,
+                                  nuisance_grid(likelihood.system()), give_up_below, std::move(tangent)),
+                .log_others = one.log_others};
+  const Fit& fit = out.settled.fit;
+  // What the linear model about none says of the others is nothing where that is not what this one is.
+  if (fit.valid && fit.tangent) {
+    const VectorXd own = log_over_priors(discrepancy, fit, discrepancy.columns(*fit.likelihood, fit), 0);
+    out.log_others = log_sum(std::span<const double>(own.data(), static_cast<std::size_t>(own.size()))) -
+                     std::log(static_cast<double>(choices));
+  }
   return out;
 }
 
 }  // namespace
 
+Fit with_first_curve(const Discrepancy& discrepancy, Fit fit) {
+  fit.curve_values.conservativeResize(discrepancy.places(fit.scales.curves)[1]);
+  fit.scales.curves.resize(1);
+  fit.tangent = nullptr;
+  return fit;
+}
+
 void add_discrepancy(const Likelihood& likelihood, const Discrepancy& discrepancy, const CurveRules& rules,
-                     Evaluated& out, double give_up_below) {
+                     Evaluated& out, double give_up_below, const LargeCurves& large) {
   out.with_discrepancy = true;
   out.curves = scan_beside(likelihood, discrepancy, out.fit);
   if (out.curves.empty()) return;
@@ -166,16 +237,35 @@ void add_discrepancy(const Likelihood& likelihood, const Discrepancy& discrepanc
   const double least =
       stands_out ? -std::numeric_limits<double>::infinity() : out.log_evidence + out.log_bayes_factor_curve;
   // The likeliest, where the model is nonlinear: about the mode that it moves to; the rest of them by the linear model.
-  Settled with{.fit = Fit(out.fit.layout), .over = {}};
-  double log_others = 0;
-  for (const Candidate& one : candidates(likelihood, discrepancy, out.fit, out.curves)) {
-    const Scales scales{.nuisance_sd = one.nuisance_sd, .curves = {one.prior}};
-    Settled there = settle(*out.fit.likelihood, &discrepancy, out.fit.layout, out.fit.shared, out.fit.local, scales,
-                           nuisance_grid(likelihood.system()), give_up_below);
-    if (!(there.over.log_mean + one.log_others > with.over.log_mean + log_others)) continue;
-    with = std::move(there);
-    log_others = one.log_others;
+  std::vector<Candidate> list;
+  if (large.beside)
+    list.push_back({.prior = large.beside->scales.curves.front(),
+                    .log_others = integrated(out.curves).log_others,
+                    .from = large.beside,
+                    .nuisance_sd = large.beside->scales.nuisance_sd});
+  for (Candidate& one : candidates(likelihood, discrepancy, out.fit, out.curves)) list.push_back(std::move(one));
+  WithCurve best{.settled = {.fit = Fit(out.fit.layout), .over = {}}};
+  bool is_large = false;
+  const auto try_all = [&](const std::vector<Candidate>& some) {
+    for (const Candidate& one : some) {
+      if (out.log_evidence + one.promised + one.log_others < best.log_evidence()) continue;
+      WithCurve there = settle_with(likelihood, discrepancy, out.fit, one, out.curves.size(), give_up_below);
+      is_large = is_large || there.settled.fit.tangent;
+      if (there.log_evidence() > best.log_evidence()) best = std::move(there);
+    }
+  };
+  try_all(list);
+  if (large.every_component && is_large) {
+    std::vector<Candidate> others;
+    for (const CurvePrior& prior : of_other_components(likelihood.system(), out.curves, list))
+      others.push_back({.prior = prior,
+                        .log_others = -std::log(static_cast<double>(out.curves.size())),
+                        .from = &out.fit,
+                        .nuisance_sd = out.fit.scales.nuisance_sd});
+    try_all(others);
   }
+  Settled& with = best.settled;
+  const double log_others = best.log_others;
   if (!(with.over.log_mean + log_others > least)) return;
   // Beside the curve another local minimum may have been found: it counts without the curve too.
   Settled again = settle(*with.fit.likelihood, nullptr, out.fit.layout, with.fit.shared, with.fit.local,

@@ -35,10 +35,18 @@ struct CurveRules {
   double log_prior_odds_more;  // of one more, against no more
   std::size_t most = 2;
 };
+// Where a large discrepancy is looked for beside what the linear model about none says is likeliest.
+struct LargeCurves {
+  bool every_component = false;  // the likeliest of each, once one is too large for the linear model
+  const Fit* beside = nullptr;   // with the curve that it has, and from there; null: none
+};
 // The discrepancy's part, added to a set that was evaluated without: the likeliest curve, then beside it the next, for
 // as long as one more is likelier than not. Once the evidence with a curve is so low, it is left as it is.
 void add_discrepancy(const Likelihood& likelihood, const Discrepancy& discrepancy, const CurveRules& rules,
-                     Evaluated& evaluated, double give_up_below = -std::numeric_limits<double>::infinity());
+                     Evaluated& evaluated, double give_up_below = -std::numeric_limits<double>::infinity(),
+                     const LargeCurves& large = {});
+// A fit's likeliest curve, as `beside` another set's is begun: in that set's layout, its values as they are.
+Fit with_first_curve(const Discrepancy& discrepancy, Fit fit);
 
 // The same mode sought again by the noise of another likelihood, and by how much its evidence is more there.
 std::pair<Fit, double> moved_to(const std::shared_ptr<const Likelihood>& likelihood, const Fit& from,

@@ -21,9 +21,8 @@ InstantPosterior instant_posterior(const Likelihood& likelihood, const Fit& fit,
   VectorXd values = fit.local[r];
   const auto chi2_at = [&](double value) {
     values[static_cast<Index>(local)] = value;
-    if (!likelihood.evaluate(fit.layout, r, fit.shared, values, false, residuals))
+    if (!likelihood.evaluate(fit.layout, r, fit.shared, values, false, residuals, curve, fit.curve_values))
       return std::numeric_limits<double>::infinity();
-    if (curve) residuals.white -= curve.columns[r] * fit.curve_values;
     return residuals.white.squaredNorm();
   };
   const double best = chi2_at(at_s);

@@ -102,19 +102,24 @@ MatrixXd Likelihood::whitened(std::size_t r, const MatrixXd& columns) const {
   return out;
 }
 
-VectorXd Likelihood::errors(const Layout& layout, std::size_t r, const VectorXd& shared, const VectorXd& local) const {
-  Prediction prediction;
-  if (!system_->predict(layout.set(), r, shared, local, false, prediction)) return {};
-  return measured_[r] - kept(r, prediction.reading);
+VectorXd Likelihood::errors(const Layout& layout, std::size_t r, const VectorXd& shared, const VectorXd& local,
+                            const CurveColumns& curve, const VectorXd& curve_values) const {
+  const auto prediction = memo_->predict(layout.set(), r, shared, local, false, curve.tangent);
+  if (!prediction) return {};
+  VectorXd out = measured_[r] - kept(r, prediction->reading);
+  if (curve) out -= curve.raw[r] * curve.steps_to(curve_values);
+  return out;
 }
 
 bool Likelihood::evaluate(const Layout& layout, std::size_t r, const VectorXd& shared, const VectorXd& local,
-                          bool derivatives, Residuals& out) const {
-  const auto prediction = memo_->predict(layout.set(), r, shared, local, derivatives);
+                          bool derivatives, Residuals& out, const CurveColumns& curve,
+                          const VectorXd& curve_values) const {
+  const auto prediction = memo_->predict(layout.set(), r, shared, local, derivatives, curve.tangent);
   if (!prediction) return false;
   MatrixXd white = measured_[r] - kept(r, prediction->reading);
   whiten_rows(r, white);
   out.white = white;
+  if (curve) out.white -= curve.columns[r] * curve.steps_to(curve_values);
   if (derivatives) {
     out.by_shared = whitened(r, prediction->by_shared);
     out.by_local = whitened(r, prediction->by_local);
@@ -182,10 +187,10 @@ VectorXd local_precision_of(const Layout& layout, const Scales& scales) {
 bool linearise(const Likelihood& likelihood, const Fit& fit, const CurveColumns& curve, std::size_t r,
                LinearRecording& out) {
   Residuals& residuals = out.residuals;
-  if (!likelihood.evaluate(fit.layout, r, fit.shared, fit.local[r], true, residuals)) return false;
+  if (!likelihood.evaluate(fit.layout, r, fit.shared, fit.local[r], true, residuals, curve, fit.curve_values))
+    return false;
   out.Z = residuals.by_shared;
   if (curve) {
-    residuals.white -= curve.columns[r] * fit.curve_values;
     out.Z.conservativeResize(Eigen::NoChange, out.Z.cols() + curve.columns[r].cols());
     out.Z.rightCols(curve.columns[r].cols()) = curve.columns[r];
   }
@@ -262,6 +267,8 @@ Fit carried_to(Layout layout, const Fit& from) {
   out.shared = out.layout.shared_from(from.layout, from.shared);
   for (const VectorXd& local : from.local) out.local.push_back(out.layout.local_from(from.layout, local));
   out.curve_values = from.curve_values;
+  out.tangent = from.tangent;
+  out.likelihood = from.likelihood;
   out.valid = from.valid;
   return out;
 }
@@ -287,24 +294,52 @@ std::vector<ArrowBlock> linearise(const Likelihood& likelihood, const Fit& fit, 
   return blocks;
 }
 
+double cost_at(const Likelihood& likelihood, const Fit& fit, const CurveColumns& curve) {
+  const Pulls pulls = pulls_of(fit.layout, fit.shared, fit.curve_values, curve.covariance);
+  const VectorXd precision = local_precision_of(fit.layout, fit.scales);
+  std::vector<double> squares(likelihood.recordings());
+  parallel_for(likelihood.recordings(), [&](std::size_t r) {
+    Residuals residuals;
+    squares[r] = likelihood.evaluate(fit.layout, r, fit.shared, fit.local[r], false, residuals, curve, fit.curve_values)
+                     ? residuals.white.squaredNorm()
+                     : std::numeric_limits<double>::infinity();
+  });
+  double cost = pulls.centre.dot(pulls.precision * pulls.centre);
+  for (std::size_t r = 0; r < squares.size(); ++r) {
+    const VectorXd centre = nuisance_centre(fit.layout, fit.local[r]);
+    cost += squares[r] + centre.dot(precision.cwiseProduct(centre));
+  }
+  return cost;
+}
+
 Fit fit(const Likelihood& likelihood, const Layout& layout, const VectorXd& shared, const std::vector<VectorXd>& local,
         const Scales& scales, const CurveColumns& curve, const FitRules& rules) {
-  Fit now(layout);
-  now.scales = scales;
-  now.shared = shared;
-  now.local = local;
-  if (curve) now.curve_values = VectorXd::Zero(curve.covariance.rows());
+  Fit begin(layout);
+  begin.scales = scales;
+  begin.shared = shared;
+  begin.local = local;
+  if (curve) begin.curve_values = curve.tangent ? curve.tangent->values : VectorXd::Zero(curve.covariance.rows());
+  const std::shared_ptr<const CurveColumns> same(std::shared_ptr<const void>(), &curve);  // not owned
+  return fit_from(
+      likelihood, std::move(begin), [&](const Fit&) { return same; }, rules);
+}
+
+Fit fit_from(const Likelihood& likelihood, Fit now, const CurveAt& curve_at, const FitRules& rules) {
+  const Layout layout = now.layout;
   layout.clamp(now.shared, now.local);
   const auto free = free_locals(layout);
   // Derivatives come with the cost: most steps are taken.
   struct Point {
+    std::shared_ptr<const CurveColumns> curve;
     std::vector<ArrowBlock> blocks;
     Pulls pulls;
   };
   const auto look = [&](Fit& at, Point& point) {
     at.cost = std::numeric_limits<double>::infinity();
-    if (!make_blocks(likelihood, at, curve, point.blocks)) return;
-    point.pulls = pulls_of(layout, at.shared, at.curve_values, curve.covariance);
+    point.curve = curve_at(at);
+    if (!point.curve || !make_blocks(likelihood, at, *point.curve, point.blocks)) return;
+    at.tangent = point.curve->tangent;
+    point.pulls = pulls_of(layout, at.shared, at.curve_values, point.curve->covariance);
     at.cost = cost_of(point.pulls, point.blocks);
   };
   Point here, there;
@@ -328,7 +363,7 @@ Fit fit(const Likelihood& likelihood, const Layout& layout, const VectorXd& shar
       }
       Fit trial = now;
       trial.shared += step.shared.head(now.shared.size());
-      if (curve) trial.curve_values += step.shared.tail(now.curve_values.size());
+      trial.curve_values += step.shared.tail(now.curve_values.size());
       for (std::size_t r = 0; r < trial.local.size(); ++r)
         if (step.local[r].size() > 0)
           for (std::size_t i = 0; i < free.size(); ++i) trial.local[r][free[i]] += step.local[r][static_cast<Index>(i)];

@@ -1,10 +1,12 @@
 #pragma once
 // The likelihood of readings under a set of effects, a discrepancy and autocorrelated noise, and its mode.
 //
-//   y_r = h(shared, local_r) + C_r c + e_r        e_r ~ noise;  local_r: nuisances ~ N(0, sd^2), phases, instants
-//                                                 c ~ N(0, K): the discrepancy, a sum of curves
+//   y_r = h(shared, local_r, c) + e_r             e_r ~ noise;  local_r: nuisances ~ N(0, sd^2), phases, instants
+//                                                 c ~ N(0, K): the discrepancy, a sum of curves,
+//                                                 h linear in it about none or about a tangent's values
 //
 // Solution: Gauss-Newton with Levenberg's damping on the arrow-shaped normal equations, bounds by an active set.
+#include <functional>
 #include <memory>
 #include <optional>
 
@@ -42,6 +44,20 @@ struct Residuals {
   Eigen::MatrixXd by_local;
 };
 
+// Columns of one curve or of several side by side, whitened, per recording: rows x values; the values' prior covariance
+// is `covariance`, zero between curves.
+struct CurveColumns {
+  std::vector<Eigen::MatrixXd> columns;
+  std::vector<Eigen::MatrixXd> raw;  // the same, not whitened
+  Eigen::MatrixXd covariance;
+  std::shared_ptr<const CurveTangent> tangent;  // what they are derivatives about; null: none
+  explicit operator bool() const { return !columns.empty(); }
+  // How far values are from those that the columns are derivatives about.
+  Eigen::VectorXd steps_to(const Eigen::VectorXd& values) const {
+    return tangent ? Eigen::VectorXd(values - tangent->values) : values;
+  }
+};
+
 // A system, its readings but for the outliers, and the noise.
 class Likelihood {
  public:
@@ -65,12 +81,14 @@ class Likelihood {
   double log_weights() const { return log_weights_.sum(); }
   double log_weights(std::size_t recording) const { return log_weights_[static_cast<Eigen::Index>(recording)]; }
 
-  // False outside the model's domain.
+  // Beside these values of the curves, if any. False outside the model's domain.
   bool evaluate(const Layout& layout, std::size_t recording, const Eigen::VectorXd& shared,
-                const Eigen::VectorXd& local, bool derivatives, Residuals& out) const;
-  // Measured - predicted in the channels' units, outliers left out.
+                const Eigen::VectorXd& local, bool derivatives, Residuals& out, const CurveColumns& curve = {},
+                const Eigen::VectorXd& curve_values = {}) const;
+  // Measured - predicted in the channels' units, outliers left out; empty outside the model's domain.
   Eigen::VectorXd errors(const Layout& layout, std::size_t recording, const Eigen::VectorXd& shared,
-                         const Eigen::VectorXd& local) const;
+                         const Eigen::VectorXd& local, const CurveColumns& curve = {},
+                         const Eigen::VectorXd& curve_values = {}) const;
   // Columns of all of the system's rows: outliers taken out, whitened.
   Eigen::MatrixXd whitened(std::size_t recording, const Eigen::MatrixXd& columns) const;
   Eigen::MatrixXd kept(std::size_t recording, const Eigen::MatrixXd& columns) const;
@@ -100,6 +118,7 @@ struct Fit {
   Eigen::VectorXd shared;
   std::vector<Eigen::VectorXd> local;
   Eigen::VectorXd curve_values;                  // of all curves, in their components' units; empty: no curve
+  std::shared_ptr<const CurveTangent> tangent;   // what the model is linear about in them; null: none
   std::shared_ptr<const Likelihood> likelihood;  // by whose noise it was fitted
   double cost = 0;                               // squared whitened residuals and priors' pulls
   std::vector<Eigen::Index> held;                // shared unknowns that press against a bound
@@ -120,18 +139,16 @@ struct FitRules {
   std::vector<Eigen::Index> fixed{};  // shared unknowns that stay where they start
 };
 
-// Columns of one curve or of several side by side, whitened, per recording: rows x values; the values' prior covariance
-// is `covariance`, zero between curves.
-struct CurveColumns {
-  std::vector<Eigen::MatrixXd> columns;
-  std::vector<Eigen::MatrixXd> raw;  // the same, not whitened
-  Eigen::MatrixXd covariance;
-  explicit operator bool() const { return !columns.empty(); }
-};
-
 Fit fit(const Likelihood& likelihood, const Layout& layout, const Eigen::VectorXd& shared,
         const std::vector<Eigen::VectorXd>& local, const Scales& scales, const CurveColumns& curve = {},
         const FitRules& rules = {});
+// From a fit's unknowns and curve values on, with the curves' columns of each place that is looked at; null: outside
+// the model's domain.
+using CurveAt = std::function<std::shared_ptr<const CurveColumns>(const Fit&)>;
+Fit fit_from(const Likelihood& likelihood, Fit begin, const CurveAt& curve_at, const FitRules& rules = {});
+
+// Squared whitened residuals and priors' pulls at a fit's unknowns, as Fit::cost; infinite outside the model's domain.
+double cost_at(const Likelihood& likelihood, const Fit& fit, const CurveColumns& curve);
 
 // The normal equations about a fit, unknowns as steps from the mode: shared, then the curve's values. Empty outside the
 // model's domain.

@@ -251,10 +251,10 @@ Fit replaced(const Likelihood& likelihood, const CurveColumns& curve, const Fit&
   return carried_to(Layout(system, with(without(from.layout.set(), leaving), effect)), now);
 }
 
-std::vector<double> log_costs_of_dropping(const Fit& fit) {
+std::vector<double> log_costs_of_dropping(const Fit& fit, const CurveColumns& curve) {
   const ModelSet& set = fit.layout.set();
   std::vector<double> out(set.size(), std::numeric_limits<double>::infinity());
-  const auto blocks = linearise(*fit.likelihood, fit, {});
+  const auto blocks = linearise(*fit.likelihood, fit, curve);
   for (std::size_t m = 0; m < set.size() && !blocks.empty(); ++m) {
     const auto& parameters = fit.layout.system().effects()[set[m]].parameters;
     std::vector<Index> sizes;
@@ -267,7 +267,7 @@ std::vector<double> log_costs_of_dropping(const Fit& fit) {
       held = held || std::ranges::count(fit.held, sizes.back()) > 0;
     }
     if (sizes.empty() || held) continue;
-    const ArrowSolution solution = solve_about(fit, blocks, {}, sizes);
+    const ArrowSolution solution = solve_about(fit, blocks, curve, sizes);
     if (!solution.valid) continue;
     const auto d = Eigen::Map<const VectorXd>(apart.data(), static_cast<Index>(apart.size()));
     out[m] = 0.5 * d.dot(solution.covariance(sizes, sizes).ldlt().solve(d));

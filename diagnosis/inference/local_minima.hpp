@@ -37,6 +37,6 @@ Fit replaced(const Likelihood& likelihood, const CurveColumns& curve, const Fit&
 
 // By the linear model: by how much the log likelihood falls where one member's sizes are none, for each member.
 // Infinite for one that has no size to be none, or one that presses against a bound.
-std::vector<double> log_costs_of_dropping(const Fit& fit);
+std::vector<double> log_costs_of_dropping(const Fit& fit, const CurveColumns& curve = {});
 
 }  // namespace bevel::inference

@@ -10,6 +10,7 @@ namespace bevel::inference {
 
 void Search::expand(const ModelSet& set) {
   expanded_.insert(set);
+  if (!set.empty()) look_at_every_component(set);
   const Visited here = visited_.at(set);
   if (progress_)
     progress_(describe(system_, set) + "; " + std::to_string(fits_) + " fits done, nothing is begun after " +
@@ -42,13 +43,13 @@ void Search::expand(const ModelSet& set) {
           continue;
         for (const StartPoint& start : one.starts)
           if (start.log_bayes_factor > one.starts.front().log_bayes_factor - rules_.window)
-            jobs.push_back(job_from(about, one.effect, start)), jobs.back().beside_curve = beside == Beside::curve;
+            jobs.push_back(job_from(about, one.effect, start)), ask_for_curve_of(about, jobs.back());
       }
     };
     if (here.is_likelier_with_curve()) {
       const auto by = with_inputs_of(*here.at->fit_with_curve, likelihood_);
       const auto [beside_curve, more] = moved_to(by, *here.at->fit_with_curve, *discrepancy_);
-      const CurveColumns curve = discrepancy_->columns(*by, beside_curve.scales.curves);
+      const CurveColumns curve = discrepancy_->columns(*by, beside_curve);
       add(beside_curve, proposals_->beside(Marginal(*by, beside_curve, curve, likelihood_.get()), rules_.starts),
           here.log_with_curve + more, Beside::curve);
     }
@@ -64,16 +65,33 @@ void Search::expand(const ModelSet& set) {
   }
   // Smaller sets, from which swaps come. One that was visited already once more, if from here it is likelier even
   // without what it gains by having fewer parameters: then it was in a local minimum.
+  const bool large = here.is_likelier_with_curve() && here.at->fit_with_curve->tangent;
   const Fit& fit = here.at->fit;
   const auto costs = log_costs_of_dropping(fit);
+  std::vector<double> costs_beside_curve;
+  if (large) {
+    const Fit& with_curve = *here.at->fit_with_curve;
+    costs_beside_curve = log_costs_of_dropping(with_curve, discrepancy_->columns(*with_curve.likelihood, with_curve));
+  }
   for (std::size_t m = 0; m < set.size(); ++m) {
     const ModelSet smaller = without(set, set[m]);
     if (const auto known = visited_.find(smaller); known != visited_.end()) {
-      const double promised = here.log_without_curve - costs[m] - log_prior_odds(set[m]);
-      if (known->second.log_without_curve > promised - rules_.optimism || !from_larger_.insert(smaller).second)
+      const auto falls_short = [&](double log_known, double log_here, double cost) {
+        return log_known <= log_here - cost - log_prior_odds(set[m]) - rules_.optimism;
+      };
+      const Visited& there = known->second;
+      if (!falls_short(there.log_without_curve, here.log_without_curve, costs[m]) &&
+          !(large && falls_short(there.log_with_curve, here.log_with_curve, costs_beside_curve[m])))
         continue;
+      if (!from_larger_.insert(smaller).second) continue;
     }
     jobs.push_back(job_at(carried_to(Layout(system_, smaller), fit)));
+    if (large) {
+      Job beside = job_at(carried_to(Layout(system_, smaller), *here.at->fit_with_curve));
+      ask_for_curve_of(*here.at->fit_with_curve, beside);
+      jobs.back().beside_curve = true;
+      jobs.back().large_curve = beside.large_curve;
+    }
   }
   for (Job& job : swaps(here)) jobs.push_back(std::move(job));
   evaluate_all(std::move(jobs));
@@ -87,7 +105,7 @@ std::vector<Search::Job> Search::swaps(const Visited& here) {
   const Fit& fit = here.likelier_fit();
   const double log_here = beside_curve ? here.log_with_curve : here.log_without_curve, best = best_log();
   const auto own = with_inputs_of(fit, likelihood_);
-  const CurveColumns curve = discrepancy_->columns(*own, fit.scales.curves);
+  const CurveColumns curve = discrepancy_->columns(*own, fit);
   std::vector<Job> out;
   for (std::size_t place = 0; place < here.set.size(); ++place) {
     const std::size_t member = here.set[place];
@@ -109,11 +127,11 @@ std::vector<Search::Job> Search::swaps(const Visited& here) {
       if (!swapped_.insert(swapped).second || one.starts.empty()) continue;
       out.push_back(job_from(about, one.effect, one.starts.front()));
       Job& job = out.back();
-      job.beside_curve = beside_curve;
+      ask_for_curve_of(about, job);
       const auto many = [](const Unknown& u) { return u.parameter != nullptr && has_many_minima(*u.parameter); };
       if (!std::ranges::any_of(about.layout.shared(), many) || !system_.allows(with(here.set, one.effect))) continue;
       const Fit there = replaced(*own, curve, fit, place, one.effect, one.starts.front().shared);
-      if (there.valid) job.shared = there.shared, job.local = there.local;
+      if (there.valid) job.shared = there.shared, job.local = there.local, ask_for_curve_of(about, job);
     }
   }
   return out;

@@ -104,7 +104,7 @@ Posterior posterior_of(const Search& search, double visible_sigmas) {
 }
 
 CurveColumns curve_of(const Search& search, const Fit& fit) {
-  return search.discrepancy().columns(*fit.likelihood, fit.scales.curves);
+  return search.discrepancy().columns(*fit.likelihood, fit);
 }
 
 const VectorXd& nuisance_weights_of(const Search& search, const Fit& fit) {

@@ -4,22 +4,24 @@
 #include <memory>
 #include <mutex>
 
-#include "diagnosis/inference/system.hpp"
+#include "diagnosis/inference/curve_tangent.hpp"
 
 namespace bevel::inference {
 
 class PredictionMemo {
  public:
   explicit PredictionMemo(const System& system);
-  // As System::predict(); null outside the model's domain. Thread-safe. The same to the last bit whether or not it was
-  // asked before.
+  // As System::predict(), or predict_with() where the tangent's curves have its values; null outside the model's
+  // domain. Thread-safe. The same to the last bit whether or not it was asked before.
   std::shared_ptr<const Prediction> predict(const ModelSet& set, std::size_t recording, const Eigen::VectorXd& shared,
-                                            const Eigen::VectorXd& local, bool derivatives);
+                                            const Eigen::VectorXd& local, bool derivatives,
+                                            const std::shared_ptr<const CurveTangent>& tangent = nullptr);
 
  private:
   struct Known {
     ModelSet set;
     Eigen::VectorXd shared, local;
+    std::shared_ptr<const CurveTangent> tangent;
     std::shared_ptr<const Prediction> prediction;
   };
   struct OfRecording {

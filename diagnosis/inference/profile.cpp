@@ -56,9 +56,8 @@ double Profile::at(Index which, double value, VectorXd& shared, std::vector<Vect
   Residuals residuals;
   auto blocks = blocks_;
   for (std::size_t r = 0; r < blocks.size(); ++r) {
-    if (!likelihood_.evaluate(fit_.layout, r, shared, instants[r], false, residuals))
+    if (!likelihood_.evaluate(fit_.layout, r, shared, instants[r], false, residuals, curve_, fit_.curve_values))
       return std::numeric_limits<double>::infinity();
-    if (curve_) residuals.white -= curve_.columns[r] * fit_.curve_values;
     blocks[r].lw = L_[r].transpose() * residuals.white;
     blocks[r].zw = Z_[r].transpose() * residuals.white;
     blocks[r].ww = residuals.white.squaredNorm();
@@ -77,9 +76,8 @@ double Profile::at(Index which, double value, VectorXd& shared, std::vector<Vect
 
 double Profile::chi2(std::size_t r, const VectorXd& shared, const VectorXd& local) const {
   Residuals residuals;
-  if (!likelihood_.evaluate(fit_.layout, r, shared, local, false, residuals))
+  if (!likelihood_.evaluate(fit_.layout, r, shared, local, false, residuals, curve_, fit_.curve_values))
     return std::numeric_limits<double>::infinity();
-  if (curve_) residuals.white -= curve_.columns[r] * fit_.curve_values;
   return residuals.white.squaredNorm();
 }
 

@@ -83,6 +83,18 @@ Search::Job Search::job_at(const Fit& fit) {
           .nuisance_sd = fit.scales.nuisance_sd};
 }
 
+void Search::ask_for_curve_of(const Fit& fit, Job& job) const {
+  job.beside_curve = !fit.scales.curves.empty();
+  if (!fit.tangent) return;
+  Fit from = with_first_curve(*discrepancy_, carried_to(job.layout, fit));
+  from.shared = job.shared;
+  from.local = job.local;
+  from.scales.nuisance_sd = job.nuisance_sd;
+  // What is left without the curve may pass for noise: that is not where to begin.
+  from.likelihood = std::make_shared<const Likelihood>(*fit.likelihood, fit.likelihood->noise());
+  job.large_curve = std::make_shared<const Fit>(std::move(from));
+}
+
 Search::Job Search::job_from(const Fit& fit, std::size_t effect, const StartPoint& start) const {
   Job job = job_at(carried_to(Layout(system_, with(fit.layout.set(), effect)), fit));
   if (start.beside.size() > 0) job.shared = job.layout.shared_from(fit.layout, start.beside);
@@ -145,6 +157,7 @@ void Search::drop_repeated(std::vector<Job>& jobs) const {
       if (out[k].set == job.set && out[k].nuisance_sd == job.nuisance_sd &&
           std::abs(kept[k] - cost[i]) < 2 * kSameMode) {  // costs are twice a logarithm
         out[k].beside_curve = out[k].beside_curve || job.beside_curve;
+        if (!out[k].large_curve) out[k].large_curve = job.large_curve;
         repeated = true;
       }
     if (!repeated) out.push_back(job), kept.push_back(cost[i]);
@@ -184,7 +197,8 @@ void Search::evaluate_all(std::vector<Job> jobs) {
   parallel_for(asked.size(), [&](std::size_t k) {
     with[k] = std::make_shared<Evaluated>(*results[asked[k]]);
     add_discrepancy(*likelihood_, *discrepancy_, curve_rules_, *with[k],
-                    hopeless(jobs[asked[k]]) - curve_rules_.log_prior_odds);
+                    hopeless(jobs[asked[k]]) - curve_rules_.log_prior_odds,
+                    {.beside = jobs[asked[k]].large_curve.get()});
   });
   for (std::size_t k = 0; k < asked.size(); ++k) keep(jobs[asked[k]].set, with[k]);
 }
@@ -206,7 +220,7 @@ void Search::run(const Readings& outliers, const Noise& noise, const Progress& p
     for (const auto& [set, one] : visited_) {
       if (set.empty() || one.log_posterior() < best - rules_.curve_window) continue;
       jobs.push_back(job_at(one.likelier_fit()));
-      jobs.back().beside_curve = one.is_likelier_with_curve();
+      ask_for_curve_of(one.likelier_fit(), jobs.back());
     }
     visited_.clear();
     fits_ = 0;
@@ -216,7 +230,7 @@ void Search::run(const Readings& outliers, const Noise& noise, const Progress& p
 }
 
 std::shared_ptr<const Likelihood> Search::with_heavy_tails(const Fit& fit) const {
-  const CurveColumns curve = discrepancy_->columns(*fit.likelihood, fit.scales.curves);
+  const CurveColumns curve = discrepancy_->columns(*fit.likelihood, fit);
   const NoiseBeside noise = tails_beside(fit, curve);
   if (noise.noise.tails.degrees == 0) return nullptr;
   return std::make_shared<const Likelihood>(*fit.likelihood, noise.noise, std::vector<VectorXd>{}, noise.precision);
@@ -232,7 +246,8 @@ void Search::look_in_rounds(std::shared_ptr<const Likelihood> reference, Start& 
     Evaluated base = evaluate(*likelihood_, nothing, start.shared, start.local, start.nuisance_sd);
     if (!base.valid) throw std::domain_error("the model cannot follow the recordings");
     discrepancy_ = std::make_unique<const Discrepancy>(*likelihood_, base.fit);
-    add_discrepancy(*likelihood_, *discrepancy_, curve_rules_, base);
+    add_discrepancy(*likelihood_, *discrepancy_, curve_rules_, base, -std::numeric_limits<double>::infinity(),
+                    {.every_component = true});
     start = {.shared = base.fit.shared, .local = base.fit.local, .nuisance_sd = base.fit.scales.nuisance_sd};
     if (anew) {
       // A curve takes up most of what is missing: the noise beside it is nearer to the truth.
@@ -270,11 +285,21 @@ void Search::look_with_less_spread() {
     const Fit& fit = one.likelier_fit();
     for (const VectorXd& less : less_spread(fit.scales.nuisance_sd)) {
       jobs.push_back(job_at(fit));
-      jobs.back().beside_curve = one.is_likelier_with_curve();
       jobs.back().nuisance_sd = less;
+      ask_for_curve_of(fit, jobs.back());
     }
   }
   evaluate_all(std::move(jobs));
+}
+
+void Search::look_at_every_component(const ModelSet& set) {
+  const auto at = visited_.at(set).at;
+  if (!at->fit_with_curve || !at->fit_with_curve->tangent) return;
+  auto anew = std::make_shared<Evaluated>(*at);
+  const Fit beside = with_first_curve(*discrepancy_, *at->fit_with_curve);
+  add_discrepancy(*likelihood_, *discrepancy_, curve_rules_, *anew, -std::numeric_limits<double>::infinity(),
+                  {.every_component = true, .beside = &beside});
+  keep(set, anew);
 }
 
 const ModelSet* next_to_expand(const std::map<ModelSet, Visited>& visited, const std::set<ModelSet>& expanded,

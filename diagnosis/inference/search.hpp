@@ -83,6 +83,8 @@ class Search {
     std::vector<Eigen::VectorXd> local;
     Eigen::VectorXd nuisance_sd;
     bool beside_curve = false;
+    std::shared_ptr<const Fit>
+        large_curve{};  // where the same with a curve begins that the linear model is not enough for
   };
   void expand(const ModelSet& set);
   std::vector<Job> swaps(const Visited& here);
@@ -90,6 +92,10 @@ class Search {
   void drop_repeated(std::vector<Job>& jobs) const;
   void evaluate_all(std::vector<Job> jobs);
   static Job job_at(const Fit& fit);
+  // A job that is begun from a fit with a curve asks for one, too, and begins with a large one from there.
+  void ask_for_curve_of(const Fit& fit, Job& job) const;
+  // Beside a set whose discrepancy is large, the likeliest curve of every component.
+  void look_at_every_component(const ModelSet& set);
   Job job_from(const Fit& fit, std::size_t effect, const StartPoint& start) const;
   // Null: its noise is normal.
   std::shared_ptr<const Likelihood> with_heavy_tails(const Fit& fit) const;

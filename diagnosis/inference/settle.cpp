@@ -5,6 +5,7 @@
 #include <cmath>
 #include <limits>
 
+#include "diagnosis/inference/curved_fit.hpp"
 #include "diagnosis/inference/error_spread.hpp"
 #include "diagnosis/inference/instant_posterior.hpp"
 #include "diagnosis/inference/local_minima.hpp"
@@ -110,7 +111,8 @@ bool alike(const std::vector<VectorXd>& a, const std::vector<VectorXd>& b, const
 }  // namespace
 
 Settled settle(const Likelihood& likelihood, const Discrepancy* discrepancy, const Layout& layout, VectorXd shared,
-               std::vector<VectorXd> local, Scales scales, const NuisanceGrid& grid, double give_up_below) {
+               std::vector<VectorXd> local, Scales scales, const NuisanceGrid& grid, double give_up_below,
+               std::shared_ptr<const CurveTangent> tangent) {
   auto now = std::make_shared<const Likelihood>(likelihood);
   CurveColumns curve;
   Settled best{.fit = Fit(layout), .over = {}};
@@ -119,9 +121,11 @@ Settled settle(const Likelihood& likelihood, const Discrepancy* discrepancy, con
   bool noise_moved = false, spread_moved = false;
   double most_promised = -std::numeric_limits<double>::infinity();
   for (int pass = 0; pass < kRefits; ++pass) {
-    if (discrepancy) curve = discrepancy->columns(*now, scales.curves);
-    Settled one{.fit = fit(*now, layout, shared, local, scales, curve), .over = {}};
+    Settled one{.fit = discrepancy ? fit_beside_curves(*now, *discrepancy, layout, shared, local, scales, tangent)
+                                   : fit(*now, layout, shared, local, scales),
+                .over = {}};
     if (!one.fit.valid) break;
+    if (discrepancy) curve = discrepancy->columns(*now, one.fit);
     // What has many local minima is scanned, with the rest as it now stands.
     if (pass == 0 || noise_moved) {
       scan_locals(*now, curve, one.fit);
@@ -157,7 +161,14 @@ Settled settle(const Likelihood& likelihood, const Discrepancy* discrepancy, con
       }
     }
     spread_moved = false;
-    if (!noise_moved) {
+    // A curve that is large has another scale than the linear model about none saw.
+    bool curves_moved = false;
+    if (!noise_moved && !lost && one.fit.tangent) {
+      auto priors = likeliest_priors(*discrepancy, one.fit, curve, kWorthARefit);
+      curves_moved = priors != scales.curves;
+      scales.curves = std::move(priors);
+    }
+    if (!noise_moved && !curves_moved) {
       const Index here = column_of(likelihood.system(), scales.nuisance_sd);
       const Index next = spreads.next(one.over.promised, here, kWorthARefit);
       if (next == here) break;
@@ -166,9 +177,10 @@ Settled settle(const Likelihood& likelihood, const Discrepancy* discrepancy, con
     }
     shared = one.fit.shared;
     local = one.fit.local;
+    tangent = one.fit.tangent;
   }
   if (!best.fit.valid) return best;
-  if (discrepancy) curve = discrepancy->columns(*best.fit.likelihood, best.fit.scales.curves);
+  if (discrepancy) curve = discrepancy->columns(*best.fit.likelihood, best.fit);
   best.over = over_nuisances(best.fit, curve, grid, kWithAShare);
   return best;
 }

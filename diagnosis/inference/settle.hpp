@@ -23,9 +23,9 @@ struct Settled {
 
 // Fit, noise (with what the inputs leave open) and the nuisances' standard deviations in turn, until none changes. From
 // the starting values and scales; likelihood: where the noise begins; discrepancy: null where the scales have no
-// curves. Once the evidence is below give_up_below, it is left as it is.
+// curves; tangent: what they are linear about at first. Once the evidence is below give_up_below, it is left as it is.
 Settled settle(const Likelihood& likelihood, const Discrepancy* discrepancy, const Layout& layout,
                Eigen::VectorXd shared, std::vector<Eigen::VectorXd> local, Scales scales, const NuisanceGrid& grid,
-               double give_up_below);
+               double give_up_below, std::shared_ptr<const CurveTangent> tangent = nullptr);
 
 }  // namespace bevel::inference

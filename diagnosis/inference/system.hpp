@@ -4,6 +4,7 @@
 // needle is one client (diagnosis/needle), a pendulum another (tests/inference).
 #include <cmath>
 #include <memory>
+#include <span>
 #include <string>
 #include <vector>
 
@@ -60,6 +61,12 @@ struct Curve {
   bool periodic = false;
 };
 
+// Values of one of a system's curves, at its `at`.
+struct CurveValues {
+  std::size_t curve = 0;
+  Eigen::VectorXd values;
+};
+
 // A set of effects: indices into System::effects(), ascending.
 using ModelSet = std::vector<std::size_t>;
 
@@ -93,6 +100,16 @@ class System {
   }
   // Derivatives of the readings by the values of all curves, one after the other, without effects. Thread-safe.
   virtual Eigen::MatrixXd by_curves(std::size_t recording, const Eigen::VectorXd& base) const = 0;
+  // Whether by_curves() is all there is to say of curves; if not, predict_with() says what they do where they are
+  // large.
+  virtual bool is_linear_in_curves() const { return true; }
+  // predict() where curves have these values; by_values, unless null: the readings' derivatives by them, one curve
+  // after the other. False outside the model's domain. Thread-safe.
+  virtual bool predict_with(const ModelSet& /*set*/, std::size_t /*recording*/, const Eigen::VectorXd& /*shared*/,
+                            const Eigen::VectorXd& /*local*/, std::span<const CurveValues> /*curves*/,
+                            bool /*derivatives*/, Prediction& /*out*/, Eigen::MatrixXd* /*by_values*/) const {
+    return false;
+  }
 };
 
 }  // namespace bevel::inference

@@ -18,17 +18,18 @@ Checks check_model(const inference::Search& search, const ChosenModel& model, co
   Checks out;
   const inference::Fit& fit = *model.fit;
   const inference::Likelihood by_measured(search.system(), outliers, measured);
-  const auto curve = search.discrepancy().columns(by_measured, fit.scales.curves);
+  const auto curve = search.discrepancy().columns(by_measured, fit);
   inference::Residuals residuals;
   double chi2 = 0, count = 0, smallest_p = 1;
   int series_count = 0;
   for (std::size_t r = 0; r < by_measured.recordings(); ++r) {
-    if (!by_measured.evaluate(fit.layout, r, fit.shared, fit.local[r], false, residuals)) continue;
-    if (model.curve) residuals.white -= curve.columns[r] * fit.curve_values;
+    if (!by_measured.evaluate(fit.layout, r, fit.shared, fit.local[r], false, residuals, curve, fit.curve_values))
+      continue;
     chi2 += residuals.white.squaredNorm();
     count += static_cast<double>(residuals.white.size());
-    if (!fit.likelihood->evaluate(fit.layout, r, fit.shared, fit.local[r], false, residuals)) continue;
-    if (model.curve) residuals.white -= model.curve.columns[r] * fit.curve_values;
+    if (!fit.likelihood->evaluate(fit.layout, r, fit.shared, fit.local[r], false, residuals, model.curve,
+                                  fit.curve_values))
+      continue;
     for (const auto& white : by_channel(fit.likelihood->data().recordings[r], residuals.white)) {
       if (white.size() < kFewest) continue;
       const auto& noise = fit.likelihood->noise();

@@ -23,7 +23,7 @@ struct ChosenModel {
   inference::CurveColumns curve;
   std::vector<inference::ArrowBlock> blocks;
   double log_posterior = 0;
-  std::vector<DiscrepancyValues> discrepancy{};  // its curves; empty: none
+  std::vector<inference::CurveValues> discrepancy{};  // its curves; empty: none
 };
 
 struct Decision {

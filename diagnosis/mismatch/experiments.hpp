@@ -16,7 +16,7 @@ std::vector<MotionScript> motion_scripts(double depth_mm, double frame_s);
 struct Imagined {
   inference::ModelSet set;
   Eigen::VectorXd shared, local;
-  std::vector<DiscrepancyValues> discrepancy{};
+  std::vector<inference::CurveValues> discrepancy{};
   Eigen::MatrixXd information{};      // of the shared unknowns, from what is recorded already
   Eigen::VectorXd local_precision{};  // of what differs between insertions
 };

@@ -91,7 +91,7 @@ std::vector<std::string> rivals_of(const Search& search, const ModelSet& set, st
 }
 
 // Borrows `discrepancy`.
-ModelledTip tip_of(const ChosenModel& model, std::span<const DiscrepancyValues> discrepancy) {
+ModelledTip tip_of(const ChosenModel& model, std::span<const inference::CurveValues> discrepancy) {
   const Fit& fit = *model.fit;
   return {.layout = &fit.layout, .shared = &fit.shared, .local = &fit.local, .discrepancy = discrepancy};
 }

@@ -143,7 +143,7 @@ Fit refit_without(const inference::Search& search, const Fit& whole, const Fit& 
       if (series.time_s[i] > until_s) gone.insert(series.message[i]);
   without[r].assign(gone.begin(), gone.end());
   const Likelihood some(all.system(), without, all.noise(), inputs_about(whole));
-  const auto curve = search.discrepancy().columns(some, whole.scales.curves);
+  const auto curve = search.discrepancy().columns(some, whole);
   Fit out = inference::fit(some, whole.layout, start.shared, start.local, whole.scales, curve);
   if (!out.valid) out = start;
   return out;
@@ -191,10 +191,10 @@ Sums sums_of(const NeedleSystem& system, const inference::Search& search, const 
   fit.likelihood = normal.of(judge);
   fit.scales.nuisance_sd = judge.scales.nuisance_sd;
   const auto curve = curve_of(search, fit);
-  VectorXd errors = fit.likelihood->errors(fit.layout, r, fit.shared, new_insertion(fit, r).local[r]);
+  const VectorXd errors =
+      fit.likelihood->errors(fit.layout, r, fit.shared, new_insertion(fit, r).local[r], curve, fit.curve_values);
   const auto blocks = linearise(*fit.likelihood, fit, curve);
   if (errors.size() == 0 || blocks.empty()) return out;
-  if (curve) errors -= curve.raw[r] * fit.curve_values;
   add_errors(system, *fit.likelihood, r, errors, out);
   const auto predictive = predictive_of(fit, blocks, curve, r);
   constexpr double kNotPredicted = std::numeric_limits<double>::quiet_NaN();

@@ -18,8 +18,9 @@ constexpr double kSpanShare = 0.8;  // of a series' fall of chi2 that a located 
 std::vector<VectorXd> white_of(const ChosenModel& model, std::size_t r) {
   const Fit& fit = *model.fit;
   inference::Residuals residuals;
-  if (!fit.likelihood->evaluate(fit.layout, r, fit.shared, fit.local[r], false, residuals)) return {};
-  if (model.curve) residuals.white -= model.curve.columns[r] * fit.curve_values;
+  if (!fit.likelihood->evaluate(fit.layout, r, fit.shared, fit.local[r], false, residuals, model.curve,
+                                fit.curve_values))
+    return {};
   return by_channel(fit.likelihood->data().recordings[r], residuals.white);
 }
 

@@ -10,7 +10,7 @@ struct ModelledTip {
   const inference::Layout* layout = nullptr;
   const Eigen::VectorXd* shared = nullptr;
   const std::vector<Eigen::VectorXd>* local = nullptr;  // one per recording
-  std::span<const DiscrepancyValues> discrepancy{};
+  std::span<const inference::CurveValues> discrepancy{};
 };
 
 // How far apart the cameras would see the two tips at the deepest reading of each recording (of two groups: of the

@@ -11,8 +11,9 @@ namespace {
 
 using model::Covariate;
 
-constexpr int kValues = 12;               // of a curve
-constexpr double kLeastVariation = 0.05;  // of a covariate, in its unit
+constexpr int kValues = 12;                    // of a curve
+static_assert(kValues <= model::kMaxColumns);  // a path is followed with its derivatives by all of them
+constexpr double kLeastVariation = 0.05;       // of a covariate, in its unit
 constexpr double kLeastRoll_rad = 0.2;
 
 // Ascending.

@@ -11,6 +11,7 @@ namespace bevel::diagnosis {
 using Eigen::Index;
 using Eigen::MatrixXd;
 using Eigen::VectorXd;
+using inference::CurveValues;
 using inference::ModelSet;
 using inference::Scope;
 
@@ -116,8 +117,8 @@ model::NeedleParameters NeedleSystem::needle_in(const ModelSet& set, int recordi
 }
 
 bool NeedleSystem::follow(const ModelSet& set, const model::Motion& motion, int recording, const VectorXd& shared,
-                          const VectorXd& local, std::span<const DiscrepancyValues> discrepancy, Columns* columns,
-                          model::OpenLoop& path) const {
+                          const VectorXd& local, std::span<const CurveValues> discrepancy, Columns* columns,
+                          model::OpenLoop& path, std::size_t by_curve) const {
   // Columns: the needle's three, tilt and roll, by hand the bend, then the effects' in the order of the set.
   int column = kBaseParameters;
   const auto unknown = [&](double value) { return model::Dual::unknown(value, columns ? column++ : -1); };
@@ -157,21 +158,32 @@ bool NeedleSystem::follow(const ModelSet& set, const model::Motion& motion, int 
     effects.push_back(active);
   }
   effects.insert(effects.end(), known(recording).begin(), known(recording).end());
-  if (acts)
-    for (const DiscrepancyValues& one : discrepancy) {
+  int of_curve = 0;
+  for (std::size_t i = 0; acts && i < discrepancy.size(); ++i) {
+    const auto& [curve, values] = discrepancy[i];
+    if (i != by_curve) {
       model::ActiveEffect& active = effects.emplace_back();
-      active.owned = make_curve(needle_curves_[one.curve], one.values);
+      active.owned = make_curve(needle_curves_[curve], values);
       active.effect = active.owned.get();
+      continue;
     }
+    for (Index first = 0; first < values.size(); first += static_cast<Index>(kValuesOfPart)) {
+      model::ActiveEffect& active = effects.emplace_back();
+      active.owned = make_curve_part(needle_curves_[curve], static_cast<std::size_t>(first));
+      active.effect = active.owned.get();
+      for (Index k = first; k < std::min(values.size(), first + static_cast<Index>(kValuesOfPart)); ++k)
+        active.parameters[static_cast<std::size_t>(k - first)] = model::Dual::unknown(values[k], of_curve++);
+    }
+  }
   const model::AugmentedNeedle augmented(
-      needle_in(set, recording, shared, local), std::move(effects), columns ? column : 0,
+      needle_in(set, recording, shared, local), std::move(effects), columns ? column : of_curve,
       columns ? model::NeedleColumns{.curvature = 0, .lambda1 = 1, .lambda2 = 2, .wheelbase = -1}
               : model::NeedleColumns{});
   return model::predict(augmented, motion, path, headings_);
 }
 
 bool NeedleSystem::tip_path(const ModelSet& set, const model::Motion& motion, int recording, const VectorXd& shared,
-                            const VectorXd& local, std::span<const DiscrepancyValues> discrepancy,
+                            const VectorXd& local, std::span<const CurveValues> discrepancy,
                             model::OpenLoop& out) const {
   if (!follow(set, motion, recording, shared, local, discrepancy, nullptr, out)) return false;
   for (auto& position : out.position_mm) position.head(registrations()) += local.segment(kEntryX, registrations());
@@ -193,10 +205,27 @@ bool NeedleSystem::tip_path(const ModelSet& set, const model::Motion& motion, in
 
 bool NeedleSystem::predict(const ModelSet& set, std::size_t r, const VectorXd& shared, const VectorXd& local,
                            bool derivatives, inference::Prediction& out) const {
+  return predict_with(set, r, shared, local, {}, derivatives, out, nullptr);
+}
+
+bool NeedleSystem::predict_with(const ModelSet& set, std::size_t r, const VectorXd& shared, const VectorXd& local,
+                                std::span<const CurveValues> curves, bool derivatives, inference::Prediction& out,
+                                MatrixXd* by_values) const {
   thread_local model::OpenLoop path;
+  const auto& motion = recorded_.recordings[r].motion;
+  if (by_values) {
+    Index count = 0;
+    for (const auto& one : curves) count += one.values.size();
+    *by_values = MatrixXd::Zero(data_.recordings[r].rows(), count);
+    count = 0;
+    for (std::size_t i = 0; i < curves.size() && acts_in(static_cast<int>(r)); ++i) {
+      if (!follow(set, motion, static_cast<int>(r), shared, local, curves, nullptr, path, i)) return false;
+      by_values->middleCols(count, curves[i].values.size()) = rows_of(r, path, true);
+      count += curves[i].values.size();
+    }
+  }
   Columns columns;
-  if (!follow(set, recorded_.recordings[r].motion, static_cast<int>(r), shared, local, {},
-              derivatives ? &columns : nullptr, path))
+  if (!follow(set, motion, static_cast<int>(r), shared, local, curves, derivatives ? &columns : nullptr, path))
     return false;
   out.reading = rows_of(r, path, false);
   MatrixXd entry = MatrixXd::Zero(out.reading.size(), registrations());

@@ -40,12 +40,6 @@ struct KnownPhysics {
   std::vector<model::ActiveEffect> elsewhere;                  // in a motion that was not recorded
 };
 
-// Values of one of the system's curves.
-struct DiscrepancyValues {
-  std::size_t curve = 0;
-  Eigen::VectorXd values;
-};
-
 class NeedleSystem final : public inference::System {
  public:
   // Throws std::invalid_argument where `known` is too much to add anything to. An effect that is known is no candidate.
@@ -68,6 +62,10 @@ class NeedleSystem final : public inference::System {
   Eigen::VectorXd by_inputs(const inference::ModelSet& set, std::size_t recording, const Eigen::VectorXd& shared,
                             const Eigen::VectorXd& local) const override;
   Eigen::MatrixXd by_curves(std::size_t recording, const Eigen::VectorXd& base) const override;
+  bool is_linear_in_curves() const override { return false; }
+  bool predict_with(const inference::ModelSet& set, std::size_t recording, const Eigen::VectorXd& shared,
+                    const Eigen::VectorXd& local, std::span<const inference::CurveValues> curves, bool derivatives,
+                    inference::Prediction& out, Eigen::MatrixXd* by_values) const override;
 
   model::NeedleParameters needle(const Eigen::VectorXd& shared) const;
   // Of these recordings' effects that no library holds: by how much a parameter of the needle changed; -1: none.
@@ -86,7 +84,7 @@ class NeedleSystem final : public inference::System {
   // for predict. recording: whose motion it is, or -1: of the second group, if there are two.
   bool tip_path(const inference::ModelSet& set, const model::Motion& motion, int recording,
                 const Eigen::VectorXd& shared, const Eigen::VectorXd& local,
-                std::span<const DiscrepancyValues> discrepancy, model::OpenLoop& out) const;
+                std::span<const inference::CurveValues> discrepancy, model::OpenLoop& out) const;
 
  private:
   // Which columns of a path's Jacobian are the members' shared unknowns, and which their own in the recording. kNone:
@@ -95,9 +93,11 @@ class NeedleSystem final : public inference::System {
     static constexpr Eigen::Index kNone = -1;
     std::vector<Eigen::Index> shared, local;
   };
+  // by_curve: which of the discrepancy's curves the path's Jacobian is by the values of, where `columns` is null.
+  static constexpr std::size_t kNoCurve = static_cast<std::size_t>(-1);
   bool follow(const inference::ModelSet& set, const model::Motion& motion, int recording, const Eigen::VectorXd& shared,
-              const Eigen::VectorXd& local, std::span<const DiscrepancyValues> discrepancy, Columns* columns,
-              model::OpenLoop& path) const;
+              const Eigen::VectorXd& local, std::span<const inference::CurveValues> discrepancy, Columns* columns,
+              model::OpenLoop& path, std::size_t by_curve = kNoCurve) const;
   Eigen::MatrixXd rows_of(std::size_t recording, const model::OpenLoop& path, bool derivatives) const;
   // Whether effects and discrepancy act in it.
   bool acts_in(int recording) const;

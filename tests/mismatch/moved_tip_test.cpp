@@ -81,10 +81,10 @@ TEST_F(MovedTip, AConstantDiscrepancyOfAReadingByAsMuch) {
   shared[layout.find_shared(0, 0)] = 0.6;
   const auto local = nothing_of_their_own(layout);
   const auto constant = [&](double value) {
-    return DiscrepancyValues{
+    return inference::CurveValues{
         curve, Eigen::VectorXd::Constant(static_cast<Eigen::Index>(system.curves()[curve].at.size()), value)};
   };
-  const std::vector<DiscrepancyValues> one = {constant(-0.7)}, two = {constant(-0.7), constant(0.3)};
+  const std::vector<inference::CurveValues> one = {constant(-0.7)}, two = {constant(-0.7), constant(0.3)};
   const ModelledTip without{&layout, &shared, &local, {}};
   EXPECT_NEAR(apart_at_depth_mm(system, {&layout, &shared, &local, one}, without), 0.7, 1e-9);
   EXPECT_NEAR(apart_at_depth_mm(system, {&layout, &shared, &local, two}, without), 0.4, 1e-9);  // they add up

@@ -1,0 +1,110 @@
+#include "diagnosis/inference/curved_fit.hpp"
+
+#include <cmath>
+#include <limits>
+
+namespace bevel::inference {
+
+using Eigen::Index;
+using Eigen::VectorXd;
+
+namespace {
+
+constexpr double kLinear = 0.5;  // of the cost: so near the linear model has to be
+constexpr int kTangents = 4;     // that are tried without damping
+constexpr int kDamped = 12;      // steps with it; the next fit goes on
+
+// What the nonlinear model says, where the curves have a fit's values: columns about these are not asked for.
+double nonlinear_cost(const Likelihood& likelihood, const Discrepancy& discrepancy, const Fit& fit,
+                      const CurveColumns& curve) {
+  auto there = std::make_shared<CurveTangent>();
+  there->about = values_by_curve(discrepancy, fit.scales.curves, fit.curve_values);
+  there->values = fit.curve_values;
+  CurveColumns about = curve;
+  about.tangent = std::move(there);
+  return cost_at(likelihood, fit, about);
+}
+
+}  // namespace
+
+VectorXd log_over_priors(const Discrepancy& discrepancy, const Fit& fit, const CurveColumns& curve, std::size_t which) {
+  const auto blocks = linearise(*fit.likelihood, fit, curve);
+  const auto log_with = [&](const CurvePrior& prior) {
+    CurveColumns with = curve;
+    discrepancy.set_prior(fit.scales.curves, which, prior, with.covariance);
+    const ArrowSolution solution = solve_about(fit, blocks, with, std::vector<Index>{});
+    return solution.valid ? -0.5 * (solution.least + solution.log_volume_ratio)
+                          : -std::numeric_limits<double>::infinity();
+  };
+  VectorXd out = VectorXd::Constant(std::ssize(kCurveScales) * std::ssize(kCurveLengths),
+                                    -std::numeric_limits<double>::infinity());
+  if (blocks.empty()) return out;
+  const CurvePrior& now = fit.scales.curves[which];
+  const double here = log_with(now);
+  Index i = 0;
+  for (const double scale : kCurveScales)
+    for (const double length : kCurveLengths) out[i++] = log_with({now.curve, scale, length}) - here;
+  return out;
+}
+
+std::vector<CurvePrior> likeliest_priors(const Discrepancy& discrepancy, const Fit& fit, CurveColumns curve,
+                                         double least_gain) {
+  Fit now = fit;
+  for (std::size_t k = 0; k < now.scales.curves.size(); ++k) {
+    Index best = 0;
+    if (!(log_over_priors(discrepancy, now, curve, k).maxCoeff(&best) > least_gain)) continue;
+    now.scales.curves[k].scale = kCurveScales[best / std::ssize(kCurveLengths)];
+    now.scales.curves[k].length = kCurveLengths[best % std::ssize(kCurveLengths)];
+    discrepancy.set_prior(now.scales.curves, k, now.scales.curves[k], curve.covariance);
+  }
+  return now.scales.curves;
+}
+
+std::vector<CurveValues> values_by_curve(const Discrepancy& discrepancy, std::span<const CurvePrior> curves,
+                                         const VectorXd& values) {
+  std::vector<CurveValues> out;
+  const auto at = discrepancy.places(curves);
+  for (std::size_t i = 0; i < curves.size(); ++i)
+    out.push_back({curves[i].curve, values.segment(at[i], at[i + 1] - at[i])});
+  return out;
+}
+
+Fit fit_beside_curves(const Likelihood& likelihood, const Discrepancy& discrepancy, const Layout& layout,
+                      const VectorXd& shared, const std::vector<VectorXd>& local, const Scales& scales,
+                      std::shared_ptr<const CurveTangent> tangent) {
+  CurveColumns curve = discrepancy.columns(likelihood, scales.curves, std::move(tangent));
+  Fit next = fit(likelihood, layout, shared, local, scales, curve);
+  if (likelihood.system().is_linear_in_curves()) return next;
+  const auto curve_at = [&](const Fit& at) -> std::shared_ptr<const CurveColumns> {
+    auto about = make_tangent(likelihood.system(), {layout.set(), at.shared, at.local},
+                              values_by_curve(discrepancy, scales.curves, at.curve_values));
+    if (!about) return nullptr;
+    return std::make_shared<const CurveColumns>(discrepancy.columns(likelihood, scales.curves, std::move(about)));
+  };
+  const auto true_cost = [&](const Fit& at) { return nonlinear_cost(likelihood, discrepancy, at, curve); };
+  double cost = next.valid ? true_cost(next) : std::numeric_limits<double>::infinity();
+  const auto is_enough = [&] { return !next.valid || std::abs(cost - next.cost) <= kLinear; };
+  if (is_enough()) return next;
+  Fit here = next;
+  here.shared = shared, here.local = local;
+  here.curve_values = curve.tangent ? curve.tangent->values : VectorXd::Zero(curve.covariance.rows());
+  // Where recordings do not differ, they do not at the beginning.
+  for (VectorXd& own : here.local)
+    for (std::size_t i = 0; i < likelihood.system().nuisances().size(); ++i)
+      if (scales.nuisance_sd[static_cast<Index>(likelihood.system().nuisances()[i].group)] == 0)
+        own[static_cast<Index>(i)] = 0;
+  double cost_here = true_cost(here);
+  // A linear model of where the last one led, for as long as that is downhill.
+  for (int i = 0; i < kTangents && cost < cost_here; ++i) {
+    here = std::move(next), cost_here = cost;
+    const auto about = curve_at(here);
+    if (!about) break;
+    curve = *about;
+    next = fit(likelihood, layout, here.shared, here.local, scales, curve);
+    cost = next.valid ? true_cost(next) : std::numeric_limits<double>::infinity();
+    if (is_enough()) return next;
+  }
+  return fit_from(likelihood, std::move(here), curve_at, {.max_iterations = kDamped});
+}
+
+}  // namespace bevel::inference
