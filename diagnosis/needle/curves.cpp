@@ -56,25 +56,28 @@ bool find_places(const std::vector<double>& values, Covariate covariate, inferen
 
 class CurveEffect final : public model::ComponentEffect {
  public:
-  CurveEffect(const NeedleCurve& curve, const Eigen::VectorXd& values)
+  CurveEffect(const NeedleCurve& curve, const Eigen::VectorXd& values, int first_column)
       : ComponentEffect(curve.component, {.name = "discrepancy",
                                           .meaning = "a discrepancy without a name",
                                           .covariate = curve.covariate,
                                           .parameters = {}}),
         at_(curve.curve.at),
-        values_(values.begin(), values.end()),
-        periodic_(curve.curve.periodic) {}
+        periodic_(curve.curve.periodic) {
+    for (const double value : values)
+      values_.push_back(model::Dual::unknown(value, first_column < 0 ? -1 : first_column++));
+  }
 
  protected:
   model::Dual value_at(model::Parameters, double place) const override {
     const model::KnotWeights weights = model::weights_at(at_, periodic_, place);
     model::Dual sum;
-    for (std::size_t i = 0; i < 2; ++i) sum.value += weights.weight[i] * values_[weights.knot[i]];
+    for (std::size_t i = 0; i < 2; ++i) sum += values_[weights.knot[i]] * weights.weight[i];
     return sum;
   }
 
  private:
-  std::vector<double> at_, values_;
+  std::vector<double> at_;
+  std::vector<model::Dual> values_;
   bool periodic_;
 };
 
@@ -121,8 +124,9 @@ model::DiscrepancyCurve to_model(const NeedleCurve& curve, std::vector<double> v
           .periodic = curve.curve.periodic};
 }
 
-std::shared_ptr<const model::Effect> make_curve(const NeedleCurve& curve, const Eigen::VectorXd& values) {
-  return std::make_shared<CurveEffect>(curve, values);
+std::shared_ptr<const model::Effect> make_curve(const NeedleCurve& curve, const Eigen::VectorXd& values,
+                                                int first_column) {
+  return std::make_shared<CurveEffect>(curve, values, first_column);
 }
 
 std::shared_ptr<const model::Effect> make_curve_part(const NeedleCurve& curve, std::size_t first) {

@@ -29,7 +29,9 @@ Eigen::VectorXd weights_at(const inference::Curve& curve, double x);
 model::DiscrepancyCurve to_model(const NeedleCurve& curve, std::vector<double> values, std::vector<double> std_errors);
 
 // The curve with these values as an effect, whatever they are: a fit may go beyond what a model file may hold.
-std::shared_ptr<const model::Effect> make_curve(const NeedleCurve& curve, const Eigen::VectorXd& values);
+// first_column: of the path's sensitivities, which that by the first value is; -1: by none of them.
+std::shared_ptr<const model::Effect> make_curve(const NeedleCurve& curve, const Eigen::VectorXd& values,
+                                                int first_column = -1);
 
 // The value itself as an effect with slope in one dual number: part of the curves' values, [first, first + 4), the rest
 // taken as zero.

@@ -161,19 +161,10 @@ bool NeedleSystem::follow(const ModelSet& set, const model::Motion& motion, int 
   int of_curve = 0;
   for (std::size_t i = 0; acts && i < discrepancy.size(); ++i) {
     const auto& [curve, values] = discrepancy[i];
-    if (i != by_curve) {
-      model::ActiveEffect& active = effects.emplace_back();
-      active.owned = make_curve(needle_curves_[curve], values);
-      active.effect = active.owned.get();
-      continue;
-    }
-    for (Index first = 0; first < values.size(); first += static_cast<Index>(kValuesOfPart)) {
-      model::ActiveEffect& active = effects.emplace_back();
-      active.owned = make_curve_part(needle_curves_[curve], static_cast<std::size_t>(first));
-      active.effect = active.owned.get();
-      for (Index k = first; k < std::min(values.size(), first + static_cast<Index>(kValuesOfPart)); ++k)
-        active.parameters[static_cast<std::size_t>(k - first)] = model::Dual::unknown(values[k], of_curve++);
-    }
+    if (i == by_curve) of_curve = static_cast<int>(values.size());
+    model::ActiveEffect& active = effects.emplace_back();
+    active.owned = make_curve(needle_curves_[curve], values, i == by_curve ? 0 : -1);
+    active.effect = active.owned.get();
   }
   const model::AugmentedNeedle augmented(
       needle_in(set, recording, shared, local), std::move(effects), columns ? column : of_curve,

@@ -97,6 +97,30 @@ TEST_F(LargeCurves, WhereTheyAreNoneTheyAreTheLinearModel) {
   }
 }
 
+// Three effects, two that are known, the variation and two curves are as much as a needle carries.
+TEST(LargeCurve, BesideAsMuchAsThereCanBe) {
+  const SimulatedRig rig;
+  const KnownPhysics known{.in_recording = {},
+                           .elsewhere = {active("insertion_scale", {1.02}), active("camera_latency", {0.04})}};
+  const NeedleSystem system(record_case(rig, 1), rig.needle, known);
+  inference::ModelSet set;
+  for (const char* name : {"layer", "bevel_offset", "torsional_windup"})
+    for (std::size_t e = 0; e < system.effects().size(); ++e)
+      if (system.effects()[e].label == name) set = inference::with(set, e);
+  ASSERT_EQ(set.size(), 3U);
+  const std::size_t one = curve_of(system, model::DiscrepancyComponent::turning, "depth_mm"),
+                    other = curve_of(system, model::DiscrepancyComponent::y, "time_s");
+  const std::vector<CurveValues> curves = {{one, wave(system.curves()[one], 0.01)},
+                                           {other, wave(system.curves()[other], 0.2)}};
+  const inference::Layout layout(system, set);
+  inference::Prediction prediction;
+  MatrixXd by_values;
+  ASSERT_TRUE(
+      system.predict_with(set, 0, layout.shared_start(), layout.local_start(), curves, true, prediction, &by_values));
+  EXPECT_GT(by_values.leftCols(curves[0].values.size()).norm(), 1);
+  EXPECT_GT(by_values.rightCols(curves[1].values.size()).norm(), 1);
+}
+
 // A needle whose cut turns it by more than a radian on the way: no multiple of what a small turn does.
 TEST(LargeCurve, ANeedleThatTurnsByItselfIsFollowed) {
   constexpr double kTurn_rad_per_mm = 0.02;
