@@ -11,8 +11,7 @@ using Eigen::VectorXd;
 namespace {
 
 constexpr double kLinear = 0.5;  // of the cost: so near the linear model has to be
-constexpr int kTangents = 4;     // that are tried without damping
-constexpr int kDamped = 12;      // steps with it; the next fit goes on
+constexpr int kDamped = 12;      // steps; the next fit goes on
 
 // What the nonlinear model says, where the curves have a fit's values: columns about these are not asked for.
 double nonlinear_cost(const Likelihood& likelihood, const Discrepancy& discrepancy, const Fit& fit,
@@ -72,37 +71,30 @@ std::vector<CurveValues> values_by_curve(const Discrepancy& discrepancy, std::sp
 Fit fit_beside_curves(const Likelihood& likelihood, const Discrepancy& discrepancy, const Layout& layout,
                       const VectorXd& shared, const std::vector<VectorXd>& local, const Scales& scales,
                       std::shared_ptr<const CurveTangent> tangent) {
-  CurveColumns curve = discrepancy.columns(likelihood, scales.curves, std::move(tangent));
-  Fit next = fit(likelihood, layout, shared, local, scales, curve);
-  if (likelihood.system().is_linear_in_curves()) return next;
-  const auto curve_at = [&](const Fit& at) -> std::shared_ptr<const CurveColumns> {
+  const CurveAt curve_at = [&](const Fit& at) -> std::shared_ptr<const CurveColumns> {
     auto about = make_tangent(likelihood.system(), {layout.set(), at.shared, at.local},
                               values_by_curve(discrepancy, scales.curves, at.curve_values));
     if (!about) return nullptr;
     return std::make_shared<const CurveColumns>(discrepancy.columns(likelihood, scales.curves, std::move(about)));
   };
-  const auto true_cost = [&](const Fit& at) { return nonlinear_cost(likelihood, discrepancy, at, curve); };
-  double cost = next.valid ? true_cost(next) : std::numeric_limits<double>::infinity();
-  const auto is_enough = [&] { return !next.valid || std::abs(cost - next.cost) <= kLinear; };
-  if (is_enough()) return next;
-  Fit here = next;
+  Fit here(layout);
+  here.scales = scales;
   here.shared = shared, here.local = local;
-  here.curve_values = curve.tangent ? curve.tangent->values : VectorXd::Zero(curve.covariance.rows());
-  // Where recordings do not differ, they do not at the beginning.
-  for (VectorXd& own : here.local)
-    for (std::size_t i = 0; i < likelihood.system().nuisances().size(); ++i)
-      if (scales.nuisance_sd[static_cast<Index>(likelihood.system().nuisances()[i].group)] == 0)
-        own[static_cast<Index>(i)] = 0;
-  double cost_here = true_cost(here);
-  // A linear model of where the last one led, for as long as that is downhill.
-  for (int i = 0; i < kTangents && cost < cost_here; ++i) {
-    here = std::move(next), cost_here = cost;
-    const auto about = curve_at(here);
-    if (!about) break;
-    curve = *about;
-    next = fit(likelihood, layout, here.shared, here.local, scales, curve);
-    cost = next.valid ? true_cost(next) : std::numeric_limits<double>::infinity();
-    if (is_enough()) return next;
+  if (tangent) {
+    here.curve_values = tangent->values;
+  } else {
+    const CurveColumns curve = discrepancy.columns(likelihood, scales.curves);
+    Fit next = fit(likelihood, layout, shared, local, scales, curve);
+    if (likelihood.system().is_linear_in_curves() || !next.valid) return next;
+    const double cost = nonlinear_cost(likelihood, discrepancy, next, curve);
+    if (std::abs(cost - next.cost) <= kLinear) return next;
+    here.curve_values = VectorXd::Zero(curve.covariance.rows());
+    // Where recordings do not differ, they do not at the beginning.
+    for (VectorXd& own : here.local)
+      for (std::size_t i = 0; i < likelihood.system().nuisances().size(); ++i)
+        if (scales.nuisance_sd[static_cast<Index>(likelihood.system().nuisances()[i].group)] == 0)
+          own[static_cast<Index>(i)] = 0;
+    if (cost < nonlinear_cost(likelihood, discrepancy, here, curve)) here = std::move(next);
   }
   return fit_from(likelihood, std::move(here), curve_at, {.max_iterations = kDamped});
 }

@@ -4,7 +4,7 @@
 
 namespace bevel::inference {
 
-// By the linear model about none, or about a tangent's values; where the readings are not those that this says, by
+// By the linear model about none; where the readings are not those that this says, or from a tangent's values on, by
 // Levenberg and Marquardt's steps in the curves' values too. The fit's tangent is what it is linear about; null: none,
 // which is enough where curves are small, and all there is where the system is linear in them.
 Fit fit_beside_curves(const Likelihood& likelihood, const Discrepancy& discrepancy, const Layout& layout,
