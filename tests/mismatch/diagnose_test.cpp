@@ -153,12 +153,23 @@ TEST(Diagnose, WhereNothingIsMissingSaysHowSmallItWouldHaveSeen) {
   EXPECT_GT(effects.size(), 18U);
 }
 
+Findings of_exponent(double exponent) {
+  return findings_of({.effects = {active("rate_dependence", {exponent})}, .recordings = 3, .frame_s = 0.1}, 1);
+}
+
 TEST(Diagnose, SaysOfAValueAtTheEndOfItsRangeThatItIsNone) {
-  const Findings found =
-      findings_of({.effects = {active("rate_dependence", {1.4})}, .recordings = 3, .frame_s = 0.1}, 1);
+  const Findings found = of_exponent(1.2);
   ASSERT_EQ(found.effects.size(), 1U) << found.sentence;
   EXPECT_EQ(found.effects[0].parameters[0].value, 1);  // the largest exponent that is fitted
   EXPECT_THAT(found.remarks, Contains(HasSubstr("rate_dependence: exponent lies at the end")));
+}
+
+TEST(Diagnose, WhatLiesFarBeyondARangeIsOnNoList) {
+  const Findings found = of_exponent(1.4);
+  EXPECT_EQ(found.verdict, Verdict::unknown_effect) << found.sentence;
+  EXPECT_TRUE(found.effects.empty()) << found.sentence;
+  ASSERT_FALSE(found.discrepancies.empty());
+  EXPECT_EQ(found.discrepancies[0].curve.covariate, model::Covariate::speed_mm_s);
 }
 
 // The tip advances in waves of its own along the depth: on no list.
