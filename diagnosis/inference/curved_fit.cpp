@@ -68,12 +68,16 @@ std::vector<CurveValues> values_by_curve(const Discrepancy& discrepancy, std::sp
   return out;
 }
 
+std::shared_ptr<const CurveTangent> tangent_about(const Discrepancy& discrepancy, const Fit& fit) {
+  return make_tangent(fit.layout.system(), {fit.layout.set(), fit.shared, fit.local},
+                      values_by_curve(discrepancy, fit.scales.curves, fit.curve_values));
+}
+
 Fit fit_beside_curves(const Likelihood& likelihood, const Discrepancy& discrepancy, const Layout& layout,
                       const VectorXd& shared, const std::vector<VectorXd>& local, const Scales& scales,
                       std::shared_ptr<const CurveTangent> tangent) {
   const CurveAt curve_at = [&](const Fit& at) -> std::shared_ptr<const CurveColumns> {
-    auto about = make_tangent(likelihood.system(), {layout.set(), at.shared, at.local},
-                              values_by_curve(discrepancy, scales.curves, at.curve_values));
+    auto about = tangent_about(discrepancy, at);
     if (!about) return nullptr;
     return std::make_shared<const CurveColumns>(discrepancy.columns(likelihood, scales.curves, std::move(about)));
   };

@@ -22,5 +22,7 @@ std::vector<CurvePrior> likeliest_priors(const Discrepancy& discrepancy, const F
 // These values of these curves, one after the other, each by itself.
 std::vector<CurveValues> values_by_curve(const Discrepancy& discrepancy, std::span<const CurvePrior> curves,
                                          const Eigen::VectorXd& values);
+// About a fit's curve values, beside its unknowns. Null outside the model's domain.
+std::shared_ptr<const CurveTangent> tangent_about(const Discrepancy& discrepancy, const Fit& fit);
 
 }  // namespace bevel::inference

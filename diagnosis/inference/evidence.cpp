@@ -114,10 +114,11 @@ bool add_curve(const Likelihood& likelihood, const Discrepancy& discrepancy, dou
   scales.curves.push_back(more.front().prior);
   std::shared_ptr<const CurveTangent> tangent;
   if (here.tangent) {
-    VectorXd values = VectorXd::Zero(discrepancy.places(scales.curves).back());
-    values.head(here.curve_values.size()) = here.curve_values;
-    tangent = make_tangent(likelihood.system(), {here.layout.set(), here.shared, here.local},
-                           values_by_curve(discrepancy, scales.curves, values));
+    Fit with_one_more = here;
+    with_one_more.scales = scales;
+    with_one_more.curve_values = VectorXd::Zero(discrepancy.places(scales.curves).back());
+    with_one_more.curve_values.head(here.curve_values.size()) = here.curve_values;
+    tangent = tangent_about(discrepancy, with_one_more);
   }
   Settled with =
       settle(*here.likelihood, &discrepancy, here.layout, here.shared, here.local, scales,
@@ -199,9 +200,7 @@ WithCurve settle_with(const Likelihood& likelihood, const Discrepancy& discrepan
                       const Candidate& one, std::size_t choices, double give_up_below) {
   const Fit& from = *one.from;
   std::shared_ptr<const CurveTangent> tangent;
-  if (from.curve_values.size() > 0)
-    tangent = make_tangent(likelihood.system(), {from.layout.set(), from.shared, from.local},
-                           values_by_curve(discrepancy, from.scales.curves, from.curve_values));
+  if (from.curve_values.size() > 0) tangent = tangent_about(discrepancy, from);
   const Scales scales{.nuisance_sd = one.nuisance_sd, .curves = {one.prior}};
   const Likelihood& by = from.likelihood ? *from.likelihood : *set.likelihood;
   WithCurve out{.settled = settle(by, &discrepancy, set.layout, from.shared, from.local, scales,

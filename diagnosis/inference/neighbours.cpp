@@ -21,17 +21,16 @@ void Search::expand(const ModelSet& set) {
     const auto own = with_inputs_of(here.at->fit, likelihood_);
     const auto [plain, change] = moved_to(own, here.at->fit, *discrepancy_);
     const double best = best_log();
-    enum class Beside { as_it_is, curve, less_spread };
-    const auto add = [&](const Fit& about, const std::vector<Proposal>& list, double from, Beside beside) {
+    const auto add = [&](const Fit& about, const std::vector<Proposal>& list, double from, bool less_spread = false) {
       std::size_t rank = 0;
       for (const Proposal& one : list) {
         // Far from its start an effect may bring much more than in proportion: the foremost are fitted in any case.
-        const bool foremost = beside != Beside::less_spread && rank++ < rules_.foremost &&
-                              one.log_bayes_factor > -log_prior_odds(one.effect);
+        const bool foremost =
+            !less_spread && rank++ < rules_.foremost && one.log_bayes_factor > -log_prior_odds(one.effect);
         const ModelSet larger = with(set, one.effect);
         const double promised = from + one.log_bayes_factor + log_prior_odds(one.effect);
         auto& most = promised_.try_emplace(larger, -std::numeric_limits<double>::infinity()).first->second;
-        const bool nothing_new = beside == Beside::less_spread && promised < most + rules_.optimism;
+        const bool nothing_new = less_spread && promised < most + rules_.optimism;
         most = std::max(most, promised);
         if (nothing_new) continue;
         const double doubtful = rules_.optimism + rules_.linear_error * std::max(0.0, one.log_bayes_factor);
@@ -51,17 +50,17 @@ void Search::expand(const ModelSet& set) {
       const auto [beside_curve, more] = moved_to(by, *here.at->fit_with_curve, *discrepancy_);
       const CurveColumns curve = discrepancy_->columns(*by, beside_curve);
       add(beside_curve, proposals_->beside(Marginal(*by, beside_curve, curve, likelihood_.get()), rules_.starts),
-          here.log_with_curve + more, Beside::curve);
+          here.log_with_curve + more);
     }
     // Without the curve too: an effect may take its place.
     const Marginal marginal(*own, plain, {}, likelihood_.get());
     auto list = proposals_->beside(marginal, rules_.starts);
     // What takes up the mean of steps is a member; the base alone has none.
     if (!set.empty()) proposals_->look_with_others_moved(*likelihood_, plain, marginal, rules_.starts, list);
-    add(plain, list, here.log_without_curve + change, Beside::as_it_is);
+    add(plain, list, here.log_without_curve + change);
     for (const WithoutSpread& less : without_spread(*own, plain))
       add(less.fit, proposals_->beside(Marginal(*own, less.fit, {}, likelihood_.get()), rules_.starts),
-          here.log_without_curve + change + less.log_change, Beside::less_spread);
+          here.log_without_curve + change + less.log_change, true);
   }
   // Smaller sets, from which swaps come. One that was visited already once more, if from here it is likelier even
   // without what it gains by having fewer parameters: then it was in a local minimum.

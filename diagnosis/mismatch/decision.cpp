@@ -4,6 +4,8 @@
 #include <cmath>
 #include <set>
 
+#include "diagnosis/inference/curved_fit.hpp"
+
 namespace bevel::diagnosis {
 
 using inference::Fit;
@@ -24,10 +26,7 @@ std::set<std::string> names_of(const Search& search, const ModelSet& set) {
 ChosenModel model_of(const Search& search, const Fit& fit, double log_posterior) {
   ChosenModel out{.fit = &fit, .curve = curve_of(search, fit), .blocks = {}, .log_posterior = log_posterior};
   out.blocks = linearise(*fit.likelihood, fit, out.curve);
-  const auto& curves = fit.scales.curves;
-  const auto at = search.discrepancy().places(curves);
-  for (std::size_t i = 0; i < curves.size(); ++i)
-    out.discrepancy.push_back({curves[i].curve, fit.curve_values.segment(at[i], at[i + 1] - at[i])});
+  out.discrepancy = values_by_curve(search.discrepancy(), fit.scales.curves, fit.curve_values);
   return out;
 }
 

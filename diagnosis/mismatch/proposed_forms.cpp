@@ -51,10 +51,8 @@ std::vector<ProposedForm> propose_forms(const NeedleSystem& system, const infere
     beside.scales.curves.erase(beside.scales.curves.begin() + static_cast<std::ptrdiff_t>(d));
     beside.curve_values = Eigen::VectorXd(at.back() - (at[d + 1] - at[d]));
     beside.curve_values << model.fit->curve_values.head(at[d]), model.fit->curve_values.tail(at.back() - at[d + 1]);
-    const auto others = values_by_curve(search.discrepancy(), beside.scales.curves, beside.curve_values);
-    beside.tangent = beside.tangent && !others.empty()
-                         ? make_tangent(system, {beside.layout.set(), beside.shared, beside.local}, others)
-                         : nullptr;
+    if (beside.scales.curves.empty()) beside.tangent = nullptr;
+    if (beside.tangent) beside.tangent = tangent_about(search.discrepancy(), beside);
     const inference::Marginal marginal(search.likelihood(), beside,
                                        search.discrepancy().columns(search.likelihood(), beside));
     const double all = log_bayes_factor(search.discrepancy().scan(marginal));
