@@ -83,8 +83,7 @@ class Search {
     std::vector<Eigen::VectorXd> local;
     Eigen::VectorXd nuisance_sd;
     bool beside_curve = false;
-    std::shared_ptr<const Fit>
-        large_curve{};  // where the same with a curve begins that the linear model is not enough for
+    std::shared_ptr<const Fit> large_curve{};  // with a curve too large for the linear model: the same begins there
   };
   void expand(const ModelSet& set);
   std::vector<Job> swaps(const Visited& here);
