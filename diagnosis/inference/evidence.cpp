@@ -39,20 +39,35 @@ std::vector<WithoutSpread> without_spread(const Likelihood& likelihood, const Fi
   return out;
 }
 
-std::pair<Fit, double> moved_to(const std::shared_ptr<const Likelihood>& likelihood, const Fit& from,
-                                const Discrepancy& discrepancy) {
-  const auto curve_of = [&](const Likelihood& by) { return discrepancy.columns(by, from); };
-  const auto log_evidence = [&](const Fit& at, const CurveColumns& curve) {
-    const auto blocks = linearise(*at.likelihood, at, curve);
-    if (blocks.empty()) return -std::numeric_limits<double>::infinity();
-    return at.likelihood->log_weights() - 0.5 * (at.cost + solve_about(at, blocks, curve).log_volume_ratio);
+Moved moved_to(const std::shared_ptr<const Likelihood>& likelihood, const Fit& from, const Discrepancy& discrepancy) {
+  struct About {
+    double log_evidence = -std::numeric_limits<double>::infinity();
+    VectorXd information;  // of each shared unknown by itself
   };
-  const CurveColumns curve = curve_of(*likelihood);
-  Fit there = fit(*likelihood, from.layout, from.shared, from.local, from.scales, curve);
-  there.likelihood = likelihood;
-  if (!there.valid) return {std::move(there), -std::numeric_limits<double>::infinity()};
-  const double change = log_evidence(there, curve) - log_evidence(from, curve_of(*from.likelihood));
-  return {std::move(there), change};
+  const auto about = [&](const Fit& at, const CurveColumns& curve) {
+    About out;
+    const auto blocks = linearise(*at.likelihood, at, curve);
+    if (blocks.empty()) return out;
+    out.log_evidence = at.likelihood->log_weights() - 0.5 * (at.cost + solve_about(at, blocks, curve).log_volume_ratio);
+    out.information = VectorXd::Zero(at.shared.size());
+    for (const ArrowBlock& block : blocks) out.information += block.zz.diagonal().head(at.shared.size());
+    return out;
+  };
+  const CurveColumns curve = discrepancy.columns(*likelihood, from);
+  Moved out{.fit = fit(*likelihood, from.layout, from.shared, from.local, from.scales, curve)};
+  out.fit.likelihood = likelihood;
+  out.log_change = -std::numeric_limits<double>::infinity();
+  if (!out.fit.valid) return out;
+  const About there = about(out.fit, curve), here = about(from, discrepancy.columns(*from.likelihood, from));
+  out.log_change = there.log_evidence - here.log_evidence;
+  double log_share = 0, count = 0;
+  for (Index i = 0; i < std::min(here.information.size(), there.information.size()); ++i)
+    if (here.information[i] > 0 && there.information[i] > 0) {
+      log_share += std::log(here.information[i] / there.information[i]);
+      ++count;
+    }
+  if (count > 0) out.share_before = std::exp(log_share / count);
+  return out;
 }
 
 Evaluated evaluate(const Likelihood& likelihood, const Layout& layout, const VectorXd& shared,

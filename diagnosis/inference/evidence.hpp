@@ -48,9 +48,15 @@ void add_discrepancy(const Likelihood& likelihood, const Discrepancy& discrepanc
 // A fit's likeliest curve, as `beside` another set's is begun: in that set's layout, its values as they are.
 Fit with_first_curve(const Discrepancy& discrepancy, Fit fit);
 
-// The same mode sought again by the noise of another likelihood, and by how much its evidence is more there.
-std::pair<Fit, double> moved_to(const std::shared_ptr<const Likelihood>& likelihood, const Fit& from,
-                                const Discrepancy& discrepancy);
+// The same mode sought again by the noise of another likelihood.
+struct Moved {
+  Fit fit;
+  double log_change = 0;  // by how much its evidence is more there
+  // What the readings say of the shared unknowns by the noise that the fit had, as a share of what they say by this one
+  // (the geometric mean of their information).
+  double share_before = 1;
+};
+Moved moved_to(const std::shared_ptr<const Likelihood>& likelihood, const Fit& from, const Discrepancy& discrepancy);
 
 // The same fit with less_spread(), each way, and by how much its evidence, the prior of the spread with it, is more
 // there (less, as a rule), by the linear model. What some recordings share looks like a spread until it has a

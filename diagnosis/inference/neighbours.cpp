@@ -19,18 +19,26 @@ void Search::expand(const ModelSet& set) {
   if (set.size() < rules_.largest) {
     // What is promised is relative to this set by the reference's noise.
     const auto own = with_inputs_of(here.at->fit, likelihood_);
-    const auto [plain, change] = moved_to(own, here.at->fit, *discrepancy_);
+    const Moved plain = moved_to(own, here.at->fit, *discrepancy_);
     const double best = best_log();
-    const auto add = [&](const Fit& about, const std::vector<Proposal>& list, double from, bool less_spread = false) {
+    // By the reference's noise, which may be wrong for this set and right for the larger; or by that of this set, of
+    // which it is the other way about: the larger finds its own, which promises no less than either.
+    const auto by_either_noise = [](const Moved& moved, double log_change) {
+      return moved.fit.valid ? std::max(moved.log_change + log_change, moved.share_before * log_change)
+                             : moved.log_change;
+    };
+    const auto add = [&](const Fit& about, const std::vector<Proposal>& list, double log_here, const Moved& moved,
+                         const WithoutSpread* less = nullptr) {
       std::size_t rank = 0;
       for (const Proposal& one : list) {
         // Far from its start an effect may bring much more than in proportion: the foremost are fitted in any case.
-        const bool foremost =
-            !less_spread && rank++ < rules_.foremost && one.log_bayes_factor > -log_prior_odds(one.effect);
+        const bool foremost = !less && rank++ < rules_.foremost && one.log_bayes_factor > -log_prior_odds(one.effect);
         const ModelSet larger = with(set, one.effect);
-        const double promised = from + one.log_bayes_factor + log_prior_odds(one.effect);
+        const double promised = log_here +
+                                by_either_noise(moved, (less ? less->log_change : 0) + one.log_bayes_factor) +
+                                log_prior_odds(one.effect);
         auto& most = promised_.try_emplace(larger, -std::numeric_limits<double>::infinity()).first->second;
-        const bool nothing_new = less_spread && promised < most + rules_.optimism;
+        const bool nothing_new = less && promised < most + rules_.optimism;
         most = std::max(most, promised);
         if (nothing_new) continue;
         const double doubtful = rules_.optimism + rules_.linear_error * std::max(0.0, one.log_bayes_factor);
@@ -41,26 +49,30 @@ void Search::expand(const ModelSet& set) {
             (visited->second.log_posterior() > promised - doubtful || !refitted_.insert(larger).second))
           continue;
         for (const StartPoint& start : one.starts)
-          if (start.log_bayes_factor > one.starts.front().log_bayes_factor - rules_.window)
-            jobs.push_back(job_from(about, one.effect, start)), ask_for_curve_of(about, jobs.back());
+          if (start.log_bayes_factor > one.starts.front().log_bayes_factor - rules_.window) {
+            jobs.push_back(job_from(about, one.effect, start));
+            if (!foremost) jobs.back().promised = promised + doubtful;
+            ask_for_curve_of(about, jobs.back());
+          }
       }
     };
     if (here.is_likelier_with_curve()) {
       const auto by = with_inputs_of(*here.at->fit_with_curve, likelihood_);
-      const auto [beside_curve, more] = moved_to(by, *here.at->fit_with_curve, *discrepancy_);
-      const CurveColumns curve = discrepancy_->columns(*by, beside_curve);
-      add(beside_curve, proposals_->beside(Marginal(*by, beside_curve, curve, likelihood_.get()), rules_.starts),
-          here.log_with_curve + more);
+      const Moved beside_curve = moved_to(by, *here.at->fit_with_curve, *discrepancy_);
+      const CurveColumns curve = discrepancy_->columns(*by, beside_curve.fit);
+      add(beside_curve.fit,
+          proposals_->beside(Marginal(*by, beside_curve.fit, curve, likelihood_.get()), rules_.starts),
+          here.log_with_curve, beside_curve);
     }
     // Without the curve too: an effect may take its place.
-    const Marginal marginal(*own, plain, {}, likelihood_.get());
+    const Marginal marginal(*own, plain.fit, {}, likelihood_.get());
     auto list = proposals_->beside(marginal, rules_.starts);
     // What takes up the mean of steps is a member; the base alone has none.
-    if (!set.empty()) proposals_->look_with_others_moved(*likelihood_, plain, marginal, rules_.starts, list);
-    add(plain, list, here.log_without_curve + change);
-    for (const WithoutSpread& less : without_spread(*own, plain))
+    if (!set.empty()) proposals_->look_with_others_moved(*likelihood_, plain.fit, marginal, rules_.starts, list);
+    add(plain.fit, list, here.log_without_curve, plain);
+    for (const WithoutSpread& less : without_spread(*own, plain.fit))
       add(less.fit, proposals_->beside(Marginal(*own, less.fit, {}, likelihood_.get()), rules_.starts),
-          here.log_without_curve + change + less.log_change, true);
+          here.log_without_curve, plain, &less);
   }
   // Smaller sets, from which swaps come. One that was visited already once more, if from here it is likelier even
   // without what it gains by having fewer parameters: then it was in a local minimum.

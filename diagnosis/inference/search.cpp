@@ -157,6 +157,7 @@ void Search::drop_repeated(std::vector<Job>& jobs) const {
       if (out[k].set == job.set && out[k].nuisance_sd == job.nuisance_sd &&
           std::abs(kept[k] - cost[i]) < 2 * kSameMode) {  // costs are twice a logarithm
         out[k].beside_curve = out[k].beside_curve || job.beside_curve;
+        out[k].promised = std::max(out[k].promised, job.promised);
         if (!out[k].large_curve) out[k].large_curve = job.large_curve;
         repeated = true;
       }
@@ -177,7 +178,8 @@ void Search::evaluate_all(std::vector<Job> jobs) {
   });
   for (std::size_t i = 0; i < jobs.size(); ++i)
     if (results[i]->valid) keep(jobs[i].set, results[i]);
-  // Those that still end in one mode are asked for a discrepancy once, the likeliest of them.
+  // Those that still end in one mode are asked for a discrepancy once, the likeliest of them; what was promised beside
+  // one, only while that is near to what has been found since.
   const double best = best_log();
   std::vector<std::size_t> order(jobs.size()), asked;
   std::iota(order.begin(), order.end(), std::size_t{0});
@@ -186,8 +188,8 @@ void Search::evaluate_all(std::vector<Job> jobs) {
   });
   for (const std::size_t i : order) {
     const Evaluated& one = *results[i];
-    const bool asks =
-        one.valid && (jobs[i].beside_curve || log_prior(jobs[i].set) + one.log_evidence > best - rules_.curve_window);
+    const bool asks = one.valid && ((jobs[i].beside_curve && jobs[i].promised > best - rules_.window) ||
+                                    log_prior(jobs[i].set) + one.log_evidence > best - rules_.curve_window);
     const auto same = [&](std::size_t k) {
       return jobs[k].set == jobs[i].set && std::abs(results[k]->log_evidence - one.log_evidence) < kSameMode;
     };
@@ -227,6 +229,7 @@ void Search::run(const Readings& outliers, const Noise& noise, const Progress& p
     look_in_rounds(heavy, start, std::move(jobs));
   }
   look_with_less_spread();
+  look_at_what_is_left();
 }
 
 std::shared_ptr<const Likelihood> Search::with_heavy_tails(const Fit& fit) const {
@@ -340,6 +343,10 @@ void Search::look_around() {
         jobs.push_back(job_from(single->second.at->fit, second, one.starts.front()));
   }
   evaluate_all(std::move(jobs));
+  look_at_what_is_left();
+}
+
+void Search::look_at_what_is_left() {
   while (fits_ < rules_.most_fits) {
     const ModelSet* next = next_to_expand(visited_, expanded_, rules_.window);
     if (!next) break;

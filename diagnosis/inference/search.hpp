@@ -2,6 +2,7 @@
 // Which sets of effects are likely: an Occam window (Madigan and Raftery 1994, JASA 89) over all sets of up to
 // `largest`, searched from a queue by adding, dropping and swapping, with refits where the linear model comes near.
 #include <functional>
+#include <limits>
 #include <map>
 #include <memory>
 #include <set>
@@ -83,6 +84,8 @@ class Search {
     std::vector<Eigen::VectorXd> local;
     Eigen::VectorXd nuisance_sd;
     bool beside_curve = false;
+    // Log posterior that it may have by the linear model; what nothing was promised of is fitted in any case.
+    double promised = std::numeric_limits<double>::infinity();
     std::shared_ptr<const Fit> large_curve{};  // with a curve too large for the linear model: the same begins there
   };
   void expand(const ModelSet& set);
@@ -110,6 +113,7 @@ class Search {
   };
   void look_in_rounds(std::shared_ptr<const Likelihood> reference, Start& start, std::vector<Job> known);
   void look_around();
+  void look_at_what_is_left();  // in the window, the likeliest first
   void look_with_less_spread();
 
   const System& system_;
