@@ -30,7 +30,10 @@ std::vector<WithoutSpread> without_spread(const Likelihood& likelihood, const Fi
   if (blocks.empty()) return out;
   const double here = log_with_spread(fit, fit.scales.nuisance_sd, blocks) +
                       log_prior_of_spread(likelihood.system(), fit.scales.nuisance_sd);
-  for (const VectorXd& less : less_spread(fit.scales.nuisance_sd)) {
+  auto all = less_spread(fit.scales.nuisance_sd);
+  for (VectorXd& less : one_step_less_spread(likelihood.system(), fit.scales.nuisance_sd))
+    if (std::ranges::find(all, less) == all.end()) all.push_back(std::move(less));
+  for (const VectorXd& less : all) {
     WithoutSpread one{.fit = fit};
     one.fit.scales.nuisance_sd = less;
     one.log_change = log_with_spread(fit, less, blocks) + log_prior_of_spread(likelihood.system(), less) - here;

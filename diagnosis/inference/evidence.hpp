@@ -58,9 +58,9 @@ struct Moved {
 };
 Moved moved_to(const std::shared_ptr<const Likelihood>& likelihood, const Fit& from, const Discrepancy& discrepancy);
 
-// The same fit with less_spread(), each way, and by how much its evidence, the prior of the spread with it, is more
-// there (less, as a rule), by the linear model. What some recordings share looks like a spread until it has a
-// name: beside what spread is left then, an effect may be worth much more.
+// The same fit with less_spread() and one_step_less_spread(), each way, and by how much its evidence, the prior of the
+// spread with it, is more there (less, as a rule), by the linear model. What some recordings share looks like a spread
+// until it has a name: beside what spread is left then, none or less, an effect may be worth much more.
 struct WithoutSpread {
   Fit fit;
   double log_change = 0;

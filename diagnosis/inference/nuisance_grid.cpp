@@ -53,6 +53,19 @@ std::vector<Eigen::VectorXd> less_spread(const Eigen::VectorXd& nuisance_sd) {
   return out;
 }
 
+std::vector<Eigen::VectorXd> one_step_less_spread(const System& system, const Eigen::VectorXd& nuisance_sd) {
+  std::vector<Eigen::VectorXd> out;
+  for (Index g = 0; g < nuisance_sd.size(); ++g) {
+    double smaller = -1;
+    for (const double value : system.nuisance_groups()[static_cast<std::size_t>(g)].standard_deviations)
+      if (value < nuisance_sd[g]) smaller = std::max(smaller, value);
+    if (smaller < 0) continue;
+    out.push_back(nuisance_sd);
+    out.back()[g] = smaller;
+  }
+  return out;
+}
+
 Index column_of(const System& system, const Eigen::VectorXd& nuisance_sd) {
   const auto& groups = system.nuisance_groups();
   Index column = 0, stride = 1;

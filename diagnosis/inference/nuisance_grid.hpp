@@ -20,6 +20,8 @@ double log_prior_of_spread(const System& system, const Eigen::VectorXd& nuisance
 Eigen::VectorXd middle_nuisance_sd(const System& system);
 // The same with one group at none, for each that is not, and, of several, with all of them at none.
 std::vector<Eigen::VectorXd> less_spread(const Eigen::VectorXd& nuisance_sd);
+// The same with one group at its next smaller value, for each that is not at none.
+std::vector<Eigen::VectorXd> one_step_less_spread(const System& system, const Eigen::VectorXd& nuisance_sd);
 // Which of its columns this is; each is one of its group's standard deviations.
 Eigen::Index column_of(const System& system, const Eigen::VectorXd& nuisance_sd);
 // How far apart two of its columns are: steps of the group that differs most.

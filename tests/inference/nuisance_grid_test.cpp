@@ -48,6 +48,17 @@ TEST(NuisanceGrid, LessSpreadIsWithoutOneGroupOrWithoutAll) {
   EXPECT_TRUE(of_two[2].isZero(0));
 }
 
+TEST(NuisanceGrid, OneStepLessSpreadIsTheNextSmallerValueOfAGroup) {
+  const Grouped system;
+  EXPECT_TRUE(one_step_less_spread(system, Eigen::Vector4d::Zero()).empty());
+  const auto values = [&](std::size_t group) { return system.nuisance_groups()[group].standard_deviations; };
+  const Eigen::Vector4d from(values(0)[3], 0, values(2)[1], 0);
+  const auto less = one_step_less_spread(system, from);
+  ASSERT_EQ(less.size(), 2U);
+  EXPECT_EQ(less[0], Eigen::Vector4d(values(0)[2], 0, from[2], 0));
+  EXPECT_EQ(less[1], Eigen::Vector4d(from[0], 0, 0, 0));
+}
+
 // A peak where recordings differ in every way, beside that where they differ in none, with much less between.
 TEST(NuisanceGrid, BothPeaksAreFound) {
   const Grouped system;
