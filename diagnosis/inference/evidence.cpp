@@ -165,18 +165,17 @@ struct Candidate {
 std::vector<Candidate> candidates(const Likelihood& likelihood, const Discrepancy& discrepancy, const Fit& fit,
                                   const std::vector<CurveFactor>& beside) {
   std::vector<Candidate> out;
-  const auto add = [&](const std::vector<CurveFactor>& curves, const VectorXd& nuisance_sd, double least,
-                       double more = 0) {
+  const auto add = [&](const std::vector<CurveFactor>& curves, double least, double more = 0) {
     if (curves.empty() || curves.front().log_bayes_factor < least) return;
     const CurvePrior& prior = curves.front().prior;
     if (std::ranges::none_of(out, [&](const Candidate& known) { return known.prior.curve == prior.curve; }))
       out.push_back({.prior = prior,
                      .log_others = integrated(curves).log_others,
                      .from = &fit,
-                     .nuisance_sd = nuisance_sd,
+                     .nuisance_sd = fit.scales.nuisance_sd,
                      .promised = curves.front().log_bayes_factor + more});
   };
-  add(beside, fit.scales.nuisance_sd, kLikelyCurve);
+  add(beside, kLikelyCurve);
   if (fit.scales.nuisance_sd.isZero(0)) return out;
   auto blocks = linearise(*fit.likelihood, fit, {});
   if (blocks.empty()) return out;
@@ -184,8 +183,8 @@ std::vector<Candidate> candidates(const Likelihood& likelihood, const Discrepanc
   alike.scales.nuisance_sd.setZero();
   const double spread_gains =
       log_with_spread(fit, fit.scales.nuisance_sd, blocks) - log_with_spread(fit, alike.scales.nuisance_sd, blocks);
-  add(scan_beside(likelihood, discrepancy, alike), alike.scales.nuisance_sd,
-      std::max(kLikelyCurve, kOfSpread * spread_gains), -spread_gains);
+  // Fitted from the spread that there is: without it the noise takes what is left of that, and does not give it back.
+  add(scan_beside(likelihood, discrepancy, alike), std::max(kLikelyCurve, kOfSpread * spread_gains), -spread_gains);
   return out;
 }
 
