@@ -6,6 +6,7 @@
 #include <random>
 
 #include "diagnosis/inference/search.hpp"
+#include "diagnosis/inference/settle.hpp"
 #include "tests/inference/held_system.hpp"
 
 namespace bevel::inference {
@@ -16,7 +17,7 @@ using Eigen::MatrixXd;
 using Eigen::VectorXd;
 
 // y = level + (slope_r + size g_r) x + white noise: g_r is -1 in one half of the recordings and 1 in the other, slope_r
-// each recording's own, normal about zero.
+// each recording's own, normal about zero. What sets the halves apart is an effect's, or a curve's of the slope over g.
 class HalvesDiffer final : public testing::HeldSystem {
  public:
   static constexpr Index kReadings = 60;
@@ -46,6 +47,7 @@ class HalvesDiffer final : public testing::HeldSystem {
          .label = "halves",
          .parameters = {
              {.name = "size", .lower = -20, .upper = 20, .none = 0, .starts = {0.5}, .prior = normal_prior(0, 5)}}}};
+    curves_ = {{.component = "slope", .unit = "1", .covariate = "half", .at = {-1, 0, 1}}};
     nuisances_ = {{"slope", 0}};
     groups_ = {{"slope", "1", {0, 0.03, 0.1, 0.3}}};
   }
@@ -61,7 +63,11 @@ class HalvesDiffer final : public testing::HeldSystem {
     out.by_local = along;
     return true;
   }
-  MatrixXd by_curves(std::size_t, const VectorXd&) const override { return MatrixXd(kReadings, 0); }
+  MatrixXd by_curves(std::size_t r, const VectorXd&) const override {
+    MatrixXd out = MatrixXd::Zero(kReadings, 3);
+    for (Index i = 0; i < kReadings; ++i) out(i, half_of(r) < 0 ? 0 : 2) = x(i);
+    return out;
+  }
 
  private:
   static double half_of(std::size_t r) { return r % 2 == 0 ? -1 : 1; }
@@ -74,13 +80,18 @@ Noise white() {
   return noise;
 }
 
+Search searched(const HalvesDiffer& system) {
+  Search search(system, {.threads = 1});
+  search.run(Readings(system.data().recordings.size()), white());
+  return search;
+}
+
 TEST(HiddenInSpread, AnEffectIsLookedForWhereRecordingsDoNotDifferToo) {
   constexpr std::size_t kRecordings = 6;
   for (unsigned seed = 1; seed <= 10; ++seed) {
     SCOPED_TRACE("seed " + std::to_string(seed));
     const HalvesDiffer system(kRecordings, 0.1, 0, seed);
-    Search search(system, {.threads = 1});
-    search.run(Readings(kRecordings), white());
+    const Search search = searched(system);
     const Visited& nothing = search.visited().at({});
     EXPECT_GT(nothing.at->fit.scales.nuisance_sd[0], 0);  // it passes for spread
     // Beside that spread it is not worth its prior odds.
@@ -127,8 +138,7 @@ TEST(HiddenInSpread, NoEffectThatByItselfIsLikelyIsLeftOut) {
   for (unsigned seed = 1; seed <= 40; ++seed) {
     SCOPED_TRACE("seed " + std::to_string(seed));
     const HalvesDiffer system(kRecordings, 0.08, 0.03, seed, 4);
-    Search search(system, {.threads = 1});
-    search.run(Readings(kRecordings), white());
+    const Search search = searched(system);
     const Fit begin = carried_to(Layout(system, {0}), search.visited().at({}).at->fit);
     const auto by_itself = std::make_shared<const Evaluated>(
         evaluate(search.likelihood(), begin.layout, begin.shared, begin.local, begin.scales.nuisance_sd));
@@ -141,6 +151,31 @@ TEST(HiddenInSpread, NoEffectThatByItselfIsLikelyIsLeftOut) {
     EXPECT_GT(found->second.log_posterior(), log_posterior - search.rules().optimism);
   }
   EXPECT_GE(likely, 10);
+}
+
+// The curve stands out only beside less spread than there is; fitted from no spread, its noise would keep what is left.
+TEST(HiddenInSpread, ACurveThatByItselfIsLikelyIsFitted) {
+  constexpr std::size_t kRecordings = 8;
+  for (unsigned seed = 1; seed <= 10; ++seed) {
+    SCOPED_TRACE("seed " + std::to_string(seed));
+    const HalvesDiffer system(kRecordings, 0.2, 0.03, seed, 4);
+    const Search search = searched(system);
+    const Evaluated& nothing = *search.visited().at({}).at;
+    const Fit& fit = nothing.fit;
+    const auto curves = search.discrepancy().scan(Marginal(search.likelihood(), fit, {}));
+    ASSERT_FALSE(curves.empty());
+    double most = 0;
+    for (const double sd : system.nuisance_groups()[0].standard_deviations)
+      for (const CurveFactor& one : curves) {
+        const Settled by_itself = settle(search.likelihood(), &search.discrepancy(), fit.layout, fit.shared, fit.local,
+                                         {.nuisance_sd = VectorXd::Constant(1, sd), .curves = {one.prior}},
+                                         nuisance_grid(system), -std::numeric_limits<double>::infinity());
+        most = std::max(most, by_itself.over.log_mean - nothing.log_evidence);
+      }
+    EXPECT_GT(most, 5);
+    // Of all its scales and lengths one is the likeliest.
+    EXPECT_GT(nothing.log_bayes_factor_curve, most - std::log(static_cast<double>(curves.size())));
+  }
 }
 
 }  // namespace
