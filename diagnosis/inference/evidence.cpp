@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <functional>
 #include <limits>
 
 #include "diagnosis/inference/curved_fit.hpp"
@@ -89,7 +90,6 @@ namespace {
 
 constexpr double kLikelyCurve = 3;    // log Bayes factor from which a curve is fitted
 constexpr double kOfLikeliest = 0.5;  // of what the likeliest curve gains: what that of another component does
-constexpr double kOfSpread = 0.5;     // of what spread gains: what a curve that may stand for it gains without
 
 // Of all curves of a scan together, each as likely beforehand: the likeliest's factor and what the rest adds to it.
 struct Integrated {
@@ -159,32 +159,31 @@ struct Candidate {
   double promised = std::numeric_limits<double>::infinity();  // log Bayes factor by the linear model about none
 };
 
-// The likeliest beside the fit, and beside the same where recordings do not differ: what they all share looks like
-// recordings that differ more, and then another curve than the one that it is may stand out of what is left. So it may
-// be where a curve stands for much of what the spread is worth; where they do differ, no curve does.
+// The likeliest beside the fit, and beside the same with less spread, each way: what all recordings share looks like
+// recordings that differ more, and then another curve than the one that it is may stand out of what is left. Where they
+// do differ, no curve gains what spread does. Each is fitted from the spread that there is: without it the noise takes
+// what is left of that, and does not give it back.
 std::vector<Candidate> candidates(const Likelihood& likelihood, const Discrepancy& discrepancy, const Fit& fit,
                                   const std::vector<CurveFactor>& beside) {
   std::vector<Candidate> out;
-  const auto add = [&](const std::vector<CurveFactor>& curves, double least, double more = 0) {
-    if (curves.empty() || curves.front().log_bayes_factor < least) return;
+  const auto add = [&](const std::vector<CurveFactor>& curves, double log_change) {
+    if (curves.empty()) return;
+    const double promised = curves.front().log_bayes_factor + log_change;
+    if (promised < kLikelyCurve) return;
     const CurvePrior& prior = curves.front().prior;
-    if (std::ranges::none_of(out, [&](const Candidate& known) { return known.prior.curve == prior.curve; }))
-      out.push_back({.prior = prior,
-                     .log_others = integrated(curves).log_others,
-                     .from = &fit,
-                     .nuisance_sd = fit.scales.nuisance_sd,
-                     .promised = curves.front().log_bayes_factor + more});
+    const auto known = std::ranges::find(out, prior.curve, [](const Candidate& c) { return c.prior.curve; });
+    if (known != out.end() && known->promised >= promised) return;
+    if (known != out.end()) out.erase(known);
+    out.push_back({.prior = prior,
+                   .log_others = integrated(curves).log_others,
+                   .from = &fit,
+                   .nuisance_sd = fit.scales.nuisance_sd,
+                   .promised = promised});
   };
-  add(beside, kLikelyCurve);
-  if (fit.scales.nuisance_sd.isZero(0)) return out;
-  auto blocks = linearise(*fit.likelihood, fit, {});
-  if (blocks.empty()) return out;
-  Fit alike = fit;
-  alike.scales.nuisance_sd.setZero();
-  const double spread_gains =
-      log_with_spread(fit, fit.scales.nuisance_sd, blocks) - log_with_spread(fit, alike.scales.nuisance_sd, blocks);
-  // Fitted from the spread that there is: without it the noise takes what is left of that, and does not give it back.
-  add(scan_beside(likelihood, discrepancy, alike), std::max(kLikelyCurve, kOfSpread * spread_gains), -spread_gains);
+  add(beside, 0);
+  for (const WithoutSpread& less : without_spread(*fit.likelihood, fit))
+    add(scan_beside(likelihood, discrepancy, less.fit), less.log_change);
+  std::ranges::stable_sort(out, std::greater{}, &Candidate::promised);
   return out;
 }
 
