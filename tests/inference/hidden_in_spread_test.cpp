@@ -16,29 +16,35 @@ using Eigen::Index;
 using Eigen::MatrixXd;
 using Eigen::VectorXd;
 
-// y = level + (slope_r + size g_r) x + white noise: g_r is -1 in one half of the recordings and 1 in the other, slope_r
-// each recording's own, normal about zero. What sets the halves apart is an effect's, or a curve's of the slope over g.
+// y = level + level_r + (slope_r + size g_r) x + white noise: g_r is -1 in one half of the recordings and 1 in the
+// other, slope_r and level_r each recording's own, normal about zero. What sets the halves apart is an effect's, or a
+// curve's of the slope over g.
 class HalvesDiffer final : public testing::HeldSystem {
  public:
   static constexpr Index kReadings = 60;
   static constexpr double kSigma = 0.005;
   static double x(Index i) { return static_cast<double>(i) / (kReadings - 1); }
 
-  // tail_degrees: of Student's t, of the same standard deviation; 0: normal noise.
-  HalvesDiffer(std::size_t recordings, double size, double slope_sd, unsigned seed, double tail_degrees = 0) {
+  struct Truth {
+    double size = 0, slope_sd = 0;
+    double tail_degrees = 0;  // of Student's t, of the same standard deviation; 0: normal noise
+    double level_sd = 0;      // 0: nor may they differ in it
+  };
+  HalvesDiffer(std::size_t recordings, const Truth& truth, unsigned seed) {
     data_.claimed_sd = {kSigma};
     data_.frame_s = 1;
     std::mt19937_64 random(seed);
     std::normal_distribution<double> normal;
     const auto noise = [&] {
-      return tail_degrees > 0 ? std::student_t_distribution<double>(tail_degrees)(random) *
-                                    std::sqrt((tail_degrees - 2) / tail_degrees)
-                              : normal(random);
+      const double degrees = truth.tail_degrees;
+      return degrees > 0 ? std::student_t_distribution<double>(degrees)(random) * std::sqrt((degrees - 2) / degrees)
+                         : normal(random);
     };
     for (std::size_t r = 0; r < recordings; ++r) {
       std::vector<double> measured;
-      const double slope = slope_sd * normal(random) + size * half_of(r);
-      for (Index i = 0; i < kReadings; ++i) measured.push_back(slope * x(i) + kSigma * noise());
+      const double slope = truth.slope_sd * normal(random) + truth.size * half_of(r);
+      const double level = truth.level_sd > 0 ? truth.level_sd * normal(random) : 0;
+      for (Index i = 0; i < kReadings; ++i) measured.push_back(level + slope * x(i) + kSigma * noise());
       add_recording(measured, data_.frame_s);
     }
     base_ = {{.name = "level", .lower = -9, .upper = 9, .none = 0, .starts = {}, .prior = normal_prior(0, 1)}};
@@ -50,17 +56,22 @@ class HalvesDiffer final : public testing::HeldSystem {
     curves_ = {{.component = "slope", .unit = "1", .covariate = "half", .at = {-1, 0, 1}}};
     nuisances_ = {{"slope", 0}};
     groups_ = {{"slope", "1", {0, 0.03, 0.1, 0.3}}};
+    if (truth.level_sd == 0) return;
+    nuisances_.push_back({"level", 1});
+    groups_.push_back({"level", "1", {0, 0.1, 1}});
   }
   bool predict(const ModelSet& set, std::size_t r, const VectorXd& shared, const VectorXd& local, bool derivatives,
                Prediction& out) const override {
     VectorXd along(kReadings);
     for (Index i = 0; i < kReadings; ++i) along[i] = x(i);
     const double slope = local[0] + (set.empty() ? 0 : half_of(r) * shared[1]);
-    out.reading = VectorXd::Constant(kReadings, shared[0]) + slope * along;
+    const bool levels = local.size() > 1;
+    out.reading = VectorXd::Constant(kReadings, shared[0] + (levels ? local[1] : 0)) + slope * along;
     if (!derivatives) return true;
     out.by_shared = MatrixXd::Ones(kReadings, shared.size());
     if (!set.empty()) out.by_shared.col(1) = half_of(r) * along;
-    out.by_local = along;
+    out.by_local = MatrixXd::Ones(kReadings, local.size());
+    out.by_local.col(0) = along;
     return true;
   }
   MatrixXd by_curves(std::size_t r, const VectorXd&) const override {
@@ -90,7 +101,7 @@ TEST(HiddenInSpread, AnEffectIsLookedForWhereRecordingsDoNotDifferToo) {
   constexpr std::size_t kRecordings = 6;
   for (unsigned seed = 1; seed <= 10; ++seed) {
     SCOPED_TRACE("seed " + std::to_string(seed));
-    const HalvesDiffer system(kRecordings, 0.1, 0, seed);
+    const HalvesDiffer system(kRecordings, {.size = 0.1}, seed);
     const Search search = searched(system);
     const Visited& nothing = search.visited().at({});
     EXPECT_GT(nothing.at->fit.scales.nuisance_sd[0], 0);  // it passes for spread
@@ -109,7 +120,7 @@ TEST(HiddenInSpread, ASetIsNotGivenUpWhileTheNoiseHoldsWhatRecordingsDifferBy) {
   int from_none = 0;
   for (unsigned seed = 1; seed <= 10; ++seed) {
     SCOPED_TRACE("seed " + std::to_string(seed));
-    const HalvesDiffer system(kRecordings, 0, 0.1, seed);
+    const HalvesDiffer system(kRecordings, {.slope_sd = 0.1}, seed);
     const Likelihood likelihood(system, Readings(kRecordings), white());
     const Layout layout(system, {});
     const std::vector<VectorXd> local(kRecordings, layout.local_start());
@@ -137,7 +148,7 @@ TEST(HiddenInSpread, NoEffectThatByItselfIsLikelyIsLeftOut) {
   int likely = 0;
   for (unsigned seed = 1; seed <= 40; ++seed) {
     SCOPED_TRACE("seed " + std::to_string(seed));
-    const HalvesDiffer system(kRecordings, 0.08, 0.03, seed, 4);
+    const HalvesDiffer system(kRecordings, {.size = 0.08, .slope_sd = 0.03, .tail_degrees = 4}, seed);
     const Search search = searched(system);
     const Fit begin = carried_to(Layout(system, {0}), search.visited().at({}).at->fit);
     const auto by_itself = std::make_shared<const Evaluated>(
@@ -153,12 +164,12 @@ TEST(HiddenInSpread, NoEffectThatByItselfIsLikelyIsLeftOut) {
   EXPECT_GE(likely, 10);
 }
 
-// The curve stands out only beside less spread than there is; fitted from no spread, its noise would keep what is left.
-TEST(HiddenInSpread, ACurveThatByItselfIsLikelyIsFitted) {
+// The likeliest curve by itself, from every spread, brings no more log evidence than what was found says.
+void expect_curves_found(const HalvesDiffer::Truth& truth) {
   constexpr std::size_t kRecordings = 8;
   for (unsigned seed = 1; seed <= 10; ++seed) {
     SCOPED_TRACE("seed " + std::to_string(seed));
-    const HalvesDiffer system(kRecordings, 0.2, 0.03, seed, 4);
+    const HalvesDiffer system(kRecordings, truth, seed);
     const Search search = searched(system);
     const Evaluated& nothing = *search.visited().at({}).at;
     const Fit& fit = nothing.fit;
@@ -167,15 +178,27 @@ TEST(HiddenInSpread, ACurveThatByItselfIsLikelyIsFitted) {
     double most = 0;
     for (const double sd : system.nuisance_groups()[0].standard_deviations)
       for (const CurveFactor& one : curves) {
+        VectorXd from = fit.scales.nuisance_sd;
+        from[0] = sd;
         const Settled by_itself = settle(search.likelihood(), &search.discrepancy(), fit.layout, fit.shared, fit.local,
-                                         {.nuisance_sd = VectorXd::Constant(1, sd), .curves = {one.prior}},
-                                         nuisance_grid(system), -std::numeric_limits<double>::infinity());
+                                         {.nuisance_sd = from, .curves = {one.prior}}, nuisance_grid(system),
+                                         -std::numeric_limits<double>::infinity());
         most = std::max(most, by_itself.over.log_mean - nothing.log_evidence);
       }
     EXPECT_GT(most, 5);
     // Of all its scales and lengths one is the likeliest.
     EXPECT_GT(nothing.log_bayes_factor_curve, most - std::log(static_cast<double>(curves.size())));
   }
+}
+
+// The curve stands out only beside less spread than there is; fitted from no spread, its noise would keep what is left.
+TEST(HiddenInSpread, ACurveIsFittedWhereNoiseWouldKeepTheSpread) {
+  expect_curves_found({.size = 0.2, .slope_sd = 0.03, .tail_degrees = 4});
+}
+
+// In the one way recordings do differ, in the other they seem to.
+TEST(HiddenInSpread, ACurveIsLookedForBesideLessSpreadOfOneKind) {
+  expect_curves_found({.size = 0.2, .slope_sd = 0.03, .level_sd = 0.1});
 }
 
 }  // namespace
