@@ -24,8 +24,8 @@ double log_with_spread(const Fit& fit, const VectorXd& nuisance_sd, std::vector<
 
 }  // namespace
 
-std::vector<WithoutSpread> without_spread(const Likelihood& likelihood, const Fit& fit) {
-  std::vector<WithoutSpread> out;
+std::vector<WithLessSpread> with_less_spread(const Likelihood& likelihood, const Fit& fit) {
+  std::vector<WithLessSpread> out;
   if (fit.scales.nuisance_sd.isZero(0)) return out;
   auto blocks = linearise(likelihood, fit, {});
   if (blocks.empty()) return out;
@@ -35,7 +35,7 @@ std::vector<WithoutSpread> without_spread(const Likelihood& likelihood, const Fi
   for (VectorXd& less : one_step_less_spread(likelihood.system(), fit.scales.nuisance_sd))
     if (std::ranges::find(all, less) == all.end()) all.push_back(std::move(less));
   for (const VectorXd& less : all) {
-    WithoutSpread one{.fit = fit};
+    WithLessSpread one{.fit = fit};
     one.fit.scales.nuisance_sd = less;
     one.log_change = log_with_spread(fit, less, blocks) + log_prior_of_spread(likelihood.system(), less) - here;
     out.push_back(std::move(one));
@@ -60,7 +60,6 @@ Moved moved_to(const std::shared_ptr<const Likelihood>& likelihood, const Fit& f
   const CurveColumns curve = discrepancy.columns(*likelihood, from);
   Moved out{.fit = fit(*likelihood, from.layout, from.shared, from.local, from.scales, curve)};
   out.fit.likelihood = likelihood;
-  out.log_change = -std::numeric_limits<double>::infinity();
   if (!out.fit.valid) return out;
   const About there = about(out.fit, curve), here = about(from, discrepancy.columns(*from.likelihood, from));
   out.log_change = there.log_evidence - here.log_evidence;
@@ -181,7 +180,7 @@ std::vector<Candidate> candidates(const Likelihood& likelihood, const Discrepanc
                    .promised = promised});
   };
   add(beside, 0);
-  for (const WithoutSpread& less : without_spread(*fit.likelihood, fit))
+  for (const WithLessSpread& less : with_less_spread(*fit.likelihood, fit))
     add(scan_beside(likelihood, discrepancy, less.fit), less.log_change);
   std::ranges::stable_sort(out, std::greater{}, &Candidate::promised);
   return out;

@@ -51,7 +51,8 @@ Fit with_first_curve(const Discrepancy& discrepancy, Fit fit);
 // The same mode sought again by the noise of another likelihood.
 struct Moved {
   Fit fit;
-  double log_change = 0;  // by how much its evidence is more there
+  // By how much its evidence is more there; where the model cannot follow, without end less.
+  double log_change = -std::numeric_limits<double>::infinity();
   // What the readings say of the shared unknowns by the noise that the fit had, as a share of what they say by this one
   // (the geometric mean of their information).
   double share_before = 1;
@@ -61,10 +62,10 @@ Moved moved_to(const std::shared_ptr<const Likelihood>& likelihood, const Fit& f
 // The same fit with less_spread() and one_step_less_spread(), each way, and by how much its evidence, the prior of the
 // spread with it, is more there (less, as a rule), by the linear model. What some recordings share looks like a spread
 // until it has a name: beside what spread is left then, none or less, an effect may be worth much more.
-struct WithoutSpread {
+struct WithLessSpread {
   Fit fit;
   double log_change = 0;
 };
-std::vector<WithoutSpread> without_spread(const Likelihood& likelihood, const Fit& fit);
+std::vector<WithLessSpread> with_less_spread(const Likelihood& likelihood, const Fit& fit);
 
 }  // namespace bevel::inference

@@ -28,7 +28,7 @@ void Search::expand(const ModelSet& set) {
                              : moved.log_change;
     };
     const auto add = [&](const Fit& about, const std::vector<Proposal>& list, double log_here, const Moved& moved,
-                         const WithoutSpread* less = nullptr) {
+                         const WithLessSpread* less = nullptr) {
       std::size_t rank = 0;
       for (const Proposal& one : list) {
         // Far from its start an effect may bring much more than in proportion: the foremost are fitted in any case.
@@ -70,7 +70,7 @@ void Search::expand(const ModelSet& set) {
     // What takes up the mean of steps is a member; the base alone has none.
     if (!set.empty()) proposals_->look_with_others_moved(*likelihood_, plain.fit, marginal, rules_.starts, list);
     add(plain.fit, list, here.log_without_curve, plain);
-    for (const WithoutSpread& less : without_spread(*own, plain.fit))
+    for (const WithLessSpread& less : with_less_spread(*own, plain.fit))
       add(less.fit, proposals_->beside(Marginal(*own, less.fit, {}, likelihood_.get()), rules_.starts),
           here.log_without_curve, plain, &less);
   }

@@ -7,18 +7,19 @@
 namespace bevel::inference {
 namespace {
 
-using Eigen::Index;
-using Eigen::MatrixXd;
 using Eigen::VectorXd;
 using testing::LinearSystem;
 
 TEST(EitherNoise, ASetByAnotherNoiseIsThatOfItsNormalDensity) {
   constexpr std::size_t kRecordings = 4;
   const LinearSystem system(kRecordings, 7, 0.3, 0.2, 0);
-  const auto of = [&](double sigma) {
+  const auto noise_of = [&](double sigma) {
     Noise noise = testing::white(system);
     noise.sigma = {sigma};
-    return std::make_shared<const Likelihood>(system, Readings(kRecordings), noise);
+    return noise;
+  };
+  const auto of = [&](double sigma) {
+    return std::make_shared<const Likelihood>(system, Readings(kRecordings), noise_of(sigma));
   };
   const auto from = of(0.13), to = of(0.08);
   const Layout layout(system, {0});
@@ -28,16 +29,8 @@ TEST(EitherNoise, ASetByAnotherNoiseIsThatOfItsNormalDensity) {
   const Moved moved = moved_to(to, here, Discrepancy(*from, here));
   ASSERT_TRUE(moved.fit.valid);
   const auto log_density = [&](double sigma) {
-    const Index n = LinearSystem::kCount, rows = system.data().rows();
-    const MatrixXd X = LinearSystem::design({0}), L = LinearSystem::cosine();
-    const Eigen::Vector3d prior(1, 1, 0.25);
-    MatrixXd covariance(rows, rows);
-    for (Index a = 0; a < rows / n; ++a)
-      for (Index b = 0; b < rows / n; ++b)
-        covariance.block(a * n, b * n, n, n) =
-            X * prior.asDiagonal() * X.transpose() + (a == b ? 0.04 : 0) * L * L.transpose();
-    covariance.diagonal().array() += sigma * sigma;
-    return testing::log_normal(testing::all_readings(system), covariance);
+    return testing::log_normal(testing::all_readings(system),
+                               testing::covariance_of(system, {0}, noise_of(sigma), 0.2));
   };
   EXPECT_NEAR(moved.log_change, log_density(0.08) - log_density(0.13), 1e-4);
   EXPECT_NEAR(moved.share_before, std::pow(0.08 / 0.13, 2), 1e-9);

@@ -18,30 +18,10 @@ using Eigen::Index;
 using Eigen::MatrixXd;
 using Eigen::VectorXd;
 using testing::all_readings;
+using testing::covariance_of;
 using testing::LinearSystem;
 using testing::log_normal;
 using testing::white;
-
-// Covariance of all readings: noise, shared parameters, nuisances, the values of all curves.
-MatrixXd covariance_of(const LinearSystem& system, const ModelSet& set, const Noise& noise, double nuisance_sd,
-                       const MatrixXd& curve_covariance = {}) {
-  const Index n = LinearSystem::kCount, rows = system.data().rows();
-  const MatrixXd X = LinearSystem::design(set), L = LinearSystem::cosine(), C = system.by_curves(0, {});
-  VectorXd prior(X.cols());
-  prior << 1, 1, VectorXd::Constant(X.cols() - 2, 0.25);
-  MatrixXd shared = X * prior.asDiagonal() * X.transpose();
-  if (curve_covariance.size() > 0) shared += C * curve_covariance * C.transpose();
-  MatrixXd out(rows, rows);
-  for (Index a = 0; a < rows / n; ++a)
-    for (Index b = 0; b < rows / n; ++b) out.block(a * n, b * n, n, n) = shared;
-  for (Index a = 0; a < rows / n; ++a) out.block(a * n, a * n, n, n) += nuisance_sd * nuisance_sd * L * L.transpose();
-  for (Index a = 0; a < rows / n; ++a)
-    for (Index i = 0; i < n; ++i)
-      for (Index j = 0; j < n; ++j)
-        out(a * n + i, a * n + j) +=
-            noise.sigma[0] * noise.sigma[0] * std::pow(noise.ar1, std::abs(static_cast<double>(i - j)));
-  return out;
-}
 
 Evaluated evaluate_set(const LinearSystem& system, const ModelSet& set, const Discrepancy* discrepancy = nullptr) {
   const Likelihood likelihood(system, Readings(system.data().recordings.size()), white(system));

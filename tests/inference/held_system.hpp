@@ -1,10 +1,19 @@
 #pragma once
 // A system that holds what it is made of; what it predicts is left to each.
+#include <cmath>
+#include <random>
 #include <span>
 
 #include "diagnosis/inference/system.hpp"
 
 namespace bevel::inference::testing {
+
+// Of standard deviation one; tail_degrees: of Student's t, 0: normal.
+inline double draw_noise(std::mt19937_64& random, std::normal_distribution<double>& normal, double tail_degrees) {
+  return tail_degrees > 0
+             ? std::student_t_distribution<double>(tail_degrees)(random) * std::sqrt((tail_degrees - 2) / tail_degrees)
+             : normal(random);
+}
 
 class HeldSystem : public System {
  public:

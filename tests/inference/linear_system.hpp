@@ -126,6 +126,28 @@ inline double log_normal(const Eigen::VectorXd& y, const Eigen::MatrixXd& covari
   return -0.5 * (y.dot(lu.solve(y)) + lu.matrixLU().diagonal().array().abs().log().sum());
 }
 
+// Covariance of all readings: noise, shared parameters, nuisances, the values of all curves.
+inline Eigen::MatrixXd covariance_of(const LinearSystem& system, const ModelSet& set, const Noise& noise,
+                                     double nuisance_sd, const Eigen::MatrixXd& curve_covariance = {}) {
+  const Eigen::Index n = LinearSystem::kCount, rows = system.data().rows();
+  const Eigen::MatrixXd X = LinearSystem::design(set), L = LinearSystem::cosine(), C = system.by_curves(0, {});
+  Eigen::VectorXd prior(X.cols());
+  prior << 1, 1, Eigen::VectorXd::Constant(X.cols() - 2, 0.25);
+  Eigen::MatrixXd shared = X * prior.asDiagonal() * X.transpose();
+  if (curve_covariance.size() > 0) shared += C * curve_covariance * C.transpose();
+  Eigen::MatrixXd out(rows, rows);
+  for (Eigen::Index a = 0; a < rows / n; ++a)
+    for (Eigen::Index b = 0; b < rows / n; ++b) out.block(a * n, b * n, n, n) = shared;
+  for (Eigen::Index a = 0; a < rows / n; ++a)
+    out.block(a * n, a * n, n, n) += nuisance_sd * nuisance_sd * L * L.transpose();
+  for (Eigen::Index a = 0; a < rows / n; ++a)
+    for (Eigen::Index i = 0; i < n; ++i)
+      for (Eigen::Index j = 0; j < n; ++j)
+        out(a * n + i, a * n + j) +=
+            noise.sigma[0] * noise.sigma[0] * std::pow(noise.ar1, std::abs(static_cast<double>(i - j)));
+  return out;
+}
+
 // The noise that its readings have.
 inline Noise white(const LinearSystem& system) {
   Noise noise;

@@ -71,11 +71,6 @@ class Pendulum final : public HeldSystem {
 
     std::mt19937_64 random(seed);
     std::normal_distribution<double> normal;
-    const double degrees = truth.tail_degrees;
-    const auto noise = [&] {
-      return degrees > 0 ? std::student_t_distribution<double>(degrees)(random) * std::sqrt((degrees - 2) / degrees)
-                         : normal(random);
-    };
     data_.claimed_sd = {kSigma_rad};
     data_.frame_s = kFrame_s;
     for (std::size_t r = 0; r < recordings; ++r) {
@@ -88,7 +83,8 @@ class Pendulum final : public HeldSystem {
       u.start_rad = truth.start_sd_rad * normal(random);
       std::vector<double> measured;
       const Eigen::VectorXd angle = simulate(r, u);
-      for (int i = 0; i < kReadings; ++i) measured.push_back(angle[i] + kSigma_rad * noise());
+      for (int i = 0; i < kReadings; ++i)
+        measured.push_back(angle[i] + kSigma_rad * draw_noise(random, normal, truth.tail_degrees));
       add_recording(measured, kFrame_s);
     }
   }
