@@ -100,6 +100,7 @@ void refine_tails(const ErrorsByChannel& errors, Dataset& data, Noise& noise) {
   for (double& square : squares) square /= mean;
   for (double& sigma : noise.sigma) sigma *= std::sqrt(mean);
   noise.tails = likeliest_tails(squares);
+  noise.tails_are_open = true;
   if (noise.tails.degrees == 0) return;
   std::size_t next = 0;
   for (SeriesSet& set : data.recordings)
@@ -172,7 +173,8 @@ NoiseBeside noise_beside(const Fit& fit, const CurveColumns& curve) {
     if (now.empty()) break;
     const Noise before = noise;
     noise = refine_noise(data, now, before);
-    if (noise.tails.degrees > 0) refine_tails(now, data, noise);
+    // Normal as they may be now: what a set leaves without its curve hides them.
+    if (noise.tails_are_open) refine_tails(now, data, noise);
     if (alike(noise, before)) break;
   }
   return {.noise = noise, .precision = precision_in(data)};

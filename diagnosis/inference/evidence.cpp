@@ -17,19 +17,20 @@ using Eigen::VectorXd;
 namespace {
 
 // Log evidence of a fit's linear model with these standard deviations, but for what does not depend on them.
-double log_with_spread(const Fit& fit, const VectorXd& nuisance_sd, std::vector<ArrowBlock>& blocks) {
-  const ArrowSolution solution = solve_at(nuisance_sd, fit, blocks, {}, std::vector<Index>{});
+double log_with_spread(const Fit& fit, const CurveColumns& curve, const VectorXd& nuisance_sd,
+                       std::vector<ArrowBlock>& blocks) {
+  const ArrowSolution solution = solve_at(nuisance_sd, fit, blocks, curve, std::vector<Index>{});
   return -0.5 * (solution.least + solution.log_volume_ratio);
 }
 
 }  // namespace
 
-std::vector<WithLessSpread> with_less_spread(const Likelihood& likelihood, const Fit& fit) {
+std::vector<WithLessSpread> with_less_spread(const Likelihood& likelihood, const Fit& fit, const CurveColumns& curve) {
   std::vector<WithLessSpread> out;
   if (fit.scales.nuisance_sd.isZero(0)) return out;
-  auto blocks = linearise(likelihood, fit, {});
+  auto blocks = linearise(likelihood, fit, curve);
   if (blocks.empty()) return out;
-  const double here = log_with_spread(fit, fit.scales.nuisance_sd, blocks) +
+  const double here = log_with_spread(fit, curve, fit.scales.nuisance_sd, blocks) +
                       log_prior_of_spread(likelihood.system(), fit.scales.nuisance_sd);
   auto all = less_spread(fit.scales.nuisance_sd);
   for (VectorXd& less : one_step_less_spread(likelihood.system(), fit.scales.nuisance_sd))
@@ -37,7 +38,7 @@ std::vector<WithLessSpread> with_less_spread(const Likelihood& likelihood, const
   for (const VectorXd& less : all) {
     WithLessSpread one{.fit = fit};
     one.fit.scales.nuisance_sd = less;
-    one.log_change = log_with_spread(fit, less, blocks) + log_prior_of_spread(likelihood.system(), less) - here;
+    one.log_change = log_with_spread(fit, curve, less, blocks) + log_prior_of_spread(likelihood.system(), less) - here;
     out.push_back(std::move(one));
   }
   return out;
@@ -117,18 +118,40 @@ std::vector<CurveFactor> scan_beside(const Likelihood& likelihood, const Discrep
   return discrepancy.scan(Marginal(*by, fit, discrepancy.columns(*by, fit), &likelihood));
 }
 
+// The same beside the fit with less spread, each way, with what that costs: what all recordings share looks like
+// recordings that differ more, and then another curve than the one that it is may stand out of what is left. Where they
+// do differ, no curve gains what spread does.
+struct Scan {
+  std::vector<CurveFactor> curves;
+  double log_change = 0;
+  double promised() const {
+    return curves.empty() ? -std::numeric_limits<double>::infinity() : curves.front().log_bayes_factor + log_change;
+  }
+};
+std::vector<Scan> scans_beside_less_spread(const Likelihood& likelihood, const Discrepancy& discrepancy,
+                                           const Fit& fit) {
+  std::vector<Scan> out;
+  for (const WithLessSpread& less : with_less_spread(*fit.likelihood, fit, discrepancy.columns(*fit.likelihood, fit)))
+    out.push_back({.curves = scan_beside(likelihood, discrepancy, less.fit), .log_change = less.log_change});
+  return out;
+}
+
 // One more curve beside those that a set has; whether it is likelier than none more. log_evidence: with those it has.
-bool add_curve(const Likelihood& likelihood, const Discrepancy& discrepancy, double log_prior_odds, Evaluated& out,
+bool add_curve(const Likelihood& likelihood, const Discrepancy& discrepancy, const CurveRules& rules, Evaluated& out,
                double& log_evidence) {
   const Fit& here = *out.fit_with_curve;
-  auto more = scan_beside(likelihood, discrepancy, here);
-  for (const CurvePrior& known : here.scales.curves)
-    std::erase_if(more, [&](const CurveFactor& one) { return one.prior.curve == known.curve; });
-  if (more.empty()) return false;
-  const Integrated all = integrated(more);
-  if (all.log_factor + log_prior_odds < 0) return false;
+  auto scans = scans_beside_less_spread(likelihood, discrepancy, here);
+  scans.push_back({.curves = scan_beside(likelihood, discrepancy, here)});
+  for (Scan& scan : scans)
+    for (const CurvePrior& known : here.scales.curves)
+      std::erase_if(scan.curves, [&](const CurveFactor& one) { return one.prior.curve == known.curve; });
+  const Scan &own = scans.back(), &more = *std::ranges::max_element(scans, {}, &Scan::promised);
+  if (more.curves.empty()) return false;
+  const Integrated all = integrated(more.curves);
+  if (all.log_factor + more.log_change + rules.log_prior_odds_more + rules.optimism < 0) return false;
+  const CurvePrior& prior = more.curves.front().prior;
   Scales scales = here.scales;
-  scales.curves.push_back(more.front().prior);
+  scales.curves.push_back(prior);
   std::shared_ptr<const CurveTangent> tangent;
   if (here.tangent) {
     Fit with_one_more = here;
@@ -140,9 +163,15 @@ bool add_curve(const Likelihood& likelihood, const Discrepancy& discrepancy, dou
   Settled with =
       settle(*here.likelihood, &discrepancy, here.layout, here.shared, here.local, scales,
              nuisance_grid(likelihood.system()), -std::numeric_limits<double>::infinity(), std::move(tangent));
-  const double log_factor = with.over.log_mean + all.log_others - log_evidence;
-  if (!(log_factor + log_prior_odds > 0)) return false;
+  // Of the other scales and lengths, beside the spread that there is in the end.
+  double log_others = all.log_others;
+  if (with.fit.valid && with.fit.scales.nuisance_sd == here.scales.nuisance_sd)
+    log_others =
+        integrated(own.curves).log_factor - std::ranges::find(own.curves, prior, &CurveFactor::prior)->log_bayes_factor;
+  const double log_factor = with.over.log_mean + log_others - log_evidence;
+  if (!(log_factor + rules.log_prior_odds_more > 0)) return false;
   log_evidence = with.over.log_mean;
+  out.fit_without_last_curve = std::move(out.fit_with_curve);
   out.fit_with_curve = std::move(with.fit);
   out.nuisance_weights_with_curve = with.over.weights;
   out.log_factors.push_back(log_factor);
@@ -158,16 +187,12 @@ struct Candidate {
   double promised = std::numeric_limits<double>::infinity();  // log Bayes factor by the linear model about none
 };
 
-// The likeliest beside the fit, and beside the same with less spread, each way: what all recordings share looks like
-// recordings that differ more, and then another curve than the one that it is may stand out of what is left. Where they
-// do differ, no curve gains what spread does. Each is fitted from the spread that there is: without it the noise takes
-// what is left of that, and does not give it back.
+// The likeliest beside the fit, and beside the same with less spread. Each is fitted from the spread that there is:
+// without it the noise takes what is left of that, and does not give it back.
 std::vector<Candidate> candidates(const Likelihood& likelihood, const Discrepancy& discrepancy, const Fit& fit,
                                   const std::vector<CurveFactor>& beside) {
   std::vector<Candidate> out;
-  const auto add = [&](const std::vector<CurveFactor>& curves, double log_change) {
-    if (curves.empty()) return;
-    const double promised = curves.front().log_bayes_factor + log_change;
+  const auto add = [&](const std::vector<CurveFactor>& curves, double promised) {
     if (promised < kLikelyCurve) return;
     const CurvePrior& prior = curves.front().prior;
     const auto known = std::ranges::find(out, prior.curve, [](const Candidate& c) { return c.prior.curve; });
@@ -179,9 +204,8 @@ std::vector<Candidate> candidates(const Likelihood& likelihood, const Discrepanc
                    .nuisance_sd = fit.scales.nuisance_sd,
                    .promised = promised});
   };
-  add(beside, 0);
-  for (const WithLessSpread& less : with_less_spread(*fit.likelihood, fit))
-    add(scan_beside(likelihood, discrepancy, less.fit), less.log_change);
+  add(beside, beside.front().log_bayes_factor);
+  for (const Scan& scan : scans_beside_less_spread(likelihood, discrepancy, fit)) add(scan.curves, scan.promised());
   std::ranges::stable_sort(out, std::greater{}, &Candidate::promised);
   return out;
 }
@@ -243,6 +267,7 @@ Fit with_first_curve(const Discrepancy& discrepancy, Fit fit) {
 void add_discrepancy(const Likelihood& likelihood, const Discrepancy& discrepancy, const CurveRules& rules,
                      Evaluated& out, double give_up_below, const LargeCurves& large) {
   out.with_discrepancy = true;
+  out.fit_without_last_curve.reset();
   out.curves = scan_beside(likelihood, discrepancy, out.fit);
   if (out.curves.empty()) return;
   out.log_bayes_factor_curve = log_factor_of_unlikely(out.curves);
@@ -295,7 +320,7 @@ void add_discrepancy(const Likelihood& likelihood, const Discrepancy& discrepanc
   out.nuisance_weights_with_curve = with.over.weights;
   double log_evidence = with.over.log_mean;
   while (log_evidence > give_up_below && out.log_factors.size() < rules.most &&
-         add_curve(likelihood, discrepancy, rules.log_prior_odds_more, out, log_evidence)) {
+         add_curve(likelihood, discrepancy, rules, out, log_evidence)) {
   }
   // Over their number, each more with its prior odds.
   out.log_bayes_factor_curve = out.log_factors.back();

@@ -12,13 +12,14 @@ namespace bevel::inference {
 // A set at its mode, with its evidence. Logarithms, natural; all of one Likelihood stand on one scale.
 struct Evaluated {
   explicit Evaluated(Fit f) : fit(std::move(f)) {}
-  Fit fit;                            // without a curve, at the likeliest standard deviations
-  std::optional<Fit> fit_with_curve;  // with the likeliest curves, where one is likely at all
-  double log_evidence = 0;            // without a discrepancy
-  double log_bayes_factor_curve = 0;  // of a discrepancy of any number of curves, against none
-  std::vector<CurveFactor> curves;    // each of them as the first, the likeliest first
-  std::vector<double> log_factors;    // of each curve of fit_with_curve beside those before it, choices integrated over
-  Eigen::VectorXd nuisance_weights;   // posterior over the grid of standard deviations
+  Fit fit;                                    // without a curve, at the likeliest standard deviations
+  std::optional<Fit> fit_with_curve;          // with the likeliest curves, where one is likely at all
+  std::optional<Fit> fit_without_last_curve;  // where there are several
+  double log_evidence = 0;                    // without a discrepancy
+  double log_bayes_factor_curve = 0;          // of a discrepancy of any number of curves, against none
+  std::vector<CurveFactor> curves;            // each of them as the first, the likeliest first
+  std::vector<double> log_factors;   // of each curve of fit_with_curve beside those before it, choices integrated over
+  Eigen::VectorXd nuisance_weights;  // posterior over the grid of standard deviations
   Eigen::VectorXd nuisance_weights_with_curve;
   bool with_discrepancy = false;  // whether that was asked
   bool valid = false;
@@ -34,6 +35,7 @@ struct CurveRules {
   double log_prior_odds;       // of a curve, against none
   double log_prior_odds_more;  // of one more, against no more
   std::size_t most = 2;
+  double optimism = 2;  // by which a fit may exceed what the linear model promised of one more
 };
 // Where a large discrepancy is looked for beside what the linear model about none says is likeliest.
 struct LargeCurves {
@@ -61,11 +63,11 @@ Moved moved_to(const std::shared_ptr<const Likelihood>& likelihood, const Fit& f
 
 // The same fit with less_spread() and one_step_less_spread(), each way, and by how much its evidence, the prior of the
 // spread with it, is more there (less, as a rule), by the linear model. What some recordings share looks like a spread
-// until it has a name: beside what spread is left then, none or less, an effect may be worth much more.
+// until it has a name: beside what spread is left then, none or less, an effect or a curve may be worth much more.
 struct WithLessSpread {
   Fit fit;
   double log_change = 0;
 };
-std::vector<WithLessSpread> with_less_spread(const Likelihood& likelihood, const Fit& fit);
+std::vector<WithLessSpread> with_less_spread(const Likelihood& likelihood, const Fit& fit, const CurveColumns& curve);
 
 }  // namespace bevel::inference

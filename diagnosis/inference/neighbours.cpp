@@ -17,22 +17,21 @@ void Search::expand(const ModelSet& set) {
               std::to_string(rules_.most_fits));
   std::vector<Job> jobs;
   if (set.size() < rules_.largest) {
-    // What is promised is relative to this set by the reference's noise.
-    const auto own = with_inputs_of(here.at->fit, likelihood_);
-    const Moved plain = moved_to(own, here.at->fit, *discrepancy_);
     const double best = best_log();
-    // By the reference's noise, which may be wrong for this set and right for the larger; or by that of this set, of
-    // which it is the other way about: the larger finds its own, which promises no less than either.
+    // What is promised is relative to this set by the reference's noise, which may be wrong for this set and right for
+    // the larger; or by that of this set, of which it is the other way about: the larger finds its own, which promises
+    // no less than either.
     const auto by_either_noise = [](const Moved& moved, double log_change) {
       return moved.fit.valid ? std::max(moved.log_change + log_change, moved.share_before * log_change)
                              : moved.log_change;
     };
-    const auto add = [&](const Fit& about, const std::vector<Proposal>& list, double log_here, const Moved& moved,
-                         const WithLessSpread* less = nullptr) {
+    const auto add = [&](const Fit& about, const std::vector<Proposal>& list, bool with_foremost, double log_here,
+                         const Moved& moved, const WithLessSpread* less = nullptr) {
       std::size_t rank = 0;
       for (const Proposal& one : list) {
         // Far from its start an effect may bring much more than in proportion: the foremost are fitted in any case.
-        const bool foremost = !less && rank++ < rules_.foremost && one.log_bayes_factor > -log_prior_odds(one.effect);
+        const bool foremost =
+            with_foremost && rank++ < rules_.foremost && one.log_bayes_factor > -log_prior_odds(one.effect);
         const ModelSet larger = with(set, one.effect);
         const double promised = log_here +
                                 by_either_noise(moved, (less ? less->log_change : 0) + one.log_bayes_factor) +
@@ -56,23 +55,24 @@ void Search::expand(const ModelSet& set) {
           }
       }
     };
-    if (here.is_likelier_with_curve()) {
-      const auto by = with_inputs_of(*here.at->fit_with_curve, likelihood_);
-      const Moved beside_curve = moved_to(by, *here.at->fit_with_curve, *discrepancy_);
-      const CurveColumns curve = discrepancy_->columns(*by, beside_curve.fit);
-      add(beside_curve.fit,
-          proposals_->beside(Marginal(*by, beside_curve.fit, curve, likelihood_.get()), rules_.starts),
-          here.log_with_curve, beside_curve);
-    }
-    // Without the curve too: an effect may take its place.
-    const Marginal marginal(*own, plain.fit, {}, likelihood_.get());
-    auto list = proposals_->beside(marginal, rules_.starts);
+    const auto look_beside = [&](const Fit& fit, double log_here, bool with_foremost, bool with_others_moved) {
+      const auto by = with_inputs_of(fit, likelihood_);
+      const Moved moved = moved_to(by, fit, *discrepancy_);
+      const CurveColumns curve = discrepancy_->columns(*by, moved.fit);
+      const Marginal marginal(*by, moved.fit, curve, likelihood_.get());
+      auto list = proposals_->beside(marginal, rules_.starts);
+      if (with_others_moved) proposals_->look_with_others_moved(*likelihood_, moved.fit, marginal, rules_.starts, list);
+      add(moved.fit, list, with_foremost, log_here, moved);
+      for (const WithLessSpread& less : with_less_spread(*by, moved.fit, curve))
+        add(less.fit, proposals_->beside(Marginal(*by, less.fit, curve, likelihood_.get()), rules_.starts), false,
+            log_here, moved, &less);
+    };
+    if (here.is_likelier_with_curve()) look_beside(*here.at->fit_with_curve, here.log_with_curve, true, false);
+    // With one curve less and without any, too: an effect may take its place.
+    if (here.is_likelier_with_curve() && here.at->fit_without_last_curve)
+      look_beside(*here.at->fit_without_last_curve, log_without_last_curve(here), false, false);
     // What takes up the mean of steps is a member; the base alone has none.
-    if (!set.empty()) proposals_->look_with_others_moved(*likelihood_, plain.fit, marginal, rules_.starts, list);
-    add(plain.fit, list, here.log_without_curve, plain);
-    for (const WithLessSpread& less : with_less_spread(*own, plain.fit))
-      add(less.fit, proposals_->beside(Marginal(*own, less.fit, {}, likelihood_.get()), rules_.starts),
-          here.log_without_curve, plain, &less);
+    look_beside(here.at->fit, here.log_without_curve, true, !set.empty());
   }
   // Smaller sets, from which swaps come. One that was visited already once more, if from here it is likelier even
   // without what it gains by having fewer parameters: then it was in a local minimum.

@@ -13,11 +13,12 @@
 namespace bevel::inference {
 
 struct Noise {
-  std::vector<double> sigma;  // per channel, of one reading (the process's own)
-  double ar1 = 0;             // correlation of readings one frame apart
-  double ar2 = 0;             // of readings two frames apart, given the one between; 0: of first order
-  Tails tails{};              // of the innovations
-  double outlier_share = 0;   // of messages
+  std::vector<double> sigma;    // per channel, of one reading (the process's own)
+  double ar1 = 0;               // correlation of readings one frame apart
+  double ar2 = 0;               // of readings two frames apart, given the one between; 0: of first order
+  Tails tails{};                // of the innovations
+  bool tails_are_open = false;  // whether how heavy they are is fitted with the rest; else they stay as they are
+  double outlier_share = 0;     // of messages
   double frame_s = 1.0 / 30;
   std::vector<double> own_ar1{};  // per channel, where each has one of its own, of first order; empty: ar1, ar2 of all
   // What it is of one channel.

@@ -37,7 +37,8 @@ Search::Search(const System& system, const SearchRules& rules) : system_(system)
   curve_rules_ = {
       .log_prior_odds = rules.log_prior_odds_effect + std::log(std::max(1.0, static_cast<double>(names.size()))),
       .log_prior_odds_more = rules.log_prior_odds_effect,
-      .most = rules.most_curves};
+      .most = rules.most_curves,
+      .optimism = rules.optimism};
 }
 
 double Visited::log_posterior() const {
@@ -124,6 +125,14 @@ Visited Search::weighed(const ModelSet& set, double log_prior, const std::shared
   one.log_with_curve = at->with_discrepancy ? one.log_without_curve + odds + at->log_bayes_factor_curve
                                             : -std::numeric_limits<double>::infinity();
   return one;
+}
+
+double Search::log_without_last_curve(const Visited& one) const {
+  double log = one.log_without_curve + curve_rules_.log_prior_odds;
+  const auto& factors = one.at->log_factors;
+  for (std::size_t i = 0; i + 1 < factors.size(); ++i)
+    log += factors[i] + (i > 0 ? curve_rules_.log_prior_odds_more : 0);
+  return log;
 }
 
 void Search::keep(const ModelSet& set, const std::shared_ptr<const Evaluated>& at) {

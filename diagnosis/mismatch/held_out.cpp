@@ -167,7 +167,7 @@ class NormalNoise {
   static std::shared_ptr<const Likelihood> made(const Fit& fit) {
     inference::Noise noise = fit.likelihood->noise();
     if (noise.tails.degrees == 0) return fit.likelihood;
-    noise.tails = {};
+    noise.tails = {}, noise.tails_are_open = false;
     return std::make_shared<const Likelihood>(*fit.likelihood, noise, inputs_about(fit), inference::ByReading{});
   }
   std::map<const Fit*, std::shared_ptr<const Likelihood>> known_;

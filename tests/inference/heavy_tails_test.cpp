@@ -80,7 +80,7 @@ class HeavySystem final : public LinearSystem {
 
 Evaluated evaluate_set(const HeavySystem& system, const ModelSet& set, bool tails) {
   Noise noise = white(system);
-  if (tails) noise.tails = {.degrees = 5, .scale = 0.6};
+  if (tails) noise.tails = {.degrees = 5, .scale = 0.6}, noise.tails_are_open = true;
   const Likelihood likelihood(system, Readings(HeavySystem::kRecordings), noise);
   const Layout layout(system, set);
   return evaluate(likelihood, layout, layout.shared_start(),
