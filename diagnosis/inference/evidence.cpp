@@ -103,6 +103,12 @@ Integrated integrated(const std::vector<CurveFactor>& curves) {
   return {.log_factor = mean, .log_others = mean - logs.front()};
 }
 
+void erase_known(std::span<const CurvePrior> known, std::vector<CurveFactor>& curves) {
+  std::erase_if(curves, [&](const CurveFactor& one) {
+    return std::ranges::find(known, one.prior.curve, &CurvePrior::curve) != known.end();
+  });
+}
+
 // Of those among a scan's curves that stand out nowhere: what they promise is little, and the linear model is right
 // about it.
 double log_factor_of_unlikely(const std::vector<CurveFactor>& curves) {
@@ -142,9 +148,7 @@ bool add_curve(const Likelihood& likelihood, const Discrepancy& discrepancy, con
   const Fit& here = *out.fit_with_curve;
   auto scans = scans_beside_less_spread(likelihood, discrepancy, here);
   scans.push_back({.curves = scan_beside(likelihood, discrepancy, here)});
-  for (Scan& scan : scans)
-    for (const CurvePrior& known : here.scales.curves)
-      std::erase_if(scan.curves, [&](const CurveFactor& one) { return one.prior.curve == known.curve; });
+  for (Scan& scan : scans) erase_known(here.scales.curves, scan.curves);
   const Scan &own = scans.back(), &more = *std::ranges::max_element(scans, {}, &Scan::promised);
   if (more.curves.empty()) return false;
   const Integrated all = integrated(more.curves);
@@ -171,7 +175,6 @@ bool add_curve(const Likelihood& likelihood, const Discrepancy& discrepancy, con
   const double log_factor = with.over.log_mean + log_others - log_evidence;
   if (!(log_factor + rules.log_prior_odds_more > 0)) return false;
   log_evidence = with.over.log_mean;
-  out.fit_without_last_curve = std::move(out.fit_with_curve);
   out.fit_with_curve = std::move(with.fit);
   out.nuisance_weights_with_curve = with.over.weights;
   out.log_factors.push_back(log_factor);
@@ -257,6 +260,23 @@ WithCurve settle_with(const Likelihood& likelihood, const Discrepancy& discrepan
 
 }  // namespace
 
+double log_factor_of_one_more(const Discrepancy& discrepancy, const Marginal& beside,
+                              std::span<const CurvePrior> known) {
+  auto curves = discrepancy.scan(beside);
+  erase_known(known, curves);
+  return curves.empty() ? 0 : integrated(curves).log_factor;
+}
+
+Fit without_curve(const Discrepancy& discrepancy, Fit fit, std::size_t which) {
+  const auto places = discrepancy.places(fit.scales.curves);
+  const Index after = fit.curve_values.size() - places[which + 1];
+  fit.curve_values.segment(places[which], after) = fit.curve_values.tail(after).eval();
+  fit.curve_values.conservativeResize(places[which] + after);
+  fit.scales.curves.erase(fit.scales.curves.begin() + static_cast<std::ptrdiff_t>(which));
+  if (fit.tangent) fit.tangent = fit.scales.curves.empty() ? nullptr : tangent_about(discrepancy, fit);
+  return fit;
+}
+
 Fit with_first_curve(const Discrepancy& discrepancy, Fit fit) {
   fit.curve_values.conservativeResize(discrepancy.places(fit.scales.curves)[1]);
   fit.scales.curves.resize(1);
@@ -267,7 +287,6 @@ Fit with_first_curve(const Discrepancy& discrepancy, Fit fit) {
 void add_discrepancy(const Likelihood& likelihood, const Discrepancy& discrepancy, const CurveRules& rules,
                      Evaluated& out, double give_up_below, const LargeCurves& large) {
   out.with_discrepancy = true;
-  out.fit_without_last_curve.reset();
   out.curves = scan_beside(likelihood, discrepancy, out.fit);
   if (out.curves.empty()) return;
   out.log_bayes_factor_curve = log_factor_of_unlikely(out.curves);

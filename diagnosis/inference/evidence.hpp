@@ -12,14 +12,13 @@ namespace bevel::inference {
 // A set at its mode, with its evidence. Logarithms, natural; all of one Likelihood stand on one scale.
 struct Evaluated {
   explicit Evaluated(Fit f) : fit(std::move(f)) {}
-  Fit fit;                                    // without a curve, at the likeliest standard deviations
-  std::optional<Fit> fit_with_curve;          // with the likeliest curves, where one is likely at all
-  std::optional<Fit> fit_without_last_curve;  // where there are several
-  double log_evidence = 0;                    // without a discrepancy
-  double log_bayes_factor_curve = 0;          // of a discrepancy of any number of curves, against none
-  std::vector<CurveFactor> curves;            // each of them as the first, the likeliest first
-  std::vector<double> log_factors;   // of each curve of fit_with_curve beside those before it, choices integrated over
-  Eigen::VectorXd nuisance_weights;  // posterior over the grid of standard deviations
+  Fit fit;                            // without a curve, at the likeliest standard deviations
+  std::optional<Fit> fit_with_curve;  // with the likeliest curves, where one is likely at all
+  double log_evidence = 0;            // without a discrepancy
+  double log_bayes_factor_curve = 0;  // of a discrepancy of any number of curves, against none
+  std::vector<CurveFactor> curves;    // each of them as the first, the likeliest first
+  std::vector<double> log_factors;    // of each curve of fit_with_curve beside those before it, choices integrated over
+  Eigen::VectorXd nuisance_weights;   // posterior over the grid of standard deviations
   Eigen::VectorXd nuisance_weights_with_curve;
   bool with_discrepancy = false;  // whether that was asked
   bool valid = false;
@@ -47,6 +46,11 @@ struct LargeCurves {
 void add_discrepancy(const Likelihood& likelihood, const Discrepancy& discrepancy, const CurveRules& rules,
                      Evaluated& evaluated, double give_up_below = -std::numeric_limits<double>::infinity(),
                      const LargeCurves& large = {});
+// The same without one of its curves, all else where it is.
+Fit without_curve(const Discrepancy& discrepancy, Fit fit, std::size_t which);
+// Log Bayes factor of one more curve than those known, whichever it is, beside what a set leaves.
+double log_factor_of_one_more(const Discrepancy& discrepancy, const Marginal& beside,
+                              std::span<const CurvePrior> known);
 // A fit's likeliest curve, as `beside` another set's is begun: in that set's layout, its values as they are.
 Fit with_first_curve(const Discrepancy& discrepancy, Fit fit);
 

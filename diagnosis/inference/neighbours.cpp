@@ -67,11 +67,23 @@ void Search::expand(const ModelSet& set) {
         add(less.fit, proposals_->beside(Marginal(*by, less.fit, curve, likelihood_.get()), rules_.starts), false,
             log_here, moved, &less);
     };
-    if (here.is_likelier_with_curve()) look_beside(*here.at->fit_with_curve, here.log_with_curve, true, false);
-    // With one curve less and without any, too: an effect may take its place.
-    if (here.is_likelier_with_curve() && here.at->fit_without_last_curve)
-      look_beside(*here.at->fit_without_last_curve, log_without_last_curve(here), false, false);
-    // What takes up the mean of steps is a member; the base alone has none.
+    if (here.is_likelier_with_curve()) {
+      const Fit& with_curve = *here.at->fit_with_curve;
+      look_beside(with_curve, here.log_with_curve, true, false);
+      // In each curve's place: by how much more an effect is worth there than the curve.
+      const auto own = with_inputs_of(with_curve, likelihood_);
+      const auto& curves = with_curve.scales.curves;
+      for (std::size_t k = 0; k < curves.size(); ++k) {
+        const Fit about = without_curve(*discrepancy_, with_curve, k);
+        const Marginal marginal(*own, about, discrepancy_->columns(*own, about), likelihood_.get());
+        const double leaves = log_factor_of_one_more(*discrepancy_, marginal, about.scales.curves) +
+                              (curves.size() == 1 ? curve_rules_.log_prior_odds : curve_rules_.log_prior_odds_more);
+        add(about, proposals_->beside(marginal, rules_.starts), false, here.log_with_curve - leaves,
+            {.fit = about, .log_change = 0});
+      }
+    }
+    // Without a curve too, from where the set is fitted by itself. What takes up the mean of steps is a member; the
+    // base alone has none.
     look_beside(here.at->fit, here.log_without_curve, true, !set.empty());
   }
   // Smaller sets, from which swaps come. One that was visited already once more, if from here it is likelier even

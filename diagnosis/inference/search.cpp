@@ -127,14 +127,6 @@ Visited Search::weighed(const ModelSet& set, double log_prior, const std::shared
   return one;
 }
 
-double Search::log_without_last_curve(const Visited& one) const {
-  double log = one.log_without_curve + curve_rules_.log_prior_odds;
-  const auto& factors = one.at->log_factors;
-  for (std::size_t i = 0; i + 1 < factors.size(); ++i)
-    log += factors[i] + (i > 0 ? curve_rules_.log_prior_odds_more : 0);
-  return log;
-}
-
 void Search::keep(const ModelSet& set, const std::shared_ptr<const Evaluated>& at) {
   Visited one = weighed(set, log_prior(set), at);
   const auto known = visited_.find(set);
@@ -206,10 +198,13 @@ void Search::evaluate_all(std::vector<Job> jobs) {
   }
   std::vector<std::shared_ptr<Evaluated>> with(asked.size());
   parallel_for(asked.size(), [&](std::size_t k) {
+    const Job& job = jobs[asked[k]];
     with[k] = std::make_shared<Evaluated>(*results[asked[k]]);
-    add_discrepancy(*likelihood_, *discrepancy_, curve_rules_, *with[k],
-                    hopeless(jobs[asked[k]]) - curve_rules_.log_prior_odds,
-                    {.beside = jobs[asked[k]].large_curve.get()});
+    // What is promised beside several curves has little of it with the first alone.
+    const double give_up_below =
+        job.beside_curve ? -std::numeric_limits<double>::infinity() : hopeless(job) - curve_rules_.log_prior_odds;
+    add_discrepancy(*likelihood_, *discrepancy_, curve_rules_, *with[k], give_up_below,
+                    {.beside = job.large_curve.get()});
   });
   for (std::size_t k = 0; k < asked.size(); ++k) keep(jobs[asked[k]].set, with[k]);
 }

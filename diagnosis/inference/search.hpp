@@ -102,7 +102,6 @@ class Search {
   // Null: its noise is normal.
   std::shared_ptr<const Likelihood> with_heavy_tails(const Fit& fit) const;
   double best_log() const;
-  double log_without_last_curve(const Visited& one) const;  // log posterior, of a set with several
   const Fit& likeliest_fit() const { return best().likelier_fit(); }
   bool is_visited(const ModelSet& set) const { return visited_.contains(set); }
 

@@ -16,10 +16,10 @@ using Eigen::Index;
 using Eigen::MatrixXd;
 using Eigen::VectorXd;
 
-// y = level + level_r + (slope_r + size g_r) x + wave w(x) + white noise: g_r is -1 in one half of the recordings and 1
-// in the other, slope_r and level_r each recording's own, normal about zero; w a triangle that goes up to 1 and down to
-// -1. What sets the halves apart is an effect's, or a curve's of the slope over g; the wave is a curve's of the level
-// over x.
+// y = level + level_r + (slope_r + size g_r + of_pairs p_r) x + wave w(x) + white noise: g_r is -1 in one half of the
+// recordings and 1 in the other, p_r in pairs of them, slope_r and level_r each recording's own, normal about zero; w a
+// triangle that goes up to 1 and down to -1. What sets the halves apart is an effect's, or a curve's of the slope over
+// g; that of the pairs a curve's over p, and the wave one's of the level over x.
 class HalvesDiffer final : public testing::HeldSystem {
  public:
   static constexpr Index kReadings = 60;
@@ -32,6 +32,7 @@ class HalvesDiffer final : public testing::HeldSystem {
     double tail_degrees = 0;  // of Student's t, of the same standard deviation; 0: normal noise
     double level_sd = 0;      // 0: nor may they differ in it
     double wave = 0;          // 0: nor is there a curve of it
+    double of_pairs = 0;      // the same
   };
   HalvesDiffer(std::size_t recordings, const Truth& truth, unsigned seed) {
     data_.claimed_sd = {kSigma};
@@ -40,7 +41,7 @@ class HalvesDiffer final : public testing::HeldSystem {
     std::normal_distribution<double> normal;
     for (std::size_t r = 0; r < recordings; ++r) {
       std::vector<double> measured;
-      const double slope = truth.slope_sd * normal(random) + truth.size * half_of(r);
+      const double slope = truth.slope_sd * normal(random) + truth.size * half_of(r) + truth.of_pairs * pair_of(r);
       const double level = truth.level_sd > 0 ? truth.level_sd * normal(random) : 0;
       for (Index i = 0; i < kReadings; ++i)
         measured.push_back(level + slope * x(i) + truth.wave * (hat(i, 0.25) - hat(i, 0.75)) +
@@ -58,6 +59,8 @@ class HalvesDiffer final : public testing::HeldSystem {
     groups_ = {{"slope", "1", {0, 0.03, 0.1, 0.3}}};
     if (truth.wave != 0)
       curves_.push_back({.component = "level", .unit = "1", .covariate = "x", .at = {0, 0.25, 0.5, 0.75, 1}});
+    if (truth.of_pairs != 0)
+      curves_.push_back({.component = "slope", .unit = "1", .covariate = "pair", .at = {-1, 0, 1}});
     if (truth.level_sd == 0) return;
     nuisances_.push_back({"level", 1});
     groups_.push_back({"level", "1", {0, 0.1, 1}});
@@ -77,16 +80,22 @@ class HalvesDiffer final : public testing::HeldSystem {
     return true;
   }
   MatrixXd by_curves(std::size_t r, const VectorXd&) const override {
-    MatrixXd out = MatrixXd::Zero(kReadings, curves_.size() > 1 ? 8 : 3);
-    for (Index i = 0; i < kReadings; ++i) {
-      out(i, half_of(r) < 0 ? 0 : 2) = x(i);
-      for (Index k = 0; k < out.cols() - 3; ++k) out(i, 3 + k) = hat(i, curves_[1].at[static_cast<std::size_t>(k)]);
-    }
+    Index columns = 0;
+    for (const Curve& curve : curves_) columns += static_cast<Index>(curve.at.size());
+    MatrixXd out = MatrixXd::Zero(kReadings, columns);
+    Index column = 0;
+    for (const Curve& curve : curves_)
+      for (const double at : curve.at) {
+        const bool here = at == (curve.covariate == "half" ? half_of(r) : pair_of(r));
+        for (Index i = 0; i < kReadings; ++i) out(i, column) = curve.covariate == "x" ? hat(i, at) : here ? x(i) : 0;
+        ++column;
+      }
     return out;
   }
 
  private:
   static double half_of(std::size_t r) { return r % 2 == 0 ? -1 : 1; }
+  static double pair_of(std::size_t r) { return r / 2 % 2 == 0 ? -1 : 1; }
 };
 
 constexpr double kNever = -std::numeric_limits<double>::infinity();
@@ -179,6 +188,17 @@ TEST(HiddenInSpread, NorIsOneThatIsLikelyBesideACurve) {
   expect_effects_found({.size = 0.08, .slope_sd = 0.03, .tail_degrees = 4, .wave = 0.02});
 }
 
+// With two curves nothing is left of it, and without any it is small beside what is.
+TEST(HiddenInSpread, AnEffectIsLookedForInACurvesPlace) {
+  expect_effects_found({.size = 0.3, .wave = 0.004});
+  expect_effects_found({.size = 0.3, .slope_sd = 0.03, .wave = 0.01});
+  expect_effects_found({.size = 1, .wave = 0.03});
+}
+
+TEST(HiddenInSpread, NorIsOneThatIsLikelyBesideTwoCurvesOnly) {
+  expect_effects_found({.size = 0.2, .slope_sd = 0.03, .wave = 0.1, .of_pairs = 2});
+}
+
 // The likeliest curve of the slope by itself, from every spread, brings no more log evidence than what was found says;
 // beside the wave's curve, where there is one.
 void expect_curves_found(const HalvesDiffer::Truth& truth) {
@@ -192,9 +212,8 @@ void expect_curves_found(const HalvesDiffer::Truth& truth) {
     const Fit* fit = &nothing.fit;
     if (truth.wave != 0) {
       ASSERT_TRUE(nothing.fit_with_curve);
-      fit = nothing.fit_without_last_curve ? &*nothing.fit_without_last_curve : &*nothing.fit_with_curve;
-      beside = fit->scales.curves;
-      ASSERT_EQ(beside.size(), 1U);
+      fit = &*nothing.fit_with_curve;
+      beside = {fit->scales.curves.front()};
       ASSERT_EQ(beside.front().curve, 1U);
     }
     const auto settled = [&](double sd, const std::vector<CurvePrior>& curves) {
