@@ -1,5 +1,6 @@
 #include <algorithm>
 #include <cmath>
+#include <iterator>
 #include <limits>
 
 #include "diagnosis/inference/error_spread.hpp"
@@ -7,6 +8,120 @@
 #include "diagnosis/inference/search.hpp"
 
 namespace bevel::inference {
+
+// Beside a fit, with its curve if it has one, and beside the same with less spread.
+std::vector<Search::Beside> Search::look_beside(const Fit& fit, double log_here, bool with_others_moved) const {
+  const auto by = with_inputs_of(fit, likelihood_);
+  const Moved moved = moved_to(by, fit, *discrepancy_);
+  const CurveColumns curve = discrepancy_->columns(*by, moved.fit);
+  const Marginal marginal(*by, moved.fit, curve, likelihood_.get());
+  // What is promised is relative to this set by the reference's noise, which may be wrong for this set and right for
+  // the larger; or by that of this set, of which it is the other way about: the larger finds its own, which promises no
+  // less than either.
+  const auto log_promised = [=](double log_change) {
+    return log_here + (moved.fit.valid ? std::max(moved.log_change + log_change, moved.share_before * log_change)
+                                       : moved.log_change);
+  };
+  std::vector<Beside> out{{.about = moved.fit,
+                           .proposals = proposals_->beside(marginal, rules_.starts),
+                           .log_promised = log_promised,
+                           .with_foremost = true}};
+  if (with_others_moved)
+    proposals_->look_with_others_moved(*likelihood_, moved.fit, marginal, rules_.starts, out.front().proposals);
+  for (WithLessSpread& less : with_less_spread(*by, moved.fit, curve)) {
+    auto proposals = proposals_->beside(Marginal(*by, less.fit, curve, likelihood_.get()), rules_.starts);
+    out.push_back(
+        {.about = std::move(less.fit),
+         .proposals = std::move(proposals),
+         .log_promised = [=, change = less.log_change](double log_factor) { return log_promised(change + log_factor); },
+         .only_if_new = true});
+  }
+  return out;
+}
+
+// In the place of each curve that a set has: by how much more an effect is worth there than the curve.
+std::vector<Search::Beside> Search::look_in_curves_places(const Fit& with_curve, double log_here) const {
+  std::vector<Beside> out;
+  const auto by = with_inputs_of(with_curve, likelihood_);
+  const std::size_t count = with_curve.scales.curves.size();
+  for (std::size_t k = 0; k < count; ++k) {
+    Fit about = without_curve(*discrepancy_, with_curve, k);
+    const Marginal marginal(*by, about, discrepancy_->columns(*by, about), likelihood_.get());
+    const double leaves = log_factor_of_one_more(*discrepancy_, marginal, about.scales.curves) +
+                          (count == 1 ? curve_rules_.log_prior_odds : curve_rules_.log_prior_odds_more);
+    out.push_back({.about = std::move(about),
+                   .proposals = proposals_->beside(marginal, rules_.starts),
+                   .log_promised = [=](double log_factor) { return log_here - leaves + log_factor; }});
+  }
+  return out;
+}
+
+// The set with each effect that comes near.
+std::vector<Search::Job> Search::larger(const ModelSet& set, const Beside& beside) {
+  std::vector<Job> out;
+  const double best = best_log();
+  std::size_t rank = 0;
+  for (const Proposal& one : beside.proposals) {
+    // Far from its start an effect may bring much more than in proportion: the foremost are fitted in any case.
+    const bool foremost =
+        beside.with_foremost && rank++ < rules_.foremost && one.log_bayes_factor > -log_prior_odds(one.effect);
+    const ModelSet larger = with(set, one.effect);
+    const double promised = beside.log_promised(one.log_bayes_factor) + log_prior_odds(one.effect);
+    auto& most = promised_.try_emplace(larger, -std::numeric_limits<double>::infinity()).first->second;
+    const bool nothing_new = beside.only_if_new && promised < most + rules_.optimism;
+    most = std::max(most, promised);
+    if (nothing_new) continue;
+    const double doubtful = rules_.optimism + rules_.linear_error * std::max(0.0, one.log_bayes_factor);
+    if (!foremost && promised + doubtful < best - rules_.window) continue;
+    // A fit that fell far short of the promise may be in a local minimum: once more, from these starts.
+    const auto visited = visited_.find(larger);
+    if (visited != visited_.end() &&
+        (visited->second.log_posterior() > promised - doubtful || !refitted_.insert(larger).second))
+      continue;
+    for (const StartPoint& start : one.starts)
+      if (start.log_bayes_factor > one.starts.front().log_bayes_factor - rules_.window) {
+        out.push_back(job_from(beside.about, one.effect, start));
+        if (!foremost) out.back().promised = promised + doubtful;
+        ask_for_curve_of(beside.about, out.back());
+      }
+  }
+  return out;
+}
+
+// The set without each member. One that was visited already once more, if from here it is likelier even without what it
+// gains by having fewer parameters: then it was in a local minimum.
+std::vector<Search::Job> Search::smaller(const Visited& here) {
+  std::vector<Job> out;
+  const bool large = here.is_likelier_with_curve() && here.at->fit_with_curve->tangent;
+  const Fit& fit = here.at->fit;
+  const auto costs = log_costs_of_dropping(fit);
+  std::vector<double> costs_beside_curve;
+  if (large) {
+    const Fit& with_curve = *here.at->fit_with_curve;
+    costs_beside_curve = log_costs_of_dropping(with_curve, discrepancy_->columns(*with_curve.likelihood, with_curve));
+  }
+  for (std::size_t m = 0; m < here.set.size(); ++m) {
+    const ModelSet smaller = without(here.set, here.set[m]);
+    if (const auto known = visited_.find(smaller); known != visited_.end()) {
+      const auto falls_short = [&](double log_known, double log_here, double cost) {
+        return log_known <= log_here - cost - log_prior_odds(here.set[m]) - rules_.optimism;
+      };
+      const Visited& there = known->second;
+      if (!falls_short(there.log_without_curve, here.log_without_curve, costs[m]) &&
+          !(large && falls_short(there.log_with_curve, here.log_with_curve, costs_beside_curve[m])))
+        continue;
+      if (!from_larger_.insert(smaller).second) continue;
+    }
+    out.push_back(job_at(carried_to(Layout(system_, smaller), fit)));
+    if (large) {
+      Job beside = job_at(carried_to(Layout(system_, smaller), *here.at->fit_with_curve));
+      ask_for_curve_of(*here.at->fit_with_curve, beside);
+      out.back().beside_curve = true;
+      out.back().large_curve = beside.large_curve;
+    }
+  }
+  return out;
+}
 
 void Search::expand(const ModelSet& set) {
   expanded_.insert(set);
@@ -16,107 +131,21 @@ void Search::expand(const ModelSet& set) {
     progress_(describe(system_, set) + "; " + std::to_string(fits_) + " fits done, nothing is begun after " +
               std::to_string(rules_.most_fits));
   std::vector<Job> jobs;
+  const auto append = [&](std::vector<Job> more) { std::ranges::move(more, std::back_inserter(jobs)); };
+  const auto append_larger = [&](const std::vector<Beside>& looked) {
+    for (const Beside& one : looked) append(larger(set, one));
+  };
   if (set.size() < rules_.largest) {
-    const double best = best_log();
-    // What is promised is relative to this set by the reference's noise, which may be wrong for this set and right for
-    // the larger; or by that of this set, of which it is the other way about: the larger finds its own, which promises
-    // no less than either.
-    const auto by_either_noise = [](const Moved& moved, double log_change) {
-      return moved.fit.valid ? std::max(moved.log_change + log_change, moved.share_before * log_change)
-                             : moved.log_change;
-    };
-    const auto add = [&](const Fit& about, const std::vector<Proposal>& list, bool with_foremost, double log_here,
-                         const Moved& moved, const WithLessSpread* less = nullptr) {
-      std::size_t rank = 0;
-      for (const Proposal& one : list) {
-        // Far from its start an effect may bring much more than in proportion: the foremost are fitted in any case.
-        const bool foremost =
-            with_foremost && rank++ < rules_.foremost && one.log_bayes_factor > -log_prior_odds(one.effect);
-        const ModelSet larger = with(set, one.effect);
-        const double promised = log_here +
-                                by_either_noise(moved, (less ? less->log_change : 0) + one.log_bayes_factor) +
-                                log_prior_odds(one.effect);
-        auto& most = promised_.try_emplace(larger, -std::numeric_limits<double>::infinity()).first->second;
-        const bool nothing_new = less && promised < most + rules_.optimism;
-        most = std::max(most, promised);
-        if (nothing_new) continue;
-        const double doubtful = rules_.optimism + rules_.linear_error * std::max(0.0, one.log_bayes_factor);
-        if (!foremost && promised + doubtful < best - rules_.window) continue;
-        // A fit that fell far short of the promise may be in a local minimum: once more, from these starts.
-        const auto visited = visited_.find(larger);
-        if (visited != visited_.end() &&
-            (visited->second.log_posterior() > promised - doubtful || !refitted_.insert(larger).second))
-          continue;
-        for (const StartPoint& start : one.starts)
-          if (start.log_bayes_factor > one.starts.front().log_bayes_factor - rules_.window) {
-            jobs.push_back(job_from(about, one.effect, start));
-            if (!foremost) jobs.back().promised = promised + doubtful;
-            ask_for_curve_of(about, jobs.back());
-          }
-      }
-    };
-    const auto look_beside = [&](const Fit& fit, double log_here, bool with_foremost, bool with_others_moved) {
-      const auto by = with_inputs_of(fit, likelihood_);
-      const Moved moved = moved_to(by, fit, *discrepancy_);
-      const CurveColumns curve = discrepancy_->columns(*by, moved.fit);
-      const Marginal marginal(*by, moved.fit, curve, likelihood_.get());
-      auto list = proposals_->beside(marginal, rules_.starts);
-      if (with_others_moved) proposals_->look_with_others_moved(*likelihood_, moved.fit, marginal, rules_.starts, list);
-      add(moved.fit, list, with_foremost, log_here, moved);
-      for (const WithLessSpread& less : with_less_spread(*by, moved.fit, curve))
-        add(less.fit, proposals_->beside(Marginal(*by, less.fit, curve, likelihood_.get()), rules_.starts), false,
-            log_here, moved, &less);
-    };
     if (here.is_likelier_with_curve()) {
-      const Fit& with_curve = *here.at->fit_with_curve;
-      look_beside(with_curve, here.log_with_curve, true, false);
-      // In each curve's place: by how much more an effect is worth there than the curve.
-      const auto own = with_inputs_of(with_curve, likelihood_);
-      const auto& curves = with_curve.scales.curves;
-      for (std::size_t k = 0; k < curves.size(); ++k) {
-        const Fit about = without_curve(*discrepancy_, with_curve, k);
-        const Marginal marginal(*own, about, discrepancy_->columns(*own, about), likelihood_.get());
-        const double leaves = log_factor_of_one_more(*discrepancy_, marginal, about.scales.curves) +
-                              (curves.size() == 1 ? curve_rules_.log_prior_odds : curve_rules_.log_prior_odds_more);
-        add(about, proposals_->beside(marginal, rules_.starts), false, here.log_with_curve - leaves,
-            {.fit = about, .log_change = 0});
-      }
+      append_larger(look_beside(*here.at->fit_with_curve, here.log_with_curve, false));
+      append_larger(look_in_curves_places(*here.at->fit_with_curve, here.log_with_curve));
     }
     // Without a curve too, from where the set is fitted by itself. What takes up the mean of steps is a member; the
     // base alone has none.
-    look_beside(here.at->fit, here.log_without_curve, true, !set.empty());
+    append_larger(look_beside(here.at->fit, here.log_without_curve, !set.empty()));
   }
-  // Smaller sets, from which swaps come. One that was visited already once more, if from here it is likelier even
-  // without what it gains by having fewer parameters: then it was in a local minimum.
-  const bool large = here.is_likelier_with_curve() && here.at->fit_with_curve->tangent;
-  const Fit& fit = here.at->fit;
-  const auto costs = log_costs_of_dropping(fit);
-  std::vector<double> costs_beside_curve;
-  if (large) {
-    const Fit& with_curve = *here.at->fit_with_curve;
-    costs_beside_curve = log_costs_of_dropping(with_curve, discrepancy_->columns(*with_curve.likelihood, with_curve));
-  }
-  for (std::size_t m = 0; m < set.size(); ++m) {
-    const ModelSet smaller = without(set, set[m]);
-    if (const auto known = visited_.find(smaller); known != visited_.end()) {
-      const auto falls_short = [&](double log_known, double log_here, double cost) {
-        return log_known <= log_here - cost - log_prior_odds(set[m]) - rules_.optimism;
-      };
-      const Visited& there = known->second;
-      if (!falls_short(there.log_without_curve, here.log_without_curve, costs[m]) &&
-          !(large && falls_short(there.log_with_curve, here.log_with_curve, costs_beside_curve[m])))
-        continue;
-      if (!from_larger_.insert(smaller).second) continue;
-    }
-    jobs.push_back(job_at(carried_to(Layout(system_, smaller), fit)));
-    if (large) {
-      Job beside = job_at(carried_to(Layout(system_, smaller), *here.at->fit_with_curve));
-      ask_for_curve_of(*here.at->fit_with_curve, beside);
-      jobs.back().beside_curve = true;
-      jobs.back().large_curve = beside.large_curve;
-    }
-  }
-  for (Job& job : swaps(here)) jobs.push_back(std::move(job));
+  append(smaller(here));
+  append(swaps(here));
   evaluate_all(std::move(jobs));
 }
 

@@ -201,8 +201,9 @@ void Search::evaluate_all(std::vector<Job> jobs) {
     const Job& job = jobs[asked[k]];
     with[k] = std::make_shared<Evaluated>(*results[asked[k]]);
     // What is promised beside several curves has little of it with the first alone.
+    const bool promised = job.beside_curve && std::isfinite(job.promised);
     const double give_up_below =
-        job.beside_curve ? -std::numeric_limits<double>::infinity() : hopeless(job) - curve_rules_.log_prior_odds;
+        promised ? -std::numeric_limits<double>::infinity() : hopeless(job) - curve_rules_.log_prior_odds;
     add_discrepancy(*likelihood_, *discrepancy_, curve_rules_, *with[k], give_up_below,
                     {.beside = job.large_curve.get()});
   });

@@ -88,7 +88,20 @@ class Search {
     double promised = std::numeric_limits<double>::infinity();
     std::shared_ptr<const Fit> large_curve{};  // with a curve too large for the linear model: the same begins there
   };
+  // What further effects bring beside one fit of a set, by the linear model.
+  struct Beside {
+    Fit about;
+    std::vector<Proposal> proposals;
+    // Of a log Bayes factor: the larger set's log posterior, but for the prior odds of what joins.
+    std::function<double(double)> log_promised;
+    bool with_foremost = false;
+    bool only_if_new = false;  // what promises no more than it did elsewhere is not begun from here
+  };
   void expand(const ModelSet& set);
+  std::vector<Beside> look_beside(const Fit& fit, double log_here, bool with_others_moved) const;
+  std::vector<Beside> look_in_curves_places(const Fit& with_curve, double log_here) const;
+  std::vector<Job> larger(const ModelSet& set, const Beside& beside);
+  std::vector<Job> smaller(const Visited& here);
   std::vector<Job> swaps(const Visited& here);
   void keep(const ModelSet& set, const std::shared_ptr<const Evaluated>& at);
   void drop_repeated(std::vector<Job>& jobs) const;
