@@ -16,8 +16,9 @@ using Eigen::VectorXd;
 
 namespace {
 
-constexpr double kLikelyCurve = 3;    // log Bayes factor from which a curve is fitted
-constexpr double kOfLikeliest = 0.5;  // of what the likeliest curve gains: what that of another component does
+constexpr double kLikelyCurve = 3;        // log Bayes factor from which a curve is fitted
+constexpr double kOfLikeliest = 0.5;      // of what the likeliest curve gains: what that of another component does
+constexpr double kWorthAnExchange = 0.5;  // log evidence: what a curve in another's place has to promise, and bring
 
 // Of all curves of a scan together, each as likely beforehand: the likeliest's factor and what the rest adds to it.
 struct Integrated {
@@ -70,9 +71,36 @@ std::vector<Scan> scans_beside_less_spread(const Likelihood& likelihood, const D
   return out;
 }
 
-// One more curve beside those that a set has; whether it is likelier than none more. log_evidence: with those it has.
+// The curves that a set has so far: the log evidence with them, and Integrated::log_others of each.
+struct Together {
+  double log_evidence = 0;
+  std::vector<double> log_others;
+};
+
+Settled settle_with_one_more(const Likelihood& likelihood, const Discrepancy& discrepancy, const Fit& from,
+                             const CurvePrior& prior) {
+  Scales scales = from.scales;
+  scales.curves.push_back(prior);
+  std::shared_ptr<const CurveTangent> tangent;
+  if (from.tangent) {
+    Fit with_one_more = from;
+    with_one_more.scales = scales;
+    with_one_more.curve_values = VectorXd::Zero(discrepancy.places(scales.curves).back());
+    with_one_more.curve_values.head(from.curve_values.size()) = from.curve_values;
+    tangent = tangent_about(discrepancy, with_one_more);
+  }
+  return settle(*from.likelihood, &discrepancy, from.layout, from.shared, from.local, scales,
+                nuisance_grid(likelihood.system()), -std::numeric_limits<double>::infinity(), std::move(tangent));
+}
+
+double log_factor_of(const std::vector<CurveFactor>& curves, const CurvePrior& prior) {
+  const auto at = std::ranges::find(curves, prior, &CurveFactor::prior);
+  return at == curves.end() ? -std::numeric_limits<double>::infinity() : at->log_bayes_factor;
+}
+
+// One more curve beside those that a set has; whether it is likelier than none more.
 bool add_curve(const Likelihood& likelihood, const Discrepancy& discrepancy, const CurveRules& rules, Evaluated& out,
-               double& log_evidence) {
+               Together& so_far) {
   const Fit& here = *out.fit_with_curve;
   auto scans = scans_beside_less_spread(likelihood, discrepancy, here);
   scans.push_back({.curves = scan_beside(likelihood, discrepancy, here)});
@@ -82,31 +110,42 @@ bool add_curve(const Likelihood& likelihood, const Discrepancy& discrepancy, con
   const Integrated all = integrated(more.curves);
   if (all.log_factor + more.log_change + rules.log_prior_odds_more + rules.optimism < 0) return false;
   const CurvePrior& prior = more.curves.front().prior;
-  Scales scales = here.scales;
-  scales.curves.push_back(prior);
-  std::shared_ptr<const CurveTangent> tangent;
-  if (here.tangent) {
-    Fit with_one_more = here;
-    with_one_more.scales = scales;
-    with_one_more.curve_values = VectorXd::Zero(discrepancy.places(scales.curves).back());
-    with_one_more.curve_values.head(here.curve_values.size()) = here.curve_values;
-    tangent = tangent_about(discrepancy, with_one_more);
-  }
-  Settled with =
-      settle(*here.likelihood, &discrepancy, here.layout, here.shared, here.local, scales,
-             nuisance_grid(likelihood.system()), -std::numeric_limits<double>::infinity(), std::move(tangent));
+  Settled with = settle_with_one_more(likelihood, discrepancy, here, prior);
   // Of the other scales and lengths, beside the spread that there is in the end.
   double log_others = all.log_others;
   if (with.fit.valid && with.fit.scales.nuisance_sd == here.scales.nuisance_sd)
-    log_others =
-        integrated(own.curves).log_factor - std::ranges::find(own.curves, prior, &CurveFactor::prior)->log_bayes_factor;
-  const double log_factor = with.over.log_mean + log_others - log_evidence;
+    log_others = integrated(own.curves).log_factor - log_factor_of(own.curves, prior);
+  const double log_factor = with.over.log_mean + log_others - so_far.log_evidence;
   if (!(log_factor + rules.log_prior_odds_more > 0)) return false;
-  log_evidence = with.over.log_mean;
+  so_far.log_evidence = with.over.log_mean;
+  so_far.log_others.push_back(log_others);
   out.fit_with_curve = std::move(with.fit);
   out.nuisance_weights_with_curve = with.over.weights;
   out.log_factors.push_back(log_factor);
   return true;
+}
+
+// The curves that are likeliest one after the other need not be those that are likeliest together: one of them in
+// another's place, the others as they are; whether there was such a one.
+bool exchange_curve(const Likelihood& likelihood, const Discrepancy& discrepancy, Evaluated& out, Together& so_far) {
+  for (std::size_t k = 0; k < out.fit_with_curve->scales.curves.size(); ++k) {
+    const CurvePrior leaves = out.fit_with_curve->scales.curves[k];
+    const Fit rest = without_curve(discrepancy, *out.fit_with_curve, k);
+    auto curves = scan_beside(likelihood, discrepancy, rest);
+    erase_known(rest.scales.curves, curves);
+    if (curves.empty() || curves.front().log_bayes_factor < log_factor_of(curves, leaves) + kWorthAnExchange) continue;
+    Settled with = settle_with_one_more(likelihood, discrepancy, rest, curves.front().prior);
+    if (!(with.over.log_mean > so_far.log_evidence + kWorthAnExchange)) continue;
+    const double log_others = integrated(curves).log_others;
+    out.log_factors.back() += with.over.log_mean + log_others - so_far.log_evidence - so_far.log_others[k];
+    so_far.log_evidence = with.over.log_mean;
+    so_far.log_others.erase(so_far.log_others.begin() + static_cast<std::ptrdiff_t>(k));
+    so_far.log_others.push_back(log_others);
+    out.fit_with_curve = std::move(with.fit);
+    out.nuisance_weights_with_curve = with.over.weights;
+    return true;
+  }
+  return false;
 }
 
 // A curve to be fitted beside a set.
@@ -265,9 +304,11 @@ void add_discrepancy(const Likelihood& likelihood, const Discrepancy& discrepanc
   out.log_factors = {with.over.log_mean + log_others - out.log_evidence};
   out.fit_with_curve = std::move(with.fit);
   out.nuisance_weights_with_curve = with.over.weights;
-  double log_evidence = with.over.log_mean;
-  while (log_evidence > give_up_below && out.log_factors.size() < rules.most &&
-         add_curve(likelihood, discrepancy, rules, out, log_evidence)) {
+  Together so_far{.log_evidence = with.over.log_mean, .log_others = {log_others}};
+  while (so_far.log_evidence > give_up_below && out.log_factors.size() < rules.most &&
+         add_curve(likelihood, discrepancy, rules, out, so_far)) {
+    while (exchange_curve(likelihood, discrepancy, out, so_far)) {
+    }
   }
   // Over their number, each more with its prior odds.
   out.log_bayes_factor_curve = out.log_factors.back();

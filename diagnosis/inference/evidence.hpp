@@ -17,7 +17,7 @@ struct Evaluated {
   double log_evidence = 0;            // without a discrepancy
   double log_bayes_factor_curve = 0;  // of a discrepancy of any number of curves, against none
   std::vector<CurveFactor> curves;    // each of them as the first, the likeliest first
-  std::vector<double> log_factors;    // of each curve of fit_with_curve beside those before it, choices integrated over
+  std::vector<double> log_factors;    // of one curve against none, of two against one, choices integrated over
   Eigen::VectorXd nuisance_weights;   // posterior over the grid of standard deviations
   Eigen::VectorXd nuisance_weights_with_curve;
   bool with_discrepancy = false;  // whether that was asked

@@ -33,6 +33,7 @@ class HalvesDiffer final : public testing::HeldSystem {
     double level_sd = 0;      // 0: nor may they differ in it
     double wave = 0;          // 0: nor is there a curve of it
     double of_pairs = 0;      // the same
+    bool mixed = false;       // whether there is a curve over what is nearly the mean of both
   };
   HalvesDiffer(std::size_t recordings, const Truth& truth, unsigned seed) {
     data_.claimed_sd = {kSigma};
@@ -61,6 +62,7 @@ class HalvesDiffer final : public testing::HeldSystem {
       curves_.push_back({.component = "level", .unit = "1", .covariate = "x", .at = {0, 0.25, 0.5, 0.75, 1}});
     if (truth.of_pairs != 0)
       curves_.push_back({.component = "slope", .unit = "1", .covariate = "pair", .at = {-1, 0, 1}});
+    if (truth.mixed) curves_.push_back({.component = "slope", .unit = "1", .covariate = "mixed", .at = {-1, 0, 1}});
     if (truth.level_sd == 0) return;
     nuisances_.push_back({"level", 1});
     groups_.push_back({"level", "1", {0, 0.1, 1}});
@@ -86,7 +88,9 @@ class HalvesDiffer final : public testing::HeldSystem {
     Index column = 0;
     for (const Curve& curve : curves_)
       for (const double at : curve.at) {
-        const bool here = at == (curve.covariate == "half" ? half_of(r) : pair_of(r));
+        const bool here = at == (curve.covariate == "half"   ? half_of(r)
+                                 : curve.covariate == "pair" ? pair_of(r)
+                                                             : mixed_of(r));
         for (Index i = 0; i < kReadings; ++i) out(i, column) = curve.covariate == "x" ? hat(i, at) : here ? x(i) : 0;
         ++column;
       }
@@ -96,6 +100,7 @@ class HalvesDiffer final : public testing::HeldSystem {
  private:
   static double half_of(std::size_t r) { return r % 2 == 0 ? -1 : 1; }
   static double pair_of(std::size_t r) { return r / 2 % 2 == 0 ? -1 : 1; }
+  static double mixed_of(std::size_t r) { return r == 3 ? 0 : 0.5 * (half_of(r) + pair_of(r)); }
 };
 
 constexpr double kNever = -std::numeric_limits<double>::infinity();
@@ -253,6 +258,29 @@ TEST(HiddenInSpread, ACurveIsLookedForBesideLessSpreadOfOneKind) {
 
 TEST(HiddenInSpread, NorIsACurveBesideAnotherLeftOut) {
   expect_curves_found({.size = 0.2, .slope_sd = 0.03, .tail_degrees = 4, .wave = 0.02});
+}
+
+// By itself that over the mixture is likeliest; beside either of the two that there are it is worth nothing.
+TEST(HiddenInSpread, TheLikeliestPairOfCurvesNeedNotBeginWithTheLikeliest) {
+  for (unsigned seed = 1; seed <= 10; ++seed) {
+    SCOPED_TRACE("seed " + std::to_string(seed));
+    const HalvesDiffer system(24, {.size = 0.36, .of_pairs = 0.24, .mixed = true}, seed);
+    const Search search = searched(system);
+    const Evaluated& nothing = *search.visited().at({}).at;
+    EXPECT_EQ(nothing.curves.front().prior.curve, 2U);
+    ASSERT_TRUE(nothing.fit_with_curve);
+    const auto& curves = nothing.fit_with_curve->scales.curves;
+    ASSERT_EQ(curves.size(), 2U);
+    EXPECT_EQ(std::max(curves[0].curve, curves[1].curve), 1U);
+    // What is added up is the evidence of these two, and of their scales and lengths.
+    const double all = std::log(static_cast<double>(search.discrepancy().choices()));
+    const double gain = nothing.log_factors[0] + nothing.log_factors[1];
+    const Fit& fit = *nothing.fit_with_curve;
+    const Settled both = settle(search.likelihood(), &search.discrepancy(), fit.layout, fit.shared, fit.local,
+                                fit.scales, nuisance_grid(system), kNever);
+    EXPECT_LE(gain, both.over.log_mean - nothing.log_evidence + 0.1);
+    EXPECT_GE(gain, both.over.log_mean - nothing.log_evidence - 2 * all);
+  }
 }
 
 // The wave is bounded, and passes for normal noise until it has a curve.
