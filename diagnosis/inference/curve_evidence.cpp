@@ -151,9 +151,8 @@ bool exchange_curve(const Likelihood& likelihood, const Discrepancy& discrepancy
 // A curve to be fitted beside a set.
 struct Candidate {
   CurvePrior prior;
-  double log_others = 0;  // Integrated
-  const Fit* from;        // where the fit begins
-  VectorXd nuisance_sd;
+  double log_others = 0;                                      // Integrated
+  const Fit* from;                                            // where the fit begins, its spread too
   double promised = std::numeric_limits<double>::infinity();  // log Bayes factor by the linear model about none
 };
 
@@ -168,11 +167,7 @@ std::vector<Candidate> candidates(const Likelihood& likelihood, const Discrepanc
     const auto known = std::ranges::find(out, prior.curve, [](const Candidate& c) { return c.prior.curve; });
     if (known != out.end() && known->promised >= promised) return;
     if (known != out.end()) out.erase(known);
-    out.push_back({.prior = prior,
-                   .log_others = integrated(curves).log_others,
-                   .from = &fit,
-                   .nuisance_sd = fit.scales.nuisance_sd,
-                   .promised = promised});
+    out.push_back({.prior = prior, .log_others = integrated(curves).log_others, .from = &fit, .promised = promised});
   };
   add(beside, beside.front().log_bayes_factor);
   for (const Scan& scan : scans_beside_less_spread(likelihood, discrepancy, fit)) add(scan.curves, scan.promised());
@@ -210,7 +205,7 @@ WithCurve settle_with(const Likelihood& likelihood, const Discrepancy& discrepan
   const Fit& from = *one.from;
   std::shared_ptr<const CurveTangent> tangent;
   if (from.curve_values.size() > 0) tangent = tangent_about(discrepancy, from);
-  const Scales scales{.nuisance_sd = one.nuisance_sd, .curves = {one.prior}};
+  const Scales scales{.nuisance_sd = from.scales.nuisance_sd, .curves = {one.prior}};
   const Likelihood& by = from.likelihood ? *from.likelihood : *set.likelihood;
   WithCurve out{.settled = settle(by, &discrepancy, set.layout, from.shared, from.local, scales,
                                   nuisance_grid(likelihood.system()), give_up_below, std::move(tangent)),
@@ -266,8 +261,7 @@ void add_discrepancy(const Likelihood& likelihood, const Discrepancy& discrepanc
   if (large.beside)
     list.push_back({.prior = large.beside->scales.curves.front(),
                     .log_others = integrated(out.curves).log_others,
-                    .from = large.beside,
-                    .nuisance_sd = large.beside->scales.nuisance_sd});
+                    .from = large.beside});
   for (Candidate& one : candidates(likelihood, discrepancy, out.fit, out.curves)) list.push_back(std::move(one));
   WithCurve best{.settled = {.fit = Fit(out.fit.layout), .over = {}}};
   bool is_large = false;
@@ -283,10 +277,8 @@ void add_discrepancy(const Likelihood& likelihood, const Discrepancy& discrepanc
   if (large.every_component && is_large) {
     std::vector<Candidate> others;
     for (const CurvePrior& prior : of_other_components(likelihood.system(), out.curves, list))
-      others.push_back({.prior = prior,
-                        .log_others = -std::log(static_cast<double>(out.curves.size())),
-                        .from = &out.fit,
-                        .nuisance_sd = out.fit.scales.nuisance_sd});
+      others.push_back(
+          {.prior = prior, .log_others = -std::log(static_cast<double>(out.curves.size())), .from = &out.fit});
     try_all(others);
   }
   Settled& with = best.settled;

@@ -57,7 +57,7 @@ std::vector<Search::Beside> Search::look_in_curves_places(const Fit& with_curve,
 }
 
 // The set with each effect that comes near.
-std::vector<Search::Job> Search::larger(const ModelSet& set, const Beside& beside) {
+std::vector<Search::Job> Search::larger_sets(const ModelSet& set, const Beside& beside) {
   std::vector<Job> out;
   const double best = best_log();
   std::size_t rank = 0;
@@ -90,7 +90,7 @@ std::vector<Search::Job> Search::larger(const ModelSet& set, const Beside& besid
 
 // The set without each member. One that was visited already once more, if from here it is likelier even without what it
 // gains by having fewer parameters: then it was in a local minimum.
-std::vector<Search::Job> Search::smaller(const Visited& here) {
+std::vector<Search::Job> Search::smaller_sets(const Visited& here) {
   std::vector<Job> out;
   const bool large = here.is_likelier_with_curve() && here.at->fit_with_curve->tangent;
   const Fit& fit = here.at->fit;
@@ -133,7 +133,7 @@ void Search::expand(const ModelSet& set) {
   std::vector<Job> jobs;
   const auto append = [&](std::vector<Job> more) { std::ranges::move(more, std::back_inserter(jobs)); };
   const auto append_larger = [&](const std::vector<Beside>& looked) {
-    for (const Beside& one : looked) append(larger(set, one));
+    for (const Beside& one : looked) append(larger_sets(set, one));
   };
   if (set.size() < rules_.largest) {
     if (here.is_likelier_with_curve()) {
@@ -144,7 +144,7 @@ void Search::expand(const ModelSet& set) {
     // base alone has none.
     append_larger(look_beside(here.at->fit, here.log_without_curve, !set.empty()));
   }
-  append(smaller(here));
+  append(smaller_sets(here));
   append(swaps(here));
   evaluate_all(std::move(jobs));
 }

@@ -100,8 +100,8 @@ class Search {
   void expand(const ModelSet& set);
   std::vector<Beside> look_beside(const Fit& fit, double log_here, bool with_others_moved) const;
   std::vector<Beside> look_in_curves_places(const Fit& with_curve, double log_here) const;
-  std::vector<Job> larger(const ModelSet& set, const Beside& beside);
-  std::vector<Job> smaller(const Visited& here);
+  std::vector<Job> larger_sets(const ModelSet& set, const Beside& beside);
+  std::vector<Job> smaller_sets(const Visited& here);
   std::vector<Job> swaps(const Visited& here);
   void keep(const ModelSet& set, const std::shared_ptr<const Evaluated>& at);
   void drop_repeated(std::vector<Job>& jobs) const;

@@ -129,7 +129,7 @@ struct DetectableSize {
 // What remains unexplained, described: which quantity of the motion is off by how much, against what. Several add up.
 struct Discrepancy {
   model::DiscrepancyCurve curve;
-  double log_bayes_factor = 0;   // natural: of the first against none, of the next against those before it alone
+  double log_bayes_factor = 0;   // natural: of the likeliest one against none, of so many against one less
   double visible_size = 0;       // root mean square over the readings, in standard deviations of the noise
   double moved_at_depth_mm = 0;  // as of an effect
 };

@@ -260,7 +260,7 @@ TEST(HiddenInSpread, NorIsACurveBesideAnotherLeftOut) {
   expect_curves_found({.size = 0.2, .slope_sd = 0.03, .tail_degrees = 4, .wave = 0.02});
 }
 
-// By itself that over the mixture is likeliest; beside either of the two that there are it is worth nothing.
+// By itself the curve over the mixture is likeliest; together the two that there are, without it.
 TEST(HiddenInSpread, TheLikeliestPairOfCurvesNeedNotBeginWithTheLikeliest) {
   for (unsigned seed = 1; seed <= 10; ++seed) {
     SCOPED_TRACE("seed " + std::to_string(seed));
