@@ -2,6 +2,7 @@
 #include <cmath>
 #include <functional>
 #include <limits>
+#include <optional>
 
 #include "diagnosis/inference/curved_fit.hpp"
 #include "diagnosis/inference/evidence.hpp"
@@ -57,18 +58,37 @@ std::vector<CurveFactor> scan_beside(const Likelihood& likelihood, const Discrep
 // recordings that differ more, and then another curve than the one that it is may stand out of what is left. Where they
 // do differ, no curve gains what spread does.
 struct Scan {
-  std::vector<CurveFactor> curves;
-  double log_change = 0;
+  std::vector<CurveFactor> curves{};
+  WithLessSpread beside;
+  bool at_mode = false;
   double promised() const {
-    return curves.empty() ? -std::numeric_limits<double>::infinity() : curves.front().log_bayes_factor + log_change;
+    return curves.empty() ? -std::numeric_limits<double>::infinity()
+                          : curves.front().log_bayes_factor + beside.log_change;
   }
 };
 std::vector<Scan> scans_beside_less_spread(const Likelihood& likelihood, const Discrepancy& discrepancy,
                                            const Fit& fit) {
   std::vector<Scan> out;
-  for (const WithLessSpread& less : with_less_spread(*fit.likelihood, fit, discrepancy.columns(*fit.likelihood, fit)))
-    out.push_back({.curves = scan_beside(likelihood, discrepancy, less.fit), .log_change = less.log_change});
+  for (WithLessSpread& less : with_less_spread(*fit.likelihood, fit, discrepancy.columns(*fit.likelihood, fit))) {
+    auto curves = scan_beside(likelihood, discrepancy, less.fit);
+    erase_known(fit.scales.curves, curves);
+    out.push_back({.curves = std::move(curves), .beside = std::move(less)});
+  }
   return out;
+}
+
+// Which of them promises most, once that has been looked at about its mode; end: none promises as much as `least`.
+std::vector<Scan>::iterator most_promising(const Likelihood& likelihood, const Discrepancy& discrepancy, const Fit& fit,
+                                           double least, std::vector<Scan>& scans) {
+  for (;;) {
+    const auto most = std::ranges::max_element(scans, {}, &Scan::promised);
+    if (most == scans.end() || most->promised() < least) return scans.end();
+    if (most->at_mode) return most;
+    most->beside = at_its_mode(most->beside, fit, discrepancy.columns(*fit.likelihood, fit));
+    most->curves = scan_beside(likelihood, discrepancy, most->beside.fit);
+    erase_known(fit.scales.curves, most->curves);
+    most->at_mode = true;
+  }
 }
 
 // The curves that a set has so far: the log evidence with them, and Integrated::log_others of each.
@@ -103,18 +123,21 @@ bool add_curve(const Likelihood& likelihood, const Discrepancy& discrepancy, con
                Together& so_far) {
   const Fit& here = *out.fit_with_curve;
   auto scans = scans_beside_less_spread(likelihood, discrepancy, here);
-  scans.push_back({.curves = scan_beside(likelihood, discrepancy, here)});
-  for (Scan& scan : scans) erase_known(here.scales.curves, scan.curves);
-  const Scan &own = scans.back(), &more = *std::ranges::max_element(scans, {}, &Scan::promised);
-  if (own.curves.empty() || more.curves.empty()) return false;  // outside the model's domain, or no other is left
-  const Integrated all = integrated(more.curves);
-  if (all.log_factor + more.log_change + rules.log_prior_odds_more + rules.optimism < 0) return false;
-  const CurvePrior& prior = more.curves.front().prior;
+  scans.push_back({.curves = scan_beside(likelihood, discrepancy, here), .beside = {.fit = here}, .at_mode = true});
+  erase_known(here.scales.curves, scans.back().curves);
+  const std::vector<CurveFactor> own = scans.back().curves;
+  if (own.empty()) return false;  // outside the model's domain, or no other is left
+  const double least = -rules.log_prior_odds_more - rules.optimism;
+  const auto more = most_promising(likelihood, discrepancy, here, least, scans);
+  if (more == scans.end()) return false;
+  const Integrated all = integrated(more->curves);
+  if (all.log_factor + more->beside.log_change < least) return false;
+  const CurvePrior& prior = more->curves.front().prior;
   Settled with = settle_with_one_more(likelihood, discrepancy, here, prior);
   // Of the other scales and lengths, beside the spread that there is in the end.
   double log_others = all.log_others;
   if (with.fit.valid && with.fit.scales.nuisance_sd == here.scales.nuisance_sd)
-    log_others = integrated(own.curves).log_factor - log_factor_of(own.curves, prior);
+    log_others = integrated(own).log_factor - log_factor_of(own, prior);
   const double log_factor = with.over.log_mean + log_others - so_far.log_evidence;
   if (!(log_factor + rules.log_prior_odds_more > 0)) return false;
   so_far.log_evidence = with.over.log_mean;
@@ -151,43 +174,22 @@ bool exchange_curve(const Likelihood& likelihood, const Discrepancy& discrepancy
 // A curve to be fitted beside a set.
 struct Candidate {
   CurvePrior prior;
-  double log_others = 0;                                      // Integrated
-  const Fit* from;                                            // where the fit begins, its spread too
-  double promised = std::numeric_limits<double>::infinity();  // log Bayes factor by the linear model about none
+  double log_others = 0;  // Integrated
+  const Fit* from;        // where the fit begins, its spread too
 };
-
-// The likeliest beside the fit, and beside the same with less spread. Each is fitted from the spread that there is:
-// without it the noise takes what is left of that, and does not give it back.
-std::vector<Candidate> candidates(const Likelihood& likelihood, const Discrepancy& discrepancy, const Fit& fit,
-                                  const std::vector<CurveFactor>& beside) {
-  std::vector<Candidate> out;
-  const auto add = [&](const std::vector<CurveFactor>& curves, double promised) {
-    if (promised < kLikelyCurve) return;
-    const CurvePrior& prior = curves.front().prior;
-    const auto known = std::ranges::find(out, prior.curve, [](const Candidate& c) { return c.prior.curve; });
-    if (known != out.end() && known->promised >= promised) return;
-    if (known != out.end()) out.erase(known);
-    out.push_back({.prior = prior, .log_others = integrated(curves).log_others, .from = &fit, .promised = promised});
-  };
-  add(beside, beside.front().log_bayes_factor);
-  for (const Scan& scan : scans_beside_less_spread(likelihood, discrepancy, fit)) add(scan.curves, scan.promised());
-  std::ranges::stable_sort(out, std::greater{}, &Candidate::promised);
-  return out;
-}
 
 // The likeliest of each component but those that are known, where the linear model about none, which is wrong here,
 // does not say much less of it than of the likeliest.
 std::vector<CurvePrior> of_other_components(const System& system, const std::vector<CurveFactor>& curves,
-                                            const std::vector<Candidate>& known) {
+                                            const std::vector<CurvePrior>& known) {
   const auto component = [&](std::size_t curve) { return system.curves()[curve].component; };
   std::vector<CurvePrior> out;
   const auto has = [&](const CurvePrior& prior) {
-    return [&](const auto& one) { return component(one) == component(prior.curve); };
+    return [&](const CurvePrior& one) { return component(one.curve) == component(prior.curve); };
   };
   for (const CurveFactor& one : curves) {
     if (one.log_bayes_factor < std::max(kLikelyCurve, kOfLikeliest * curves.front().log_bayes_factor)) break;
-    if (std::ranges::none_of(known, has(one.prior), [](const Candidate& c) { return c.prior.curve; }) &&
-        std::ranges::none_of(out, has(one.prior), &CurvePrior::curve))
+    if (std::ranges::none_of(known, has(one.prior)) && std::ranges::none_of(out, has(one.prior)))
       out.push_back(one.prior);
   }
   return out;
@@ -220,6 +222,36 @@ WithCurve settle_with(const Likelihood& likelihood, const Discrepancy& discrepan
   return out;
 }
 
+// From the likeliest first curve on: the next beside it, for as long as one more is likelier than not.
+void begin_with(const Likelihood& likelihood, const Discrepancy& discrepancy, const CurveRules& rules, WithCurve first,
+                double give_up_below, Evaluated& out) {
+  Settled& with = first.settled;
+  // Beside the curve another local minimum may have been found: it counts without the curve too.
+  Settled again = settle(*with.fit.likelihood, nullptr, out.fit.layout, with.fit.shared, with.fit.local,
+                         {.nuisance_sd = with.fit.scales.nuisance_sd, .curves = {}}, nuisance_grid(likelihood.system()),
+                         out.log_evidence);
+  if (again.over.log_mean > out.log_evidence) {
+    out.fit = std::move(again.fit);
+    out.log_evidence = again.over.log_mean;
+    out.nuisance_weights = again.over.weights;
+  }
+  out.log_factors = {first.log_evidence() - out.log_evidence};
+  Together so_far{.log_evidence = with.over.log_mean, .log_others = {first.log_others}};
+  out.fit_with_curve = std::move(with.fit);
+  out.nuisance_weights_with_curve = std::move(with.over.weights);
+  while (so_far.log_evidence > give_up_below && out.log_factors.size() < rules.most &&
+         add_curve(likelihood, discrepancy, rules, out, so_far)) {
+    while (exchange_curve(likelihood, discrepancy, out, so_far)) {
+    }
+  }
+  // Over their number, each more with its prior odds.
+  out.log_bayes_factor_curve = out.log_factors.back();
+  for (std::size_t i = out.log_factors.size() - 1; i > 0; --i) {
+    const double terms[] = {0, rules.log_prior_odds_more + out.log_bayes_factor_curve};
+    out.log_bayes_factor_curve = out.log_factors[i - 1] + log_sum(terms);
+  }
+}
+
 }  // namespace
 
 double log_factor_of_one_more(const Discrepancy& discrepancy, const Marginal& beside,
@@ -247,7 +279,7 @@ Fit with_first_curve(const Discrepancy& discrepancy, Fit fit) {
 }
 
 void add_discrepancy(const Likelihood& likelihood, const Discrepancy& discrepancy, const CurveRules& rules,
-                     Evaluated& out, double give_up_below, const LargeCurves& large) {
+                     Evaluated& out, double give_up_below, const Fit* large_curve) {
   out.with_discrepancy = true;
   out.curves = scan_beside(likelihood, discrepancy, out.fit);
   if (out.curves.empty()) return;
@@ -257,57 +289,52 @@ void add_discrepancy(const Likelihood& likelihood, const Discrepancy& discrepanc
   const double least =
       stands_out ? -std::numeric_limits<double>::infinity() : out.log_evidence + out.log_bayes_factor_curve;
   // The likeliest, where the model is nonlinear: about the mode that it moves to; the rest of them by the linear model.
-  std::vector<Candidate> list;
-  if (large.beside)
-    list.push_back({.prior = large.beside->scales.curves.front(),
-                    .log_others = integrated(out.curves).log_others,
-                    .from = large.beside});
-  for (Candidate& one : candidates(likelihood, discrepancy, out.fit, out.curves)) list.push_back(std::move(one));
+  // Of those that were tried a large one had its scale and length fitted too.
+  std::vector<CurvePrior> tried, refined;
   WithCurve best{.settled = {.fit = Fit(out.fit.layout), .over = {}}};
-  bool is_large = false;
-  const auto try_all = [&](const std::vector<Candidate>& some) {
-    for (const Candidate& one : some) {
-      if (out.log_evidence + one.promised + one.log_others < best.log_evidence()) continue;
-      WithCurve there = settle_with(likelihood, discrepancy, out.fit, one, out.curves.size(), give_up_below);
-      is_large = is_large || there.settled.fit.tangent;
-      if (there.log_evidence() > best.log_evidence()) best = std::move(there);
-    }
+  const auto try_one = [&](const Candidate& one) {
+    WithCurve there = settle_with(likelihood, discrepancy, out.fit, one, out.curves.size(), give_up_below);
+    (there.settled.fit.tangent ? refined : tried).push_back(one.prior);
+    if (there.log_evidence() > best.log_evidence()) best = std::move(there);
   };
-  try_all(list);
-  if (large.every_component && is_large) {
-    std::vector<Candidate> others;
-    for (const CurvePrior& prior : of_other_components(likelihood.system(), out.curves, list))
-      others.push_back(
-          {.prior = prior, .log_others = -std::log(static_cast<double>(out.curves.size())), .from = &out.fit});
-    try_all(others);
+  const double log_others = integrated(out.curves).log_others;
+  if (large_curve)
+    try_one({.prior = large_curve->scales.curves.front(), .log_others = log_others, .from = large_curve});
+  if (stands_out && out.log_evidence + out.curves.front().log_bayes_factor + log_others > best.log_evidence())
+    try_one({.prior = out.curves.front().prior, .log_others = log_others, .from = &out.fit});
+  // And beside less spread, where that promises more. Fitted from the spread that there is: without it the noise takes
+  // what is left of that, and does not give it back.
+  auto scans = scans_beside_less_spread(likelihood, discrepancy, out.fit);
+  for (;;) {
+    const double no_less = std::max(kLikelyCurve, best.log_evidence() - out.log_evidence);
+    const auto more = most_promising(likelihood, discrepancy, out.fit, no_less, scans);
+    if (more == scans.end()) break;
+    const Candidate one{
+        .prior = more->curves.front().prior, .log_others = integrated(more->curves).log_others, .from = &out.fit};
+    const bool promises_more = out.log_evidence + more->promised() + one.log_others > best.log_evidence();
+    scans.erase(more);
+    if (promises_more && std::ranges::count(tried, one.prior) == 0 &&
+        std::ranges::count(refined, one.prior.curve, &CurvePrior::curve) == 0)
+      try_one(one);
   }
-  Settled& with = best.settled;
-  const double log_others = best.log_others;
-  if (!(with.over.log_mean + log_others > least)) return;
-  // Beside the curve another local minimum may have been found: it counts without the curve too.
-  Settled again = settle(*with.fit.likelihood, nullptr, out.fit.layout, with.fit.shared, with.fit.local,
-                         {.nuisance_sd = with.fit.scales.nuisance_sd, .curves = {}}, nuisance_grid(likelihood.system()),
-                         out.log_evidence);
-  if (again.over.log_mean > out.log_evidence) {
-    out.fit = std::move(again.fit);
-    out.log_evidence = again.over.log_mean;
-    out.nuisance_weights = again.over.weights;
+  if (best.log_evidence() > least) begin_with(likelihood, discrepancy, rules, std::move(best), give_up_below, out);
+}
+
+void add_large_curves(const Likelihood& likelihood, const Discrepancy& discrepancy, const CurveRules& rules,
+                      Evaluated& out) {
+  if (!out.fit_with_curve || !out.fit_with_curve->tangent) return;
+  std::vector<CurvePrior> known = out.fit_with_curve->scales.curves;
+  known.push_back(out.curves.front().prior);
+  constexpr double kNever = -std::numeric_limits<double>::infinity();
+  std::optional<WithCurve> best;
+  double most = out.log_evidence + out.log_factors.front();
+  for (const CurvePrior& prior : of_other_components(likelihood.system(), out.curves, known)) {
+    const Candidate one{
+        .prior = prior, .log_others = -std::log(static_cast<double>(out.curves.size())), .from = &out.fit};
+    WithCurve there = settle_with(likelihood, discrepancy, out.fit, one, out.curves.size(), kNever);
+    if (there.log_evidence() > most) most = there.log_evidence(), best = std::move(there);
   }
-  out.log_factors = {with.over.log_mean + log_others - out.log_evidence};
-  out.fit_with_curve = std::move(with.fit);
-  out.nuisance_weights_with_curve = with.over.weights;
-  Together so_far{.log_evidence = with.over.log_mean, .log_others = {log_others}};
-  while (so_far.log_evidence > give_up_below && out.log_factors.size() < rules.most &&
-         add_curve(likelihood, discrepancy, rules, out, so_far)) {
-    while (exchange_curve(likelihood, discrepancy, out, so_far)) {
-    }
-  }
-  // Over their number, each more with its prior odds.
-  out.log_bayes_factor_curve = out.log_factors.back();
-  for (std::size_t i = out.log_factors.size() - 1; i > 0; --i) {
-    const double terms[] = {0, rules.log_prior_odds_more + out.log_bayes_factor_curve};
-    out.log_bayes_factor_curve = out.log_factors[i - 1] + log_sum(terms);
-  }
+  if (best) begin_with(likelihood, discrepancy, rules, std::move(*best), kNever, out);
 }
 
 }  // namespace bevel::inference

@@ -41,6 +41,20 @@ std::vector<WithLessSpread> with_less_spread(const Likelihood& likelihood, const
   return out;
 }
 
+WithLessSpread at_its_mode(const WithLessSpread& less, const Fit& fit, const CurveColumns& curve) {
+  const Likelihood& likelihood = *fit.likelihood;
+  const auto log_about = [&](const Fit& at) {
+    const auto blocks = linearise(likelihood, at, curve);
+    if (!at.valid || blocks.empty()) return -std::numeric_limits<double>::infinity();
+    return -0.5 * (at.cost + solve_about(at, blocks, curve).log_volume_ratio) +
+           log_prior_of_spread(likelihood.system(), at.scales.nuisance_sd);
+  };
+  WithLessSpread out{.fit = inference::fit(likelihood, fit.layout, fit.shared, fit.local, less.fit.scales, curve)};
+  out.fit.likelihood = fit.likelihood;
+  out.log_change = log_about(out.fit) - log_about(fit);
+  return out;
+}
+
 Moved moved_to(const std::shared_ptr<const Likelihood>& likelihood, const Fit& from, const Discrepancy& discrepancy) {
   struct About {
     double log_evidence = -std::numeric_limits<double>::infinity();

@@ -36,16 +36,15 @@ struct CurveRules {
   std::size_t most = 2;
   double optimism = 2;  // by which a fit may exceed what the linear model promised of one more
 };
-// Where a large discrepancy is looked for beside what the linear model about none says is likeliest.
-struct LargeCurves {
-  bool every_component = false;  // the likeliest of each, once one is too large for the linear model
-  const Fit* beside = nullptr;   // with the curve that it has, and from there; null: none
-};
 // The discrepancy's part, added to a set that was evaluated without: the likeliest curve, then beside it the next, for
-// as long as one more is likelier than not. Once the evidence with a curve is so low, it is left as it is.
+// as long as one more is likelier than not. Once the evidence with a curve is so low, it is left as it is. large_curve:
+// the curve that another set's fit has is tried too, from there; null: none.
 void add_discrepancy(const Likelihood& likelihood, const Discrepancy& discrepancy, const CurveRules& rules,
                      Evaluated& evaluated, double give_up_below = -std::numeric_limits<double>::infinity(),
-                     const LargeCurves& large = {});
+                     const Fit* large_curve = nullptr);
+// Where that is too large for the linear model, which chose it: the likeliest of each other component in its place.
+void add_large_curves(const Likelihood& likelihood, const Discrepancy& discrepancy, const CurveRules& rules,
+                      Evaluated& evaluated);
 // The same without one of its curves, all else where it is.
 Fit without_curve(const Discrepancy& discrepancy, Fit fit, std::size_t which);
 // Log Bayes factor of one more curve than those known, whichever it is, beside what a set leaves.
@@ -73,5 +72,9 @@ struct WithLessSpread {
   double log_change = 0;
 };
 std::vector<WithLessSpread> with_less_spread(const Likelihood& likelihood, const Fit& fit, const CurveColumns& curve);
+// One of them at its mode, by the nonlinear model: the shared unknowns go far for what a spread no longer takes up, and
+// what the linear model promises there may be off by any amount (of 13 in log evidence -284 is left). `fit` is at its
+// mode by its own likelihood.
+WithLessSpread at_its_mode(const WithLessSpread& less, const Fit& fit, const CurveColumns& curve);
 
 }  // namespace bevel::inference

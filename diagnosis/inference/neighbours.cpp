@@ -28,13 +28,15 @@ std::vector<Search::Beside> Search::look_beside(const Fit& fit, double log_here,
                            .with_foremost = true}};
   if (with_others_moved)
     proposals_->look_with_others_moved(*likelihood_, moved.fit, marginal, rules_.starts, out.front().proposals);
-  for (WithLessSpread& less : with_less_spread(*by, moved.fit, curve)) {
-    auto proposals = proposals_->beside(Marginal(*by, less.fit, curve, likelihood_.get()), rules_.starts);
-    out.push_back(
-        {.about = std::move(less.fit),
-         .proposals = std::move(proposals),
-         .log_promised = [=, change = less.log_change](double log_factor) { return log_promised(change + log_factor); },
-         .only_if_new = true});
+  const auto beside_less = [this, by, curve, log_promised](const WithLessSpread& less) {
+    return Beside{
+        .about = less.fit,
+        .proposals = proposals_->beside(Marginal(*by, less.fit, curve, likelihood_.get()), rules_.starts),
+        .log_promised = [=, change = less.log_change](double log_factor) { return log_promised(change + log_factor); }};
+  };
+  for (const WithLessSpread& less : with_less_spread(*by, moved.fit, curve)) {
+    out.push_back(beside_less(less));
+    out.back().at_its_mode = [=, from = moved.fit] { return beside_less(inference::at_its_mode(less, from, curve)); };
   }
   return out;
 }
@@ -56,23 +58,44 @@ std::vector<Search::Beside> Search::look_in_curves_places(const Fit& with_curve,
   return out;
 }
 
+double Search::most_promised(const ModelSet& set) const {
+  const auto known = promised_.find(set);
+  return known == promised_.end() ? -std::numeric_limits<double>::infinity() : known->second;
+}
+
+double Search::log_promised(const Beside& beside, const Proposal& one) const {
+  return beside.log_promised(one.log_bayes_factor) + log_prior_odds(one.effect);
+}
+
+double Search::doubtful(const Proposal& one) const {
+  return rules_.optimism + rules_.linear_error * std::max(0.0, one.log_bayes_factor);
+}
+
 // The set with each effect that comes near.
 std::vector<Search::Job> Search::larger_sets(const ModelSet& set, const Beside& beside) {
   std::vector<Job> out;
-  const double best = best_log();
+  const double near = best_log() - rules_.window;
+  const auto is_new = [&](const Beside& by, const Proposal& one) {
+    return log_promised(by, one) >= most_promised(with(set, one.effect)) + rules_.optimism;
+  };
+  const auto promises_more = [&](const Proposal& one) {
+    return log_promised(beside, one) + doubtful(one) >= near && is_new(beside, one);
+  };
+  const bool again = static_cast<bool>(beside.at_its_mode);
+  if (again && std::ranges::none_of(beside.proposals, promises_more)) return out;
+  const Beside here = again ? beside.at_its_mode() : beside;
   std::size_t rank = 0;
-  for (const Proposal& one : beside.proposals) {
+  for (const Proposal& one : here.proposals) {
     // Far from its start an effect may bring much more than in proportion: the foremost are fitted in any case.
     const bool foremost =
-        beside.with_foremost && rank++ < rules_.foremost && one.log_bayes_factor > -log_prior_odds(one.effect);
+        here.with_foremost && rank++ < rules_.foremost && one.log_bayes_factor > -log_prior_odds(one.effect);
     const ModelSet larger = with(set, one.effect);
-    const double promised = beside.log_promised(one.log_bayes_factor) + log_prior_odds(one.effect);
-    auto& most = promised_.try_emplace(larger, -std::numeric_limits<double>::infinity()).first->second;
-    const bool nothing_new = beside.only_if_new && promised < most + rules_.optimism;
-    most = std::max(most, promised);
+    const double promised = log_promised(here, one);
+    const bool nothing_new = again && !is_new(here, one);
+    promised_[larger] = std::max(most_promised(larger), promised);
     if (nothing_new) continue;
-    const double doubtful = rules_.optimism + rules_.linear_error * std::max(0.0, one.log_bayes_factor);
-    if (!foremost && promised + doubtful < best - rules_.window) continue;
+    const double doubtful = this->doubtful(one);
+    if (!foremost && promised + doubtful < near) continue;
     // A fit that fell far short of the promise may be in a local minimum: once more, from these starts.
     const auto visited = visited_.find(larger);
     if (visited != visited_.end() &&
@@ -80,9 +103,9 @@ std::vector<Search::Job> Search::larger_sets(const ModelSet& set, const Beside& 
       continue;
     for (const StartPoint& start : one.starts)
       if (start.log_bayes_factor > one.starts.front().log_bayes_factor - rules_.window) {
-        out.push_back(job_from(beside.about, one.effect, start));
+        out.push_back(job_from(here.about, one.effect, start));
         if (!foremost) out.back().promised = promised + doubtful;
-        ask_for_curve_of(beside.about, out.back());
+        ask_for_curve_of(here.about, out.back());
       }
   }
   return out;
@@ -172,8 +195,7 @@ std::vector<Search::Job> Search::swaps(const Visited& here) {
       const ModelSet swapped = with(rest, one.effect);
       const double difference = one.log_bayes_factor - leaves->log_bayes_factor;
       const double promised = log_here + difference + log_prior_odds(one.effect) - log_prior_odds(member);
-      const double doubtful = rules_.optimism + rules_.linear_error * std::max(0.0, leaves->log_bayes_factor);
-      if (rank++ >= rules_.foremost || promised + doubtful < best - rules_.window) break;
+      if (rank++ >= rules_.foremost || promised + doubtful(*leaves) < best - rules_.window) break;
       const auto visited = visited_.find(swapped);
       if (visited != visited_.end() && visited->second.log_posterior() > best - rules_.window) continue;
       if (!swapped_.insert(swapped).second || one.starts.empty()) continue;

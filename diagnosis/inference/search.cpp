@@ -204,8 +204,7 @@ void Search::evaluate_all(std::vector<Job> jobs) {
     const bool promised = job.beside_curve && std::isfinite(job.promised);
     const double give_up_below =
         promised ? -std::numeric_limits<double>::infinity() : hopeless(job) - curve_rules_.log_prior_odds;
-    add_discrepancy(*likelihood_, *discrepancy_, curve_rules_, *with[k], give_up_below,
-                    {.beside = job.large_curve.get()});
+    add_discrepancy(*likelihood_, *discrepancy_, curve_rules_, *with[k], give_up_below, job.large_curve.get());
   });
   for (std::size_t k = 0; k < asked.size(); ++k) keep(jobs[asked[k]].set, with[k]);
 }
@@ -254,8 +253,8 @@ void Search::look_in_rounds(std::shared_ptr<const Likelihood> reference, Start& 
     Evaluated base = evaluate(*likelihood_, nothing, start.shared, start.local, start.nuisance_sd);
     if (!base.valid) throw std::domain_error("the model cannot follow the recordings");
     discrepancy_ = std::make_unique<const Discrepancy>(*likelihood_, base.fit);
-    add_discrepancy(*likelihood_, *discrepancy_, curve_rules_, base, -std::numeric_limits<double>::infinity(),
-                    {.every_component = true});
+    add_discrepancy(*likelihood_, *discrepancy_, curve_rules_, base);
+    add_large_curves(*likelihood_, *discrepancy_, curve_rules_, base);
     start = {.shared = base.fit.shared, .local = base.fit.local, .nuisance_sd = base.fit.scales.nuisance_sd};
     if (anew) {
       // A curve takes up most of what is missing: the noise beside it is nearer to the truth.
@@ -304,9 +303,7 @@ void Search::look_at_every_component(const ModelSet& set) {
   const auto at = visited_.at(set).at;
   if (!at->fit_with_curve || !at->fit_with_curve->tangent) return;
   auto anew = std::make_shared<Evaluated>(*at);
-  const Fit beside = with_first_curve(*discrepancy_, *at->fit_with_curve);
-  add_discrepancy(*likelihood_, *discrepancy_, curve_rules_, *anew, -std::numeric_limits<double>::infinity(),
-                  {.every_component = true, .beside = &beside});
+  add_large_curves(*likelihood_, *discrepancy_, curve_rules_, *anew);
   keep(set, anew);
 }
 

@@ -95,12 +95,17 @@ class Search {
     // Of a log Bayes factor: the larger set's log posterior, but for the prior odds of what joins.
     std::function<double(double)> log_promised;
     bool with_foremost = false;
-    bool only_if_new = false;  // what promises no more than it did elsewhere is not begun from here
+    // Beside less spread: what promises no more than it did elsewhere is not begun from here, nor anything before that
+    // has been looked at about its mode.
+    std::function<Beside()> at_its_mode{};
   };
   void expand(const ModelSet& set);
   std::vector<Beside> look_beside(const Fit& fit, double log_here, bool with_others_moved) const;
   std::vector<Beside> look_in_curves_places(const Fit& with_curve, double log_here) const;
   std::vector<Job> larger_sets(const ModelSet& set, const Beside& beside);
+  double most_promised(const ModelSet& set) const;
+  double log_promised(const Beside& beside, const Proposal& one) const;
+  double doubtful(const Proposal& one) const;  // by which a fit may exceed that
   std::vector<Job> smaller_sets(const Visited& here);
   std::vector<Job> swaps(const Visited& here);
   void keep(const ModelSet& set, const std::shared_ptr<const Evaluated>& at);
