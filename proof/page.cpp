@@ -65,6 +65,8 @@ void shares(report::Page& page, const Tally& t) {
                                {"all trials", at(t.strict, "all"), -1},
                                {"on no list: called unknown", t.unknown_called_unknown, 0.8},
                                {"the same, imitated by none listed", t.unknown_distinct, -1},
+                               {"on no list: held-out density higher", t.unknown_likelier, 0.9},
+                               {"on no list: held-out error smaller", t.unknown_nearer, 0.9},
                                {"truth within the 95 % intervals", t.covered, 0.95},
                                {"nearest plain form within them", t.covers_nearest, 0.95},
                                {"place within 0.2 s or 3 mm", t.located, -1},

@@ -228,6 +228,8 @@ TrialScore score_verdict(const OpenedTruth& truth, const Verdict& verdict) {
   score.chi2_after = verdict.chi2_after;
   score.rmse_before_mm = verdict.rmse_before_mm;
   score.rmse_after_mm = verdict.rmse_after_mm;
+  score.log_density_before = verdict.log_density_before;
+  score.log_density_after = verdict.log_density_after;
   return score;
 }
 

@@ -82,6 +82,7 @@ struct TrialScore {
   std::vector<ParameterScore> parameters;
   std::vector<LocationScore> locations;
   std::optional<double> chi2_before, chi2_after, rmse_before_mm, rmse_after_mm;
+  std::optional<double> log_density_before, log_density_after;
   double seconds = 0;
 };
 

@@ -67,6 +67,8 @@ json as_json(const TrialScore& s) {
          {"chi2_after", optional_json(s.chi2_after)},
          {"rmse_before_mm", optional_json(s.rmse_before_mm)},
          {"rmse_after_mm", optional_json(s.rmse_after_mm)},
+         {"log_density_before", optional_json(s.log_density_before)},
+         {"log_density_after", optional_json(s.log_density_after)},
          {"seconds", s.seconds},
          {"found", json::array()},
          {"parameters", json::array()},
@@ -108,6 +110,8 @@ TrialScore trial_score_of(const json& j) {
   s.chi2_after = optional_number(j, "chi2_after");
   s.rmse_before_mm = optional_number(j, "rmse_before_mm");
   s.rmse_after_mm = optional_number(j, "rmse_after_mm");
+  s.log_density_before = optional_number(j, "log_density_before");
+  s.log_density_after = optional_number(j, "log_density_after");
   s.seconds = j.at("seconds");
   for (const json& f : j.at("found")) s.found.push_back({f.at("name"), f.at("visible_sigmas"), f.at("named")});
   for (const json& p : j.at("parameters")) {
@@ -144,6 +148,8 @@ json as_json(const Tally& t) {
           {"unknown_called_unknown", share_json(t.unknown_called_unknown)},
           {"unknown_called_unknown_without_rival", share_json(t.unknown_distinct)},
           {"unknown_called_without_cause", share_json(t.unknown_alarms)},
+          {"unknown_likelier_held_out", share_json(t.unknown_likelier)},
+          {"unknown_nearer_held_out", share_json(t.unknown_nearer)},
           {"mean_probability_of_truth", t.mean_probability_of_truth},
           {"truth_below_one_percent", share_json(t.truth_improbable)},
           {"reliability", reliability},

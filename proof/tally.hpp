@@ -35,6 +35,9 @@ struct Tally {
   Share unknown_called_unknown;                  // of visible unlisted effects
   Share unknown_distinct;                        // of those that no listed effect imitates
   Share unknown_alarms;                          // "unknown" called where nothing unlisted was concealed
+  // Of visible unlisted effects: what was held out has a higher predictive density (a proper score: Gneiting and
+  // Raftery 2007, JASA 102) than by the needle alone, or a smaller error.
+  Share unknown_likelier, unknown_nearer;
   double mean_probability_of_truth = 0;
   Share truth_improbable;  // the truth had a probability below 0.01
   std::vector<ReliabilityBin> reliability;

@@ -154,6 +154,8 @@ Verdict parse_verdict(std::string_view text_of_file) {
     verdict.chi2_after = number(after, "chi2_per_dof");
     verdict.rmse_before_mm = number(before, "rmse_mm");
     verdict.rmse_after_mm = number(after, "rmse_mm");
+    verdict.log_density_before = number(before, "log_density");
+    verdict.log_density_after = number(after, "log_density");
   }
   return verdict;
 }

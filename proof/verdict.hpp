@@ -48,6 +48,7 @@ struct Verdict {
   std::optional<PosteriorGiven> posterior;
   std::optional<double> chi2_before, chi2_after;  // held-out, per degree of freedom
   std::optional<double> rmse_before_mm, rmse_after_mm;
+  std::optional<double> log_density_before, log_density_after;  // predictive, held-out, natural, per reading
 
   // Sorted, without repeats: the effects named, and "unknown" for unknown-effect.
   std::vector<std::string> named() const;

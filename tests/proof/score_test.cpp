@@ -129,6 +129,22 @@ TEST(Score, ARivalOfAnUnlistedEffect) {
   EXPECT_EQ(tally({s}).unknown_distinct.of, 0);
 }
 
+// With a wide spread between insertions a model that predicts better need not be nearer.
+TEST(Score, HeldOutByDensityAndByError) {
+  const auto fit = [](double rmse_mm, double log_density) {
+    return nlohmann::json{{"rmse_mm", rmse_mm}, {"log_density", log_density}};
+  };
+  const nlohmann::json fits{{"fit", {{"before", fit(0.5, -0.13)}, {"after", fit(0.6, -0.12)}}}};
+  const TrialScore s = score(truth_of({screw()}), "unknown-effect", {}, fits);
+  const Tally t = tally({s});
+  EXPECT_EQ(t.unknown_likelier.of, 1);
+  EXPECT_EQ(t.unknown_likelier.hits, 1);
+  EXPECT_EQ(t.unknown_nearer.of, 1);
+  EXPECT_EQ(t.unknown_nearer.hits, 0);
+  EXPECT_EQ(tally({score(truth_of({layer()}), "effects-found", {effect("layer")}, fits)}).unknown_likelier.of, 0);
+  EXPECT_EQ(as_json(trial_score_of(as_json(s))), as_json(s));
+}
+
 TEST(Score, ProbabilityOfTheTruth) {
   const OpenedTruth one = truth_of({windup()});
   EXPECT_NEAR(score(one, "effects-found", {effect("torsional_windup", 0.8)}).probability_of_truth, 0.8, 1e-12);
