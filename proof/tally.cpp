@@ -61,11 +61,12 @@ void note_shares(const TrialScore& score, Tally& tally) {
 }
 
 void note_fit(const TrialScore& score, Tally& tally) {
-  const bool unlisted = holds(score.expected, "unknown");
+  // Where nothing is said there is no other model; what a refit changes is rounding.
+  const bool unlisted = holds(score.expected, "unknown"), said = !score.named.empty();
   if (unlisted && score.log_density_before && score.log_density_after)
-    tally.unknown_likelier.add(*score.log_density_after > *score.log_density_before);
+    tally.unknown_likelier.add(said && *score.log_density_after > *score.log_density_before);
   if (unlisted && score.rmse_before_mm && score.rmse_after_mm)
-    tally.unknown_nearer.add(*score.rmse_after_mm < *score.rmse_before_mm);
+    tally.unknown_nearer.add(said && *score.rmse_after_mm < *score.rmse_before_mm);
   if (score.chi2_before) tally.chi2_before.push_back(*score.chi2_before);
   if (!score.chi2_after) return;
   tally.chi2_after.push_back(*score.chi2_after);
