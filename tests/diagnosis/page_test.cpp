@@ -154,9 +154,9 @@ TEST(Page, what_is_left_may_be_less_than_the_noise_or_only_correlated) {
     findings.checks = {.chi2_per_dof = chi2, .band = {0.92, 1.08}, .ljung_box_p = p, .clean = false};
     return report_html(findings, {});
   };
-  EXPECT_THAT(left(1.2, 0.5), HasSubstr("What is left is more than that noise; the verdict"));
-  EXPECT_THAT(left(0.83, 0.5), HasSubstr("What is left is less than that noise (a curve"));
-  EXPECT_THAT(left(1.2, 0.001), HasSubstr("What is left is more than that noise, and correlated; the verdict"));
+  EXPECT_THAT(left(1.2, 0.5), HasSubstr("What is left is more than the fitted noise; the verdict"));
+  EXPECT_THAT(left(0.83, 0.5), HasSubstr("What is left is less than the fitted noise (a curve"));
+  EXPECT_THAT(left(1.2, 0.001), HasSubstr("What is left is more than the fitted noise, and correlated; the verdict"));
   EXPECT_THAT(left(1, 0.001), HasSubstr("What is left is correlated from reading to reading; the verdict"));
 }
 

@@ -142,6 +142,21 @@ TEST_F(Results, WhatTheyDoNotHaveIsTakenAwayWithTheOlderOnes) {
   EXPECT_THAT(names_in(folder.path()), UnorderedElementsAre("a", "b"));
 }
 
+// Silence beside residuals that are no noise must not pass for a clean bill of health.
+TEST(PrintedVerdict, WhatIsLeftIsSaidWhereItIsNoNoise) {
+  auto findings = made_up(Verdict::nothing_missing);
+  const auto said = [&] {
+    std::ostringstream out;
+    print_verdict(out, findings);
+    return out.str();
+  };
+  findings.checks = {.chi2_per_dof = 1, .band = {0.92, 1.08}, .ljung_box_p = 0.5, .clean = true};
+  EXPECT_THAT(said(), ::testing::Not(HasSubstr("What is left")));
+  findings.checks.ljung_box_p = 1e-9;
+  findings.checks.clean = false;
+  EXPECT_THAT(said(), HasSubstr("What is left is correlated from reading to reading"));
+}
+
 TEST_F(Results, AProposedEffectIsThereForAnUnknownOneAlone) {
   const auto write = [&](const diagnosis::Findings& findings) {
     write_together(folder.path(), result_files(findings, model_of(findings),

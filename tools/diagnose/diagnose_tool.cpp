@@ -149,6 +149,7 @@ void print_verdict(std::ostream& out, const Findings& f) {
   if (const auto unseen = not_to_be_seen(f); !unseen.empty())
     out << "  not to be seen in these recordings at its usual size: " << listed(unseen, ", ")
         << "; the page says which motions would show it\n";
+  if (!f.checks.clean) out << "  " << what_is_left(f.checks) << '\n';
   for (const auto& remark : f.remarks) out << "  - " << remark << '\n';
 }
 

@@ -57,6 +57,8 @@ std::string steered_in_words(const diagnosis::SteeredFigures& figures, std::size
 bool steers_worse(const diagnosis::SteeredToTargets& steered);
 std::string span_mm(const diagnosis::SteeredToTargets& steered);  // "74 to 82 mm", of the targets' depths
 
+// Of the checks of the final model, a sentence.
+std::string what_is_left(const diagnosis::Checks& checks);
 std::string headline_of(diagnosis::Verdict verdict, bool two_groups = false);  // "Effects found", ...
 
 }  // namespace bevel::diagnose

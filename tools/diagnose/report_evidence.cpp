@@ -209,15 +209,6 @@ void add_next_experiment(report::Page& page, const Findings& f) {
 
 namespace {
 
-std::string what_is_left(const Checks& c) {
-  if (c.clean) return "What is left is noise.";
-  std::string left;
-  if (c.chi2_per_dof > c.band[1]) left = "more than that noise";
-  if (c.chi2_per_dof < c.band[0]) left = "less than that noise (a curve with a knot a second takes jumps for noise)";
-  if (c.ljung_box_p <= 0.01) left += left.empty() ? "correlated from reading to reading" : ", and correlated";
-  return "What is left is " + left + "; the verdict does not rest on this.";
-}
-
 std::string near_entry(const Findings& f, std::size_t channel) {
   if (channel >= f.scatter.size() || !(f.scatter[channel].length_mm > 0)) return "the same";
   return number(f.scatter[channel].sd_at_entry(), 2) + " times as much, for some " +
