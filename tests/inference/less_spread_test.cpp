@@ -64,7 +64,8 @@ class Levels final : public testing::HeldSystem {
   // Squares in standard deviations, of the readings and the level's prior, where recordings do not differ: over a grid.
   double least_cost() const {
     double least = std::numeric_limits<double>::infinity();
-    for (double at = 0; at < 10; at += 1e-4) {
+    for (int i = 0; i < 100'000; ++i) {
+      const double at = 1e-4 * i;
       double cost = at * at / (kPriorSd * kPriorSd);
       for (const SeriesSet& set : data_.recordings)
         for (const double y : set.series[0].measured) cost += std::pow((y - std::tanh(at)) / kSigma, 2);
