@@ -1,6 +1,5 @@
 #include <algorithm>
 #include <cmath>
-#include <functional>
 #include <limits>
 #include <optional>
 
@@ -17,7 +16,8 @@ using Eigen::VectorXd;
 
 namespace {
 
-constexpr double kLikelyCurve = 3;        // log Bayes factor from which a curve is fitted
+constexpr double kNever = -std::numeric_limits<double>::infinity();  // log evidence below which a fit is given up
+constexpr double kLikelyCurve = 3;                                   // log Bayes factor from which a curve is fitted
 constexpr double kOfLikeliest = 0.5;      // of what the likeliest curve gains: what that of another component does
 constexpr double kWorthAnExchange = 0.5;  // log evidence: what a curve in another's place has to promise, and bring
 
@@ -48,10 +48,13 @@ double log_factor_of_unlikely(const std::vector<CurveFactor>& curves) {
   return log_sum(logs) - std::log(static_cast<double>(curves.size()));
 }
 
-// Every curve beside a fit, with what its set leaves open, by the noise that the curves were prepared with.
+// Every curve but those that it has beside a fit, with what its set leaves open, by the noise that the curves were
+// prepared with.
 std::vector<CurveFactor> scan_beside(const Likelihood& likelihood, const Discrepancy& discrepancy, const Fit& fit) {
   const auto by = with_inputs_of(fit, {std::shared_ptr<const void>(), &likelihood});  // not owned: no longer than here
-  return discrepancy.scan(Marginal(*by, fit, discrepancy.columns(*by, fit), &likelihood));
+  auto curves = discrepancy.scan(Marginal(*by, fit, discrepancy.columns(*by, fit), &likelihood));
+  erase_known(fit.scales.curves, curves);
+  return curves;
 }
 
 // The same beside the fit with less spread, each way, with what that costs: what all recordings share looks like
@@ -66,12 +69,11 @@ struct Scan {
                           : curves.front().log_bayes_factor + beside.log_change;
   }
 };
-std::vector<Scan> scans_beside_less_spread(const Likelihood& likelihood, const Discrepancy& discrepancy,
-                                           const Fit& fit) {
+std::vector<Scan> scans_beside_less_spread(const Likelihood& likelihood, const Discrepancy& discrepancy, const Fit& fit,
+                                           const CurveColumns& curve) {
   std::vector<Scan> out;
-  for (WithLessSpread& less : with_less_spread(*fit.likelihood, fit, discrepancy.columns(*fit.likelihood, fit))) {
+  for (WithLessSpread& less : with_less_spread(*fit.likelihood, fit, curve)) {
     auto curves = scan_beside(likelihood, discrepancy, less.fit);
-    erase_known(fit.scales.curves, curves);
     out.push_back({.curves = std::move(curves), .beside = std::move(less)});
   }
   return out;
@@ -79,14 +81,13 @@ std::vector<Scan> scans_beside_less_spread(const Likelihood& likelihood, const D
 
 // Which of them promises most, once that has been looked at about its mode; end: none promises as much as `least`.
 std::vector<Scan>::iterator most_promising(const Likelihood& likelihood, const Discrepancy& discrepancy, const Fit& fit,
-                                           double least, std::vector<Scan>& scans) {
+                                           const CurveColumns& curve, double least, std::vector<Scan>& scans) {
   for (;;) {
     const auto most = std::ranges::max_element(scans, {}, &Scan::promised);
     if (most == scans.end() || most->promised() < least) return scans.end();
     if (most->at_mode) return most;
-    most->beside = at_its_mode(most->beside, fit, discrepancy.columns(*fit.likelihood, fit));
+    most->beside = at_its_mode(most->beside, fit, curve);
     most->curves = scan_beside(likelihood, discrepancy, most->beside.fit);
-    erase_known(fit.scales.curves, most->curves);
     most->at_mode = true;
   }
 }
@@ -110,7 +111,7 @@ Settled settle_with_one_more(const Likelihood& likelihood, const Discrepancy& di
     tangent = tangent_about(discrepancy, with_one_more);
   }
   return settle(*from.likelihood, &discrepancy, from.layout, from.shared, from.local, scales,
-                nuisance_grid(likelihood.system()), -std::numeric_limits<double>::infinity(), std::move(tangent));
+                nuisance_grid(likelihood.system()), kNever, std::move(tangent));
 }
 
 double log_factor_of(const std::vector<CurveFactor>& curves, const CurvePrior& prior) {
@@ -122,13 +123,13 @@ double log_factor_of(const std::vector<CurveFactor>& curves, const CurvePrior& p
 bool add_curve(const Likelihood& likelihood, const Discrepancy& discrepancy, const CurveRules& rules, Evaluated& out,
                Together& so_far) {
   const Fit& here = *out.fit_with_curve;
-  auto scans = scans_beside_less_spread(likelihood, discrepancy, here);
+  const CurveColumns curve = discrepancy.columns(*here.likelihood, here);
+  auto scans = scans_beside_less_spread(likelihood, discrepancy, here, curve);
   scans.push_back({.curves = scan_beside(likelihood, discrepancy, here), .beside = {.fit = here}, .at_mode = true});
-  erase_known(here.scales.curves, scans.back().curves);
-  const std::vector<CurveFactor> own = scans.back().curves;
+  const std::vector<CurveFactor>& own = scans.back().curves;
   if (own.empty()) return false;  // outside the model's domain, or no other is left
   const double least = -rules.log_prior_odds_more - rules.optimism;
-  const auto more = most_promising(likelihood, discrepancy, here, least, scans);
+  const auto more = most_promising(likelihood, discrepancy, here, curve, least, scans);
   if (more == scans.end()) return false;
   const Integrated all = integrated(more->curves);
   if (all.log_factor + more->beside.log_change < least) return false;
@@ -154,8 +155,7 @@ bool exchange_curve(const Likelihood& likelihood, const Discrepancy& discrepancy
   for (std::size_t k = 0; k < out.fit_with_curve->scales.curves.size(); ++k) {
     const CurvePrior leaves = out.fit_with_curve->scales.curves[k];
     const Fit rest = without_curve(discrepancy, *out.fit_with_curve, k);
-    auto curves = scan_beside(likelihood, discrepancy, rest);
-    erase_known(rest.scales.curves, curves);
+    const auto curves = scan_beside(likelihood, discrepancy, rest);
     if (curves.empty() || curves.front().log_bayes_factor < log_factor_of(curves, leaves) + kWorthAnExchange) continue;
     Settled with = settle_with_one_more(likelihood, discrepancy, rest, curves.front().prior);
     if (!(with.over.log_mean > so_far.log_evidence + kWorthAnExchange)) continue;
@@ -304,10 +304,11 @@ void add_discrepancy(const Likelihood& likelihood, const Discrepancy& discrepanc
     try_one({.prior = out.curves.front().prior, .log_others = log_others, .from = &out.fit});
   // And beside less spread, where that promises more. Fitted from the spread that there is: without it the noise takes
   // what is left of that, and does not give it back.
-  auto scans = scans_beside_less_spread(likelihood, discrepancy, out.fit);
+  const CurveColumns none;
+  auto scans = scans_beside_less_spread(likelihood, discrepancy, out.fit, none);
   for (;;) {
     const double no_less = std::max(kLikelyCurve, best.log_evidence() - out.log_evidence);
-    const auto more = most_promising(likelihood, discrepancy, out.fit, no_less, scans);
+    const auto more = most_promising(likelihood, discrepancy, out.fit, none, no_less, scans);
     if (more == scans.end()) break;
     const Candidate one{
         .prior = more->curves.front().prior, .log_others = integrated(more->curves).log_others, .from = &out.fit};
@@ -325,7 +326,6 @@ void add_large_curves(const Likelihood& likelihood, const Discrepancy& discrepan
   if (!out.fit_with_curve || !out.fit_with_curve->tangent) return;
   std::vector<CurvePrior> known = out.fit_with_curve->scales.curves;
   known.push_back(out.curves.front().prior);
-  constexpr double kNever = -std::numeric_limits<double>::infinity();
   std::optional<WithCurve> best;
   double most = out.log_evidence + out.log_factors.front();
   for (const CurvePrior& prior : of_other_components(likelihood.system(), out.curves, known)) {

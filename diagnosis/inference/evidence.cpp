@@ -20,6 +20,11 @@ double log_with_spread(const Fit& fit, const CurveColumns& curve, const VectorXd
   return -0.5 * (solution.least + solution.log_volume_ratio);
 }
 
+// The same about a fit's mode, by the nonlinear model's cost there.
+double log_about_mode(const Fit& fit, const CurveColumns& curve, const std::vector<ArrowBlock>& blocks) {
+  return -0.5 * (fit.cost + solve_about(fit, blocks, curve).log_volume_ratio);
+}
+
 }  // namespace
 
 std::vector<WithLessSpread> with_less_spread(const Likelihood& likelihood, const Fit& fit, const CurveColumns& curve) {
@@ -46,8 +51,7 @@ WithLessSpread at_its_mode(const WithLessSpread& less, const Fit& fit, const Cur
   const auto log_about = [&](const Fit& at) {
     const auto blocks = linearise(likelihood, at, curve);
     if (!at.valid || blocks.empty()) return -std::numeric_limits<double>::infinity();
-    return -0.5 * (at.cost + solve_about(at, blocks, curve).log_volume_ratio) +
-           log_prior_of_spread(likelihood.system(), at.scales.nuisance_sd);
+    return log_about_mode(at, curve, blocks) + log_prior_of_spread(likelihood.system(), at.scales.nuisance_sd);
   };
   WithLessSpread out{.fit = inference::fit(likelihood, fit.layout, fit.shared, fit.local, less.fit.scales, curve)};
   out.fit.likelihood = fit.likelihood;
@@ -64,7 +68,7 @@ Moved moved_to(const std::shared_ptr<const Likelihood>& likelihood, const Fit& f
     About out;
     const auto blocks = linearise(*at.likelihood, at, curve);
     if (blocks.empty()) return out;
-    out.log_evidence = at.likelihood->log_weights() - 0.5 * (at.cost + solve_about(at, blocks, curve).log_volume_ratio);
+    out.log_evidence = at.likelihood->log_weights() + log_about_mode(at, curve, blocks);
     out.information = VectorXd::Zero(at.shared.size());
     for (const ArrowBlock& block : blocks) out.information += block.zz.diagonal().head(at.shared.size());
     return out;

@@ -2,6 +2,7 @@
 #include <cmath>
 #include <iterator>
 #include <limits>
+#include <optional>
 
 #include "diagnosis/inference/error_spread.hpp"
 #include "diagnosis/inference/local_minima.hpp"
@@ -13,30 +14,32 @@ namespace bevel::inference {
 std::vector<Search::Beside> Search::look_beside(const Fit& fit, double log_here, bool with_others_moved) const {
   const auto by = with_inputs_of(fit, likelihood_);
   const Moved moved = moved_to(by, fit, *discrepancy_);
-  const CurveColumns curve = discrepancy_->columns(*by, moved.fit);
-  const Marginal marginal(*by, moved.fit, curve, likelihood_.get());
+  // Shared by all that is looked at beside less spread, now or later.
+  const auto curve = std::make_shared<const CurveColumns>(discrepancy_->columns(*by, moved.fit));
+  const auto from = std::make_shared<const Fit>(moved.fit);
+  const Marginal marginal(*by, *from, *curve, likelihood_.get());
   // What is promised is relative to this set by the reference's noise, which may be wrong for this set and right for
   // the larger; or by that of this set, of which it is the other way about: the larger finds its own, which promises no
   // less than either.
-  const auto log_promised = [=](double log_change) {
-    return log_here + (moved.fit.valid ? std::max(moved.log_change + log_change, moved.share_before * log_change)
-                                       : moved.log_change);
+  const auto log_promised = [log_here, valid = from->valid, log_moved = moved.log_change,
+                             share = moved.share_before](double log_change) {
+    return log_here + (valid ? std::max(log_moved + log_change, share * log_change) : log_moved);
   };
-  std::vector<Beside> out{{.about = moved.fit,
+  std::vector<Beside> out{{.about = *from,
                            .proposals = proposals_->beside(marginal, rules_.starts),
                            .log_promised = log_promised,
                            .with_foremost = true}};
   if (with_others_moved)
-    proposals_->look_with_others_moved(*likelihood_, moved.fit, marginal, rules_.starts, out.front().proposals);
+    proposals_->look_with_others_moved(*likelihood_, *from, marginal, rules_.starts, out.front().proposals);
   const auto beside_less = [this, by, curve, log_promised](const WithLessSpread& less) {
     return Beside{
         .about = less.fit,
-        .proposals = proposals_->beside(Marginal(*by, less.fit, curve, likelihood_.get()), rules_.starts),
+        .proposals = proposals_->beside(Marginal(*by, less.fit, *curve, likelihood_.get()), rules_.starts),
         .log_promised = [=, change = less.log_change](double log_factor) { return log_promised(change + log_factor); }};
   };
-  for (const WithLessSpread& less : with_less_spread(*by, moved.fit, curve)) {
+  for (const WithLessSpread& less : with_less_spread(*by, *from, *curve)) {
     out.push_back(beside_less(less));
-    out.back().at_its_mode = [=, from = moved.fit] { return beside_less(inference::at_its_mode(less, from, curve)); };
+    out.back().at_its_mode = [=] { return beside_less(inference::at_its_mode(less, *from, *curve)); };
   }
   return out;
 }
@@ -83,7 +86,9 @@ std::vector<Search::Job> Search::larger_sets(const ModelSet& set, const Beside& 
   };
   const bool again = static_cast<bool>(beside.at_its_mode);
   if (again && std::ranges::none_of(beside.proposals, promises_more)) return out;
-  const Beside here = again ? beside.at_its_mode() : beside;
+  std::optional<Beside> at_mode;
+  if (again) at_mode = beside.at_its_mode();
+  const Beside& here = again ? *at_mode : beside;
   std::size_t rank = 0;
   for (const Proposal& one : here.proposals) {
     // Far from its start an effect may bring much more than in proportion: the foremost are fitted in any case.
