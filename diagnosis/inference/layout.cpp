@@ -31,6 +31,8 @@ bool Layout::is_instant(std::size_t local) const {
   return local_[local].parameter != nullptr && local_[local].parameter->scope == Scope::instant;
 }
 
+bool Layout::is_fitted(std::size_t local) const { return !is_instant(local) || !local_[local].parameter->jumps; }
+
 double Layout::upper(std::size_t local, std::size_t recording) const {
   const Parameter& parameter = *local_[local].parameter;
   return parameter.scope == Scope::instant ? std::min(parameter.upper, system_->data().recordings[recording].duration_s)
@@ -100,8 +102,8 @@ void Layout::clamp(VectorXd& shared, std::vector<VectorXd>& local) const {
       double& value = local[r][static_cast<Index>(i)];
       if (p.scope == Scope::phase)
         value -= (p.upper - p.lower) * std::floor((value - p.lower) / (p.upper - p.lower));
-      else
-        value = std::clamp(value, p.lower, upper(i, r));
+      else if (value != 0)
+        value = std::clamp(value, std::max(p.lower, kEarliest_s), upper(i, r));
     }
   }
 }

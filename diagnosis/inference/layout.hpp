@@ -11,6 +11,9 @@ struct Unknown {
   const Parameter* parameter = nullptr;
 };
 
+// The earliest that what happens in a recording does.
+inline constexpr double kEarliest_s = 0.004;
+
 class Layout {
  public:
   Layout(const System& system, ModelSet set);
@@ -23,6 +26,8 @@ class Layout {
   int find_shared(std::size_t member, std::size_t parameter) const { return find(shared_, member, parameter); }
   int find_local(std::size_t member, std::size_t parameter) const { return find(local_, member, parameter); }
   bool is_instant(std::size_t local) const;
+  // All but an instant at which readings jump.
+  bool is_fitted(std::size_t local) const;
   // A phase or an instant: what has many local minima and is scanned.
   bool is_scanned(std::size_t local) const { return local_[local].parameter != nullptr; }
   // Largest value of a local unknown in a recording: an instant lies within it.
@@ -34,7 +39,7 @@ class Layout {
   // Values of another layout carried over, effect by effect; the rest from the start.
   Eigen::VectorXd shared_from(const Layout& other, const Eigen::VectorXd& values) const;
   Eigen::VectorXd local_from(const Layout& other, const Eigen::VectorXd& values) const;
-  // Back within the bounds; angles by whole turns, with the angles that go with them (Parameter::half_turns).
+  // Back within the bounds, an instant that is one never at none; angles by whole turns, with the angles that go with them (Parameter::half_turns).
   void clamp(Eigen::VectorXd& shared, std::vector<Eigen::VectorXd>& local) const;
 
  private:

@@ -130,7 +130,7 @@ bool Likelihood::evaluate(const Layout& layout, std::size_t r, const VectorXd& s
 std::vector<Index> free_locals(const Layout& layout) {
   std::vector<Index> out;
   for (std::size_t i = 0; i < layout.local().size(); ++i)
-    if (!layout.is_instant(i)) out.push_back(static_cast<Index>(i));
+    if (layout.is_fitted(i)) out.push_back(static_cast<Index>(i));
   return out;
 }
 

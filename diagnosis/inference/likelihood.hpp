@@ -160,10 +160,10 @@ struct Pulls {
 };
 Pulls pulls_of(const Layout& layout, const Eigen::VectorXd& shared, const Eigen::VectorXd& curve_values,
                const Eigen::MatrixXd& curve_covariance);
-// Local unknowns in the arrow: all but instants, in order; their priors' precision and centre.
+// Local unknowns in the arrow: all that are fitted, in order; their priors' precision and centre.
 std::vector<Eigen::Index> free_locals(const Layout& layout);
 Eigen::VectorXd local_precision_of(const Layout& layout, const Scales& scales);
-// Of such a precision: what is scanned (a phase) taken as it stands.
+// Of such a precision: what is scanned (a phase, an instant) taken as it stands.
 void hold_scanned(const Layout& layout, Eigen::VectorXd& precision);
 Eigen::VectorXd nuisance_centre(const Layout& layout, const Eigen::VectorXd& local);
 // One recording of them, with the columns that it is made of: local unknowns, then shared ones and the curve's values.

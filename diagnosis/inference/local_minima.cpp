@@ -151,9 +151,9 @@ void doubt_instants(const Likelihood& likelihood, const CurveColumns& curve, Fit
   }
 }
 
-bool has_instant(const Layout& layout, int member) {
+bool has_jump(const Layout& layout, int member) {
   for (std::size_t i = 0; i < layout.local().size(); ++i)
-    if (layout.is_instant(i) && layout.local()[i].member == member) return true;
+    if (!layout.is_fitted(i) && layout.local()[i].member == member) return true;
   return false;
 }
 
@@ -211,7 +211,7 @@ void scan_shapes(const Likelihood& likelihood, const CurveColumns& curve, Fit& f
       double step = grid_spacing(p, fitted.shared[which]) / kSteps;
       for (int zoom = 0; zoom < kZooms; ++zoom, step /= kSteps)
         scan_about(likelihood, curve, which, step, kSteps, fitted);
-    } else if (unknown.member >= 0 && is_size(p) && has_instant(fitted.layout, unknown.member)) {
+    } else if (unknown.member >= 0 && is_size(p) && has_jump(fitted.layout, unknown.member)) {
       // A larger one that happens later is much the same.
       const double step = kSizeShare / kSizeSteps * std::abs(fitted.shared[which] - p.none);
       scan_about(likelihood, curve, which, step, kSizeSteps, fitted);

@@ -14,8 +14,8 @@ bool has_many_minima(const Parameter& parameter);
 // Of its starts: from a value's neighbour to the next.
 double grid_spacing(const Parameter& parameter, double value);
 
-// Whether a member of the set happens at instants.
-bool has_instant(const Layout& layout, int member);
+// Whether a member of the set happens at instants at which readings jump.
+bool has_jump(const Layout& layout, int member);
 
 // Every phase and instant at the best of a grid, all else as it is, again and again until that helps no more.
 void scan_locals(const Likelihood& likelihood, const CurveColumns& curve, Fit& fitted);
@@ -24,7 +24,7 @@ void scan_locals(const Likelihood& likelihood, const CurveColumns& curve, Fit& f
 // parameters that are still off may hold them there.
 void doubt_instants(const Likelihood& likelihood, const CurveColumns& curve, Fit& fitted);
 
-// Each shared parameter that has many local minima along a finer grid about where it is, and the size of what happens
+// Each shared parameter that has many local minima along a finer grid about where it is, and the size of what jumps
 // at instants, all else following by the linear model, and the instants too.
 void scan_shapes(const Likelihood& likelihood, const CurveColumns& curve, Fit& fitted);
 

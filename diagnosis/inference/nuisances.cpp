@@ -35,7 +35,7 @@ std::vector<std::vector<Mixture>> nuisance_posterior(const Fit& fit, std::vector
     if (!solution.valid) continue;
     for (std::size_t r = 0; r < out.size(); ++r) {
       const VectorXd variances = local_variances(blocks[r], solution);
-      // Nuisances come first among a recording's own unknowns, and none of them is an instant.
+      // Nuisances come first among a recording's own unknowns.
       for (std::size_t i = 0; i < count; ++i) {
         const auto at = static_cast<Index>(i);
         out[r][i].parts.push_back({.weight = weights[k],

@@ -4,7 +4,7 @@
 
 namespace bevel::inference {
 
-// Variances of a recording's own unknowns that are not instants, in the order of free_locals. solution: with its whole
+// Variances of a recording's own unknowns, in the order of free_locals. solution: with its whole
 // covariance.
 Eigen::VectorXd local_variances(const ArrowBlock& block, const ArrowSolution& solution);
 

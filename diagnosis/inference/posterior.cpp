@@ -198,7 +198,7 @@ void Unknowns::look_along(const Fit& fit, const CurveColumns& curve, const Matri
     const Unknown& unknown = fit.layout.shared()[static_cast<std::size_t>(i)];
     if (unknown.member < 0) continue;
     const Parameter& p = *unknown.parameter;
-    if (has_instant(fit.layout, unknown.member)) {
+    if (has_jump(fit.layout, unknown.member)) {
       if (!profile) profile.emplace(*fit.likelihood, curve, fit);
       if (!profile->valid()) return;
       part.along[i] = posterior_along(*profile, i, part.sd[i] > 0 ? part.sd[i] : kOfHeld * (p.upper - p.lower));

@@ -170,7 +170,7 @@ std::optional<Place> look(const Fit& fit, const CurveColumns& curve, std::size_t
   Place out{.A = MatrixXd(linear.Z.rows(), linear.Z.cols() + mean.size() + linear.L.cols()),
             .w = linear.residuals.white,
             .own = -nuisance_centre(fit.layout, fit.local[recording])};
-  out.own.head(mean.size()) -= mean;  // nuisances come first, and none of them is an instant
+  out.own.head(mean.size()) -= mean;  // nuisances come first
   out.A << linear.Z, linear.L.leftCols(mean.size()), linear.L;
   return out;
 }

@@ -16,8 +16,8 @@ constexpr double kNegligible = 20;  // of chi2: values beyond have no part in an
 constexpr double kFirstStep = 0.1;  // of what is near
 constexpr double kGrowth = 1.15;    // of the steps
 constexpr int kMostSteps = 60;      // to each side
-// Of an instant that follows: its steps, each half of the one before, down to 6 ms; and the earliest it goes to.
-constexpr double kWidestStep_s = 0.2, kEarliest_s = 0.004;
+// Of an instant that follows: its steps, each half of the one before, down to 6 ms.
+constexpr double kWidestStep_s = 0.2;
 constexpr int kSteps = 6;
 // Of refits: where the parabola is tried, and by how much of it the rise may be off there; the root's rise in a step,
 // at least and at most; where nothing is left, also where the model has no value; fits to each side.

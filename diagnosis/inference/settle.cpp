@@ -32,15 +32,22 @@ double beta_binomial(int happened, int recordings) {
                   boost::math::beta(kHappens, kHappensNot));
 }
 
-double log_prior_of_instants(const Likelihood& likelihood, const Fit& fit, const CurveColumns& curve) {
+// What instants add to a set's evidence: how often they happen, and the share of a recording in which each may have
+// happened, all else held. Of those that are fitted the arrow has the volume together with all else, by the linear model:
+// with it as it is alone by the likelihood itself, no density being normal far from its mode.
+double log_prior_of_instants(const Likelihood& likelihood, const Fit& fit, const CurveColumns& curve,
+                             const std::vector<ArrowBlock>& blocks) {
+  const auto free = free_locals(fit.layout);
   double sum = 0;
   for (std::size_t i = 0; i < fit.layout.local().size(); ++i) {
     if (!fit.layout.is_instant(i)) continue;
+    const auto place = static_cast<Index>(std::ranges::find(free, static_cast<Index>(i)) - free.begin());
     int happened = 0;
     for (std::size_t r = 0; r < fit.local.size(); ++r)
       if (fit.local[r][static_cast<Index>(i)] > 0) {
         ++happened;
         sum += std::log(instant_posterior(likelihood, fit, curve, r, i).width_s / fit.layout.upper(i, r));
+        if (fit.layout.is_fitted(i)) sum += 0.5 * std::log1p(blocks[r].ll(place, place) / blocks[r].precision[place]);
       }
     sum += beta_binomial(happened, static_cast<int>(fit.local.size()));
   }
@@ -90,8 +97,8 @@ GridEvidence over_nuisances(const Fit& fit, const CurveColumns& curve, const Nui
   logs = logs.cwiseMin(out.log_here);
   const double all = log_sum(std::span<const double>(logs.data(), static_cast<std::size_t>(logs.size())));
   out.weights = (logs.array() - all).exp();
-  const double constant =
-      likelihood.log_weights() + log_prior_of_instants(likelihood, fit, curve) + beyond_information(likelihood, blocks);
+  const double constant = likelihood.log_weights() + log_prior_of_instants(likelihood, fit, curve, blocks) +
+                          beyond_information(likelihood, blocks);
   out.log_here += constant;
   out.log_promised += constant;
   out.log_mean = all + constant;

@@ -29,6 +29,7 @@ struct Parameter {
   bool periodic = false;
   bool shape = false;   // readings at one start are no multiple of those at another: starts are taken as they stand
   int half_turns = -1;  // periodic: the parameter of this effect that turns by half a period when this one turns by one
+  bool jumps = false;   // an instant at which readings jump: it is scanned, and no derivative says where it is
 };
 
 // Readings are about as far from those without the effect as the parameter is from where it vanishes.

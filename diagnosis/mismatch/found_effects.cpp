@@ -58,11 +58,12 @@ bool local_parameter(const ChosenModel& model, std::size_t r, int at, const Vect
   const auto i = static_cast<std::size_t>(at);
   out.name = fit.layout.local()[i].parameter->name;
   out.value = fit.local[r][at];
-  if (fit.layout.is_instant(i)) {
-    if (!(out.value > 0)) return false;
+  const bool instant = fit.layout.is_instant(i);
+  if (instant && !(out.value > 0)) return false;
+  // Between two readings nothing is seen: where in a frame it happened is known only by its assumed form.
+  const double between_s = instant ? frame_s / std::sqrt(12.0) : 0;
+  if (!fit.layout.is_fitted(i)) {
     const auto posterior = instant_posterior(*fit.likelihood, fit, model.curve, r, i);
-    // Between two readings nothing is seen: where in a frame it happened is known only by its assumed form.
-    const double between_s = frame_s / std::sqrt(12.0);
     out.std_error = std::hypot(posterior.sd_s, between_s);
     out.ci95 = {std::min(posterior.low_s, out.value - k95 * between_s),
                 std::max(posterior.high_s, out.value + k95 * between_s)};
@@ -70,8 +71,10 @@ bool local_parameter(const ChosenModel& model, std::size_t r, int at, const Vect
   }
   const auto free = free_locals(fit.layout);
   const auto place = std::find(free.begin(), free.end(), at) - free.begin();
-  out.std_error = std::sqrt(std::max(0.0, variances[place]));
+  out.std_error = std::hypot(std::sqrt(std::max(0.0, variances[place])), between_s);
   out.ci95 = {out.value - k95 * out.std_error, out.value + k95 * out.std_error};
+  if (instant)
+    for (double& end : out.ci95) end = std::clamp(end, 0.0, fit.layout.upper(i, r));
   return true;
 }
 

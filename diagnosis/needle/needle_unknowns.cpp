@@ -207,7 +207,10 @@ void NeedleSystem::add_effects_of_library() {
     for (const std::uint32_t variant : effect.variants()) {
       inference::Effect one{.name = std::string(effect.name()), .label = label_of(effect, variant), .parameters = {}};
       for (std::size_t p = 0; p < effect.parameters().size(); ++p)
-        if ((variant >> p & 1U) != 0) one.parameters.push_back(parameter_of(effect.parameters()[p], recorded_));
+        if ((variant >> p & 1U) != 0) {
+          one.parameters.push_back(parameter_of(effect.parameters()[p], recorded_));
+          one.parameters.back().jumps = one.parameters.back().scope == Scope::instant && effect.jumps(variant);
+        }
       // Where only some parameters are fitted, a partner's place moves with them; none of those has one.
       effects_.push_back(std::move(one));
       physics_.push_back(&effect);

@@ -191,6 +191,8 @@ class Effect {
   // Adds the variance of the offset in one reading, along the axes of {A}; neighbouring readings share the error.
   virtual void blur(const EffectMemory&, std::array<double, 3>& /*variance_mm2*/) const {}
 
+  // Whether readings jump at the instant of one of its kinds, so that no derivative says where it is.
+  virtual bool jumps(std::uint32_t /*kind*/) const { return false; }
   // Which parameters are fitted together: bit i for parameter i. More than one where the effect comes in kinds.
   virtual std::span<const std::uint32_t> variants() const;
 

@@ -44,11 +44,13 @@ class LostSteps final : public Effect {
   }
   // One axis stalls, not both.
   std::span<const std::uint32_t> variants() const override {
-    static constexpr std::uint32_t kOneAxis[] = {0b101, 0b110};
+    static constexpr std::uint32_t kOneAxis[] = {kOfRotation, kOfInsertion};
     return kOneAxis;
   }
+  bool jumps(std::uint32_t kind) const override { return kind == kOfInsertion; }
 
  private:
+  static constexpr std::uint32_t kOfRotation = 0b101, kOfInsertion = 0b110;
   static constexpr double kInsertionStall_s = 0.02;
   static constexpr double kRotationStall_s = 0.1;
 };
