@@ -69,6 +69,7 @@ void shares(report::Page& page, const Tally& t) {
                                {"on no list: held-out error smaller", t.unknown_nearer, 0.9},
                                {"truth within the 95 % intervals", t.covered, 0.95},
                                {"nearest plain form within them", t.covers_nearest, 0.95},
+                               {"k, lambda1, lambda2 within theirs", t.needle_covered, 0.95},
                                {"place within 0.2 s or 3 mm", t.located, -1},
                                {"held-out chi-square within 10 % of 1", t.chi2_at_floor, -1}};
   page.picture(share_figure(lines),
@@ -227,6 +228,17 @@ void parameters(report::Page& page, const Tally& t) {
       "the noise.");
 }
 
+void needles(report::Page& page, const Tally& t) {
+  if (t.z_needle.empty()) return;
+  page.heading("The needle");
+  const Interval w = wilson95(t.needle_covered);
+  page.paragraph("k, lambda1 and lambda2 where all that was concealed is named rightly, or nothing was, " +
+                 std::to_string(t.z_needle.size()) + " values: errors in their own standard errors have the mean " +
+                 digits(t.z_needle_mean) + " and the spread " + digits(t.z_needle_spread) + "; " +
+                 percent(t.needle_covered.value()) + " (" + percent(w.low) + " to " + percent(w.high) +
+                 ") are within 1.96.");
+}
+
 void fits(report::Page& page, const Tally& t, const std::vector<TrialScore>& scores) {
   std::vector<double> x, before, after_x, after;
   for (const TrialScore& s : scores) {
@@ -288,6 +300,7 @@ std::string results_page(const CampaignFacts& facts, const Tally& t, const std::
   sensitivity(page, t);
   confusion(page, t);
   parameters(page, t);
+  needles(page, t);
   fits(page, t, scores);
   if (!t.seconds.empty()) {
     page.heading("Time");

@@ -142,6 +142,25 @@ void score_location(const OpenedEffect& truth, const NamedEffect& named, const V
   if (error) score.locations.push_back({truth.name, *error, false});
 }
 
+void score_needle(const OpenedTruth& truth, const Verdict& verdict, TrialScore& score) {
+  constexpr double k95 = 1.96;
+  std::set<std::string> concealed;
+  for (const OpenedEffect& effect : truth.effects) concealed.insert(effect.name);
+  const bool all_named = score.named == Names(concealed.begin(), concealed.end());
+  if (truth.plant == "beam" || !all_named || concealed.contains("unknown")) return;
+  for (const char* name : {"curvature_per_mm", "lambda1_per_rad", "lambda2"}) {
+    const auto found = verdict.needle.find(name);
+    const auto true_value = truth.needle.find(name);
+    if (found == verdict.needle.end() || true_value == truth.needle.end()) continue;
+    ParameterScore p{"needle", name, true_value->second, found->second.value, {}, {}};
+    if (const auto error = found->second.std_error; error && *error > 0) {
+      p.z = (p.value - p.truth) / *error;
+      p.covered = std::abs(*p.z) <= k95;
+    }
+    score.needle.push_back(p);
+  }
+}
+
 TrialScore begin(const OpenedTruth& truth) {
   TrialScore score;
   score.trial = truth.trial;
@@ -196,6 +215,8 @@ OpenedTruth parse_truth(std::string_view text) {
       if (e.contains("nearest")) effect.nearest = e.at("nearest").get<std::map<std::string, double>>();
       truth.effects.push_back(std::move(effect));
     }
+    for (const char* name : {"curvature_per_mm", "lambda1_per_rad", "lambda2"})
+      if (j.contains("needle")) truth.needle[name] = j.at("needle").at(name);
     for (const json& rival : j.at("rivals")) truth.rivals.push_back(rival.at("name"));
     return truth;
   } catch (const json::exception& e) {
@@ -224,6 +245,7 @@ TrialScore score_verdict(const OpenedTruth& truth, const Verdict& verdict) {
         score_location(effect, named, verdict, score);
       }
   }
+  score_needle(truth, verdict, score);
   score.chi2_before = verdict.chi2_before;
   score.chi2_after = verdict.chi2_after;
   score.rmse_before_mm = verdict.rmse_before_mm;

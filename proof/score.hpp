@@ -26,7 +26,8 @@ struct OpenedTruth {
   double visible_sigmas = 0;
   std::vector<std::string> expected;
   std::vector<OpenedEffect> effects;
-  std::vector<std::string> rivals;  // listed effects that these recordings cannot tell from the unlisted one
+  std::map<std::string, double> needle = {};  // its parameters
+  std::vector<std::string> rivals;            // listed effects that these recordings cannot tell from the unlisted one
 };
 OpenedTruth parse_truth(std::string_view text);  // throws std::runtime_error
 
@@ -80,6 +81,9 @@ struct TrialScore {
   double probability_of_said = 0;
   std::vector<FoundEffect> found;
   std::vector<ParameterScore> parameters;
+  // k, lambda1 and lambda2 where everything that was concealed is named rightly, or nothing was: what nobody sees of it
+  // is in these. Of the beam they have no truth.
+  std::vector<ParameterScore> needle;
   std::vector<LocationScore> locations;
   std::optional<double> chi2_before, chi2_after, rmse_before_mm, rmse_after_mm;
   std::optional<double> log_density_before, log_density_after;

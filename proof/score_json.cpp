@@ -72,6 +72,7 @@ json as_json(const TrialScore& s) {
          {"seconds", s.seconds},
          {"found", json::array()},
          {"parameters", json::array()},
+         {"needle", json::array()},
          {"locations", json::array()}};
   for (const FoundEffect& f : s.found)
     j["found"].push_back({{"name", f.name}, {"visible_sigmas", f.visible_sigmas}, {"named", f.named}});
@@ -84,6 +85,12 @@ json as_json(const TrialScore& s) {
                                {"covered", optional_json(p.covered)},
                                {"z_nearest", optional_json(p.z_nearest)},
                                {"covers_nearest", optional_json(p.covers_nearest)}});
+  for (const ParameterScore& p : s.needle)
+    j["needle"].push_back({{"parameter", p.parameter},
+                           {"truth", p.truth},
+                           {"value", p.value},
+                           {"z", optional_json(p.z)},
+                           {"covered", optional_json(p.covered)}});
   for (const LocationScore& l : s.locations)
     j["locations"].push_back({{"effect", l.effect}, {"error", l.error}, {"unit", l.in_seconds ? "s" : "mm"}});
   return j;
@@ -121,6 +128,10 @@ TrialScore trial_score_of(const json& j) {
     if (p.at("covers_nearest").is_boolean()) score.covers_nearest = p.at("covers_nearest").get<bool>();
     s.parameters.push_back(std::move(score));
   }
+  for (const json& p : j.value("needle", json::array())) {
+    s.needle.push_back({"needle", p.at("parameter"), p.at("truth"), p.at("value"), optional_number(p, "z"), {}});
+    if (p.at("covered").is_boolean()) s.needle.back().covered = p.at("covered").get<bool>();
+  }
   for (const json& l : j.at("locations")) s.locations.push_back({l.at("effect"), l.at("error"), l.at("unit") == "s"});
   return s;
 }
@@ -139,35 +150,38 @@ json as_json(const Tally& t) {
   json false_alarms = share_json(t.false_alarms);
   false_alarms["clopper_pearson95"] = {exact.low, exact.high};
   false_alarms["upper95_one_sided"] = clopper_pearson_upper95(t.false_alarms);
-  return {{"trials", t.trials},
-          {"abstentions", t.abstentions},
-          {"exact_set_strict", shares_json(t.strict)},
-          {"exact_set_lenient", shares_json(t.lenient)},
-          {"exact_set_strict_visible_by_class", shares_json(t.strict_by_class)},
-          {"false_alarms_in_nulls", false_alarms},
-          {"unknown_called_unknown", share_json(t.unknown_called_unknown)},
-          {"unknown_called_unknown_without_rival", share_json(t.unknown_distinct)},
-          {"unknown_called_without_cause", share_json(t.unknown_alarms)},
-          {"unknown_likelier_held_out", share_json(t.unknown_likelier)},
-          {"unknown_nearer_held_out", share_json(t.unknown_nearer)},
-          {"mean_probability_of_truth", t.mean_probability_of_truth},
-          {"truth_below_one_percent", share_json(t.truth_improbable)},
-          {"reliability", reliability},
-          {"expected_calibration_error", t.expected_calibration_error},
-          {"sensitivity", sensitivity},
-          {"confusion", t.confusion},
-          {"z_scores", {{"count", t.z.size()}, {"mean", t.z_mean}, {"spread", t.z_spread}, {"values", t.z}}},
-          {"coverage95", share_json(t.covered)},
-          {"z_scores_of_nearest",
-           {{"count", t.z_nearest.size()}, {"mean", t.z_nearest_mean}, {"spread", t.z_nearest_spread}}},
-          {"coverage95_of_nearest", share_json(t.covers_nearest)},
-          {"located_within_0.2_s_or_3_mm", share_json(t.located)},
-          {"location_errors_s", t.location_errors_s},
-          {"location_errors_mm", t.location_errors_mm},
-          {"held_out_chi2_before", spread_json(t.chi2_before)},
-          {"held_out_chi2_after", spread_json(t.chi2_after)},
-          {"held_out_chi2_within_10_percent_of_one", share_json(t.chi2_at_floor)},
-          {"seconds", spread_json(t.seconds)}};
+  return {
+      {"trials", t.trials},
+      {"abstentions", t.abstentions},
+      {"exact_set_strict", shares_json(t.strict)},
+      {"exact_set_lenient", shares_json(t.lenient)},
+      {"exact_set_strict_visible_by_class", shares_json(t.strict_by_class)},
+      {"false_alarms_in_nulls", false_alarms},
+      {"unknown_called_unknown", share_json(t.unknown_called_unknown)},
+      {"unknown_called_unknown_without_rival", share_json(t.unknown_distinct)},
+      {"unknown_called_without_cause", share_json(t.unknown_alarms)},
+      {"unknown_likelier_held_out", share_json(t.unknown_likelier)},
+      {"unknown_nearer_held_out", share_json(t.unknown_nearer)},
+      {"mean_probability_of_truth", t.mean_probability_of_truth},
+      {"truth_below_one_percent", share_json(t.truth_improbable)},
+      {"reliability", reliability},
+      {"expected_calibration_error", t.expected_calibration_error},
+      {"sensitivity", sensitivity},
+      {"confusion", t.confusion},
+      {"z_scores", {{"count", t.z.size()}, {"mean", t.z_mean}, {"spread", t.z_spread}, {"values", t.z}}},
+      {"coverage95", share_json(t.covered)},
+      {"z_scores_of_nearest",
+       {{"count", t.z_nearest.size()}, {"mean", t.z_nearest_mean}, {"spread", t.z_nearest_spread}}},
+      {"coverage95_of_nearest", share_json(t.covers_nearest)},
+      {"coverage95_of_needle", share_json(t.needle_covered)},
+      {"z_scores_of_needle", {{"count", t.z_needle.size()}, {"mean", t.z_needle_mean}, {"spread", t.z_needle_spread}}},
+      {"located_within_0.2_s_or_3_mm", share_json(t.located)},
+      {"location_errors_s", t.location_errors_s},
+      {"location_errors_mm", t.location_errors_mm},
+      {"held_out_chi2_before", spread_json(t.chi2_before)},
+      {"held_out_chi2_after", spread_json(t.chi2_after)},
+      {"held_out_chi2_within_10_percent_of_one", share_json(t.chi2_at_floor)},
+      {"seconds", spread_json(t.seconds)}};
 }
 
 }  // namespace bevel::proof

@@ -81,6 +81,10 @@ void note_parameters(const TrialScore& score, Tally& tally) {
     if (p.z_nearest) tally.z_nearest.push_back(*p.z_nearest);
     if (p.covers_nearest) tally.covers_nearest.add(*p.covers_nearest);
   }
+  for (const ParameterScore& p : score.needle) {
+    if (p.z) tally.z_needle.push_back(*p.z);
+    if (p.covered) tally.needle_covered.add(*p.covered);
+  }
   for (const LocationScore& location : score.locations) {
     (location.in_seconds ? tally.location_errors_s : tally.location_errors_mm).push_back(location.error);
     tally.located.add(location.error <= (location.in_seconds ? 0.2 : 3.0));
@@ -140,6 +144,7 @@ Tally tally(const std::vector<TrialScore>& scores) {
   finish_reliability(t);
   std::tie(t.z_mean, t.z_spread) = mean_and_spread(t.z);
   std::tie(t.z_nearest_mean, t.z_nearest_spread) = mean_and_spread(t.z_nearest);
+  std::tie(t.z_needle_mean, t.z_needle_spread) = mean_and_spread(t.z_needle);
   std::ranges::sort(t.seconds);
   return t;
 }

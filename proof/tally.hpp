@@ -54,6 +54,10 @@ struct Tally {
   double z_nearest_mean = 0;
   double z_nearest_spread = 0;
   Share covers_nearest;
+  std::vector<double> z_needle;  // of k, lambda1, lambda2 (TrialScore::needle)
+  double z_needle_mean = 0;
+  double z_needle_spread = 0;
+  Share needle_covered;
   std::vector<double> location_errors_s, location_errors_mm;
   Share located;  // within 0.2 s or 3 mm
   std::vector<double> chi2_before, chi2_after;

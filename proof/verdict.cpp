@@ -117,6 +117,17 @@ PosteriorGiven read_posterior(const json& j) {
   return posterior;
 }
 
+std::map<std::string, Estimate> read_needle(const json& j) {
+  std::map<std::string, Estimate> out;
+  if (!j.is_object() || !j.contains("after") || !j.at("after").is_object()) return out;
+  for (const auto& [name, of_one] : j.at("after").items())
+    if (const auto value = of_one.is_object() ? number(of_one, "value") : std::nullopt) {
+      out[name].value = *value;
+      out[name].std_error = number(of_one, "std_error");
+    }
+  return out;
+}
+
 }  // namespace
 
 std::vector<std::string> Verdict::named() const {
@@ -144,6 +155,7 @@ Verdict parse_verdict(std::string_view text_of_file) {
   if (verdict.kind == "nothing-missing" && !verdict.effects.empty()) fail("nothing-missing, yet effects are named");
   if (verdict.kind == "effects-found" && verdict.effects.empty()) fail("effects-found, yet none is named");
   for (const json& location : list(j, "where")) verdict.where.push_back(read_location(location));
+  if (j.contains("needle")) verdict.needle = read_needle(j.at("needle"));
   if (j.contains("posterior")) verdict.posterior = read_posterior(j.at("posterior"));
   if (j.contains("fit") && j.at("fit").is_object()) {
     const json& fit = j.at("fit");

@@ -45,6 +45,7 @@ struct Verdict {
   std::string kind;  // nothing-missing, effects-found, unknown-effect
   std::vector<NamedEffect> effects;
   std::vector<Location> where;
+  std::map<std::string, Estimate> needle;  // its parameters with what was found
   std::optional<PosteriorGiven> posterior;
   std::optional<double> chi2_before, chi2_after;  // held-out, per degree of freedom
   std::optional<double> rmse_before_mm, rmse_after_mm;

@@ -79,6 +79,7 @@ ArrowSolution solve(const std::vector<ArrowBlock>& blocks, const MatrixXd& preci
     H += block.zz;
     H.noalias() -= block.lz.transpose() * across;
     g += block.zw;
+    g.head(block.slope.size()) -= block.slope;
     g.noalias() -= block.lz.transpose() * own;
     out.least += block.ww + block.centre.dot(block.precision.cwiseProduct(block.centre)) - pulls[r].dot(own);
     out.log_volume_ratio += log_det(factors[r]) - block.precision.array().log().sum();

@@ -2,7 +2,7 @@
 // Least squares in which each recording has unknowns of its own beside those that all share: the normal equations have
 // the shape of an arrow, and each recording's own part is eliminated by its Schur complement.
 //
-//   minimise  sum_r |w_r - L_r l_r - Z_r z|^2 + (l_r - l0_r)' T_r (l_r - l0_r) + (z - z0)' P (z - z0)
+//   minimise  sum_r |w_r - L_r l_r - Z_r z|^2 + (l_r - l0_r)' T_r (l_r - l0_r) + 2 s_r' z + (z - z0)' P (z - z0)
 #include <Eigen/Core>
 #include <optional>
 #include <vector>
@@ -15,6 +15,7 @@ struct ArrowBlock {
   Eigen::VectorXd lw, zw;
   double ww = 0;
   Eigen::VectorXd precision, centre;  // T_r (diagonal), l0_r
+  Eigen::VectorXd slope;              // s_r, of the first of z; empty: zero
 };
 
 struct ArrowSolution {

@@ -19,6 +19,7 @@ namespace {
 constexpr double kNever = -std::numeric_limits<double>::infinity();  // log evidence below which a fit is given up
 constexpr double kLikelyCurve = 3;                                   // log Bayes factor from which a curve is fitted
 constexpr double kOfLikeliest = 0.5;      // of what the likeliest curve gains: what that of another component does
+constexpr double kMostOfPromise = 2;      // of what is promised of one more curve: what a fit comes to at most
 constexpr double kWorthAnExchange = 0.5;  // log evidence: what a curve in another's place has to promise, and bring
 
 // Of all curves of a scan together, each as likely beforehand: the likeliest's factor and what the rest adds to it.
@@ -120,8 +121,8 @@ double log_factor_of(const std::vector<CurveFactor>& curves, const CurvePrior& p
 }
 
 // One more curve beside those that a set has; whether it is likelier than none more.
-bool add_curve(const Likelihood& likelihood, const Discrepancy& discrepancy, const CurveRules& rules, Evaluated& out,
-               Together& so_far) {
+bool add_curve(const Likelihood& likelihood, const Discrepancy& discrepancy, const CurveRules& rules, double hopeless,
+               Evaluated& out, Together& so_far) {
   const Fit& here = *out.fit_with_curve;
   const CurveColumns curve = discrepancy.columns(*here.likelihood, here);
   auto scans = scans_beside_less_spread(likelihood, discrepancy, here, curve);
@@ -132,7 +133,8 @@ bool add_curve(const Likelihood& likelihood, const Discrepancy& discrepancy, con
   const auto more = most_promising(likelihood, discrepancy, here, curve, least, scans);
   if (more == scans.end()) return false;
   const Integrated all = integrated(more->curves);
-  if (all.log_factor + more->beside.log_change < least) return false;
+  const double promised = all.log_factor + more->beside.log_change;
+  if (promised < least || so_far.log_evidence + kMostOfPromise * promised < hopeless) return false;
   const CurvePrior& prior = more->curves.front().prior;
   Settled with = settle_with_one_more(likelihood, discrepancy, here, prior);
   // Of the other scales and lengths, beside the spread that there is in the end.
@@ -224,7 +226,7 @@ WithCurve settle_with(const Likelihood& likelihood, const Discrepancy& discrepan
 
 // From the likeliest first curve on: the next beside it, for as long as one more is likelier than not.
 void begin_with(const Likelihood& likelihood, const Discrepancy& discrepancy, const CurveRules& rules, WithCurve first,
-                double give_up_below, Evaluated& out) {
+                double hopeless, Evaluated& out) {
   Settled& with = first.settled;
   // Beside the curve another local minimum may have been found: it counts without the curve too.
   Settled again = settle(*with.fit.likelihood, nullptr, out.fit.layout, with.fit.shared, with.fit.local,
@@ -239,8 +241,7 @@ void begin_with(const Likelihood& likelihood, const Discrepancy& discrepancy, co
   Together so_far{.log_evidence = with.over.log_mean, .log_others = {first.log_others}};
   out.fit_with_curve = std::move(with.fit);
   out.nuisance_weights_with_curve = std::move(with.over.weights);
-  while (so_far.log_evidence > give_up_below && out.log_factors.size() < rules.most &&
-         add_curve(likelihood, discrepancy, rules, out, so_far)) {
+  while (out.log_factors.size() < rules.most && add_curve(likelihood, discrepancy, rules, hopeless, out, so_far)) {
     while (exchange_curve(likelihood, discrepancy, out, so_far)) {
     }
   }
@@ -279,7 +280,9 @@ Fit with_first_curve(const Discrepancy& discrepancy, Fit fit) {
 }
 
 void add_discrepancy(const Likelihood& likelihood, const Discrepancy& discrepancy, const CurveRules& rules,
-                     Evaluated& out, double give_up_below, const Fit* large_curve) {
+                     Evaluated& out, const CurveStart& start) {
+  const Fit* const large_curve = start.large_curve;
+  const double give_up_below = start.promised_with_several ? kNever : start.hopeless_below;
   out.with_discrepancy = true;
   out.curves = scan_beside(likelihood, discrepancy, out.fit);
   if (out.curves.empty()) return;
@@ -318,7 +321,8 @@ void add_discrepancy(const Likelihood& likelihood, const Discrepancy& discrepanc
         std::ranges::count(refined, one.prior.curve, &CurvePrior::curve) == 0)
       try_one(one);
   }
-  if (best.log_evidence() > least) begin_with(likelihood, discrepancy, rules, std::move(best), give_up_below, out);
+  if (best.log_evidence() > least)
+    begin_with(likelihood, discrepancy, rules, std::move(best), start.hopeless_below, out);
 }
 
 void add_large_curves(const Likelihood& likelihood, const Discrepancy& discrepancy, const CurveRules& rules,

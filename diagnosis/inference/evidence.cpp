@@ -4,6 +4,7 @@
 #include <cmath>
 #include <limits>
 
+#include "diagnosis/inference/own_volume.hpp"
 #include "diagnosis/inference/settle.hpp"
 
 namespace bevel::inference {
@@ -55,6 +56,7 @@ WithLessSpread at_its_mode(const WithLessSpread& less, const Fit& fit, const Cur
   };
   WithLessSpread out{.fit = inference::fit(likelihood, fit.layout, fit.shared, fit.local, less.fit.scales, curve)};
   out.fit.likelihood = fit.likelihood;
+  if (fit.own_volume) out.fit = with_own_integrated(std::move(out.fit), curve);
   out.log_change = log_about(out.fit) - log_about(fit);
   return out;
 }
@@ -74,7 +76,8 @@ Moved moved_to(const std::shared_ptr<const Likelihood>& likelihood, const Fit& f
     return out;
   };
   const CurveColumns curve = discrepancy.columns(*likelihood, from);
-  Moved out{.fit = fit(*likelihood, from.layout, from.shared, from.local, from.scales, curve)};
+  Moved out{.fit = fit(*likelihood, from.layout, from.shared, from.local, from.scales, curve,
+                       {.own_volume = from.own_volume})};
   out.fit.likelihood = likelihood;
   if (!out.fit.valid) return out;
   const About there = about(out.fit, curve), here = about(from, discrepancy.columns(*from.likelihood, from));

@@ -36,12 +36,16 @@ struct CurveRules {
   std::size_t most = 2;
   double optimism = 2;  // by which a fit may exceed what the linear model promised of one more
 };
+// What is known of a set before it has a curve.
+struct CurveStart {
+  const Fit* large_curve = nullptr;  // the curve that another set's fit has is tried too, from there; null: none
+  double hopeless_below = -std::numeric_limits<double>::infinity();  // log evidence with all that it may have
+  bool promised_with_several = false;                                // with the first alone it may be below that
+};
 // The discrepancy's part, added to a set that was evaluated without: the likeliest curve, then beside it the next, for
-// as long as one more is likelier than not. Once the evidence with a curve is so low, it is left as it is. large_curve:
-// the curve that another set's fit has is tried too, from there; null: none.
+// as long as one more is likelier than not, and not hopeless.
 void add_discrepancy(const Likelihood& likelihood, const Discrepancy& discrepancy, const CurveRules& rules,
-                     Evaluated& evaluated, double give_up_below = -std::numeric_limits<double>::infinity(),
-                     const Fit* large_curve = nullptr);
+                     Evaluated& evaluated, const CurveStart& start = {});
 // Where that is too large for the linear model, which chose it: the likeliest of each other component in its place.
 void add_large_curves(const Likelihood& likelihood, const Discrepancy& discrepancy, const CurveRules& rules,
                       Evaluated& evaluated);

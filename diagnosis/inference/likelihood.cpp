@@ -194,10 +194,16 @@ bool linearise(const Likelihood& likelihood, const Fit& fit, const CurveColumns&
     out.Z.conservativeResize(Eigen::NoChange, out.Z.cols() + curve.columns[r].cols());
     out.Z.rightCols(curve.columns[r].cols()) = curve.columns[r];
   }
-  out.L = residuals.by_local(Eigen::all, free_locals(fit.layout));
+  const auto free = free_locals(fit.layout);
+  out.L = residuals.by_local(Eigen::all, free);
+  // What did not happen has no derivative by when it did.
+  for (std::size_t i = 0; i < free.size(); ++i)
+    if (fit.layout.is_instant(static_cast<std::size_t>(free[i])) && fit.local[r][free[i]] == 0)
+      out.L.col(static_cast<Index>(i)).setZero();
   out.block = make_block(out.L, out.Z, residuals.white);
   out.block.precision = local_precision_of(fit.layout, fit.scales);
   out.block.centre = nuisance_centre(fit.layout, fit.local[r]);
+  if (fit.own_volume) out.block.slope = fit.own_volume->slope[r];
   return true;
 }
 
@@ -318,6 +324,7 @@ Fit fit(const Likelihood& likelihood, const Layout& layout, const VectorXd& shar
   begin.scales = scales;
   begin.shared = shared;
   begin.local = local;
+  begin.own_volume = rules.own_volume;
   if (curve) begin.curve_values = curve.tangent ? curve.tangent->values : VectorXd::Zero(curve.covariance.rows());
   const std::shared_ptr<const CurveColumns> same(std::shared_ptr<const void>(), &curve);  // not owned
   return fit_from(
@@ -345,6 +352,13 @@ Fit fit_from(const Likelihood& likelihood, Fit now, const CurveAt& curve_at, con
   Point here, there;
   look(now, here);
   now.valid = std::isfinite(now.cost);
+  // With what the recordings' own volume is more, or less, than where its slopes were taken.
+  VectorXd slope = VectorXd::Zero(now.shared.size());
+  if (now.own_volume)
+    for (const VectorXd& one : now.own_volume->slope) slope += one;
+  const auto with_volume = [&](const Fit& at, double cost) {
+    return now.own_volume ? cost + 2 * slope.dot(at.shared - now.own_volume->about) : cost;
+  };
   double damping = 1e-4;
   for (int iteration = 0; now.valid && iteration < rules.max_iterations; ++iteration) {
     now.iterations = iteration + 1;
@@ -357,7 +371,8 @@ Fit fit_from(const Likelihood& likelihood, Fit now, const CurveAt& curve_at, con
         continue;
       }
       // What the linear model expects to gain is too little to look for.
-      if (now.cost - step.least < rules.tolerance && how.damping < 1e-2) {
+      const double least = with_volume(now, step.least), here_is = with_volume(now, now.cost);
+      if (here_is - least < rules.tolerance && how.damping < 1e-2) {
         now.held = how.held;
         break;
       }
@@ -369,9 +384,9 @@ Fit fit_from(const Likelihood& likelihood, Fit now, const CurveAt& curve_at, con
           for (std::size_t i = 0; i < free.size(); ++i) trial.local[r][free[i]] += step.local[r][static_cast<Index>(i)];
       layout.clamp(trial.shared, trial.local);
       look(trial, there);
-      if (trial.cost < now.cost) {
+      if (const double gained = here_is - with_volume(trial, trial.cost); gained > 0) {
         trial.held = how.held;
-        small = now.cost - trial.cost < rules.tolerance;
+        small = gained < rules.tolerance;
         now = std::move(trial);
         std::swap(here, there);
         damping = std::max(how.damping * 0.2, 1e-7);

@@ -110,6 +110,13 @@ class Likelihood {
   double information_ = 1;
 };
 
+// How the volume of what a recording's own unknowns leave open changes with the shared ones: half the gradient of
+// log det(L_r' L_r + T_r) by them (own_volume.hpp).
+struct OwnVolume {
+  Eigen::VectorXd about;  // the shared unknowns there
+  std::vector<Eigen::VectorXd> slope;
+};
+
 // The mode of a set of effects, and the likelihood about it.
 struct Fit {
   explicit Fit(Layout l) : layout(std::move(l)) {}
@@ -121,6 +128,7 @@ struct Fit {
   std::shared_ptr<const CurveTangent> tangent;   // what the model is linear about in them; null: none
   std::shared_ptr<const Likelihood> likelihood;  // by whose noise it was fitted
   double cost = 0;                               // squared whitened residuals and priors' pulls
+  std::shared_ptr<const OwnVolume> own_volume;   // beside the cost, what the mode is one of; null: of the cost alone
   std::vector<Eigen::Index> held;                // shared unknowns that press against a bound
   int iterations = 0;
   bool valid = false;
@@ -135,8 +143,9 @@ std::shared_ptr<const Likelihood> with_inputs_of(const Fit& fit, const std::shar
 
 struct FitRules {
   int max_iterations = 25;
-  double tolerance = 0.02;            // of the cost
-  std::vector<Eigen::Index> fixed{};  // shared unknowns that stay where they start
+  double tolerance = 0.02;                        // of the cost
+  std::vector<Eigen::Index> fixed{};              // shared unknowns that stay where they start
+  std::shared_ptr<const OwnVolume> own_volume{};  // sought is the mode of the cost and this, by its slopes; null: none
 };
 
 Fit fit(const Likelihood& likelihood, const Layout& layout, const Eigen::VectorXd& shared,

@@ -109,7 +109,7 @@ std::vector<Search::Job> Search::larger_sets(const ModelSet& set, const Beside& 
     for (const StartPoint& start : one.starts)
       if (start.log_bayes_factor > one.starts.front().log_bayes_factor - rules_.window) {
         out.push_back(job_from(here.about, one.effect, start));
-        if (!foremost) out.back().promised = promised + doubtful;
+        out.back().promised = promised + doubtful;
         ask_for_curve_of(here.about, out.back());
       }
   }

@@ -23,6 +23,24 @@ VectorXd local_variances(const ArrowBlock& block, const ArrowSolution& solution)
   return (own + through * solution.covariance * through.transpose()).diagonal();
 }
 
+MatrixXd shared_covariance(const Fit& fit, std::vector<ArrowBlock> blocks, const CurveColumns& curve,
+                           const VectorXd& weights) {
+  const Index n = fit.shared.size();
+  const NuisanceGrid grid = nuisance_grid(fit.layout.system());
+  MatrixXd sum = MatrixXd::Zero(n, n);
+  double all = 0;
+  for (Index k = 0; k < weights.size(); ++k) {
+    if (weights[k] < kNegligible) continue;
+    const ArrowSolution solution = solve_at(grid.standard_deviations.col(k), fit, blocks, curve);
+    if (!solution.valid) continue;
+    const VectorXd away = solution.shared.head(n);
+    sum += weights[k] * (solution.covariance.topLeftCorner(n, n) + away * away.transpose());
+    all += weights[k];
+  }
+  if (all > 0) return sum / all;
+  return solve_about(fit, blocks, curve).covariance.topLeftCorner(n, n);
+}
+
 std::vector<std::vector<Mixture>> nuisance_posterior(const Fit& fit, std::vector<ArrowBlock> blocks,
                                                      const CurveColumns& curve, const VectorXd& weights) {
   const System& system = fit.layout.system();

@@ -5,6 +5,8 @@
 #include <limits>
 #include <utility>
 
+#include "diagnosis/inference/own_volume.hpp"
+
 namespace bevel::inference {
 
 using Eigen::Index;
@@ -49,6 +51,8 @@ Profile::Profile(const Likelihood& likelihood, const CurveColumns& curve, const 
 double Profile::at(Index which, double value, VectorXd& shared, std::vector<VectorXd>& local) const {
   shared = fit_.shared;
   shared[which] = value;
+  const VectorXd away = shared - fit_.shared;
+  double volume = 0;
   std::vector<VectorXd> instants = fit_.local;
   for (std::size_t r = 0; r < instants.size(); ++r)
     for (std::size_t i = 0; i < fit_.layout.local().size(); ++i)
@@ -61,6 +65,7 @@ double Profile::at(Index which, double value, VectorXd& shared, std::vector<Vect
     blocks[r].lw = L_[r].transpose() * residuals.white;
     blocks[r].zw = Z_[r].transpose() * residuals.white;
     blocks[r].ww = residuals.white.squaredNorm();
+    volume += 2 * blocks[r].slope.dot(away.head(blocks[r].slope.size()));
   }
   const Pulls pulls = pulls_of(fit_.layout, shared, fit_.curve_values, curve_.covariance);
   ArrowRules how{.held = fit_.held};
@@ -71,7 +76,7 @@ double Profile::at(Index which, double value, VectorXd& shared, std::vector<Vect
   local = std::move(instants);
   for (std::size_t r = 0; r < local.size(); ++r)
     for (std::size_t i = 0; i < free_.size(); ++i) local[r][free_[i]] += step.local[r][static_cast<Index>(i)];
-  return step.least;
+  return step.least + volume;
 }
 
 double Profile::chi2(std::size_t r, const VectorXd& shared, const VectorXd& local) const {
@@ -136,10 +141,18 @@ std::vector<ProfileStep> posterior_by_refits(const Likelihood& likelihood, const
   // From a fit nearby: the others moved with it by the linear model.
   const auto fitted_at = [&](const Fit& from, double value) {
     const VectorXd shared = from.shared + (value - from.shared[which]) * by_which;
-    return inference::fit(likelihood, fit.layout, shared, from.local, fit.scales, curve, {.fixed = {which}});
+    return inference::fit(likelihood, fit.layout, shared, from.local, fit.scales, curve,
+                          {.fixed = {which}, .own_volume = fit.own_volume});
   };
+  const auto total_of = [&](const Fit& there) {
+    if (!there.valid) return std::numeric_limits<double>::infinity();
+    if (!fit.own_volume) return there.cost;
+    const auto blocks = linearise(likelihood, there, curve);
+    return blocks.empty() ? std::numeric_limits<double>::infinity() : there.cost + log_own_volume(blocks);
+  };
+  const double least = total_of(fit);
   const auto root_of = [&](const Fit& there) {
-    return there.valid ? std::min(std::sqrt(std::max(0.0, there.cost - fit.cost)), kNothingLeft) : kNothingLeft;
+    return std::min(std::sqrt(std::max(0.0, total_of(there) - least)), kNothingLeft);
   };
   const auto is_parabola = [&](double direction) {
     const double value = fit.shared[which] + direction * kTried_sd * near;

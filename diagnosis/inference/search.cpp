@@ -202,9 +202,10 @@ void Search::evaluate_all(std::vector<Job> jobs) {
     with[k] = std::make_shared<Evaluated>(*results[asked[k]]);
     // What is promised beside several curves has little of it with the first alone.
     const bool promised = job.beside_curve && std::isfinite(job.promised);
-    const double give_up_below =
-        promised ? -std::numeric_limits<double>::infinity() : hopeless(job) - curve_rules_.log_prior_odds;
-    add_discrepancy(*likelihood_, *discrepancy_, curve_rules_, *with[k], give_up_below, job.large_curve.get());
+    add_discrepancy(*likelihood_, *discrepancy_, curve_rules_, *with[k],
+                    {.large_curve = job.large_curve.get(),
+                     .hopeless_below = hopeless(job) - curve_rules_.log_prior_odds,
+                     .promised_with_several = promised});
   });
   for (std::size_t k = 0; k < asked.size(); ++k) keep(jobs[asked[k]].set, with[k]);
 }

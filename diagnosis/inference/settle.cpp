@@ -10,6 +10,7 @@
 #include "diagnosis/inference/instant_posterior.hpp"
 #include "diagnosis/inference/local_minima.hpp"
 #include "diagnosis/inference/log_sum.hpp"
+#include "diagnosis/inference/own_volume.hpp"
 #include "diagnosis/inference/spread_search.hpp"
 
 namespace bevel::inference {
@@ -33,8 +34,8 @@ double beta_binomial(int happened, int recordings) {
 }
 
 // What instants add to a set's evidence: how often they happen, and the share of a recording in which each may have
-// happened, all else held. Of those that are fitted the arrow has the volume together with all else, by the linear model:
-// with it as it is alone by the likelihood itself, no density being normal far from its mode.
+// happened, all else held. Of those that are fitted the arrow has the volume together with all else, by the linear
+// model: with it as it is alone by the likelihood itself, no density being normal far from its mode.
 double log_prior_of_instants(const Likelihood& likelihood, const Fit& fit, const CurveColumns& curve,
                              const std::vector<ArrowBlock>& blocks) {
   const auto free = free_locals(fit.layout);
@@ -188,6 +189,7 @@ Settled settle(const Likelihood& likelihood, const Discrepancy* discrepancy, con
   }
   if (!best.fit.valid) return best;
   if (discrepancy) curve = discrepancy->columns(*best.fit.likelihood, best.fit);
+  best.fit = with_own_integrated(std::move(best.fit), curve);
   best.over = over_nuisances(best.fit, curve, grid, kWithAShare);
   return best;
 }

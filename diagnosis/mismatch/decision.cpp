@@ -5,6 +5,7 @@
 #include <set>
 
 #include "diagnosis/inference/curved_fit.hpp"
+#include "diagnosis/inference/own_volume.hpp"
 
 namespace bevel::diagnosis {
 
@@ -88,7 +89,7 @@ Fit refitted_base(const Search& search, const Fit& like) {
   Fit out =
       fit(*like.likelihood, nothing, base.shared, base.local, {.nuisance_sd = like.scales.nuisance_sd, .curves = {}});
   out.likelihood = like.likelihood;
-  return out;
+  return with_own_integrated(std::move(out), {});
 }
 
 }  // namespace bevel::diagnosis

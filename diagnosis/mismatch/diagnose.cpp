@@ -218,9 +218,9 @@ Findings diagnose(const RecordedCase& recorded, const model::NeedleParameters& m
   findings.proposals = propose_forms(system, search, decision.model);
   findings.variation = variation_of(search, unknowns);
   findings.insertions = insertions_of(system, search, decision.model);
-  findings.needle = needle_estimate(system, decision.model);
+  findings.needle = needle_estimate(system, search, decision.model);
   const inference::Fit& alone = search.visited().at({}).at->fit;
-  findings.base = needle_estimate(system, model_of(search, alone, 0));
+  findings.base = needle_estimate(system, search, model_of(search, alone, 0));
   findings.tried = tried_beside(search, {});
   if (!decision.model.fit->layout.set().empty())
     findings.beside = tried_beside(search, decision.model.fit->layout.set());

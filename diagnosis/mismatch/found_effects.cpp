@@ -174,10 +174,11 @@ std::vector<TriedEffect> tried_beside(const Search& search, const ModelSet& set)
   return out;
 }
 
-NeedleEstimate needle_estimate(const NeedleSystem& system, const ChosenModel& model) {
+NeedleEstimate needle_estimate(const NeedleSystem& system, const Search& search, const ChosenModel& model) {
   NeedleEstimate out;
   out.value = system.needle(model.fit->shared);
-  const MatrixXd covariance = solve_about(*model.fit, model.blocks, model.curve).covariance;
+  const MatrixXd covariance =
+      shared_covariance(*model.fit, model.blocks, model.curve, nuisance_weights_of(search, *model.fit));
   const Eigen::RowVector2d by(1, out.value.lambda2 / std::numbers::pi);  // lambda1 by (u, lambda2)
   out.curvature_sd_per_mm = std::sqrt(covariance(kCurvature, kCurvature));
   out.lambda1_sd_per_rad = std::sqrt((by * covariance.block<2, 2>(kU, kU) * by.transpose()).value());

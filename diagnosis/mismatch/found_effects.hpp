@@ -10,7 +10,7 @@ std::vector<FoundEffect> found_effects(const NeedleSystem& system, const inferen
                                        const ChosenModel& model);
 // Every effect of the library, added to a set that was visited.
 std::vector<TriedEffect> tried_beside(const inference::Search& search, const inference::ModelSet& set);
-NeedleEstimate needle_estimate(const NeedleSystem& system, const ChosenModel& model);
+NeedleEstimate needle_estimate(const NeedleSystem& system, const inference::Search& search, const ChosenModel& model);
 std::vector<VariationEstimate> variation_of(const inference::Search& search, const inference::Unknowns& unknowns);
 // What each insertion has of its own, beside the model that was chosen.
 std::vector<InsertionValues> insertions_of(const NeedleSystem& system, const inference::Search& search,

@@ -144,7 +144,8 @@ Fit refit_without(const inference::Search& search, const Fit& whole, const Fit& 
   without[r].assign(gone.begin(), gone.end());
   const Likelihood some(all.system(), without, all.noise(), inputs_about(whole));
   const auto curve = search.discrepancy().columns(some, whole);
-  Fit out = inference::fit(some, whole.layout, start.shared, start.local, whole.scales, curve);
+  Fit out = inference::fit(some, whole.layout, start.shared, start.local, whole.scales, curve,
+                           {.own_volume = whole.own_volume});
   if (!out.valid) out = start;
   return out;
 }

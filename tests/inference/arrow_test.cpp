@@ -71,6 +71,26 @@ TEST(Arrow, SolvesAsTheWholeSystemDoes) {
   }
 }
 
+TEST(Arrow, ASlopeIsWhatItAddsToTheSquares) {
+  Problem p = random_problem(6);
+  p.blocks[1].slope = VectorXd{{0.3, -2}};  // of the first two
+  p.blocks[4].slope = VectorXd{{1, 0, 0.5, -1}};
+  const ArrowSolution s = solve(p.blocks, p.precision.topLeftCorner(4, 4), p.centre.head(4));
+  VectorXd slope = VectorXd::Zero(p.centre.size());
+  slope.head(4) << 1.3, -2, 0.5, -1;
+  const MatrixXd H = p.A.transpose() * p.A + p.precision;
+  const VectorXd x = H.ldlt().solve(p.A.transpose() * p.w + p.precision * p.centre - slope);
+  EXPECT_LT((s.shared - x.head(4)).norm(), 1e-10);
+  const VectorXd off = x - p.centre;
+  EXPECT_NEAR(s.least, (p.w - p.A * x).squaredNorm() + off.dot(p.precision * off) + 2 * slope.dot(x), 1e-9);
+  ArrowRules rules;
+  rules.used = {true, false, true, true, false};
+  p.blocks[1].slope = p.blocks[4].slope = {};
+  const VectorXd rest = solve(p.blocks, p.precision.topLeftCorner(4, 4), p.centre.head(4), rules).shared;
+  p.blocks[1].slope = p.blocks[4].slope = VectorXd::Ones(4);
+  EXPECT_EQ(solve(p.blocks, p.precision.topLeftCorner(4, 4), p.centre.head(4), rules).shared, rest);
+}
+
 TEST(Arrow, WithoutARecordingIsTheRestAlone) {
   const Problem p = random_problem(9);
   ArrowRules rules;

@@ -103,7 +103,7 @@ TEST(Discrepancy, OfWhichNothingStandsOutCountsByTheLinearModel) {
     ASSERT_TRUE(at.valid);
     const Discrepancy discrepancy(likelihood, at.fit);
     add_discrepancy(likelihood, discrepancy, {.log_prior_odds = -2, .log_prior_odds_more = -5}, at,
-                    at.log_evidence - 10);
+                    {.hopeless_below = at.log_evidence - 10});
     ASSERT_LT(at.curves.front().log_bayes_factor, 3);
     double mean = 0;
     for (const CurveFactor& one : at.curves)

@@ -36,7 +36,14 @@ class Step final : public testing::HeldSystem {
     data_.recordings = {{.series = {series}, .messages = 270, .duration_s = 9}};
     base_ = {{.name = "level", .lower = -9, .upper = 9, .none = 0, .starts = {}, .prior = normal_prior(0, 1)}};
     Parameter size{.name = "size", .lower = 0, .upper = 9, .none = 0, .starts = {1}, .prior = normal_prior(0, 3)};
-    Parameter at{.name = "at_s", .lower = 0, .upper = 9, .none = 0, .starts = {}, .prior = {}, .scope = Scope::instant};
+    Parameter at{.name = "at_s",
+                 .lower = 0,
+                 .upper = 9,
+                 .none = 0,
+                 .starts = {},
+                 .prior = {},
+                 .scope = Scope::instant,
+                 .jumps = true};
     effects_ = {{"step", "step", {size, at}}};
   }
   bool predict(const ModelSet& set, std::size_t, const VectorXd& shared, const VectorXd& local, bool derivatives,

@@ -52,6 +52,41 @@ TEST(Score, ExactSetsOnly) {
   EXPECT_FALSE(score(two, "unknown-effect", {effect("layer"), effect("torsional_windup")}).strict);
 }
 
+TEST(Score, NeedleCountsWhereAllThatWasConcealedIsNamed) {
+  const auto with_needle = [](OpenedTruth truth) {
+    truth.needle = {{"curvature_per_mm", 0.005}, {"lambda1_per_rad", 0.3}, {"lambda2", 0.1}};
+    return truth;
+  };
+  const json found{{"needle",
+                    {{"after",
+                      {{"curvature_per_mm", {{"value", 0.0052}, {"std_error", 0.0001}}},
+                       {"lambda1_per_rad", {{"value", 0.25}, {"std_error", 0.1}}},
+                       {"lambda2", {{"value", 0.1}}},
+                       {"wheelbase_mm", 20}}}}}};
+  const TrialScore right = score(with_needle(truth_of({layer()})), "effects-found", {effect("layer")}, found);
+  ASSERT_EQ(right.needle.size(), 3U);
+  EXPECT_NEAR(*right.needle[0].z, 2, 1e-9);
+  EXPECT_FALSE(*right.needle[0].covered);
+  EXPECT_NEAR(*right.needle[1].z, -0.5, 1e-9);
+  EXPECT_TRUE(*right.needle[1].covered);
+  EXPECT_FALSE(right.needle[2].z);
+  EXPECT_EQ(as_json(trial_score_of(as_json(right))), as_json(right));
+  const Tally t = tally({right});
+  EXPECT_EQ(t.needle_covered.of, 2);
+  EXPECT_EQ(t.needle_covered.hits, 1);
+  EXPECT_NEAR(t.z_needle_mean, 0.75, 1e-9);
+
+  EXPECT_EQ(score(with_needle(truth_of({})), "nothing-missing", {}, found).needle.size(), 3U);
+  // What is there and not named is in the needle.
+  EXPECT_TRUE(score(with_needle(truth_of({layer(4)})), "nothing-missing", {}, found).needle.empty());
+  EXPECT_TRUE(
+      score(with_needle(truth_of({layer(), windup(3)})), "effects-found", {effect("layer")}, found).needle.empty());
+  EXPECT_TRUE(score(with_needle(truth_of({screw()})), "unknown-effect", {}, found).needle.empty());
+  OpenedTruth beam = with_needle(truth_of({layer()}));
+  beam.plant = "beam";
+  EXPECT_TRUE(score(beam, "effects-found", {effect("layer")}, found).needle.empty());
+}
+
 TEST(Score, OfTwoGroupsTheChangeIsWhatCounts) {
   const OpenedTruth one = truth_of({layer()});
   const auto of_groups = [&](const std::string& kind, const std::vector<json>& changes) {

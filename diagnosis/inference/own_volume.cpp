@@ -1,0 +1,107 @@
+#include "diagnosis/inference/own_volume.hpp"
+
+#include <Eigen/Cholesky>
+#include <algorithm>
+#include <cmath>
+
+#include "diagnosis/parallel.hpp"
+
+namespace bevel::inference {
+
+using Eigen::Index;
+using Eigen::MatrixXd;
+using Eigen::VectorXd;
+
+namespace {
+
+constexpr int kMostSteps = 8;
+constexpr int kHalvings = 4;
+constexpr double kSmallStep = 0.02;      // of cost and volume: what a step has to promise
+constexpr double kDifference_sd = 0.25;  // of a shared unknown: over which slopes are taken
+
+MatrixXd inner_of(const ArrowBlock& block) {
+  MatrixXd out = block.ll;
+  out.diagonal() += block.precision;
+  return out;
+}
+
+double log_own_volume(const ArrowBlock& block) {
+  const Eigen::LLT<MatrixXd> factor(inner_of(block));
+  return 2 * factor.matrixLLT().diagonal().array().log().sum() - block.precision.array().log().sum();
+}
+
+bool has_slope(const Unknown& unknown) { return unknown.member < 0 || is_size(*unknown.parameter); }
+
+// Each recording's own unknowns follow a shared one, by the linear model.
+std::shared_ptr<const OwnVolume> own_volume_about(const Fit& fit, const CurveColumns& curve,
+                                                  const std::vector<ArrowBlock>& blocks,
+                                                  const ArrowSolution& solution) {
+  const Layout& layout = fit.layout;
+  const auto free = free_locals(layout);
+  OwnVolume out{.about = fit.shared, .slope = std::vector<VectorXd>(blocks.size(), VectorXd::Zero(fit.shared.size()))};
+  parallel_for(blocks.size(), [&](std::size_t r) {
+    const double here = log_own_volume(blocks[r]);
+    const MatrixXd follow = -Eigen::LLT<MatrixXd>(inner_of(blocks[r])).solve(blocks[r].lz);
+    for (Index j = 0; j < fit.shared.size(); ++j) {
+      const Parameter& p = *layout.shared()[static_cast<std::size_t>(j)].parameter;
+      double step = kDifference_sd * std::sqrt(std::max(0.0, solution.covariance(j, j)));
+      if (!has_slope(layout.shared()[static_cast<std::size_t>(j)]) || !(step > 0)) continue;
+      if (fit.shared[j] + step > p.upper) step = -step;
+      Fit there = fit;
+      there.own_volume = nullptr;
+      there.shared[j] += step;
+      for (std::size_t i = 0; i < free.size(); ++i) there.local[r][free[i]] += step * follow(static_cast<Index>(i), j);
+      LinearRecording moved;
+      if (!linearise(*fit.likelihood, there, curve, r, moved)) continue;
+      if (const double slope = 0.5 * (log_own_volume(moved.block) - here) / step; std::isfinite(slope))
+        out.slope[r][j] = slope;
+    }
+  });
+  return std::make_shared<const OwnVolume>(std::move(out));
+}
+
+}  // namespace
+
+double log_own_volume(const std::vector<ArrowBlock>& blocks) {
+  double sum = 0;
+  for (const ArrowBlock& block : blocks) sum += log_own_volume(block);
+  return sum;
+}
+
+Fit with_own_integrated(Fit now, const CurveColumns& curve) {
+  if (!now.valid || free_locals(now.layout).empty()) return now;
+  const Likelihood& likelihood = *now.likelihood;
+  now.own_volume = nullptr;
+  auto blocks = linearise(likelihood, now, curve);
+  if (blocks.empty()) return now;
+  double total = now.cost + log_own_volume(blocks);
+  std::vector<Index> all(static_cast<std::size_t>(now.shared.size()));
+  for (std::size_t i = 0; i < all.size(); ++i) all[i] = static_cast<Index>(i);
+  for (int step = 0; step < kMostSteps; ++step) {
+    ArrowSolution about = solve_about(now, blocks, curve);
+    if (!about.valid) return now;
+    now.own_volume = own_volume_about(now, curve, blocks, about);
+    for (std::size_t r = 0; r < blocks.size(); ++r) blocks[r].slope = now.own_volume->slope[r];
+    about = solve_about(now, blocks, curve);
+    if (!about.valid || now.cost - about.least < kSmallStep) return now;
+    double share = 1;
+    bool gained = false;
+    for (int halving = 0; halving < kHalvings && !gained; ++halving, share *= 0.5) {
+      const VectorXd shared = now.shared + share * about.shared.head(now.shared.size());
+      Fit there = fit(likelihood, now.layout, shared, now.local, now.scales, curve, {.fixed = all});
+      if (!there.valid) continue;
+      there.likelihood = now.likelihood;
+      auto blocks_there = linearise(likelihood, there, curve);
+      if (blocks_there.empty()) continue;
+      const double total_there = there.cost + log_own_volume(blocks_there);
+      if (!(total_there < total)) continue;
+      there.held = now.held;
+      now = std::move(there), blocks = std::move(blocks_there), total = total_there;
+      gained = true;
+    }
+    if (!gained) return now;
+  }
+  return now;
+}
+
+}  // namespace bevel::inference
