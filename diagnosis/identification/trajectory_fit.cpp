@@ -90,6 +90,7 @@ FitResult TrajectoryFit::run() {
     break;
   }
   renew_scale(now);
+  if (locals_ > 0 && globals_ > 0) integrate_entries(x, now);
   normal_equations(x, now);
   FitResult r = result(x, now);
   r.iterations = iteration;

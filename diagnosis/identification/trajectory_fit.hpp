@@ -9,7 +9,9 @@
 //   Huber's loss or the square, s the scale of the noise against what the measurements claim, found with the fit.
 //   Constraints: the model's domain, (23), (24), (26). (26) is kept by fitting lambda1 - lambda2^2/(2 pi) >= 0.
 // Solution
-//   Levenberg-Marquardt with analytic Jacobians, weights renewed each iteration (IRLS), bounds by an active set.
+//   Levenberg-Marquardt with analytic Jacobians, weights renewed each iteration (IRLS), bounds by an active set; where
+//   entries are asked for, from there to the least of twice that and log det of the entries' own part of the normal
+//   equations, which integrates them out (diagnosis/inference/own_volume.hpp says why).
 // Result
 //   Estimate, covariance (Huber 1981, 7.6, for the loss; multiplied by (1 + rho)/(1 - rho) where successive residuals
 //   correlate, because a camera's error is not white), and what the data do not fix (fit_statistics.hpp).

@@ -30,6 +30,11 @@ class TrajectoryFit {
   void renew_scale(const std::vector<Block>& blocks);
   [[nodiscard]] double cost(const Eigen::VectorXd& x, const std::vector<Block>& blocks) const;
   void normal_equations(const Eigen::VectorXd& x, const std::vector<Block>& blocks);
+  // From the mode of needle and entries together to that of the needle with the entries integrated out, each at its
+  // mode there.
+  void integrate_entries(Eigen::VectorXd& x, std::vector<Block>& now);
+  void follow_entries(Eigen::VectorXd& x, std::vector<Block>& blocks);
+  double log_own_volume(const Eigen::VectorXd& x, const std::vector<Block>& blocks);
   [[nodiscard]] std::vector<double> all_residuals(const std::vector<Block>& blocks) const;
   [[nodiscard]] double correlation(const std::vector<Block>& blocks) const;
   FitResult result(const Eigen::VectorXd& x, const std::vector<Block>& blocks) const;
