@@ -4,7 +4,6 @@
 #include <cmath>
 #include <limits>
 
-#include "diagnosis/inference/own_volume.hpp"
 #include "diagnosis/inference/settle.hpp"
 
 namespace bevel::inference {
@@ -56,7 +55,6 @@ WithLessSpread at_its_mode(const WithLessSpread& less, const Fit& fit, const Cur
   };
   WithLessSpread out{.fit = inference::fit(likelihood, fit.layout, fit.shared, fit.local, less.fit.scales, curve)};
   out.fit.likelihood = fit.likelihood;
-  if (fit.own_volume) out.fit = with_own_integrated(std::move(out.fit), curve);
   out.log_change = log_about(out.fit) - log_about(fit);
   return out;
 }

@@ -14,7 +14,7 @@ using Eigen::VectorXd;
 
 namespace {
 
-constexpr int kMostSteps = 8;
+constexpr int kMostSteps = 4;
 constexpr int kHalvings = 4;
 constexpr double kSmallStep = 0.02;      // of cost and volume: what a step has to promise
 constexpr double kDifference_sd = 0.25;  // of a shared unknown: over which slopes are taken

@@ -189,7 +189,7 @@ Settled settle(const Likelihood& likelihood, const Discrepancy* discrepancy, con
   }
   if (!best.fit.valid) return best;
   if (discrepancy) curve = discrepancy->columns(*best.fit.likelihood, best.fit);
-  best.fit = with_own_integrated(std::move(best.fit), curve);
+  if (!(best.over.log_here < give_up_below)) best.fit = with_own_integrated(std::move(best.fit), curve);
   best.over = over_nuisances(best.fit, curve, grid, kWithAShare);
   return best;
 }
