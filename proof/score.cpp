@@ -142,13 +142,15 @@ void score_location(const OpenedEffect& truth, const NamedEffect& named, const V
   if (error) score.locations.push_back({truth.name, *error, false});
 }
 
+constexpr const char* kNeedle[] = {"curvature_per_mm", "lambda1_per_rad", "lambda2"};
+
 void score_needle(const OpenedTruth& truth, const Verdict& verdict, TrialScore& score) {
   constexpr double k95 = 1.96;
   std::set<std::string> concealed;
   for (const OpenedEffect& effect : truth.effects) concealed.insert(effect.name);
   const bool all_named = score.named == Names(concealed.begin(), concealed.end());
   if (truth.plant == "beam" || !all_named || concealed.contains("unknown")) return;
-  for (const char* name : {"curvature_per_mm", "lambda1_per_rad", "lambda2"}) {
+  for (const char* name : kNeedle) {
     const auto found = verdict.needle.find(name);
     const auto true_value = truth.needle.find(name);
     if (found == verdict.needle.end() || true_value == truth.needle.end()) continue;
@@ -215,7 +217,7 @@ OpenedTruth parse_truth(std::string_view text) {
       if (e.contains("nearest")) effect.nearest = e.at("nearest").get<std::map<std::string, double>>();
       truth.effects.push_back(std::move(effect));
     }
-    for (const char* name : {"curvature_per_mm", "lambda1_per_rad", "lambda2"})
+    for (const char* name : kNeedle)
       if (j.contains("needle")) truth.needle[name] = j.at("needle").at(name);
     for (const json& rival : j.at("rivals")) truth.rivals.push_back(rival.at("name"));
     return truth;

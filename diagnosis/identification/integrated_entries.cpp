@@ -48,28 +48,24 @@ void TrajectoryFit::integrate_entries(VectorXd& x, std::vector<Block>& now) {
   double volume = log_own_volume(x, now), total = 2 * cost(x, now) + volume;
   for (int step = 0; step < kMostSteps; ++step) {
     const MatrixXd H = H_;
-    VectorXd g = g_;
+    VectorXd b = -g_;
+    MatrixXd follow(size_ - globals_, globals_);  // entries by the needle
+    for (Index at = globals_; at < size_; at += locals_)
+      follow.middleRows(at - globals_, locals_) =
+          -H.block(at, at, locals_, locals_).llt().solve(MatrixXd(H.block(at, 0, locals_, globals_)));
     const VectorXd sd = H.ldlt().solve(MatrixXd::Identity(size_, size_)).diagonal().cwiseMax(0.0).cwiseSqrt();
     for (Index j = 0; j < globals_; ++j) {
       double by = kDifference_sd * sd(j);
       if (x(j) + by > high_(j)) by = -by;
       VectorXd there = x;
       there(j) += by;
-      for (Index at = globals_; at < size_; at += locals_)
-        there.segment(at, locals_) -=
-            by * H.block(at, at, locals_, locals_).llt().solve(H.block(at, j, locals_, 1).eval());
-      if (by != 0 && evaluate(there, trial)) g(j) += 0.5 * (log_own_volume(there, trial) - volume) / by;
+      there.tail(size_ - globals_) += by * follow.col(j);
+      if (by != 0 && evaluate(there, trial)) b(j) -= 0.5 * (log_own_volume(there, trial) - volume) / by;
     }
     MatrixXd A = H;
-    for (Index i = 0; i < globals_; ++i) {
-      if (!(x(i) <= low_(i) && g(i) > 0) && !(x(i) >= high_(i) && g(i) < 0)) continue;
-      A.row(i).setZero();
-      A.col(i).setZero();
-      A(i, i) = 1;
-      g(i) = 0;
-    }
-    const VectorXd move = -A.ldlt().solve(g);
-    if (!move.allFinite() || -move.dot(g) < kSmallStep) break;
+    hold_at_bounds(x, A, b);
+    const VectorXd move = A.ldlt().solve(b);
+    if (!move.allFinite() || move.dot(b) < kSmallStep) break;
     bool gained = false;
     double share = 1;
     for (int halving = 0; halving < kHalvings && !gained; ++halving, share *= 0.5) {
@@ -83,7 +79,6 @@ void TrajectoryFit::integrate_entries(VectorXd& x, std::vector<Block>& now) {
       gained = true;
     }
     if (!gained) break;
-    normal_equations(x, now);
   }
 }
 

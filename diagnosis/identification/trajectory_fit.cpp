@@ -53,14 +53,7 @@ FitResult TrajectoryFit::run() {
       MatrixXd A = H_;
       VectorXd b = -g_;
       A.diagonal() += damping * H_.diagonal();
-      for (Eigen::Index i = 0; i < size_; ++i) {
-        const bool held = (x(i) <= low_(i) && b(i) < 0) || (x(i) >= high_(i) && b(i) > 0);
-        if (!held && A(i, i) > 0) continue;
-        A.row(i).setZero();
-        A.col(i).setZero();
-        A(i, i) = 1;
-        b(i) = 0;
-      }
+      hold_at_bounds(x, A, b);
       const VectorXd step = A.ldlt().solve(b);
       const VectorXd x_new = (x + step).cwiseMax(low_).cwiseMin(high_);
       const VectorXd moved = x_new - x;
@@ -96,6 +89,17 @@ FitResult TrajectoryFit::run() {
   r.iterations = iteration;
   r.converged = converged;
   return r;
+}
+
+void TrajectoryFit::hold_at_bounds(const VectorXd& x, MatrixXd& A, VectorXd& b) const {
+  for (Eigen::Index i = 0; i < size_; ++i) {
+    const bool held = (x(i) <= low_(i) && b(i) < 0) || (x(i) >= high_(i) && b(i) > 0);
+    if (!held && A(i, i) > 0) continue;
+    A.row(i).setZero();
+    A.col(i).setZero();
+    A(i, i) = 1;
+    b(i) = 0;
+  }
 }
 
 FitResult TrajectoryFit::result(const VectorXd& x, const std::vector<Block>& blocks) const {

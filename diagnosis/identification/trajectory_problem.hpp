@@ -30,6 +30,8 @@ class TrajectoryFit {
   void renew_scale(const std::vector<Block>& blocks);
   [[nodiscard]] double cost(const Eigen::VectorXd& x, const std::vector<Block>& blocks) const;
   void normal_equations(const Eigen::VectorXd& x, const std::vector<Block>& blocks);
+  // Of a step A s = b: what presses against a bound, and what nothing moves, stays.
+  void hold_at_bounds(const Eigen::VectorXd& x, Eigen::MatrixXd& A, Eigen::VectorXd& b) const;
   // From the mode of needle and entries together to that of the needle with the entries integrated out, each at its
   // mode there.
   void integrate_entries(Eigen::VectorXd& x, std::vector<Block>& now);
