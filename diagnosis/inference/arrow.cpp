@@ -1,6 +1,5 @@
 #include "diagnosis/inference/arrow.hpp"
 
-#include <Eigen/Cholesky>
 #include <algorithm>
 #include <cmath>
 #include <numbers>
@@ -12,7 +11,6 @@ using Eigen::MatrixXd;
 using Eigen::VectorXd;
 
 namespace {
-double log_det(const Eigen::LLT<MatrixXd>& factor) { return 2 * factor.matrixLLT().diagonal().array().log().sum(); }
 
 // exp(x^2) erfc(x), x >= 0.
 double scaled_erfc(double x) {
@@ -44,6 +42,14 @@ std::vector<double> curvatures_of_tails(const MatrixXd& H, const VectorXd& g, co
 }
 }  // namespace
 
+MatrixXd ArrowBlock::own_information() const {
+  MatrixXd out = ll;
+  out.diagonal() += precision;
+  return out;
+}
+
+double log_det(const Eigen::LLT<MatrixXd>& factor) { return 2 * factor.matrixLLT().diagonal().array().log().sum(); }
+
 ArrowBlock make_block(const MatrixXd& L, const MatrixXd& Z, const VectorXd& w) {
   ArrowBlock out;
   out.ll.noalias() = L.transpose() * L;
@@ -68,8 +74,7 @@ ArrowSolution solve(const std::vector<ArrowBlock>& blocks, const MatrixXd& preci
   for (std::size_t r = 0; r < blocks.size(); ++r) {
     const ArrowBlock& block = blocks[r];
     if (!uses(r)) continue;
-    MatrixXd inner = block.ll;
-    inner.diagonal() += block.precision;
+    MatrixXd inner = block.own_information();
     inner.diagonal() *= 1 + rules.damping;
     factors[r].compute(inner);
     if (factors[r].info() != Eigen::Success) return out;

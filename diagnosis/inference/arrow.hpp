@@ -3,6 +3,7 @@
 // the shape of an arrow, and each recording's own part is eliminated by its Schur complement.
 //
 //   minimise  sum_r |w_r - L_r l_r - Z_r z|^2 + (l_r - l0_r)' T_r (l_r - l0_r) + 2 s_r' z + (z - z0)' P (z - z0)
+#include <Eigen/Cholesky>
 #include <Eigen/Core>
 #include <optional>
 #include <vector>
@@ -14,8 +15,9 @@ struct ArrowBlock {
   Eigen::MatrixXd ll, lz, zz;
   Eigen::VectorXd lw, zw;
   double ww = 0;
-  Eigen::VectorXd precision, centre;  // T_r (diagonal), l0_r
-  Eigen::VectorXd slope;              // s_r, of the first of z; empty: zero
+  Eigen::VectorXd precision, centre;        // T_r (diagonal), l0_r
+  Eigen::VectorXd slope;                    // s_r, of the first of z; empty: zero
+  Eigen::MatrixXd own_information() const;  // L_r' L_r + T_r
 };
 
 struct ArrowSolution {
@@ -28,6 +30,8 @@ struct ArrowSolution {
   double log_volume_ratio = 0;
   bool valid = false;
 };
+
+double log_det(const Eigen::LLT<Eigen::MatrixXd>& factor);
 
 // Z_r and L_r from columns; the precision and the centre are left to the caller.
 ArrowBlock make_block(const Eigen::MatrixXd& L, const Eigen::MatrixXd& Z, const Eigen::VectorXd& w);

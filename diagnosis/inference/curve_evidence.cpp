@@ -100,7 +100,7 @@ struct Together {
 };
 
 Settled settle_with_one_more(const Likelihood& likelihood, const Discrepancy& discrepancy, const Fit& from,
-                             const CurvePrior& prior) {
+                             const CurvePrior& prior, double give_up_below) {
   Scales scales = from.scales;
   scales.curves.push_back(prior);
   std::shared_ptr<const CurveTangent> tangent;
@@ -112,7 +112,7 @@ Settled settle_with_one_more(const Likelihood& likelihood, const Discrepancy& di
     tangent = tangent_about(discrepancy, with_one_more);
   }
   return settle(*from.likelihood, &discrepancy, from.layout, from.shared, from.local, scales,
-                nuisance_grid(likelihood.system()), kNever, std::move(tangent));
+                nuisance_grid(likelihood.system()), give_up_below, std::move(tangent));
 }
 
 double log_factor_of(const std::vector<CurveFactor>& curves, const CurvePrior& prior) {
@@ -136,7 +136,8 @@ bool add_curve(const Likelihood& likelihood, const Discrepancy& discrepancy, con
   const double promised = all.log_factor + more->beside.log_change;
   if (promised < least || so_far.log_evidence + kMostOfPromise * promised < hopeless) return false;
   const CurvePrior& prior = more->curves.front().prior;
-  Settled with = settle_with_one_more(likelihood, discrepancy, here, prior);
+  const double no_likelier = so_far.log_evidence - rules.log_prior_odds_more - all.log_others;
+  Settled with = settle_with_one_more(likelihood, discrepancy, here, prior, no_likelier - rules.optimism);
   // Of the other scales and lengths, beside the spread that there is in the end.
   double log_others = all.log_others;
   if (with.fit.valid && with.fit.scales.nuisance_sd == here.scales.nuisance_sd)
@@ -153,13 +154,15 @@ bool add_curve(const Likelihood& likelihood, const Discrepancy& discrepancy, con
 
 // The curves that are likeliest one after the other need not be those that are likeliest together: one of them in
 // another's place, the others as they are; whether there was such a one.
-bool exchange_curve(const Likelihood& likelihood, const Discrepancy& discrepancy, Evaluated& out, Together& so_far) {
+bool exchange_curve(const Likelihood& likelihood, const Discrepancy& discrepancy, const CurveRules& rules,
+                    Evaluated& out, Together& so_far) {
   for (std::size_t k = 0; k < out.fit_with_curve->scales.curves.size(); ++k) {
     const CurvePrior leaves = out.fit_with_curve->scales.curves[k];
     const Fit rest = without_curve(discrepancy, *out.fit_with_curve, k);
     const auto curves = scan_beside(likelihood, discrepancy, rest);
     if (curves.empty() || curves.front().log_bayes_factor < log_factor_of(curves, leaves) + kWorthAnExchange) continue;
-    Settled with = settle_with_one_more(likelihood, discrepancy, rest, curves.front().prior);
+    Settled with = settle_with_one_more(likelihood, discrepancy, rest, curves.front().prior,
+                                        so_far.log_evidence + kWorthAnExchange - rules.optimism);
     if (!(with.over.log_mean > so_far.log_evidence + kWorthAnExchange)) continue;
     const double log_others = integrated(curves).log_others;
     out.log_factors.back() += with.over.log_mean + log_others - so_far.log_evidence - so_far.log_others[k];
@@ -242,7 +245,7 @@ void begin_with(const Likelihood& likelihood, const Discrepancy& discrepancy, co
   out.fit_with_curve = std::move(with.fit);
   out.nuisance_weights_with_curve = std::move(with.over.weights);
   while (out.log_factors.size() < rules.most && add_curve(likelihood, discrepancy, rules, hopeless, out, so_far)) {
-    while (exchange_curve(likelihood, discrepancy, out, so_far)) {
+    while (exchange_curve(likelihood, discrepancy, rules, out, so_far)) {
     }
   }
   // Over their number, each more with its prior odds.

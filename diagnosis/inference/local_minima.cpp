@@ -23,6 +23,7 @@ constexpr int kPhases = 12;
 constexpr int kScans = 4;
 constexpr std::size_t kJumps = 3;        // in a recording, at which an instant is tried
 constexpr double kInstantWidth_s = 0.1;  // of an instant's posterior, while it is not known yet
+constexpr double kBeyondDoubt = 3;       // times an instant's cost: what the linear model says is lost without it
 constexpr std::size_t kGrid = 5;         // starts from which on a parameter is taken to have many local minima
 constexpr int kSteps = 10;               // of a scan, to each side
 constexpr int kZooms = 2;
@@ -97,9 +98,9 @@ void scan_local(const Likelihood& likelihood, const Layout& layout, const Vector
   }
 }
 
-bool has_scanned(const Layout& layout) { return layout.local().size() > layout.system().nuisances().size(); }
-
 }  // namespace
+
+bool has_scanned(const Layout& layout) { return layout.local().size() > layout.system().nuisances().size(); }
 
 double grid_spacing(const Parameter& p, double value) {
   auto starts = p.starts;
@@ -125,14 +126,34 @@ void scan_locals(const Likelihood& likelihood, const CurveColumns& curve, Fit& f
   }
 }
 
+namespace {
+
+// By the linear model, all else following: the rise in cost where an instant did not happen in a recording.
+double rise_without(const Likelihood& likelihood, const CurveColumns& curve, const Fit& fitted,
+                    std::vector<ArrowBlock> blocks, std::size_t r, Index instant) {
+  Fit off = fitted;
+  off.local[r][instant] = 0;
+  LinearRecording there;
+  if (blocks.empty() || !linearise(likelihood, off, curve, r, there)) return 0;
+  blocks[r] = std::move(there.block);
+  const ArrowSolution solution = solve_about(off, blocks, curve, std::vector<Index>{});
+  return solution.valid ? solution.least - fitted.cost : 0;
+}
+
+}  // namespace
+
 // Each instant in turn taken out, all else fitted anew: kept out, or put elsewhere in its recording, where it is not
 // missed. What a scan finds beside parameters that are still off may hold them there.
 void doubt_instants(const Likelihood& likelihood, const CurveColumns& curve, Fit& fitted) {
   const Layout& layout = fitted.layout;
+  std::vector<ArrowBlock> blocks;
   for (std::size_t i = 0; i < layout.local().size(); ++i) {
     if (!layout.is_instant(i)) continue;
     for (std::size_t r = 0; r < fitted.local.size(); ++r) {
       if (!(fitted.local[r][static_cast<Index>(i)] > 0)) continue;
+      const double cost = instant_cost(layout.upper(i, r));
+      if (blocks.empty()) blocks = linearise(likelihood, fitted, curve);
+      if (rise_without(likelihood, curve, fitted, blocks, r, static_cast<Index>(i)) > kBeyondDoubt * cost) continue;
       auto local = fitted.local;
       local[r][static_cast<Index>(i)] = 0;
       Fit without = fit(likelihood, layout, fitted.shared, local, fitted.scales, curve);
@@ -143,10 +164,9 @@ void doubt_instants(const Likelihood& likelihood, const CurveColumns& curve, Fit
         return std::count_if(f.local.begin(), f.local.end(),
                              [&](const VectorXd& l) { return l[static_cast<Index>(i)] > 0; });
       };
-      const double cost = instant_cost(layout.upper(i, r));
       if (again.valid && again.cost + cost * static_cast<double>(happened(again)) <
                              fitted.cost + cost * static_cast<double>(happened(fitted)))
-        fitted = std::move(again);
+        fitted = std::move(again), blocks.clear();
     }
   }
 }

@@ -17,6 +17,9 @@ double grid_spacing(const Parameter& parameter, double value);
 // Whether a member of the set happens at instants at which readings jump.
 bool has_jump(const Layout& layout, int member);
 
+// Whether it has phases or instants.
+bool has_scanned(const Layout& layout);
+
 // Every phase and instant at the best of a grid, all else as it is, again and again until that helps no more.
 void scan_locals(const Likelihood& likelihood, const CurveColumns& curve, Fit& fitted);
 

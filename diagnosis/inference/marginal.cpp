@@ -30,9 +30,7 @@ Marginal::Marginal(const Likelihood& likelihood, const Fit& fit, const CurveColu
     if (!linearise(likelihood, fit, curve, r, recording)) return;
     const MatrixXd &L = recording.L, &Z = recording.Z;
     const ArrowBlock& block = recording.block;
-    MatrixXd inner = block.ll;
-    inner.diagonal() += block.precision;
-    inner_.emplace_back(inner.llt().solve(MatrixXd::Identity(L.cols(), L.cols())));
+    inner_.emplace_back(block.own_information().llt().solve(MatrixXd::Identity(L.cols(), L.cols())));
     pull_.emplace_back(block.lw + block.precision.cwiseProduct(block.centre));
     MatrixXf LZ(Z.rows(), L.cols() + Z.cols());
     LZ.leftCols(L.cols()) = L.cast<float>();

@@ -15,11 +15,9 @@ constexpr double kNegligible = 1e-3;  // share of a combination of standard devi
 }
 
 VectorXd local_variances(const ArrowBlock& block, const ArrowSolution& solution) {
-  MatrixXd inner = block.ll;
-  inner.diagonal() += block.precision;
-  const Eigen::LLT<MatrixXd> factor(inner);
+  const Eigen::LLT<MatrixXd> factor(block.own_information());
   const MatrixXd through = factor.solve(block.lz);
-  const MatrixXd own = factor.solve(MatrixXd::Identity(inner.rows(), inner.cols()));
+  const MatrixXd own = factor.solve(MatrixXd::Identity(block.ll.rows(), block.ll.cols()));
   return (own + through * solution.covariance * through.transpose()).diagonal();
 }
 

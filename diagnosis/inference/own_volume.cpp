@@ -19,15 +19,8 @@ constexpr int kHalvings = 4;
 constexpr double kSmallStep = 0.02;      // of cost and volume: what a step has to promise
 constexpr double kDifference_sd = 0.25;  // of a shared unknown: over which slopes are taken
 
-MatrixXd inner_of(const ArrowBlock& block) {
-  MatrixXd out = block.ll;
-  out.diagonal() += block.precision;
-  return out;
-}
-
 double log_own_volume(const ArrowBlock& block) {
-  const Eigen::LLT<MatrixXd> factor(inner_of(block));
-  return 2 * factor.matrixLLT().diagonal().array().log().sum() - block.precision.array().log().sum();
+  return log_det(Eigen::LLT<MatrixXd>(block.own_information())) - block.precision.array().log().sum();
 }
 
 bool has_slope(const Unknown& unknown) { return unknown.member < 0 || is_size(*unknown.parameter); }
@@ -41,7 +34,7 @@ std::shared_ptr<const OwnVolume> own_volume_about(const Fit& fit, const CurveCol
   OwnVolume out{.about = fit.shared, .slope = std::vector<VectorXd>(blocks.size(), VectorXd::Zero(fit.shared.size()))};
   parallel_for(blocks.size(), [&](std::size_t r) {
     const double here = log_own_volume(blocks[r]);
-    const MatrixXd follow = -Eigen::LLT<MatrixXd>(inner_of(blocks[r])).solve(blocks[r].lz);
+    const MatrixXd follow = -Eigen::LLT<MatrixXd>(blocks[r].own_information()).solve(blocks[r].lz);
     for (Index j = 0; j < fit.shared.size(); ++j) {
       const Parameter& p = *layout.shared()[static_cast<std::size_t>(j)].parameter;
       double step = kDifference_sd * std::sqrt(std::max(0.0, solution.covariance(j, j)));

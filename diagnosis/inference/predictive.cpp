@@ -55,7 +55,7 @@ struct Factor {
   explicit Factor(const MatrixXd& m)
       : unit(m.diagonal().cwiseSqrt().cwiseInverse()), llt(unit.asDiagonal() * m * unit.asDiagonal()) {}
   VectorXd solve(const VectorXd& v) const { return unit.cwiseProduct(llt.solve(unit.cwiseProduct(v))); }
-  double log_det() const { return 2 * (llt.matrixLLT().diagonal().array().log().sum() - unit.array().log().sum()); }
+  double log_det() const { return inference::log_det(llt) - 2 * unit.array().log().sum(); }
   // Diagonal of A M^-1 A'.
   VectorXd variances(const MatrixXd& A) const {
     MatrixXd turned = unit.asDiagonal() * A.transpose();

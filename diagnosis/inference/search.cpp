@@ -16,7 +16,8 @@
 namespace bevel::inference {
 namespace {
 
-constexpr double kSameMode = 0.1;  // log evidence
+constexpr double kSameMode = 0.1;   // log evidence
+constexpr std::size_t kAtOnce = 4;  // sets beside a discrepancy: the next are chosen by what these come to
 
 // So near that what is promised beside one is not far from what is beside the other.
 bool near(const Noise& a, const Noise& b) {
@@ -187,27 +188,39 @@ void Search::evaluate_all(std::vector<Job> jobs) {
   std::ranges::stable_sort(order, std::greater{}, [&](std::size_t i) {
     return results[i]->valid ? results[i]->log_evidence : -std::numeric_limits<double>::infinity();
   });
+  const auto asks = [&](std::size_t i, double likeliest) {
+    return results[i]->valid && ((jobs[i].beside_curve && jobs[i].promised > likeliest - rules_.window) ||
+                                 log_prior(jobs[i].set) + results[i]->log_evidence > likeliest - rules_.curve_window);
+  };
   for (const std::size_t i : order) {
     const Evaluated& one = *results[i];
-    const bool asks = one.valid && ((jobs[i].beside_curve && jobs[i].promised > best - rules_.window) ||
-                                    log_prior(jobs[i].set) + one.log_evidence > best - rules_.curve_window);
     const auto same = [&](std::size_t k) {
       return jobs[k].set == jobs[i].set && std::abs(results[k]->log_evidence - one.log_evidence) < kSameMode;
     };
-    if (asks && std::ranges::none_of(asked, same)) asked.push_back(i);
+    if (asks(i, best) && std::ranges::none_of(asked, same)) asked.push_back(i);
   }
-  std::vector<std::shared_ptr<Evaluated>> with(asked.size());
-  parallel_for(asked.size(), [&](std::size_t k) {
-    const Job& job = jobs[asked[k]];
-    with[k] = std::make_shared<Evaluated>(*results[asked[k]]);
-    // What is promised beside several curves has little of it with the first alone.
-    const bool promised = job.beside_curve && std::isfinite(job.promised);
-    add_discrepancy(*likelihood_, *discrepancy_, curve_rules_, *with[k],
-                    {.large_curve = job.large_curve.get(),
-                     .hopeless_below = hopeless(job) - curve_rules_.log_prior_odds,
-                     .promised_with_several = promised});
+  // The most promising first: what is found beside them decides which of the others still come near.
+  std::ranges::stable_sort(asked, std::greater{}, [&](std::size_t i) {
+    const double without = log_prior(jobs[i].set) + results[i]->log_evidence;
+    return std::isfinite(jobs[i].promised) ? std::max(jobs[i].promised, without) : without;
   });
-  for (std::size_t k = 0; k < asked.size(); ++k) keep(jobs[asked[k]].set, with[k]);
+  for (std::size_t first = 0; first < asked.size(); first += kAtOnce) {
+    std::vector<std::size_t> now(asked.begin() + static_cast<std::ptrdiff_t>(first),
+                                 asked.begin() + static_cast<std::ptrdiff_t>(std::min(first + kAtOnce, asked.size())));
+    std::erase_if(now, [&, best_now = best_log()](std::size_t i) { return !asks(i, best_now); });
+    std::vector<std::shared_ptr<Evaluated>> with(now.size());
+    parallel_for(now.size(), [&](std::size_t k) {
+      const Job& job = jobs[now[k]];
+      with[k] = std::make_shared<Evaluated>(*results[now[k]]);
+      // What is promised beside several curves has little of it with the first alone.
+      const bool promised = job.beside_curve && std::isfinite(job.promised);
+      add_discrepancy(*likelihood_, *discrepancy_, curve_rules_, *with[k],
+                      {.large_curve = job.large_curve.get(),
+                       .hopeless_below = hopeless(job) - curve_rules_.log_prior_odds,
+                       .promised_with_several = promised});
+    });
+    for (std::size_t k = 0; k < now.size(); ++k) keep(jobs[now[k]].set, with[k]);
+  }
 }
 
 Marginal Search::base_marginal() const { return {*likelihood_, visited_.at({}).at->fit, {}}; }

@@ -25,6 +25,7 @@ constexpr double kWorthARefit = 0.2;  // of log evidence: what another spread ha
 // Spreads are looked at beside those whose log posterior is no farther below the likeliest's.
 constexpr double kOnTheWay = 0;    // while fit and noise still move
 constexpr double kWithAShare = 6;  // where they end
+constexpr int kAstray = 3;         // passes that come to less, one after the other: they go round
 constexpr int kRefits = 12;        // with the standard deviations and the curve at their likeliest
 
 double beta_binomial(int happened, int recordings) {
@@ -127,6 +128,9 @@ Settled settle(const Likelihood& likelihood, const Discrepancy* discrepancy, con
   std::vector<VectorXd> inputs, inputs_of_best;
   SpreadSearch spreads(likelihood.system());
   bool noise_moved = false, spread_moved = false;
+  int astray = 0;
+  // What has many local minima is scanned with the rest as it stands at first, and by the noise where that rests.
+  bool to_scan = true, scanned_by_noise = true;
   double most_promised = -std::numeric_limits<double>::infinity();
   for (int pass = 0; pass < kRefits; ++pass) {
     Settled one{.fit = discrepancy ? fit_beside_curves(*now, *discrepancy, layout, shared, local, scales, tangent)
@@ -134,10 +138,11 @@ Settled settle(const Likelihood& likelihood, const Discrepancy* discrepancy, con
                 .over = {}};
     if (!one.fit.valid) break;
     if (discrepancy) curve = discrepancy->columns(*now, one.fit);
-    // What has many local minima is scanned, with the rest as it now stands.
-    if (pass == 0 || noise_moved) {
+    if (to_scan) {
       scan_locals(*now, curve, one.fit);
       doubt_instants(*now, curve, one.fit);
+      scanned_by_noise = true;
+      to_scan = false;
     }
     if (pass == 0) scan_shapes(*now, curve, one.fit);
     one.fit.likelihood = now;
@@ -146,7 +151,12 @@ Settled settle(const Likelihood& likelihood, const Discrepancy* discrepancy, con
     const bool lost = spread_moved && one.over.log_here < best.over.log_here;
     const Index spread = column_of(likelihood.system(), scales.nuisance_sd);
     spreads.tried(spread);
-    if (one.over.log_here > best.over.log_here) best = one, inputs_of_best = inputs;
+    if (one.over.log_here > best.over.log_here) {
+      best = one, inputs_of_best = inputs;
+      astray = 0;
+    } else if (!spread_moved && ++astray == kAstray) {
+      break;
+    }
     // Not before the noise had its turn: what a wrong model leaves passes for noise. And by any noise that it had: what
     // the noise took at first the spread is promised only when it has given it back.
     most_promised = std::max(most_promised, one.over.log_promised);
@@ -166,6 +176,7 @@ Settled settle(const Likelihood& likelihood, const Discrepancy* discrepancy, con
       if (noise_moved) {
         inputs = std::move(open);
         now = std::make_shared<const Likelihood>(likelihood, noise.noise, inputs, noise.precision);
+        scanned_by_noise = false;
       }
     }
     spread_moved = false;
@@ -176,7 +187,8 @@ Settled settle(const Likelihood& likelihood, const Discrepancy* discrepancy, con
       curves_moved = priors != scales.curves;
       scales.curves = std::move(priors);
     }
-    if (!noise_moved && !curves_moved) {
+    to_scan = !noise_moved && !curves_moved && !scanned_by_noise && has_scanned(layout);
+    if (!noise_moved && !curves_moved && !to_scan) {
       const Index here = column_of(likelihood.system(), scales.nuisance_sd);
       const Index next = spreads.next(one.over.promised, here, kWorthARefit);
       if (next == here) break;
