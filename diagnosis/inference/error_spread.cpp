@@ -15,7 +15,8 @@ using Eigen::MatrixXd;
 using Eigen::VectorXd;
 
 namespace {
-constexpr int kSteps = 3;  // of the noise, about one fit; the next fit goes on
+constexpr int kSteps = 3;      // of the noise, about one fit; the next fit goes on
+constexpr double kAtMode = 2;  // of the cost: what the linear model says is left to gain at a mode
 }  // namespace
 
 std::vector<RawRows> raw_rows(const Fit& fit, const CurveColumns& curve) {
@@ -47,8 +48,7 @@ ArrowBlock block_by(const RawRows& raw, const SeriesSet& set, const Noise& noise
 
 std::vector<ExpectedErrors> expected_errors(const RawRows& raw, const SeriesSet& set, const ArrowBlock& block,
                                             const ArrowSolution& solution, std::size_t recording) {
-  MatrixXd inner = block.ll;
-  inner.diagonal() += block.precision;
+  const MatrixXd inner = block.own_information();
   const VectorXd unit = inner.diagonal().cwiseSqrt().cwiseInverse();
   const Eigen::LLT<MatrixXd> own(unit.asDiagonal() * inner * unit.asDiagonal());
   const MatrixXd through = unit.asDiagonal() * own.solve(unit.asDiagonal() * block.lz);
@@ -127,6 +127,11 @@ bool alike(const NoiseBeside& a, const Likelihood& b) {
 
 namespace {
 
+bool is_at_mode(const Fit& fit, const CurveColumns& curve) {
+  const auto blocks = linearise(*fit.likelihood, fit, curve);
+  return !blocks.empty() && fit.cost - solve_about(fit, blocks, curve, std::vector<Index>{}).least < kAtMode;
+}
+
 // Of all recordings by a noise; none outside the model's domain.
 class ErrorsBeside {
  public:
@@ -134,7 +139,8 @@ class ErrorsBeside {
       : fit_(&fit),
         raw_(raw_rows(fit, curve)),
         pulls_(pulls_of(fit.layout, fit.shared, fit.curve_values, curve.covariance)),
-        precision_(local_precision_of(fit.layout, fit.scales)) {
+        precision_(local_precision_of(fit.layout, fit.scales)),
+        at_mode_(is_at_mode(fit, curve)) {
     hold_scanned(fit.layout, precision_);
   }
   ErrorsByChannel by(const Dataset& data, const Noise& noise) const {
@@ -147,8 +153,13 @@ class ErrorsBeside {
     if (blocks.empty()) return {};
     ArrowRules rules;
     rules.held = fit_->held;
-    const ArrowSolution solution = solve(blocks, pulls_.precision, pulls_.centre, rules);
+    ArrowSolution solution = solve(blocks, pulls_.precision, pulls_.centre, rules);
     if (!solution.valid) return {};
+    // A fit that was left on its way has the errors that it has, not those where its linear model would go.
+    if (!at_mode_) {
+      solution.shared.setZero();
+      for (VectorXd& own : solution.local) own.setZero();
+    }
     ErrorsByChannel out(raw_.size());
     parallel_for(raw_.size(),
                  [&](std::size_t r) { out[r] = expected_errors(raw_[r], data.recordings[r], blocks[r], solution, r); });
@@ -160,6 +171,7 @@ class ErrorsBeside {
   std::vector<RawRows> raw_;
   Pulls pulls_;
   VectorXd precision_;
+  bool at_mode_;
 };
 
 }  // namespace

@@ -354,6 +354,21 @@ TEST(NoiseBeside, IsTheLikeliestWithAllElseIntegratedOut) {
   }
 }
 
+// A fit that was left on its way, an offset of ten standard deviations off: by the errors of where it would go, the
+// next fit, which does not get there, would be by far too sure.
+TEST(NoiseBeside, OfAFitOnItsWayIsThatOfTheErrorsItHas) {
+  const LinearSystem system(2, 5, 0, 0, 0);
+  const Layout layout(system, {});
+  const auto likelihood = std::make_shared<const Likelihood>(system, Readings(2), white(system));
+  Fit at = fit(*likelihood, layout, layout.shared_start(), std::vector<VectorXd>(2, layout.local_start()),
+               {.nuisance_sd = VectorXd::Zero(1), .curves = {}}, {});
+  at.likelihood = likelihood;
+  EXPECT_NEAR(noise_beside(at, {}).noise.sigma[0], 0.1, 0.02);
+  at.shared[0] += 1;
+  at.cost = cost_at(*likelihood, at, {});
+  EXPECT_GT(noise_beside(at, {}).noise.sigma[0], 0.5);
+}
+
 TEST(HeldOut, OfALinearModelIsTheConditionalDensity) {
   const LinearSystem system(4, 7, 0.3, 0.2, 0);
   const Evaluated at = evaluate_set(system, {0});
