@@ -27,13 +27,14 @@ std::vector<RawRows> raw_rows(const Fit& fit, const CurveColumns& curve) {
     const RecordingRows rows(*fit.likelihood, r, std::numeric_limits<double>::infinity());
     out.push_back({.Z = rows.coloured(linear.Z, false),
                    .L = rows.coloured(linear.L, false),
-                   .e = rows.coloured(linear.residuals.white, false)});
+                   .e = rows.coloured(linear.residuals.white, false),
+                   .block = std::move(linear.block)});
   }
   return out;
 }
 
 ArrowBlock block_by(const RawRows& raw, const SeriesSet& set, const Noise& noise) {
-  RawRows white = raw;
+  RawRows white{.Z = raw.Z, .L = raw.L, .e = raw.e, .block = {}};
   Index row = 0;
   for (std::size_t c = 0; c < set.series.size(); ++c) {
     const Whitening whitening = make_whitening(set.series[c], noise.of(c), noise.sigma[c]);
@@ -127,8 +128,9 @@ bool alike(const NoiseBeside& a, const Likelihood& b) {
 
 namespace {
 
-bool is_at_mode(const Fit& fit, const CurveColumns& curve) {
-  const auto blocks = linearise(*fit.likelihood, fit, curve);
+bool is_at_mode(const Fit& fit, const CurveColumns& curve, const std::vector<RawRows>& raw) {
+  std::vector<ArrowBlock> blocks;
+  for (const RawRows& one : raw) blocks.push_back(one.block);
   return !blocks.empty() && fit.cost - solve_about(fit, blocks, curve, std::vector<Index>{}).least < kAtMode;
 }
 
@@ -140,7 +142,7 @@ class ErrorsBeside {
         raw_(raw_rows(fit, curve)),
         pulls_(pulls_of(fit.layout, fit.shared, fit.curve_values, curve.covariance)),
         precision_(local_precision_of(fit.layout, fit.scales)),
-        at_mode_(is_at_mode(fit, curve)) {
+        at_mode_(is_at_mode(fit, curve, raw_)) {
     hold_scanned(fit.layout, precision_);
   }
   ErrorsByChannel by(const Dataset& data, const Noise& noise) const {

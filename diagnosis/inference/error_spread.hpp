@@ -12,6 +12,7 @@ namespace bevel::inference {
 struct RawRows {
   Eigen::MatrixXd Z, L;  // by the shared unknowns (and the curves' values), by its own
   Eigen::VectorXd e;     // measured - predicted
+  ArrowBlock block;      // whitened by the fit's own noise, with its precision and centre
 };
 // Of every recording; empty outside the model's domain.
 std::vector<RawRows> raw_rows(const Fit& fit, const CurveColumns& curve);

@@ -142,8 +142,6 @@ double rise_without(const Likelihood& likelihood, const CurveColumns& curve, con
 
 }  // namespace
 
-// Each instant in turn taken out, all else fitted anew: kept out, or put elsewhere in its recording, where it is not
-// missed. What a scan finds beside parameters that are still off may hold them there.
 void doubt_instants(const Likelihood& likelihood, const CurveColumns& curve, Fit& fitted) {
   const Layout& layout = fitted.layout;
   std::vector<ArrowBlock> blocks;

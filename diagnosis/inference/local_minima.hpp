@@ -23,8 +23,9 @@ bool has_scanned(const Layout& layout);
 // Every phase and instant at the best of a grid, all else as it is, again and again until that helps no more.
 void scan_locals(const Likelihood& likelihood, const CurveColumns& curve, Fit& fitted);
 
-// Each instant in turn taken out, all else fitted anew: kept out where it is not missed. What a scan finds beside
-// parameters that are still off may hold them there.
+// Each instant in turn taken out, all else fitted anew: kept out, or put elsewhere in its recording, where it is not
+// missed. What a scan finds beside parameters that are still off may hold them there. One that is missed by far by the
+// linear model stays.
 void doubt_instants(const Likelihood& likelihood, const CurveColumns& curve, Fit& fitted);
 
 // Each shared parameter that has many local minima along a finer grid about where it is, and the size of what jumps

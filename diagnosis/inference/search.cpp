@@ -3,8 +3,10 @@
 #include <algorithm>
 #include <cmath>
 #include <functional>
+#include <iterator>
 #include <limits>
 #include <numeric>
+#include <ranges>
 #include <set>
 #include <stdexcept>
 
@@ -188,9 +190,10 @@ void Search::evaluate_all(std::vector<Job> jobs) {
   std::ranges::stable_sort(order, std::greater{}, [&](std::size_t i) {
     return results[i]->valid ? results[i]->log_evidence : -std::numeric_limits<double>::infinity();
   });
+  const auto log_without = [&](std::size_t i) { return log_prior(jobs[i].set) + results[i]->log_evidence; };
   const auto asks = [&](std::size_t i, double likeliest) {
     return results[i]->valid && ((jobs[i].beside_curve && jobs[i].promised > likeliest - rules_.window) ||
-                                 log_prior(jobs[i].set) + results[i]->log_evidence > likeliest - rules_.curve_window);
+                                 log_without(i) > likeliest - rules_.curve_window);
   };
   for (const std::size_t i : order) {
     const Evaluated& one = *results[i];
@@ -201,13 +204,12 @@ void Search::evaluate_all(std::vector<Job> jobs) {
   }
   // The most promising first: what is found beside them decides which of the others still come near.
   std::ranges::stable_sort(asked, std::greater{}, [&](std::size_t i) {
-    const double without = log_prior(jobs[i].set) + results[i]->log_evidence;
-    return std::isfinite(jobs[i].promised) ? std::max(jobs[i].promised, without) : without;
+    return std::isfinite(jobs[i].promised) ? std::max(jobs[i].promised, log_without(i)) : log_without(i);
   });
   for (std::size_t first = 0; first < asked.size(); first += kAtOnce) {
-    std::vector<std::size_t> now(asked.begin() + static_cast<std::ptrdiff_t>(first),
-                                 asked.begin() + static_cast<std::ptrdiff_t>(std::min(first + kAtOnce, asked.size())));
-    std::erase_if(now, [&, best_now = best_log()](std::size_t i) { return !asks(i, best_now); });
+    std::vector<std::size_t> now;
+    std::ranges::copy_if(asked | std::views::drop(first) | std::views::take(kAtOnce), std::back_inserter(now),
+                         [&, likeliest = best_log()](std::size_t i) { return asks(i, likeliest); });
     std::vector<std::shared_ptr<Evaluated>> with(now.size());
     parallel_for(now.size(), [&](std::size_t k) {
       const Job& job = jobs[now[k]];

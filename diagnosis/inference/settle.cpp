@@ -142,7 +142,6 @@ Settled settle(const Likelihood& likelihood, const Discrepancy* discrepancy, con
       scan_locals(*now, curve, one.fit);
       doubt_instants(*now, curve, one.fit);
       scanned_by_noise = true;
-      to_scan = false;
     }
     if (pass == 0) scan_shapes(*now, curve, one.fit);
     one.fit.likelihood = now;
