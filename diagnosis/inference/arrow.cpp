@@ -93,6 +93,11 @@ ArrowSolution solve(const std::vector<ArrowBlock>& blocks, const MatrixXd& preci
     const auto curvatures = curvatures_of_tails(H, g, rules.held);
     for (std::size_t k = 0; k < rules.held.size(); ++k) {
       const Index i = rules.held[k];
+      if (!rules.held_at.empty()) {
+        const double at = rules.held_at[k];
+        out.least += at * (at * H(i, i) - 2 * g[i]);
+        g -= at * H.col(i);
+      }
       H.row(i).setZero();
       H.col(i).setZero();
       H(i, i) = curvatures[k];
@@ -116,6 +121,7 @@ ArrowSolution solve(const std::vector<ArrowBlock>& blocks, const MatrixXd& preci
   }
   out.shared = unit.cwiseProduct(factor.solve(unit.cwiseProduct(g)));
   out.least -= g.dot(out.shared);
+  for (std::size_t k = 0; k < rules.held_at.size(); ++k) out.shared[rules.held[k]] = rules.held_at[k];
   out.log_volume_ratio += log_det(factor) - 2 * unit.array().log().sum();
   for (const Index i : rules.held) out.covariance(i, i) = 0;
   if (precision.isDiagonal(0)) {

@@ -37,13 +37,15 @@ double log_det(const Eigen::LLT<Eigen::MatrixXd>& factor);
 ArrowBlock make_block(const Eigen::MatrixXd& L, const Eigen::MatrixXd& Z, const Eigen::VectorXd& w);
 
 // damping: of Levenberg and Marquardt, on the diagonals; `precision` P may be full. used: recordings that take part;
-// empty: all. held: shared unknowns that stay at zero, pressed against a bound: what is left of their posterior is the
-// tail of a normal one beyond its middle, whose volume is the one in log_volume_ratio. covariance_of: columns of the
+// empty: all. held: shared unknowns that stay at zero, or at held_at, pressed against a bound: what is left of their
+// posterior is the tail of a normal one beyond its middle, whose volume is the one in log_volume_ratio (of those at
+// zero). held_at: as many as held; empty: all at zero. covariance_of: columns of the
 // covariance that are wanted; without it all: they cost as much as the rest.
 struct ArrowRules {
   double damping = 0;
   std::vector<bool> used{};
   std::vector<Eigen::Index> held{};
+  std::vector<double> held_at{};
   std::optional<std::vector<Eigen::Index>> covariance_of{};
 };
 ArrowSolution solve(const std::vector<ArrowBlock>& blocks, const Eigen::MatrixXd& precision,

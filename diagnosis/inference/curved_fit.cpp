@@ -13,14 +13,20 @@ namespace {
 constexpr double kLinear = 0.5;  // of the cost: so near the linear model has to be
 constexpr int kDamped = 12;      // steps; the next fit goes on
 
-// What the nonlinear model says, where the curves have a fit's values: columns about these are not asked for.
+// What a fit's curves are there, without columns: derivatives by their values are not asked for.
+std::shared_ptr<const CurveTangent> values_only(const Discrepancy& discrepancy, const Fit& fit) {
+  auto out = std::make_shared<CurveTangent>();
+  out->about = values_by_curve(discrepancy, fit.scales.curves, fit.curve_values);
+  out->values = fit.curve_values;
+  return out;
+}
+
+// What the nonlinear model says, where the curves have a fit's values.
 double nonlinear_cost(const Likelihood& likelihood, const Discrepancy& discrepancy, const Fit& fit,
                       const CurveColumns& curve) {
-  auto there = std::make_shared<CurveTangent>();
-  there->about = values_by_curve(discrepancy, fit.scales.curves, fit.curve_values);
-  there->values = fit.curve_values;
-  CurveColumns about = curve;
-  about.tangent = std::move(there);
+  CurveColumns about;
+  about.covariance = curve.covariance;
+  about.tangent = values_only(discrepancy, fit);
   return cost_at(likelihood, fit, about);
 }
 
@@ -76,7 +82,12 @@ std::shared_ptr<const CurveTangent> tangent_about(const Discrepancy& discrepancy
 Fit fit_beside_curves(const Likelihood& likelihood, const Discrepancy& discrepancy, const Layout& layout,
                       const VectorXd& shared, const std::vector<VectorXd>& local, const Scales& scales,
                       std::shared_ptr<const CurveTangent> tangent) {
-  const CurveAt curve_at = [&](const Fit& at) -> std::shared_ptr<const CurveColumns> {
+  const CurveAt curve_at = [&](const Fit& at, bool derivatives) -> std::shared_ptr<const CurveColumns> {
+    if (!derivatives) {
+      CurveColumns there;
+      there.tangent = values_only(discrepancy, at);
+      return std::make_shared<const CurveColumns>(std::move(there));
+    }
     auto about = tangent_about(discrepancy, at);
     if (!about) return nullptr;
     return std::make_shared<const CurveColumns>(discrepancy.columns(likelihood, scales.curves, std::move(about)));

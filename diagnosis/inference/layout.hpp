@@ -39,7 +39,8 @@ class Layout {
   // Values of another layout carried over, effect by effect; the rest from the start.
   Eigen::VectorXd shared_from(const Layout& other, const Eigen::VectorXd& values) const;
   Eigen::VectorXd local_from(const Layout& other, const Eigen::VectorXd& values) const;
-  // Back within the bounds, an instant that is one never at none; angles by whole turns, with the angles that go with them (Parameter::half_turns).
+  // Back within the bounds, an instant that is one never at none; angles by whole turns, with the angles that go with
+  // them (Parameter::half_turns).
   void clamp(Eigen::VectorXd& shared, std::vector<Eigen::VectorXd>& local) const;
 
  private:

@@ -5,7 +5,8 @@
 //                                                 c ~ N(0, K): the discrepancy, a sum of curves,
 //                                                 h linear in it about none or about a tangent's values
 //
-// Solution: Gauss-Newton with Levenberg's damping on the arrow-shaped normal equations, bounds by an active set.
+// Solution (mode.cpp): Gauss-Newton with Levenberg's damping on the arrow-shaped normal equations, along geodesics
+// where the linear model promises too much; bounds by an active set.
 #include <functional>
 #include <memory>
 #include <optional>
@@ -151,9 +152,10 @@ struct FitRules {
 Fit fit(const Likelihood& likelihood, const Layout& layout, const Eigen::VectorXd& shared,
         const std::vector<Eigen::VectorXd>& local, const Scales& scales, const CurveColumns& curve = {},
         const FitRules& rules = {});
-// From a fit's unknowns and curve values on, with the curves' columns of each place that is looked at; null: outside
-// the model's domain.
-using CurveAt = std::function<std::shared_ptr<const CurveColumns>(const Fit&)>;
+// From a fit's unknowns and curve values on, with the curves' columns of each place that is looked at, or only with
+// what its readings are without derivatives; null: outside the model's domain. Where the linear model promises too
+// much, by steps along geodesics.
+using CurveAt = std::function<std::shared_ptr<const CurveColumns>(const Fit&, bool derivatives)>;
 Fit fit_from(const Likelihood& likelihood, Fit begin, const CurveAt& curve_at, const FitRules& rules = {});
 
 // Squared whitened residuals and priors' pulls at a fit's unknowns, as Fit::cost; infinite outside the model's domain.

@@ -126,6 +126,31 @@ TEST(Arrow, WhatIsHeldStaysAndHasTheVolumeOfItsTail) {
   EXPECT_GT(s.log_volume_ratio, t.log_volume_ratio);
 }
 
+// The least squares of the rest, with those unknowns where they are held.
+TEST(Arrow, WhatIsHeldElsewhereIsThereAndTheRestFollows) {
+  const Problem p = random_problem(11);
+  const Index n = 4, all = p.A.cols();
+  ArrowRules rules;
+  rules.held = {2, 0};
+  rules.held_at = {0.7, -1.3};
+  const ArrowSolution s = solve(p.blocks, p.precision.topLeftCorner(n, n), p.centre.head(n), rules);
+  ASSERT_TRUE(s.valid);
+  VectorXd x = VectorXd::Zero(all);
+  x[2] = 0.7, x[0] = -1.3;
+  std::vector<Index> rest;
+  for (Index i = 0; i < all; ++i)
+    if (i != 2 && i != 0) rest.push_back(i);
+  const MatrixXd H = p.A.transpose() * p.A + p.precision;
+  const VectorXd g = p.A.transpose() * p.w + p.precision * p.centre - H * x;
+  const VectorXd others = MatrixXd(H(rest, rest)).ldlt().solve(VectorXd(g(rest)));
+  for (std::size_t i = 0; i < rest.size(); ++i) x[rest[i]] = others[static_cast<Index>(i)];
+  EXPECT_LT((s.shared - x.head(n)).norm(), 1e-9);
+  for (std::size_t r = 0; r < p.blocks.size(); ++r)
+    EXPECT_LT((s.local[r] - x.segment(n + 3 * static_cast<Index>(r), 3)).norm(), 1e-9);
+  const VectorXd off = x - p.centre;
+  EXPECT_NEAR(s.least, (p.w - p.A * x).squaredNorm() + off.dot(p.precision * off), 1e-8);
+}
+
 TEST(Arrow, WhatPressesAgainstABoundHasTheVolumeThatItsCurvatureLeaves) {
   const Problem p = random_problem(4);
   const MatrixXd precision = p.precision.topLeftCorner(4, 4).diagonal().asDiagonal();
