@@ -60,30 +60,30 @@ WithLessSpread at_its_mode(const WithLessSpread& less, const Fit& fit, const Cur
 }
 
 Moved moved_to(const std::shared_ptr<const Likelihood>& likelihood, const Fit& from, const Discrepancy& discrepancy) {
-  struct About {
-    double log_evidence = -std::numeric_limits<double>::infinity();
-    VectorXd information;  // of each shared unknown by itself
+  const auto blocks_of = [&](const Fit& at, const Likelihood& by) {
+    return linearise(by, at, discrepancy.columns(by, at));
   };
-  const auto about = [&](const Fit& at, const CurveColumns& curve) {
-    About out;
-    const auto blocks = linearise(*at.likelihood, at, curve);
-    if (blocks.empty()) return out;
-    out.log_evidence = at.likelihood->log_weights() + log_about_mode(at, curve, blocks);
-    out.information = VectorXd::Zero(at.shared.size());
-    for (const ArrowBlock& block : blocks) out.information += block.zz.diagonal().head(at.shared.size());
-    return out;
-  };
-  const CurveColumns curve = discrepancy.columns(*likelihood, from);
-  Moved out{.fit = fit(*likelihood, from.layout, from.shared, from.local, from.scales, curve,
-                       {.own_volume = from.own_volume})};
+  Moved out{.fit = fit(*likelihood, from.layout, from.shared, from.local, from.scales,
+                       discrepancy.columns(*likelihood, from), {.own_volume = from.own_volume})};
   out.fit.likelihood = likelihood;
   if (!out.fit.valid) return out;
-  const About there = about(out.fit, curve), here = about(from, discrepancy.columns(*from.likelihood, from));
-  out.log_change = there.log_evidence - here.log_evidence;
+  const auto log_evidence = [&](const Fit& at, const std::vector<ArrowBlock>& blocks) {
+    if (blocks.empty()) return -std::numeric_limits<double>::infinity();
+    return at.likelihood->log_weights() + log_about_mode(at, discrepancy.columns(*at.likelihood, at), blocks);
+  };
+  const auto here = blocks_of(from, *from.likelihood);
+  out.log_change = log_evidence(out.fit, blocks_of(out.fit, *likelihood)) - log_evidence(from, here);
+  // By both noises where the fit is: what another place says more or less is not the noise's.
+  const auto information = [&](const std::vector<ArrowBlock>& blocks) {
+    VectorXd sum = VectorXd::Zero(from.shared.size());
+    for (const ArrowBlock& block : blocks) sum += block.zz.diagonal().head(from.shared.size());
+    return sum;
+  };
+  const VectorXd by_own = information(here), by_this = information(blocks_of(from, *likelihood));
   double log_share = 0, count = 0;
-  for (Index i = 0; i < std::min(here.information.size(), there.information.size()); ++i)
-    if (here.information[i] > 0 && there.information[i] > 0) {
-      log_share += std::log(here.information[i] / there.information[i]);
+  for (Index i = 0; i < by_own.size(); ++i)
+    if (by_own[i] > 0 && by_this[i] > 0) {
+      log_share += std::log(by_own[i] / by_this[i]);
       ++count;
     }
   if (count > 0) out.share_before = std::exp(log_share / count);
