@@ -153,7 +153,8 @@ std::vector<Search::Job> Search::smaller_sets(const Visited& here) {
 
 void Search::expand(const ModelSet& set) {
   expanded_.insert(set);
-  if (!set.empty()) look_at_every_component(set);
+  const bool hopeless = is_hopeless(set);
+  if (!set.empty() && !hopeless) look_at_every_component(set);
   const Visited here = visited_.at(set);
   if (progress_)
     progress_(describe(system_, set) + "; " + std::to_string(fits_) + " fits done, nothing is begun after " +
@@ -172,45 +173,55 @@ void Search::expand(const ModelSet& set) {
     // base alone has none.
     append_larger(look_beside(here.at->fit, here.log_without_curve, !set.empty()));
   }
-  append(smaller_sets(here));
-  append(swaps(here));
+  if (!hopeless) {
+    append(smaller_sets(here));
+    if (here.is_likelier_with_curve()) append(swaps(*here.at->fit_with_curve, here.log_with_curve));
+    append(swaps(here.at->fit, here.log_without_curve));
+  }
   evaluate_all(std::move(jobs));
 }
 
 // Each member's place taken by another effect, with all else where it is: what two have in common is far from where the
 // smaller set alone would be fitted, and what sets them apart is little. Promised is the difference between the two, by
 // one linear model.
-std::vector<Search::Job> Search::swaps(const Visited& here) {
-  const bool beside_curve = here.is_likelier_with_curve();
-  const Fit& fit = here.likelier_fit();
-  const double log_here = beside_curve ? here.log_with_curve : here.log_without_curve, best = best_log();
+std::vector<Search::Job> Search::swaps(const Fit& fit, double log_here) {
+  const ModelSet& set = fit.layout.set();
+  const bool beside_curve = !fit.scales.curves.empty();
+  const double best = best_log();
   const auto own = with_inputs_of(fit, likelihood_);
   const CurveColumns curve = discrepancy_->columns(*own, fit);
   std::vector<Job> out;
-  for (std::size_t place = 0; place < here.set.size(); ++place) {
-    const std::size_t member = here.set[place];
-    const ModelSet rest = without(here.set, member);
+  for (std::size_t place = 0; place < set.size(); ++place) {
+    const std::size_t member = set[place];
+    const ModelSet rest = without(set, member);
     const Fit about = carried_to(Layout(system_, rest), fit);
     const auto list = proposals_->beside(Marginal(*own, about, curve, likelihood_.get()), rules_.starts);
     const auto leaves = std::ranges::find(list, member, &Proposal::effect);
     if (leaves == list.end()) continue;
+    const auto many = [](const Unknown& u) { return u.parameter != nullptr && has_many_minima(*u.parameter); };
+    const bool has_many = std::ranges::any_of(about.layout.shared(), many);
     std::size_t rank = 0;
     for (const Proposal& one : list) {
       if (one.effect == member) continue;
+      if (rank++ >= rules_.foremost) break;
       const ModelSet swapped = with(rest, one.effect);
-      const double difference = one.log_bayes_factor - leaves->log_bayes_factor;
-      const double promised = log_here + difference + log_prior_odds(one.effect) - log_prior_odds(member);
-      if (rank++ >= rules_.foremost || promised + doubtful(*leaves) < best - rules_.window) break;
       const auto visited = visited_.find(swapped);
       if (visited != visited_.end() && visited->second.log_posterior() > best - rules_.window) continue;
-      if (!swapped_.insert(swapped).second || one.starts.empty()) continue;
+      if (one.starts.empty() || swapped_.contains({swapped, beside_curve})) continue;
+      double difference = one.log_bayes_factor - leaves->log_bayes_factor, doubt = doubtful(*leaves);
+      // Where the rest has many local minima the linear model about none of the two says nothing of either.
+      std::optional<Fit> there;
+      if (has_many && system_.allows(with(set, one.effect))) {
+        there = replaced(*own, curve, fit, place, one.effect, one.starts.front().shared);
+        if (there->valid) difference = 0.5 * (cost_at(*own, fit, curve) - there->cost), doubt = rules_.optimism;
+      }
+      const double promised = log_here + difference + log_prior_odds(one.effect) - log_prior_odds(member);
+      if (promised + doubt < best - rules_.window) continue;
+      swapped_.insert({swapped, beside_curve});
       out.push_back(job_from(about, one.effect, one.starts.front()));
       Job& job = out.back();
+      if (there && there->valid) job.shared = there->shared, job.local = there->local;
       ask_for_curve_of(about, job);
-      const auto many = [](const Unknown& u) { return u.parameter != nullptr && has_many_minima(*u.parameter); };
-      if (!std::ranges::any_of(about.layout.shared(), many) || !system_.allows(with(here.set, one.effect))) continue;
-      const Fit there = replaced(*own, curve, fit, place, one.effect, one.starts.front().shared);
-      if (there.valid) job.shared = there.shared, job.local = there.local, ask_for_curve_of(about, job);
     }
   }
   return out;

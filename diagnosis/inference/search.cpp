@@ -249,7 +249,7 @@ void Search::run(const Readings& outliers, const Noise& noise, const Progress& p
     look_in_rounds(heavy, start, std::move(jobs));
   }
   look_with_less_spread();
-  look_at_what_is_left();
+  look_at_what_is_left(true);
 }
 
 std::shared_ptr<const Likelihood> Search::with_heavy_tails(const Fit& fit) const {
@@ -269,18 +269,18 @@ void Search::look_in_rounds(std::shared_ptr<const Likelihood> reference, Start& 
     Evaluated base = evaluate(*likelihood_, nothing, start.shared, start.local, start.nuisance_sd);
     if (!base.valid) throw std::domain_error("the model cannot follow the recordings");
     discrepancy_ = std::make_unique<const Discrepancy>(*likelihood_, base.fit);
-    add_discrepancy(*likelihood_, *discrepancy_, curve_rules_, base);
-    add_large_curves(*likelihood_, *discrepancy_, curve_rules_, base);
+    keep({}, std::make_shared<const Evaluated>(base));
+    if (!known.empty()) evaluate_all(std::move(known));
+    known.clear();
+    if (!is_hopeless({})) {
+      add_discrepancy(*likelihood_, *discrepancy_, curve_rules_, base);
+      add_large_curves(*likelihood_, *discrepancy_, curve_rules_, base);
+    }
     start = {.shared = base.fit.shared, .local = base.fit.local, .nuisance_sd = base.fit.scales.nuisance_sd};
     if (anew) {
       // A curve takes up most of what is missing: the noise beside it is nearer to the truth.
       likelihood_ = reference = without_inputs(*(base.fit_with_curve ? *base.fit_with_curve : base.fit).likelihood);
       discrepancy_ = std::make_unique<const Discrepancy>(*likelihood_, base.fit);
-    }
-    if (!known.empty()) {
-      keep({}, std::make_shared<const Evaluated>(base));
-      evaluate_all(std::move(known));
-      known.clear();
     }
     const Fit about = anew ? base.fit : likeliest_fit();
     anew = false;
@@ -291,7 +291,7 @@ void Search::look_in_rounds(std::shared_ptr<const Likelihood> reference, Start& 
     refitted_.clear();
     from_larger_.clear();
     swapped_.clear();
-    look_around();
+    look_around(round + 1 == rules_.rounds);
     const Fit& likeliest = likeliest_fit();
     if (near(likeliest.likelihood->noise(), reference->noise()) && likeliest.layout.set() == about.layout.set()) break;
     reference = without_inputs(*likeliest.likelihood);
@@ -343,8 +343,15 @@ const ModelSet* next_to_expand(const std::map<ModelSet, Visited>& visited, const
   return next;
 }
 
-void Search::look_around() {
+bool Search::is_hopeless(const ModelSet& set) const {
+  return visited_.at(set).log_posterior() < best_log() - rules_.window - rules_.doubt;
+}
+
+bool Search::noise_has_moved() const { return !near(likeliest_fit().likelihood->noise(), likelihood_->noise()); }
+
+void Search::look_around(bool last) {
   expand({});
+  if (!last && noise_has_moved()) return;
   // Pairs of which neither by itself comes near.
   std::vector<Job> jobs;
   std::map<std::size_t, std::vector<Proposal>> known;  // beside one effect
@@ -362,11 +369,11 @@ void Search::look_around() {
         jobs.push_back(job_from(single->second.at->fit, second, one.starts.front()));
   }
   evaluate_all(std::move(jobs));
-  look_at_what_is_left();
+  look_at_what_is_left(last);
 }
 
-void Search::look_at_what_is_left() {
-  while (fits_ < rules_.most_fits) {
+void Search::look_at_what_is_left(bool last) {
+  while (fits_ < rules_.most_fits && (last || !noise_has_moved())) {
     const ModelSet* next = next_to_expand(visited_, expanded_, rules_.window);
     if (!next) break;
     const ModelSet set = *next;

@@ -25,7 +25,7 @@ struct SearchRules {
   std::size_t most_fits = 90;           // in all, and as many again by noise with heavy tails
   double log_prior_odds_effect = -5.0;  // of one effect being in the model, against not; its kinds share it
   std::size_t most_curves = 2;          // of a discrepancy
-  std::size_t rounds = 3;
+  std::size_t rounds = 6;
   int threads = 2;
 };
 
@@ -107,7 +107,7 @@ class Search {
   double log_promised(const Beside& beside, const Proposal& one) const;
   double doubtful(const Proposal& one) const;  // by which a fit may exceed that
   std::vector<Job> smaller_sets(const Visited& here);
-  std::vector<Job> swaps(const Visited& here);
+  std::vector<Job> swaps(const Fit& fit, double log_here);
   void keep(const ModelSet& set, const std::shared_ptr<const Evaluated>& at);
   void drop_repeated(std::vector<Job>& jobs) const;
   void evaluate_all(std::vector<Job> jobs);
@@ -130,8 +130,13 @@ class Search {
     Eigen::VectorXd nuisance_sd;
   };
   void look_in_rounds(std::shared_ptr<const Likelihood> reference, Start& start, std::vector<Job> known);
-  void look_around();
-  void look_at_what_is_left();  // in the window, the likeliest first
+  // Of a set that is visited: so far below the likeliest that no curve is sought beside it any more.
+  bool is_hopeless(const ModelSet& set) const;
+  // Whether promises that were made by this noise are not worth much by that of what was found since.
+  bool noise_has_moved() const;
+  // Ends where the noise has moved, unless in the last round.
+  void look_around(bool last);
+  void look_at_what_is_left(bool last);  // in the window, the likeliest first
   void look_with_less_spread();
 
   const System& system_;
@@ -141,7 +146,8 @@ class Search {
   std::unique_ptr<const Discrepancy> discrepancy_;
   std::unique_ptr<const Proposals> proposals_;
   std::map<ModelSet, Visited> visited_;
-  std::set<ModelSet> expanded_, refitted_, from_larger_, swapped_;  // once a round each
+  std::set<ModelSet> expanded_, refitted_, from_larger_;  // once a round each
+  std::set<std::pair<ModelSet, bool>> swapped_;           // beside a curve and without one, the same
   Progress progress_;
   std::map<ModelSet, double> promised_;  // log posterior of sets that were not fitted
   std::size_t fits_ = 0;
