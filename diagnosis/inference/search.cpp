@@ -174,7 +174,7 @@ void Search::evaluate_all(std::vector<Job> jobs) {
   drop_repeated(jobs);
   fits_ += jobs.size();
   std::vector<std::shared_ptr<Evaluated>> results(jobs.size());
-  const auto hopeless = [&](const Job& job) { return best_log() - rules_.window - rules_.doubt - log_prior(job.set); };
+  const auto hopeless = [&](const Job& job) { return hopeless_below() - log_prior(job.set); };
   parallel_for(jobs.size(), [&](std::size_t i) {
     const Job& job = jobs[i];
     results[i] = std::make_shared<Evaluated>(
@@ -272,9 +272,11 @@ void Search::look_in_rounds(std::shared_ptr<const Likelihood> reference, Start& 
     keep({}, std::make_shared<const Evaluated>(base));
     if (!known.empty()) evaluate_all(std::move(known));
     known.clear();
-    if (!is_hopeless({})) {
-      add_discrepancy(*likelihood_, *discrepancy_, curve_rules_, base);
-      add_large_curves(*likelihood_, *discrepancy_, curve_rules_, base);
+    if (!visited_.at({}).at->with_discrepancy || !is_hopeless({})) {
+      add_discrepancy(*likelihood_, *discrepancy_, curve_rules_, base,
+                      {.hopeless_below = hopeless_below() - curve_rules_.log_prior_odds});
+      keep({}, std::make_shared<const Evaluated>(base));
+      if (!is_hopeless({})) add_large_curves(*likelihood_, *discrepancy_, curve_rules_, base);
     }
     start = {.shared = base.fit.shared, .local = base.fit.local, .nuisance_sd = base.fit.scales.nuisance_sd};
     if (anew) {
@@ -343,9 +345,9 @@ const ModelSet* next_to_expand(const std::map<ModelSet, Visited>& visited, const
   return next;
 }
 
-bool Search::is_hopeless(const ModelSet& set) const {
-  return visited_.at(set).log_posterior() < best_log() - rules_.window - rules_.doubt;
-}
+double Search::hopeless_below() const { return best_log() - rules_.window - rules_.doubt; }
+
+bool Search::is_hopeless(const ModelSet& set) const { return visited_.at(set).log_posterior() < hopeless_below(); }
 
 bool Search::noise_has_moved() const { return !near(likeliest_fit().likelihood->noise(), likelihood_->noise()); }
 

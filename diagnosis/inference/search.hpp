@@ -132,6 +132,7 @@ class Search {
   void look_in_rounds(std::shared_ptr<const Likelihood> reference, Start& start, std::vector<Job> known);
   // Of a set that is visited: so far below the likeliest that no curve is sought beside it any more.
   bool is_hopeless(const ModelSet& set) const;
+  double hopeless_below() const;
   // Whether promises that were made by this noise are not worth much by that of what was found since.
   bool noise_has_moved() const;
   // Ends where the noise has moved, unless in the last round.
