@@ -206,7 +206,7 @@ Fit stepped(const Fit& from, const ArrowSolution& step, double share) {
 }
 
 // Half of the second derivative by how far a step is gone, as one more step: the way along a valley that is bent
-// (Transtrum, Machta and Sethna 2011, Phys. Rev. E 83, 036701, eq. 33: geodesic acceleration). By one difference of
+// (Transtrum, Machta and Sethna 2011, Phys. Rev. E 83, 036701: geodesic acceleration). By one difference of
 // readings. Not valid where the model cannot follow, or where it is no small thing beside the step.
 ArrowSolution bend(const Likelihood& likelihood, const CurveAt& curve_at, const Fit& now, const Place& here,
                    const ArrowSolution& step, ArrowRules how) {
