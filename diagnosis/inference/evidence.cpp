@@ -60,26 +60,26 @@ WithLessSpread at_its_mode(const WithLessSpread& less, const Fit& fit, const Cur
 }
 
 Moved moved_to(const std::shared_ptr<const Likelihood>& likelihood, const Fit& from, const Discrepancy& discrepancy) {
-  const auto blocks_of = [&](const Fit& at, const Likelihood& by) {
-    return linearise(by, at, discrepancy.columns(by, at));
-  };
-  Moved out{.fit = fit(*likelihood, from.layout, from.shared, from.local, from.scales,
-                       discrepancy.columns(*likelihood, from), {.own_volume = from.own_volume})};
+  const CurveColumns curve_by_own = discrepancy.columns(*from.likelihood, from);
+  const CurveColumns curve_by_this = discrepancy.columns(*likelihood, from);
+  Moved out{.fit = fit(*likelihood, from.layout, from.shared, from.local, from.scales, curve_by_this,
+                       {.own_volume = from.own_volume})};
   out.fit.likelihood = likelihood;
   if (!out.fit.valid) return out;
-  const auto log_evidence = [&](const Fit& at, const std::vector<ArrowBlock>& blocks) {
+  const auto log_evidence = [](const Fit& at, const CurveColumns& curve, const std::vector<ArrowBlock>& blocks) {
     if (blocks.empty()) return -std::numeric_limits<double>::infinity();
-    return at.likelihood->log_weights() + log_about_mode(at, discrepancy.columns(*at.likelihood, at), blocks);
+    return at.likelihood->log_weights() + log_about_mode(at, curve, blocks);
   };
-  const auto here = blocks_of(from, *from.likelihood);
-  out.log_change = log_evidence(out.fit, blocks_of(out.fit, *likelihood)) - log_evidence(from, here);
+  const auto here = linearise(*from.likelihood, from, curve_by_own);
+  const auto there = linearise(*likelihood, out.fit, curve_by_this);
+  out.log_change = log_evidence(out.fit, curve_by_this, there) - log_evidence(from, curve_by_own, here);
   // By both noises where the fit is: what another place says more or less is not the noise's.
   const auto information = [&](const std::vector<ArrowBlock>& blocks) {
     VectorXd sum = VectorXd::Zero(from.shared.size());
     for (const ArrowBlock& block : blocks) sum += block.zz.diagonal().head(from.shared.size());
     return sum;
   };
-  const VectorXd by_own = information(here), by_this = information(blocks_of(from, *likelihood));
+  const VectorXd by_own = information(here), by_this = information(linearise(*likelihood, from, curve_by_this));
   double log_share = 0, count = 0;
   for (Index i = 0; i < by_own.size(); ++i)
     if (by_own[i] > 0 && by_this[i] > 0) {

@@ -9,7 +9,6 @@
 namespace bevel::inference {
 
 using Eigen::Index;
-using Eigen::MatrixXd;
 using Eigen::VectorXd;
 
 bool linearise(const Likelihood& likelihood, const Fit& fit, const CurveColumns& curve, std::size_t r,
@@ -78,9 +77,10 @@ ArrowSolution solve_within(const Fit& now, const std::vector<ArrowBlock>& blocks
       const Parameter& p = *now.layout.shared()[static_cast<std::size_t>(i)].parameter;
       if (p.periodic || step.shared[i] == 0 || std::ranges::count(how.held, i) > 0) continue;
       const double room = step.shared[i] < 0 ? p.lower - now.shared[i] : p.upper - now.shared[i];
-      if (room == 0 || (bounds == Bounds::end_steps && std::abs(step.shared[i]) > std::abs(room))) {
+      const bool presses = room == 0 || (room > 0) != (step.shared[i] > 0);
+      if (presses || (bounds == Bounds::end_steps && std::abs(step.shared[i]) > std::abs(room))) {
         how.held.push_back(i);
-        how.held_at.push_back(room);
+        how.held_at.push_back(presses ? 0 : room);
       }
     }
     if (how.held.size() == before) break;
@@ -173,7 +173,6 @@ namespace {
 
 // A place, with the linear model about it.
 struct Place {
-  std::shared_ptr<const CurveColumns> curve;
   std::vector<LinearRecording> recordings;
   std::vector<ArrowBlock> blocks;
   Pulls pulls;
@@ -182,11 +181,11 @@ struct Place {
 // Derivatives come with the cost: most steps are taken.
 bool look(const Likelihood& likelihood, const CurveAt& curve_at, Fit& at, Place& place) {
   at.cost = std::numeric_limits<double>::infinity();
-  place.curve = curve_at(at, true);
+  const auto curve = curve_at(at, true);
   place.recordings.resize(likelihood.recordings());
-  if (!place.curve || !make_blocks(likelihood, at, *place.curve, place.blocks, &place.recordings)) return false;
-  at.tangent = place.curve->tangent;
-  place.pulls = pulls_of(at.layout, at.shared, at.curve_values, place.curve->covariance);
+  if (!curve || !make_blocks(likelihood, at, *curve, place.blocks, &place.recordings)) return false;
+  at.tangent = curve->tangent;
+  place.pulls = pulls_of(at.layout, at.shared, at.curve_values, curve->covariance);
   at.cost = cost_of(place.pulls, place.blocks);
   return true;
 }

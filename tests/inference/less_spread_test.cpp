@@ -89,7 +89,7 @@ Without without_spread(const Levels& system) {
   const auto likelihood = std::make_shared<const Likelihood>(system, Readings(kRecordings), noise);
   const Layout layout(system, {});
   Fit here = fit(*likelihood, layout, VectorXd::Zero(1), std::vector<VectorXd>(kRecordings, VectorXd::Zero(1)),
-                 {.nuisance_sd = VectorXd::Constant(1, kSpread), .curves = {}});
+                 {.nuisance_sd = VectorXd::Constant(1, kSpread), .curves = {}}, {}, {.tolerance = 1e-9});
   here.likelihood = likelihood;
   const auto less = with_less_spread(*likelihood, here, {});
   EXPECT_EQ(less.size(), 1U);
@@ -110,7 +110,7 @@ TEST(LessSpread, BothAreTheClosedFormWhereTheModelIsLinear) {
 TEST(LessSpread, WhereItIsNotTheModeSaysWhatTheLinearModelDoesNot) {
   const Levels system(true);
   const Without without = without_spread(system);
-  EXPECT_GT(without.linear.log_change, -40);  // it takes the level to where the recordings are
+  EXPECT_GT(without.linear.log_change, -20);  // it takes the level to where the recordings are
   EXPECT_LT(without.at_mode.log_change, -1e4);
   EXPECT_NEAR(without.at_mode.fit.cost, system.least_cost(), 0.1);
   // But for the volumes, a few units each.
@@ -120,7 +120,7 @@ TEST(LessSpread, WhereItIsNotTheModeSaysWhatTheLinearModelDoesNot) {
 // By a noise of other size the mode is elsewhere, where the level hardly shows: that says nothing of the two noises.
 TEST(LessSpread, ByAnotherNoiseTheReadingsSayInProportionToThatAlone) {
   const Levels system(true);
-  const Fit here = without_spread(system).fit;
+  const Fit here = without_spread(system).at_mode.fit;
   Noise larger = here.likelihood->noise();
   larger.sigma = {5 * kSigma};
   const auto to = std::make_shared<const Likelihood>(*here.likelihood, larger);
