@@ -22,16 +22,30 @@ constexpr double kOfLikeliest = 0.5;      // of what the likeliest curve gains: 
 constexpr double kMostOfPromise = 2;      // of what is promised of one more curve: what a fit comes to at most
 constexpr double kWorthAnExchange = 0.5;  // log evidence: what a curve in another's place has to promise, and bring
 
+// What all choices together add to the evidence of one that was fitted, each as likely beforehand, by the linear model:
+// another counts for no more than that one, whatever it promises. What it would come to was not looked at, or was, and
+// it is less.
+double log_others(std::span<const double> logs, double log_fitted, std::size_t choices) {
+  std::vector<double> kept;
+  for (const double log : logs) kept.push_back(std::min(log - log_fitted, 0.0));
+  return log_sum(kept) - std::log(static_cast<double>(choices));
+}
+
+std::vector<double> log_factors_of(const std::vector<CurveFactor>& curves) {
+  std::vector<double> logs;
+  for (const auto& one : curves) logs.push_back(one.log_bayes_factor);
+  return logs;
+}
+
 // Of all curves of a scan together, each as likely beforehand: the likeliest's factor and what the rest adds to it.
 struct Integrated {
   double log_factor = 0;
   double log_others = 0;  // what the others add to the likeliest's own: log_factor less that
 };
 Integrated integrated(const std::vector<CurveFactor>& curves) {
-  std::vector<double> logs;
-  for (const auto& one : curves) logs.push_back(one.log_bayes_factor);
-  const double mean = log_sum(logs) - std::log(static_cast<double>(logs.size()));
-  return {.log_factor = mean, .log_others = mean - logs.front()};
+  const auto logs = log_factors_of(curves);
+  const double others = log_others(logs, logs.front(), logs.size());
+  return {.log_factor = logs.front() + others, .log_others = others};
 }
 
 void erase_known(std::span<const CurvePrior> known, std::vector<CurveFactor>& curves) {
@@ -139,13 +153,13 @@ bool add_curve(const Likelihood& likelihood, const Discrepancy& discrepancy, con
   const double no_likelier = so_far.log_evidence - rules.log_prior_odds_more - all.log_others;
   Settled with = settle_with_one_more(likelihood, discrepancy, here, prior, no_likelier - rules.optimism);
   // Of the other scales and lengths, beside the spread that there is in the end.
-  double log_others = all.log_others;
+  double others = all.log_others;
   if (with.fit.valid && with.fit.scales.nuisance_sd == here.scales.nuisance_sd)
-    log_others = integrated(own).log_factor - log_factor_of(own, prior);
-  const double log_factor = with.over.log_mean + log_others - so_far.log_evidence;
+    others = log_others(log_factors_of(own), log_factor_of(own, prior), own.size());
+  const double log_factor = with.over.log_mean + others - so_far.log_evidence;
   if (!(log_factor + rules.log_prior_odds_more > 0)) return false;
   so_far.log_evidence = with.over.log_mean;
-  so_far.log_others.push_back(log_others);
+  so_far.log_others.push_back(others);
   out.fit_with_curve = std::move(with.fit);
   out.nuisance_weights_with_curve = with.over.weights;
   out.log_factors.push_back(log_factor);
@@ -164,11 +178,11 @@ bool exchange_curve(const Likelihood& likelihood, const Discrepancy& discrepancy
     Settled with = settle_with_one_more(likelihood, discrepancy, rest, curves.front().prior,
                                         so_far.log_evidence + kWorthAnExchange - rules.optimism);
     if (!(with.over.log_mean > so_far.log_evidence + kWorthAnExchange)) continue;
-    const double log_others = integrated(curves).log_others;
-    out.log_factors.back() += with.over.log_mean + log_others - so_far.log_evidence - so_far.log_others[k];
+    const double others = integrated(curves).log_others;
+    out.log_factors.back() += with.over.log_mean + others - so_far.log_evidence - so_far.log_others[k];
     so_far.log_evidence = with.over.log_mean;
     so_far.log_others.erase(so_far.log_others.begin() + static_cast<std::ptrdiff_t>(k));
-    so_far.log_others.push_back(log_others);
+    so_far.log_others.push_back(others);
     out.fit_with_curve = std::move(with.fit);
     out.nuisance_weights_with_curve = with.over.weights;
     return true;
@@ -221,8 +235,7 @@ WithCurve settle_with(const Likelihood& likelihood, const Discrepancy& discrepan
   // What the linear model about none says of the others is nothing where that is not what this one is.
   if (fit.valid && fit.tangent) {
     const VectorXd own = log_over_priors(discrepancy, fit, discrepancy.columns(*fit.likelihood, fit), 0);
-    out.log_others = log_sum(std::span<const double>(own.data(), static_cast<std::size_t>(own.size()))) -
-                     std::log(static_cast<double>(choices));
+    out.log_others = log_others(std::span<const double>(own.data(), static_cast<std::size_t>(own.size())), 0, choices);
   }
   return out;
 }
@@ -303,11 +316,10 @@ void add_discrepancy(const Likelihood& likelihood, const Discrepancy& discrepanc
     (there.settled.fit.tangent ? refined : tried).push_back(one.prior);
     if (there.log_evidence() > best.log_evidence()) best = std::move(there);
   };
-  const double log_others = integrated(out.curves).log_others;
-  if (large_curve)
-    try_one({.prior = large_curve->scales.curves.front(), .log_others = log_others, .from = large_curve});
-  if (stands_out && out.log_evidence + out.curves.front().log_bayes_factor + log_others > best.log_evidence())
-    try_one({.prior = out.curves.front().prior, .log_others = log_others, .from = &out.fit});
+  const double others = integrated(out.curves).log_others;
+  if (large_curve) try_one({.prior = large_curve->scales.curves.front(), .log_others = others, .from = large_curve});
+  if (stands_out && out.log_evidence + out.curves.front().log_bayes_factor + others > best.log_evidence())
+    try_one({.prior = out.curves.front().prior, .log_others = others, .from = &out.fit});
   // And beside less spread, where that promises more. Fitted from the spread that there is: without it the noise takes
   // what is left of that, and does not give it back.
   const CurveColumns none;

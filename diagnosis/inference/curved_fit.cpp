@@ -79,10 +79,9 @@ std::shared_ptr<const CurveTangent> tangent_about(const Discrepancy& discrepancy
                       values_by_curve(discrepancy, fit.scales.curves, fit.curve_values));
 }
 
-Fit fit_beside_curves(const Likelihood& likelihood, const Discrepancy& discrepancy, const Layout& layout,
-                      const VectorXd& shared, const std::vector<VectorXd>& local, const Scales& scales,
-                      std::shared_ptr<const CurveTangent> tangent) {
-  const CurveAt curve_at = [&](const Fit& at, bool derivatives) -> std::shared_ptr<const CurveColumns> {
+CurveAt about_values(const Discrepancy& discrepancy, const Likelihood& likelihood, std::vector<CurvePrior> curves) {
+  return [&discrepancy, &likelihood, curves = std::move(curves)](
+             const Fit& at, bool derivatives) -> std::shared_ptr<const CurveColumns> {
     if (!derivatives) {
       CurveColumns there;
       there.tangent = values_only(discrepancy, at);
@@ -90,8 +89,13 @@ Fit fit_beside_curves(const Likelihood& likelihood, const Discrepancy& discrepan
     }
     auto about = tangent_about(discrepancy, at);
     if (!about) return nullptr;
-    return std::make_shared<const CurveColumns>(discrepancy.columns(likelihood, scales.curves, std::move(about)));
+    return std::make_shared<const CurveColumns>(discrepancy.columns(likelihood, curves, std::move(about)));
   };
+}
+
+Fit fit_beside_curves(const Likelihood& likelihood, const Discrepancy& discrepancy, const Layout& layout,
+                      const VectorXd& shared, const std::vector<VectorXd>& local, const Scales& scales,
+                      std::shared_ptr<const CurveTangent> tangent) {
   Fit here(layout);
   here.scales = scales;
   here.shared = shared, here.local = local;
@@ -111,7 +115,8 @@ Fit fit_beside_curves(const Likelihood& likelihood, const Discrepancy& discrepan
           own[static_cast<Index>(i)] = 0;
     if (cost < nonlinear_cost(likelihood, discrepancy, here, curve)) here = std::move(next);
   }
-  return fit_from(likelihood, std::move(here), curve_at, {.max_iterations = kDamped});
+  return fit_from(likelihood, std::move(here), about_values(discrepancy, likelihood, scales.curves),
+                  {.max_iterations = kDamped});
 }
 
 }  // namespace bevel::inference

@@ -11,6 +11,9 @@ Fit fit_beside_curves(const Likelihood& likelihood, const Discrepancy& discrepan
                       const Eigen::VectorXd& shared, const std::vector<Eigen::VectorXd>& local, const Scales& scales,
                       std::shared_ptr<const CurveTangent> tangent);
 
+// Of curves with these priors, what fit_from() asks for: their columns about a fit's values.
+CurveAt about_values(const Discrepancy& discrepancy, const Likelihood& likelihood, std::vector<CurvePrior> curves);
+
 // Log evidence about a fit with each of kCurveScales x kCurveLengths (lengths the faster) for one of its curves, less
 // that with those it has, by the linear model about the fit; what the linear model does not have is -infinity.
 Eigen::VectorXd log_over_priors(const Discrepancy& discrepancy, const Fit& fit, const CurveColumns& curve,

@@ -164,9 +164,12 @@ Fit fit(const Likelihood& likelihood, const Layout& layout, const VectorXd& shar
   begin.local = local;
   begin.own_volume = rules.own_volume;
   if (curve) begin.curve_values = curve.tangent ? curve.tangent->values : VectorXd::Zero(curve.covariance.rows());
-  const std::shared_ptr<const CurveColumns> same(std::shared_ptr<const void>(), &curve);  // not owned
-  return fit_from(
-      likelihood, std::move(begin), [&](const Fit&, bool) { return same; }, rules);
+  return fit_from(likelihood, std::move(begin), everywhere(curve), rules);
+}
+
+CurveAt everywhere(const CurveColumns& curve) {
+  const std::shared_ptr<const CurveColumns> same(std::shared_ptr<const void>(), &curve);
+  return [same](const Fit&, bool) { return same; };
 }
 
 namespace {

@@ -61,35 +61,40 @@ double log_own_volume(const std::vector<ArrowBlock>& blocks) {
   return sum;
 }
 
-Fit with_own_integrated(Fit now, const CurveColumns& curve) {
+Fit with_own_integrated(Fit now, const CurveAt& curve_at) {
   if (!now.valid || free_locals(now.layout).empty()) return now;
   const Likelihood& likelihood = *now.likelihood;
   now.own_volume = nullptr;
-  auto blocks = linearise(likelihood, now, curve);
+  auto curve = curve_at(now, true);
+  if (!curve) return now;
+  auto blocks = linearise(likelihood, now, *curve);
   if (blocks.empty()) return now;
   double total = now.cost + log_own_volume(blocks);
   std::vector<Index> all(static_cast<std::size_t>(now.shared.size()));
   for (std::size_t i = 0; i < all.size(); ++i) all[i] = static_cast<Index>(i);
   for (int step = 0; step < kMostSteps; ++step) {
-    ArrowSolution about = solve_about(now, blocks, curve);
+    ArrowSolution about = solve_about(now, blocks, *curve);
     if (!about.valid) return now;
-    now.own_volume = own_volume_about(now, curve, blocks, about);
+    now.own_volume = own_volume_about(now, *curve, blocks, about);
     for (std::size_t r = 0; r < blocks.size(); ++r) blocks[r].slope = now.own_volume->slope[r];
-    about = solve_about(now, blocks, curve);
+    about = solve_about(now, blocks, *curve);
     if (!about.valid || now.cost - about.least < kSmallStep) return now;
     double share = 1;
     bool gained = false;
     for (int halving = 0; halving < kHalvings && !gained; ++halving, share *= 0.5) {
-      const VectorXd shared = now.shared + share * about.shared.head(now.shared.size());
-      Fit there = fit(likelihood, now.layout, shared, now.local, now.scales, curve, {.fixed = all});
+      Fit there = now;
+      there.own_volume = nullptr;
+      there.shared += share * about.shared.head(now.shared.size());
+      there = fit_from(likelihood, std::move(there), curve_at, {.fixed = all});
       if (!there.valid) continue;
-      there.likelihood = now.likelihood;
-      auto blocks_there = linearise(likelihood, there, curve);
+      auto curve_there = curve_at(there, true);
+      if (!curve_there) continue;
+      auto blocks_there = linearise(likelihood, there, *curve_there);
       if (blocks_there.empty()) continue;
       const double total_there = there.cost + log_own_volume(blocks_there);
       if (!(total_there < total)) continue;
       there.held = now.held;
-      now = std::move(there), blocks = std::move(blocks_there), total = total_there;
+      now = std::move(there), curve = std::move(curve_there), blocks = std::move(blocks_there), total = total_there;
       gained = true;
     }
     if (!gained) return now;

@@ -15,7 +15,8 @@ double log_own_volume(const std::vector<ArrowBlock>& blocks);
 
 // From a joint mode on, by Gauss and Newton's steps in the shared unknowns, the recordings' own at their mode for each:
 // the least of cost + log_own_volume(). The fit carries the slopes that it is stationary with (Fit::own_volume). One
-// that is not valid comes back as it is. Shapes have no slopes: readings are no smooth function of them.
-Fit with_own_integrated(Fit fit, const CurveColumns& curve);
+// that is not valid comes back as it is. Shapes have no slopes: readings are no smooth function of them. curve_at: of
+// the fit's curves, as fit_from() has it.
+Fit with_own_integrated(Fit fit, const CurveAt& curve_at);
 
 }  // namespace bevel::inference

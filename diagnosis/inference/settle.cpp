@@ -200,7 +200,13 @@ Settled settle(const Likelihood& likelihood, const Discrepancy* discrepancy, con
   }
   if (!best.fit.valid) return best;
   if (discrepancy) curve = discrepancy->columns(*best.fit.likelihood, best.fit);
-  if (!(best.over.log_here < give_up_below)) best.fit = with_own_integrated(std::move(best.fit), curve);
+  if (!(best.over.log_here < give_up_below)) {
+    const auto by = best.fit.likelihood;
+    const CurveAt curve_at =
+        best.fit.tangent ? about_values(*discrepancy, *by, best.fit.scales.curves) : everywhere(curve);
+    best.fit = with_own_integrated(std::move(best.fit), curve_at);
+    if (best.fit.tangent) curve = discrepancy->columns(*by, best.fit);
+  }
   best.over = over_nuisances(best.fit, curve, grid, kWithAShare);
   return best;
 }

@@ -89,7 +89,7 @@ Fit refitted_base(const Search& search, const Fit& like) {
   Fit out =
       fit(*like.likelihood, nothing, base.shared, base.local, {.nuisance_sd = like.scales.nuisance_sd, .curves = {}});
   out.likelihood = like.likelihood;
-  return with_own_integrated(std::move(out), {});
+  return with_own_integrated(std::move(out), inference::everywhere({}));
 }
 
 }  // namespace bevel::diagnosis

@@ -18,27 +18,37 @@ using Eigen::Index;
 using Eigen::MatrixXd;
 using Eigen::VectorXd;
 
-// y = level + exp(c(x)) - 1 + white noise, c linear between its values at x = 0 and x = 1.
+// y = level + exp(c(x)) - 1 + white noise, c linear between its values at x = 0 and x = 1, where it comes once or goes
+// to and fro; the model cannot follow where |c| is larger than a limit.
 class Exponential final : public testing::HeldSystem {
  public:
   static constexpr Index kReadings = 40;
   static constexpr double kSigma = 0.1, kLevel_sd = 1;
-  static double x(Index i) { return static_cast<double>(i) / (kReadings - 1); }
+  struct Course {
+    double rise;
+    bool to_and_fro = false;
+    double limit = 10;
+  };
+  double x(Index i) const {
+    const double share = static_cast<double>(i) / (kReadings - 1);
+    return course_.to_and_fro ? 0.5 - 0.5 * std::cos(20 * share) : share;
+  }
 
-  explicit Exponential(double rise) {
+  explicit Exponential(const Course& course) : course_(course) {
     data_.claimed_sd = {kSigma};
     data_.frame_s = 1;
     std::mt19937_64 random(11);
     std::normal_distribution<double> normal;
     std::vector<double> measured;
-    for (Index i = 0; i < kReadings; ++i) measured.push_back(0.3 + std::expm1(rise * x(i)) + kSigma * normal(random));
+    for (Index i = 0; i < kReadings; ++i)
+      measured.push_back(0.3 + std::expm1(course.rise * x(i)) + kSigma * normal(random));
     add_recording(measured, data_.frame_s);
     base_ = {{.name = "level", .lower = -9, .upper = 9, .none = 0, .starts = {}, .prior = normal_prior(0, kLevel_sd)}};
     nuisances_ = {{"tilt", 0}};
     groups_ = {{"tilt", "1", {0, 0.1}}};
     curves_ = {{.component = "exponent", .unit = "1", .covariate = "x", .at = {0, 1}}};
   }
-  static MatrixXd weights() {
+  MatrixXd weights() const {
     MatrixXd out(kReadings, 2);
     for (Index i = 0; i < kReadings; ++i) out.row(i) << 1 - x(i), x(i);
     return out;
@@ -53,6 +63,7 @@ class Exponential final : public testing::HeldSystem {
                     MatrixXd* by_values) const override {
     VectorXd exponent = VectorXd::Zero(kReadings);
     for (const CurveValues& one : curves) exponent += weights() * one.values;
+    if (exponent.cwiseAbs().maxCoeff() > course_.limit) return false;
     const VectorXd grown = exponent.array().exp();
     const VectorXd along = weights().col(1);
     out.reading = grown.array() - 1 + shared[0] + (local[0] * along).array();
@@ -65,10 +76,14 @@ class Exponential final : public testing::HeldSystem {
     return true;
   }
   MatrixXd by_curves(std::size_t, const VectorXd&) const override { return weights(); }
+
+ private:
+  Course course_;
 };
 
 struct Case {
-  explicit Case(double rise) : system(rise), likelihood(system, Readings(1), noise()), layout(system, {}) {
+  explicit Case(const Exponential::Course& course)
+      : system(course), likelihood(system, Readings(1), noise()), layout(system, {}) {
     base = fit(likelihood, layout, layout.shared_start(), {layout.local_start()}, {.nuisance_sd = none, .curves = {}});
     discrepancy.emplace(likelihood, base);
   }
@@ -97,7 +112,7 @@ double cost_of(const Case& made, const MatrixXd& covariance, const Eigen::Vector
       at[0] * at[0] / (Exponential::kLevel_sd * Exponential::kLevel_sd) + values.dot(covariance.ldlt().solve(values));
   const auto& measured = made.system.data().recordings[0].series[0].measured;
   for (Index i = 0; i < Exponential::kReadings; ++i) {
-    const double c = (1 - Exponential::x(i)) * values[0] + Exponential::x(i) * values[1];
+    const double c = (1 - made.system.x(i)) * values[0] + made.system.x(i) * values[1];
     const double off = (measured[static_cast<std::size_t>(i)] - at[0] - std::expm1(c)) / Exponential::kSigma;
     cost += off * off;
   }
@@ -107,7 +122,7 @@ double cost_of(const Case& made, const MatrixXd& covariance, const Eigen::Vector
 constexpr CurvePrior kPrior{.curve = 0, .scale = 8, .length = 1};
 
 TEST(CurvedFit, FindsTheModeOfTheNonlinearModel) {
-  const Case made(1.6);
+  const Case made({.rise = 1.6});
   const CurveColumns linear = made.discrepancy->columns(made.likelihood, std::span(&kPrior, 1));
   const Fit about_none = fit(made.likelihood, made.layout, made.base.shared, made.base.local,
                              {.nuisance_sd = made.none, .curves = {kPrior}}, linear);
@@ -125,7 +140,7 @@ TEST(CurvedFit, FindsTheModeOfTheNonlinearModel) {
 }
 
 TEST(CurvedFit, EvidenceAboutItIsThatOfAGrid) {
-  const Case made(1.6);
+  const Case made({.rise = 1.6});
   const Fit found = made.with_curve(kPrior);
   const CurveColumns curve = made.discrepancy->columns(made.likelihood, found);
   const ArrowSolution solution = solve_about(found, linearise(made.likelihood, found, curve), curve);
@@ -149,7 +164,7 @@ TEST(CurvedFit, EvidenceAboutItIsThatOfAGrid) {
 }
 
 TEST(CurvedFit, ASmallCurveIsLeftToTheLinearModel) {
-  const Case made(0.02);
+  const Case made({.rise = 0.02});
   const Fit found = made.with_curve({.curve = 0, .scale = 0.25, .length = 1});
   ASSERT_TRUE(found.valid);
   EXPECT_FALSE(found.tangent);
@@ -157,7 +172,7 @@ TEST(CurvedFit, ASmallCurveIsLeftToTheLinearModel) {
 
 // By the linear model about none a large curve has another size than it has.
 TEST(CurvedFit, ScaleAndLengthAreThoseOfTheModeThatIsFound) {
-  const Case made(1.6);
+  const Case made({.rise = 1.6});
   const Fit found = made.with_curve({.curve = 0, .scale = 0.25, .length = 0.2});
   const CurveColumns curve = made.discrepancy->columns(made.likelihood, found);
   Fit at = found;
@@ -188,7 +203,7 @@ TEST(CurvedFit, ScaleAndLengthAreThoseOfTheModeThatIsFound) {
 
 // The factor of a discrepancy is that of the nonlinear model, whatever the linear one promises.
 TEST(CurvedFit, TheDiscrepancysEvidenceIsThatOfTheNonlinearModel) {
-  const Case made(1.6);
+  const Case made({.rise = 1.6});
   Evaluated at = evaluate(made.likelihood, made.layout, made.base.shared, made.base.local, made.none);
   add_discrepancy(made.likelihood, *made.discrepancy, {.log_prior_odds = -2, .log_prior_odds_more = -5}, at);
   ASSERT_TRUE(at.fit_with_curve);
@@ -197,6 +212,38 @@ TEST(CurvedFit, TheDiscrepancysEvidenceIsThatOfTheNonlinearModel) {
   EXPECT_NEAR(rise, 1.6, 0.1);
   EXPECT_NEAR(at.fit_with_curve->likelihood->noise().sigma[0], Exponential::kSigma, 0.03);
   EXPECT_GT(at.log_bayes_factor_curve, 20);
+}
+
+// A curve beside a base that begins with a small one.
+Evaluated with_small_curve(const Case& made) {
+  const Fit small = made.with_curve({.curve = 0, .scale = 0.25, .length = 1});
+  Evaluated out = evaluate(made.likelihood, made.layout, made.base.shared, made.base.local, made.none);
+  add_discrepancy(made.likelihood, *made.discrepancy, {.log_prior_odds = -2, .log_prior_odds_more = -5}, out,
+                  {.large_curve = &small});
+  return out;
+}
+
+TEST(CurvedFit, TheModeIsWhereTheModelCanFollow) {
+  const Case made({.rise = 0.8, .limit = 0.05});
+  const Evaluated at = with_small_curve(made);
+  ASSERT_TRUE(at.fit_with_curve);
+  const Fit& with = *at.fit_with_curve;
+  ASSERT_TRUE(with.tangent);
+  EXPECT_LT(with.curve_values.cwiseAbs().maxCoeff(), 0.051);
+}
+
+// An integral over a prior is no more than the likelihood's maximum. Where the model cannot go on, a larger scale's
+// promise is not kept, and does not count.
+TEST(CurvedFit, TheDiscrepancysEvidenceIsNoMoreThanTheLikelihoodAtItsMode) {
+  const Case made({.rise = 0.8, .to_and_fro = true, .limit = 0.05});
+  const Evaluated at = with_small_curve(made);
+  ASSERT_TRUE(at.fit_with_curve);
+  const Fit& with = *at.fit_with_curve;
+  ASSERT_TRUE(with.tangent);
+  const VectorXd promised =
+      log_over_priors(*made.discrepancy, with, made.discrepancy->columns(*with.likelihood, with), 0);
+  EXPECT_GT(promised.maxCoeff(), 10) << "nothing is promised";
+  EXPECT_LT(at.log_evidence + at.log_factors.front(), with.likelihood->log_weights() - 0.5 * with.cost);
 }
 
 }  // namespace

@@ -99,7 +99,7 @@ Modes modes_of(const Paths& system) {
   Fit joint = fit(*likelihood, layout, VectorXd::Zero(1), std::vector<VectorXd>(kRecordings, VectorXd::Zero(1)),
                   {.nuisance_sd = VectorXd::Constant(1, kSpread), .curves = {}}, {}, {.tolerance = 1e-9});
   joint.likelihood = likelihood;
-  Fit integrated = with_own_integrated(joint, {});
+  Fit integrated = with_own_integrated(joint, everywhere({}));
   const double variance = solve_about(integrated, linearise(*likelihood, integrated, {}), {}).covariance(0, 0);
   return {.joint = std::move(joint), .integrated = std::move(integrated), .sd = std::sqrt(variance)};
 }
