@@ -19,7 +19,6 @@ namespace {
 constexpr double kNever = -std::numeric_limits<double>::infinity();  // log evidence below which a fit is given up
 constexpr double kLikelyCurve = 3;                                   // log Bayes factor from which a curve is fitted
 constexpr double kOfLikeliest = 0.5;      // of what the likeliest curve gains: what that of another component does
-constexpr double kMostOfPromise = 2;      // of what is promised of one more curve: what a fit comes to at most
 constexpr double kWorthAnExchange = 0.5;  // log evidence: what a curve in another's place has to promise, and bring
 
 // What all choices together add to the evidence of one that was fitted, each as likely beforehand, by the linear model:

@@ -30,6 +30,9 @@ Evaluated evaluate(const Likelihood& likelihood, const Layout& layout, const Eig
                    const std::vector<Eigen::VectorXd>& local, const Eigen::VectorXd& nuisance_sd,
                    double give_up_below = -std::numeric_limits<double>::infinity());
 
+// Of the log Bayes factor that is promised of one more curve: what a fit comes to at most.
+inline constexpr double kMostOfPromise = 2;
+
 struct CurveRules {
   double log_prior_odds;       // of a curve, against none
   double log_prior_odds_more;  // of one more, against no more

@@ -110,7 +110,7 @@ std::vector<Search::Job> Search::larger_sets(const ModelSet& set, const Beside& 
       if (start.log_bayes_factor > one.starts.front().log_bayes_factor - rules_.window) {
         out.push_back(job_from(here.about, one.effect, start));
         out.back().promised = promised + doubtful;
-        ask_for_curve_of(here.about, out.back());
+        if (!is_hopeless(set)) ask_for_curve_of(here.about, out.back());
       }
   }
   return out;

@@ -16,6 +16,7 @@ namespace {
 
 constexpr int kMostSteps = 4;
 constexpr int kHalvings = 4;
+constexpr int kToFollow = 3;             // steps of what follows a step; where it needs more, that was too long
 constexpr double kSmallStep = 0.02;      // of cost and volume: what a step has to promise
 constexpr double kDifference_sd = 0.25;  // of a shared unknown: over which slopes are taken
 
@@ -85,7 +86,7 @@ Fit with_own_integrated(Fit now, const CurveAt& curve_at) {
       Fit there = now;
       there.own_volume = nullptr;
       there.shared += share * about.shared.head(now.shared.size());
-      there = fit_from(likelihood, std::move(there), curve_at, {.fixed = all});
+      there = fit_from(likelihood, std::move(there), curve_at, {.max_iterations = kToFollow, .fixed = all});
       if (!there.valid) continue;
       auto curve_there = curve_at(there, true);
       if (!curve_there) continue;

@@ -6,6 +6,7 @@
 #include <iterator>
 #include <limits>
 #include <numeric>
+#include <optional>
 #include <ranges>
 #include <set>
 #include <stdexcept>
@@ -235,6 +236,7 @@ void Search::run(const Readings& outliers, const Noise& noise, const Progress& p
   const Fit tempered = tempered_base(system_, outliers, noise);
   Start start{.shared = tempered.shared, .local = tempered.local, .nuisance_sd = middle_nuisance_sd(system_)};
   look_in_rounds(std::make_shared<const Likelihood>(system_, outliers, noise), start, {});
+  nothing_is_hopeless_ = visited_.at({}).log_posterior() < hopeless_below() - rules_.curve_window;
   // Whether the noise has heavy tails only the likeliest set can say: what jumps is no noise, once it has a name.
   if (const auto heavy = with_heavy_tails(likeliest_fit())) {
     std::vector<Job> jobs;
@@ -272,7 +274,14 @@ void Search::look_in_rounds(std::shared_ptr<const Likelihood> reference, Start& 
     keep({}, std::make_shared<const Evaluated>(base));
     if (!known.empty()) evaluate_all(std::move(known));
     known.clear();
-    if (!visited_.at({}).at->with_discrepancy || !is_hopeless({})) {
+    // What is far too much for a curve need not be taken up by one first: by the noise beside it the search begins.
+    if (anew && one_effect_is_more_than_a_curve()) {
+      anew = false;
+      nothing_is_hopeless_ = true;
+      reference = without_inputs(*likeliest_fit().likelihood);
+      continue;
+    }
+    if (!nothing_is_hopeless_ && (!visited_.at({}).at->with_discrepancy || !is_hopeless({}))) {
       add_discrepancy(*likelihood_, *discrepancy_, curve_rules_, base,
                       {.hopeless_below = hopeless_below() - curve_rules_.log_prior_odds});
       keep({}, std::make_shared<const Evaluated>(base));
@@ -348,6 +357,26 @@ const ModelSet* next_to_expand(const std::map<ModelSet, Visited>& visited, const
 double Search::hopeless_below() const { return best_log() - rules_.window - rules_.doubt; }
 
 bool Search::is_hopeless(const ModelSet& set) const { return visited_.at(set).log_posterior() < hopeless_below(); }
+
+bool Search::one_effect_is_more_than_a_curve() {
+  const Fit& base = visited_.at({}).at->fit;
+  const auto list = Proposals(*likelihood_, base).beside(base_marginal(), 1);
+  std::vector<Job> jobs;
+  for (const Proposal& one : list | std::views::take(kAtOnce))
+    if (!one.starts.empty()) jobs.push_back(job_from(base, one.effect, one.starts.front()));
+  std::vector<std::optional<Evaluated>> results(jobs.size());
+  parallel_for(jobs.size(), [&](std::size_t i) {
+    const Job& job = jobs[i];
+    results[i] = evaluate(*likelihood_, job.layout, job.shared, job.local, job.nuisance_sd);
+  });
+  for (std::size_t i = 0; i < jobs.size(); ++i)
+    if (results[i]->valid) keep(jobs[i].set, std::make_shared<const Evaluated>(*std::move(results[i])));
+  const auto curves = discrepancy_->scan(base_marginal());
+  const double promised = curves.empty() ? 0 : std::max(0.0, curves.front().log_bayes_factor);
+  if (visited_.at({}).log_posterior() + kMostOfPromise * promised < hopeless_below()) return true;
+  std::erase_if(visited_, [](const auto& one) { return !one.first.empty(); });
+  return false;
+}
 
 bool Search::noise_has_moved() const { return !near(likeliest_fit().likelihood->noise(), likelihood_->noise()); }
 

@@ -133,6 +133,9 @@ class Search {
   // Of a set that is visited: so far below the likeliest that no curve is sought beside it any more.
   bool is_hopeless(const ModelSet& set) const;
   double hopeless_below() const;
+  // Whether one of the foremost effects beside nothing leaves that hopeless with all that is promised of a curve; else
+  // they are as if not looked at.
+  bool one_effect_is_more_than_a_curve();
   // Whether promises that were made by this noise are not worth much by that of what was found since.
   bool noise_has_moved() const;
   // Ends where the noise has moved, unless in the last round.
@@ -152,6 +155,7 @@ class Search {
   Progress progress_;
   std::map<ModelSet, double> promised_;  // log posterior of sets that were not fitted
   std::size_t fits_ = 0;
+  bool nothing_is_hopeless_ = false;  // whatever the noise: beside it no curve is sought any more
 };
 
 }  // namespace bevel::inference
