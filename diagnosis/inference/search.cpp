@@ -6,7 +6,6 @@
 #include <iterator>
 #include <limits>
 #include <numeric>
-#include <optional>
 #include <ranges>
 #include <set>
 #include <stdexcept>
@@ -19,8 +18,7 @@
 namespace bevel::inference {
 namespace {
 
-constexpr double kSameMode = 0.1;   // log evidence
-constexpr std::size_t kAtOnce = 4;  // sets beside a discrepancy: the next are chosen by what these come to
+constexpr double kSameMode = 0.1;  // log evidence
 
 // So near that what is promised beside one is not far from what is beside the other.
 bool near(const Noise& a, const Noise& b) {
@@ -207,9 +205,9 @@ void Search::evaluate_all(std::vector<Job> jobs) {
   std::ranges::stable_sort(asked, std::greater{}, [&](std::size_t i) {
     return std::isfinite(jobs[i].promised) ? std::max(jobs[i].promised, log_without(i)) : log_without(i);
   });
-  for (std::size_t first = 0; first < asked.size(); first += kAtOnce) {
+  for (std::size_t first = 0; first < asked.size(); first += rules_.at_once) {
     std::vector<std::size_t> now;
-    std::ranges::copy_if(asked | std::views::drop(first) | std::views::take(kAtOnce), std::back_inserter(now),
+    std::ranges::copy_if(asked | std::views::drop(first) | std::views::take(rules_.at_once), std::back_inserter(now),
                          [&, likeliest = best_log()](std::size_t i) { return asks(i, likeliest); });
     std::vector<std::shared_ptr<Evaluated>> with(now.size());
     parallel_for(now.size(), [&](std::size_t k) {
@@ -357,26 +355,6 @@ const ModelSet* next_to_expand(const std::map<ModelSet, Visited>& visited, const
 double Search::hopeless_below() const { return best_log() - rules_.window - rules_.doubt; }
 
 bool Search::is_hopeless(const ModelSet& set) const { return visited_.at(set).log_posterior() < hopeless_below(); }
-
-bool Search::one_effect_is_more_than_a_curve() {
-  const Fit& base = visited_.at({}).at->fit;
-  const auto list = Proposals(*likelihood_, base).beside(base_marginal(), 1);
-  std::vector<Job> jobs;
-  for (const Proposal& one : list | std::views::take(kAtOnce))
-    if (!one.starts.empty()) jobs.push_back(job_from(base, one.effect, one.starts.front()));
-  std::vector<std::optional<Evaluated>> results(jobs.size());
-  parallel_for(jobs.size(), [&](std::size_t i) {
-    const Job& job = jobs[i];
-    results[i] = evaluate(*likelihood_, job.layout, job.shared, job.local, job.nuisance_sd);
-  });
-  for (std::size_t i = 0; i < jobs.size(); ++i)
-    if (results[i]->valid) keep(jobs[i].set, std::make_shared<const Evaluated>(*std::move(results[i])));
-  const auto curves = discrepancy_->scan(base_marginal());
-  const double promised = curves.empty() ? 0 : std::max(0.0, curves.front().log_bayes_factor);
-  if (visited_.at({}).log_posterior() + kMostOfPromise * promised < hopeless_below()) return true;
-  std::erase_if(visited_, [](const auto& one) { return !one.first.empty(); });
-  return false;
-}
 
 bool Search::noise_has_moved() const { return !near(likeliest_fit().likelihood->noise(), likelihood_->noise()); }
 

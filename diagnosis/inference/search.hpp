@@ -25,6 +25,7 @@ struct SearchRules {
   std::size_t most_fits = 90;           // in all, and as many again by noise with heavy tails
   double log_prior_odds_effect = -5.0;  // of one effect being in the model, against not; its kinds share it
   std::size_t most_curves = 2;          // of a discrepancy
+  std::size_t at_once = 4;              // fits of which the next are chosen by what these come to
   std::size_t rounds = 6;
   int threads = 2;
 };

@@ -114,6 +114,20 @@ TEST(PendulumTest, WhatIsOnNoListIsADiscrepancy) {
   EXPECT_GT(found.fit.curve_values[5], found.fit.curve_values[6] + 0.4) << found.fit.curve_values.transpose();
 }
 
+// Beside nothing a curve is sought, but where one effect is far more than any; what is named is the same.
+TEST(PendulumTest, NoCurveIsSoughtWhereOneEffectIsFarMore) {
+  const auto sought = [](const TruePendulum& truth, const ModelSet& named) {
+    const Pendulum system(truth, 6, 22);
+    Search search(system, {});
+    search.run(Readings(6), white());
+    EXPECT_EQ(search.best().set, named);
+    return search.visited().at({}).at->with_discrepancy;
+  };
+  EXPECT_FALSE(sought({.scale = 1.3}, {Pendulum::kSensorScale}));
+  EXPECT_TRUE(sought({.scale = 1.01}, {Pendulum::kSensorScale}));
+  EXPECT_TRUE(sought({}, {}));
+}
+
 // By the projection itself, in one dense system of all readings and all unknowns, priors as readings of their own.
 TEST(PendulumTest, WhatOfACurveNothingElseTakesOverIsTheRestOfAProjection) {
   TruePendulum truth;
