@@ -123,8 +123,8 @@ TEST(PendulumTest, NoCurveIsSoughtWhereOneEffectIsFarMore) {
     EXPECT_EQ(search.best().set, named);
     return search.visited().at({}).at->with_discrepancy;
   };
-  EXPECT_FALSE(sought({.scale = 1.3}, {Pendulum::kSensorScale}));
-  EXPECT_TRUE(sought({.scale = 1.01}, {Pendulum::kSensorScale}));
+  EXPECT_FALSE(sought({.dry_friction = 0.6}, {Pendulum::kDryFriction}));
+  EXPECT_TRUE(sought({.scale = 1.1}, {Pendulum::kSensorScale}));
   EXPECT_TRUE(sought({}, {}));
 }
 
