@@ -156,9 +156,9 @@ Fit fit(const Likelihood& likelihood, const Layout& layout, const Eigen::VectorX
 // what its readings are without derivatives; null: outside the model's domain. Where the linear model promises too
 // much, by steps along geodesics.
 using CurveAt = std::function<std::shared_ptr<const CurveColumns>(const Fit&, bool derivatives)>;
-// The same columns everywhere; they are not kept.
-CurveAt everywhere(const CurveColumns& curve);
 Fit fit_from(const Likelihood& likelihood, Fit begin, const CurveAt& curve_at, const FitRules& rules = {});
+// The same columns everywhere; not copied: they have to last as long.
+CurveAt everywhere(const CurveColumns& curve);
 
 // Squared whitened residuals and priors' pulls at a fit's unknowns, as Fit::cost; infinite outside the model's domain.
 double cost_at(const Likelihood& likelihood, const Fit& fit, const CurveColumns& curve);

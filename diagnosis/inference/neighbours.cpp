@@ -8,7 +8,6 @@
 #include "diagnosis/inference/error_spread.hpp"
 #include "diagnosis/inference/local_minima.hpp"
 #include "diagnosis/inference/search.hpp"
-#include "diagnosis/parallel.hpp"
 
 namespace bevel::inference {
 
@@ -189,13 +188,7 @@ bool Search::one_effect_is_more_than_a_curve() {
   std::vector<Job> jobs;
   for (const Proposal& one : list | std::views::take(rules_.at_once))
     if (!one.starts.empty()) jobs.push_back(job_from(base, one.effect, one.starts.front()));
-  std::vector<std::optional<Evaluated>> results(jobs.size());
-  parallel_for(jobs.size(), [&](std::size_t i) {
-    const Job& job = jobs[i];
-    results[i] = evaluate(*likelihood_, job.layout, job.shared, job.local, job.nuisance_sd);
-  });
-  for (std::size_t i = 0; i < jobs.size(); ++i)
-    if (results[i]->valid) keep(jobs[i].set, std::make_shared<const Evaluated>(*std::move(results[i])));
+  evaluate_without_curve(jobs, -std::numeric_limits<double>::infinity());
   const auto curves = discrepancy_->scan(base_marginal());
   const double promised = curves.empty() ? 0 : std::max(0.0, curves.front().log_bayes_factor);
   if (visited_.at({}).log_posterior() + kMostOfPromise * promised < hopeless_below()) return true;

@@ -169,18 +169,24 @@ void Search::drop_repeated(std::vector<Job>& jobs) const {
   jobs = std::move(out);
 }
 
+std::vector<std::shared_ptr<Evaluated>> Search::evaluate_without_curve(const std::vector<Job>& jobs,
+                                                                       double give_up_below) {
+  std::vector<std::shared_ptr<Evaluated>> out(jobs.size());
+  parallel_for(jobs.size(), [&](std::size_t i) {
+    const Job& job = jobs[i];
+    out[i] = std::make_shared<Evaluated>(
+        evaluate(*likelihood_, job.layout, job.shared, job.local, job.nuisance_sd, give_up_below - log_prior(job.set)));
+  });
+  for (std::size_t i = 0; i < jobs.size(); ++i)
+    if (out[i]->valid) keep(jobs[i].set, out[i]);
+  return out;
+}
+
 void Search::evaluate_all(std::vector<Job> jobs) {
   drop_repeated(jobs);
   fits_ += jobs.size();
-  std::vector<std::shared_ptr<Evaluated>> results(jobs.size());
+  const auto results = evaluate_without_curve(jobs, hopeless_below());
   const auto hopeless = [&](const Job& job) { return hopeless_below() - log_prior(job.set); };
-  parallel_for(jobs.size(), [&](std::size_t i) {
-    const Job& job = jobs[i];
-    results[i] = std::make_shared<Evaluated>(
-        evaluate(*likelihood_, job.layout, job.shared, job.local, job.nuisance_sd, hopeless(job)));
-  });
-  for (std::size_t i = 0; i < jobs.size(); ++i)
-    if (results[i]->valid) keep(jobs[i].set, results[i]);
   // Those that still end in one mode are asked for a discrepancy once, the likeliest of them; what was promised beside
   // one, only while that is near to what has been found since.
   const double best = best_log();
@@ -273,7 +279,7 @@ void Search::look_in_rounds(std::shared_ptr<const Likelihood> reference, Start& 
     if (!known.empty()) evaluate_all(std::move(known));
     known.clear();
     // What is far too much for a curve need not be taken up by one first: by the noise beside it the search begins.
-    if (anew && one_effect_is_more_than_a_curve()) {
+    if (anew && round + 1 < rules_.rounds && one_effect_is_more_than_a_curve()) {
       anew = false;
       nothing_is_hopeless_ = true;
       reference = without_inputs(*likeliest_fit().likelihood);

@@ -111,6 +111,8 @@ class Search {
   std::vector<Job> swaps(const Fit& fit, double log_here);
   void keep(const ModelSet& set, const std::shared_ptr<const Evaluated>& at);
   void drop_repeated(std::vector<Job>& jobs) const;
+  // Without a curve, all kept that are valid; what comes to a lower log posterior is left as it is.
+  std::vector<std::shared_ptr<Evaluated>> evaluate_without_curve(const std::vector<Job>& jobs, double give_up_below);
   void evaluate_all(std::vector<Job> jobs);
   static Job job_at(const Fit& fit);
   // A job that is begun from a fit with a curve asks for one, too, and begins with a large one from there.
