@@ -34,6 +34,17 @@ constexpr int kWaypoints = 10;      // from one effect to another
 // What an instant has to bring in a recording to be taken for one, in chi2: its expected odds.
 double instant_cost(double duration_s) { return 2 * std::log(kHappensNot / kHappens * duration_s / kInstantWidth_s); }
 
+// The cost of a fit, its instants' with it.
+double cost_with_instants(const Fit& fit) {
+  double sum = fit.cost;
+  for (std::size_t i = 0; i < fit.layout.local().size(); ++i) {
+    if (!fit.layout.is_instant(i)) continue;
+    for (std::size_t r = 0; r < fit.local.size(); ++r)
+      if (fit.local[r][static_cast<Index>(i)] > 0) sum += instant_cost(fit.layout.upper(i, r));
+  }
+  return sum;
+}
+
 // Just before the readings that are least expected from those before them, the worst first: with autocorrelated noise
 // any wrong instant costs two such jumps, wherever it is, and a grid goes past the one that costs none.
 std::vector<double> before_jumps(const SeriesSet& data, const VectorXd& white, double frame_s) {
@@ -51,10 +62,12 @@ std::vector<double> before_jumps(const SeriesSet& data, const VectorXd& white, d
   return out;
 }
 
-// Every phase and instant of the recordings from first to last at the best of a grid, all else as it is; an instant
-// also where the readings jump if it did not happen.
-void scan_local(const Likelihood& likelihood, const Layout& layout, const VectorXd& shared,
-                std::vector<VectorXd>& local, std::size_t first, std::size_t last) {
+// A fit's phases and instants in the recordings from first to last, each at the best of a grid, all else as it is; an
+// instant also where the readings jump if it did not happen. As if there were no curve: it may have taken up what they
+// are to explain.
+std::vector<VectorXd> scanned_local(const Likelihood& likelihood, const Fit& fit, std::size_t first, std::size_t last) {
+  const Layout& layout = fit.layout;
+  std::vector<VectorXd> local = fit.local;
   for (std::size_t i = 0; i < layout.local().size(); ++i) {
     if (!layout.is_scanned(i)) continue;
     const bool instant = layout.is_instant(i);
@@ -67,7 +80,7 @@ void scan_local(const Likelihood& likelihood, const Layout& layout, const Vector
       VectorXd trial = local[r];
       const auto cost_at = [&](double value) {
         trial[at] = value;
-        if (!likelihood.evaluate(layout, r, shared, trial, false, residuals))
+        if (!likelihood.evaluate(layout, r, fit.shared, trial, false, residuals))
           return std::numeric_limits<double>::infinity();
         return residuals.white.squaredNorm() + (instant && value > 0 ? cost : 0);
       };
@@ -96,6 +109,15 @@ void scan_local(const Likelihood& likelihood, const Layout& layout, const Vector
       local[r][at] = best;
     });
   }
+  return local;
+}
+
+// The fit from there. Not valid where nothing is found elsewhere.
+Fit scanned(const Likelihood& likelihood, const CurveColumns& curve, const Fit& from, std::size_t first,
+            std::size_t last) {
+  const auto local = scanned_local(likelihood, from, first, last);
+  if (local == from.local) return Fit(from.layout);
+  return fit(likelihood, from.layout, from.shared, local, from.scales, curve);
 }
 
 }  // namespace
@@ -116,13 +138,9 @@ bool has_many_minima(const Parameter& parameter) {
 
 void scan_locals(const Likelihood& likelihood, const CurveColumns& curve, Fit& fitted) {
   for (int scan = 0; scan < kScans && has_scanned(fitted.layout); ++scan) {
-    auto scanned = fitted.local;
-    scan_local(likelihood, fitted.layout, fitted.shared, scanned, 0, scanned.size());
-    if (scanned == fitted.local) return;
-    Fit again = fit(likelihood, fitted.layout, fitted.shared, scanned, fitted.scales, curve);
-    const bool better = again.valid && again.cost < fitted.cost;
-    if (again.valid) fitted = std::move(again);
-    if (!better) return;
+    Fit again = scanned(likelihood, curve, fitted, 0, fitted.local.size());
+    if (!again.valid || !(cost_with_instants(again) < cost_with_instants(fitted))) return;
+    fitted = std::move(again);
   }
 }
 
@@ -156,15 +174,9 @@ void doubt_instants(const Likelihood& likelihood, const CurveColumns& curve, Fit
       local[r][static_cast<Index>(i)] = 0;
       Fit without = fit(likelihood, layout, fitted.shared, local, fitted.scales, curve);
       if (!without.valid) continue;
-      scan_local(likelihood, layout, without.shared, without.local, r, r + 1);
-      Fit again = fit(likelihood, layout, without.shared, without.local, fitted.scales, curve);
-      const auto happened = [&](const Fit& f) {
-        return std::count_if(f.local.begin(), f.local.end(),
-                             [&](const VectorXd& l) { return l[static_cast<Index>(i)] > 0; });
-      };
-      if (again.valid && again.cost + cost * static_cast<double>(happened(again)) <
-                             fitted.cost + cost * static_cast<double>(happened(fitted)))
-        fitted = std::move(again), blocks.clear();
+      Fit again = scanned(likelihood, curve, without, r, r + 1);
+      if (!again.valid) again = std::move(without);  // nor is it anywhere else
+      if (cost_with_instants(again) < cost_with_instants(fitted)) fitted = std::move(again), blocks.clear();
     }
   }
 }

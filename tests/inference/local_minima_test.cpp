@@ -15,7 +15,7 @@ using Eigen::MatrixXd;
 using Eigen::VectorXd;
 
 // y = level + size from an instant on, in slowly wandering noise.
-class Step final : public testing::HeldSystem {
+class Step : public testing::HeldSystem {
  public:
   static constexpr double kAt_s = 3.29, kSize = 1, kSigma = 0.15, kAr1 = 0.99, kFrame_s = 1.0 / 30;
   explicit Step(unsigned seed) {
@@ -63,14 +63,18 @@ class Step final : public testing::HeldSystem {
   MatrixXd by_curves(std::size_t, const VectorXd&) const override { return {}; }
 };
 
+Noise noise_of_step() {
+  Noise noise;
+  noise.sigma = {Step::kSigma};
+  noise.ar1 = Step::kAr1;
+  noise.frame_s = Step::kFrame_s;
+  return noise;
+}
+
 TEST(Instants, AreFoundWhereReadingsJumpInNoiseThatWanders) {
   for (unsigned seed = 1; seed <= 20; ++seed) {
     const Step system(seed);
-    Noise noise;
-    noise.sigma = {Step::kSigma};
-    noise.ar1 = Step::kAr1;
-    noise.frame_s = Step::kFrame_s;
-    const Likelihood likelihood(system, Readings(1), noise);
+    const Likelihood likelihood(system, Readings(1), noise_of_step());
     const Layout layout(system, {0});
     // From where another recording's fit put it: a wrong instant costs two jumps, wherever it is.
     for (const double from_s : {0.0, 4.0}) {
@@ -80,6 +84,55 @@ TEST(Instants, AreFoundWhereReadingsJumpInNoiseThatWanders) {
       scan_locals(likelihood, {}, there);
       EXPECT_NEAR(there.local[0][0], Step::kAt_s, Step::kFrame_s) << "seed " << seed << ", from " << from_s << " s";
     }
+  }
+}
+
+// The same with a hump of 5 from 6 to 7 s that is no step: a curve over time, with a value every half second.
+class StepBesideAHump final : public Step {
+ public:
+  static constexpr int kValues = 19;
+  explicit StepBesideAHump(unsigned seed) : Step(seed) {
+    Curve curve{.component = "reading", .unit = "mm", .covariate = "time_s", .at = {}};
+    for (int i = 0; i < kValues; ++i) curve.at.push_back(0.5 * i);
+    curves_ = {curve};
+    Series& series = data_.recordings[0].series[0];
+    const VectorXd hump = hats() * hump_values();
+    for (std::size_t i = 0; i < series.measured.size(); ++i) series.measured[i] += hump[static_cast<Index>(i)];
+  }
+  static VectorXd hump_values() {
+    VectorXd out = VectorXd::Zero(kValues);
+    out.segment(12, 3).setConstant(5);
+    return out;
+  }
+  MatrixXd hats() const {
+    const auto& times = data_.recordings[0].series[0].time_s;
+    MatrixXd out(static_cast<Index>(times.size()), kValues);
+    for (Index i = 0; i < out.rows(); ++i)
+      for (Index k = 0; k < kValues; ++k)
+        out(i, k) =
+            std::max(0.0, 1 - std::abs(times[static_cast<std::size_t>(i)] - 0.5 * static_cast<double>(k)) / 0.5);
+    return out;
+  }
+  MatrixXd by_curves(std::size_t, const VectorXd&) const override { return hats(); }
+};
+
+// A scan sees no curve: what the curve explains is not for the instants to explain.
+TEST(Instants, StayWhereTheyAreLikelierBesideACurve) {
+  for (unsigned seed = 1; seed <= 5; ++seed) {
+    const StepBesideAHump system(seed);
+    const Likelihood likelihood(system, Readings(1), noise_of_step());
+    CurveColumns curve;
+    curve.raw = {system.hats()};
+    curve.columns = {likelihood.whitened(0, system.hats())};
+    curve.covariance = 25 * MatrixXd::Identity(StepBesideAHump::kValues, StepBesideAHump::kValues);
+    const Layout layout(system, {0});
+    const Scales scales{.nuisance_sd = VectorXd::Zero(0), .curves = {{.curve = 0, .scale = 1, .length = 1}}};
+    Fit there = fit(likelihood, layout, VectorXd{{0, Step::kSize}}, {VectorXd::Constant(1, Step::kAt_s)}, scales, curve,
+                    {.fixed = {0, 1}});
+    ASSERT_TRUE(there.valid);
+    scan_locals(likelihood, curve, there);
+    EXPECT_NEAR(there.local[0][0], Step::kAt_s, 2 * Step::kFrame_s) << "seed " << seed;
+    EXPECT_NEAR(there.curve_values[13], 5, 1) << "seed " << seed;
   }
 }
 
