@@ -161,9 +161,11 @@ std::vector<Marginal::Added> Discrepancy::added(const Marginal& beside) const {
       }
       across[k] += part.across.middleRows(first, size);
       out[k].pull += part.pull.segment(first, size);
-      // The columns' own products were made once, for all sets.
-      out[k].square += square_[r].block(0, first, size, size).cast<double>() -
-                       part.own.middleRows(first, size) * part.by_own.middleRows(first, size).transpose();
+      // The columns' own products were made once, for all sets in which rows have no weight.
+      out[k].square += part.weight != nullptr
+                           ? part.square(white_[r], first, size)
+                           : square_[r].block(0, first, size, size).cast<double>() -
+                                 part.own.middleRows(first, size) * part.by_own.middleRows(first, size).transpose();
     }
   }
   for (std::size_t k = 0; k < first_.size(); ++k) {

@@ -55,6 +55,11 @@ MatrixXd Marginal::Part::square(const MatrixXf& X, Index first, Index size) cons
          own.middleRows(first, size) * by_own.middleRows(first, size).transpose();
 }
 
+VectorXd Marginal::Part::squares(const MatrixXf& X) const {
+  const MatrixXf weighted = weight != nullptr ? MatrixXf(weight->asDiagonal() * X) : X;
+  return weighted.colwise().squaredNorm().transpose().cast<double>() - own.cwiseProduct(by_own).rowwise().sum();
+}
+
 Marginal::Part Marginal::part(std::size_t r, const MatrixXf& X) const {
   const MatrixXd products = (X.transpose() * LZ_[r]).cast<double>();
   const Index count = inner_[r].rows();

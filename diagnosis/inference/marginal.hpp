@@ -28,8 +28,9 @@ class Marginal {
     Eigen::MatrixXd across;                   // X'MZ
     Eigen::VectorXd pull;                     // X'Mw
     const Eigen::VectorXf* weight = nullptr;  // of the rows; null: one
-    // X'MX of columns [first, first + size).
+    // X'MX of columns [first, first + size); its diagonal for all of them.
     Eigen::MatrixXd square(const Eigen::MatrixXf& X, Eigen::Index first, Eigen::Index size) const;
+    Eigen::VectorXd squares(const Eigen::MatrixXf& X) const;
   };
   Part part(std::size_t recording, const Eigen::MatrixXf& X) const;
 

@@ -279,9 +279,7 @@ Proposal Proposals::judge_local(const Candidate& candidate, std::size_t e, const
     const MatrixXf& X = candidate.columns[r];
     const Marginal::Part part = beside.part(r, X);
     pull[r] = part.pull - part.across * beside.step();
-    square[r] = X.colwise().squaredNorm().transpose().cast<double>();
-    square[r] -= (part.own.cwiseProduct(part.by_own).rowwise().sum() +
-                  (part.across * beside.covariance()).cwiseProduct(part.across).rowwise().sum());
+    square[r] = part.squares(X) - (part.across * beside.covariance()).cwiseProduct(part.across).rowwise().sum();
     square[r] = square[r].cwiseMax(0);
   }
   Proposal out{.effect = e, .starts = {}};

@@ -96,6 +96,12 @@ TEST(Evidence, WhatASetLeavesOpenCountsInColumnsBesideIt) {
   const VectorXd weighed = covariance.llt().solve(step.replicate(4, 1));
   EXPECT_NEAR(added.square(0, 0), weighed.dot(step.replicate(4, 1).col(0)), 1e-3 * added.square(0, 0));
   EXPECT_NEAR(added.pull[0], weighed.dot(all_readings(system)), 1e-3 * std::sqrt(added.square(0, 0)));
+  // So it is of curves.
+  const Discrepancy discrepancy(*reference, at);
+  const std::vector<Eigen::MatrixXf> of_curve(4, reference->whitened(0, system.by_curves(0, {})).cast<float>());
+  const Marginal beside(*own, at, {}, reference.get());
+  const MatrixXd expected = beside.added(of_curve).square;
+  EXPECT_LT((discrepancy.added(beside)[0].square - expected).norm(), 1e-3 * expected.norm());
   // And it matters: without, the readings that are open would count like the others.
   const auto blind = Marginal(*reference, at, {}).added(columns);
   EXPECT_GT(std::abs(blind.square(0, 0) / added.square(0, 0) - 1), 0.1);
