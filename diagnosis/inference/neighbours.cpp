@@ -11,6 +11,51 @@
 
 namespace bevel::inference {
 
+using Eigen::Index;
+
+Search::Job Search::job_at(const Fit& fit) {
+  return {.set = fit.layout.set(),
+          .layout = fit.layout,
+          .shared = fit.shared,
+          .local = fit.local,
+          .nuisance_sd = fit.scales.nuisance_sd};
+}
+
+void Search::ask_for_curve_of(const Fit& fit, Job& job) const {
+  // What is left without the curve may pass for noise: that is not where to begin.
+  ask_for_curve_of(fit, std::make_shared<const Likelihood>(*fit.likelihood, fit.likelihood->noise()), job);
+}
+
+void Search::ask_for_curve_of(const Fit& fit, std::shared_ptr<const Likelihood> by, Job& job) const {
+  job.beside_curve = !fit.scales.curves.empty();
+  if (!fit.tangent) return;
+  Fit from = with_first_curve(*discrepancy_, carried_to(job.layout, fit));
+  from.shared = job.shared;
+  from.local = job.local;
+  from.scales.nuisance_sd = job.nuisance_sd;
+  from.likelihood = std::move(by);
+  job.large_curve = std::make_shared<const Fit>(std::move(from));
+}
+
+Search::Job Search::job_from(const Fit& fit, std::size_t effect, const StartPoint& start) const {
+  Job job = job_at(carried_to(Layout(system_, with(fit.layout.set(), effect)), fit));
+  if (start.beside.size() > 0) job.shared = job.layout.shared_from(fit.layout, start.beside);
+  if (start.base_at_prior) job.shared = with_base_at_prior(job.layout, std::move(job.shared));
+  const auto member = static_cast<std::size_t>(std::find(job.set.begin(), job.set.end(), effect) - job.set.begin());
+  const auto& parameters = system_.effects()[effect].parameters;
+  for (std::size_t r = 0; r < fit.local.size(); ++r) {
+    Index shared = 0, local = 0;
+    for (std::size_t p = 0; p < parameters.size(); ++p) {
+      if (parameters[p].scope == Scope::shared) {
+        job.shared[job.layout.find_shared(member, p)] = start.shared[shared++];
+      } else if (r < start.local.size()) {
+        job.local[r][job.layout.find_local(member, p)] = start.local[r][local++];
+      }
+    }
+  }
+  return job;
+}
+
 // Beside a fit, with its curve if it has one, and beside the same with less spread.
 std::vector<Search::Beside> Search::look_beside(const Fit& fit, double log_here, bool with_others_moved) const {
   const auto by = with_inputs_of(fit, likelihood_);
@@ -182,18 +227,19 @@ void Search::expand(const ModelSet& set) {
   evaluate_all(std::move(jobs));
 }
 
-bool Search::one_effect_is_more_than_a_curve() {
-  const Fit& base = visited_.at({}).at->fit;
+void Search::look_at_foremost_effects() {
+  const Fit base = visited_.at({}).at->fit;
   const auto list = Proposals(*likelihood_, base).beside(base_marginal(), 1);
   std::vector<Job> jobs;
   for (const Proposal& one : list | std::views::take(rules_.at_once))
     if (!one.starts.empty()) jobs.push_back(job_from(base, one.effect, one.starts.front()));
   evaluate_without_curve(jobs, -std::numeric_limits<double>::infinity());
+}
+
+bool Search::is_nothing_hopeless_with_a_curve() const {
   const auto curves = discrepancy_->scan(base_marginal());
   const double promised = curves.empty() ? 0 : std::max(0.0, curves.front().log_bayes_factor);
-  if (visited_.at({}).log_posterior() + kMostOfPromise * promised < hopeless_below()) return true;
-  std::erase_if(visited_, [](const auto& one) { return !one.first.empty(); });
-  return false;
+  return visited_.at({}).log_posterior() + kMostOfPromise * promised < hopeless_below();
 }
 
 // Each member's place taken by another effect, with all else where it is: what two have in common is far from where the

@@ -28,10 +28,9 @@ bool near(const Noise& a, const Noise& b) {
   return std::abs(a.ar1 - b.ar1) < kCorrelation && (a.tails.degrees > 0) == (b.tails.degrees > 0);
 }
 
-using Eigen::Index;
-using Eigen::VectorXd;
-
 }  // namespace
+
+using Eigen::VectorXd;
 
 Search::Search(const System& system, const SearchRules& rules) : system_(system), rules_(rules) {
   std::set<std::string> names;
@@ -76,45 +75,6 @@ double Search::log_not_visited() const {
   for (const auto& [set, log] : promised_)
     if (!is_visited(set)) logs.push_back(log);
   return log_sum(logs);
-}
-
-Search::Job Search::job_at(const Fit& fit) {
-  return {.set = fit.layout.set(),
-          .layout = fit.layout,
-          .shared = fit.shared,
-          .local = fit.local,
-          .nuisance_sd = fit.scales.nuisance_sd};
-}
-
-void Search::ask_for_curve_of(const Fit& fit, Job& job) const {
-  job.beside_curve = !fit.scales.curves.empty();
-  if (!fit.tangent) return;
-  Fit from = with_first_curve(*discrepancy_, carried_to(job.layout, fit));
-  from.shared = job.shared;
-  from.local = job.local;
-  from.scales.nuisance_sd = job.nuisance_sd;
-  // What is left without the curve may pass for noise: that is not where to begin.
-  from.likelihood = std::make_shared<const Likelihood>(*fit.likelihood, fit.likelihood->noise());
-  job.large_curve = std::make_shared<const Fit>(std::move(from));
-}
-
-Search::Job Search::job_from(const Fit& fit, std::size_t effect, const StartPoint& start) const {
-  Job job = job_at(carried_to(Layout(system_, with(fit.layout.set(), effect)), fit));
-  if (start.beside.size() > 0) job.shared = job.layout.shared_from(fit.layout, start.beside);
-  if (start.base_at_prior) job.shared = with_base_at_prior(job.layout, std::move(job.shared));
-  const auto member = static_cast<std::size_t>(std::find(job.set.begin(), job.set.end(), effect) - job.set.begin());
-  const auto& parameters = system_.effects()[effect].parameters;
-  for (std::size_t r = 0; r < fit.local.size(); ++r) {
-    Index shared = 0, local = 0;
-    for (std::size_t p = 0; p < parameters.size(); ++p) {
-      if (parameters[p].scope == Scope::shared) {
-        job.shared[job.layout.find_shared(member, p)] = start.shared[shared++];
-      } else if (r < start.local.size()) {
-        job.local[r][job.layout.find_local(member, p)] = start.local[r][local++];
-      }
-    }
-  }
-  return job;
 }
 
 Visited Search::weighed(const ModelSet& set, double log_prior, const std::shared_ptr<const Evaluated>& at) const {
@@ -248,7 +208,7 @@ void Search::run(const Readings& outliers, const Noise& noise, const Progress& p
     for (const auto& [set, one] : visited_) {
       if (set.empty() || one.log_posterior() < best - rules_.curve_window) continue;
       jobs.push_back(job_at(one.likelier_fit()));
-      ask_for_curve_of(one.likelier_fit(), jobs.back());
+      ask_for_curve_of(one.likelier_fit(), heavy, jobs.back());
     }
     visited_.clear();
     fits_ = 0;
@@ -278,12 +238,10 @@ void Search::look_in_rounds(std::shared_ptr<const Likelihood> reference, Start& 
     keep({}, std::make_shared<const Evaluated>(base));
     if (!known.empty()) evaluate_all(std::move(known));
     known.clear();
-    // What is far too much for a curve need not be taken up by one first: by the noise beside it the search begins.
-    if (anew && round + 1 < rules_.rounds && one_effect_is_more_than_a_curve()) {
-      anew = false;
-      nothing_is_hopeless_ = true;
-      reference = without_inputs(*likeliest_fit().likelihood);
-      continue;
+    // What is far too much for a curve need not be taken up by one first.
+    if (anew) {
+      look_at_foremost_effects();
+      nothing_is_hopeless_ = is_nothing_hopeless_with_a_curve();
     }
     if (!nothing_is_hopeless_ && (!visited_.at({}).at->with_discrepancy || !is_hopeless({}))) {
       add_discrepancy(*likelihood_, *discrepancy_, curve_rules_, base,
@@ -293,11 +251,11 @@ void Search::look_in_rounds(std::shared_ptr<const Likelihood> reference, Start& 
     }
     start = {.shared = base.fit.shared, .local = base.fit.local, .nuisance_sd = base.fit.scales.nuisance_sd};
     if (anew) {
-      // A curve takes up most of what is missing: the noise beside it is nearer to the truth.
-      likelihood_ = reference = without_inputs(*(base.fit_with_curve ? *base.fit_with_curve : base.fit).likelihood);
+      // An effect or a curve takes up most of what is missing: the noise beside it is nearer to the truth.
+      likelihood_ = reference = without_inputs(*likeliest_fit().likelihood);
       discrepancy_ = std::make_unique<const Discrepancy>(*likelihood_, base.fit);
     }
-    const Fit about = anew ? base.fit : likeliest_fit();
+    const Fit about = anew && best().set.empty() ? base.fit : likeliest_fit();
     anew = false;
     proposals_ = std::make_unique<const Proposals>(*likelihood_, about);
     keep({}, std::make_shared<const Evaluated>(base));

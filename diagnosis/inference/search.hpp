@@ -117,6 +117,7 @@ class Search {
   static Job job_at(const Fit& fit);
   // A job that is begun from a fit with a curve asks for one, too, and begins with a large one from there.
   void ask_for_curve_of(const Fit& fit, Job& job) const;
+  void ask_for_curve_of(const Fit& fit, std::shared_ptr<const Likelihood> by, Job& job) const;
   // Beside a set whose discrepancy is large, the likeliest curve of every component.
   void look_at_every_component(const ModelSet& set);
   Job job_from(const Fit& fit, std::size_t effect, const StartPoint& start) const;
@@ -136,9 +137,10 @@ class Search {
   // Of a set that is visited: so far below the likeliest that no curve is sought beside it any more.
   bool is_hopeless(const ModelSet& set) const;
   double hopeless_below() const;
-  // Whether one of the foremost effects beside nothing leaves that hopeless with all that is promised of a curve; else
-  // they are as if not looked at.
-  bool one_effect_is_more_than_a_curve();
+  // Each alone and without a curve, before any is sought.
+  void look_at_foremost_effects();
+  // Whether nothing stays hopeless with all that is promised of a curve.
+  bool is_nothing_hopeless_with_a_curve() const;
   // Whether promises that were made by this noise are not worth much by that of what was found since.
   bool noise_has_moved() const;
   // Ends where the noise has moved, unless in the last round.
