@@ -13,16 +13,22 @@ using Eigen::VectorXd;
 
 namespace {
 
+constexpr double kNever = -std::numeric_limits<double>::infinity();
+
+// By how much one log evidence is more than another; where there is none of either, it never is.
+double log_change(double to, double from) { return std::isfinite(from) ? to - from : kNever; }
+
 // Log evidence of a fit's linear model with these standard deviations, but for what does not depend on them.
 double log_with_spread(const Fit& fit, const CurveColumns& curve, const VectorXd& nuisance_sd,
                        std::vector<ArrowBlock>& blocks) {
   const ArrowSolution solution = solve_at(nuisance_sd, fit, blocks, curve, std::vector<Index>{});
-  return -0.5 * (solution.least + solution.log_volume_ratio);
+  return solution.valid ? -0.5 * (solution.least + solution.log_volume_ratio) : kNever;
 }
 
 // The same about a fit's mode, by the nonlinear model's cost there.
 double log_about_mode(const Fit& fit, const CurveColumns& curve, const std::vector<ArrowBlock>& blocks) {
-  return -0.5 * (fit.cost + solve_about(fit, blocks, curve).log_volume_ratio);
+  const ArrowSolution solution = solve_about(fit, blocks, curve, std::vector<Index>{});
+  return solution.valid ? -0.5 * (fit.cost + solution.log_volume_ratio) : kNever;
 }
 
 }  // namespace
@@ -40,7 +46,8 @@ std::vector<WithLessSpread> with_less_spread(const Likelihood& likelihood, const
   for (const VectorXd& less : all) {
     WithLessSpread one{.fit = fit};
     one.fit.scales.nuisance_sd = less;
-    one.log_change = log_with_spread(fit, curve, less, blocks) + log_prior_of_spread(likelihood.system(), less) - here;
+    one.log_change =
+        log_change(log_with_spread(fit, curve, less, blocks) + log_prior_of_spread(likelihood.system(), less), here);
     out.push_back(std::move(one));
   }
   return out;
@@ -50,12 +57,12 @@ WithLessSpread at_its_mode(const WithLessSpread& less, const Fit& fit, const Cur
   const Likelihood& likelihood = *fit.likelihood;
   const auto log_about = [&](const Fit& at) {
     const auto blocks = linearise(likelihood, at, curve);
-    if (!at.valid || blocks.empty()) return -std::numeric_limits<double>::infinity();
+    if (!at.valid || blocks.empty()) return kNever;
     return log_about_mode(at, curve, blocks) + log_prior_of_spread(likelihood.system(), at.scales.nuisance_sd);
   };
   WithLessSpread out{.fit = inference::fit(likelihood, fit.layout, fit.shared, fit.local, less.fit.scales, curve)};
   out.fit.likelihood = fit.likelihood;
-  out.log_change = log_about(out.fit) - log_about(fit);
+  out.log_change = log_change(log_about(out.fit), log_about(fit));
   return out;
 }
 
@@ -67,12 +74,12 @@ Moved moved_to(const std::shared_ptr<const Likelihood>& likelihood, const Fit& f
   out.fit.likelihood = likelihood;
   if (!out.fit.valid) return out;
   const auto log_evidence = [](const Fit& at, const CurveColumns& curve, const std::vector<ArrowBlock>& blocks) {
-    if (blocks.empty()) return -std::numeric_limits<double>::infinity();
+    if (blocks.empty()) return kNever;
     return at.likelihood->log_weights() + log_about_mode(at, curve, blocks);
   };
   const auto here = linearise(*from.likelihood, from, curve_by_own);
   const auto there = linearise(*likelihood, out.fit, curve_by_this);
-  out.log_change = log_evidence(out.fit, curve_by_this, there) - log_evidence(from, curve_by_own, here);
+  out.log_change = log_change(log_evidence(out.fit, curve_by_this, there), log_evidence(from, curve_by_own, here));
   // By both noises where the fit is: what another place says more or less is not the noise's.
   const auto information = [&](const std::vector<ArrowBlock>& blocks) {
     VectorXd sum = VectorXd::Zero(from.shared.size());

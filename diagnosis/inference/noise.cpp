@@ -22,10 +22,11 @@ struct Whitened {
 };
 
 Whitened project(const Series& series, const Eigen::VectorXd& error, const Eigen::MatrixXd& basis, const Noise& noise) {
+  Whitened out;
+  if (basis.rows() <= basis.cols()) return out;  // the curve goes through all of them: they say nothing of the noise
   const Whitening whitening = make_whitening(series, noise, 1.0);
   Eigen::VectorXd e = error;
   whiten(whitening, e);
-  Whitened out;
   out.dof = static_cast<double>(e.size());
   for (double weight : whitening.weight) out.log_terms -= 2 * std::log(weight);
   Eigen::MatrixXd X = basis;

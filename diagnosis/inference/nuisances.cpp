@@ -28,7 +28,7 @@ MatrixXd shared_covariance(const Fit& fit, std::vector<ArrowBlock> blocks, const
   MatrixXd sum = MatrixXd::Zero(n, n);
   double all = 0;
   for (Index k = 0; k < weights.size(); ++k) {
-    if (weights[k] < kNegligible) continue;
+    if (weights[k] < kNegligible * weights.maxCoeff()) continue;
     const ArrowSolution solution = solve_at(grid.standard_deviations.col(k), fit, blocks, curve);
     if (!solution.valid) continue;
     const VectorXd away = solution.shared.head(n);
@@ -46,7 +46,7 @@ std::vector<std::vector<Mixture>> nuisance_posterior(const Fit& fit, std::vector
   std::vector<std::vector<Mixture>> out(fit.local.size(), std::vector<Mixture>(count));
   const NuisanceGrid grid = nuisance_grid(system);
   for (Index k = 0; k < weights.size(); ++k) {
-    if (weights[k] < kNegligible) continue;
+    if (weights[k] < kNegligible * weights.maxCoeff()) continue;
     const ArrowSolution solution = solve_at(grid.standard_deviations.col(k), fit, blocks, curve);
     if (!solution.valid) continue;
     for (std::size_t r = 0; r < out.size(); ++r) {

@@ -73,13 +73,13 @@ Fit with_own_integrated(Fit now, const CurveAt& curve_at) {
   double total = now.cost + log_own_volume(blocks);
   std::vector<Index> all(static_cast<std::size_t>(now.shared.size()));
   for (std::size_t i = 0; i < all.size(); ++i) all[i] = static_cast<Index>(i);
-  for (int step = 0; step < kMostSteps; ++step) {
+  for (int step = 0;; ++step) {
     ArrowSolution about = solve_about(now, blocks, *curve);
     if (!about.valid) return now;
     now.own_volume = own_volume_about(now, *curve, blocks, about);
     for (std::size_t r = 0; r < blocks.size(); ++r) blocks[r].slope = now.own_volume->slope[r];
     about = solve_about(now, blocks, *curve);
-    if (!about.valid || now.cost - about.least < kSmallStep) return now;
+    if (!about.valid || now.cost - about.least < kSmallStep || step == kMostSteps) return now;
     double share = 1;
     bool gained = false;
     for (int halving = 0; halving < kHalvings && !gained; ++halving, share *= 0.5) {
@@ -100,7 +100,6 @@ Fit with_own_integrated(Fit now, const CurveAt& curve_at) {
     }
     if (!gained) return now;
   }
-  return now;
 }
 
 }  // namespace bevel::inference

@@ -157,7 +157,7 @@ Unknowns::Unknowns(const Search& search) : search_(&search) {
     if (blocks.empty()) return;
     std::optional<Part> first;  // the likelihood is followed once for all standard deviations
     for (Index k = 0; k < over.size(); ++k) {
-      if (weight * over[k] < kNegligible) continue;
+      if (weight * over[k] < kNegligible * over.maxCoeff()) continue;
       const VectorXd nuisance_sd = grid.standard_deviations.col(k);
       const ArrowSolution solution = solve_at(nuisance_sd, fit, blocks, curve);
       if (!solution.valid) continue;

@@ -85,7 +85,9 @@ GridEvidence over_nuisances(const Fit& fit, const CurveColumns& curve, const Nui
   for (Index i = 0; i < fit.shared.size(); ++i)
     if (fit.layout.shared()[static_cast<std::size_t>(i)].parameter->prior.form != Prior::Form::normal)
       not_normal.push_back(i);
-  const double here = solve_about(fit, blocks, curve, not_normal).least;
+  const ArrowSolution about = solve_about(fit, blocks, curve, std::vector<Index>{});
+  if (!about.valid) return out;
+  const double here = about.least;
   const Index start = column_of(likelihood.system(), fit.scales.nuisance_sd);
   VectorXd logs = over_likely(likelihood.system(), start, far_below, [&](Index k) {
     const ArrowSolution solution = solve_at(grid.standard_deviations.col(k), fit, blocks, curve, not_normal);
@@ -146,6 +148,7 @@ Settled settle(const Likelihood& likelihood, const Discrepancy* discrepancy, con
     if (pass == 0) scan_shapes(*now, curve, one.fit);
     one.fit.likelihood = now;
     one.over = over_nuisances(one.fit, curve, grid, kOnTheWay);
+    if (one.over.promised.size() == 0) break;  // no mode there
     // The linear model promised what is not there: back to the likeliest, and to what that promises next.
     const bool lost = spread_moved && one.over.log_here < best.over.log_here;
     const Index spread = column_of(likelihood.system(), scales.nuisance_sd);
