@@ -43,7 +43,8 @@ Checks check_model(const inference::Search& search, const ChosenModel& model, co
   // Noise and model were found on these same readings: the noise's own variance is in the band.
   const double sd = std::sqrt(4 / std::max(count, 1.0));
   out.band = {1 - kBandQuantile * sd, 1 + kBandQuantile * sd};
-  out.ljung_box_p = std::min(1.0, smallest_p * series_count);
+  // Series too short to be tested say nothing against it.
+  out.ljung_box_p = series_count > 0 ? std::min(1.0, smallest_p * series_count) : 1;
   out.clean = out.chi2_per_dof > out.band[0] && out.chi2_per_dof < out.band[1] && out.ljung_box_p > kChance;
   return out;
 }

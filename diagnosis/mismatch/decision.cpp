@@ -24,8 +24,8 @@ std::set<std::string> names_of(const Search& search, const ModelSet& set) {
 
 }  // namespace
 
-ChosenModel model_of(const Search& search, const Fit& fit, double log_posterior) {
-  ChosenModel out{.fit = &fit, .curve = curve_of(search, fit), .blocks = {}, .log_posterior = log_posterior};
+ChosenModel model_of(const Search& search, const Fit& fit) {
+  ChosenModel out{.fit = &fit, .curve = curve_of(search, fit), .blocks = {}};
   out.blocks = linearise(*fit.likelihood, fit, out.curve);
   out.discrepancy = values_by_curve(search.discrepancy(), fit.scales.curves, fit.curve_values);
   return out;
@@ -78,8 +78,7 @@ Decision decide(const Search& search, const Posterior& posterior) {
   out.verdict = unknown             ? Verdict::unknown_effect
                 : best->set.empty() ? Verdict::nothing_missing
                                     : Verdict::effects_found;
-  out.model = unknown ? model_of(search, *best->at->fit_with_curve, best->log_with_curve)
-                      : model_of(search, best->at->fit, best->log_without_curve);
+  out.model = model_of(search, unknown ? *best->at->fit_with_curve : best->at->fit);
   return out;
 }
 

@@ -22,7 +22,6 @@ struct ChosenModel {
   const inference::Fit* fit = nullptr;
   inference::CurveColumns curve;
   std::vector<inference::ArrowBlock> blocks;
-  double log_posterior = 0;
   std::vector<inference::CurveValues> discrepancy{};  // its curves; empty: none
 };
 
@@ -32,7 +31,7 @@ struct Decision {
 };
 Decision decide(const inference::Search& search, const inference::Posterior& posterior);
 // Any other fit, ready for the same uses.
-ChosenModel model_of(const inference::Search& search, const inference::Fit& fit, double log_posterior);
+ChosenModel model_of(const inference::Search& search, const inference::Fit& fit);
 
 // The needle alone, refitted by the noise and the variation that go with another model: what that model explains shows
 // in its residuals, and is neither noise nor variation.

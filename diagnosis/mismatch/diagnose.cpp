@@ -144,14 +144,14 @@ std::optional<NextExperiment> next_experiment(const inference::Search& search, c
     for (const auto& share : posterior.sets)
       if (!share.set.empty() && share.set != chosen) {
         const auto& fit = search.visited().at(share.set).at->fit;
-        return experiments.best(imagined(*decision.model.fit, decision.model), imagined(fit, model_of(search, fit, 0)));
+        return experiments.best(imagined(*decision.model.fit, decision.model), imagined(fit, model_of(search, fit)));
       }
     return experiments.best(imagined(*decision.model.fit, decision.model), imagined(*base.fit, base));
   }
   for (const auto& share : posterior.sets) {
     if (share.set == chosen) continue;
     const auto& fit = search.visited().at(share.set).at->fit;
-    const Imagined rival = imagined(fit, model_of(search, fit, 0));
+    const Imagined rival = imagined(fit, model_of(search, fit));
     const Imagined found = imagined(*decision.model.fit, decision.model);
     // Where nothing was found, the rival would have to be true to be seen.
     return chosen.empty() ? experiments.best(rival, found) : experiments.best(found, rival);
@@ -210,7 +210,7 @@ Findings diagnose(const RecordedCase& recorded, const model::NeedleParameters& m
   findings.noise = decision.model.fit->likelihood->noise();
   findings.noise.outlier_share = calibration.noise.outlier_share;
   const inference::Fit base_fit = refitted_base(search, *decision.model.fit);
-  const ChosenModel base = model_of(search, base_fit, 0);
+  const ChosenModel base = model_of(search, base_fit);
   findings.effects = found_effects(system, search, posterior, unknowns, decision.model);
   findings.discrepancies = discrepancies_of(system, search, decision.model);
   if (!findings.discrepancies.empty())
@@ -220,7 +220,7 @@ Findings diagnose(const RecordedCase& recorded, const model::NeedleParameters& m
   findings.insertions = insertions_of(system, search, decision.model);
   findings.needle = needle_estimate(system, search, decision.model);
   const inference::Fit& alone = search.visited().at({}).at->fit;
-  findings.base = needle_estimate(system, search, model_of(search, alone, 0));
+  findings.base = needle_estimate(system, search, model_of(search, alone));
   findings.tried = tried_beside(search, {});
   if (!decision.model.fit->layout.set().empty())
     findings.beside = tried_beside(search, decision.model.fit->layout.set());

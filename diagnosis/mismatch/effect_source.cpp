@@ -294,13 +294,18 @@ EffectSource effect_source(const ProposedForm& p) {
                                  {"name", name}})};
 }
 
-std::optional<EffectSource> proposed_effect(const Findings& findings) {
-  if (findings.verdict != Verdict::unknown_effect || findings.proposals.empty()) return std::nullopt;
+const ProposedForm* proposed_form(const Findings& findings) {
+  if (findings.verdict != Verdict::unknown_effect || findings.proposals.empty()) return nullptr;
   // Of the discrepancy that shows most: a small one beside it may follow its form as well.
   const auto rank = [&](const ProposedForm& one) {
     return std::pair(findings.discrepancies.at(one.discrepancy).visible_size, one.log_bayes_factor);
   };
-  return effect_source(*std::ranges::max_element(findings.proposals, {}, rank));
+  return &*std::ranges::max_element(findings.proposals, {}, rank);
+}
+
+std::optional<EffectSource> proposed_effect(const Findings& findings) {
+  const ProposedForm* form = proposed_form(findings);
+  return form ? std::optional(effect_source(*form)) : std::nullopt;
 }
 
 }  // namespace bevel::diagnosis

@@ -15,7 +15,9 @@ struct EffectSource {
 
 EffectSource effect_source(const ProposedForm& proposal);
 
-// Of the likeliest proposal, where the verdict is unknown-effect. Nothing otherwise.
+// The likeliest proposal for the discrepancy that shows most, where the verdict is unknown-effect; null otherwise. And
+// its source.
+const ProposedForm* proposed_form(const Findings& findings);
 std::optional<EffectSource> proposed_effect(const Findings& findings);
 
 }  // namespace bevel::diagnosis

@@ -106,9 +106,11 @@ std::vector<MotionScript> motion_scripts(double depth_mm, double frame_s) {
                     .turn(kPi / 2)
                     .insert(3 * d / 4, 8)
                     .done());
-  Script saw = say("insertion reversals: 10 mm in and 4 mm back at 8 mm/s, over and over");
-  for (double at = 0; at + 10 <= d; at += 6) saw.insert(10, 8).insert(-4, 8);
-  all.push_back(saw.done());
+  if (d >= 10) {
+    Script saw = say("insertion reversals: 10 mm in and 4 mm back at 8 mm/s, over and over");
+    for (double at = 0; at + 10 <= d; at += 6) saw.insert(10, 8).insert(-4, 8);
+    all.push_back(saw.done());
+  }
   all.push_back(
       say("slow: 2 mm/s, no rotation, a rest of 3 s in the middle").insert(d / 2, 2).rest(3).insert(d / 2, 2).done());
   return all;
@@ -142,10 +144,15 @@ Experiments::Experiments(const NeedleSystem& system, const inference::Noise& noi
 
 double Experiments::separation(std::size_t script, const Imagined& truth, const Imagined& rival) const {
   const model::Motion& motion = scripts_[script].motion;
+  // What two groups get wrong alike has a part in each channel, which a path has not: the difference is the rival's.
+  const Index common = static_cast<Index>(system_.base().size()) - kBaseParameters;
+  VectorXd true_shared = truth.shared, rival_shared = rival.shared;
+  rival_shared.segment(kBaseParameters, common) -= true_shared.segment(kBaseParameters, common);
+  true_shared.segment(kBaseParameters, common).setZero();
   model::OpenLoop path;
-  if (!system_.tip_path(truth.set, motion, -1, truth.shared, truth.local, truth.discrepancy, path)) return 0;
+  if (!system_.tip_path(truth.set, motion, -1, true_shared, truth.local, truth.discrepancy, path)) return 0;
   inference::Prediction prediction;
-  if (!planned_->predict(rival.set, script, rival.shared, rival.local, true, prediction)) return 0;
+  if (!planned_->predict(rival.set, script, rival_shared, rival.local, true, prediction)) return 0;
   VectorXd difference = -prediction.reading;
   Index row = 0;
   for (const Channel& channel : system_.recorded().channels)

@@ -8,6 +8,7 @@
 #include <set>
 
 #include "diagnosis/inference/prediction_noise.hpp"
+#include "diagnosis/mismatch/prediction_sums.hpp"
 #include "diagnosis/parallel.hpp"
 
 namespace bevel::diagnosis {
@@ -18,97 +19,6 @@ using inference::Fit;
 using inference::Likelihood;
 
 namespace {
-
-// Sums over readings of one recording.
-struct Sums {
-  double squares = 0, largest = 0, positions = 0;  // of positions, mm
-  double chi2 = 0, log_density = 0, count = 0;
-};
-
-FitFigures figures_of(const std::vector<Sums>& all) {
-  FitFigures out;
-  Sums sum;
-  for (const Sums& one : all) {
-    sum.squares += one.squares, sum.positions += one.positions;
-    sum.chi2 += one.chi2, sum.log_density += one.log_density, sum.count += one.count;
-    out.max_mm = std::max(out.max_mm, one.largest);
-  }
-  const double n = std::max(sum.count, 1.0), positions = std::max(sum.positions, 1.0);
-  out.rmse_mm = std::sqrt(sum.squares / positions);
-  out.chi2_per_dof = sum.chi2 / n;
-  out.log_density = sum.log_density / n;
-  if (all.size() < 2) return out;
-  // From recording to recording, weighed by their readings: of the mean square, and of the mean logarithm.
-  double square = 0, log = 0;
-  for (const Sums& one : all) {
-    square += std::pow(one.squares - one.positions * sum.squares / positions, 2);
-    log += std::pow(one.log_density - one.count * out.log_density, 2);
-  }
-  const auto r = static_cast<double>(all.size());
-  const double error = std::sqrt(square * r / (r - 1)) / positions;
-  out.rmse_se_mm = out.rmse_mm > 0 ? error / (2 * out.rmse_mm) : 0;
-  out.log_density_se = std::sqrt(log * r / (r - 1)) / n;
-  return out;
-}
-
-// The same of readings that were predicted one by one, of one channel.
-struct ChannelSums {
-  double squares = 0, inside = 0, count = 0;
-};
-// Of one way of prediction, over recordings.
-class PredictionSums {
- public:
-  explicit PredictionSums(const NeedleSystem& system)
-      : recorded_(&system.recorded()), channels_(system.recorded().channels.size()) {}
-  void add(const inference::SeriesSet& recording, const inference::Forecast& forecast) {
-    constexpr double kTail = 0.025;
-    std::vector<std::size_t> channel_of;
-    for (std::size_t c = 0; c < recording.series.size(); ++c)
-      channel_of.insert(channel_of.end(), recording.series[c].time_s.size(), c);
-    for (std::size_t i = 0; i < forecast.rows.size(); ++i) {
-      ChannelSums& sums = channels_[channel_of[static_cast<std::size_t>(forecast.rows[i])]];
-      const auto at = static_cast<Index>(i);
-      sums.squares += forecast.error[at] * forecast.error[at];
-      sums.inside += forecast.below[at] > kTail && forecast.below[at] < 1 - kTail ? 1 : 0;
-      ++sums.count;
-    }
-    log_density_ += forecast.log_density;
-  }
-  PredictionFigures figures() const {
-    PredictionFigures out;
-    ChannelSums all, positions;
-    for (std::size_t c = 0; c < channels_.size(); ++c) {
-      const ChannelSums& one = channels_[c];
-      out.channels.push_back({.rmse = std::sqrt(one.squares / one.count), .share_in_95 = one.inside / one.count});
-      all.inside += one.inside, all.count += one.count;
-      if (!recorded_->channels[c].heading) positions.squares += one.squares, positions.count += one.count;
-    }
-    out.rmse_mm = std::sqrt(positions.squares / positions.count);
-    out.log_density = log_density_ / all.count;
-    out.share_in_95 = all.inside / all.count;
-    out.readings = static_cast<std::size_t>(all.count);
-    return out;
-  }
-
- private:
-  const RecordedCase* recorded_;
-  std::vector<ChannelSums> channels_;
-  double log_density_ = 0;
-};
-
-struct InsertionSums {
-  explicit InsertionSums(const NeedleSystem& system) : whole(system), beyond(system), continued(system) {}
-  void add(const inference::SeriesSet& recording, const inference::Forecasts& one) {
-    whole.add(recording, one.all);
-    if (one.continued.rows.empty()) return;
-    beyond.add(recording, one.beyond);
-    continued.add(recording, one.continued);
-  }
-  InsertionPredicted figures() const {
-    return {.whole = whole.figures(), .beyond = beyond.figures(), .continued = continued.figures()};
-  }
-  PredictionSums whole, beyond, continued;
-};
 
 double constant_of(double count) { return -0.5 * count * std::log(2 * std::numbers::pi); }
 
@@ -132,6 +42,31 @@ Fit new_insertion(Fit fit, std::size_t r) {
   return fit;
 }
 
+// Of the readings that are left, the precisions that they have in another likelihood (Series::precision).
+inference::ByReading precision_of_left(const Likelihood& all, const Likelihood& some) {
+  inference::ByReading out(some.recordings());
+  for (std::size_t r = 0; r < out.size(); ++r)
+    for (std::size_t c = 0; c < some.data().recordings[r].series.size(); ++c) {
+      const auto &known = all.data().recordings[r].series[c], &left = some.data().recordings[r].series[c];
+      if (known.precision.empty()) return {};
+      out[r].emplace_back();
+      std::size_t at = 0;  // in the same order
+      for (const std::size_t message : left.message) {
+        while (known.message[at] != message) ++at;
+        out[r].back().push_back(known.precision[at]);
+      }
+    }
+  return out;
+}
+
+// Of what each recording has of its own, without one recording's part.
+std::shared_ptr<const inference::OwnVolume> own_volume_without(const Fit& fit, std::size_t r) {
+  if (!fit.own_volume) return nullptr;
+  inference::OwnVolume out = *fit.own_volume;
+  out.slope[r].setZero();
+  return std::make_shared<const inference::OwnVolume>(std::move(out));
+}
+
 // Refitted without the recording's readings after until_s: where much is missing, or hardly known, the linear model
 // about all of them says little of it.
 Fit refit_without(const inference::Search& search, const Fit& whole, const Fit& start, std::size_t r, double until_s) {
@@ -142,10 +77,11 @@ Fit refit_without(const inference::Search& search, const Fit& whole, const Fit& 
     for (std::size_t i = 0; i < series.message.size(); ++i)
       if (series.time_s[i] > until_s) gone.insert(series.message[i]);
   without[r].assign(gone.begin(), gone.end());
-  const Likelihood some(all.system(), without, all.noise(), inputs_about(whole));
+  const Likelihood left(all.system(), without, all.noise());
+  const Likelihood some(left, all.noise(), inputs_about(whole), precision_of_left(all, left));
   const auto curve = search.discrepancy().columns(some, whole);
   Fit out = inference::fit(some, whole.layout, start.shared, start.local, whole.scales, curve,
-                           {.own_volume = whole.own_volume});
+                           {.own_volume = own_volume_without(whole, r)});
   if (!out.valid) out = start;
   return out;
 }
@@ -195,12 +131,11 @@ Sums sums_of(const NeedleSystem& system, const inference::Search& search, const 
   const VectorXd errors =
       fit.likelihood->errors(fit.layout, r, fit.shared, new_insertion(fit, r).local[r], curve, fit.curve_values);
   const auto blocks = linearise(*fit.likelihood, fit, curve);
-  if (errors.size() == 0 || blocks.empty()) return out;
+  if (errors.size() == 0 || blocks.empty()) return not_predicted();
   add_errors(system, *fit.likelihood, r, errors, out);
   const auto predictive = predictive_of(fit, blocks, curve, r);
-  constexpr double kNotPredicted = std::numeric_limits<double>::quiet_NaN();
-  out.chi2 = predictive ? predictive->chi2 : kNotPredicted;
-  out.log_density = predictive ? predictive->log_density + constant_of(out.count) : kNotPredicted;
+  out.chi2 = predictive ? predictive->chi2 : kNone;
+  out.log_density = predictive ? predictive->log_density + constant_of(out.count) : kNone;
   return out;
 }
 
@@ -271,8 +206,7 @@ Sums as_it_stands(const NeedleSystem& system, const Likelihood& likelihood, std:
   const VectorXd shared = nothing.shared_start(), local = nothing.local_start();
   inference::Residuals residuals;
   if (!likelihood.evaluate(nothing, r, shared, local, false, residuals)) {
-    const double none = std::numeric_limits<double>::quiet_NaN();
-    return {.squares = none, .largest = none, .positions = 1, .chi2 = none, .log_density = none, .count = 1};
+    return not_predicted();
   }
   add_errors(system, likelihood, r, likelihood.errors(nothing, r, shared, local), out);
   out.chi2 = residuals.white.squaredNorm();

@@ -1,6 +1,5 @@
 #include <cstdio>
 
-#include "diagnosis/inference/curved_fit.hpp"
 #include "diagnosis/inference/forms.hpp"
 #include "diagnosis/mismatch/found_effects.hpp"
 
@@ -44,15 +43,9 @@ std::vector<ProposedForm> propose_forms(const NeedleSystem& system, const infere
                                         const ChosenModel& model) {
   std::vector<ProposedForm> out;
   const auto& curves = model.fit->scales.curves;
-  const auto at = search.discrepancy().places(curves);
   for (std::size_t d = 0; d < curves.size(); ++d) {
     // About the needle, the effects and the other curves as they are beside this one, which is left to the forms.
-    inference::Fit beside = *model.fit;
-    beside.scales.curves.erase(beside.scales.curves.begin() + static_cast<std::ptrdiff_t>(d));
-    beside.curve_values = Eigen::VectorXd(at.back() - (at[d + 1] - at[d]));
-    beside.curve_values << model.fit->curve_values.head(at[d]), model.fit->curve_values.tail(at.back() - at[d + 1]);
-    if (beside.scales.curves.empty()) beside.tangent = nullptr;
-    if (beside.tangent) beside.tangent = tangent_about(search.discrepancy(), beside);
+    const inference::Fit beside = without_curve(search.discrepancy(), *model.fit, d);
     const inference::Marginal marginal(search.likelihood(), beside,
                                        search.discrepancy().columns(search.likelihood(), beside));
     const double all = log_bayes_factor(search.discrepancy().scan(marginal));

@@ -25,7 +25,8 @@ constexpr double kSmallestU = 1e-9;      // (26) is strict
 constexpr double kExpectedShare = 0.75;  // scale of a size's prior, of the largest that is reported
 constexpr double kFewestReadings = 2.5;  // a period
 constexpr double kFewestPeriods = 1.5;   // of the longest recording
-constexpr std::size_t kMostKnown = 2;    // beside the variation, three effects and two curves: kMaxEffects
+// Beside the variation, three effects and two curves: kMaxEffects. A hand's variation is two effects.
+constexpr std::size_t kMostKnown = 2, kMostKnownByHand = 1;
 
 // By how much a parameter of the needle changed from one group of recordings to the other; NeedleSystem::needle_in
 // knows what it does.
@@ -154,10 +155,12 @@ NeedleSystem::NeedleSystem(RecordedCase recorded, const model::NeedleParameters&
       groups_(variation_groups(by_hand())),
       two_groups_(recorded_.two_groups()),
       headings_(recorded_.has_headings()) {
-  if (known_.elsewhere.size() > kMostKnown)
+  const std::size_t most_known = by_hand() ? kMostKnownByHand : kMostKnown;
+  if (known_.elsewhere.size() > most_known)
     throw std::invalid_argument("the model in use has " + std::to_string(known_.elsewhere.size()) +
-                                " effects and discrepancies; at most " + std::to_string(kMostKnown) +
-                                " can be held while more is looked for");
+                                " effects and discrepancies; at most " + std::to_string(most_known) +
+                                " can be held while more is looked for" +
+                                (by_hand() ? " in recordings without a clock" : ""));
   const double u = std::max(model.lambda1_per_rad - model.lambda2 * model.lambda2 / (2 * std::numbers::pi), kSmallestU);
   const double width_k = kCurvatureShare * std::max(std::abs(model.curvature_per_mm), 1e-4);
   base_ = {{.name = "curvature_per_mm",

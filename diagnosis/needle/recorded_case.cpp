@@ -230,6 +230,19 @@ Recording make_recording(RawRecording& raw, std::vector<Channel>& channels) {
   return recording;
 }
 
+// The noise is measured beside a curve that four readings determine.
+void check_lengths(const RecordedCase& recorded) {
+  constexpr std::size_t kFewest = 5;
+  for (std::size_t c = 0; c < recorded.channels.size(); ++c) {
+    std::size_t most = 0;
+    for (const auto& recording : recorded.recordings) most = std::max(most, recording.series[c].time_s.size());
+    if (most < kFewest)
+      throw std::invalid_argument("channel " + recorded.channels[c].name + " has " + std::to_string(most) +
+                                  " readings in its longest recording; at least " + std::to_string(kFewest) +
+                                  " are needed to measure its noise");
+  }
+}
+
 void check_same_rig(const RecordedCase& recorded) {
   const auto& first = recorded.recordings.front();
   const auto period = [](const Series& s) {
@@ -289,6 +302,7 @@ RecordedCase make_case(std::vector<RawRecording> raw) {
   }
   for (auto& recording : recorded.recordings) recording.series.resize(recorded.channels.size());
   check_same_rig(recorded);
+  check_lengths(recorded);
   std::vector<double> periods;
   for (std::size_t c = 0; c < recorded.channels.size(); ++c) {
     std::vector<double> claimed;

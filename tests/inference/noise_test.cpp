@@ -57,6 +57,25 @@ Made make(double ar1, double outlier_share, double dropped_share, std::uint64_t 
   return out;
 }
 
+// A curve goes through four readings and fewer, whatever they are.
+TEST(Noise, RecordingsOfFourReadingsAndFewerSayNothingOfIt) {
+  for (const std::size_t few : {std::size_t{1}, std::size_t{2}, std::size_t{3}, std::size_t{4}}) {
+    Made made = make(0.6, 0, 0, 7);
+    const Noise without = estimate_noise(made.data, made.errors);
+    made.data.recordings.push_back(made.data.recordings.front());
+    made.errors.push_back(made.errors.front());
+    for (std::size_t c = 0; c < 2; ++c) {
+      Series& series = made.data.recordings.back().series[c];
+      for (auto* of : {&series.time_s, &series.measured, &series.relative_sd}) of->resize(few);
+      series.message.resize(few);
+      made.errors.back()[c] = Eigen::VectorXd::Constant(static_cast<Eigen::Index>(few), 100);
+    }
+    const Noise with = estimate_noise(made.data, made.errors);
+    EXPECT_EQ(with.sigma, without.sigma) << few;
+    EXPECT_EQ(with.ar1, without.ar1) << few;
+  }
+}
+
 class NoiseBesideACurve : public ::testing::TestWithParam<double> {};
 
 TEST_P(NoiseBesideACurve, IsFoundWithItsOutliers) {

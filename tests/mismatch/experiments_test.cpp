@@ -11,6 +11,11 @@
 namespace bevel::diagnosis::testing {
 namespace {
 
+TEST(MotionScripts, AreMotionsHoweverShallow) {
+  for (const double depth_mm : {3.0, 8.0, 10.0})
+    for (const auto& script : motion_scripts(depth_mm, 1.0 / 30)) EXPECT_GT(script.motion.at.size(), 1U) << script.text;
+}
+
 TEST(MotionScripts, KeepToTheDepthAndTheRatesStated) {
   for (const double depth_mm : {40.0, 70.0, 123.0}) {
     const double frame_s = 1.0 / 30;
@@ -72,7 +77,7 @@ struct Known {
     return out;
   }
   Imagined imagine(const inference::Fit& fit) const {
-    const ChosenModel model{.fit = &fit, .curve = {}, .blocks = linearise(*likelihood, fit, {}), .log_posterior = 0};
+    const ChosenModel model{.fit = &fit, .curve = {}, .blocks = linearise(*likelihood, fit, {})};
     return imagined(fit, model);
   }
 };

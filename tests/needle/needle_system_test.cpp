@@ -167,6 +167,20 @@ TEST(NeedleSystem, LooksOnlyForWhatTheRecordingsCanShow) {
   for (const auto& curve : stops.curves()) EXPECT_THAT(curve.covariate, ::testing::Not(::testing::HasSubstr("_s")));
 }
 
+// With three effects, two curves and what differs between insertions there are as many as a needle carries.
+TEST(NeedleSystem, HoldsAsManyKnownEffectsAsLeaveRoomForTheOthers) {
+  const SimulatedRig rig;
+  const auto known = [](std::size_t count) {
+    KnownPhysics out;
+    for (std::size_t i = 0; i < count; ++i) out.elsewhere.push_back(active("insertion_scale", {1.02}));
+    return out;
+  };
+  EXPECT_NO_THROW(NeedleSystem(record_case(rig, 1), rig.needle, known(2)));
+  EXPECT_THROW(NeedleSystem(record_case(rig, 1), rig.needle, known(3)), std::invalid_argument);
+  EXPECT_NO_THROW(NeedleSystem(without_clock(rig, 1), rig.needle, known(1)));
+  EXPECT_THROW(NeedleSystem(without_clock(rig, 1), rig.needle, known(2)), std::invalid_argument);
+}
+
 TEST(NeedleSystem, WithoutEffectsItIsTheModel) {
   const SimulatedRig rig;
   const NeedleSystem system(record_case(rig, 2), rig.needle);

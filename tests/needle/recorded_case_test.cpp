@@ -210,6 +210,15 @@ TEST(BadInput, NoMotion) {
   EXPECT_THAT(refusal(raw), AllOf(HasSubstr("rec2: 1 ACTUATOR_STATE"), HasSubstr("at least two")));
 }
 
+TEST(BadInput, TooFewReadingsForANoise) {
+  auto raw = record({.recordings = 2}, 1);
+  for (auto& recording : raw) recording.tips.resize(4);
+  EXPECT_THAT(refusal(raw), AllOf(HasSubstr("channel tip.x has 4 readings"), HasSubstr("at least 5")));
+  raw = record({.recordings = 2}, 1);
+  raw[1].tips.resize(5);
+  EXPECT_EQ(refusal(raw), "taken");
+}
+
 TEST(BadInput, ClocksApart) {
   for (const double ahead_s : {30.0, -30.0}) {
     auto raw = record({.recordings = 2}, 1);

@@ -315,9 +315,9 @@ void add_unknown_part(report::Page& page, const Findings& f) {
              "Simple forms of one covariate, each beside the needle, what was named and the other curves. Above zero, "
              "the equation is "
              "worth more than the freedom of a curve. A proposal to be tried as an effect, not a cause.");
-  if (const auto proposed = proposed_effect(f))
-    page.paragraph(std::string(kProposedEffectFile) + " beside this page is the first of them as an effect, " +
-                   proposed->name + ", ready to be added to the library (docs/adding-an-effect.md).");
+  if (const ProposedForm* form = proposed_form(f))
+    page.paragraph(std::string(kProposedEffectFile) + " beside this page is " + form->equation + " as an effect, " +
+                   effect_source(*form).name + ", ready to be added to the library (docs/adding-an-effect.md).");
 }
 
 void add_residuals(report::Page& page, const Findings& f) {
