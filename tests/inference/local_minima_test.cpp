@@ -87,30 +87,29 @@ TEST(Instants, AreFoundWhereReadingsJumpInNoiseThatWanders) {
   }
 }
 
-// The same with a hump of 5 from 6 to 7 s that is no step: a curve over time, with a value every half second.
+// The same with a jump by 5 at 6 s and back at 7 s that is no step: a curve over time, which can jump there.
 class StepBesideAHump final : public Step {
  public:
-  static constexpr int kValues = 19;
+  static constexpr int kValues = 6;
   explicit StepBesideAHump(unsigned seed) : Step(seed) {
-    Curve curve{.component = "reading", .unit = "mm", .covariate = "time_s", .at = {}};
-    for (int i = 0; i < kValues; ++i) curve.at.push_back(0.5 * i);
-    curves_ = {curve};
+    curves_ = {{.component = "reading", .unit = "mm", .covariate = "time_s", .at = {0, 6, 6.01, 7, 7.01, 9}}};
     Series& series = data_.recordings[0].series[0];
-    const VectorXd hump = hats() * hump_values();
+    const VectorXd hump = hats() * VectorXd{{0, 0, 5, 5, 0, 0}};
     for (std::size_t i = 0; i < series.measured.size(); ++i) series.measured[i] += hump[static_cast<Index>(i)];
   }
-  static VectorXd hump_values() {
-    VectorXd out = VectorXd::Zero(kValues);
-    out.segment(12, 3).setConstant(5);
-    return out;
-  }
+  // Linear between the places.
   MatrixXd hats() const {
     const auto& times = data_.recordings[0].series[0].time_s;
-    MatrixXd out(static_cast<Index>(times.size()), kValues);
-    for (Index i = 0; i < out.rows(); ++i)
-      for (Index k = 0; k < kValues; ++k)
-        out(i, k) =
-            std::max(0.0, 1 - std::abs(times[static_cast<std::size_t>(i)] - 0.5 * static_cast<double>(k)) / 0.5);
+    const auto& at = curves_[0].at;
+    MatrixXd out = MatrixXd::Zero(static_cast<Index>(times.size()), kValues);
+    for (Index i = 0; i < out.rows(); ++i) {
+      const double time_s = times[static_cast<std::size_t>(i)];
+      std::size_t k = 0;
+      while (k + 2 < at.size() && time_s >= at[k + 1]) ++k;
+      const double share = (time_s - at[k]) / (at[k + 1] - at[k]);
+      out(i, static_cast<Index>(k)) = 1 - share;
+      out(i, static_cast<Index>(k) + 1) = share;
+    }
     return out;
   }
   MatrixXd by_curves(std::size_t, const VectorXd&) const override { return hats(); }
@@ -132,7 +131,7 @@ TEST(Instants, StayWhereTheyAreLikelierBesideACurve) {
     ASSERT_TRUE(there.valid);
     scan_locals(likelihood, curve, there);
     EXPECT_NEAR(there.local[0][0], Step::kAt_s, 2 * Step::kFrame_s) << "seed " << seed;
-    EXPECT_NEAR(there.curve_values[13], 5, 1) << "seed " << seed;
+    EXPECT_NEAR(there.curve_values[3] - there.curve_values[4], 5, 0.5) << "seed " << seed;
   }
 }
 
