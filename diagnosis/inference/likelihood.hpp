@@ -139,7 +139,8 @@ struct Fit {
 Fit carried_to(Layout layout, const Fit& from);
 // System::by_inputs() of a fit, per recording; empty: nothing.
 std::vector<Eigen::VectorXd> inputs_about(const Fit& fit);
-// The same readings and noise with them; itself where there is nothing.
+// The same readings and noise with them; itself where there is nothing. And without any.
+std::shared_ptr<const Likelihood> without_inputs(const Likelihood& likelihood);
 std::shared_ptr<const Likelihood> with_inputs_of(const Fit& fit, const std::shared_ptr<const Likelihood>& likelihood);
 
 struct FitRules {

@@ -127,6 +127,10 @@ std::vector<VectorXd> inputs_about(const Fit& fit) {
   return out;
 }
 
+std::shared_ptr<const Likelihood> without_inputs(const Likelihood& likelihood) {
+  return std::make_shared<const Likelihood>(likelihood, likelihood.noise());
+}
+
 std::shared_ptr<const Likelihood> with_inputs_of(const Fit& fit, const std::shared_ptr<const Likelihood>& likelihood) {
   const auto inputs = inputs_about(fit);
   return inputs.empty() ? likelihood : std::make_shared<const Likelihood>(*likelihood, likelihood->noise(), inputs);

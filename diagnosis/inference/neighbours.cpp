@@ -23,7 +23,7 @@ Search::Job Search::job_at(const Fit& fit) {
 
 void Search::ask_for_curve_of(const Fit& fit, Job& job) const {
   // What is left without the curve may pass for noise: that is not where to begin.
-  ask_for_curve_of(fit, std::make_shared<const Likelihood>(*fit.likelihood, fit.likelihood->noise()), job);
+  ask_for_curve_of(fit, without_inputs(*fit.likelihood), job);
 }
 
 void Search::ask_for_curve_of(const Fit& fit, std::shared_ptr<const Likelihood> by, Job& job) const {

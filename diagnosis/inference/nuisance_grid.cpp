@@ -26,6 +26,11 @@ NuisanceGrid nuisance_grid(const System& system) {
   return out;
 }
 
+double negligible_of(const Eigen::VectorXd& weights) {
+  constexpr double kNegligible = 1e-3;
+  return weights.size() > 0 ? kNegligible * weights.maxCoeff() : 0;
+}
+
 double log_prior_of_spread(const System& system, const Eigen::VectorXd& nuisance_sd) {
   constexpr double kDiffer = 0.5;
   double share = kDiffer;

@@ -12,6 +12,8 @@ struct NuisanceGrid {
   Eigen::VectorXd log_prior;
 };
 NuisanceGrid nuisance_grid(const System& system);
+// Of a posterior over it: a combination of less than this, a thousandth of the likeliest, is left out of sums.
+double negligible_of(const Eigen::VectorXd& weights);
 // Recordings do not differ at all, as in a simulation or where one was copied, with probability one half; else each
 // group's standard deviation is any of its values, 0 among them. What differs between repetitions differs in most
 // ways: that all stay alike in every way but one is what something else would make of them.

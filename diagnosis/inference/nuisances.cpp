@@ -10,10 +10,6 @@ using Eigen::Index;
 using Eigen::MatrixXd;
 using Eigen::VectorXd;
 
-namespace {
-constexpr double kNegligible = 1e-3;  // share of a combination of standard deviations
-}
-
 VectorXd local_variances(const ArrowBlock& block, const ArrowSolution& solution) {
   const Eigen::LLT<MatrixXd> factor(block.own_information());
   const MatrixXd through = factor.solve(block.lz);
@@ -27,8 +23,9 @@ MatrixXd shared_covariance(const Fit& fit, std::vector<ArrowBlock> blocks, const
   const NuisanceGrid grid = nuisance_grid(fit.layout.system());
   MatrixXd sum = MatrixXd::Zero(n, n);
   double all = 0;
+  const double negligible = negligible_of(weights);
   for (Index k = 0; k < weights.size(); ++k) {
-    if (weights[k] < kNegligible * weights.maxCoeff()) continue;
+    if (weights[k] < negligible) continue;
     const ArrowSolution solution = solve_at(grid.standard_deviations.col(k), fit, blocks, curve);
     if (!solution.valid) continue;
     const VectorXd away = solution.shared.head(n);
@@ -45,8 +42,9 @@ std::vector<std::vector<Mixture>> nuisance_posterior(const Fit& fit, std::vector
   const std::size_t count = system.nuisances().size();
   std::vector<std::vector<Mixture>> out(fit.local.size(), std::vector<Mixture>(count));
   const NuisanceGrid grid = nuisance_grid(system);
+  const double negligible = negligible_of(weights);
   for (Index k = 0; k < weights.size(); ++k) {
-    if (weights[k] < kNegligible * weights.maxCoeff()) continue;
+    if (weights[k] < negligible) continue;
     const ArrowSolution solution = solve_at(grid.standard_deviations.col(k), fit, blocks, curve);
     if (!solution.valid) continue;
     for (std::size_t r = 0; r < out.size(); ++r) {

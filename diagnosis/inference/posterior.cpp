@@ -156,8 +156,9 @@ Unknowns::Unknowns(const Search& search) : search_(&search) {
     auto blocks = linearise(*fit.likelihood, fit, curve);
     if (blocks.empty()) return;
     std::optional<Part> first;  // the likelihood is followed once for all standard deviations
+    const double negligible = negligible_of(over);
     for (Index k = 0; k < over.size(); ++k) {
-      if (weight * over[k] < kNegligible * over.maxCoeff()) continue;
+      if (weight * over[k] < negligible) continue;
       const VectorXd nuisance_sd = grid.standard_deviations.col(k);
       const ArrowSolution solution = solve_at(nuisance_sd, fit, blocks, curve);
       if (!solution.valid) continue;

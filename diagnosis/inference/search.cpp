@@ -228,7 +228,6 @@ std::shared_ptr<const Likelihood> Search::with_heavy_tails(const Fit& fit) const
 // By the noise of a reference and its innovations' precision, at first; known: sets to be weighed before any is sought.
 void Search::look_in_rounds(std::shared_ptr<const Likelihood> reference, Start& start, std::vector<Job> known) {
   const Layout nothing(system_, {});
-  const auto without_inputs = [](const Likelihood& by) { return std::make_shared<const Likelihood>(by, by.noise()); };
   bool anew = known.empty();
   for (std::size_t round = 0; round < rules_.rounds; ++round) {
     likelihood_ = reference;
