@@ -165,13 +165,10 @@ std::vector<Marginal::Added> Discrepancy::added(const Marginal& beside) const {
       out[k].square += part.weight != nullptr
                            ? part.square(white_[r], first, size)
                            : square_[r].block(0, first, size, size).cast<double>() -
-                                 part.own.middleRows(first, size) * part.by_own.middleRows(first, size).transpose();
+                                 part.own.middleRows(first, size) * part.own.middleRows(first, size).transpose();
     }
   }
-  for (std::size_t k = 0; k < first_.size(); ++k) {
-    out[k].pull -= across[k] * beside.step();
-    out[k].square -= across[k] * beside.covariance() * across[k].transpose();
-  }
+  for (std::size_t k = 0; k < first_.size(); ++k) out[k].square -= across[k] * across[k].transpose();
   return out;
 }
 

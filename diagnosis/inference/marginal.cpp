@@ -1,6 +1,8 @@
 #include "diagnosis/inference/marginal.hpp"
 
-#include <Eigen/Cholesky>
+#include <Eigen/Eigenvalues>
+#include <Eigen/QR>
+#include <cmath>
 
 namespace bevel::inference {
 
@@ -20,53 +22,71 @@ VectorXf weights_of(const Likelihood& likelihood, const Likelihood& columns_by, 
   return Eigen::Map<const VectorXf>(out.data(), static_cast<Index>(out.size()));
 }
 
+// A square root of a covariance, in units of each unknown's own error; what is held has none.
+MatrixXd root_of(const MatrixXd& covariance) {
+  const VectorXd sd = covariance.diagonal().cwiseMax(0).cwiseSqrt();
+  const VectorXd inverse = sd.unaryExpr([](double v) { return v > 0 ? 1 / v : 0.0; });
+  const Eigen::SelfAdjointEigenSolver<MatrixXd> eigen(inverse.asDiagonal() * covariance * inverse.asDiagonal());
+  return sd.asDiagonal() * eigen.eigenvectors() * eigen.eigenvalues().cwiseMax(0).cwiseSqrt().asDiagonal();
+}
+
+// Q of L and the root of its prior's precision, one below the other: the rows of L.
+MatrixXd orthogonal(const MatrixXd& L, const VectorXd& precision) {
+  MatrixXd both(L.rows() + L.cols(), L.cols());
+  both.topRows(L.rows()) = L;
+  both.bottomRows(L.cols()) = precision.cwiseSqrt().asDiagonal();
+  return (Eigen::HouseholderQR<MatrixXd>(both).householderQ() * MatrixXd::Identity(both.rows(), L.cols()))
+      .topRows(L.rows());
+}
+
 }  // namespace
 
 Marginal::Marginal(const Likelihood& likelihood, const Fit& fit, const CurveColumns& curve,
                    const Likelihood* columns_by)
     : set_(fit.layout.set()) {
-  LinearRecording recording;
-  for (std::size_t r = 0; r < likelihood.recordings(); ++r) {
-    if (!linearise(likelihood, fit, curve, r, recording)) return;
-    const MatrixXd &L = recording.L, &Z = recording.Z;
-    const ArrowBlock& block = recording.block;
-    inner_.emplace_back(block.own_information().llt().solve(MatrixXd::Identity(L.cols(), L.cols())));
-    pull_.emplace_back(block.lw + block.precision.cwiseProduct(block.centre));
-    MatrixXf LZ(Z.rows(), L.cols() + Z.cols());
-    LZ.leftCols(L.cols()) = L.cast<float>();
-    LZ.rightCols(Z.cols()) = Z.cast<float>();
-    VectorXf white = recording.residuals.white.cast<float>();
+  std::vector<LinearRecording> recordings(likelihood.recordings());
+  std::vector<ArrowBlock> blocks;
+  for (std::size_t r = 0; r < recordings.size(); ++r) {
+    if (!linearise(likelihood, fit, curve, r, recordings[r])) return;
+    blocks.push_back(recordings[r].block);
+  }
+  solution_ = solve_about(fit, blocks, curve);
+  if (!solution_.valid) return;
+  root_ = root_of(solution_.covariance);
+  for (std::size_t r = 0; r < recordings.size(); ++r) {
+    const auto& [residuals, L, Z, block] = recordings[r];
+    const MatrixXd Q = orthogonal(L, block.precision);
+    MatrixXf own = Q.cast<float>(), shared = ((Z - Q * (Q.transpose() * Z)) * root_).cast<float>();
+    VectorXf left = (residuals.white - L * solution_.local[r] - Z * solution_.shared).cast<float>();
     if (columns_by != nullptr && columns_by != &likelihood) {
       weight_.push_back(weights_of(likelihood, *columns_by, r));
-      LZ = weight_.back().asDiagonal() * LZ;
-      white = weight_.back().cwiseProduct(white);
+      own = weight_.back().asDiagonal() * own;
+      shared = weight_.back().asDiagonal() * shared;
+      left = weight_.back().cwiseProduct(left);
     }
-    LZ_.push_back(std::move(LZ));
-    w_.push_back(std::move(white));
-    blocks_.push_back(block);
+    own_.push_back(std::move(own));
+    shared_.push_back(std::move(shared));
+    left_.push_back(std::move(left));
   }
-  solution_ = solve_about(fit, blocks_, curve);
 }
 
 MatrixXd Marginal::Part::square(const MatrixXf& X, Index first, Index size) const {
   MatrixXf columns = X.middleCols(first, size);
   if (weight != nullptr) columns = weight->asDiagonal() * columns;
-  return (columns.transpose() * columns).cast<double>() -
-         own.middleRows(first, size) * by_own.middleRows(first, size).transpose();
+  const auto taken = own.middleRows(first, size);
+  return (columns.transpose() * columns).cast<double>() - taken * taken.transpose();
 }
 
 VectorXd Marginal::Part::squares(const MatrixXf& X) const {
   const MatrixXf weighted = weight != nullptr ? MatrixXf(weight->asDiagonal() * X) : X;
-  return weighted.colwise().squaredNorm().transpose().cast<double>() - own.cwiseProduct(by_own).rowwise().sum();
+  return weighted.colwise().squaredNorm().transpose().cast<double>() - own.rowwise().squaredNorm();
 }
 
 Marginal::Part Marginal::part(std::size_t r, const MatrixXf& X) const {
-  const MatrixXd products = (X.transpose() * LZ_[r]).cast<double>();
-  const Index count = inner_[r].rows();
-  Part out{.own = products.leftCols(count) * inner_[r], .by_own = products.leftCols(count), .across = {}, .pull = {}};
+  Part out{.own = (X.transpose() * own_[r]).cast<double>(),
+           .across = (X.transpose() * shared_[r]).cast<double>(),
+           .pull = (X.transpose() * left_[r]).cast<double>()};
   if (!weight_.empty()) out.weight = &weight_[r];
-  out.across = products.rightCols(products.cols() - count) - out.own * blocks_[r].lz;
-  out.pull = (X.transpose() * w_[r]).cast<double>() - out.own * pull_[r];
   return out;
 }
 
@@ -80,8 +100,7 @@ Marginal::Added Marginal::added(const std::vector<MatrixXf>& X) const {
     out.pull += one.pull;
     out.square += one.square(X[r], 0, columns);
   }
-  out.pull -= across * step();
-  out.square -= across * covariance() * across.transpose();
+  out.square -= across * across.transpose();
   return out;
 }
 

@@ -15,18 +15,18 @@ class Marginal {
            const Likelihood* columns_by = nullptr);
   // False outside the model's domain.
   bool valid() const { return solution_.valid; }
-  std::size_t recordings() const { return blocks_.size(); }
+  std::size_t recordings() const { return own_.size(); }
   const ModelSet& set() const { return set_; }
-  // Covariance of the shared unknowns, the curve's values last, and the step from the fit to their mode.
-  const Eigen::MatrixXd& covariance() const { return solution_.covariance; }
+  // The step from the fit to the mode of the shared unknowns, the curve's values last; and R: their covariance is RR'.
   const Eigen::VectorXd& step() const { return solution_.shared; }
+  const Eigen::MatrixXd& root() const { return root_; }
 
-  // Inner products of a recording's columns X (whitened) with what is left once its own unknowns are integrated out;
-  // those that all recordings share are still in: `across` is by them.
+  // Inner products of a recording's columns X (whitened) with what is left at the mode, once its own unknowns are
+  // integrated out; those that all recordings share are still in: `across` is by them, in units of R.
   struct Part {
-    Eigen::MatrixXd own, by_own;              // X'L (L'L + T)^-1, X'L
-    Eigen::MatrixXd across;                   // X'MZ
-    Eigen::VectorXd pull;                     // X'Mw
+    Eigen::MatrixXd own;                      // X'Q, where QQ' = L (L'L + T)^-1 L'
+    Eigen::MatrixXd across;                   // X'MZR
+    Eigen::VectorXd pull;                     // X'M(w - Z step)
     const Eigen::VectorXf* weight = nullptr;  // of the rows; null: one
     // X'MX of columns [first, first + size); its diagonal for all of them.
     Eigen::MatrixXd square(const Eigen::MatrixXf& X, Eigen::Index first, Eigen::Index size) const;
@@ -43,14 +43,15 @@ class Marginal {
   Added added(const std::vector<Eigen::MatrixXf>& X) const;
 
  private:
+  // By rows that are orthogonal to what they leave out, a recording's own unknowns by Q and the shared ones by MZR, all
+  // products are no larger than the columns: where paths diverge, derivatives are 10^9, and of their own products in
+  // single precision, or of normal equations, nothing is left.
   ModelSet set_;
-  std::vector<ArrowBlock> blocks_;
-  std::vector<Eigen::MatrixXf> LZ_;  // [L Z] per recording
-  std::vector<Eigen::VectorXf> w_;
-  std::vector<Eigen::VectorXf> weight_;  // of the rows of columns; empty: one. LZ_ and w_ have it already
-  std::vector<Eigen::MatrixXd> inner_;   // (L'L + T)^-1
-  std::vector<Eigen::VectorXd> pull_;    // L'w and the prior's part
+  std::vector<Eigen::MatrixXf> own_, shared_;  // Q and MZR, per recording
+  std::vector<Eigen::VectorXf> left_;          // w - L l - Z z at the mode
+  std::vector<Eigen::VectorXf> weight_;        // of the rows of columns; empty: one. All of the above have it already
   ArrowSolution solution_;
+  Eigen::MatrixXd root_;
 };
 
 }  // namespace bevel::inference

@@ -34,7 +34,7 @@ struct Path {
 MatrixXd Proposals::steps_beside(const Candidate& candidate, const Marginal& beside) {
   MatrixXd across = MatrixXd::Zero(candidate.columns.front().cols(), beside.step().size());
   for (std::size_t r = 0; r < beside.recordings(); ++r) across += beside.part(r, candidate.columns[r]).across;
-  return beside.step().replicate(1, across.rows()) - beside.covariance() * across.transpose();
+  return beside.step().replicate(1, across.rows()) - beside.root() * across.transpose();
 }
 
 void Proposals::look_with_others_moved(const Likelihood& by, const Fit& fit, const Marginal& beside, std::size_t starts,

@@ -223,14 +223,13 @@ Proposal Proposals::judge(const Candidate& candidate, std::size_t e, const Margi
     Xw += part.pull;
     for (Index c = 0; c < columns; c += width) XX.middleCols(c, width) += part.square(X, c, width);
   }
-  Xw -= XZ * beside.step();
   Proposal out{.effect = e, .starts = {}};
   std::vector<double> logs;
   const bool sizes_have_grid =
       std::ranges::any_of(candidate.amplitudes, [&](std::size_t a) { return effect.parameters[a].starts.size() > 1; });
   for (const Signature& signature : candidate.signatures) {
     const auto across = XZ.middleRows(signature.first, width);
-    MatrixXd square = XX.middleCols(signature.first, width) - across * beside.covariance() * across.transpose();
+    MatrixXd square = XX.middleCols(signature.first, width) - across * across.transpose();
     const VectorXd pull = Xw.segment(signature.first, width);
     StartPoint start{.shared = shared_part(effect, signature.values),
                      .local = {},
@@ -278,8 +277,8 @@ Proposal Proposals::judge_local(const Candidate& candidate, std::size_t e, const
   for (std::size_t r = 0; r < recordings; ++r) {
     const MatrixXf& X = candidate.columns[r];
     const Marginal::Part part = beside.part(r, X);
-    pull[r] = part.pull - part.across * beside.step();
-    square[r] = part.squares(X) - (part.across * beside.covariance()).cwiseProduct(part.across).rowwise().sum();
+    pull[r] = part.pull;
+    square[r] = part.squares(X) - part.across.rowwise().squaredNorm();
     square[r] = square[r].cwiseMax(0);
   }
   Proposal out{.effect = e, .starts = {}};

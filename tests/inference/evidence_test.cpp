@@ -107,6 +107,41 @@ TEST(Evidence, WhatASetLeavesOpenCountsInColumnsBesideIt) {
   EXPECT_GT(std::abs(blind.square(0, 0) / added.square(0, 0) - 1), 0.1);
 }
 
+// Where paths diverge all derivatives are nearly the same one, and 10^7 of the noise. By least squares with everything
+// side by side, priors as rows of their own.
+TEST(Evidence, WhatAColumnAddsIsRightWherePathsDiverge) {
+  constexpr std::size_t kRecordings = 4;
+  LinearSystem system(kRecordings, 7, 0.3, 0.2, 0);
+  system.divergence = 1e6;
+  const Likelihood likelihood(system, Readings(kRecordings), white(system));
+  Fit at(Layout(system, {}));
+  at.shared = Eigen::Vector2d(LinearSystem::kOffset, LinearSystem::kSlope);
+  at.local.assign(kRecordings, VectorXd::Zero(1));
+  at.scales.nuisance_sd = VectorXd::Constant(1, 0.2);
+  at.valid = true;
+  const MatrixXd step = LinearSystem::design({1}).rightCols(1);
+  const std::vector<Eigen::MatrixXf> columns(kRecordings, likelihood.whitened(0, step).cast<float>());
+  const auto added = Marginal(likelihood, at, {}).added(columns);
+
+  const Index n = LinearSystem::kCount, rows = n * static_cast<Index>(kRecordings), width = 2 + kRecordings;
+  MatrixXd design = MatrixXd::Zero(rows + width, width), target = MatrixXd::Zero(rows + width, 2);
+  Prediction prediction;
+  for (std::size_t r = 0; r < kRecordings; ++r) {
+    ASSERT_TRUE(system.predict({}, r, at.shared, at.local[r], true, prediction));
+    const Index first = n * static_cast<Index>(r);
+    design.block(first, 0, n, 2) = prediction.by_shared / system.sigma;
+    design.block(first, 2 + static_cast<Index>(r), n, 1) = prediction.by_local / system.sigma;
+    target.block(first, 0, n, 1) = step / system.sigma;
+    target.block(first, 1, n, 1) = (all_readings(system).segment(first, n) - prediction.reading) / system.sigma;
+  }
+  design.bottomRows(width).diagonal() << 1, 1, VectorXd::Constant(kRecordings, 1 / 0.2);
+  target.block(rows, 1, 2, 1) = -at.shared;
+  const MatrixXd left = target - design * design.colPivHouseholderQr().solve(target);
+  const double square = left.col(0).squaredNorm();
+  EXPECT_NEAR(added.square(0, 0), square, 1e-3 * square);
+  EXPECT_NEAR(added.pull[0], left.col(0).dot(left.col(1)), 1e-2 * std::sqrt(square));
+}
+
 TEST(Evidence, TheNoiseIsTheLikeliest) {
   const LinearSystem system(6, 11, 0, 0.2, 0);
   const Evaluated at = evaluate_set(system, {});

@@ -16,8 +16,11 @@ namespace bevel::inference::testing {
 class LinearSystem : public HeldSystem {
  public:
   static constexpr int kCount = 60;
+  static constexpr double kOffset = 0.3, kSlope = 0.2;
   double sigma = 0.1;
   Eigen::VectorXd input_sd;  // of each recording's readings; empty: none
+  // By which the path runs away, in the end, from where base and nuisance are not as recorded, each alike.
+  double divergence = 0;
 
   LinearSystem(std::size_t recordings, std::uint64_t seed, double parabola, double nuisance_sd, double bump,
                double by_sawtooth = 0) {
@@ -30,7 +33,7 @@ class LinearSystem : public HeldSystem {
       const double own = nuisance_sd * normal(random);
       for (int i = 0; i < kCount; ++i) {
         const double t = 0.1 * i;
-        measured.push_back(0.3 + 0.2 * t + parabola * parabola_of(t) + own * std::cos(t) +
+        measured.push_back(kOffset + kSlope * t + parabola * parabola_of(t) + own * std::cos(t) +
                            bump * std::exp(-4 * (t - 3) * (t - 3)) + by_sawtooth * std::sin(6 * sawtooth(t)) +
                            sigma * normal(random));
       }
@@ -82,8 +85,11 @@ class LinearSystem : public HeldSystem {
   }
   bool predict(const ModelSet& set, std::size_t, const Eigen::VectorXd& shared, const Eigen::VectorXd& local,
                bool derivatives, Prediction& out) const override {
-    const Eigen::MatrixXd X = design(set), L = cosine();
-    out.reading = X * shared + L * local;
+    Eigen::MatrixXd X = design(set), L = cosine();
+    const Eigen::VectorXd away = divergence * (0.1 * Eigen::ArrayXd::LinSpaced(kCount, 1 - kCount, 0)).exp();
+    X.leftCols(2).colwise() += away;
+    L.colwise() += away;
+    out.reading = X * shared + L * local - (kOffset + kSlope) * away;
     if (derivatives) out.by_shared = X, out.by_local = L;
     return true;
   }
