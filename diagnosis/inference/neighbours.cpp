@@ -3,7 +3,7 @@
 #include <iterator>
 #include <limits>
 #include <optional>
-#include <ranges>
+#include <span>
 
 #include "diagnosis/inference/error_spread.hpp"
 #include "diagnosis/inference/local_minima.hpp"
@@ -156,43 +156,28 @@ std::vector<Search::Job> Search::larger_sets(const ModelSet& set, const Beside& 
       if (start.log_bayes_factor > one.starts.front().log_bayes_factor - rules_.window) {
         out.push_back(job_from(here.about, one.effect, start));
         out.back().promised = promised + doubtful;
+        out.back().foremost = foremost;
         if (!is_hopeless(set)) ask_for_curve_of(here.about, out.back());
       }
   }
   return out;
 }
 
-// The set without each member. One that was visited already once more, if from here it is likelier even without what it
-// gains by having fewer parameters: then it was in a local minimum.
-std::vector<Search::Job> Search::smaller_sets(const Visited& here) {
+// The set without each member, from where the fit is. One that was visited already once more, if from here it is
+// likelier even without what it gains by having fewer parameters: then it was in a local minimum.
+std::vector<Search::Job> Search::smaller_sets(const Fit& fit, double log_here) {
+  const ModelSet& set = fit.layout.set();
+  const bool beside_curve = !fit.scales.curves.empty();
+  const auto costs = log_costs_of_dropping(fit, discrepancy_->columns(*fit.likelihood, fit));
   std::vector<Job> out;
-  const bool large = here.is_likelier_with_curve() && here.at->fit_with_curve->tangent;
-  const Fit& fit = here.at->fit;
-  const auto costs = log_costs_of_dropping(fit);
-  std::vector<double> costs_beside_curve;
-  if (large) {
-    const Fit& with_curve = *here.at->fit_with_curve;
-    costs_beside_curve = log_costs_of_dropping(with_curve, discrepancy_->columns(*with_curve.likelihood, with_curve));
-  }
-  for (std::size_t m = 0; m < here.set.size(); ++m) {
-    const ModelSet smaller = without(here.set, here.set[m]);
+  for (std::size_t m = 0; m < set.size(); ++m) {
+    const ModelSet smaller = without(set, set[m]);
     if (const auto known = visited_.find(smaller); known != visited_.end()) {
-      const auto falls_short = [&](double log_known, double log_here, double cost) {
-        return log_known <= log_here - cost - log_prior_odds(here.set[m]) - rules_.optimism;
-      };
-      const Visited& there = known->second;
-      if (!falls_short(there.log_without_curve, here.log_without_curve, costs[m]) &&
-          !(large && falls_short(there.log_with_curve, here.log_with_curve, costs_beside_curve[m])))
-        continue;
-      if (!from_larger_.insert(smaller).second) continue;
+      const double log_known = beside_curve ? known->second.log_with_curve : known->second.log_without_curve;
+      if (log_known > log_here - costs[m] - log_prior_odds(set[m]) - rules_.optimism) continue;
     }
     out.push_back(job_at(carried_to(Layout(system_, smaller), fit)));
-    if (large) {
-      Job beside = job_at(carried_to(Layout(system_, smaller), *here.at->fit_with_curve));
-      ask_for_curve_of(*here.at->fit_with_curve, beside);
-      out.back().beside_curve = true;
-      out.back().large_curve = beside.large_curve;
-    }
+    ask_for_curve_of(fit, out.back());
   }
   return out;
 }
@@ -220,9 +205,12 @@ void Search::expand(const ModelSet& set) {
     append_larger(look_beside(here.at->fit, here.log_without_curve, !set.empty()));
   }
   if (!hopeless) {
-    append(smaller_sets(here));
-    if (here.is_likelier_with_curve()) append(swaps(*here.at->fit_with_curve, here.log_with_curve));
-    append(swaps(here.at->fit, here.log_without_curve));
+    const auto append_others = [&](const Fit& fit, double log_here) {
+      append(smaller_sets(fit, log_here));
+      append(swaps(fit, log_here));
+    };
+    if (here.is_likelier_with_curve()) append_others(*here.at->fit_with_curve, here.log_with_curve);
+    append_others(here.at->fit, here.log_without_curve);
   }
   evaluate_all(std::move(jobs));
 }
@@ -231,7 +219,7 @@ void Search::look_at_foremost_effects() {
   const Fit base = visited_.at({}).at->fit;
   const auto list = Proposals(*likelihood_, base).beside(base_marginal(), 1);
   std::vector<Job> jobs;
-  for (const Proposal& one : list | std::views::take(rules_.at_once))
+  for (const Proposal& one : std::span(list).first(std::min(list.size(), rules_.at_once)))
     if (!one.starts.empty()) jobs.push_back(job_from(base, one.effect, one.starts.front()));
   evaluate_without_curve(jobs, -std::numeric_limits<double>::infinity());
 }

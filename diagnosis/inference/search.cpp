@@ -6,7 +6,6 @@
 #include <iterator>
 #include <limits>
 #include <numeric>
-#include <ranges>
 #include <set>
 #include <stdexcept>
 
@@ -129,7 +128,7 @@ void Search::drop_repeated(std::vector<Job>& jobs) const {
   jobs = std::move(out);
 }
 
-std::vector<std::shared_ptr<Evaluated>> Search::evaluate_without_curve(const std::vector<Job>& jobs,
+std::vector<std::shared_ptr<Evaluated>> Search::evaluate_without_curve(std::span<const Job> jobs,
                                                                        double give_up_below) {
   std::vector<std::shared_ptr<Evaluated>> out(jobs.size());
   parallel_for(jobs.size(), [&](std::size_t i) {
@@ -139,55 +138,62 @@ std::vector<std::shared_ptr<Evaluated>> Search::evaluate_without_curve(const std
   });
   for (std::size_t i = 0; i < jobs.size(); ++i)
     if (out[i]->valid) keep(jobs[i].set, out[i]);
+  fits_ += jobs.size();
   return out;
 }
 
 void Search::evaluate_all(std::vector<Job> jobs) {
   drop_repeated(jobs);
-  fits_ += jobs.size();
+  // The most promising first: what is found with them decides which of the others still come near, and whether what
+  // was promised of them holds.
+  std::ranges::stable_sort(jobs, std::greater{}, &Job::promised);
+  Modes asked;
+  while (!jobs.empty()) {
+    const double near = best_log() - rules_.window;
+    const bool over = is_round_over();
+    std::erase_if(jobs, [&](const Job& job) {
+      return std::isfinite(job.promised) && (over || (!job.foremost && job.promised < near));
+    });
+    const std::size_t count = std::min(jobs.size(), rules_.at_once);
+    evaluate_with_curve(std::span(jobs).first(count), asked);
+    jobs.erase(jobs.begin(), jobs.begin() + static_cast<std::ptrdiff_t>(count));
+  }
+}
+
+void Search::evaluate_with_curve(std::span<const Job> jobs, Modes& asked) {
   const auto results = evaluate_without_curve(jobs, hopeless_below());
-  const auto hopeless = [&](const Job& job) { return hopeless_below() - log_prior(job.set); };
-  // Those that still end in one mode are asked for a discrepancy once, the likeliest of them; what was promised beside
-  // one, only while that is near to what has been found since.
-  const double best = best_log();
-  std::vector<std::size_t> order(jobs.size()), asked;
+  // What was promised beside a curve is asked for one only while that is near to what has been found since, and those
+  // that end in one mode once, the likeliest of them.
+  const double likeliest = best_log();
+  const auto asks = [&](std::size_t i) {
+    return results[i]->valid && ((jobs[i].beside_curve && jobs[i].promised > likeliest - rules_.window) ||
+                                 log_prior(jobs[i].set) + results[i]->log_evidence > likeliest - rules_.curve_window);
+  };
+  std::vector<std::size_t> order(jobs.size()), now;
   std::iota(order.begin(), order.end(), std::size_t{0});
   std::ranges::stable_sort(order, std::greater{}, [&](std::size_t i) {
     return results[i]->valid ? results[i]->log_evidence : -std::numeric_limits<double>::infinity();
   });
-  const auto log_without = [&](std::size_t i) { return log_prior(jobs[i].set) + results[i]->log_evidence; };
-  const auto asks = [&](std::size_t i, double likeliest) {
-    return results[i]->valid && ((jobs[i].beside_curve && jobs[i].promised > likeliest - rules_.window) ||
-                                 log_without(i) > likeliest - rules_.curve_window);
-  };
   for (const std::size_t i : order) {
-    const Evaluated& one = *results[i];
-    const auto same = [&](std::size_t k) {
-      return jobs[k].set == jobs[i].set && std::abs(results[k]->log_evidence - one.log_evidence) < kSameMode;
+    const auto same = [&](const auto& mode) {
+      return mode.first == jobs[i].set && std::abs(mode.second - results[i]->log_evidence) < kSameMode;
     };
-    if (asks(i, best) && std::ranges::none_of(asked, same)) asked.push_back(i);
+    if (!asks(i) || std::ranges::any_of(asked, same)) continue;
+    asked.emplace_back(jobs[i].set, results[i]->log_evidence);
+    now.push_back(i);
   }
-  // The most promising first: what is found beside them decides which of the others still come near.
-  std::ranges::stable_sort(asked, std::greater{}, [&](std::size_t i) {
-    return std::isfinite(jobs[i].promised) ? std::max(jobs[i].promised, log_without(i)) : log_without(i);
+  std::vector<std::shared_ptr<Evaluated>> with(now.size());
+  parallel_for(now.size(), [&](std::size_t k) {
+    const Job& job = jobs[now[k]];
+    with[k] = std::make_shared<Evaluated>(*results[now[k]]);
+    // What is promised beside several curves has little of it with the first alone.
+    const bool promised = job.beside_curve && std::isfinite(job.promised);
+    add_discrepancy(*likelihood_, *discrepancy_, curve_rules_, *with[k],
+                    {.large_curve = job.large_curve.get(),
+                     .hopeless_below = hopeless_below() - log_prior(job.set) - curve_rules_.log_prior_odds,
+                     .promised_with_several = promised});
   });
-  for (std::size_t first = 0; first < asked.size(); first += rules_.at_once) {
-    std::vector<std::size_t> now;
-    std::ranges::copy_if(asked | std::views::drop(first) | std::views::take(rules_.at_once), std::back_inserter(now),
-                         [&, likeliest = best_log()](std::size_t i) { return asks(i, likeliest); });
-    std::vector<std::shared_ptr<Evaluated>> with(now.size());
-    parallel_for(now.size(), [&](std::size_t k) {
-      const Job& job = jobs[now[k]];
-      with[k] = std::make_shared<Evaluated>(*results[now[k]]);
-      // What is promised beside several curves has little of it with the first alone.
-      const bool promised = job.beside_curve && std::isfinite(job.promised);
-      add_discrepancy(*likelihood_, *discrepancy_, curve_rules_, *with[k],
-                      {.large_curve = job.large_curve.get(),
-                       .hopeless_below = hopeless(job) - curve_rules_.log_prior_odds,
-                       .promised_with_several = promised});
-    });
-    for (std::size_t k = 0; k < now.size(); ++k) keep(jobs[now[k]].set, with[k]);
-  }
+  for (std::size_t k = 0; k < now.size(); ++k) keep(jobs[now[k]].set, with[k]);
 }
 
 Marginal Search::base_marginal() const { return {*likelihood_, visited_.at({}).at->fit, {}}; }
@@ -214,8 +220,9 @@ void Search::run(const Readings& outliers, const Noise& noise, const Progress& p
     fits_ = 0;
     look_in_rounds(heavy, start, std::move(jobs));
   }
+  last_round_ = true;
   look_with_less_spread();
-  look_at_what_is_left(true);
+  look_at_what_is_left();
 }
 
 std::shared_ptr<const Likelihood> Search::with_heavy_tails(const Fit& fit) const {
@@ -230,6 +237,7 @@ void Search::look_in_rounds(std::shared_ptr<const Likelihood> reference, Start& 
   const Layout nothing(system_, {});
   bool anew = known.empty();
   for (std::size_t round = 0; round < rules_.rounds; ++round) {
+    last_round_ = round + 1 == rules_.rounds;
     likelihood_ = reference;
     Evaluated base = evaluate(*likelihood_, nothing, start.shared, start.local, start.nuisance_sd);
     if (!base.valid) throw std::domain_error("the model cannot follow the recordings");
@@ -261,9 +269,8 @@ void Search::look_in_rounds(std::shared_ptr<const Likelihood> reference, Start& 
     expanded_.clear();
     promised_.clear();
     refitted_.clear();
-    from_larger_.clear();
     swapped_.clear();
-    look_around(round + 1 == rules_.rounds);
+    look_around();
     const Fit& likeliest = likeliest_fit();
     if (near(likeliest.likelihood->noise(), reference->noise()) && likeliest.layout.set() == about.layout.set()) break;
     reference = without_inputs(*likeliest.likelihood);
@@ -319,11 +326,13 @@ double Search::hopeless_below() const { return best_log() - rules_.window - rule
 
 bool Search::is_hopeless(const ModelSet& set) const { return visited_.at(set).log_posterior() < hopeless_below(); }
 
-bool Search::noise_has_moved() const { return !near(likeliest_fit().likelihood->noise(), likelihood_->noise()); }
+bool Search::is_round_over() const {
+  return !last_round_ && !near(likeliest_fit().likelihood->noise(), likelihood_->noise());
+}
 
-void Search::look_around(bool last) {
+void Search::look_around() {
   expand({});
-  if (!last && noise_has_moved()) return;
+  if (is_round_over()) return;
   // Pairs of which neither by itself comes near.
   std::vector<Job> jobs;
   std::map<std::size_t, std::vector<Proposal>> known;  // beside one effect
@@ -341,11 +350,11 @@ void Search::look_around(bool last) {
         jobs.push_back(job_from(single->second.at->fit, second, one.starts.front()));
   }
   evaluate_all(std::move(jobs));
-  look_at_what_is_left(last);
+  look_at_what_is_left();
 }
 
-void Search::look_at_what_is_left(bool last) {
-  while (fits_ < rules_.most_fits && (last || !noise_has_moved())) {
+void Search::look_at_what_is_left() {
+  while (fits_ < rules_.most_fits && !is_round_over()) {
     const ModelSet* next = next_to_expand(visited_, expanded_, rules_.window);
     if (!next) break;
     const ModelSet set = *next;

@@ -6,6 +6,7 @@
 #include <map>
 #include <memory>
 #include <set>
+#include <span>
 
 #include "diagnosis/inference/evidence.hpp"
 #include "diagnosis/inference/proposals.hpp"
@@ -85,6 +86,7 @@ class Search {
     std::vector<Eigen::VectorXd> local;
     Eigen::VectorXd nuisance_sd;
     bool beside_curve = false;
+    bool foremost = false;  // fitted though it does not come near
     // Log posterior that it may have by the linear model; what nothing was promised of is fitted in any case.
     double promised = std::numeric_limits<double>::infinity();
     std::shared_ptr<const Fit> large_curve{};  // with a curve too large for the linear model: the same begins there
@@ -107,13 +109,16 @@ class Search {
   double most_promised(const ModelSet& set) const;
   double log_promised(const Beside& beside, const Proposal& one) const;
   double doubtful(const Proposal& one) const;  // by which a fit may exceed that
-  std::vector<Job> smaller_sets(const Visited& here);
+  std::vector<Job> smaller_sets(const Fit& fit, double log_here);
   std::vector<Job> swaps(const Fit& fit, double log_here);
   void keep(const ModelSet& set, const std::shared_ptr<const Evaluated>& at);
   void drop_repeated(std::vector<Job>& jobs) const;
   // Without a curve, all kept that are valid; what comes to a lower log posterior is left as it is.
-  std::vector<std::shared_ptr<Evaluated>> evaluate_without_curve(const std::vector<Job>& jobs, double give_up_below);
+  std::vector<std::shared_ptr<Evaluated>> evaluate_without_curve(std::span<const Job> jobs, double give_up_below);
   void evaluate_all(std::vector<Job> jobs);
+  // Modes that were asked for a curve: of a set, with its log evidence.
+  using Modes = std::vector<std::pair<ModelSet, double>>;
+  void evaluate_with_curve(std::span<const Job> jobs, Modes& asked);
   static Job job_at(const Fit& fit);
   // A job that is begun from a fit with a curve asks for one, too, and begins with a large one from there.
   void ask_for_curve_of(const Fit& fit, Job& job) const;
@@ -141,11 +146,10 @@ class Search {
   void look_at_foremost_effects();
   // Whether nothing stays hopeless with all that is promised of a curve.
   bool is_nothing_hopeless_with_a_curve() const;
-  // Whether promises that were made by this noise are not worth much by that of what was found since.
-  bool noise_has_moved() const;
-  // Ends where the noise has moved, unless in the last round.
-  void look_around(bool last);
-  void look_at_what_is_left(bool last);  // in the window, the likeliest first
+  // Promises that were made by this noise are not worth much by that of what was found since; the last goes on.
+  bool is_round_over() const;
+  void look_around();
+  void look_at_what_is_left();  // in the window, the likeliest first
   void look_with_less_spread();
 
   const System& system_;
@@ -155,11 +159,12 @@ class Search {
   std::unique_ptr<const Discrepancy> discrepancy_;
   std::unique_ptr<const Proposals> proposals_;
   std::map<ModelSet, Visited> visited_;
-  std::set<ModelSet> expanded_, refitted_, from_larger_;  // once a round each
-  std::set<std::pair<ModelSet, bool>> swapped_;           // beside a curve and without one, the same
+  std::set<ModelSet> expanded_, refitted_;       // once a round each
+  std::set<std::pair<ModelSet, bool>> swapped_;  // beside a curve and without one, the same
   Progress progress_;
   std::map<ModelSet, double> promised_;  // log posterior of sets that were not fitted
   std::size_t fits_ = 0;
+  bool last_round_ = false;
   bool nothing_is_hopeless_ = false;  // whatever the noise: beside it no curve is sought any more
 };
 
