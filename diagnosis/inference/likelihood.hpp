@@ -164,9 +164,11 @@ CurveAt everywhere(const CurveColumns& curve);
 // Squared whitened residuals and priors' pulls at a fit's unknowns, as Fit::cost; infinite outside the model's domain.
 double cost_at(const Likelihood& likelihood, const Fit& fit, const CurveColumns& curve);
 
+struct LinearRecording;
 // The normal equations about a fit, unknowns as steps from the mode: shared, then the curve's values. Empty outside the
-// model's domain.
-std::vector<ArrowBlock> linearise(const Likelihood& likelihood, const Fit& fit, const CurveColumns& curve);
+// model's domain. recordings: given what the blocks are made of, without these; null: not kept.
+std::vector<ArrowBlock> linearise(const Likelihood& likelihood, const Fit& fit, const CurveColumns& curve,
+                                  std::vector<LinearRecording>* recordings = nullptr);
 // Priors of the shared part: precision and centre.
 struct Pulls {
   Eigen::MatrixXd precision;

@@ -44,20 +44,19 @@ MatrixXd orthogonal(const MatrixXd& L, const VectorXd& precision) {
 Marginal::Marginal(const Likelihood& likelihood, const Fit& fit, const CurveColumns& curve,
                    const Likelihood* columns_by)
     : set_(fit.layout.set()) {
-  std::vector<LinearRecording> recordings(likelihood.recordings());
-  std::vector<ArrowBlock> blocks;
+  std::vector<LinearRecording> recordings;
+  const auto blocks = linearise(likelihood, fit, curve, &recordings);
+  if (blocks.empty()) return;
+  const ArrowSolution solution = solve_about(fit, blocks, curve);
+  if (!solution.valid) return;
+  valid_ = true;
+  step_ = solution.shared;
+  root_ = root_of(solution.covariance);
   for (std::size_t r = 0; r < recordings.size(); ++r) {
-    if (!linearise(likelihood, fit, curve, r, recordings[r])) return;
-    blocks.push_back(recordings[r].block);
-  }
-  solution_ = solve_about(fit, blocks, curve);
-  if (!solution_.valid) return;
-  root_ = root_of(solution_.covariance);
-  for (std::size_t r = 0; r < recordings.size(); ++r) {
-    const auto& [residuals, L, Z, block] = recordings[r];
-    const MatrixXd Q = orthogonal(L, block.precision);
+    const MatrixXd &L = recordings[r].L, &Z = recordings[r].Z;
+    const MatrixXd Q = orthogonal(L, blocks[r].precision);
     MatrixXf own = Q.cast<float>(), shared = ((Z - Q * (Q.transpose() * Z)) * root_).cast<float>();
-    VectorXf left = (residuals.white - L * solution_.local[r] - Z * solution_.shared).cast<float>();
+    VectorXf left = (recordings[r].residuals.white - L * solution.local[r] - Z * step_).cast<float>();
     if (columns_by != nullptr && columns_by != &likelihood) {
       weight_.push_back(weights_of(likelihood, *columns_by, r));
       own = weight_.back().asDiagonal() * own;

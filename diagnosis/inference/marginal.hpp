@@ -14,11 +14,11 @@ class Marginal {
   Marginal(const Likelihood& likelihood, const Fit& fit, const CurveColumns& curve,
            const Likelihood* columns_by = nullptr);
   // False outside the model's domain.
-  bool valid() const { return solution_.valid; }
+  bool valid() const { return valid_; }
   std::size_t recordings() const { return own_.size(); }
   const ModelSet& set() const { return set_; }
   // The step from the fit to the mode of the shared unknowns, the curve's values last; and R: their covariance is RR'.
-  const Eigen::VectorXd& step() const { return solution_.shared; }
+  const Eigen::VectorXd& step() const { return step_; }
   const Eigen::MatrixXd& root() const { return root_; }
 
   // Inner products of a recording's columns X (whitened) with what is left at the mode, once its own unknowns are
@@ -50,8 +50,9 @@ class Marginal {
   std::vector<Eigen::MatrixXf> own_, shared_;  // Q and MZR, per recording
   std::vector<Eigen::VectorXf> left_;          // w - L l - Z z at the mode
   std::vector<Eigen::VectorXf> weight_;        // of the rows of columns; empty: one. All of the above have it already
-  ArrowSolution solution_;
+  Eigen::VectorXd step_;
   Eigen::MatrixXd root_;
+  bool valid_ = false;
 };
 
 }  // namespace bevel::inference

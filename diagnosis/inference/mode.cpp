@@ -40,6 +40,7 @@ namespace {
 bool make_blocks(const Likelihood& likelihood, const Fit& fit, const CurveColumns& curve,
                  std::vector<ArrowBlock>& blocks, std::vector<LinearRecording>* kept = nullptr) {
   blocks.resize(likelihood.recordings());
+  if (kept) kept->resize(likelihood.recordings());
   std::atomic<bool> valid = true;
   parallel_for(likelihood.recordings(), [&](std::size_t r) {
     LinearRecording recording;
@@ -136,9 +137,10 @@ std::shared_ptr<const Likelihood> with_inputs_of(const Fit& fit, const std::shar
   return inputs.empty() ? likelihood : std::make_shared<const Likelihood>(*likelihood, likelihood->noise(), inputs);
 }
 
-std::vector<ArrowBlock> linearise(const Likelihood& likelihood, const Fit& fit, const CurveColumns& curve) {
+std::vector<ArrowBlock> linearise(const Likelihood& likelihood, const Fit& fit, const CurveColumns& curve,
+                                  std::vector<LinearRecording>* recordings) {
   std::vector<ArrowBlock> blocks;
-  if (!make_blocks(likelihood, fit, curve, blocks)) blocks.clear();
+  if (!make_blocks(likelihood, fit, curve, blocks, recordings)) blocks.clear();
   return blocks;
 }
 
@@ -189,7 +191,6 @@ struct Place {
 bool look(const Likelihood& likelihood, const CurveAt& curve_at, Fit& at, Place& place) {
   at.cost = std::numeric_limits<double>::infinity();
   const auto curve = curve_at(at, true);
-  place.recordings.resize(likelihood.recordings());
   if (!curve || !make_blocks(likelihood, at, *curve, place.blocks, &place.recordings)) return false;
   at.tangent = curve->tangent;
   place.pulls = pulls_of(at.layout, at.shared, at.curve_values, curve->covariance);
