@@ -133,6 +133,17 @@ double log_factor_of(const std::vector<CurveFactor>& curves, const CurvePrior& p
   return at == curves.end() ? -std::numeric_limits<double>::infinity() : at->log_bayes_factor;
 }
 
+// Whether a fit stays hopeless with all that is promised of one more curve by the noise that the curves were prepared
+// with. By a noise that is much smaller than the fit's own every curve promises much, and leaves more undone.
+bool stays_hopeless(const Likelihood& likelihood, const Discrepancy& discrepancy, const Fit& fit, double log_evidence,
+                    double promised, double hopeless) {
+  if (log_evidence + kMostOfPromise * promised < hopeless) return true;
+  if (!(log_evidence < hopeless)) return false;
+  const auto by = with_inputs_of(fit, {std::shared_ptr<const void>(), &likelihood});  // not owned: no longer than here
+  const Moved moved = moved_to(by, fit, discrepancy);
+  return moved.fit.valid && log_evidence + kMostOfPromise * moved.log_gain(promised) < hopeless;
+}
+
 // One more curve beside those that a set has; whether it is likelier than none more.
 bool add_curve(const Likelihood& likelihood, const Discrepancy& discrepancy, const CurveRules& rules, double hopeless,
                Evaluated& out, Together& so_far) {
@@ -147,7 +158,8 @@ bool add_curve(const Likelihood& likelihood, const Discrepancy& discrepancy, con
   if (more == scans.end()) return false;
   const Integrated all = integrated(more->curves);
   const double promised = all.log_factor + more->beside.log_change;
-  if (promised < least || so_far.log_evidence + kMostOfPromise * promised < hopeless) return false;
+  if (promised < least || stays_hopeless(likelihood, discrepancy, here, so_far.log_evidence, promised, hopeless))
+    return false;
   const CurvePrior& prior = more->curves.front().prior;
   const double no_likelier = so_far.log_evidence - rules.log_prior_odds_more - all.log_others;
   Settled with = settle_with_one_more(likelihood, discrepancy, here, prior, no_likelier - rules.optimism);
@@ -316,7 +328,11 @@ void add_discrepancy(const Likelihood& likelihood, const Discrepancy& discrepanc
     if (there.log_evidence() > best.log_evidence()) best = std::move(there);
   };
   const double others = integrated(out.curves).log_others;
-  if (large_curve) try_one({.prior = large_curve->scales.curves.front(), .log_others = others, .from = large_curve});
+  if (large_curve) {
+    try_one({.prior = large_curve->scales.curves.front(), .log_others = others, .from = large_curve});
+    // What was promised was promised beside that one.
+    if (best.log_evidence() < give_up_below) return;
+  }
   if (stands_out && out.log_evidence + out.curves.front().log_bayes_factor + others > best.log_evidence())
     try_one({.prior = out.curves.front().prior, .log_others = others, .from = &out.fit});
   // And beside less spread, where that promises more. Fitted from the spread that there is: without it the noise takes

@@ -2,6 +2,7 @@
 // The evidence of a set of effects: the integral of likelihood times prior over everything unknown. By Laplace's method
 // in what is nonlinear, exactly in what is linear about the mode; over grids for the standard deviations of the
 // nuisances and for each of the discrepancy's curves, their scales and lengths.
+#include <algorithm>
 #include <limits>
 
 #include "diagnosis/inference/discrepancy.hpp"
@@ -68,6 +69,12 @@ struct Moved {
   // What the readings say of the shared unknowns by the noise that the fit had, as a share of what they say by this one
   // (the geometric mean of their information).
   double share_before = 1;
+  // Of what is promised by this noise: what it comes to, relative to the fit by its own. This noise may be wrong for
+  // the fit and right for what has more, or the other way about: that finds its own, which promises no less than
+  // either.
+  double log_gain(double log_promised) const {
+    return std::max(log_change + log_promised, share_before * log_promised);
+  }
 };
 Moved moved_to(const std::shared_ptr<const Likelihood>& likelihood, const Fit& from, const Discrepancy& discrepancy);
 

@@ -28,6 +28,7 @@ void Search::ask_for_curve_of(const Fit& fit, Job& job) const {
 
 void Search::ask_for_curve_of(const Fit& fit, std::shared_ptr<const Likelihood> by, Job& job) const {
   job.beside_curve = !fit.scales.curves.empty();
+  job.beside_several = fit.scales.curves.size() > 1;
   if (!fit.tangent) return;
   Fit from = with_first_curve(*discrepancy_, carried_to(job.layout, fit));
   from.shared = job.shared;
@@ -59,17 +60,14 @@ Search::Job Search::job_from(const Fit& fit, std::size_t effect, const StartPoin
 // Beside a fit, with its curve if it has one, and beside the same with less spread.
 std::vector<Search::Beside> Search::look_beside(const Fit& fit, double log_here, bool with_others_moved) const {
   const auto by = with_inputs_of(fit, likelihood_);
-  const Moved moved = moved_to(by, fit, *discrepancy_);
   // Shared by all that is looked at beside less spread, now or later.
-  const auto curve = std::make_shared<const CurveColumns>(discrepancy_->columns(*by, moved.fit));
-  const auto from = std::make_shared<const Fit>(moved.fit);
+  const auto moved = std::make_shared<const Moved>(moved_to(by, fit, *discrepancy_));
+  const std::shared_ptr<const Fit> from(moved, &moved->fit);
+  const auto curve = std::make_shared<const CurveColumns>(discrepancy_->columns(*by, *from));
   const Marginal marginal(*by, *from, *curve, likelihood_.get());
-  // What is promised is relative to this set by the reference's noise, which may be wrong for this set and right for
-  // the larger; or by that of this set, of which it is the other way about: the larger finds its own, which promises no
-  // less than either.
-  const auto log_promised = [log_here, valid = from->valid, log_moved = moved.log_change,
-                             share = moved.share_before](double log_change) {
-    return log_here + (valid ? std::max(log_moved + log_change, share * log_change) : log_moved);
+  // What is promised is relative to this set by the reference's noise.
+  const auto log_promised = [log_here, moved](double log_change) {
+    return log_here + (moved->fit.valid ? moved->log_gain(log_change) : moved->log_change);
   };
   std::vector<Beside> out{{.about = *from,
                            .proposals = proposals_->beside(marginal, rules_.starts),
@@ -116,8 +114,8 @@ double Search::log_promised(const Beside& beside, const Proposal& one) const {
   return beside.log_promised(one.log_bayes_factor) + log_prior_odds(one.effect);
 }
 
-double Search::doubtful(const Proposal& one) const {
-  return rules_.optimism + rules_.linear_error * std::max(0.0, one.log_bayes_factor);
+double Search::doubtful(double log_promised) const {
+  return rules_.optimism + rules_.linear_error * std::max(0.0, log_promised);
 }
 
 // The set with each effect that comes near.
@@ -128,7 +126,7 @@ std::vector<Search::Job> Search::larger_sets(const ModelSet& set, const Beside& 
     return log_promised(by, one) >= most_promised(with(set, one.effect)) + rules_.optimism;
   };
   const auto promises_more = [&](const Proposal& one) {
-    return log_promised(beside, one) + doubtful(one) >= near && is_new(beside, one);
+    return log_promised(beside, one) + doubtful(one.log_bayes_factor) >= near && is_new(beside, one);
   };
   const bool again = static_cast<bool>(beside.at_its_mode);
   if (again && std::ranges::none_of(beside.proposals, promises_more)) return out;
@@ -145,7 +143,7 @@ std::vector<Search::Job> Search::larger_sets(const ModelSet& set, const Beside& 
     const bool nothing_new = again && !is_new(here, one);
     promised_[larger] = std::max(most_promised(larger), promised);
     if (nothing_new) continue;
-    const double doubtful = this->doubtful(one);
+    const double doubtful = this->doubtful(one.log_bayes_factor);
     if (!foremost && promised + doubtful < near) continue;
     // A fit that fell far short of the promise may be in a local minimum: once more, from these starts.
     const auto visited = visited_.find(larger);
@@ -163,23 +161,24 @@ std::vector<Search::Job> Search::larger_sets(const ModelSet& set, const Beside& 
   return out;
 }
 
-// The set without each member, from where the fit is. One that was visited already once more, if from here it is
-// likelier even without what it gains by having fewer parameters: then it was in a local minimum.
-std::vector<Search::Job> Search::smaller_sets(const Fit& fit, double log_here) {
-  const ModelSet& set = fit.layout.set();
-  const bool beside_curve = !fit.scales.curves.empty();
-  const auto costs = log_costs_of_dropping(fit, discrepancy_->columns(*fit.likelihood, fit));
-  std::vector<Job> out;
-  for (std::size_t m = 0; m < set.size(); ++m) {
-    const ModelSet smaller = without(set, set[m]);
-    if (const auto known = visited_.find(smaller); known != visited_.end()) {
-      const double log_known = beside_curve ? known->second.log_with_curve : known->second.log_without_curve;
-      if (log_known > log_here - costs[m] - log_prior_odds(set[m]) - rules_.optimism) continue;
-    }
-    out.push_back(job_at(carried_to(Layout(system_, smaller), fit)));
-    ask_for_curve_of(fit, out.back());
+// The set without a member, from where the fit is. One that was visited already once more, if from here it is likelier
+// even without what it gains by having fewer parameters: then it was in a local minimum. That is of no use where it
+// stays far from the likeliest set all the same.
+std::optional<Search::Job> Search::smaller_set(const Fit& about, std::size_t member, double log_here,
+                                               double log_cost) const {
+  const ModelSet& smaller = about.layout.set();
+  const double promised = log_here - log_cost - log_prior_odds(member);
+  const auto known = visited_.find(smaller);
+  if (known != visited_.end()) {
+    const bool beside_curve = !about.scales.curves.empty();
+    const double log_known = beside_curve ? known->second.log_with_curve : known->second.log_without_curve;
+    if (log_known > promised - rules_.optimism) return std::nullopt;
   }
-  return out;
+  Job job = job_at(about);
+  if (std::isfinite(log_cost)) job.promised = promised + doubtful(log_cost);
+  job.foremost = known == visited_.end();
+  ask_for_curve_of(about, job);
+  return job;
 }
 
 void Search::expand(const ModelSet& set) {
@@ -205,19 +204,16 @@ void Search::expand(const ModelSet& set) {
     append_larger(look_beside(here.at->fit, here.log_without_curve, !set.empty()));
   }
   if (!hopeless) {
-    const auto append_others = [&](const Fit& fit, double log_here) {
-      append(smaller_sets(fit, log_here));
-      append(swaps(fit, log_here));
-    };
-    if (here.is_likelier_with_curve()) append_others(*here.at->fit_with_curve, here.log_with_curve);
-    append_others(here.at->fit, here.log_without_curve);
+    if (here.is_likelier_with_curve()) append(sets_without_a_member(*here.at->fit_with_curve, here.log_with_curve));
+    append(sets_without_a_member(here.at->fit, here.log_without_curve));
   }
   evaluate_all(std::move(jobs));
 }
 
 void Search::look_at_foremost_effects() {
   const Fit base = visited_.at({}).at->fit;
-  const auto list = Proposals(*likelihood_, base).beside(base_marginal(), 1);
+  proposals_ = std::make_unique<const Proposals>(*likelihood_, base);
+  const auto list = proposals_->beside(base_marginal(), 1);
   std::vector<Job> jobs;
   for (const Proposal& one : std::span(list).first(std::min(list.size(), rules_.at_once)))
     if (!one.starts.empty()) jobs.push_back(job_from(base, one.effect, one.starts.front()));
@@ -230,50 +226,62 @@ bool Search::is_nothing_hopeless_with_a_curve() const {
   return visited_.at({}).log_posterior() + kMostOfPromise * promised < hopeless_below();
 }
 
-// Each member's place taken by another effect, with all else where it is: what two have in common is far from where the
-// smaller set alone would be fitted, and what sets them apart is little. Promised is the difference between the two, by
-// one linear model.
-std::vector<Search::Job> Search::swaps(const Fit& fit, double log_here) {
+// Each member's place left empty, and taken by another effect.
+std::vector<Search::Job> Search::sets_without_a_member(const Fit& fit, double log_here) {
   const ModelSet& set = fit.layout.set();
-  const bool beside_curve = !fit.scales.curves.empty();
-  const double best = best_log();
   const auto own = with_inputs_of(fit, likelihood_);
   const CurveColumns curve = discrepancy_->columns(*own, fit);
+  const auto costs = log_costs_of_dropping(fit, discrepancy_->columns(*fit.likelihood, fit));
   std::vector<Job> out;
   for (std::size_t place = 0; place < set.size(); ++place) {
-    const std::size_t member = set[place];
-    const ModelSet rest = without(set, member);
-    const Fit about = carried_to(Layout(system_, rest), fit);
+    const Fit about = carried_to(Layout(system_, without(set, set[place])), fit);
     const auto list = proposals_->beside(Marginal(*own, about, curve, likelihood_.get()), rules_.starts);
-    const auto leaves = std::ranges::find(list, member, &Proposal::effect);
-    if (leaves == list.end()) continue;
-    const auto many = [](const Unknown& u) { return u.parameter != nullptr && has_many_minima(*u.parameter); };
-    const bool has_many = std::ranges::any_of(about.layout.shared(), many);
-    std::size_t rank = 0;
-    for (const Proposal& one : list) {
-      if (one.effect == member) continue;
-      if (rank++ >= rules_.foremost) break;
-      const ModelSet swapped = with(rest, one.effect);
-      const auto visited = visited_.find(swapped);
-      if (visited != visited_.end() && visited->second.log_posterior() > best - rules_.window) continue;
-      if (one.starts.empty() || swapped_.contains({swapped, beside_curve})) continue;
-      double difference = one.log_bayes_factor - leaves->log_bayes_factor, doubt = doubtful(*leaves);
-      // Where the rest has many local minima the linear model about none of the two says nothing of either.
-      std::optional<Fit> there;
-      if (has_many && system_.allows(with(set, one.effect))) {
-        there = replaced(*own, curve, fit, place, one.effect, one.starts.front().shared);
-        if (there->valid) difference = 0.5 * (cost_at(*own, fit, curve) - there->cost), doubt = rules_.optimism;
-      }
-      const double promised = log_here + difference + log_prior_odds(one.effect) - log_prior_odds(member);
-      if (promised + doubt < best - rules_.window) continue;
-      swapped_.insert({swapped, beside_curve});
-      out.push_back(job_from(about, one.effect, one.starts.front()));
-      Job& job = out.back();
-      if (there && there->valid) job.shared = there->shared, job.local = there->local;
-      ask_for_curve_of(about, job);
-    }
+    const auto leaves = std::ranges::find(list, set[place], &Proposal::effect);
+    // What has no size that may be none costs what it would be worth there.
+    const bool has_size = std::isfinite(costs[place]) || leaves == list.end();
+    if (auto job = smaller_set(about, set[place], log_here, has_size ? costs[place] : leaves->log_bayes_factor))
+      out.push_back(*std::move(job));
+    if (leaves != list.end()) append_swaps({*own, curve, fit, about, place, list, *leaves}, log_here, out);
   }
   return out;
+}
+
+// A member's place taken by another effect, with all else where it is: what two have in common is far from where the
+// smaller set alone would be fitted, and what sets them apart is little. Promised is the difference between the two, by
+// one linear model.
+void Search::append_swaps(const Swapped& from, double log_here, std::vector<Job>& out) {
+  const ModelSet& set = from.fit.layout.set();
+  const std::size_t member = set[from.place];
+  const bool beside_curve = !from.fit.scales.curves.empty();
+  const double near = best_log() - rules_.window;
+  const auto many = [](const Unknown& u) { return u.parameter != nullptr && has_many_minima(*u.parameter); };
+  const bool has_many = std::ranges::any_of(from.about.layout.shared(), many);
+  std::size_t rank = 0;
+  for (const Proposal& one : from.proposals) {
+    if (one.effect == member) continue;
+    if (rank++ >= rules_.foremost) break;
+    const ModelSet swapped = with(from.about.layout.set(), one.effect);
+    const auto visited = visited_.find(swapped);
+    if (visited != visited_.end() && visited->second.log_posterior() > near) continue;
+    if (one.starts.empty() || swapped_.contains({swapped, beside_curve})) continue;
+    double difference = one.log_bayes_factor - from.leaves.log_bayes_factor;
+    double doubt = doubtful(from.leaves.log_bayes_factor);
+    // Where the rest has many local minima the linear model about none of the two says nothing of either.
+    std::optional<Fit> there;
+    if (has_many && system_.allows(with(set, one.effect))) {
+      there = replaced(from.own, from.curve, from.fit, from.place, one.effect, one.starts.front().shared);
+      if (there->valid)
+        difference = 0.5 * (cost_at(from.own, from.fit, from.curve) - there->cost), doubt = rules_.optimism;
+    }
+    const double promised = log_here + difference + log_prior_odds(one.effect) - log_prior_odds(member) + doubt;
+    if (promised < near) continue;
+    swapped_.insert({swapped, beside_curve});
+    Job job = job_from(from.about, one.effect, one.starts.front());
+    job.promised = promised;
+    if (there && there->valid) job.shared = there->shared, job.local = there->local;
+    ask_for_curve_of(from.about, job);
+    out.push_back(std::move(job));
+  }
 }
 
 }  // namespace bevel::inference

@@ -186,12 +186,10 @@ void Search::evaluate_with_curve(std::span<const Job> jobs, Modes& asked) {
   parallel_for(now.size(), [&](std::size_t k) {
     const Job& job = jobs[now[k]];
     with[k] = std::make_shared<Evaluated>(*results[now[k]]);
-    // What is promised beside several curves has little of it with the first alone.
-    const bool promised = job.beside_curve && std::isfinite(job.promised);
     add_discrepancy(*likelihood_, *discrepancy_, curve_rules_, *with[k],
                     {.large_curve = job.large_curve.get(),
-                     .hopeless_below = hopeless_below() - log_prior(job.set) - curve_rules_.log_prior_odds,
-                     .promised_with_several = promised});
+                     .hopeless_below = hopeless_with_curve(job.set),
+                     .promised_with_several = job.beside_several && std::isfinite(job.promised)});
   });
   for (std::size_t k = 0; k < now.size(); ++k) keep(jobs[now[k]].set, with[k]);
 }
@@ -207,18 +205,19 @@ void Search::run(const Readings& outliers, const Noise& noise, const Progress& p
   Start start{.shared = tempered.shared, .local = tempered.local, .nuisance_sd = middle_nuisance_sd(system_)};
   look_in_rounds(std::make_shared<const Likelihood>(system_, outliers, noise), start, {});
   nothing_is_hopeless_ = visited_.at({}).log_posterior() < hopeless_below() - rules_.curve_window;
-  // Whether the noise has heavy tails only the likeliest set can say: what jumps is no noise, once it has a name.
-  if (const auto heavy = with_heavy_tails(likeliest_fit())) {
+  const bool heavy = look_for_heavy_tails();
+  tails_known_ = true;
+  if (heavy) {
     std::vector<Job> jobs;
     const double best = best_log();
     for (const auto& [set, one] : visited_) {
       if (set.empty() || one.log_posterior() < best - rules_.curve_window) continue;
       jobs.push_back(job_at(one.likelier_fit()));
-      ask_for_curve_of(one.likelier_fit(), heavy, jobs.back());
+      ask_for_curve_of(one.likelier_fit(), heavy_, jobs.back());
     }
     visited_.clear();
     fits_ = 0;
-    look_in_rounds(heavy, start, std::move(jobs));
+    look_in_rounds(heavy_, start, std::move(jobs));
   }
   last_round_ = true;
   look_with_less_spread();
@@ -232,6 +231,14 @@ std::shared_ptr<const Likelihood> Search::with_heavy_tails(const Fit& fit) const
   return std::make_shared<const Likelihood>(*fit.likelihood, noise.noise, std::vector<VectorXd>{}, noise.precision);
 }
 
+bool Search::look_for_heavy_tails() {
+  if (!heavy_ && asked_for_tails_ != best().at) {
+    asked_for_tails_ = best().at;
+    heavy_ = with_heavy_tails(likeliest_fit());
+  }
+  return heavy_ != nullptr;
+}
+
 // By the noise of a reference and its innovations' precision, at first; known: sets to be weighed before any is sought.
 void Search::look_in_rounds(std::shared_ptr<const Likelihood> reference, Start& start, std::vector<Job> known) {
   const Layout nothing(system_, {});
@@ -242,6 +249,7 @@ void Search::look_in_rounds(std::shared_ptr<const Likelihood> reference, Start& 
     Evaluated base = evaluate(*likelihood_, nothing, start.shared, start.local, start.nuisance_sd);
     if (!base.valid) throw std::domain_error("the model cannot follow the recordings");
     discrepancy_ = std::make_unique<const Discrepancy>(*likelihood_, base.fit);
+    proposals_ = nullptr;
     keep({}, std::make_shared<const Evaluated>(base));
     if (!known.empty()) evaluate_all(std::move(known));
     known.clear();
@@ -251,26 +259,28 @@ void Search::look_in_rounds(std::shared_ptr<const Likelihood> reference, Start& 
       nothing_is_hopeless_ = is_nothing_hopeless_with_a_curve();
     }
     if (!nothing_is_hopeless_ && (!visited_.at({}).at->with_discrepancy || !is_hopeless({}))) {
-      add_discrepancy(*likelihood_, *discrepancy_, curve_rules_, base,
-                      {.hopeless_below = hopeless_below() - curve_rules_.log_prior_odds});
+      add_discrepancy(*likelihood_, *discrepancy_, curve_rules_, base, {.hopeless_below = hopeless_with_curve({})});
       keep({}, std::make_shared<const Evaluated>(base));
       if (!is_hopeless({})) add_large_curves(*likelihood_, *discrepancy_, curve_rules_, base);
     }
     start = {.shared = base.fit.shared, .local = base.fit.local, .nuisance_sd = base.fit.scales.nuisance_sd};
-    if (anew) {
+    const Fit about = anew && best().set.empty() ? base.fit : likeliest_fit();
+    const Noise& beside = likeliest_fit().likelihood->noise();
+    if (anew && !(best().set.empty() && near(beside, likelihood_->noise()))) {
       // An effect or a curve takes up most of what is missing: the noise beside it is nearer to the truth.
       likelihood_ = reference = without_inputs(*likeliest_fit().likelihood);
       discrepancy_ = std::make_unique<const Discrepancy>(*likelihood_, base.fit);
+      proposals_ = nullptr;
     }
-    const Fit about = anew && best().set.empty() ? base.fit : likeliest_fit();
     anew = false;
-    proposals_ = std::make_unique<const Proposals>(*likelihood_, about);
+    if (!proposals_) proposals_ = std::make_unique<const Proposals>(*likelihood_, about);
     keep({}, std::make_shared<const Evaluated>(base));
     expanded_.clear();
     promised_.clear();
     refitted_.clear();
     swapped_.clear();
     look_around();
+    if (!tails_known_ && heavy_) break;
     const Fit& likeliest = likeliest_fit();
     if (near(likeliest.likelihood->noise(), reference->noise()) && likeliest.layout.set() == about.layout.set()) break;
     reference = without_inputs(*likeliest.likelihood);
@@ -324,6 +334,10 @@ const ModelSet* next_to_expand(const std::map<ModelSet, Visited>& visited, const
 
 double Search::hopeless_below() const { return best_log() - rules_.window - rules_.doubt; }
 
+double Search::hopeless_with_curve(const ModelSet& set) const {
+  return hopeless_below() - log_prior(set) - curve_rules_.log_prior_odds;
+}
+
 bool Search::is_hopeless(const ModelSet& set) const { return visited_.at(set).log_posterior() < hopeless_below(); }
 
 bool Search::is_round_over() const {
@@ -361,10 +375,12 @@ void Search::look_at_what_is_left() {
     const auto at = visited_.at(set).at;
     if (!at->with_discrepancy) {
       auto with = std::make_shared<Evaluated>(*at);
-      add_discrepancy(*likelihood_, *discrepancy_, curve_rules_, *with);
+      add_discrepancy(*likelihood_, *discrepancy_, curve_rules_, *with, {.hopeless_below = hopeless_with_curve(set)});
       keep(set, with);
     }
     expand(set);
+    // All that comes near is looked at once more by such a noise: now that the likeliest has been looked around.
+    if (!tails_known_ && expanded_.contains(best().set) && look_for_heavy_tails()) break;
   }
 }
 

@@ -5,6 +5,7 @@
 #include <limits>
 #include <map>
 #include <memory>
+#include <optional>
 #include <set>
 #include <span>
 
@@ -86,7 +87,8 @@ class Search {
     std::vector<Eigen::VectorXd> local;
     Eigen::VectorXd nuisance_sd;
     bool beside_curve = false;
-    bool foremost = false;  // fitted though it does not come near
+    bool beside_several = false;  // with the first alone there is little of what is promised
+    bool foremost = false;        // fitted though it does not come near
     // Log posterior that it may have by the linear model; what nothing was promised of is fitted in any case.
     double promised = std::numeric_limits<double>::infinity();
     std::shared_ptr<const Fit> large_curve{};  // with a curve too large for the linear model: the same begins there
@@ -108,9 +110,20 @@ class Search {
   std::vector<Job> larger_sets(const ModelSet& set, const Beside& beside);
   double most_promised(const ModelSet& set) const;
   double log_promised(const Beside& beside, const Proposal& one) const;
-  double doubtful(const Proposal& one) const;  // by which a fit may exceed that
-  std::vector<Job> smaller_sets(const Fit& fit, double log_here);
-  std::vector<Job> swaps(const Fit& fit, double log_here);
+  double doubtful(double log_promised) const;  // by which a fit may exceed what the linear model says of it
+  std::vector<Job> sets_without_a_member(const Fit& fit, double log_here);
+  std::optional<Job> smaller_set(const Fit& about, std::size_t member, double log_here, double log_cost) const;
+  // A fit whose member at `place` leaves, and what is proposed beside the rest, that member too.
+  struct Swapped {
+    const Likelihood& own;
+    const CurveColumns& curve;
+    const Fit& fit;
+    const Fit& about;
+    std::size_t place;
+    const std::vector<Proposal>& proposals;
+    const Proposal& leaves;
+  };
+  void append_swaps(const Swapped& from, double log_here, std::vector<Job>& out);
   void keep(const ModelSet& set, const std::shared_ptr<const Evaluated>& at);
   void drop_repeated(std::vector<Job>& jobs) const;
   // Without a curve, all kept that are valid; what comes to a lower log posterior is left as it is.
@@ -128,6 +141,8 @@ class Search {
   Job job_from(const Fit& fit, std::size_t effect, const StartPoint& start) const;
   // Null: its noise is normal.
   std::shared_ptr<const Likelihood> with_heavy_tails(const Fit& fit) const;
+  // Whether the likeliest set's noise has, which alone can say: what jumps is no noise, once it has a name.
+  bool look_for_heavy_tails();
   double best_log() const;
   const Fit& likeliest_fit() const { return best().likelier_fit(); }
   bool is_visited(const ModelSet& set) const { return visited_.contains(set); }
@@ -142,6 +157,7 @@ class Search {
   // Of a set that is visited: so far below the likeliest that no curve is sought beside it any more.
   bool is_hopeless(const ModelSet& set) const;
   double hopeless_below() const;
+  double hopeless_with_curve(const ModelSet& set) const;  // log evidence
   // Each alone and without a curve, before any is sought.
   void look_at_foremost_effects();
   // Whether nothing stays hopeless with all that is promised of a curve.
@@ -164,6 +180,9 @@ class Search {
   Progress progress_;
   std::map<ModelSet, double> promised_;  // log posterior of sets that were not fitted
   std::size_t fits_ = 0;
+  std::shared_ptr<const Likelihood> heavy_;           // by noise with heavy tails; null: normal, as far as is known
+  std::shared_ptr<const Evaluated> asked_for_tails_;  // the likeliest set, when that was asked
+  bool tails_known_ = false;                          // not asked any more
   bool last_round_ = false;
   bool nothing_is_hopeless_ = false;  // whatever the noise: beside it no curve is sought any more
 };
