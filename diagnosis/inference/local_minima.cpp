@@ -296,10 +296,12 @@ std::vector<double> log_costs_of_dropping(const Fit& fit, const CurveColumns& cu
       apart.push_back(fit.shared[sizes.back()] - parameters[p].none);
       held = held || std::ranges::count(fit.held, sizes.back()) > 0;
     }
-    if (sizes.empty() || held) continue;
+    if (sizes.empty()) continue;
+    const auto d = Eigen::Map<const VectorXd>(apart.data(), static_cast<Index>(apart.size()));
+    if (d.isZero(0)) out[m] = 0;
+    if (held || d.isZero(0)) continue;
     const ArrowSolution solution = solve_about(fit, blocks, curve, sizes);
     if (!solution.valid) continue;
-    const auto d = Eigen::Map<const VectorXd>(apart.data(), static_cast<Index>(apart.size()));
     out[m] = 0.5 * d.dot(solution.covariance(sizes, sizes).ldlt().solve(d));
   }
   return out;

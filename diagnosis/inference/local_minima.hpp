@@ -40,7 +40,7 @@ Fit replaced(const Likelihood& likelihood, const CurveColumns& curve, const Fit&
              std::size_t effect, const Eigen::VectorXd& start);
 
 // By the linear model: by how much the log likelihood falls where one member's sizes are none, for each member.
-// Infinite for one that has no size to be none, or one that presses against a bound.
+// Infinite for one that has no size to be none, or one that presses against a bound other than that.
 std::vector<double> log_costs_of_dropping(const Fit& fit, const CurveColumns& curve = {});
 
 }  // namespace bevel::inference

@@ -5,7 +5,6 @@
 
 #include "diagnosis/inference/error_spread.hpp"
 #include "diagnosis/inference/evidence.hpp"
-#include "diagnosis/inference/local_minima.hpp"
 #include "diagnosis/inference/log_sum.hpp"
 #include "diagnosis/inference/posterior.hpp"
 #include "diagnosis/inference/proposals.hpp"
@@ -53,26 +52,6 @@ TEST(Evidence, OfALinearModelIsTheNormalDensityOfAllReadings) {
         EXPECT_EQ(at.fit.scales.nuisance_sd[0] > 0, nuisance_sd > 0);
       }
     }
-}
-
-// A way out of a local minimum.
-TEST(Evidence, WhatDroppingAnEffectCostsIsTheFallOfTheLikelihood) {
-  const LinearSystem system(4, 7, 0.4, 0.2, 0);
-  const auto likelihood = std::make_shared<const Likelihood>(system, Readings(4), white(system));
-  const Scales scales{.nuisance_sd = VectorXd::Constant(1, 0.2), .curves = {}};
-  const auto fitted = [&](const ModelSet& set) {
-    const Layout layout(system, set);
-    Fit out = fit(*likelihood, layout, layout.shared_start(), std::vector<VectorXd>(4, layout.local_start()), scales,
-                  {}, {.tolerance = 1e-9});
-    out.likelihood = likelihood;
-    return out;
-  };
-  const Fit both = fitted({0, 1});
-  const auto costs = log_costs_of_dropping(both);
-  ASSERT_EQ(costs.size(), 2U);
-  for (std::size_t m = 0; m < 2; ++m) EXPECT_NEAR(costs[m], 0.5 * (fitted({1 - m}).cost - both.cost), 1e-4 * costs[m]);
-  EXPECT_GT(costs[0], 10);  // a parabola of four deviations at its ends, of which the cosine may take much
-  EXPECT_LT(costs[1], 5);   // no step
 }
 
 TEST(Evidence, TheNoiseIsTheLikeliest) {
