@@ -1,12 +1,12 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
-#include <optional>
 
 #include "diagnosis/inference/curved_fit.hpp"
 #include "diagnosis/inference/evidence.hpp"
 #include "diagnosis/inference/log_sum.hpp"
 #include "diagnosis/inference/settle.hpp"
+#include "diagnosis/parallel.hpp"
 
 // The part of a set's evidence that a discrepancy has.
 namespace bevel::inference {
@@ -360,15 +360,16 @@ void add_large_curves(const Likelihood& likelihood, const Discrepancy& discrepan
   if (!out.fit_with_curve || !out.fit_with_curve->tangent) return;
   std::vector<CurvePrior> known = out.fit_with_curve->scales.curves;
   known.push_back(out.curves.front().prior);
-  std::optional<WithCurve> best;
-  double most = out.log_evidence + out.log_factors.front();
-  for (const CurvePrior& prior : of_other_components(likelihood.system(), out.curves, known)) {
+  const auto priors = of_other_components(likelihood.system(), out.curves, known);
+  std::vector<WithCurve> there(priors.size(), {.settled = {.fit = Fit(out.fit.layout), .over = {}}});
+  parallel_for(priors.size(), [&](std::size_t i) {
     const Candidate one{
-        .prior = prior, .log_others = -std::log(static_cast<double>(out.curves.size())), .from = &out.fit};
-    WithCurve there = settle_with(likelihood, discrepancy, out.fit, one, out.curves.size(), kNever);
-    if (there.log_evidence() > most) most = there.log_evidence(), best = std::move(there);
-  }
-  if (best) begin_with(likelihood, discrepancy, rules, std::move(*best), kNever, out);
+        .prior = priors[i], .log_others = -std::log(static_cast<double>(out.curves.size())), .from = &out.fit};
+    there[i] = settle_with(likelihood, discrepancy, out.fit, one, out.curves.size(), kNever);
+  });
+  const auto best = std::ranges::max_element(there, {}, &WithCurve::log_evidence);
+  if (best != there.end() && best->log_evidence() > out.log_evidence + out.log_factors.front())
+    begin_with(likelihood, discrepancy, rules, std::move(*best), kNever, out);
 }
 
 }  // namespace bevel::inference
