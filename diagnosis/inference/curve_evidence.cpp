@@ -62,10 +62,15 @@ double log_factor_of_unlikely(const std::vector<CurveFactor>& curves) {
   return log_sum(logs) - std::log(static_cast<double>(curves.size()));
 }
 
-// Every curve but those that it has beside a fit, with what its set leaves open, by the noise that the curves were
-// prepared with.
+// By the noise that the curves were prepared with, with what a fit's set leaves open. Not owned: for no longer than
+// `likelihood` lives.
+std::shared_ptr<const Likelihood> as_prepared(const Likelihood& likelihood, const Fit& fit) {
+  return with_inputs_of(fit, {std::shared_ptr<const void>(), &likelihood});
+}
+
+// Every curve but those that it has beside a fit.
 std::vector<CurveFactor> scan_beside(const Likelihood& likelihood, const Discrepancy& discrepancy, const Fit& fit) {
-  const auto by = with_inputs_of(fit, {std::shared_ptr<const void>(), &likelihood});  // not owned: no longer than here
+  const auto by = as_prepared(likelihood, fit);
   auto curves = discrepancy.scan(Marginal(*by, fit, discrepancy.columns(*by, fit), &likelihood));
   erase_known(fit.scales.curves, curves);
   return curves;
@@ -139,8 +144,7 @@ bool stays_hopeless(const Likelihood& likelihood, const Discrepancy& discrepancy
                     double promised, double hopeless) {
   if (log_evidence + kMostOfPromise * promised < hopeless) return true;
   if (!(log_evidence < hopeless)) return false;
-  const auto by = with_inputs_of(fit, {std::shared_ptr<const void>(), &likelihood});  // not owned: no longer than here
-  const Moved moved = moved_to(by, fit, discrepancy);
+  const Moved moved = moved_to(as_prepared(likelihood, fit), fit, discrepancy);
   return moved.fit.valid && log_evidence + kMostOfPromise * moved.log_gain(promised) < hopeless;
 }
 

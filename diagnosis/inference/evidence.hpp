@@ -73,6 +73,7 @@ struct Moved {
   // the fit and right for what has more, or the other way about: that finds its own, which promises no less than
   // either.
   double log_gain(double log_promised) const {
+    if (!fit.valid) return log_change;
     return std::max(log_change + log_promised, share_before * log_promised);
   }
 };

@@ -298,8 +298,11 @@ std::vector<double> log_costs_of_dropping(const Fit& fit, const CurveColumns& cu
     }
     if (sizes.empty()) continue;
     const auto d = Eigen::Map<const VectorXd>(apart.data(), static_cast<Index>(apart.size()));
-    if (d.isZero(0)) out[m] = 0;
-    if (held || d.isZero(0)) continue;
+    if (d.isZero(0)) {
+      out[m] = 0;
+      continue;
+    }
+    if (held) continue;
     const ArrowSolution solution = solve_about(fit, blocks, curve, sizes);
     if (!solution.valid) continue;
     out[m] = 0.5 * d.dot(solution.covariance(sizes, sizes).ldlt().solve(d));

@@ -66,9 +66,7 @@ std::vector<Search::Beside> Search::look_beside(const Fit& fit, double log_here,
   const auto curve = std::make_shared<const CurveColumns>(discrepancy_->columns(*by, *from));
   const Marginal marginal(*by, *from, *curve, likelihood_.get());
   // What is promised is relative to this set by the reference's noise.
-  const auto log_promised = [log_here, moved](double log_change) {
-    return log_here + (moved->fit.valid ? moved->log_gain(log_change) : moved->log_change);
-  };
+  const auto log_promised = [log_here, moved](double log_change) { return log_here + moved->log_gain(log_change); };
   std::vector<Beside> out{{.about = *from,
                            .proposals = proposals_->beside(marginal, rules_.starts),
                            .log_promised = log_promised,
