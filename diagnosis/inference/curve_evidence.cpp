@@ -148,6 +148,39 @@ bool stays_hopeless(const Likelihood& likelihood, const Discrepancy& discrepancy
   return moved.fit.valid && log_evidence + kMostOfPromise * moved.log_gain(promised) < hopeless;
 }
 
+// With one more curve, where that is likelier than none more; whether it is.
+bool take_if_likelier(const CurveRules& rules, Settled with, double log_others, Evaluated& out, Together& so_far) {
+  const double log_factor = with.over.log_mean + log_others - so_far.log_evidence;
+  if (!(log_factor + rules.log_prior_odds_more > 0)) return false;
+  so_far.log_evidence = with.over.log_mean;
+  so_far.log_others.push_back(log_others);
+  out.fit_with_curve = std::move(with.fit);
+  out.nuisance_weights_with_curve = std::move(with.over.weights);
+  out.log_factors.push_back(log_factor);
+  return true;
+}
+
+// The next curve that another set's fit has, all as they are there: from one alone the others need not be found.
+// Whether it is likelier than none more.
+bool add_curve_of(const Likelihood& likelihood, const Discrepancy& discrepancy, const CurveRules& rules,
+                  const Fit& other, Evaluated& out, Together& so_far) {
+  const std::size_t count = out.log_factors.size() + 1;
+  if (other.scales.curves.size() < count) return false;
+  const Fit from = with_first_curves(discrepancy, other, count);
+  Settled with =
+      settle(*from.likelihood, &discrepancy, out.fit.layout, from.shared, from.local, from.scales,
+             nuisance_grid(likelihood.system()), so_far.log_evidence - rules.log_prior_odds_more - rules.optimism,
+             tangent_about(discrepancy, from));
+  if (!with.fit.valid) return false;
+  const VectorXd own =
+      log_over_priors(discrepancy, with.fit, discrepancy.columns(*with.fit.likelihood, with.fit), count - 1);
+  auto rest = out.curves;
+  erase_known(std::span(from.scales.curves).first(count - 1), rest);
+  const double others =
+      log_others(std::span<const double>(own.data(), static_cast<std::size_t>(own.size())), 0, rest.size());
+  return take_if_likelier(rules, std::move(with), others, out, so_far);
+}
+
 // One more curve beside those that a set has; whether it is likelier than none more.
 bool add_curve(const Likelihood& likelihood, const Discrepancy& discrepancy, const CurveRules& rules, double hopeless,
                Evaluated& out, Together& so_far) {
@@ -171,14 +204,7 @@ bool add_curve(const Likelihood& likelihood, const Discrepancy& discrepancy, con
   double others = all.log_others;
   if (with.fit.valid && with.fit.scales.nuisance_sd == here.scales.nuisance_sd)
     others = log_others(log_factors_of(own), log_factor_of(own, prior), own.size());
-  const double log_factor = with.over.log_mean + others - so_far.log_evidence;
-  if (!(log_factor + rules.log_prior_odds_more > 0)) return false;
-  so_far.log_evidence = with.over.log_mean;
-  so_far.log_others.push_back(others);
-  out.fit_with_curve = std::move(with.fit);
-  out.nuisance_weights_with_curve = with.over.weights;
-  out.log_factors.push_back(log_factor);
-  return true;
+  return take_if_likelier(rules, std::move(with), others, out, so_far);
 }
 
 // The curves that are likeliest one after the other need not be those that are likeliest together: one of them in
@@ -257,7 +283,7 @@ WithCurve settle_with(const Likelihood& likelihood, const Discrepancy& discrepan
 
 // From the likeliest first curve on: the next beside it, for as long as one more is likelier than not.
 void begin_with(const Likelihood& likelihood, const Discrepancy& discrepancy, const CurveRules& rules, WithCurve first,
-                double hopeless, Evaluated& out) {
+                const CurveStart& start, Evaluated& out) {
   Settled& with = first.settled;
   // Beside the curve another local minimum may have been found: it counts without the curve too.
   Settled again = settle(*with.fit.likelihood, nullptr, out.fit.layout, with.fit.shared, with.fit.local,
@@ -272,7 +298,11 @@ void begin_with(const Likelihood& likelihood, const Discrepancy& discrepancy, co
   Together so_far{.log_evidence = with.over.log_mean, .log_others = {first.log_others}};
   out.fit_with_curve = std::move(with.fit);
   out.nuisance_weights_with_curve = std::move(with.over.weights);
-  while (out.log_factors.size() < rules.most && add_curve(likelihood, discrepancy, rules, hopeless, out, so_far)) {
+  const auto add_one = [&] {
+    return (start.large_curve && add_curve_of(likelihood, discrepancy, rules, *start.large_curve, out, so_far)) ||
+           add_curve(likelihood, discrepancy, rules, start.hopeless_below, out, so_far);
+  };
+  while (out.log_factors.size() < rules.most && add_one()) {
     while (exchange_curve(likelihood, discrepancy, rules, out, so_far)) {
     }
   }
@@ -303,9 +333,9 @@ Fit without_curve(const Discrepancy& discrepancy, Fit fit, std::size_t which) {
   return fit;
 }
 
-Fit with_first_curve(const Discrepancy& discrepancy, Fit fit) {
-  fit.curve_values.conservativeResize(discrepancy.places(fit.scales.curves)[1]);
-  fit.scales.curves.resize(1);
+Fit with_first_curves(const Discrepancy& discrepancy, Fit fit, std::size_t count) {
+  fit.curve_values.conservativeResize(discrepancy.places(fit.scales.curves)[count]);
+  fit.scales.curves.resize(count);
   fit.tangent = nullptr;
   return fit;
 }
@@ -333,7 +363,8 @@ void add_discrepancy(const Likelihood& likelihood, const Discrepancy& discrepanc
   };
   const double others = integrated(out.curves).log_others;
   if (large_curve) {
-    try_one({.prior = large_curve->scales.curves.front(), .log_others = others, .from = large_curve});
+    const Fit first = with_first_curves(discrepancy, *large_curve, 1);
+    try_one({.prior = first.scales.curves.front(), .log_others = others, .from = &first});
     // What was promised was promised beside that one.
     if (best.log_evidence() < give_up_below) return;
   }
@@ -355,8 +386,7 @@ void add_discrepancy(const Likelihood& likelihood, const Discrepancy& discrepanc
         std::ranges::count(refined, one.prior.curve, &CurvePrior::curve) == 0)
       try_one(one);
   }
-  if (best.log_evidence() > least)
-    begin_with(likelihood, discrepancy, rules, std::move(best), start.hopeless_below, out);
+  if (best.log_evidence() > least) begin_with(likelihood, discrepancy, rules, std::move(best), start, out);
 }
 
 void add_large_curves(const Likelihood& likelihood, const Discrepancy& discrepancy, const CurveRules& rules,
@@ -373,7 +403,7 @@ void add_large_curves(const Likelihood& likelihood, const Discrepancy& discrepan
   });
   const auto best = std::ranges::max_element(there, {}, &WithCurve::log_evidence);
   if (best != there.end() && best->log_evidence() > out.log_evidence + out.log_factors.front())
-    begin_with(likelihood, discrepancy, rules, std::move(*best), kNever, out);
+    begin_with(likelihood, discrepancy, rules, std::move(*best), {}, out);
 }
 
 }  // namespace bevel::inference

@@ -42,7 +42,7 @@ struct CurveRules {
 };
 // What is known of a set before it has a curve.
 struct CurveStart {
-  const Fit* large_curve = nullptr;  // the curve that another set's fit has is tried too, from there; null: none
+  const Fit* large_curve = nullptr;  // the curves that another set's fit has are tried too, from there; null: none
   double hopeless_below = -std::numeric_limits<double>::infinity();  // log evidence with all that it may have
   bool promised_with_several = false;                                // with the first alone it may be below that
 };
@@ -58,8 +58,8 @@ Fit without_curve(const Discrepancy& discrepancy, Fit fit, std::size_t which);
 // Log Bayes factor of one more curve than those known, whichever it is, beside what a set leaves.
 double log_factor_of_one_more(const Discrepancy& discrepancy, const Marginal& beside,
                               std::span<const CurvePrior> known);
-// A fit's likeliest curve, as `beside` another set's is begun: in that set's layout, its values as they are.
-Fit with_first_curve(const Discrepancy& discrepancy, Fit fit);
+// The same with the first of its curves alone, as another set's is begun: their values as they are, about no tangent.
+Fit with_first_curves(const Discrepancy& discrepancy, Fit fit, std::size_t count);
 
 // The same mode sought again by the noise of another likelihood.
 struct Moved {

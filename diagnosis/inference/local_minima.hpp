@@ -28,6 +28,10 @@ void scan_locals(const Likelihood& likelihood, const CurveColumns& curve, Fit& f
 // linear model stays.
 void doubt_instants(const Likelihood& likelihood, const CurveColumns& curve, Fit& fitted);
 
+// Every instant once more with what a recording has of its own following from where it is like the others, then all
+// else: what happened in some recordings and was not seen at first passes for what these have of their own.
+void look_from_alike(const Likelihood& likelihood, const CurveColumns& curve, Fit& fitted);
+
 // Each shared parameter that has many local minima along a finer grid about where it is, and the size of what jumps
 // at instants, all else following by the linear model, and the instants too.
 void scan_shapes(const Likelihood& likelihood, const CurveColumns& curve, Fit& fitted);

@@ -30,7 +30,7 @@ void Search::ask_for_curve_of(const Fit& fit, std::shared_ptr<const Likelihood> 
   job.beside_curve = !fit.scales.curves.empty();
   job.beside_several = fit.scales.curves.size() > 1;
   if (!fit.tangent) return;
-  Fit from = with_first_curve(*discrepancy_, carried_to(job.layout, fit));
+  Fit from = carried_to(job.layout, fit);
   from.shared = job.shared;
   from.local = job.local;
   from.scales.nuisance_sd = job.nuisance_sd;
@@ -39,9 +39,9 @@ void Search::ask_for_curve_of(const Fit& fit, std::shared_ptr<const Likelihood> 
 }
 
 Search::Job Search::job_from(const Fit& fit, std::size_t effect, const StartPoint& start) const {
-  Job job = job_at(carried_to(Layout(system_, with(fit.layout.set(), effect)), fit));
+  const Fit beside = start.base_at_prior ? with_base_at_prior(fit) : fit;
+  Job job = job_at(carried_to(Layout(system_, with(fit.layout.set(), effect)), beside));
   if (start.beside.size() > 0) job.shared = job.layout.shared_from(fit.layout, start.beside);
-  if (start.base_at_prior) job.shared = with_base_at_prior(job.layout, std::move(job.shared));
   const auto member = static_cast<std::size_t>(std::find(job.set.begin(), job.set.end(), effect) - job.set.begin());
   const auto& parameters = system_.effects()[effect].parameters;
   for (std::size_t r = 0; r < fit.local.size(); ++r) {

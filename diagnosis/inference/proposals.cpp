@@ -91,8 +91,7 @@ std::vector<Fit> views_of(const Fit& about) {
     far = far || std::abs(about.shared[static_cast<Index>(i)] - prior.middle) * std::sqrt(precision_of(prior)) > 1;
   }
   if (far) {
-    out.push_back(about);
-    out.back().shared = with_base_at_prior(about.layout, about.shared);
+    out.push_back(with_base_at_prior(about));
   }
   return out;
 }
@@ -112,12 +111,13 @@ std::pair<VectorXd, VectorXd> unknowns_with(const Layout& layout, const Layout& 
   return {shared, local};
 }
 
-VectorXd with_base_at_prior(const Layout& layout, VectorXd shared) {
-  for (std::size_t i = 0; i < layout.shared().size(); ++i) {
-    const Unknown& unknown = layout.shared()[i];
-    if (is_normal_of_base(unknown)) shared[static_cast<Index>(i)] = unknown.parameter->prior.middle;
-  }
-  return shared;
+Fit with_base_at_prior(Fit fit) {
+  const auto& shared = fit.layout.shared();
+  for (std::size_t i = 0; i < shared.size(); ++i)
+    if (is_normal_of_base(shared[i])) fit.shared[static_cast<Index>(i)] = shared[i].parameter->prior.middle;
+  const auto own = static_cast<Index>(fit.layout.system().nuisances().size());
+  for (VectorXd& local : fit.local) local.head(own).setZero();
+  return fit;
 }
 
 Proposals::Proposals(const Likelihood& likelihood, const Fit& about) : system_(&likelihood.system()) {
@@ -137,8 +137,6 @@ Proposals::Candidate Proposals::make_candidate(const Likelihood& likelihood, std
     else if (is_size(parameter))
       out.amplitudes.push_back(p);
   }
-  // A grid in every recording takes its time from one view.
-  if (out.local >= 0) views = views.first(1);
   if (!system_->allows({e})) return out;
   ModelSet rest = without(views.front().layout.set(), e);
   if (!system_->allows(with(rest, e))) rest.clear();
@@ -296,8 +294,10 @@ Proposal Proposals::judge_local(const Candidate& candidate, std::size_t e, const
       }
       if (share > 0) shares.push_back(std::min(share, kFarthest)), shares.push_back(0.5 * std::min(share, kFarthest));
     }
-    StartPoint found{
-        .shared = shared_part(effect, candidate.signatures[s].values), .local = {}, .log_bayes_factor = kNever};
+    StartPoint found{.shared = shared_part(effect, candidate.signatures[s].values),
+                     .local = {},
+                     .log_bayes_factor = kNever,
+                     .base_at_prior = candidate.signatures[s].base_at_prior};
     for (const double share : shares) {
       double sum = 0, curvature = 0;
       std::vector<VectorXd> local;

@@ -40,8 +40,8 @@ struct Reach {
 std::pair<Eigen::VectorXd, Eigen::VectorXd> unknowns_with(const Layout& layout, const Layout& from,
                                                           const Eigen::VectorXd& shared, const Eigen::VectorXd& local,
                                                           std::size_t effect, const Eigen::VectorXd& values);
-// The base's parameters of normal prior, where that has them.
-Eigen::VectorXd with_base_at_prior(const Layout& layout, Eigen::VectorXd shared);
+// The base's parameters of normal prior where that has them, and recordings that do not differ.
+Fit with_base_at_prior(Fit fit);
 
 class Proposals {
  public:

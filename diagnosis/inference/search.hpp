@@ -91,7 +91,7 @@ class Search {
     bool foremost = false;        // fitted though it does not come near
     // Log posterior that it may have by the linear model; what nothing was promised of is fitted in any case.
     double promised = std::numeric_limits<double>::infinity();
-    std::shared_ptr<const Fit> large_curve{};  // with a curve too large for the linear model: the same begins there
+    std::shared_ptr<const Fit> large_curve{};  // with curves too large for the linear model: the same begins there
   };
   // What further effects bring beside one fit of a set, by the linear model.
   struct Beside {

@@ -143,6 +143,7 @@ Settled settle(const Likelihood& likelihood, const Discrepancy* discrepancy, con
     if (to_scan) {
       scan_locals(*now, curve, one.fit);
       doubt_instants(*now, curve, one.fit);
+      look_from_alike(*now, curve, one.fit);
       scanned_by_noise = true;
     }
     if (pass == 0) scan_shapes(*now, curve, one.fit);
