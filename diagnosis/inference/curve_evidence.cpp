@@ -285,15 +285,6 @@ WithCurve settle_with(const Likelihood& likelihood, const Discrepancy& discrepan
 void begin_with(const Likelihood& likelihood, const Discrepancy& discrepancy, const CurveRules& rules, WithCurve first,
                 const CurveStart& start, Evaluated& out) {
   Settled& with = first.settled;
-  // Beside the curve another local minimum may have been found: it counts without the curve too.
-  Settled again = settle(*with.fit.likelihood, nullptr, out.fit.layout, with.fit.shared, with.fit.local,
-                         {.nuisance_sd = with.fit.scales.nuisance_sd, .curves = {}}, nuisance_grid(likelihood.system()),
-                         out.log_evidence);
-  if (again.over.log_mean > out.log_evidence) {
-    out.fit = std::move(again.fit);
-    out.log_evidence = again.over.log_mean;
-    out.nuisance_weights = again.over.weights;
-  }
   out.log_factors = {first.log_evidence() - out.log_evidence};
   Together so_far{.log_evidence = with.over.log_mean, .log_others = {first.log_others}};
   out.fit_with_curve = std::move(with.fit);

@@ -27,9 +27,7 @@ constexpr double kBeyondDoubt = 3;       // times an instant's cost: what the li
 constexpr std::size_t kGrid = 5;         // starts from which on a parameter is taken to have many local minima
 constexpr int kSteps = 10;               // of a scan, to each side
 constexpr int kZooms = 2;
-constexpr int kSizeSteps = 5;       // to each side, of the size of what happens at an instant
-constexpr double kSizeShare = 0.1;  // of it, as far as they go
-constexpr int kWaypoints = 10;      // from one effect to another
+constexpr int kWaypoints = 10;  // from one effect to another
 
 // What an instant has to bring in a recording to be taken for one, in chi2: its expected odds.
 double instant_cost(double duration_s) { return 2 * std::log(kHappensNot / kHappens * duration_s / kInstantWidth_s); }
@@ -256,8 +254,7 @@ namespace {
 
 // The least cost of a fit's linear model with one parameter `step` by `step` away, to each side; the fit from there
 // where that costs less.
-void scan_about(const Likelihood& likelihood, const CurveColumns& curve, Index which, double step, int steps,
-                Fit& fitted) {
+void scan_about(const Likelihood& likelihood, const CurveColumns& curve, Index which, double step, Fit& fitted) {
   const Parameter& p = *fitted.layout.shared()[static_cast<std::size_t>(which)].parameter;
   const Profile profile(likelihood, curve, fitted);
   if (!profile.valid()) return;
@@ -267,7 +264,7 @@ void scan_about(const Likelihood& likelihood, const CurveColumns& curve, Index w
   for (const double direction : {-1.0, 1.0}) {
     VectorXd shared = fitted.shared;
     std::vector<VectorXd> local = fitted.local;
-    for (int k = 1; k <= steps; ++k) {
+    for (int k = 1; k <= kSteps; ++k) {
       const double value = fitted.shared[which] + direction * k * step;
       if (value < p.lower || value > p.upper) break;
       const double cost = profile.following_instants(which, value, shared, local);
@@ -298,19 +295,12 @@ void try_multiples(const Likelihood& likelihood, const CurveColumns& curve, Inde
 
 void scan_shapes(const Likelihood& likelihood, const CurveColumns& curve, Fit& fitted) {
   for (std::size_t i = 0; i < fitted.layout.shared().size(); ++i) {
-    const Unknown& unknown = fitted.layout.shared()[i];
-    const Parameter& p = *unknown.parameter;
+    const Parameter& p = *fitted.layout.shared()[i].parameter;
     const auto which = static_cast<Index>(i);
-    if (has_many_minima(p)) {
-      if (p.shape) try_multiples(likelihood, curve, which, fitted);
-      double step = grid_spacing(p, fitted.shared[which]) / kSteps;
-      for (int zoom = 0; zoom < kZooms; ++zoom, step /= kSteps)
-        scan_about(likelihood, curve, which, step, kSteps, fitted);
-    } else if (unknown.member >= 0 && is_size(p) && has_jump(fitted.layout, unknown.member)) {
-      // A larger one that happens later is much the same.
-      const double step = kSizeShare / kSizeSteps * std::abs(fitted.shared[which] - p.none);
-      scan_about(likelihood, curve, which, step, kSizeSteps, fitted);
-    }
+    if (!has_many_minima(p)) continue;
+    if (p.shape) try_multiples(likelihood, curve, which, fitted);
+    double step = grid_spacing(p, fitted.shared[which]) / kSteps;
+    for (int zoom = 0; zoom < kZooms; ++zoom, step /= kSteps) scan_about(likelihood, curve, which, step, fitted);
   }
 }
 

@@ -32,8 +32,8 @@ void doubt_instants(const Likelihood& likelihood, const CurveColumns& curve, Fit
 // else: what happened in some recordings and was not seen at first passes for what these have of their own.
 void look_from_alike(const Likelihood& likelihood, const CurveColumns& curve, Fit& fitted);
 
-// Each shared parameter that has many local minima along a finer grid about where it is, and the size of what jumps
-// at instants, all else following by the linear model, and the instants too.
+// Each shared parameter that has many local minima along a finer grid about where it is, all else following by the
+// linear model, and the instants too.
 void scan_shapes(const Likelihood& likelihood, const CurveColumns& curve, Fit& fitted);
 
 // From a fit to one in which another effect does what one of its members does: that member is taken out step by step,

@@ -67,10 +67,8 @@ std::vector<Search::Beside> Search::look_beside(const Fit& fit, double log_here,
   const Marginal marginal(*by, *from, *curve, likelihood_.get());
   // What is promised is relative to this set by the reference's noise.
   const auto log_promised = [log_here, moved](double log_change) { return log_here + moved->log_gain(log_change); };
-  std::vector<Beside> out{{.about = *from,
-                           .proposals = proposals_->beside(marginal, rules_.starts),
-                           .log_promised = log_promised,
-                           .with_foremost = true}};
+  std::vector<Beside> out{
+      {.about = *from, .proposals = proposals_->beside(marginal, rules_.starts), .log_promised = log_promised}};
   if (with_others_moved)
     proposals_->look_with_others_moved(*likelihood_, *from, marginal, rules_.starts, out.front().proposals);
   const auto beside_less = [this, by, curve, log_promised](const WithLessSpread& less) {
@@ -131,18 +129,14 @@ std::vector<Search::Job> Search::larger_sets(const ModelSet& set, const Beside& 
   std::optional<Beside> at_mode;
   if (again) at_mode = beside.at_its_mode();
   const Beside& here = again ? *at_mode : beside;
-  std::size_t rank = 0;
   for (const Proposal& one : here.proposals) {
-    // Far from its start an effect may bring much more than in proportion: the foremost are fitted in any case.
-    const bool foremost =
-        here.with_foremost && rank++ < rules_.foremost && one.log_bayes_factor > -log_prior_odds(one.effect);
     const ModelSet larger = with(set, one.effect);
     const double promised = log_promised(here, one);
     const bool nothing_new = again && !is_new(here, one);
     promised_[larger] = std::max(most_promised(larger), promised);
     if (nothing_new) continue;
     const double doubtful = this->doubtful(one.log_bayes_factor);
-    if (!foremost && promised + doubtful < near) continue;
+    if (promised + doubtful < near) continue;
     // A fit that fell far short of the promise may be in a local minimum: once more, from these starts.
     const auto visited = visited_.find(larger);
     if (visited != visited_.end() &&
@@ -152,7 +146,6 @@ std::vector<Search::Job> Search::larger_sets(const ModelSet& set, const Beside& 
       if (start.log_bayes_factor > one.starts.front().log_bayes_factor - rules_.window) {
         out.push_back(job_from(here.about, one.effect, start));
         out.back().promised = promised + doubtful;
-        out.back().foremost = foremost;
         if (!is_hopeless(set)) ask_for_curve_of(here.about, out.back());
       }
   }
@@ -182,7 +175,6 @@ std::optional<Search::Job> Search::smaller_set(const Fit& about, std::size_t mem
 void Search::expand(const ModelSet& set) {
   expanded_.insert(set);
   const bool hopeless = is_hopeless(set);
-  if (!set.empty() && !hopeless) look_at_every_component(set);
   const Visited here = visited_.at(set);
   if (progress_)
     progress_(describe(system_, set) + "; " + std::to_string(fits_) + " fits done, nothing is begun after " +

@@ -220,7 +220,6 @@ void Search::run(const Readings& outliers, const Noise& noise, const Progress& p
     look_in_rounds(heavy_, start, std::move(jobs));
   }
   last_round_ = true;
-  look_with_less_spread();
   look_at_what_is_left();
 }
 
@@ -285,31 +284,6 @@ void Search::look_in_rounds(std::shared_ptr<const Likelihood> reference, Start& 
     if (near(likeliest.likelihood->noise(), reference->noise()) && likeliest.layout.set() == about.layout.set()) break;
     reference = without_inputs(*likeliest.likelihood);
   }
-}
-
-// Noise and spread are fitted in turn, each by the other: what one took at first the other does not get back. The
-// likeliest sets once more from no spread, for each kind of it.
-void Search::look_with_less_spread() {
-  std::vector<Job> jobs;
-  const double best = best_log();
-  for (const auto& [set, one] : visited_) {
-    if (one.log_posterior() < best - rules_.window) continue;
-    const Fit& fit = one.likelier_fit();
-    for (const VectorXd& less : less_spread(fit.scales.nuisance_sd)) {
-      jobs.push_back(job_at(fit));
-      jobs.back().nuisance_sd = less;
-      ask_for_curve_of(fit, jobs.back());
-    }
-  }
-  evaluate_all(std::move(jobs));
-}
-
-void Search::look_at_every_component(const ModelSet& set) {
-  const auto at = visited_.at(set).at;
-  if (!at->fit_with_curve || !at->fit_with_curve->tangent) return;
-  auto anew = std::make_shared<Evaluated>(*at);
-  add_large_curves(*likelihood_, *discrepancy_, curve_rules_, *anew);
-  keep(set, anew);
 }
 
 const ModelSet* next_to_expand(const std::map<ModelSet, Visited>& visited, const std::set<ModelSet>& expanded,

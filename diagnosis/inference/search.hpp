@@ -22,7 +22,7 @@ struct SearchRules {
   double doubt = 12.0;         // below by that after a first fit: noise and variation are not fitted
   double linear_error = 0.15;  // of what the linear model promises, as a share of it
   std::size_t starts = 2;      // of an effect, that are fitted
-  std::size_t foremost = 2;    // proposals beside a set that are fitted though they do not come near
+  std::size_t foremost = 2;    // proposals that are looked at in a member's place
   std::size_t pairs = 8;
   std::size_t most_fits = 90;           // in all, and as many again by noise with heavy tails
   double log_prior_odds_effect = -5.0;  // of one effect being in the model, against not; its kinds share it
@@ -88,7 +88,7 @@ class Search {
     Eigen::VectorXd nuisance_sd;
     bool beside_curve = false;
     bool beside_several = false;  // with the first alone there is little of what is promised
-    bool foremost = false;        // fitted though it does not come near
+    bool foremost = false;        // fitted though it does not come near: a smaller set that was not yet
     // Log posterior that it may have by the linear model; what nothing was promised of is fitted in any case.
     double promised = std::numeric_limits<double>::infinity();
     std::shared_ptr<const Fit> large_curve{};  // with curves too large for the linear model: the same begins there
@@ -99,7 +99,6 @@ class Search {
     std::vector<Proposal> proposals;
     // Of a log Bayes factor: the larger set's log posterior, but for the prior odds of what joins.
     std::function<double(double)> log_promised;
-    bool with_foremost = false;
     // Beside less spread: what promises no more than it did elsewhere is not begun from here, nor anything before that
     // has been looked at about its mode.
     std::function<Beside()> at_its_mode{};
@@ -136,8 +135,6 @@ class Search {
   // A job that is begun from a fit with a curve asks for one, too, and begins with a large one from there.
   void ask_for_curve_of(const Fit& fit, Job& job) const;
   void ask_for_curve_of(const Fit& fit, std::shared_ptr<const Likelihood> by, Job& job) const;
-  // Beside a set whose discrepancy is large, the likeliest curve of every component.
-  void look_at_every_component(const ModelSet& set);
   Job job_from(const Fit& fit, std::size_t effect, const StartPoint& start) const;
   // Null: its noise is normal.
   std::shared_ptr<const Likelihood> with_heavy_tails(const Fit& fit) const;
@@ -166,7 +163,6 @@ class Search {
   bool is_round_over() const;
   void look_around();
   void look_at_what_is_left();  // in the window, the likeliest first
-  void look_with_less_spread();
 
   const System& system_;
   SearchRules rules_;
