@@ -29,33 +29,6 @@ constexpr int kSteps = 10;               // of a scan, to each side
 constexpr int kZooms = 2;
 constexpr int kWaypoints = 10;  // from one effect to another
 
-// What an instant has to bring in a recording to be taken for one, in chi2: its expected odds.
-double instant_cost(double duration_s) { return 2 * std::log(kHappensNot / kHappens * duration_s / kInstantWidth_s); }
-
-// The cost of a fit, its instants' with it.
-double cost_with_instants(const Fit& fit) {
-  double sum = fit.cost;
-  for (std::size_t i = 0; i < fit.layout.local().size(); ++i) {
-    if (!fit.layout.is_instant(i)) continue;
-    for (std::size_t r = 0; r < fit.local.size(); ++r)
-      if (fit.local[r][static_cast<Index>(i)] > 0) sum += instant_cost(fit.layout.upper(i, r));
-  }
-  return sum;
-}
-
-int instants_of(double duration_s) {
-  return std::max(4, static_cast<int>(std::lround(duration_s / kInstantSpacing_s)));
-}
-
-// Of one recording, with the prior of what is its own; without a curve.
-double cost_of_own(const Likelihood& likelihood, const Fit& at, std::size_t r, Residuals& residuals) {
-  const auto own = static_cast<Index>(at.layout.system().nuisances().size());
-  if (!likelihood.evaluate(at.layout, r, at.shared, at.local[r], false, residuals))
-    return std::numeric_limits<double>::infinity();
-  const VectorXd precision = local_precision_of(at.layout, at.scales).head(own);
-  return residuals.white.squaredNorm() + precision.dot(at.local[r].head(own).cwiseAbs2());
-}
-
 // Just before the readings that are least expected from those before them, the worst first: with autocorrelated noise
 // any wrong instant costs two such jumps, wherever it is, and a grid goes past the one that costs none.
 std::vector<double> before_jumps(const SeriesSet& data, const VectorXd& white, double frame_s) {
@@ -132,6 +105,22 @@ Fit scanned(const Likelihood& likelihood, const CurveColumns& curve, const Fit& 
 
 }  // namespace
 
+double instant_cost(double duration_s) { return 2 * std::log(kHappensNot / kHappens * duration_s / kInstantWidth_s); }
+
+double cost_with_instants(const Fit& fit) {
+  double sum = fit.cost;
+  for (std::size_t i = 0; i < fit.layout.local().size(); ++i) {
+    if (!fit.layout.is_instant(i)) continue;
+    for (std::size_t r = 0; r < fit.local.size(); ++r)
+      if (fit.local[r][static_cast<Index>(i)] > 0) sum += instant_cost(fit.layout.upper(i, r));
+  }
+  return sum;
+}
+
+int instants_of(double duration_s) {
+  return std::max(4, static_cast<int>(std::lround(duration_s / kInstantSpacing_s)));
+}
+
 bool has_scanned(const Layout& layout) { return layout.local().size() > layout.system().nuisances().size(); }
 
 double grid_spacing(const Parameter& p, double value) {
@@ -188,59 +177,6 @@ void doubt_instants(const Likelihood& likelihood, const CurveColumns& curve, Fit
       if (!again.valid) again = std::move(without);  // nor is it anywhere else
       if (cost_with_instants(again) < cost_with_instants(fitted)) fitted = std::move(again), blocks.clear();
     }
-  }
-}
-
-namespace {
-
-// As if there were none, like scanned_local().
-Fit without_curves(Fit fit) {
-  fit.scales.curves.clear();
-  fit.curve_values.resize(0);
-  fit.tangent = nullptr;
-  fit.own_volume = nullptr;
-  return fit;
-}
-
-// A recording's unknowns, all that is its own following from where it is like the others, by one step of the linear
-// model; what is scanned stays as it is. The cost there, with its own prior; infinite outside the model's domain.
-double follow_from_alike(const Likelihood& likelihood, Fit& at, std::size_t r, LinearRecording& there) {
-  const Layout& layout = at.layout;
-  const auto own = static_cast<Index>(layout.system().nuisances().size());
-  at.local[r].head(own).setZero();
-  if (!linearise(likelihood, at, {}, r, there)) return std::numeric_limits<double>::infinity();
-  VectorXd precision = local_precision_of(layout, at.scales);
-  hold_scanned(layout, precision);
-  MatrixXd square = there.block.ll;
-  square.diagonal() += precision;
-  at.local[r].head(own) = Eigen::LLT<MatrixXd>(square).solve(there.block.lw).head(own);
-  return cost_of_own(likelihood, at, r, there.residuals);
-}
-
-}  // namespace
-
-void look_from_alike(const Likelihood& likelihood, const CurveColumns& curve, Fit& fitted) {
-  const Layout& layout = fitted.layout;
-  if (fitted.scales.nuisance_sd.isZero(0)) return;
-  for (std::size_t i = 0; i < layout.local().size(); ++i) {
-    if (!layout.is_instant(i)) continue;
-    std::vector<VectorXd> local = fitted.local;
-    parallel_for(local.size(), [&](std::size_t r) {
-      Fit at = without_curves(fitted);
-      LinearRecording there;
-      const double upper_s = layout.upper(i, r), cost = instant_cost(upper_s);
-      double& instant_s = at.local[r][static_cast<Index>(i)];
-      double least = cost_of_own(likelihood, at, r, there.residuals) + (instant_s > 0 ? cost : 0);
-      const int count = instants_of(upper_s);
-      for (int j = 0; j <= count; ++j) {
-        instant_s = j == 0 ? 0 : upper_s * (j - 0.5) / count;
-        const double here = follow_from_alike(likelihood, at, r, there) + (instant_s > 0 ? cost : 0);
-        if (here < least) least = here, local[r] = at.local[r];
-      }
-    });
-    if (local == fitted.local) continue;
-    Fit again = fit(likelihood, layout, fitted.shared, local, fitted.scales, curve);
-    if (again.valid && cost_with_instants(again) < cost_with_instants(fitted)) fitted = std::move(again);
   }
 }
 

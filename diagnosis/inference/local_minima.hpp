@@ -17,6 +17,13 @@ double grid_spacing(const Parameter& parameter, double value);
 // Whether a member of the set happens at instants at which readings jump.
 bool has_jump(const Layout& layout, int member);
 
+// What an instant has to bring in a recording to be taken for one, in chi2: its expected odds.
+double instant_cost(double duration_s);
+// The cost of a fit, its instants' with it.
+double cost_with_instants(const Fit& fit);
+// Of a grid over a recording.
+int instants_of(double duration_s);
+
 // Whether it has phases or instants.
 bool has_scanned(const Layout& layout);
 
@@ -27,10 +34,6 @@ void scan_locals(const Likelihood& likelihood, const CurveColumns& curve, Fit& f
 // missed. What a scan finds beside parameters that are still off may hold them there. One that is missed by far by the
 // linear model stays.
 void doubt_instants(const Likelihood& likelihood, const CurveColumns& curve, Fit& fitted);
-
-// Every instant once more with what a recording has of its own following from where it is like the others, then all
-// else: what happened in some recordings and was not seen at first passes for what these have of their own.
-void look_from_alike(const Likelihood& likelihood, const CurveColumns& curve, Fit& fitted);
 
 // Each shared parameter that has many local minima along a finer grid about where it is, all else following by the
 // linear model, and the instants too.

@@ -5,6 +5,7 @@
 #include <cmath>
 #include <limits>
 
+#include "diagnosis/inference/absorbed_instants.hpp"
 #include "diagnosis/inference/curved_fit.hpp"
 #include "diagnosis/inference/error_spread.hpp"
 #include "diagnosis/inference/instant_posterior.hpp"
