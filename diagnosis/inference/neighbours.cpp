@@ -57,6 +57,19 @@ Search::Job Search::job_from(const Fit& fit, std::size_t effect, const StartPoin
   return job;
 }
 
+bool Search::has_instants(std::size_t effect) const {
+  return std::ranges::count(system_.effects()[effect].parameters, Scope::instant, &Parameter::scope) > 0;
+}
+
+// The same from recordings that do not differ, and the base where its prior has it: with a spread, what happened at an
+// instant in some of them stays what these have of their own.
+Search::Job Search::job_from_alike(const Fit& fit, std::size_t effect, StartPoint start) const {
+  start.base_at_prior = true;
+  Job job = job_from(fit, effect, start);
+  job.nuisance_sd.setZero();
+  return job;
+}
+
 // Beside a fit, with its curve if it has one, and beside the same with less spread.
 std::vector<Search::Beside> Search::look_beside(const Fit& fit, double log_here, bool with_others_moved) const {
   const auto by = with_inputs_of(fit, likelihood_);
@@ -144,9 +157,13 @@ std::vector<Search::Job> Search::larger_sets(const ModelSet& set, const Beside& 
       continue;
     for (const StartPoint& start : one.starts)
       if (start.log_bayes_factor > one.starts.front().log_bayes_factor - rules_.window) {
+        const std::size_t first = out.size();
         out.push_back(job_from(here.about, one.effect, start));
-        out.back().promised = promised + doubtful;
-        if (!is_hopeless(set)) ask_for_curve_of(here.about, out.back());
+        if (has_instants(one.effect)) out.push_back(job_from_alike(here.about, one.effect, start));
+        for (Job& job : std::span(out).subspan(first)) {
+          job.promised = promised + doubtful;
+          if (!is_hopeless(set)) ask_for_curve_of(here.about, job);
+        }
       }
   }
   return out;
@@ -207,6 +224,10 @@ void Search::look_at_foremost_effects() {
   std::vector<Job> jobs;
   for (const Proposal& one : std::span(list).first(std::min(list.size(), rules_.at_once)))
     if (!one.starts.empty()) jobs.push_back(job_from(base, one.effect, one.starts.front()));
+  // What recordings took up as their own has no rank by a linear model about that.
+  for (const Proposal& one : list)
+    if (!one.starts.empty() && has_instants(one.effect))
+      jobs.push_back(job_from_alike(base, one.effect, one.starts.front()));
   evaluate_without_curve(jobs, -std::numeric_limits<double>::infinity());
 }
 

@@ -136,6 +136,8 @@ class Search {
   void ask_for_curve_of(const Fit& fit, Job& job) const;
   void ask_for_curve_of(const Fit& fit, std::shared_ptr<const Likelihood> by, Job& job) const;
   Job job_from(const Fit& fit, std::size_t effect, const StartPoint& start) const;
+  Job job_from_alike(const Fit& fit, std::size_t effect, StartPoint start) const;
+  bool has_instants(std::size_t effect) const;
   // Null: its noise is normal.
   std::shared_ptr<const Likelihood> with_heavy_tails(const Fit& fit) const;
   // Whether the likeliest set's noise has, which alone can say: what jumps is no noise, once it has a name.
