@@ -148,6 +148,12 @@ bool stays_hopeless(const Likelihood& likelihood, const Discrepancy& discrepancy
   return moved.fit.valid && log_evidence + kMostOfPromise * moved.log_gain(promised) < hopeless;
 }
 
+// What the other scales and lengths of one of a fit's curves add to the evidence of those that it has, about its mode.
+double log_others_about(const Discrepancy& discrepancy, const Fit& fit, std::size_t which, std::size_t choices) {
+  const VectorXd logs = log_over_priors(discrepancy, fit, discrepancy.columns(*fit.likelihood, fit), which);
+  return log_others(std::span<const double>(logs.data(), static_cast<std::size_t>(logs.size())), 0, choices);
+}
+
 // With one more curve, where that is likelier than none more; whether it is.
 bool take_if_likelier(const CurveRules& rules, Settled with, double log_others, Evaluated& out, Together& so_far) {
   const double log_factor = with.over.log_mean + log_others - so_far.log_evidence;
@@ -172,12 +178,9 @@ bool add_curve_of(const Likelihood& likelihood, const Discrepancy& discrepancy, 
              nuisance_grid(likelihood.system()), so_far.log_evidence - rules.log_prior_odds_more - rules.optimism,
              tangent_about(discrepancy, from));
   if (!with.fit.valid) return false;
-  const VectorXd own =
-      log_over_priors(discrepancy, with.fit, discrepancy.columns(*with.fit.likelihood, with.fit), count - 1);
   auto rest = out.curves;
   erase_known(std::span(from.scales.curves).first(count - 1), rest);
-  const double others =
-      log_others(std::span<const double>(own.data(), static_cast<std::size_t>(own.size())), 0, rest.size());
+  const double others = log_others_about(discrepancy, with.fit, count - 1, rest.size());
   return take_if_likelier(rules, std::move(with), others, out, so_far);
 }
 
@@ -274,10 +277,7 @@ WithCurve settle_with(const Likelihood& likelihood, const Discrepancy& discrepan
                 .log_others = one.log_others};
   const Fit& fit = out.settled.fit;
   // What the linear model about none says of the others is nothing where that is not what this one is.
-  if (fit.valid && fit.tangent) {
-    const VectorXd own = log_over_priors(discrepancy, fit, discrepancy.columns(*fit.likelihood, fit), 0);
-    out.log_others = log_others(std::span<const double>(own.data(), static_cast<std::size_t>(own.size())), 0, choices);
-  }
+  if (fit.valid && fit.tangent) out.log_others = log_others_about(discrepancy, fit, 0, choices);
   return out;
 }
 
