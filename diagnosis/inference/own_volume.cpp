@@ -54,6 +54,20 @@ std::shared_ptr<const OwnVolume> own_volume_about(const Fit& fit, const CurveCol
   return std::make_shared<const OwnVolume>(std::move(out));
 }
 
+// Where no step along them comes to less (instants: no smooth function of the shared unknowns), the slopes are taken
+// to the share that keeps the linear model nearest to where it is: none of them at a mode of the cost alone.
+void keep_stationary(Fit& now, std::vector<ArrowBlock>& blocks, const CurveColumns& curve, const VectorXd& with) {
+  for (ArrowBlock& block : blocks) block.slope.resize(0);
+  const ArrowSolution without = solve_about(now, blocks, curve, std::vector<Index>{});
+  if (!without.valid) return;
+  const VectorXd by_slopes = with - without.shared, pulled = without.information * by_slopes;
+  const double square = by_slopes.dot(pulled);
+  const double share = square > 0 ? std::clamp(-without.shared.dot(pulled) / square, 0.0, 1.0) : 0;
+  OwnVolume kept = *now.own_volume;
+  for (VectorXd& slope : kept.slope) slope *= share;
+  now.own_volume = std::make_shared<const OwnVolume>(std::move(kept));
+}
+
 }  // namespace
 
 double log_own_volume(const std::vector<ArrowBlock>& blocks) {
@@ -98,7 +112,10 @@ Fit with_own_integrated(Fit now, const CurveAt& curve_at) {
       now = std::move(there), curve = std::move(curve_there), blocks = std::move(blocks_there), total = total_there;
       gained = true;
     }
-    if (!gained) return now;
+    if (!gained) {
+      keep_stationary(now, blocks, *curve, about.shared);
+      return now;
+    }
   }
 }
 

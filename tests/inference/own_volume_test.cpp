@@ -71,6 +71,8 @@ class Paths final : public testing::HeldSystem {
     }
     return sum;
   }
+  // From this growth on, what a recording has of its own moves its readings three times as far: its volume has a jump.
+  void jump_at(double growth) { jump_at_ = growth; }
   double least_deviant() const {
     double best = 0, least = std::numeric_limits<double>::infinity();
     for (double at = -1; at < 1.5; at += 1e-4)
@@ -80,10 +82,13 @@ class Paths final : public testing::HeldSystem {
 
  private:
   static VectorXd times() { return VectorXd::LinSpaced(kReadings, 0, 1); }
-  VectorXd own_column(double growth) const { return (grows_ ? std::exp(kGrowth * growth) : 1) * times().cwiseAbs2(); }
+  VectorXd own_column(double growth) const {
+    return (grows_ ? std::exp(kGrowth * growth) : 1) * (growth > jump_at_ ? 3 : 1) * times().cwiseAbs2();
+  }
   VectorXd reading(double growth, double own) const { return growth * times() + own * own_column(growth); }
 
   bool grows_;
+  double jump_at_ = std::numeric_limits<double>::infinity();
 };
 
 struct Modes {
@@ -145,6 +150,23 @@ TEST(OwnVolume, FitsWithItsSlopesStayAtItsMode) {
                         {.tolerance = 1e-6, .own_volume = there.own_volume});
   EXPECT_GT(std::abs(modes.joint.shared[0] - there.shared[0]), 0.5 * modes.sd);
   EXPECT_NEAR(again.shared[0], there.shared[0], 0.4 * modes.sd);
+}
+
+TEST(OwnVolume, BesideAJumpOfItTheModeStaysAndTheLinearModelWithIt) {
+  for (unsigned seed = 1; seed <= 10; ++seed) {
+    Paths system(false, seed);
+    const Modes smooth = modes_of(system);
+    // Slopes are taken across it, and no step along them comes to less.
+    system.jump_at(smooth.joint.shared[0] + 0.1 * smooth.sd);
+    const Modes modes = modes_of(system);
+    const Fit& there = modes.integrated;
+    ASSERT_TRUE(there.own_volume);
+    EXPECT_NEAR(there.shared[0], smooth.joint.shared[0], 1e-6) << "seed " << seed;
+    EXPECT_LT(std::abs(solve_about(there, linearise(*there.likelihood, there, {}), {}).shared[0]), 0.02 * modes.sd);
+    const Fit again = fit(*there.likelihood, there.layout, there.shared, there.local, there.scales, {},
+                          {.own_volume = there.own_volume});
+    EXPECT_NEAR(again.cost, there.cost, 0.01) << "seed " << seed;
+  }
 }
 
 TEST(OwnVolume, CovarianceIsOverTheStandardDeviations) {
