@@ -150,20 +150,23 @@ std::vector<ProfileStep> posterior_by_refits(const Likelihood& likelihood, const
     const auto blocks = linearise(likelihood, there, curve);
     return blocks.empty() ? std::numeric_limits<double>::infinity() : there.cost + log_own_volume(blocks);
   };
-  const double least = total_of(fit);
+  // All else follows by the slopes of the own volume, to where it is a mode by them: from there on, nothing jumps.
+  Fit mode = fitted_at(fit, fit.shared[which]);
+  if (!mode.valid) mode = fit;
+  const double least = total_of(mode);
   const auto root_of = [&](const Fit& there) {
     return std::min(std::sqrt(std::max(0.0, total_of(there) - least)), kNothingLeft);
   };
   const auto is_parabola = [&](double direction) {
     const double value = fit.shared[which] + direction * kTried_sd * near;
     if (value < p.lower || value > p.upper) return false;  // what is cut off is no normal density
-    const double root = root_of(fitted_at(fit, value));
+    const double root = root_of(fitted_at(mode, value));
     return std::abs(root * root - kTried_sd * kTried_sd) <= kOffParabola * kTried_sd * kTried_sd;
   };
   if (parabola && is_parabola(-1) && is_parabola(1)) return {};
   std::vector<ProfileStep> out;
   for (const double direction : {-1.0, 1.0}) {
-    Fit from = fit;
+    Fit from = mode;
     double root = 0, step = near;
     for (int i = 0; i < kMostRefits && root < kNothingLeft; ++i) {
       const double begin = from.shared[which], end = std::clamp(begin + direction * step, p.lower, p.upper);

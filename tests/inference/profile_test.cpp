@@ -80,6 +80,26 @@ TEST(Profile, OfALinearModelIsTheNormalPosterior) {
   }
 }
 
+// Slopes of the own volume that hold nowhere, as about instants, move all that follows by the same; the unknown's own
+// density does not have it.
+TEST(Profile, BesideSlopesThatDoNotHoldItIsAsWideAsWithoutThem) {
+  const LinearSystem system(4, 7, 0.3, 0, 0);
+  const Likelihood likelihood(system, Readings(4), white(system));
+  const Layout layout(system, {0, 1});
+  Fit there = fit(likelihood, layout, layout.shared_start(), std::vector<VectorXd>(4, layout.local_start()),
+                  {.nuisance_sd = VectorXd::Zero(1), .curves = {}}, {}, {.tolerance = 1e-9});
+  const Normal expected = posterior_of(system);
+  const double sd = std::sqrt(expected.covariance(kStep, kStep));
+  const double slope = 3 / std::sqrt(expected.covariance(0, 0)) / 4;  // in all the cost of three standard deviations
+  OwnVolume volume{.about = there.shared, .slope = {}};
+  volume.slope.assign(4, slope * VectorXd::Unit(there.shared.size(), 0));
+  there.own_volume = std::make_shared<const OwnVolume>(volume);
+  const VectorXd by_step = expected.covariance.col(kStep) / (sd * sd);
+  const Moments found = moments_of(posterior_by_refits(likelihood, {}, there, kStep, by_step, sd, false));
+  EXPECT_NEAR(found.step, expected.mean[kStep], 0.02 * sd);
+  EXPECT_NEAR(found.step_sd, sd, 0.02 * sd);
+}
+
 // Two standard deviations away the cost of a linear model is four more, if it is told how far a deviation is.
 TEST(Profile, NothingIsRefittedOfALinearModel) {
   const LinearSystem system(4, 7, 0.3, 0, 0);
