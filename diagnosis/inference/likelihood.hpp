@@ -7,6 +7,7 @@
 //
 // Solution (mode.cpp): Gauss-Newton with Levenberg's damping on the arrow-shaped normal equations, along geodesics
 // where the linear model promises too much; bounds by an active set.
+#include <atomic>
 #include <functional>
 #include <memory>
 #include <optional>
@@ -94,6 +95,9 @@ class Likelihood {
   Eigen::MatrixXd whitened(std::size_t recording, const Eigen::MatrixXd& columns) const;
   Eigen::MatrixXd kept(std::size_t recording, const Eigen::MatrixXd& columns) const;
   const std::vector<Whitening>& whitening(std::size_t recording) const { return whitening_[recording]; }  // by channel
+  // Steps of all fits by it and by its copies: most of what a search costs, and the same on every machine. Thread-safe.
+  void count_steps(int of_a_fit) const { *steps_ += of_a_fit; }
+  long steps() const { return *steps_; }
 
  private:
   void set_noise(Noise noise, const std::vector<Eigen::VectorXd>& inputs);
@@ -101,6 +105,7 @@ class Likelihood {
 
   const System* system_;
   std::shared_ptr<PredictionMemo> memo_;  // shared by all copies: no noise changes a prediction
+  std::shared_ptr<std::atomic<long>> steps_ = std::make_shared<std::atomic<long>>(0);  // shared by all copies
   Readings outliers_;
   Dataset data_;
   Noise noise_;

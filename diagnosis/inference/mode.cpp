@@ -316,6 +316,7 @@ Fit fit_from(const Likelihood& likelihood, Fit now, const CurveAt& curve_at, con
     }
     if (!moved || small) break;
   }
+  likelihood.count_steps(now.iterations);
   return now;
 }
 

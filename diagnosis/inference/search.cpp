@@ -138,7 +138,6 @@ std::vector<std::shared_ptr<Evaluated>> Search::evaluate_without_curve(std::span
   });
   for (std::size_t i = 0; i < jobs.size(); ++i)
     if (out[i]->valid) keep(jobs[i].set, out[i]);
-  fits_ += jobs.size();
   return out;
 }
 
@@ -150,7 +149,7 @@ void Search::evaluate_all(std::vector<Job> jobs) {
   Modes asked;
   while (!jobs.empty()) {
     const double near = best_log() - rules_.window;
-    const bool over = is_round_over();
+    const bool over = is_out_of_steps() || is_round_over();
     std::erase_if(jobs, [&](const Job& job) {
       return std::isfinite(job.promised) && (over || (!job.foremost && job.promised < near));
     });
@@ -216,7 +215,6 @@ void Search::run(const Readings& outliers, const Noise& noise, const Progress& p
       ask_for_curve_of(one.likelier_fit(), heavy_, jobs.back());
     }
     visited_.clear();
-    fits_ = 0;
     look_in_rounds(heavy_, start, std::move(jobs));
   }
   last_round_ = true;
@@ -342,7 +340,7 @@ void Search::look_around() {
 }
 
 void Search::look_at_what_is_left() {
-  while (fits_ < rules_.most_fits && !is_round_over()) {
+  while (!is_out_of_steps() && !is_round_over()) {
     const ModelSet* next = next_to_expand(visited_, expanded_, rules_.window);
     if (!next) break;
     const ModelSet set = *next;

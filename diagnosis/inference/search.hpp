@@ -24,7 +24,7 @@ struct SearchRules {
   std::size_t starts = 2;      // of an effect, that are fitted
   std::size_t foremost = 2;    // proposals that are looked at in a member's place
   std::size_t pairs = 8;
-  std::size_t most_fits = 90;           // in all, and as many again by noise with heavy tails
+  long most_steps = 3000;               // of all fits (Likelihood::steps); then nothing is begun any more
   double log_prior_odds_effect = -5.0;  // of one effect being in the model, against not; its kinds share it
   std::size_t most_curves = 2;          // of a discrepancy
   std::size_t at_once = 4;              // fits of which the next are chosen by what these come to
@@ -163,6 +163,7 @@ class Search {
   bool is_nothing_hopeless_with_a_curve() const;
   // Promises that were made by this noise are not worth much by that of what was found since; the last goes on.
   bool is_round_over() const;
+  bool is_out_of_steps() const { return likelihood_->steps() >= rules_.most_steps; }
   void look_around();
   void look_at_what_is_left();  // in the window, the likeliest first
 
@@ -176,8 +177,7 @@ class Search {
   std::set<ModelSet> expanded_, refitted_;       // once a round each
   std::set<std::pair<ModelSet, bool>> swapped_;  // beside a curve and without one, the same
   Progress progress_;
-  std::map<ModelSet, double> promised_;  // log posterior of sets that were not fitted
-  std::size_t fits_ = 0;
+  std::map<ModelSet, double> promised_;               // log posterior of sets that were not fitted
   std::shared_ptr<const Likelihood> heavy_;           // by noise with heavy tails; null: normal, as far as is known
   std::shared_ptr<const Evaluated> asked_for_tails_;  // the likeliest set, when that was asked
   bool tails_known_ = false;                          // not asked any more

@@ -101,6 +101,20 @@ TEST(PendulumTest, TwoEffects) {
   EXPECT_EQ(find(truth, 41).set, (ModelSet{Pendulum::kDryFriction, Pendulum::kSensorScale}));
 }
 
+TEST(PendulumTest, NothingIsBegunOnceTheStepsAreSpent) {
+  TruePendulum truth;
+  truth.dry_friction = 0.25;
+  const Pendulum system(truth, 6, 21);
+  const auto visited_with = [&](long most_steps) {
+    Search search(system, {.most_steps = most_steps});
+    search.run(Readings(6), white());
+    return search.visited().size();
+  };
+  const std::size_t all = visited_with(SearchRules{}.most_steps);
+  EXPECT_EQ(visited_with(2 * SearchRules{}.most_steps), all);
+  EXPECT_LT(visited_with(1), all);  // nothing, and the foremost effects alone
+}
+
 TEST(PendulumTest, WhatIsOnNoListIsADiscrepancy) {
   TruePendulum truth;
   truth.magnet = 1.5;
