@@ -194,8 +194,8 @@ void Search::expand(const ModelSet& set) {
   const bool hopeless = is_hopeless(set);
   const Visited here = visited_.at(set);
   if (progress_)
-    progress_(describe(system_, set) + "; " + std::to_string(likelihood_->steps()) +
-              " steps of fits done, nothing is begun after " + std::to_string(rules_.most_steps));
+    progress_(describe(system_, set) + "; " + std::to_string(likelihood_->steps()) + " steps of fits done, after " +
+              std::to_string(rules_.most_steps) + " only around the likeliest");
   std::vector<Job> jobs;
   const auto append = [&](std::vector<Job> more) { std::ranges::move(more, std::back_inserter(jobs)); };
   const auto append_larger = [&](const std::vector<Beside>& looked) {

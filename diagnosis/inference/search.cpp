@@ -149,7 +149,7 @@ void Search::evaluate_all(std::vector<Job> jobs) {
   Modes asked;
   while (!jobs.empty()) {
     const double near = best_log() - rules_.window;
-    const bool over = is_out_of_steps() || is_round_over();
+    const bool over = is_round_over();
     std::erase_if(jobs, [&](const Job& job) {
       return std::isfinite(job.promised) && (over || (!job.foremost && job.promised < near));
     });
@@ -340,9 +340,10 @@ void Search::look_around() {
 }
 
 void Search::look_at_what_is_left() {
-  while (!is_out_of_steps() && !is_round_over()) {
-    const ModelSet* next = next_to_expand(visited_, expanded_, rules_.window);
-    if (!next) break;
+  while (!is_round_over()) {
+    // No answer is given that was not looked around, however much that takes.
+    const ModelSet* next = is_out_of_steps() ? &best().set : next_to_expand(visited_, expanded_, rules_.window);
+    if (!next || expanded_.contains(*next)) break;
     const ModelSet set = *next;
     const auto at = visited_.at(set).at;
     if (!at->with_discrepancy) {
