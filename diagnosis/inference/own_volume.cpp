@@ -56,16 +56,12 @@ std::shared_ptr<const OwnVolume> own_volume_about(const Fit& fit, const CurveCol
 
 // Where no step along them comes to less (instants: no smooth function of the shared unknowns), the slopes are taken
 // to the share that keeps the linear model nearest to where it is: none of them at a mode of the cost alone.
-void keep_stationary(Fit& now, std::vector<ArrowBlock>& blocks, const CurveColumns& curve, const VectorXd& with) {
-  for (ArrowBlock& block : blocks) block.slope.resize(0);
-  const ArrowSolution without = solve_about(now, blocks, curve, std::vector<Index>{});
-  if (!without.valid) return;
-  const VectorXd by_slopes = with - without.shared, pulled = without.information * by_slopes;
+std::shared_ptr<const OwnVolume> stationary(OwnVolume volume, const ArrowSolution& without, const ArrowSolution& with) {
+  const VectorXd by_slopes = with.shared - without.shared, pulled = without.information * by_slopes;
   const double square = by_slopes.dot(pulled);
   const double share = square > 0 ? std::clamp(-without.shared.dot(pulled) / square, 0.0, 1.0) : 0;
-  OwnVolume kept = *now.own_volume;
-  for (VectorXd& slope : kept.slope) slope *= share;
-  now.own_volume = std::make_shared<const OwnVolume>(std::move(kept));
+  for (VectorXd& slope : volume.slope) slope *= share;
+  return std::make_shared<const OwnVolume>(std::move(volume));
 }
 
 }  // namespace
@@ -88,11 +84,11 @@ Fit with_own_integrated(Fit now, const CurveAt& curve_at) {
   std::vector<Index> all(static_cast<std::size_t>(now.shared.size()));
   for (std::size_t i = 0; i < all.size(); ++i) all[i] = static_cast<Index>(i);
   for (int step = 0;; ++step) {
-    ArrowSolution about = solve_about(now, blocks, *curve);
-    if (!about.valid) return now;
-    now.own_volume = own_volume_about(now, *curve, blocks, about);
+    const ArrowSolution without = solve_about(now, blocks, *curve);
+    if (!without.valid) return now;
+    now.own_volume = own_volume_about(now, *curve, blocks, without);
     for (std::size_t r = 0; r < blocks.size(); ++r) blocks[r].slope = now.own_volume->slope[r];
-    about = solve_about(now, blocks, *curve);
+    const ArrowSolution about = solve_about(now, blocks, *curve);
     if (!about.valid || now.cost - about.least < kSmallStep || step == kMostSteps) return now;
     double share = 1;
     bool gained = false;
@@ -113,7 +109,7 @@ Fit with_own_integrated(Fit now, const CurveAt& curve_at) {
       gained = true;
     }
     if (!gained) {
-      keep_stationary(now, blocks, *curve, about.shared);
+      now.own_volume = stationary(*now.own_volume, without, about);
       return now;
     }
   }
