@@ -146,6 +146,10 @@ CovariateWords words_of(model::Covariate covariate) {
       return {"tip_x", "mm", "where the tip is along x"};
     case model::Covariate::tip_y_mm:
       return {"tip_y", "mm", "where the tip is along y"};
+    case model::Covariate::tip_xy_mm:
+      return {"tip_xy", "mm", "where the tip is between x and y"};
+    case model::Covariate::tip_yx_mm:
+      return {"tip_yx", "mm", "where the tip is between y and minus x"};
     case model::Covariate::roll_rad:
       return {"roll", "rad", "roll"};
   }

@@ -62,8 +62,9 @@ std::vector<model::Covariates> covariates_of(const Recording& recording) {
   auto all = model::find_covariates(recording.motion.nodes);
   for (std::size_t i = 0; i < recording.motion.at.size(); ++i) {
     model::Covariates& at = all[recording.motion.at[i]];
-    at[model::Covariate::tip_x_mm] = recording.position_mm[i].x();
-    at[model::Covariate::tip_y_mm] = recording.position_mm[i].y();
+    for (const model::Covariate covariate : model::all_covariates())
+      if (const auto along = model::tip_direction(covariate))
+        at[covariate] = model::place_along(*along, recording.position_mm[i]);
   }
   return all;
 }

@@ -25,10 +25,10 @@ std::vector<double> values_of(const std::vector<std::vector<model::Covariates>>&
   return values;
 }
 
-std::vector<double> values_of(const std::vector<Eigen::Vector3d>& seen_mm, Eigen::Index axis) {
+std::vector<double> values_of(const std::vector<Eigen::Vector3d>& seen_mm, const Eigen::Vector2d& along) {
   std::vector<double> values;
   for (const auto& tip_mm : seen_mm)
-    if (std::isfinite(tip_mm[axis])) values.push_back(tip_mm[axis]);
+    if (const double at = model::place_along(along, tip_mm); std::isfinite(at)) values.push_back(at);
   std::sort(values.begin(), values.end());
   return values;
 }
@@ -90,9 +90,8 @@ std::vector<NeedleCurve> find_curves(const std::vector<const model::Motion*>& mo
   for (const model::Motion* motion : motions) recordings.push_back(model::find_covariates(motion->nodes));
   const bool roll_says = within_a_turn(recordings);
   const auto values = [&](Covariate covariate) {
-    if (covariate == Covariate::tip_x_mm) return values_of(seen_mm, 0);
-    if (covariate == Covariate::tip_y_mm) return values_of(seen_mm, 1);
-    return values_of(recordings, covariate);
+    const auto along = model::tip_direction(covariate);
+    return along ? values_of(seen_mm, *along) : values_of(recordings, covariate);
   };
   for (const Covariate covariate : model::all_covariates()) {
     inference::Curve curve;

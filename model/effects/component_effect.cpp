@@ -99,8 +99,8 @@ CovariateTracker ComponentEffect::tracked(const LegView& leg, const EffectMemory
 }
 
 Dual ComponentEffect::place_of(const CovariateTracker& tracker, const LegView& leg) const {
-  if (covariate() == Covariate::tip_x_mm) return leg.tip_side_mm[0];
-  if (covariate() == Covariate::tip_y_mm) return leg.tip_side_mm[1];
+  if (const auto along = tip_direction(covariate()))
+    return leg.tip_side_mm[0] * along->x() + leg.tip_side_mm[1] * along->y();
   return tracker[covariate()];
 }
 

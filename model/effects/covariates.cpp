@@ -26,9 +26,16 @@ void CovariateTracker::advance(const BaseMotion& from, const BaseMotion& to) {
                 to.insertion_mm - history_.turned_mm,
                 to.rotation_rad,
                 to.rotation_rad - entry_turned_rad_,
-                history_.deepest_mm - to.insertion_mm,
-                std::numeric_limits<double>::quiet_NaN(),
-                std::numeric_limits<double>::quiet_NaN()};
+                history_.deepest_mm - to.insertion_mm};
+  for (const Covariate covariate : all_covariates())
+    if (tip_direction(covariate)) now_[covariate] = std::numeric_limits<double>::quiet_NaN();
+}
+
+double place_along(const Eigen::Vector2d& direction, const Eigen::Vector3d& point_mm) {
+  double sum = 0;
+  for (int i = 0; i < 2; ++i)
+    if (direction[i] != 0) sum += direction[i] * point_mm[i];  // 0 times what is no number is none
+  return sum;
 }
 
 std::vector<Covariates> find_covariates(std::span<const BaseMotion> nodes) {

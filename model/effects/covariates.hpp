@@ -7,8 +7,8 @@ namespace bevel::model {
 
 // depth is the base's insertion; since_stop counts seconds from the moment at which insertion last ended (0 while
 // inserting), since_reversal the insertion since the shaft last turned; turned is the shaft's turning since the entry,
-// turns counted; withdrawn how far the base is drawn back from the deepest that it was. tip_x, tip_y: where the tip is
-// in {A}; not a number until somebody who knows puts it in.
+// turns counted; withdrawn how far the base is drawn back from the deepest that it was. tip_x to tip_yx: where the
+// tip is along that direction of {A} (tip_direction); not a number until somebody who knows puts it in.
 struct Covariates {
   std::array<double, kCovariates> value{};
   double operator[](Covariate covariate) const { return value[static_cast<std::size_t>(covariate)]; }
@@ -41,6 +41,9 @@ class CovariateTracker {
   History history_;
   Covariates now_;
 };
+
+// Where a point is along such a direction; not a number where a coordinate that matters is none.
+double place_along(const Eigen::Vector2d& direction, const Eigen::Vector3d& point_mm);
 
 // One per node of a motion, of which the first is the entry.
 std::vector<Covariates> find_covariates(std::span<const BaseMotion> nodes);

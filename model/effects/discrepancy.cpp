@@ -102,7 +102,9 @@ class Discrepancy final : public ComponentEffect {
         break;
       case Covariate::tip_x_mm:
       case Covariate::tip_y_mm:
-        moved = std::abs(leg.R(covariate() == Covariate::tip_x_mm ? 0 : 1, 2) * leg.base_insertion_mm());
+      case Covariate::tip_xy_mm:
+      case Covariate::tip_yx_mm:
+        moved = std::abs(tip_direction(covariate())->dot(leg.R.block<2, 1>(0, 2)) * leg.base_insertion_mm());
         break;
       case Covariate::speed_mm_s:
       case Covariate::turn_rate_rad_s:

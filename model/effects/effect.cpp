@@ -2,6 +2,7 @@
 
 #include <array>
 #include <cmath>
+#include <numbers>
 
 namespace bevel::model {
 
@@ -46,6 +47,10 @@ std::string_view name_of(Covariate covariate) {
       return "tip_x_mm";
     case Covariate::tip_y_mm:
       return "tip_y_mm";
+    case Covariate::tip_xy_mm:
+      return "tip_xy_mm";
+    case Covariate::tip_yx_mm:
+      return "tip_yx_mm";
   }
   return "time_s";
 }
@@ -55,11 +60,27 @@ bool needs_clock(Covariate covariate) {
          covariate == Covariate::turn_rate_rad_s || covariate == Covariate::since_stop_s;
 }
 
+std::optional<Eigen::Vector2d> tip_direction(Covariate covariate) {
+  switch (covariate) {
+    case Covariate::tip_x_mm:
+      return Eigen::Vector2d::UnitX();
+    case Covariate::tip_y_mm:
+      return Eigen::Vector2d::UnitY();
+    case Covariate::tip_xy_mm:
+      return Eigen::Vector2d(std::numbers::sqrt2 / 2, std::numbers::sqrt2 / 2);
+    case Covariate::tip_yx_mm:
+      return Eigen::Vector2d(-std::numbers::sqrt2 / 2, std::numbers::sqrt2 / 2);
+    default:
+      return std::nullopt;
+  }
+}
+
 std::span<const Covariate> all_covariates() {
   static constexpr std::array<Covariate, kCovariates> kAll = {
       Covariate::time_s,       Covariate::depth_mm,          Covariate::speed_mm_s, Covariate::turn_rate_rad_s,
       Covariate::since_stop_s, Covariate::since_reversal_mm, Covariate::roll_rad,   Covariate::turned_rad,
-      Covariate::withdrawn_mm, Covariate::tip_x_mm,          Covariate::tip_y_mm};
+      Covariate::withdrawn_mm, Covariate::tip_x_mm,          Covariate::tip_y_mm,   Covariate::tip_xy_mm,
+      Covariate::tip_yx_mm};
   return kAll;
 }
 

@@ -8,6 +8,7 @@
 // first, camera last.
 #include <cstdint>
 #include <limits>
+#include <optional>
 #include <span>
 #include <string_view>
 #include <utility>
@@ -78,11 +79,16 @@ enum class Covariate {
   turned_rad,
   withdrawn_mm,
   tip_x_mm,
-  tip_y_mm
+  tip_y_mm,
+  tip_xy_mm,
+  tip_yx_mm
 };
-inline constexpr std::size_t kCovariates = 11;
+inline constexpr std::size_t kCovariates = 13;
 std::string_view name_of(Covariate covariate);
 bool needs_clock(Covariate covariate);  // time, speed, rate, rest: unknown where only the order of readings is
+// Unit vector (x, y of {A}) along which a covariate says where the tip is; nothing for one of the base's motion. An
+// axis of {A} is no better than a direction between: tissue does not know them.
+std::optional<Eigen::Vector2d> tip_direction(Covariate covariate);
 std::span<const Covariate> all_covariates();
 
 // What an effect remembers between legs of one insertion. Slopes come with it.

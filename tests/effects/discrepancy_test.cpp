@@ -136,11 +136,38 @@ TEST(Discrepancy, ACurveOverTheTipsPlaceFollowsTheTip) {
   }
 }
 
+// The same toward any direction aside: turned with what it looks along, a curve says the same.
+TEST(Discrepancy, ADirectionAsideIsAsGoodAsAnother) {
+  NeedleParameters straight = bicycle();
+  straight.curvature_per_mm = 0;
+  const Motion motion = Script{{5, 10, 0}}.fine();
+  double first_mm = 0;
+  for (const Covariate covariate :
+       {Covariate::tip_x_mm, Covariate::tip_y_mm, Covariate::tip_xy_mm, Covariate::tip_yx_mm}) {
+    const Eigen::Vector2d along = *tip_direction(covariate);
+    EXPECT_NEAR(along.norm(), 1, 1e-12);
+    // The heading turns toward it by 0.3 rad: about x toward -y, about y toward x.
+    const auto entry = active("entry_angle", {-0.3 * along.y(), 0.3 * along.x()});
+    const DiscrepancyCurve faster{Component::advance, covariate, {-40, 40}, {-0.8, 0.8}, {0, 0}};
+    const Eigen::Vector3d end_mm = path_of(straight, {entry, active_discrepancy(faster)}, motion).back();
+    if (first_mm == 0) first_mm = end_mm.norm();
+    EXPECT_NEAR(end_mm.norm(), first_mm, 2e-3 * first_mm) << name_of(covariate);
+    EXPECT_NEAR(place_along(along, end_mm), end_mm.norm() * std::sin(0.3), 0.02 * end_mm.norm());
+    // Across it the tip is where nothing is off.
+    const DiscrepancyCurve across{Component::x, covariate, {-40, 40}, {-40, 40}, {0, 0}};
+    const auto sideways = active("entry_angle", {0.3 * along.x(), 0.3 * along.y()});
+    const Eigen::Vector3d with = path_of(straight, {sideways, active_discrepancy(across)}, motion).back();
+    EXPECT_NEAR((with - path_of(straight, {sideways}, motion).back()).norm(), 0, 0.2) << name_of(covariate);
+  }
+  for (const Covariate covariate : all_covariates())
+    EXPECT_EQ(tip_direction(covariate).has_value(), name_of(covariate).starts_with("tip_"));
+}
+
 // By the needle's own parameters: where the tip is moves with them, and with it what the curve says.
 TEST(Discrepancy, DerivativesOfACurveOverTheTipsPlaceAreThoseOfDifferences) {
   const Motion motion = rich_script().recorded();
   for (const auto& info : discrepancy_components())
-    for (const Covariate covariate : {Covariate::tip_x_mm, Covariate::tip_y_mm}) {
+    for (const Covariate covariate : {Covariate::tip_x_mm, Covariate::tip_y_mm, Covariate::tip_xy_mm}) {
       // One slope all the way: a difference over a knot would be of two.
       const double steep = 2e-3 * info.largest;
       const std::vector<ActiveEffect> curve = {

@@ -59,7 +59,8 @@ double value_at(const model::Effect& effect, const Values& values, model::Covari
   }
   if (covariate == model::Covariate::since_reversal_mm) leg.to.rotation_rad = 0;
   if (covariate == model::Covariate::withdrawn_mm) leg.to.insertion_mm = -place, leg.from.insertion_mm = -place + kStep;
-  if (covariate == model::Covariate::tip_y_mm) leg.tip_side_mm[1] = place;
+  if (const auto along = model::tip_direction(covariate))
+    for (std::size_t i = 0; i < 2; ++i) leg.tip_side_mm[i] = place * (*along)[static_cast<Eigen::Index>(i)];
   if (covariate == model::Covariate::time_s) leg.to.time_s = place, leg.from.time_s = place - kStep;
   if (covariate == model::Covariate::roll_rad || covariate == model::Covariate::turned_rad)
     leg.to.rotation_rad = place, leg.from.rotation_rad = place - kStep;

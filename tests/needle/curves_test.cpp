@@ -106,7 +106,8 @@ TEST(NeedleCurves, TheTipsPlaceIsACovariateWhereReadingsSayIt) {
   std::vector<Eigen::Vector3d> seen_mm;
   for (int i = 0; i <= 100; ++i) seen_mm.emplace_back(std::nan(""), 0.1 * i - 4, i);
   const auto curves = find_curves({&in}, seen_mm);
-  EXPECT_THAT(curves, Each(Field(&NeedleCurve::covariate, Ne(model::Covariate::tip_x_mm))));
+  for (const auto covariate : {model::Covariate::tip_x_mm, model::Covariate::tip_xy_mm, model::Covariate::tip_yx_mm})
+    EXPECT_THAT(curves, Each(Field(&NeedleCurve::covariate, Ne(covariate))));
   const auto over_y = std::ranges::find(curves, model::Covariate::tip_y_mm, &NeedleCurve::covariate);
   ASSERT_NE(over_y, curves.end());
   EXPECT_NEAR(over_y->curve.at.front(), -3.9, 0.1);  // the middle 98 %
