@@ -26,6 +26,10 @@ struct ArrowSolution {
   std::vector<Eigen::VectorXd> local;
   Eigen::MatrixXd information;  // of z, all else eliminated: the Schur complement plus P
   Eigen::MatrixXd covariance;   // its inverse, or those columns of it that were asked for, the others zero
+  // What the tails of those held add to it about z, where all of it is wanted: each as far as it may be from its bound,
+  // all else following. Empty: none is held.
+  Eigen::MatrixXd of_tails;
+  Eigen::MatrixXd covariance_with_tails() const { return of_tails.size() > 0 ? covariance + of_tails : covariance; }
   // log det of the whole Hessian less that of the priors' precisions: what the posterior's volume lost.
   double log_volume_ratio = 0;
   bool valid = false;

@@ -29,11 +29,11 @@ MatrixXd shared_covariance(const Fit& fit, std::vector<ArrowBlock> blocks, const
     const ArrowSolution solution = solve_at(grid.standard_deviations.col(k), fit, blocks, curve);
     if (!solution.valid) continue;
     const VectorXd away = solution.shared.head(n);
-    sum += weights[k] * (solution.covariance.topLeftCorner(n, n) + away * away.transpose());
+    sum += weights[k] * (solution.covariance_with_tails().topLeftCorner(n, n) + away * away.transpose());
     all += weights[k];
   }
   if (all > 0) return sum / all;
-  return solve_about(fit, blocks, curve).covariance.topLeftCorner(n, n);
+  return solve_about(fit, blocks, curve).covariance_with_tails().topLeftCorner(n, n);
 }
 
 std::vector<std::vector<Mixture>> nuisance_posterior(const Fit& fit, std::vector<ArrowBlock> blocks,

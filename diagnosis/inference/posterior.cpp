@@ -168,12 +168,12 @@ Unknowns::Unknowns(const Search& search) : search_(&search) {
                 .sd = fit.shared,
                 .nuisance_sd = nuisance_sd,
                 .along = {}};
+      const MatrixXd covariance = solution.covariance_with_tails();
       for (Index i = 0; i < fit.shared.size(); ++i) {
         part.mean[i] += solution.shared[i];
         // Where the readings say nothing about it here, it may be anywhere within its bounds.
         const Parameter& p = *fit.layout.shared()[static_cast<std::size_t>(i)].parameter;
-        part.sd[i] =
-            std::min(std::sqrt(std::max(0.0, solution.covariance(i, i))), (p.upper - p.lower) / std::sqrt(12.0));
+        part.sd[i] = std::min(std::sqrt(std::max(0.0, covariance(i, i))), (p.upper - p.lower) / std::sqrt(12.0));
       }
       if (weight > kShare && !first) {
         look_along(fit, curve, solution.covariance, part);
@@ -205,7 +205,7 @@ void Unknowns::look_along(const Fit& fit, const CurveColumns& curve, const Matri
       part.along[i] = posterior_along(*profile, i, part.sd[i] > 0 ? part.sd[i] : kOfHeld * (p.upper - p.lower));
     } else if (!p.periodic) {
       const bool held = !(covariance(i, i) > 0), many = has_many_minima(p);
-      double near = held ? kOfHeld * (p.upper - p.lower) : part.sd[i];
+      double near = held ? kOfHeld * (p.upper - p.lower) : std::min(std::sqrt(covariance(i, i)), part.sd[i]);
       if (many) near = std::min(near, grid_spacing(p, fit.shared[i]));
       const VectorXd by_this = held || many ? VectorXd::Unit(fit.shared.size(), i)
                                             : VectorXd(covariance.col(i).head(fit.shared.size()) / covariance(i, i));

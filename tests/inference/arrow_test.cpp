@@ -164,6 +164,7 @@ TEST(Arrow, WhatPressesAgainstABoundHasTheVolumeThatItsCurvatureLeaves) {
     const ArrowSolution s = solve(blocks, precision, centre, rules);
     // The least of the rest, with that unknown at x.
     double volume_rest = 0;
+    VectorXd others_at;
     const auto least_at = [&](double x) {
       auto moved = p.blocks;
       for (auto& block : moved) {
@@ -175,19 +176,32 @@ TEST(Arrow, WhatPressesAgainstABoundHasTheVolumeThatItsCurvatureLeaves) {
       }
       const ArrowSolution t = solve(moved, MatrixXd(precision(rest, rest)), VectorXd::Zero(3));
       volume_rest = t.log_volume_ratio;
+      others_at = t.shared;
       return t.least + precision(2, 2) * (x - centre[2]) * (x - centre[2]);
     };
     const double here = least_at(0), small = 1e-6;
     const double inwards = least_at(small) > here ? 1 : -1;
-    // Trapezia over eight widths of the tail.
+    // Trapezia over twenty widths of the tail.
     const double slope = (least_at(inwards * small) - here) / (2 * small);
     const double curvature = (least_at(1) + least_at(-1) - 2 * here) / 2;
-    const double step = 8 / std::max(slope, std::sqrt(curvature)) / 20000;
-    double volume = 0.5 * step;
-    for (int i = 1; i < 20000; ++i) volume += step * std::exp(-0.5 * (least_at(inwards * i * step) - here));
+    const double step = 20 / std::max(slope, std::sqrt(curvature)) / 20000;
+    double volume = 0.5 * step, square = 0;
+    for (int i = 1; i < 20000; ++i) {
+      const double x = i * step, density = step * std::exp(-0.5 * (least_at(inwards * x) - here));
+      volume += density, square += x * x * density;
+    }
     EXPECT_NEAR(s.log_volume_ratio,
                 volume_rest + std::log(2 * std::numbers::pi) - 2 * std::log(volume) - std::log(precision(2, 2)), 2e-3)
         << "pull " << pull;
+    // As far as it may be from there, and what follows it: of the rest, so much more than with it at its bound.
+    least_at(1);
+    const VectorXd with = others_at;
+    least_at(0);
+    VectorXd along = VectorXd::Unit(4, 2);
+    along(rest) = with - others_at;
+    const MatrixXd added = square / volume * along * along.transpose();
+    EXPECT_LT((s.of_tails - added).norm(), 2e-3 * added.norm()) << "pull " << pull;
+    EXPECT_EQ(s.covariance_with_tails(), s.covariance + s.of_tails);
   }
 }
 
