@@ -12,9 +12,10 @@ using Eigen::VectorXd;
 
 namespace {
 
+constexpr double kFar = 20;  // for scaled_erfc(), from where both its factors leave the range of a double
+
 // exp(x^2) erfc(x), x >= 0.
 double scaled_erfc(double x) {
-  constexpr double kFar = 20;  // from where both factors leave the range of a double
   return x < kFar ? std::exp(x * x) * std::erfc(x) : (1 - 0.5 / (x * x)) / (x * std::sqrt(std::numbers::pi));
 }
 
@@ -26,13 +27,17 @@ struct Tail {
   VectorXd along;        // by how much all unknowns move with it
 };
 
-// The mean of x^2 of such a density: by parts, curvature <x^2> + slope <x> = 1 and curvature <x> + slope = 1 / volume.
-double mean_square(double slope, double curvature) {
-  constexpr double kFar = 20;  // from where that is a difference of near equals, and the series in `bend` exact to 1e-5
-  const double beyond = slope / std::sqrt(2 * curvature), bend = curvature / (slope * slope);
-  if (beyond > kFar) return (2 + bend * (74 * bend - 10)) / (slope * slope);
-  const double volume = std::sqrt(0.5 * std::numbers::pi / curvature) * scaled_erfc(beyond);
-  return (1 - slope * (1 / volume - slope) / curvature) / curvature;
+Tail tail_of(double slope, double curvature, VectorXd along) {
+  const double beyond = slope / std::sqrt(2 * curvature), scaled = scaled_erfc(beyond);
+  Tail out{.curvature = 4 * curvature / (scaled * scaled), .square = 0, .along = std::move(along)};
+  if (beyond > kFar) {  // a series: exact to 1e-5, where the other is a difference of near equals
+    const double bend = curvature / (slope * slope);
+    out.square = (2 + bend * (74 * bend - 10)) / (slope * slope);
+  } else {  // by parts, curvature <x^2> + slope <x> = 1 and curvature <x> + slope = 1 / volume
+    const double volume = std::sqrt(0.5 * std::numbers::pi / curvature) * scaled;
+    out.square = (1 - slope * (1 / volume - slope) / curvature) / curvature;
+  }
+  return out;
 }
 
 std::vector<Tail> tails_of(const MatrixXd& H, const VectorXd& g, const std::vector<Index>& held) {
@@ -52,9 +57,7 @@ std::vector<Tail> tails_of(const MatrixXd& H, const VectorXd& g, const std::vect
       slope -= taken.dot(g(others).cwiseProduct(unit));
       along(others) = -taken.cwiseProduct(unit);
     }
-    slope = std::abs(slope);
-    const double volume = scaled_erfc(slope / std::sqrt(2 * curvature));
-    out.push_back({4 * curvature / (volume * volume), mean_square(slope, curvature), std::move(along)});
+    out.push_back(tail_of(std::abs(slope), curvature, std::move(along)));
   }
   return out;
 }
