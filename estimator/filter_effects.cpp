@@ -14,6 +14,7 @@ model::AugmentedState NeedleFilter::augmented(const FilterState& state) const {
   augmented.D.setIdentity(6, wheelbase_estimated_ ? 10 : 9);
   augmented.entry = effects.entry;
   augmented.base = effects.base;
+  augmented.history = effects.history;
   augmented.tip_insertion_mm = effects.tip_insertion_mm;
   augmented.tip_rotation_rad = effects.tip_rotation_rad;
   for (std::size_t i = 0; i < config_.effects.size(); ++i) {
@@ -45,6 +46,7 @@ bool NeedleFilter::predict_with_effects(FilterState& state, const model::BaseMot
   state.pose = moved.pose;
   EffectState& effects = state.effects;
   effects.base = moved.base;
+  effects.history = moved.history;
   effects.tip_insertion_mm = moved.tip_insertion_mm.value;
   effects.tip_rotation_rad = moved.tip_rotation_rad.value;
   for (std::size_t i = 0; i < config_.effects.size(); ++i) {

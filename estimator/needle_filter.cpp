@@ -88,6 +88,7 @@ FilterState NeedleFilter::initial(double insertion_mm, double rotation_rad) cons
   const model::AugmentedState entry = needle_.entry({0, insertion_mm, rotation_rad});
   state.pose = entry.pose;
   state.effects.entry = state.effects.base = entry.base;
+  state.effects.history = entry.history;
   state.effects.tip_insertion_mm = insertion_mm;
   state.effects.tip_rotation_rad = rotation_rad;
   return state;

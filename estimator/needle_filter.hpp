@@ -33,6 +33,7 @@ struct EffectState {
   std::array<std::array<double, model::EffectMemory::kSlots>, model::kMaxEffects> slot{};
   std::array<std::array<double, model::EffectMemory::kNumbers>, model::kMaxEffects> number{};
   std::array<int, model::kMaxEffects> phase{};
+  model::BaseHistory history;
 };
 
 // Errors that a camera's neighbouring readings share (ReadingNoise), in their own standard deviations: each of unit

@@ -150,15 +150,19 @@ CovariateWords words_of(model::Covariate covariate) {
       return {"tip_xy", "mm", "where the tip is between x and y"};
     case model::Covariate::tip_yx_mm:
       return {"tip_yx", "mm", "where the tip is between y and minus x"};
+    case model::Covariate::since_speed_change_s:
+      return {"since_speed_change", "s", "the time since a change of speed"};
     case model::Covariate::roll_rad:
       return {"roll", "rad", "roll"};
   }
   return {};
 }
 
-// "1/mm" is "per_mm" in a name, "mm per rad" is "mm_per_rad".
-std::string in_name(std::string unit) {
+// "1/mm" is "per_mm" in a name, "mm per rad" is "mm_per_rad", "mm/s" is "mm_s".
+std::string in_name(std::string_view of) {
+  std::string unit(of);
   if (unit.starts_with("1/")) unit.replace(0, 2, "per ");
+  std::replace(unit.begin(), unit.end(), '/', '_');
   std::replace(unit.begin(), unit.end(), ' ', '_');
   return unit;
 }
@@ -190,7 +194,7 @@ std::string parameters_of(const ProposedForm& p, const std::string& unit) {
   const auto& info = info_of(p.component);
   const bool swings = p.form == Form::sinusoid;  // half a turn of its phase is its other sign
   const double amplitude = swings ? std::abs(p.amplitude) : p.amplitude;
-  std::string out = filled(kAmplitude, {{"component_unit_in_name", in_name(std::string(info.unit))},
+  std::string out = filled(kAmplitude, {{"component_unit_in_name", in_name(unit_of(p.component, p.covariate))},
                                         {"lower", number(swings ? 0 : -info.largest)},
                                         {"upper", number(info.largest)},
                                         {"start", number(amplitude, 3)},
@@ -212,8 +216,8 @@ std::string parameters_of(const ProposedForm& p, const std::string& unit) {
 std::string found_of(const ProposedForm& p, const std::string& unit) {
   const auto line = [](const std::string& name, double value) { return "//   " + name + " = " + number(value) + "\n"; };
   const bool swings = p.form == Form::sinusoid;
-  std::string out = line("amplitude_" + in_name(std::string(info_of(p.component).unit)),
-                         swings ? std::abs(p.amplitude) : p.amplitude);
+  std::string out =
+      line("amplitude_" + in_name(unit_of(p.component, p.covariate)), swings ? std::abs(p.amplitude) : p.amplitude);
   if (!p.periodic) out += line(name_of_shape(p, unit), p.shape);
   if (swings) out += line("phase_rad", p.phase_rad + (p.amplitude < 0 ? std::numbers::pi : 0));
   return out;
@@ -226,7 +230,8 @@ std::string constants_of(const ProposedForm& p, const std::string& unit) {
   const auto constant = [&](const char* name, double value) { return written(name, number(value)); };
   switch (p.form) {
     case Form::step:
-      return constant("kWidth", kStepShare * p.range);
+      // Where only tenths of a second are looked at, from one to the next: narrower, none would say where it is.
+      return constant("kWidth", adds_up(p.covariate) ? model::kSpeedChange_s : kStepShare * p.range);
     case Form::ramp:
       return constant("kRange", p.range);
     case Form::power:
@@ -290,7 +295,7 @@ EffectSource effect_source(const ProposedForm& p) {
                                  {"a_sd", number(p.amplitude_sd, 2)},
                                  {"s", number(p.shape, 3)},
                                  {"s95", s95},
-                                 {"component_unit", std::string(info.unit)},
+                                 {"component_unit", std::string(unit_of(p.component, p.covariate))},
                                  {"component", std::string(info.name)},
                                  {"factor", number(p.log_bayes_factor, 3)},
                                  {"unit", covariate.unit},

@@ -11,9 +11,10 @@ namespace {
 
 using model::Covariate;
 
-constexpr int kValues = 12;                    // of a curve
-static_assert(kValues <= model::kMaxColumns);  // a path is followed with its derivatives by all of them
-constexpr double kLeastVariation = 0.05;       // of a covariate, in its unit
+constexpr int kValues = 12;  // of a curve
+static_assert(std::max<int>(kValues, model::kSpeedChanges) <=
+              model::kMaxColumns);        // a path is followed with its derivatives by all of them
+constexpr double kLeastVariation = 0.05;  // of a covariate, in its unit
 constexpr double kLeastRoll_rad = 0.2;
 
 // Ascending.
@@ -40,6 +41,13 @@ bool within_a_turn(const std::vector<std::vector<model::Covariates>>& recordings
   return roll.back() - roll.front() <= 2 * std::numbers::pi && std::ranges::all_of(recordings, [&](const auto& nodes) {
            return std::abs(nodes.front()[Covariate::roll_rad] - begin) < kLeastRoll_rad;
          });
+}
+
+// After a change of speed, as far as is remembered.
+std::vector<double> places_after_a_change() {
+  std::vector<double> out;
+  for (std::size_t i = 1; i <= model::kSpeedChanges; ++i) out.push_back(static_cast<double>(i) * model::kSpeedChange_s);
+  return out;
 }
 
 // Evenly over the middle 98 % of what the covariate takes (values, ascending); false if it hardly varies.
@@ -95,12 +103,15 @@ std::vector<NeedleCurve> find_curves(const std::vector<const model::Motion*>& mo
   };
   for (const Covariate covariate : model::all_covariates()) {
     inference::Curve curve;
-    if ((covariate == Covariate::turned_rad && roll_says) || !find_places(values(covariate), covariate, curve))
+    if (model::adds_up(covariate))
+      curve.at = places_after_a_change();
+    else if ((covariate == Covariate::turned_rad && roll_says) || !find_places(values(covariate), covariate, curve))
       continue;
     curve.covariate = model::name_of(covariate);
     for (const auto& info : model::discrepancy_components()) {
+      if (!model::goes_over(info.component, covariate)) continue;
       curve.component = info.meaning;
-      curve.unit = info.unit;
+      curve.unit = model::unit_of(info.component, covariate);
       out.push_back({info.component, covariate, curve});
     }
   }

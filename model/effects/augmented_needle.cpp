@@ -59,6 +59,8 @@ AugmentedNeedle::AugmentedNeedle(const NeedleParameters& needle, std::vector<Act
     return registry_index(a.effect) < registry_index(b.effect);
   });
   for (const auto& active : effects_) active.effect->change_needle(needle_);
+  keeps_history_ =
+      std::ranges::any_of(effects_, [](const ActiveEffect& one) { return adds_up(one.effect->covariate()); });
   slip_ = slip_parameters(needle_);
 }
 
@@ -72,6 +74,7 @@ void AugmentedNeedle::set_needle(double curvature_per_mm, double lambda1_per_rad
 AugmentedState AugmentedNeedle::entry(const BaseMotion& base) const {
   AugmentedState state;
   state.entry = state.base = base;
+  state.history = BaseHistory(base);
   state.D.setZero(6, columns_);
   EntryPose pose;
   for (const auto& active : effects_) active.effect->enter(parameters(active), pose);
@@ -171,6 +174,10 @@ bool AugmentedNeedle::advance_with_effects(AugmentedState& state, const BaseMoti
     inputs.row(2) = kappa[0].slope().head(columns_).matrix().transpose();
     inputs.row(3) = kappa[1].slope().head(columns_).matrix().transpose();
     state.D.noalias() += J.input.lazyProduct(inputs);
+  }
+  if (keeps_history_) {
+    state.history.advance(to);
+    leg.speed_changes_mm_s = state.history.speed_changes_mm_s();
   }
   for (std::size_t i = 0; i < effects_.size(); ++i) effects_[i].effect->settle(parameters(effects_[i]), leg, memory[i]);
   if (spread != nullptr)

@@ -6,6 +6,7 @@
 #include <memory>
 #include <vector>
 
+#include "model/effects/base_history.hpp"
 #include "model/effects/effect.hpp"
 #include "model/kinematics.hpp"
 
@@ -38,6 +39,7 @@ struct AugmentedState {
   BaseMotion entry, base;
   Dual tip_insertion_mm, tip_rotation_rad;
   std::array<EffectMemory, kMaxEffects> memory;
+  BaseHistory history;  // kept where an effect asks for it
 };
 
 // A point the cameras see, and its derivatives.
@@ -98,6 +100,7 @@ class AugmentedNeedle {
   std::vector<ActiveEffect> effects_;
   int columns_;
   NeedleColumns needle_columns_;
+  bool keeps_history_ = false;
 };
 
 }  // namespace bevel::model

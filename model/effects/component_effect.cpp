@@ -32,6 +32,10 @@ const DiscrepancyComponentInfo& info_of(DiscrepancyComponent component) {
   return kComponents.at(static_cast<std::size_t>(component));
 }
 
+std::string_view unit_of(DiscrepancyComponent component, Covariate covariate) {
+  return adds_up(covariate) ? "mm per mm/s" : info_of(component).unit;
+}
+
 std::optional<DiscrepancyComponent> find_discrepancy_component(std::string_view name) {
   for (const auto& info : kComponents)
     if (info.name == name) return info.component;
@@ -93,7 +97,8 @@ void ComponentEffect::offset(Parameters /*p*/, const EffectMemory& memory, doubl
 CovariateTracker ComponentEffect::tracked(const LegView& leg, const EffectMemory& memory) const {
   CovariateTracker tracker = memory.phase == 0
                                  ? CovariateTracker(leg.entry)
-                                 : CovariateTracker(leg.entry, {memory.number[0], memory.number[1], memory.number[2]});
+                                 : CovariateTracker(leg.entry, {memory.number[0], memory.number[1], memory.number[2],
+                                                                memory.number[3], memory.number[4]});
   tracker.advance(leg.from, leg.to);
   return tracker;
 }
@@ -109,9 +114,16 @@ Dual ComponentEffect::place(const LegView& leg, const EffectMemory& memory) cons
 }
 
 Dual ComponentEffect::value(Parameters p, const LegView& leg, EffectMemory& memory) const {
+  if (adds_up(covariate())) {
+    Dual sum;
+    for (std::size_t i = 0; i < kSpeedChanges; ++i)
+      sum += leg.speed_changes_mm_s[i] * value_at(p, static_cast<double>(i + 1) * kSpeedChange_s);
+    return sum;
+  }
   const CovariateTracker tracker = tracked(leg, memory);
   memory.phase = 1;
-  memory.number = {tracker.history().moved_s, tracker.history().turned_mm, tracker.history().deepest_mm};
+  const CovariateTracker::History& so_far = tracker.history();
+  memory.number = {so_far.moved_s, so_far.turned_mm, so_far.deepest_mm, so_far.changed_s, so_far.speed_mm_s};
   const Dual at = place_of(tracker, leg);
   Dual out = value_at(p, at.value);
   // A subclass knows its value at a number and not its slope there.

@@ -8,7 +8,9 @@
 //   drift_bevel, drift_across         the tip is carried aside by v ds_tip, toward body -y, toward body x
 //   pull_x, pull_y   the heading turns toward +x_A, +y_A by v ds_tip, wherever the bevel points
 //   x, y, z          the reading is off by v
-// A subclass states v: a curve (discrepancy.hpp), or an equation that bevel-diagnose proposed
+// Over the time since a change of the base's speed v is that of a change by 1 mm/s, and the reading is off by what all
+// of them still bring: the response of a linear filter (Pillonetto and De Nicolao 2010, Automatica 46). Only in x, y,
+// z. A subclass states v: a curve (discrepancy.hpp), or an equation that bevel-diagnose proposed
 // (docs/adding-an-effect.md).
 #include <optional>
 
@@ -42,6 +44,13 @@ struct DiscrepancyComponentInfo {
 // In the order of the enumeration.
 std::span<const DiscrepancyComponentInfo> discrepancy_components();
 const DiscrepancyComponentInfo& info_of(DiscrepancyComponent component);
+// Of v over such a covariate.
+std::string_view unit_of(DiscrepancyComponent component, Covariate covariate);
+inline bool is_reading(DiscrepancyComponent component) { return component >= DiscrepancyComponent::x; }
+// Whether there is such an effect.
+inline bool goes_over(DiscrepancyComponent component, Covariate covariate) {
+  return is_reading(component) || !adds_up(covariate);
+}
 // Nothing if there is none of that name.
 std::optional<DiscrepancyComponent> find_discrepancy_component(std::string_view name);
 
@@ -72,9 +81,7 @@ class ComponentEffect : public Effect {
   Dual2 pull_in_body(const LegView& leg, const Dual& v) const;
   // Of the reading, 0 to 2; -1 where the component is one of the motion. Such an effect keeps v in its first slot.
   int axis() const {
-    return component_ >= DiscrepancyComponent::x
-               ? static_cast<int>(component_) - static_cast<int>(DiscrepancyComponent::x)
-               : -1;
+    return is_reading(component_) ? static_cast<int>(component_) - static_cast<int>(DiscrepancyComponent::x) : -1;
   }
   // Of the covariate. Before or after value(): the same leg twice changes nothing.
   Dual place(const LegView& leg, const EffectMemory& memory) const;

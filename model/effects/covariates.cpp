@@ -8,6 +8,7 @@ namespace bevel::model {
 namespace {
 constexpr double kMoving_mm_s = 0.05;
 constexpr double kTurning_rad_s = 0.02;
+constexpr double kChange_mm_s = 0.5;
 }  // namespace
 
 void CovariateTracker::advance(const BaseMotion& from, const BaseMotion& to) {
@@ -17,6 +18,11 @@ void CovariateTracker::advance(const BaseMotion& from, const BaseMotion& to) {
   if (speed_mm_s > kMoving_mm_s) history_.moved_s = to.time_s;
   if (turn_rate_rad_s > kTurning_rad_s) history_.turned_mm = to.insertion_mm;
   history_.deepest_mm = std::max(history_.deepest_mm, to.insertion_mm);
+  const double velocity_mm_s = dt_s > 0 ? (to.insertion_mm - from.insertion_mm) / dt_s : history_.speed_mm_s;
+  if (std::abs(velocity_mm_s - history_.speed_mm_s) > kChange_mm_s) {
+    history_.changed_s = from.time_s;
+    history_.speed_mm_s = velocity_mm_s;
+  }
   // In the order of Covariate.
   now_.value = {to.time_s,
                 to.insertion_mm,
@@ -29,6 +35,7 @@ void CovariateTracker::advance(const BaseMotion& from, const BaseMotion& to) {
                 history_.deepest_mm - to.insertion_mm};
   for (const Covariate covariate : all_covariates())
     if (tip_direction(covariate)) now_[covariate] = std::numeric_limits<double>::quiet_NaN();
+  now_[Covariate::since_speed_change_s] = to.time_s - history_.changed_s;
 }
 
 double place_along(const Eigen::Vector2d& direction, const Eigen::Vector3d& point_mm) {

@@ -7,7 +7,8 @@ namespace bevel::model {
 
 // depth is the base's insertion; since_stop counts seconds from the moment at which insertion last ended (0 while
 // inserting), since_reversal the insertion since the shaft last turned; turned is the shaft's turning since the entry,
-// turns counted; withdrawn how far the base is drawn back from the deepest that it was. tip_x to tip_yx: where the
+// turns counted; withdrawn how far the base is drawn back from the deepest that it was; since_speed_change counts
+// seconds from the last change of its speed. tip_x to tip_yx: where the
 // tip is along that direction of {A} (tip_direction); not a number until somebody who knows puts it in.
 struct Covariates {
   std::array<double, kCovariates> value{};
@@ -23,9 +24,11 @@ class CovariateTracker {
     double moved_s = 0;    // when the insertion last moved
     double turned_mm = 0;  // where the shaft last turned
     double deepest_mm = 0;
+    double changed_s = 0;   // when its speed last changed, and
+    double speed_mm_s = 0;  // what it has been since
   };
   explicit CovariateTracker(const BaseMotion& entry)
-      : CovariateTracker(entry, {entry.time_s, entry.insertion_mm, entry.insertion_mm}) {
+      : CovariateTracker(entry, {entry.time_s, entry.insertion_mm, entry.insertion_mm, entry.time_s}) {
     advance(entry, entry);
   }
   // Taken up again: the covariates are known after the next leg.

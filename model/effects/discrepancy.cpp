@@ -31,7 +31,7 @@ class Discrepancy final : public ComponentEffect {
 
   void settle(Parameters p, const LegView& leg, EffectMemory& memory) const override {
     ComponentEffect::settle(p, leg, memory);
-    if (axis() >= 0) memory.slot[1].value = std_error(weights(leg, memory));  // for blur
+    if (axis() >= 0) memory.slot[1].value = std_error(leg, memory);  // for blur
   }
   void spread(const LegView& leg, const EffectMemory& memory, Spread& variance) const override {
     static constexpr std::array<int, 8> kRow = {3, 4, 2, 5, 2, 5, 1, 0};  // of the body's twist, by component
@@ -73,6 +73,15 @@ class Discrepancy final : public ComponentEffect {
   }
 
  private:
+  double std_error(const LegView& leg, const EffectMemory& memory) const {
+    if (!adds_up(covariate())) return std_error(weights(leg, memory));
+    double square = 0;
+    for (std::size_t i = 0; i < kSpeedChanges; ++i) {
+      const double one = std_error(weights_at(curve_.at, curve_.periodic, static_cast<double>(i + 1) * kSpeedChange_s));
+      square += std::pow(leg.speed_changes_mm_s[i] * one, 2);
+    }
+    return std::sqrt(square);
+  }
   KnotWeights weights(const LegView& leg, const EffectMemory& memory) const {
     return weights_at(curve_.at, curve_.periodic, place(leg, memory).value);
   }
@@ -108,6 +117,7 @@ class Discrepancy final : public ComponentEffect {
         break;
       case Covariate::speed_mm_s:
       case Covariate::turn_rate_rad_s:
+      case Covariate::since_speed_change_s:
         break;
     }
     return moved > 0 ? spacing * step / moved : kEndless;
@@ -159,6 +169,9 @@ std::string find_fault(const DiscrepancyCurve& curve) {
                 static_cast<double>(kMaxKnots));
   if (curve.periodic && curve.covariate != Covariate::roll_rad)
     return "periodic is true, but " + std::string(name_of(curve.covariate)) + " is no angle; allowed: with roll_rad";
+  if (!goes_over(curve.component, curve.covariate))
+    return "covariate is " + std::string(name_of(curve.covariate)) + ", but the component is " +
+           std::string(info_of(curve.component).name) + "; allowed: x, y, z with it";
   if (auto fault = fault_of_knots(curve); !fault.empty()) return fault;
   const double largest = info_of(curve.component).largest;
   if (auto fault = fault_of_column("values", curve.values, knots, -largest, largest); !fault.empty()) return fault;

@@ -51,13 +51,15 @@ std::string_view name_of(Covariate covariate) {
       return "tip_xy_mm";
     case Covariate::tip_yx_mm:
       return "tip_yx_mm";
+    case Covariate::since_speed_change_s:
+      return "since_speed_change_s";
   }
   return "time_s";
 }
 
 bool needs_clock(Covariate covariate) {
   return covariate == Covariate::time_s || covariate == Covariate::speed_mm_s ||
-         covariate == Covariate::turn_rate_rad_s || covariate == Covariate::since_stop_s;
+         covariate == Covariate::turn_rate_rad_s || covariate == Covariate::since_stop_s || adds_up(covariate);
 }
 
 std::optional<Eigen::Vector2d> tip_direction(Covariate covariate) {
@@ -76,11 +78,13 @@ std::optional<Eigen::Vector2d> tip_direction(Covariate covariate) {
 }
 
 std::span<const Covariate> all_covariates() {
-  static constexpr std::array<Covariate, kCovariates> kAll = {
-      Covariate::time_s,       Covariate::depth_mm,          Covariate::speed_mm_s, Covariate::turn_rate_rad_s,
-      Covariate::since_stop_s, Covariate::since_reversal_mm, Covariate::roll_rad,   Covariate::turned_rad,
-      Covariate::withdrawn_mm, Covariate::tip_x_mm,          Covariate::tip_y_mm,   Covariate::tip_xy_mm,
-      Covariate::tip_yx_mm};
+  static constexpr std::array<Covariate, kCovariates> kAll = {Covariate::time_s,       Covariate::depth_mm,
+                                                              Covariate::speed_mm_s,   Covariate::turn_rate_rad_s,
+                                                              Covariate::since_stop_s, Covariate::since_reversal_mm,
+                                                              Covariate::roll_rad,     Covariate::turned_rad,
+                                                              Covariate::withdrawn_mm, Covariate::tip_x_mm,
+                                                              Covariate::tip_y_mm,     Covariate::tip_xy_mm,
+                                                              Covariate::tip_yx_mm,    Covariate::since_speed_change_s};
   return kAll;
 }
 

@@ -81,15 +81,23 @@ enum class Covariate {
   tip_x_mm,
   tip_y_mm,
   tip_xy_mm,
-  tip_yx_mm
+  tip_yx_mm,
+  since_speed_change_s
 };
-inline constexpr std::size_t kCovariates = 13;
+inline constexpr std::size_t kCovariates = 14;
 std::string_view name_of(Covariate covariate);
 bool needs_clock(Covariate covariate);  // time, speed, rate, rest: unknown where only the order of readings is
 // Unit vector (x, y of {A}) along which a covariate says where the tip is; nothing for one of the base's motion. An
 // axis of {A} is no better than a direction between: tissue does not know them.
 std::optional<Eigen::Vector2d> tip_direction(Covariate covariate);
 std::span<const Covariate> all_covariates();
+// Whether it counts from each of several causes, of which each still acts: what they bring adds up.
+inline bool adds_up(Covariate covariate) { return covariate == Covariate::since_speed_change_s; }
+
+// By how much the base's speed of insertion changed, mm/s: at i, (i + 1) kSpeedChange_s ago (base_history.hpp).
+inline constexpr std::size_t kSpeedChanges = 12;
+inline constexpr double kSpeedChange_s = 0.1;
+using SpeedChanges = std::array<double, kSpeedChanges>;
 
 // What an effect remembers between legs of one insertion. Slopes come with it.
 struct EffectMemory {
@@ -117,8 +125,9 @@ struct LegView {
   Eigen::Matrix<double, 3, kMaxColumns> R_body;  // d(rotation vector in {B})/d(column)
   Dual curvature_per_mm;                         // the needle's own k, whatever effects make of it
   // Known from `axes` on:
-  Dual insertion_mm, rotation_rad;  // increments of the tip
-  Dual tip_rotation_rad;            // of the tip at the start of the leg
+  Dual insertion_mm, rotation_rad;    // increments of the tip
+  Dual tip_rotation_rad;              // of the tip at the start of the leg
+  SpeedChanges speed_changes_mm_s{};  // before the leg's end; known from `settle` on
 
   double duration_s() const { return to.time_s - from.time_s; }
   double base_insertion_mm() const { return to.insertion_mm - from.insertion_mm; }

@@ -27,6 +27,9 @@ TEST(Covariates, FollowTheBase) {
   EXPECT_EQ(again[Covariate::withdrawn_mm], 8);
   again.advance({3, 12, -7}, {4, 19, -7});
   EXPECT_EQ(again[Covariate::withdrawn_mm], 1);
+  EXPECT_EQ(again[Covariate::since_speed_change_s], 1);  // from -16 to 7 mm/s at 3 s
+  again.advance({4, 19, -7}, {4.5, 22.6, -7});           // 7.2 mm/s is no other speed
+  EXPECT_EQ(again[Covariate::since_speed_change_s], 1.5);
 }
 
 TEST(Covariates, OfAMotionMadeByHand) {

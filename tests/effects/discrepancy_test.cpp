@@ -53,6 +53,7 @@ TEST(Discrepancy, AConstantIsAnEquivalentMotion) {
   turned.curvature_per_mm = std::hypot(agar().curvature_per_mm, 1.5e-3);
   const auto bevel = active("bevel_offset", {std::atan2(1.5e-3, agar().curvature_per_mm)});
   for (const Covariate covariate : all_covariates()) {
+    if (!goes_over(Component::advance, covariate)) continue;
     const auto distance = [&](Component component, double value, const std::vector<Eigen::Vector3d>& expected) {
       return largest_distance_mm(path_with(agar(), constant(component, value, covariate), motion), expected);
     };
@@ -163,6 +164,63 @@ TEST(Discrepancy, ADirectionAsideIsAsGoodAsAnother) {
     EXPECT_EQ(tip_direction(covariate).has_value(), name_of(covariate).starts_with("tip_"));
 }
 
+// After a change of the base's speed a reading is off by the change times the curve, and what several changes bring
+// adds up: against that sum, and against an oscillator that is shaken by the base, which is integrated here.
+TEST(Discrepancy, WhatChangesOfSpeedBringAddsUp) {
+  NeedleParameters straight = bicycle();
+  straight.curvature_per_mm = 0;
+  constexpr double kNatural_rad_s = 2 * std::numbers::pi * 1.6, kDamping = 0.25, kGain_mm_per_mm_s = 0.05;
+  const double decay_per_s = kDamping * kNatural_rad_s;
+  const double ringing_rad_s = kNatural_rad_s * std::sqrt(1 - kDamping * kDamping);
+  DiscrepancyCurve curve{Component::y, Covariate::since_speed_change_s, {}, {}, {}};
+  for (std::size_t i = 1; i <= kSpeedChanges; ++i) {
+    const double since_s = static_cast<double>(i) * kSpeedChange_s;
+    curve.at.push_back(since_s);
+    curve.values.push_back(kGain_mm_per_mm_s * std::exp(-decay_per_s * since_s) * std::sin(ringing_rad_s * since_s) *
+                           kNatural_rad_s / ringing_rad_s);
+    curve.std_errors.push_back(0);
+  }
+  // Changes of the speed, and when: within a tick of each other, from the start, back, and at rest.
+  const std::vector<std::pair<double, double>> changes = {{0, 12},   {1.0, -12}, {1.3, 6},
+                                                          {1.31, 2}, {3.0, -18}, {4.0, 10}};
+  const Motion motion =
+      Script{{1.0, 12, 0}, {0.3, 0, 1}, {0.01, 6, 0}, {1.69, 8, 0}, {1.0, -10, 0}, {1.0, 0, 0}}.fine();
+  const auto linear = [&](double since_s) {  // none at once, and forgotten after the last
+    const double u = since_s / kSpeedChange_s;
+    const auto i = static_cast<std::size_t>(std::floor(std::max(u, 0.0)));
+    const auto at = [&](std::size_t k) { return k == 0 || k > kSpeedChanges ? 0.0 : curve.values[k - 1]; };
+    return u <= 0 ? 0 : at(i) + (u - static_cast<double>(i)) * (at(i + 1) - at(i));
+  };
+  const auto path = path_with(straight, curve, motion);
+  double y_mm = 0, rate_mm_s = 0, largest_mm = 0;
+  std::size_t node = 0;
+  for (std::size_t r = 0; r < path.size(); ++r) {
+    const double time_s = motion.nodes[motion.at[r]].time_s;
+    double sum_mm = 0;
+    for (const auto& [at_s, change_mm_s] : changes) sum_mm += change_mm_s * linear(time_s - at_s);
+    EXPECT_NEAR(path[r].y(), sum_mm, 0.03) << time_s;  // the history has ticks of its own
+    for (; node < motion.at[r]; ++node) {
+      const double step_s = motion.nodes[node + 1].time_s - motion.nodes[node].time_s;
+      for (const auto& [at_s, change_mm_s] : changes)
+        if (std::abs(at_s - motion.nodes[node].time_s) < 0.5 * step_s)
+          rate_mm_s += kGain_mm_per_mm_s * kNatural_rad_s * change_mm_s;
+      rate_mm_s -= step_s * (2 * decay_per_s * rate_mm_s + kNatural_rad_s * kNatural_rad_s * y_mm);
+      y_mm += step_s * rate_mm_s;
+    }
+    EXPECT_NEAR(path[r].y(), y_mm, 0.12) << time_s;  // which the curve follows from tenth to tenth of a second
+    largest_mm = std::max(largest_mm, std::abs(y_mm));
+  }
+  EXPECT_GT(largest_mm, 0.6);
+  // Over legs of any length: the last of three that are as long as the motion's parts.
+  const AugmentedNeedle needle(straight, {active_discrepancy(curve)});
+  AugmentedState state = needle.entry({});
+  for (const BaseMotion& to : {BaseMotion{1, 12, 0}, BaseMotion{30, 12, 1}, BaseMotion{30.2, 14.4, 1}})
+    ASSERT_TRUE(needle.advance(state, to));
+  TipReading reading;
+  needle.point(state, reading);
+  EXPECT_NEAR(reading.position_mm.y(), 12 * linear(0.2), 1e-9);
+}
+
 // By the needle's own parameters: where the tip is moves with them, and with it what the curve says.
 TEST(Discrepancy, DerivativesOfACurveOverTheTipsPlaceAreThoseOfDifferences) {
   const Motion motion = rich_script().recorded();
@@ -200,6 +258,7 @@ TEST(Discrepancy, DerivativesByItsKnotsAreThoseOfDifferences) {
   const Motion motion = rich_script().recorded();
   for (const auto& info : discrepancy_components())
     for (const Covariate covariate : all_covariates()) {
+      if (!goes_over(info.component, covariate)) continue;
       const bool periodic = covariate == Covariate::roll_rad;
       DiscrepancyCurve curve{info.component, covariate, {}, {}, {}, periodic};
       const double last = covariate == Covariate::depth_mm || covariate == Covariate::since_reversal_mm ? 40 : 5;
@@ -240,6 +299,7 @@ TEST(Discrepancy, IsTakenUpFromTheValuesOfItsMemory) {
   const Motion motion = rich_script().recorded();
   for (const auto& info : discrepancy_components())
     for (const Covariate covariate : all_covariates()) {
+      if (!goes_over(info.component, covariate)) continue;
       const bool periodic = covariate == Covariate::roll_rad;
       const std::vector<double> at = periodic ? std::vector<double>{0, std::numbers::pi} : std::vector<double>{0, 3};
       const AugmentedNeedle needle(
@@ -264,6 +324,9 @@ TEST(Discrepancy, FaultsAreNamed) {
   EXPECT_THROW(make_discrepancy(curve), std::invalid_argument);
   curve = {Component::x, Covariate::depth_mm, {}, {}, {}};
   EXPECT_THAT(find_fault(curve), ::testing::HasSubstr("knots has 0 elements"));
+  const DiscrepancyCurve of_motion{Component::advance, Covariate::since_speed_change_s, {0.1}, {0}, {0}};
+  EXPECT_THAT(find_fault(of_motion), ::testing::HasSubstr("covariate is since_speed_change_s, but the component is "
+                                                          "advance; allowed: x, y, z with it"));
 }
 
 // Draws of an insertion's own values, each propagated on its own.

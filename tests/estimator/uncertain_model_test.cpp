@@ -142,7 +142,8 @@ TEST(UncertainModel, TheFilterWidensByTheErrorsOfACurve) {
       {curve_over(Component::curvature_bevel, model::Covariate::speed_mm_s, 20, 5e-4, 4e-4), false},
       {curve_over(Component::advance, model::Covariate::depth_mm, 100, 0.03, 0.03), false},
       {curve_over(Component::turning, model::Covariate::depth_mm, 100, 0.005, 0.01), false},
-      {curve_over(Component::x, model::Covariate::depth_mm, 100, 0.3, 0.3), true}};
+      {curve_over(Component::x, model::Covariate::depth_mm, 100, 0.3, 0.3), true},
+      {curve_over(Component::z, model::Covariate::since_speed_change_s, 1.2, 0.05, 0.05), true}};
   for (const Case& one : cases) {
     EstimatorConfig told = known_needle();
     told.effects = {model::active_discrepancy(one.curve)};

@@ -3,6 +3,7 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
+#include <numbers>
 #include <set>
 
 #include "diagnosis/mismatch/diagnose.hpp"
@@ -240,6 +241,45 @@ TEST(Diagnose, TwoThingsThatAreOnNoListAreTwoCurves) {
   for (const ProposedForm& one : found.proposals) stands_for.insert(one.discrepancy);
   EXPECT_EQ(stands_for.size(), 2U);
   EXPECT_NEAR(found.held_out.after.chi2_per_dof, 1, 0.25);
+}
+
+// A camera on a stand that every change of the base's speed sets ringing along z, for about a second.
+class RingingStand final : public model::Effect {
+ public:
+  RingingStand()
+      : Effect({.name = "ringing_stand", .meaning = "", .covariate = model::Covariate::time_s, .parameters = {}}) {}
+  void settle(model::Parameters /*p*/, const model::LegView& leg, model::EffectMemory& memory) const override {
+    constexpr double kNatural_rad_s = 2 * std::numbers::pi * 2, kDecay_per_s = 0.1 * kNatural_rad_s, kGain = 0.03;
+    auto& [z_mm, rate_mm_s, speed_mm_s, unused1, unused2, unused3] = memory.number;
+    const double now_mm_s = leg.base_insertion_mm() / std::max(leg.duration_s(), 1e-9);
+    rate_mm_s += kGain * kNatural_rad_s * (now_mm_s - speed_mm_s);
+    speed_mm_s = now_mm_s;
+    constexpr int kSteps = 20;
+    const double step_s = leg.duration_s() / kSteps;
+    for (int i = 0; i < kSteps; ++i) {
+      rate_mm_s -= step_s * (2 * kDecay_per_s * rate_mm_s + kNatural_rad_s * kNatural_rad_s * z_mm);
+      z_mm += step_s * rate_mm_s;
+    }
+  }
+  void offset(model::Parameters /*p*/, const model::EffectMemory& memory, double /*time_s*/,
+              model::Dual3& position_mm) const override {
+    position_mm[2] += memory.number[0];
+  }
+};
+
+TEST(Diagnose, WhatRingsOnAfterAChangeOfSpeedIsNoNoise) {
+  const RingingStand stand;
+  SimulatedRig rig{.effects = {{.effect = &stand, .parameters = {}}}, .frame_s = 1.0 / 30};
+  const Findings found = findings_of(rig, 6);
+  EXPECT_EQ(found.verdict, Verdict::unknown_effect) << found.sentence;
+  EXPECT_THAT(found.effects, IsEmpty()) << found.sentence;
+  ASSERT_FALSE(found.discrepancies.empty());
+  const model::DiscrepancyCurve& curve = found.discrepancies[0].curve;
+  EXPECT_EQ(curve.component, model::DiscrepancyComponent::z);
+  EXPECT_EQ(curve.covariate, model::Covariate::since_speed_change_s);
+  EXPECT_LT(found.held_out.after.rmse_mm, found.held_out.before.rmse_mm);
+  // What the noise is without it.
+  EXPECT_NEAR(found.noise.sigma[2] / rig.sigma_mm.z(), 1, 0.1);
 }
 
 TEST(Diagnose, IsTheSameForOneThreadAndTwo) {

@@ -25,6 +25,7 @@ inline std::vector<ProposedForm> proposed_cases() {
                           Place{Component::advance, Covariate::depth_mm, 0.25, 60},
                           Place{Component::drift_across, Covariate::time_s, 0.125, 8},
                           Place{Component::y, Covariate::since_reversal_mm, -3.5, 20},
+                          Place{Component::z, Covariate::since_speed_change_s, 0.1, 1.1},
                           Place{Component::curvature_across, Covariate::tip_yx_mm, -7.5, 7}})
     for (const auto form : {inference::Form::step, inference::Form::ramp, inference::Form::power,
                             inference::Form::exponential, inference::Form::saturation, inference::Form::sinusoid}) {

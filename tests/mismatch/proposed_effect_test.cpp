@@ -64,6 +64,8 @@ double value_at(const model::Effect& effect, const Values& values, model::Covari
   if (covariate == model::Covariate::time_s) leg.to.time_s = place, leg.from.time_s = place - kStep;
   if (covariate == model::Covariate::roll_rad || covariate == model::Covariate::turned_rad)
     leg.to.rotation_rad = place, leg.from.rotation_rad = place - kStep;
+  if (model::adds_up(covariate))
+    leg.speed_changes_mm_s.at(static_cast<std::size_t>(std::lround(place / model::kSpeedChange_s)) - 1) = kStep;
   model::Dual insertion, rotation;
   model::Dual2 kappa;
   model::Dual3 point;
@@ -73,6 +75,7 @@ double value_at(const model::Effect& effect, const Values& values, model::Covari
   effect.offset(p, memory, 0, point);
   if (const double along = insertion.value + rotation.value; along != 0) return along / kStep;
   if (kappa[0].value != 0 || kappa[1].value != 0) return kappa[0].value + kappa[1].value;
+  if (point[2].value != 0) return point[2].value / kStep;
   return point[0].value != 0 ? point[0].value / kStep : point[1].value;
 }
 
@@ -86,9 +89,11 @@ TEST_P(EveryProposal, IsTheEquationThatWasWeighed) {
     const Values values = parameters_of(proposal, shape);
     EXPECT_EQ(find_parameter_violation(*effect, values), -1);
     for (int i = -2; i <= 32; ++i) {
-      const double place = proposal.low + proposal.range * (i + 0.37) / 29;
-      // A step is a fiftieth of the range wide.
-      if (proposal.form == Form::step && std::abs(place - shape) < 0.01 * proposal.range) continue;
+      const double place = model::adds_up(proposal.covariate) ? model::kSpeedChange_s * (1 + std::abs(i) % 12)
+                                                              : proposal.low + proposal.range * (i + 0.37) / 29;
+      // A step is a fiftieth of the range wide, or as wide as what is looked at is apart.
+      const double wide = model::adds_up(proposal.covariate) ? model::kSpeedChange_s : 0.02 * proposal.range;
+      if (proposal.form == Form::step && std::abs(place - shape) < 0.5 * wide) continue;
       const double expected = proposal.amplitude * value_of(proposal.form, places, shape, proposal.phase_rad, place);
       EXPECT_NEAR(value_at(*effect, values, proposal.covariate, place), expected,
                   1e-9 * std::abs(proposal.amplitude) + 1e-8 * std::abs(expected))

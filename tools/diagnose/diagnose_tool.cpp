@@ -105,11 +105,13 @@ void print_verdict(std::ostream& out, const Findings& f) {
   }
   if (const ProposedForm* form = proposed_form(f)) {
     const ProposedForm& p = *form;
-    out << "  an equation that would do: " << info_of(p.component).meaning << " by " << p.equation << ", x "
-        << in_words(model::name_of(p.covariate)) << "; a " << with_error(p.amplitude, p.amplitude_sd) << ' '
-        << info_of(p.component).unit << ", s " << number(p.shape) << " (95 % " << number(p.shape_low) << " to "
-        << number(p.shape_high) << "), log Bayes factor against all curves " << log_factor(p.log_bayes_factor)
-        << "; as an effect, " << effect_source(p).name << ", in " << kProposedEffectFile << '\n';
+    out << (p.log_bayes_factor > 0 ? "  an equation that would do: "
+                                   : "  the nearest of simple equations, less likely than the curve: ")
+        << info_of(p.component).meaning << " by " << p.equation << ", x " << in_words(model::name_of(p.covariate))
+        << "; a " << with_error(p.amplitude, p.amplitude_sd) << ' ' << unit_of(p.component, p.covariate) << ", s "
+        << number(p.shape) << " (95 % " << number(p.shape_low) << " to " << number(p.shape_high)
+        << "), log Bayes factor against all curves " << log_factor(p.log_bayes_factor) << "; as an effect, "
+        << effect_source(p).name << ", in " << kProposedEffectFile << '\n';
   }
   const auto& n = f.needle;
   if (!f.two_groups)

@@ -224,7 +224,7 @@ std::vector<Figure> discrepancy_panels(const std::vector<Discrepancy>& discrepan
     Figure panel;
     panel.title = std::string(info_of(c.component).meaning);
     panel.x_label = in_words(model::name_of(c.covariate));
-    panel.y_label = std::string(info_of(c.component).unit);
+    panel.y_label = std::string(unit_of(c.component, c.covariate));
     panel.height_px = 170;
     panel.references.push_back({Reference::Axis::horizontal, 0, ""});
     panel.band("two standard errors", c.at, low, high, kAfter).line("discrepancy", c.at, c.values, kAfter);

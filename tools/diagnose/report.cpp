@@ -293,7 +293,7 @@ void add_unknown_part(report::Page& page, const Findings& f) {
     double largest = 0;
     for (const double v : c.curve.values) largest = std::abs(v) > std::abs(largest) ? v : largest;
     rows.push_back({meaning_of(c), in_words(model::name_of(c.curve.covariate)),
-                    number(largest) + " " + std::string(info_of(c.curve.component).unit),
+                    number(largest) + " " + std::string(unit_of(c.curve.component, c.curve.covariate)),
                     log_factor(c.log_bayes_factor), number(c.visible_size, 2)});
   }
   page.table({"what is off", "against", "largest", "log Bayes factor", "visible size (standard deviations of noise)"},
@@ -301,7 +301,7 @@ void add_unknown_part(report::Page& page, const Findings& f) {
   if (f.proposals.empty()) return;
   std::vector<std::vector<std::string>> forms;
   for (const auto& p : f.proposals) {
-    const std::string unit(info_of(p.component).unit);
+    const std::string unit(unit_of(p.component, p.covariate));
     forms.push_back({meaning_of(f.discrepancies.at(p.discrepancy)), std::string(info_of(p.component).meaning),
                      in_words(model::name_of(p.covariate)), p.equation,
                      with_error(p.amplitude, p.amplitude_sd) + " " + unit,

@@ -139,7 +139,7 @@ json as_json(const std::vector<Discrepancy>& discrepancies) {
   for (const auto& d : discrepancies)
     all.push_back({{"component", info_of(d.curve.component).name},
                    {"meaning", info_of(d.curve.component).meaning},
-                   {"unit", info_of(d.curve.component).unit},
+                   {"unit", unit_of(d.curve.component, d.curve.covariate)},
                    {"covariate", model::name_of(d.curve.covariate)},
                    {"periodic", d.curve.periodic},
                    {"at", figures(d.curve.at)},
@@ -156,7 +156,7 @@ json as_json(const std::vector<ProposedForm>& proposals) {
   for (const auto& p : proposals)
     all.push_back({{"discrepancy", p.discrepancy},
                    {"component", info_of(p.component).name},
-                   {"unit", info_of(p.component).unit},
+                   {"unit", unit_of(p.component, p.covariate)},
                    {"covariate", model::name_of(p.covariate)},
                    {"form", name_of(p.form)},
                    {"equation", p.equation},
