@@ -292,7 +292,7 @@ const ModelSet* next_to_expand(const std::map<ModelSet, Visited>& visited, const
     if (one.log_posterior() > best) best = one.log_posterior(), top = &set;
     best_without = std::max(best_without, one.log_without_curve);
   }
-  if (!top) return nullptr;
+  if (!top || !expanded.contains(*top)) return top;
   const ModelSet* next = nullptr;
   double least_below = std::numeric_limits<double>::infinity();
   for (const auto& [set, one] : visited) {

@@ -42,9 +42,9 @@ struct Visited {
   const Fit& likelier_fit() const;
 };
 
-// The set to be looked around next, null where none is left: in the window of the likeliest, or, as a curve takes the
-// place of several effects at once and is far above the sets on the way to these, in that of the likeliest without a
-// curve; and what the likeliest is without one member.
+// The set to be looked around next, null where none is left: the likeliest; what it is without one member; what is in
+// its window, or, as a curve takes the place of several effects at once and is far above the sets on the way to these,
+// in that of the likeliest without a curve.
 const ModelSet* next_to_expand(const std::map<ModelSet, Visited>& visited, const std::set<ModelSet>& expanded,
                                double window);
 

@@ -32,7 +32,7 @@ std::vector<ModelSet> order_of(const std::map<ModelSet, Visited>& visited) {
 
 TEST(NextToExpand, TheLikeliestFirstAndNoneBelowTheWindow) {
   EXPECT_EQ(order_of(visited_of({at({}, -9), at({1}, 0), at({2}, -2), at({3}, -3.4), at({2, 3}, -3.6)})),
-            (std::vector<ModelSet>{{}, {1}, {2}, {3}}));  // what the likeliest is without its one member before all
+            (std::vector<ModelSet>{{1}, {}, {2}, {3}}));  // then what it is without its one member
 }
 
 TEST(NextToExpand, OfSetsWithoutACurveTheLikeliestAreTakenHoweverFarBelowACurveTheyAre) {
@@ -42,7 +42,7 @@ TEST(NextToExpand, OfSetsWithoutACurveTheLikeliestAreTakenHoweverFarBelowACurveT
 
 TEST(NextToExpand, WhatTheLikeliestIsWithoutOneMemberIsTakenHoweverFarBelow) {
   const auto order = order_of(visited_of({at({}, -300), at({1}, -200), at({2}, -100), at({1, 2}, 0)}));
-  EXPECT_EQ(order, (std::vector<ModelSet>{{1}, {1, 2}, {2}}));
+  EXPECT_EQ(order, (std::vector<ModelSet>{{1, 2}, {1}, {2}}));
 }
 
 TEST(NextToExpand, NothingVisitedNothingNext) { EXPECT_EQ(next_to_expand({}, {}, kWindow), nullptr); }
