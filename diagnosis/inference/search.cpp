@@ -148,7 +148,8 @@ void Search::evaluate_all(std::vector<Job> jobs) {
   std::ranges::stable_sort(jobs, std::greater{}, &Job::promised);
   Modes asked;
   while (!jobs.empty()) {
-    const double near = best_log() - rules_.window;
+    // Once the steps are spent, what promises to be the likeliest.
+    const double near = best_log() - (is_out_of_steps() ? 0 : rules_.window);
     const bool over = is_round_over();
     std::erase_if(jobs, [&](const Job& job) {
       return std::isfinite(job.promised) && (over || (!job.foremost && job.promised < near));

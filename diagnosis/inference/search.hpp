@@ -24,7 +24,7 @@ struct SearchRules {
   std::size_t starts = 2;      // of an effect, that are fitted
   std::size_t foremost = 2;    // proposals that are looked at in a member's place
   std::size_t pairs = 8;
-  long most_steps = 3000;               // of all fits (Likelihood::steps); then only around the likeliest
+  long most_steps = 3000;               // of all fits (Likelihood::steps); then only what may be the likeliest
   double log_prior_odds_effect = -5.0;  // of one effect being in the model, against not; its kinds share it
   std::size_t most_curves = 2;          // of a discrepancy
   std::size_t at_once = 4;              // fits of which the next are chosen by what these come to

@@ -106,16 +106,26 @@ TEST(PendulumTest, OnceTheStepsAreSpentOnlyTheLikeliestIsLookedAround) {
   truth.dry_friction = 0.3;
   truth.scale = 1.05;
   const Pendulum system(truth, 6, 41);
-  const auto looked_around = [&](long most_steps) {
-    Search search(system, {.most_steps = most_steps});
-    int count = 0;
-    search.run(Readings(6), white(), [&](const std::string&) { ++count; });
-    EXPECT_EQ(search.best().set, (ModelSet{Pendulum::kDryFriction, Pendulum::kSensorScale}));
-    return count;
+  struct Looked {
+    int around = 0;
+    std::size_t at = 0;
   };
-  const int all = looked_around(SearchRules{}.most_steps), few = looked_around(1);
-  EXPECT_GE(few, 1);
-  EXPECT_LT(few, all);
+  const auto looked = [&](long most_steps, double window) {
+    Search search(system, {.window = window, .most_steps = most_steps});
+    Looked out;
+    search.run(Readings(6), white(), [&](const std::string&) { ++out.around; });
+    EXPECT_EQ(search.best().set, (ModelSet{Pendulum::kDryFriction, Pendulum::kSensorScale}));
+    out.at = search.visited().size();
+    return out;
+  };
+  constexpr double kWide = 30;
+  const long most = SearchRules{}.most_steps;
+  const Looked all = looked(most, kWide), few = looked(1, kWide), narrow = looked(1, 0);
+  EXPECT_GE(few.around, 1);
+  EXPECT_LT(few.around, all.around);
+  // Nor is anything fitted but what promises to be the likeliest, however wide the window.
+  EXPECT_EQ(few.at, narrow.at);
+  EXPECT_LT(few.at, all.at);
 }
 
 TEST(PendulumTest, WhatIsOnNoListIsADiscrepancy) {
