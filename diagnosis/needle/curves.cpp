@@ -12,8 +12,8 @@ namespace {
 using model::Covariate;
 
 constexpr int kValues = 12;  // of a curve
-static_assert(std::max<int>(kValues, model::kSpeedChanges) <=
-              model::kMaxColumns);        // a path is followed with its derivatives by all of them
+// A path is followed with its derivatives by all of them.
+static_assert(kValues <= model::kMaxColumns && model::kSpeedChanges <= model::kMaxColumns);
 constexpr double kLeastVariation = 0.05;  // of a covariate, in its unit
 constexpr double kLeastRoll_rad = 0.2;
 

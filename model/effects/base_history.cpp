@@ -1,6 +1,7 @@
 #include "model/effects/base_history.hpp"
 
 #include <algorithm>
+#include <cmath>
 
 namespace bevel::model {
 

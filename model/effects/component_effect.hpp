@@ -8,9 +8,11 @@
 //   drift_bevel, drift_across         the tip is carried aside by v ds_tip, toward body -y, toward body x
 //   pull_x, pull_y   the heading turns toward +x_A, +y_A by v ds_tip, wherever the bevel points
 //   x, y, z          the reading is off by v
-// Over the time since a change of the base's speed v is that of a change by 1 mm/s, and the reading is off by what all
-// of them still bring: the response of a linear filter (Pillonetto and De Nicolao 2010, Automatica 46). Only in x, y,
-// z. A subclass states v: a curve (discrepancy.hpp), or an equation that bevel-diagnose proposed
+// Over the time since a change of the base's speed v is what a change by 1 mm/s brings, and a reading is off by what
+// all of them still do: the response of a linear filter (Pillonetto and De Nicolao 2010, Automatica 46). Only readings
+// are.
+//
+// A subclass states v: a curve (discrepancy.hpp), or an equation that bevel-diagnose proposed
 // (docs/adding-an-effect.md).
 #include <optional>
 
