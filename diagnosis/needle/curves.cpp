@@ -46,7 +46,7 @@ bool within_a_turn(const std::vector<std::vector<model::Covariates>>& recordings
 // After a change of speed, as far as is remembered.
 std::vector<double> places_after_a_change() {
   std::vector<double> out;
-  for (std::size_t i = 1; i <= model::kSpeedChanges; ++i) out.push_back(static_cast<double>(i) * model::kSpeedChange_s);
+  for (std::size_t i = 0; i < model::kSpeedChanges; ++i) out.push_back(model::since_speed_change_s(i));
   return out;
 }
 

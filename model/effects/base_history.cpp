@@ -33,9 +33,9 @@ double BaseHistory::insertion_mm(double before_s) const {
 
 SpeedChanges BaseHistory::speed_changes_mm_s() const {
   SpeedChanges out;
-  double ahead_mm = now_.insertion_mm, here_mm = insertion_mm(kSpeedChange_s);
+  double ahead_mm = now_.insertion_mm, here_mm = insertion_mm(since_speed_change_s(0));
   for (std::size_t i = 0; i < kSpeedChanges; ++i) {
-    const double behind_mm = insertion_mm(static_cast<double>(i + 2) * kSpeedChange_s);
+    const double behind_mm = insertion_mm(since_speed_change_s(i + 1));
     out[i] = (ahead_mm - 2 * here_mm + behind_mm) / kSpeedChange_s;
     ahead_mm = here_mm, here_mm = behind_mm;
   }

@@ -117,7 +117,7 @@ Dual ComponentEffect::value(Parameters p, const LegView& leg, EffectMemory& memo
   if (adds_up(covariate())) {
     Dual sum;
     for (std::size_t i = 0; i < kSpeedChanges; ++i)
-      sum += leg.speed_changes_mm_s[i] * value_at(p, static_cast<double>(i + 1) * kSpeedChange_s);
+      sum += leg.speed_changes_mm_s[i] * value_at(p, since_speed_change_s(i));
     return sum;
   }
   const CovariateTracker tracker = tracked(leg, memory);

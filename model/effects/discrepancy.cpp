@@ -77,7 +77,7 @@ class Discrepancy final : public ComponentEffect {
     if (!adds_up(covariate())) return std_error(weights(leg, memory));
     double square = 0;
     for (std::size_t i = 0; i < kSpeedChanges; ++i) {
-      const double one = std_error(weights_at(curve_.at, curve_.periodic, static_cast<double>(i + 1) * kSpeedChange_s));
+      const double one = std_error(weights_at(curve_.at, curve_.periodic, since_speed_change_s(i)));
       square += std::pow(leg.speed_changes_mm_s[i] * one, 2);
     }
     return std::sqrt(square);

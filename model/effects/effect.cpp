@@ -59,7 +59,8 @@ std::string_view name_of(Covariate covariate) {
 
 bool needs_clock(Covariate covariate) {
   return covariate == Covariate::time_s || covariate == Covariate::speed_mm_s ||
-         covariate == Covariate::turn_rate_rad_s || covariate == Covariate::since_stop_s || adds_up(covariate);
+         covariate == Covariate::turn_rate_rad_s || covariate == Covariate::since_stop_s ||
+         covariate == Covariate::since_speed_change_s;
 }
 
 std::optional<Eigen::Vector2d> tip_direction(Covariate covariate) {

@@ -94,9 +94,10 @@ std::span<const Covariate> all_covariates();
 // Whether it counts from each of several causes, of which each still acts: what they bring adds up.
 inline bool adds_up(Covariate covariate) { return covariate == Covariate::since_speed_change_s; }
 
-// By how much the base's speed of insertion changed, mm/s: at i, (i + 1) kSpeedChange_s ago (base_history.hpp).
+// By how much the base's speed of insertion changed, mm/s: at i, since_speed_change_s(i) ago (base_history.hpp).
 inline constexpr std::size_t kSpeedChanges = 12;
 inline constexpr double kSpeedChange_s = 0.1;
+constexpr double since_speed_change_s(std::size_t i) { return static_cast<double>(i + 1) * kSpeedChange_s; }
 using SpeedChanges = std::array<double, kSpeedChanges>;
 
 // What an effect remembers between legs of one insertion. Slopes come with it.
