@@ -27,7 +27,7 @@ bool was_found(const Findings& findings, const std::string& name) {
 }
 
 // Where an effect is likelier than not, as the search has it.
-constexpr double kMark = -inference::SearchRules{}.log_prior_odds_effect;
+const double kMark = -inference::SearchRules{}.log_prior_odds_effect;
 
 // Below one the logarithm says nothing: a bar that short is none.
 double shown(double gain) { return std::isfinite(gain) ? std::max(gain, 1.0) : 1.0; }
