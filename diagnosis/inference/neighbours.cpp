@@ -162,6 +162,7 @@ std::vector<Search::Job> Search::larger_sets(const ModelSet& set, const Beside& 
         if (has_instants(one.effect)) out.push_back(job_from_alike(here.about, one.effect, start));
         for (Job& job : std::span(out).subspan(first)) {
           job.promised = promised + doubtful;
+          job.doubtful = doubtful;
           if (!is_hopeless(set)) ask_for_curve_of(here.about, job);
         }
       }
@@ -183,7 +184,7 @@ std::optional<Search::Job> Search::smaller_set(const Fit& about, std::size_t mem
     if (log_known > promised - rules_.optimism) return std::nullopt;
   }
   Job job = job_at(about);
-  if (std::isfinite(log_cost)) job.promised = promised + doubtful(log_cost);
+  if (std::isfinite(log_cost)) job.doubtful = doubtful(log_cost), job.promised = promised + job.doubtful;
   job.foremost = known == visited_.end();
   ask_for_curve_of(about, job);
   return job;
@@ -289,6 +290,7 @@ void Search::append_swaps(const Swapped& from, double log_here, std::vector<Job>
     swapped_.insert({swapped, beside_curve});
     Job job = job_from(from.about, one.effect, one.starts.front());
     job.promised = promised;
+    job.doubtful = doubt;
     if (there && there->valid) job.shared = there->shared, job.local = there->local;
     ask_for_curve_of(from.about, job);
     out.push_back(std::move(job));

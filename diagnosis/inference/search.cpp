@@ -119,7 +119,7 @@ void Search::drop_repeated(std::vector<Job>& jobs) const {
       if (out[k].set == job.set && out[k].nuisance_sd == job.nuisance_sd &&
           std::abs(kept[k] - cost[i]) < 2 * kSameMode) {  // costs are twice a logarithm
         out[k].beside_curve = out[k].beside_curve || job.beside_curve;
-        out[k].promised = std::max(out[k].promised, job.promised);
+        if (job.promised > out[k].promised) out[k].promised = job.promised, out[k].doubtful = job.doubtful;
         if (!out[k].large_curve) out[k].large_curve = job.large_curve;
         repeated = true;
       }
@@ -148,12 +148,14 @@ void Search::evaluate_all(std::vector<Job> jobs) {
   std::ranges::stable_sort(jobs, std::greater{}, &Job::promised);
   Modes asked;
   while (!jobs.empty()) {
-    // Once the steps are spent, what promises to be the likeliest.
-    const double near = best_log() - (is_out_of_steps() ? 0 : rules_.window);
+    const double best = best_log();
     const bool over = is_round_over();
-    std::erase_if(jobs, [&](const Job& job) {
-      return std::isfinite(job.promised) && (over || (!job.foremost && job.promised < near));
-    });
+    // Once the steps are spent, what the linear model says to be the likeliest, without a doubt.
+    const auto is_near = [&](const Job& job) {
+      return is_out_of_steps() ? job.promised - job.doubtful >= best : job.promised >= best - rules_.window;
+    };
+    std::erase_if(
+        jobs, [&](const Job& job) { return std::isfinite(job.promised) && (over || !(job.foremost || is_near(job))); });
     const std::size_t count = std::min(jobs.size(), rules_.at_once);
     evaluate_with_curve(std::span(jobs).first(count), asked);
     jobs.erase(jobs.begin(), jobs.begin() + static_cast<std::ptrdiff_t>(count));

@@ -24,7 +24,7 @@ struct SearchRules {
   std::size_t starts = 2;      // of an effect, that are fitted
   std::size_t foremost = 2;    // proposals that are looked at in a member's place
   std::size_t pairs = 8;
-  long most_steps = 3000;               // of all fits (Likelihood::steps); then only what may be the likeliest
+  long most_steps = 2000;               // of all fits (Likelihood::steps); then only what may be the likeliest
   double log_prior_odds_effect = -5.0;  // of one effect being in the model, against not; its kinds share it
   std::size_t most_curves = 2;          // of a discrepancy
   std::size_t at_once = 4;              // fits of which the next are chosen by what these come to
@@ -89,8 +89,10 @@ class Search {
     bool beside_curve = false;
     bool beside_several = false;  // with the first alone there is little of what is promised
     bool foremost = false;        // fitted though it does not come near: a smaller set that was not yet
-    // Log posterior that it may have by the linear model; what nothing was promised of is fitted in any case.
+    // Log posterior that it may have by the linear model, and by how much of that the model may be wrong; what nothing
+    // was promised of is fitted in any case.
     double promised = std::numeric_limits<double>::infinity();
+    double doubtful = 0;
     std::shared_ptr<const Fit> large_curve{};  // with curves too large for the linear model: the same begins there
   };
   // What further effects bring beside one fit of a set, by the linear model.

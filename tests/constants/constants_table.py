@@ -34,7 +34,7 @@ def files_of(cell):
 
 def rows():
     """Cells of each row of the table."""
-    section = PAGE.read_text().split("\n## Constants\n", 1)[1].split("\n## ", 1)[0]
+    section = PAGE.read_text().split("\n## Constants\n", 1)[1].split("\n##", 1)[0]
     lines = [line for line in section.splitlines() if line.startswith("|")]
     return [[cell.strip() for cell in line.strip("|").split("|")] for line in lines[2:]]
 

@@ -90,23 +90,22 @@ def build(folder, constants, jobs):
     return program
 
 
-def changed(value, doubled, whole):
-    """Half or twice; of a share above one half, half or twice its odds."""
+def changed(value, times, whole):
+    """So many times as much; of a share from one half on, so many times its odds."""
     if 0.5 <= value < 1:
-        odds = value / (1 - value) * (2 if doubled else 0.5)
+        odds = value / (1 - value) * times
         return odds / (1 + odds)
-    out = value * 2 if doubled else value / 2
-    return max(1, round(out)) if whole else out
+    return max(1, round(value * times)) if whole else value * times
 
 
-def programs_of(constants, count, seed):
+def programs_of(constants, count, seed, factor=2):
     """Each a map from key to value; every second the mirror of the one before."""
     draw = random.Random(seed)
     out = []
     while len(out) < count:
         up = {key: draw.random() < 0.5 for key in constants}
         for mirrored in (False, True)[:count - len(out)]:
-            out.append({key: changed(constants_table.number(value), up[key] != mirrored,
+            out.append({key: changed(constants_table.number(value), factor if up[key] != mirrored else 1 / factor,
                                      not re.search(r"[.e/]", value))
                         for key, (_, value) in constants.items()})
     return out
@@ -180,6 +179,7 @@ def arguments():
     parser.add_argument("--out", type=pathlib.Path, required=True, help="the copy, its build, and what was said")
     parser.add_argument("--programs", type=int, default=8)
     parser.add_argument("--seed", type=int, default=1)
+    parser.add_argument("--factor", type=float, default=2, help="instead of half or twice")
     parser.add_argument("--most", type=int, help="cases of each folder")
     parser.add_argument("--jobs", type=int, default=2)
     parser.add_argument("--explain", type=int, default=20, help="of how many changed verdicts the constants are sought")
@@ -193,12 +193,13 @@ def main():
     out.mkdir(parents=True, exist_ok=True)
     program = build(out, constants, options.jobs)
     cases = [case for folder in options.folders for case in cases_of(folder.absolute(), options.most)]
-    drawn = programs_of(constants, options.programs, options.seed)
+    drawn = programs_of(constants, options.programs, options.seed, options.factor)
     runner = Runner(program, out / "said")
     with concurrent.futures.ThreadPoolExecutor(options.jobs) as pool:
         said = list(pool.map(lambda job: runner.said(*job), [(c, values) for values in [{}, *drawn] for c in cases]))
     said = [said[i:i + len(cases)] for i in range(0, len(said), len(cases))]
-    print(f"{len(constants)} constants, {len(cases)} cases, {len(drawn)} programs, seed {options.seed}")
+    print(f"{len(constants)} constants, {len(cases)} cases, {len(drawn)} programs, factor {options.factor:g}, seed "
+          f"{options.seed}")
     print(f"as it is: right {sum(map(right, cases, said[0]))}")
     different = []
     for number, names in enumerate(said[1:], 1):

@@ -26,7 +26,7 @@ class Table(unittest.TestCase):
 
     def test_no_number_of_the_diagnosis_is_left_out(self):
         """What the diagnosis calls a constant is in the table, or among the accuracies below it."""
-        below = constants_table.PAGE.read_text().split("\nThe rest are bounds", 1)[1].split("\n## ", 1)[0]
+        below = constants_table.PAGE.read_text().split("\nThe rest are bounds", 1)[1].split("\n##", 1)[0]
         no_choice = {"kGolden", "kPer_mm", "kNone"}  # a ratio, a unit, an index
         named = no_choice | {c.name for c in constants_table.constants()} | set(re.findall(r"`(k\w+)`", below))
         numbers = 0
@@ -42,10 +42,10 @@ class Table(unittest.TestCase):
 
 class Study(unittest.TestCase):
     def test_half_twice_and_the_odds_of_shares(self):
-        self.assertEqual(sensitivity_study.changed(3.5, True, False), 7)
-        self.assertEqual(sensitivity_study.changed(1, False, True), 1)
-        self.assertAlmostEqual(sensitivity_study.changed(0.75, True, False), 6 / 7)
-        self.assertAlmostEqual(sensitivity_study.changed(0.5, False, False), 1 / 3)
+        self.assertEqual(sensitivity_study.changed(3.5, 2, False), 7)
+        self.assertEqual(sensitivity_study.changed(1, 0.5, True), 1)
+        self.assertAlmostEqual(sensitivity_study.changed(0.75, 2, False), 6 / 7)
+        self.assertAlmostEqual(sensitivity_study.changed(0.5, 0.5, False), 1 / 3)
 
     def test_every_second_program_is_the_mirror_of_the_one_before(self):
         constants = sensitivity_study.studied()
