@@ -72,7 +72,9 @@ def instrument(copy, constants):
 def build(folder, constants, jobs):
     program = folder / "build/bin/bevel-diagnose"
     if program.exists():
+        print(f"as built before: {program}; what was said by it is kept beside it", file=sys.stderr)
         return program
+    folder.mkdir(parents=True, exist_ok=True)
     copy = folder / "source"
     files = subprocess.run(["git", "-C", ROOT, "ls-files", "-z", "-co", "--exclude-standard"], capture_output=True,
                            text=True, check=True).stdout
@@ -120,6 +122,8 @@ def cases_of(folder, most):
             yield (f"{folder.name}/{number}", folder / f"trials/t{number:04d}/case", set(trial["expected"]),
                    allowed | set(trial["expected"]))
         return
+    if not (folder / "truth.json").exists():
+        sys.exit(f"sensitivity_study: {folder}: has neither truth.json nor results.json")
     for truth in json.loads((folder / "truth.json").read_text())[:most]:
         names = {e["name"] for e in truth["effects"]}
         seen = truth.get("visible_sigmas", 5.0) >= 5.0
@@ -190,9 +194,8 @@ def main():
     options = arguments()
     constants = studied()
     out = options.out.resolve()
-    out.mkdir(parents=True, exist_ok=True)
-    program = build(out, constants, options.jobs)
     cases = [case for folder in options.folders for case in cases_of(folder.absolute(), options.most)]
+    program = build(out, constants, options.jobs)
     drawn = programs_of(constants, options.programs, options.seed, options.factor)
     runner = Runner(program, out / "said")
     with concurrent.futures.ThreadPoolExecutor(options.jobs) as pool:
