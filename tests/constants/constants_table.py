@@ -27,7 +27,7 @@ class Constant:
 
 def files_of(cell):
     for name in re.split(r"[,;]\s*", cell):
-        for folder in ("diagnosis", ".", "diagnosis/inference", "diagnosis/needle", "diagnosis/mismatch"):
+        for folder in ("diagnosis", "."):
             if (ROOT / folder / name).is_file():
                 yield pathlib.Path(folder) / name
 

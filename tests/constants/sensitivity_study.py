@@ -12,6 +12,8 @@ FOLDER: cases with truth.json (as tools/practice-table takes), or what bevel-bli
 import argparse
 import concurrent.futures
 import hashlib
+import importlib.machinery
+import importlib.util
 import json
 import os
 import pathlib
@@ -24,6 +26,17 @@ import sys
 import constants_table
 
 ROOT = constants_table.ROOT
+
+
+def script(path):
+    """A script of ours as a module, though its name has no ending."""
+    loader = importlib.machinery.SourceFileLoader(path.name.replace("-", "_"), str(path))
+    module = importlib.util.module_from_spec(importlib.util.spec_from_loader(loader.name, loader))
+    loader.exec_module(module)
+    return module
+
+
+practice_table = script(ROOT / "tools/practice-table")
 VARIABLE = "BEVEL_CONSTANTS"  # of the built program: "file:name=value;..."
 HEADER = """#pragma once
 #include <cstdlib>
@@ -125,9 +138,9 @@ def cases_of(folder, most):
     if not (folder / "truth.json").exists():
         sys.exit(f"sensitivity_study: {folder}: has neither truth.json nor results.json")
     for truth in json.loads((folder / "truth.json").read_text())[:most]:
-        names = {e["name"] for e in truth["effects"]}
-        seen = truth.get("visible_sigmas", 5.0) >= 5.0
-        yield f"{folder.name}/{truth['case']}", folder / truth["case"], names if seen else set(), names
+        names = practice_table.truth_names(truth)
+        yield (f"{folder.name}/{truth['case']}", folder / truth["case"], names,
+               names | {e["name"] for e in truth["effects"]})
 
 
 class Runner:
@@ -148,11 +161,9 @@ class Runner:
             if done.returncode not in (0, 3):
                 sys.exit(f"{case[0]}: {done.stderr.strip()} with {VARIABLE}={text!r}")
             verdict = json.loads((out / "verdict.json").read_text())
-            names = [e["name"] for e in verdict["effects"]]
-            names += ["unknown"] * (verdict["verdict"] == "unknown-effect")
             for left in out.iterdir():
                 left.unlink()
-            (out / "said.json").write_text(json.dumps(sorted(names)))
+            (out / "said.json").write_text(json.dumps(sorted(practice_table.named(verdict))))
         return set(json.loads((out / "said.json").read_text()))
 
 
