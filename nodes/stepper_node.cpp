@@ -155,8 +155,9 @@ void StepperNode::step(const Now& now) {
 }
 
 std::string StepperNode::reason(const stepper::AxesReport& report) const {
-  if (report.stop.reason == stepper::StopReason::none) return refusal_.empty() ? words_.refusal() : refusal_;
-  return stepper::describe(report.stop, report.stop_unconfirmed) + (detail_.empty() ? "" : ": " + detail_);
+  const std::string text = stepper::describe(report);
+  if (text.empty()) return refusal_.empty() ? words_.refusal() : refusal_;
+  return text + (detail_.empty() ? "" : ": " + detail_);
 }
 
 void StepperNode::end() { stop(stepper::StopReason::ending); }

@@ -122,6 +122,14 @@ void read_axis(Section s, stepper::AxisConfig& axis) {
   s.read("acceleration_unit_s2", axis.acceleration_unit_s2, optional, above(0));
   s.read("quick_stop_unit_s2", axis.quick_stop_unit_s2, optional, above(0));
   s.read("following_error_unit", axis.following_error_unit, optional, io::at_least(0));
+  s.read("counts_per_revolution", axis.counts_per_revolution, optional, in_range(0, 1e9));
+  s.read("velocity_unit", axis.velocity_unit, optional,
+         io::Choices<stepper::VelocityUnit>{{"as-stated", stepper::VelocityUnit::as_stated},
+                                            {"counts/s", stepper::VelocityUnit::counts_per_s},
+                                            {"rpm", stepper::VelocityUnit::rpm},
+                                            {"0.1 rpm", stepper::VelocityUnit::tenth_rpm},
+                                            {"0.01 rpm", stepper::VelocityUnit::hundredth_rpm},
+                                            {"0.001 rpm", stepper::VelocityUnit::thousandth_rpm}});
   s.read("position_min_unit", axis.position_min_unit, optional, io::any_finite());
   s.read("position_max_unit", axis.position_max_unit, optional, io::any_finite());
   const auto read_drive_limit = [&s](const char* key, std::optional<double>& limit) {
@@ -139,12 +147,13 @@ void read_stepper(Section s, stepper::StepperConfig& c) {
   s.read("mode", c.mode, optional,
          io::Choices<stepper::VelocityMode>{{"pv", stepper::VelocityMode::profile},
                                             {"csv", stepper::VelocityMode::cyclic}});
-  const auto read_ms = [&s](const char* key, std::int64_t& ns) {
+  const auto read_ms = [&s](const char* key, std::int64_t& ns, double longest_ms = 1000) {
     double ms = static_cast<double>(ns) * 1e-6;
-    s.read(key, ms, optional, in_range(1, 1000));
+    s.read(key, ms, optional, in_range(1, longest_ms));
     ns = std::llround(ms * 1e6);
   };
   read_ms("period_ms", c.period_ns);
+  read_ms("boot_timeout_ms", c.boot_timeout_ns, 60000);
   read_ms("setpoint_zero_age_ms", c.setpoint_zero_age_ns);
   read_ms("setpoint_stop_age_ms", c.setpoint_stop_age_ns);
   read_ms("drive_heartbeat_ms", c.drive_heartbeat_ns);

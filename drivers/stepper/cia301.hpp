@@ -33,6 +33,9 @@ enum class NmtCommand : std::uint8_t {
 enum class NmtState : std::uint8_t { boot_up = 0x00, stopped = 0x04, operational = 0x05, pre_operational = 0x7F };
 
 inline constexpr std::uint32_t kAbortTimeout = 0x05040000;
+inline constexpr std::uint32_t kAbortReadOnly = 0x06010002;
+inline constexpr std::uint32_t kAbortNoObject = 0x06020000;
+inline constexpr std::uint32_t kAbortNoSubIndex = 0x06090011;
 
 Frame nmt(NmtCommand command, std::uint8_t node);
 Frame sync();

@@ -1,9 +1,8 @@
-// The list of SDO transfers that makes a drive fit for service: identity checks, supervision, PDO mapping, mode,
-// limits.
 #pragma once
 
 #include <array>
 #include <cstdint>
+#include <optional>
 #include <vector>
 
 #include "drivers/stepper/cia301.hpp"
@@ -12,36 +11,52 @@
 
 namespace bevel::stepper {
 
+/// One step of a drive's configuration: an SDO transfer, or the decision on the drive's units.
 struct SdoJob {
   enum class Kind : std::uint8_t {
     write,
-    write_if_present,  // an object that drives may leave out; an abort is accepted
-    expect,            // read, (value & mask) must be `value`
-    expect_if_present,
-    expect_eventually,  // the same, asked again until transition_timeout_ns
+    read,               ///< a unit object (StatedUnits)
+    expect,             ///< read; (value & mask) must be `value`
+    expect_eventually,  ///< the same or 0, asked again until transition_timeout_ns
+    decide_units,       ///< no transfer: scales_of() what was read; later jobs use the scales
   };
+  /// Which aborts are accepted.
+  enum class Optional : std::uint8_t {
+    no,            ///< none
+    may_lack,      ///< the drive does not have the object
+    may_be_fixed,  ///< the drive does not have it, or keeps a value of its own; that value must still be `value`
+    any,           ///< all: the drive may ignore the object
+  };
+  /// Unit of `amount`. raw: `value` is written as it is.
+  enum class Quantity : std::uint8_t { raw, velocity, acceleration };
+
   Kind kind = Kind::write;
-  bool writes() const { return kind == Kind::write || kind == Kind::write_if_present; }
-  bool may_be_absent() const { return kind == Kind::write_if_present || kind == Kind::expect_if_present; }
   cia301::ObjectAddress object{};
-  std::uint8_t size_bytes = 4;  // writes only
+  std::uint8_t size_bytes = 4;  ///< writes only
   std::uint32_t value = 0;
   std::uint32_t mask = 0xFFFFFFFF;
-  StopReason otherwise = StopReason::configuration_failed;  // of an expectation
+  StopReason otherwise = StopReason::configuration_failed;  ///< reason if the value is another one
+  Optional optional = Optional::no;
+  bool monitored = false;                   ///< read back after writing, and cyclically from then on
+  std::optional<std::uint32_t> fallback{};  ///< written if the drive rejects `value`
+  Quantity quantity = Quantity::raw;
+  double amount_counts = 0.0;  ///< counts/s or counts/s^2, for a quantity that is not raw
+
+  /// True if an abort with this code is accepted.
+  bool accepts_abort(std::uint32_t abort_code) const;
 };
 
-constexpr std::uint32_t code_of(cia301::ObjectAddress object) {
-  return static_cast<std::uint32_t>(object.index) << 8 | object.sub;
-}
-
-// The drive's software limits (0x607D) in its position units, which are those of counts_per_unit; zero_counts: where
-// the entry is in them. Whichever way the limits move, the lower one stays below the upper one, as drives demand. A
-// limit set for the drive must be there and read back as written; of one that follows from the workspace a drive that
-// has no 0x607D is let off, as the driver keeps the workspace by itself.
-inline constexpr std::size_t kLimitJobs = 5;
+inline constexpr std::size_t kLimitJobs = 3;
+/// Returns the jobs that set the drive's software limits (0x607D), in its position units.
+///
+/// Whichever way the limits move, the lower one stays below the upper one, as drives demand. A limit that is configured
+/// for the drive must exist and read back as written. A limit that only follows from the workspace is optional, because
+/// the driver brakes for the workspace by itself.
+/// @param zero_counts position of the entry point
 std::array<SdoJob, kLimitJobs> limit_jobs(const AxisConfig& axis, const DriveLimits& limits, std::int64_t zero_counts);
 
-// In the order of CiA 301 section 7.5.2.36 for the mapping: switched off, emptied, filled, counted, typed, switched on.
+/// Returns all jobs of one drive: identity, units, supervision, PDO mapping, ramps, mode. The mapping is in the order
+/// of CiA 301 section 7.5.2.36: switched off, emptied, filled, counted, typed, switched on.
 std::vector<SdoJob> configuration_script(const StepperConfig& config, std::size_t axis);
 
 }  // namespace bevel::stepper

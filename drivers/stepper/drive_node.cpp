@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 
 namespace bevel::stepper {
 namespace {
@@ -9,11 +10,12 @@ namespace {
 using cia301::NmtCommand;
 using cia301::NmtState;
 
-constexpr int kSurplusPdos = 5;  // a frame that a bus error doubled is one
-constexpr std::int64_t kResetPause_ns = 500 * kMs;
+constexpr int kSurplusPdos = 8;  // with one frame in a hundred doubled, five occur within minutes
+constexpr std::int64_t kStillRuns_ns = 300 * kMs;  // a drive whose heartbeat goes on so long has not taken a reset
 constexpr std::int64_t kStartPause_ns = 100 * kMs;
 constexpr std::uint8_t kStatusPdoBytes = 6;    // 6041, 606C
 constexpr std::uint8_t kPositionPdoBytes = 5;  // 6064, 6061
+constexpr cia301::ObjectAddress kControlword{0x6040, 0};
 constexpr cia301::ObjectAddress kErrorCode{0x603F, 0};
 constexpr cia301::ObjectAddress kInputs{0x60FD, 0};
 constexpr std::uint32_t kNegativeSwitch = 1U << 0, kPositiveSwitch = 1U << 1;  // of kInputs, in the drive's direction
@@ -28,6 +30,7 @@ DriveNode::DriveNode(const StepperConfig& config, std::size_t axis)
       script_(configuration_script(config, axis)),
       sdo_(node_, config.sdo_timeout_ns) {
   if (has_limits()) script_.resize(script_.size() + kLimitJobs);
+  settled_.resize(script_.size());
   place_limits();
 }
 
@@ -41,6 +44,7 @@ void DriveNode::restart() {
   phase_ = Phase::absent;
   next_nmt_ns_ = INT64_MIN;
   sdo_.cancel();
+  monitoring_ = false;
   statusword_ = 0;
   error_code_ = 0;
   have_position_ = false;
@@ -48,7 +52,7 @@ void DriveNode::restart() {
 }
 
 void DriveNode::trouble(StopReason reason, std::uint32_t code) {
-  if (trouble_.reason == StopReason::none) trouble_ = {reason, static_cast<int>(axis_), code};
+  if (trouble_.reason == StopReason::none) trouble_ = {.reason = reason, .axis = static_cast<int>(axis_), .code = code};
 }
 
 Stop DriveNode::take_trouble() {
@@ -63,6 +67,7 @@ void DriveNode::out_of_sight() {
   phase_ = Phase::absent;
   next_nmt_ns_ = INT64_MIN;
   sdo_.cancel();
+  monitoring_ = false;
 }
 
 void DriveNode::on_frame(const can::Frame& frame, std::int64_t now_ns) {
@@ -77,7 +82,7 @@ void DriveNode::on_frame(const can::Frame& frame, std::int64_t now_ns) {
     }
     if (!status_pdo_due_) ++surplus_pdos_;
     statusword_ = cia301::get_u16(frame, 0);
-    rate_counts_s_ = static_cast<std::int32_t>(cia301::get_u32(frame, 2));
+    raw_rate_ = static_cast<std::int32_t>(cia301::get_u32(frame, 2));
     status_pdo_ns_ = now_ns;
     status_pdo_due_ = false;
   } else if (frame.id == cia301::tpdo2_id(node_) && runs) {
@@ -104,8 +109,9 @@ void DriveNode::on_position(const can::Frame& frame, std::int64_t now_ns) {
   position_pdo_ns_ = now_ns;
   position_pdo_due_ = false;
   sampled_ns_ = sync_ns_;  // a synchronous PDO holds what was there at the SYNC
-  if (phase_ == Phase::operational && frame.data[4] != static_cast<std::uint8_t>(config_.mode))
-    trouble(StopReason::wrong_mode, frame.data[4]);
+  shown_mode_ = frame.data[4];
+  // A drive may show no mode while it is not enabled; StepperDriver demands that it is shown while it is.
+  if (phase_ == Phase::operational && !shows_mode() && shown_mode_ != 0) trouble(StopReason::wrong_mode, shown_mode_);
 }
 
 void DriveNode::on_heartbeat(const can::Frame& frame, std::int64_t now_ns) {
@@ -132,6 +138,10 @@ void DriveNode::on_heartbeat(const can::Frame& frame, std::int64_t now_ns) {
   phase_ = Phase::configuring;
   sdo_.cancel();
   job_ = 0;
+  reads_back_ = falls_back_ = false;
+  units_ = {};
+  scales_ = {};
+  std::ranges::fill(settled_, std::nullopt);
   retries_ = 0;
   job_since_ns_ = now_ns;
 }
@@ -175,8 +185,12 @@ void DriveNode::supervise(std::int64_t now_ns) {
 void DriveNode::configure(std::int64_t now_ns, Transmitter& out) {
   switch (phase_) {
     case Phase::absent:
-      if (now_ns >= next_nmt_ns_ && out.send(cia301::nmt(NmtCommand::reset_communication, node_), now_ns))
-        next_nmt_ns_ = now_ns + kResetPause_ns;
+      // A second reset during a boot would begin it anew; a drive that goes on running has not taken the first.
+      if (waits_for_boot() && heartbeat_ns_ > reset_sent_ns_ + kStillRuns_ns) next_nmt_ns_ = now_ns;
+      if (now_ns >= next_nmt_ns_ && out.send(cia301::nmt(NmtCommand::reset_communication, node_), now_ns)) {
+        reset_sent_ns_ = now_ns;
+        next_nmt_ns_ = now_ns + config_.boot_timeout_ns;
+      }
       break;
     case Phase::configuring:
       transfer(now_ns, out);
@@ -196,74 +210,9 @@ void DriveNode::configure(std::int64_t now_ns, Transmitter& out) {
       }
       break;
     case Phase::operational:
-      renew_limits(now_ns, out);
+      maintain_settings(now_ns, out);
       break;
   }
-}
-
-void DriveNode::renew_limits(std::int64_t now_ns, Transmitter& out) {
-  if (phase_ == Phase::operational && !configured()) transfer(now_ns, out);
-}
-
-void DriveNode::begin_job() {
-  const SdoJob& job = script_.at(job_);
-  if (job.writes()) {
-    sdo_.download(job.object, job.value, job.size_bytes);
-  } else {
-    sdo_.upload(job.object);
-  }
-}
-
-void DriveNode::next_job(std::int64_t now_ns) {
-  sdo_.cancel();
-  retries_ = 0;
-  job_since_ns_ = now_ns;
-  if (++job_ < script_.size()) return begin_job();
-  if (phase_ != Phase::configuring) return;  // the limits, anew
-  phase_ = Phase::starting;
-  phase_since_ns_ = now_ns;
-  next_nmt_ns_ = now_ns;
-}
-
-void DriveNode::finish_job(std::int64_t now_ns) {
-  const SdoJob& job = script_.at(job_);
-  if (job.writes() || (sdo_.value() & job.mask) == job.value) return next_job(now_ns);
-  if (job.kind == SdoJob::Kind::expect_eventually && now_ns - job_since_ns_ < config_.transition_timeout_ns)
-    return begin_job();
-  sdo_.cancel();
-  trouble(job.otherwise, code_of(job.object));
-}
-
-void DriveNode::transfer(std::int64_t now_ns, Transmitter& out) {
-  using Status = cia301::SdoClient::Status;
-  const SdoJob& job = script_.at(job_);
-  sdo_.check_time(now_ns);
-  switch (sdo_.status()) {
-    case Status::idle:
-      begin_job();
-      break;
-    case Status::done:
-      finish_job(now_ns);
-      break;
-    case Status::aborted:
-      if (sdo_.frame_to_send()) break;
-      if (job.may_be_absent()) return next_job(now_ns);
-      trouble(StopReason::sdo_aborted, sdo_.abort_code());
-      break;
-    case Status::timed_out:
-      if (sdo_.frame_to_send()) break;
-      if (retries_++ < config_.sdo_retries) {
-        begin_job();
-      } else {
-        trouble(StopReason::sdo_timeout, code_of(job.object));
-      }
-      break;
-    case Status::to_send:
-    case Status::waiting:
-      break;
-  }
-  const auto frame = sdo_.frame_to_send();
-  if (frame && out.send(*frame, now_ns)) sdo_.sent(now_ns);
 }
 
 // True when sdo_ holds the answer, in one call.
@@ -291,25 +240,54 @@ StopReason DriveNode::read_limit(std::int64_t now_ns, Transmitter& out) {
   if (phase_ != Phase::operational || !ask_once(kInputs, inputs_asked_, now_ns, out)) return StopReason::travel_limit;
   const bool negative = (sdo_.value() & kNegativeSwitch) != 0, positive = (sdo_.value() & kPositiveSwitch) != 0;
   if (negative == positive) return negative ? StopReason::travel_limit : StopReason::drive_limit;
-  const bool turned_over = config_.axes.at(axis_).counts_per_unit < 0;
-  return negative != turned_over ? StopReason::lower_switch : StopReason::upper_switch;
+  const bool inverted = config_.axes.at(axis_).counts_per_unit < 0;
+  return negative != inverted ? StopReason::lower_switch : StopReason::upper_switch;
 }
 
-bool DriveNode::command(std::uint16_t controlword, double rate_unit_s, std::int64_t now_ns, Transmitter& out) const {
+void DriveNode::disable_voltage(std::int64_t now_ns, Transmitter& out) {
+  if (phase_ != Phase::operational) return;
+  const bool ordered = sdo_.object() == kControlword && sdo_.status() != cia301::SdoClient::Status::idle;
+  if (!ordered) {
+    sdo_.cancel();
+    monitoring_ = false;
+    sdo_.download(kControlword, cia402::controlword::kDisableVoltage, 2);
+  }
+  sdo_.check_time(now_ns);
+  const auto frame = sdo_.frame_to_send();
+  if (frame && out.send(*frame, now_ns)) sdo_.sent(now_ns);
+}
+
+bool DriveNode::command(std::uint16_t controlword, double rate_unit_s, std::int64_t now_ns, Transmitter& out) {
   can::Frame frame{cia301::rpdo1_id(node_), 6, {}};
   cia301::put_u16(frame, 0, controlword);
-  const auto rate = static_cast<std::int32_t>(std::lround(rate_unit_s * config_.axes.at(axis_).counts_per_unit));
-  cia301::put_u32(frame, 2, static_cast<std::uint32_t>(rate));
-  return out.send(frame, now_ns);
+  // What rounding leaves over is carried on, so that the mean rate is right where the drive's unit is coarse.
+  constexpr double kLargest = std::numeric_limits<std::int32_t>::max();
+  const double wanted = rate_unit_s * velocity_units() + (rate_unit_s == 0.0 ? 0.0 : rate_residue_);
+  const double rate = std::clamp(std::round(wanted), -kLargest, kLargest);
+  cia301::put_u32(frame, 2, static_cast<std::uint32_t>(static_cast<std::int32_t>(rate)));
+  if (!out.send(frame, now_ns)) return false;
+  rate_residue_ = wanted - rate;
+  return true;
+}
+
+AxisSample DriveNode::sample() const {
+  return {sampled_ns_,
+          status_pdo_ns_,
+          position_unit(),
+          rate_unit_s(),
+          1.0 / std::abs(config_.axes.at(axis_).counts_per_unit),
+          1.0 / std::abs(velocity_units())};
+}
+
+double DriveNode::velocity_units() const {
+  return config_.axes.at(axis_).counts_per_unit * scales_.velocity_per_count_s;
 }
 
 double DriveNode::position_unit() const {
   return static_cast<double>(position_counts_ - zero_counts_) / config_.axes.at(axis_).counts_per_unit;
 }
 
-double DriveNode::rate_unit_s() const {
-  return static_cast<double>(rate_counts_s_) / config_.axes.at(axis_).counts_per_unit;
-}
+double DriveNode::rate_unit_s() const { return static_cast<double>(raw_rate_) / velocity_units(); }
 
 void DriveNode::set_zero() {
   zero_counts_ = position_counts_;
@@ -318,7 +296,8 @@ void DriveNode::set_zero() {
   place_limits();
   const std::size_t first = script_.size() - kLimitJobs;
   if (job_ <= first) return;  // not written yet
-  if (job_ < script_.size()) sdo_.cancel();
+  sdo_.cancel();
+  reads_back_ = falls_back_ = monitoring_ = false;
   retries_ = 0;
   job_ = first;
 }

@@ -26,6 +26,7 @@ class FollowWatch {
     anchor_ = position_unit;
     told_ = stands_ = commanded_unit_s_ = by_changes_ = 0;
     count_ = 0;
+    rates_.fill(0);
   }
 
   // The rate commanded until now is about to change between two cycles.
@@ -39,6 +40,7 @@ class FollowWatch {
     const double dt_s = static_cast<double>(now_ns - now_ns_) * 1e-9;
     now_ns_ = now_ns;
     told_ += commanded_unit_s * dt_s;
+    rates_.at(count_ % kRoom) = std::abs(commanded_unit_s);
     history_.at(count_++ % kRoom) = told_;
     stands_ = position_unit - anchor_;
     double low = told_, high = told_;
@@ -59,6 +61,14 @@ class FollowWatch {
     return std::abs(outside) <= kLeast_unit;
   }
 
+  // The largest rate, without its sign, that was commanded within the allowed lag.
+  double fastest_commanded_unit_s() const {
+    double fastest = 0;
+    for (std::size_t i = 1; i <= std::min(count_, window_); ++i)
+      fastest = std::max(fastest, rates_.at((count_ - i) % kRoom));
+    return fastest;
+  }
+
   // What the axis has not yet gone of the way it was told.
   double behind_unit() const { return told_ - stands_; }
 
@@ -75,6 +85,7 @@ class FollowWatch {
   double commanded_unit_s_ = 0;          // last
   double by_changes_ = 0;                // what changes of rate may still explain
   std::array<double, kRoom> history_{};  // integral of the commanded rate, each cycle
+  std::array<double, kRoom> rates_{};    // commanded rate without its sign, each cycle
   std::size_t count_ = 0;
   std::int64_t now_ns_ = 0;
   double anchor_ = 0;  // position of the axis at which the integral is zero

@@ -43,6 +43,8 @@ void check_axis(Checker& check, const AxisConfig& axis, std::int64_t period_ns, 
   rate(axis.rate_limit_unit_s, ".rate_limit_unit_s");
   rate(axis.acceleration_unit_s2, ".acceleration_unit_s2");
   rate(axis.quick_stop_unit_s2, ".quick_stop_unit_s2");
+  check.require(std::isfinite(axis.counts_per_revolution) && axis.counts_per_revolution >= 0.0,
+                name + ".counts_per_revolution", axis.counts_per_revolution, "0 (not configured), or positive");
   const double window = axis.following_error_unit;
   check.require(std::isfinite(window) && window >= 0.0 && window * counts < kLargestCounts,
                 name + ".following_error_unit", window, "0 (the drive's own), or positive and below 1e9 counts");
@@ -74,6 +76,8 @@ std::vector<std::string> problems_of(const StepperConfig& config) {
                 static_cast<int>(config.axes[1].node_id), "different from insertion.node_id");
   check.require(master >= 1 && master <= 127 && master != config.axes[0].node_id && master != config.axes[1].node_id,
                 "master_id", master, "1 to 127 and no drive's node_id");
+  check.require(config.boot_timeout_ns >= 100 * kMs && config.boot_timeout_ns <= 60'000 * kMs, "boot_timeout_ms",
+                in_ms(config.boot_timeout_ns), "100 to 60000");
   const auto duration = [&](std::int64_t value, const char* key, std::int64_t least_ns) {
     check.require(value >= least_ns && value <= 10'000 * kMs, key, in_ms(value),
                   "no shorter than what it supervises, at most 10 s");

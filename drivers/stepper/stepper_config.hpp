@@ -15,7 +15,17 @@ inline constexpr std::size_t kInsertion = 0;
 inline constexpr std::size_t kRotation = 1;
 inline constexpr std::size_t kAxes = 2;
 
-// Units below: "unit" is mm for the insertion axis, rad for the rotation axis. Drives count velocity in counts/s.
+/// Velocity unit of a drive, coded as in object 0x60A9: exponent of ten, numerator, divisor (CiA 303-2).
+enum class VelocityUnit : std::uint32_t {
+  as_stated = 0,  ///< as the drive states it
+  counts_per_s = 0x00B50300,
+  rpm = 0x00B44700,
+  tenth_rpm = 0xFFB44700,
+  hundredth_rpm = 0xFEB44700,
+  thousandth_rpm = 0xFDB44700,
+};
+
+// Units below: "unit" is mm for the insertion axis, rad for the rotation axis.
 struct AxisConfig {
   std::uint8_t node_id = 1;             // 1..127
   double counts_per_unit = 1000.0;      // sign gives the direction; not 0
@@ -31,6 +41,11 @@ struct AxisConfig {
   // The drive's own supervision of its motor (0x6065, 0x6066): by how much it may lag before it faults. 0 leaves the
   // drive's setting.
   double following_error_unit = 0.0;
+  // Velocity unit of a drive that states none (neither 0x60A9 nor 0x6096).
+  VelocityUnit velocity_unit = VelocityUnit::as_stated;
+  // Position counts in one revolution of the shaft whose revolutions the drive's velocity unit counts. Needed for
+  // drives whose velocities are in rpm; 0: not configured.
+  double counts_per_revolution = 0.0;
   // Identity as in object 0x1018; 0 accepts any. The device type (0x1000 = 402) is always checked.
   std::uint32_t vendor_id = 0;
   std::uint32_t product_code = 0;
@@ -77,15 +92,16 @@ struct StepperConfig {
   std::int64_t sdo_timeout_ns = 500 * kMs;
   int sdo_retries = 1;
   std::int64_t transition_timeout_ns = 1000 * kMs;  // NMT start, mode change, enabling, fault reset
-  std::int64_t tpdo_timeout_ns = 60 * kMs;          // no fresh position
-  std::int64_t echo_timeout_ns = 60 * kMs;          // a frame of ours that does not get onto the wire
-  std::int64_t overrun_stop_ns = 100 * kMs;         // step() called this late while enabled
-  std::int64_t setpoint_zero_age_ns = 60 * kMs;     // older: rate 0 by the normal ramp
-  std::int64_t setpoint_stop_age_ns = 100 * kMs;    // older: quick stop, latched
-  std::int64_t not_following_ns = 80 * kMs;         // by which an axis may lag behind the commanded rate
-  std::int64_t following_error_ns = 50 * kMs;       // 0x6066, where following_error_unit is not 0
-  int queue_full_limit = 5;                         // refused frames in a row
-  std::int16_t quick_stop_option = 6;               // 0x605A: 6 stays in quick stop with torque, 2 lets go
+  std::int64_t boot_timeout_ns = 5000 * kMs;      // from an NMT reset to the drive's boot-up, before it is reset again
+  std::int64_t tpdo_timeout_ns = 60 * kMs;        // no fresh position
+  std::int64_t echo_timeout_ns = 60 * kMs;        // a frame of ours that does not get onto the wire
+  std::int64_t overrun_stop_ns = 100 * kMs;       // step() called this late while enabled
+  std::int64_t setpoint_zero_age_ns = 60 * kMs;   // older: rate 0 by the normal ramp
+  std::int64_t setpoint_stop_age_ns = 100 * kMs;  // older: quick stop, latched
+  std::int64_t not_following_ns = 80 * kMs;       // by which an axis may lag behind the commanded rate
+  std::int64_t following_error_ns = 50 * kMs;     // 0x6066, where following_error_unit is not 0
+  int queue_full_limit = 5;                       // refused frames in a row
+  std::int16_t quick_stop_option = 6;             // 0x605A: 6 stays in quick stop with torque, 2 lets go
 };
 
 // What is wrong with a configuration, one sentence each (key, value, allowed range); empty when it can be used.

@@ -59,17 +59,10 @@ EnableAnswer StepperDriver::enable() {
   return EnableAnswer::accepted;
 }
 
-void StepperDriver::disable() {
-  enable_wanted_ = false;
-  if (state_ == DriverState::enabled) state_ = DriverState::ready;
-  if (!latched()) stopped_ns_ = last_step_ns_;
-  for (auto& shaper : shapers_) shaper.reset();
-}
-
 void StepperDriver::stop_now(StopReason reason, std::int64_t now_ns) {
   if (latched()) return;
   take_in(now_ns);  // echoes, so that nothing holds the stop back
-  latch({reason, -1, 0});
+  latch({reason}, now_ns);
   send_stop(now_ns);
 }
 
@@ -80,7 +73,9 @@ bool StepperDriver::rearm() {
   state_since_ns_ = listen_since_ns_ = last_step_ns_;
   silent_ = withhold_heartbeat_ = false;
   reset_faults_ = true;
-  stop_ = {};
+  stop_ = later_ = {};
+  orders_.fill(StopOrder::none);
+  for (auto& rest : rests_) rest.end();
   for (auto& node : nodes_) node.restart();
   return true;
 }
@@ -96,40 +91,19 @@ void StepperDriver::confirm_position() {
   for (auto& node : nodes_) node.confirm_position();
 }
 
-void StepperDriver::latch(const Stop& stop) {
-  enable_wanted_ = false;
-  if (!latched()) {
-    for (std::size_t axis = 0; axis < kAxes; ++axis) stopped_from_unit_s_.at(axis) = nodes_.at(axis).rate_unit_s();
-    judged_.fill(state_ != DriverState::enabled);
-    held_back_.fill(false);
-    stopped_ns_ = last_step_ns_;
-    for (std::size_t axis = 0; axis < kAxes; ++axis)
-      stop_confirmed_.at(axis) = nodes_.at(axis).state() != cia402::State::operation_enabled;
-  }
-  for (auto& shaper : shapers_) shaper.reset();
-  if (latched()) {
-    ++counters_.later_stops;
-  } else {
-    stop_ = stop;
-    state_ = DriverState::stopped;
-  }
-  // That they miss our heartbeat is what we wanted.
-  if (is_fault(stop.reason) && !withhold_heartbeat_) state_ = DriverState::fault;
-}
-
-void StepperDriver::on_trouble(const Stop& trouble) {
+void StepperDriver::on_trouble(const Stop& trouble, std::int64_t now_ns) {
   switch (state_) {
     case DriverState::ready:
     case DriverState::enabled:
     case DriverState::stopped:
     case DriverState::fault:
-      latch(trouble);
+      latch(trouble, now_ns);
       break;
     case DriverState::configuring:
       // Nothing has been enabled yet: what passes by itself is waited out. A drive that still complains about its lost
       // master does so once more while it is reset.
       stop_ = trouble;
-      if (is_fault(trouble.reason) && trouble.reason != StopReason::drive_emergency) latch(trouble);
+      if (is_fault(trouble.reason) && trouble.reason != StopReason::drive_emergency) latch(trouble, now_ns);
       break;
     case DriverState::off:
       stop_ = trouble;
@@ -171,7 +145,7 @@ void StepperDriver::on_event(can::BusEvent event, std::int64_t now_ns) {
   ++counters_.bus_errors;
   out_.forget();
   if (reason != StopReason::link_down) purge(now_ns);
-  on_trouble({reason, -1, 0});
+  on_trouble({reason}, now_ns);
   if (state_ == DriverState::configuring) state_ = DriverState::off;
 }
 
@@ -183,7 +157,7 @@ void StepperDriver::on_frame(const can::Frame& frame, std::int64_t now_ns) {
   // Only a master sends this, and it was not us. While we have not sent anything ourselves, we leave the bus to it.
   if (state_ == DriverState::off) silent_ = true;
   const bool known = latched() && stop_.reason == StopReason::foreign_master;
-  if (!known) latch({StopReason::foreign_master, -1, frame.id});
+  if (!known) latch({StopReason::foreign_master, -1, frame.id}, now_ns);
 }
 
 void StepperDriver::receive(std::int64_t now_ns) {
@@ -201,7 +175,7 @@ void StepperDriver::take_in(std::int64_t now_ns) {
       bus_, [&](const can::Frame& frame) { on_frame(frame, now_ns); },
       [&](const can::Frame& frame) { out_.on_echo(frame); }, [&](can::BusEvent event) { on_event(event, now_ns); });
   for (auto& node : nodes_)
-    if (const Stop trouble = node.take_trouble(); trouble.reason != StopReason::none) on_trouble(trouble);
+    if (const Stop trouble = node.take_trouble(); trouble.reason != StopReason::none) on_trouble(trouble, now_ns);
 }
 
 void StepperDriver::note_timing(std::int64_t now_ns) {
@@ -211,7 +185,7 @@ void StepperDriver::note_timing(std::int64_t now_ns) {
     const std::int64_t elapsed_ns = now_ns - last_step_ns_;
     if (elapsed_ns > config_.period_ns * 3 / 2) ++counters_.overruns;
     if (state_ == DriverState::enabled && elapsed_ns > config_.overrun_stop_ns)
-      latch({StopReason::driver_overrun, -1, 0});
+      latch({StopReason::driver_overrun}, now_ns);
   }
 }
 
@@ -220,7 +194,7 @@ void StepperDriver::supervise_transmission(std::int64_t now_ns) {
   if (out_.refused_in_a_row() >= config_.queue_full_limit) reason = StopReason::queue_full;
   if (out_.longest_wait_ns(now_ns) > config_.echo_timeout_ns) reason = StopReason::transmit_stalled;
   if (reason == StopReason::none || now_ns < next_purge_ns_) return;
-  on_trouble({reason, -1, 0});
+  on_trouble({reason}, now_ns);
   purge(now_ns);
   if (state_ == DriverState::configuring) state_ = DriverState::off;
 }
@@ -231,7 +205,7 @@ void StepperDriver::step(std::int64_t now_ns, const std::optional<MotionSetpoint
   take_in(now_ns);
   for (auto& node : nodes_) {
     node.supervise(now_ns);
-    if (const Stop trouble = node.take_trouble(); trouble.reason != StopReason::none) on_trouble(trouble);
+    if (const Stop trouble = node.take_trouble(); trouble.reason != StopReason::none) on_trouble(trouble, now_ns);
   }
   supervise_transmission(now_ns);
   switch (state_) {
@@ -250,7 +224,6 @@ void StepperDriver::step(std::int64_t now_ns, const std::optional<MotionSetpoint
     case DriverState::stopped:
     case DriverState::fault:
       supervise_stop(now_ns);
-      judge_rest(now_ns);
       ask_why(now_ns);
       break;
   }
@@ -282,9 +255,9 @@ void StepperDriver::run_configuring(std::int64_t now_ns) {
     const bool in_fault = node.state() == cia402::State::fault;
     // The operator asked for a reset by rearm(), and by nothing else.
     if (in_fault && (!reset_faults_ || out_of_time))
-      return latch({StopReason::drive_fault, static_cast<int>(axis), node.error_code()});
+      return latch({StopReason::drive_fault, static_cast<int>(axis), node.error_code()}, now_ns);
     if (out_of_time && node.state() != cia402::State::ready_to_switch_on)
-      return latch({StopReason::start_timeout, static_cast<int>(axis), node.statusword()});
+      return latch({StopReason::start_timeout, static_cast<int>(axis), node.statusword()}, now_ns);
   }
   if (!all_in(cia402::State::ready_to_switch_on)) return;
   state_ = DriverState::ready;
@@ -293,15 +266,17 @@ void StepperDriver::run_configuring(std::int64_t now_ns) {
 }
 
 void StepperDriver::run_ready(std::int64_t now_ns) {
-  for (auto& node : nodes_) node.renew_limits(now_ns, out_);
+  for (auto& node : nodes_) node.maintain_settings(now_ns, out_);
   for (std::size_t axis = 0; axis < kAxes; ++axis) {
     const auto state = nodes_.at(axis).state();
     if (state == cia402::State::fault || state == cia402::State::fault_reaction)
-      return latch({StopReason::drive_fault, static_cast<int>(axis), nodes_.at(axis).error_code()});
+      return latch({StopReason::drive_fault, static_cast<int>(axis), nodes_.at(axis).error_code()}, now_ns);
   }
   if (!enable_wanted_) return supervise_disabling(now_ns);
-  if (all_in(cia402::State::operation_enabled)) {
+  const bool modes_shown = std::ranges::all_of(nodes_, &DriveNode::shows_mode);
+  if (all_in(cia402::State::operation_enabled) && modes_shown) {
     state_ = DriverState::enabled;
+    for (auto& rest : rests_) rest.end();
     fresh_setpoint_ns_ = shaped_ns_ = now_ns;
     refusing_setpoints_ = false;
     for (std::size_t axis = 0; axis < kAxes; ++axis) {
@@ -309,16 +284,18 @@ void StepperDriver::run_ready(std::int64_t now_ns) {
       at_limit_.at(axis) = nodes_.at(axis).says_limit();
     }
   } else if (now_ns - enable_since_ns_ > config_.transition_timeout_ns) {
-    latch({StopReason::enable_timeout, -1, 0});
+    latch({StopReason::enable_timeout}, now_ns);
   }
 }
 
-std::uint16_t StepperDriver::controlword_for(const DriveNode& node) const {
+std::uint16_t StepperDriver::controlword_for(std::size_t axis) const {
   using cia402::Goal;
+  const DriveNode& node = nodes_.at(axis);
   if (latched()) {
+    if (orders_.at(axis) >= StopOrder::disable_voltage) return cia402::controlword::kDisableVoltage;
     // An axis that was held back would jump by what it is behind when it comes free: once it rests it is let go.
-    const bool held_back = held_back_.at(&node == &nodes_[kInsertion] ? kInsertion : kRotation);
-    if (held_back && node.state() == cia402::State::quick_stop_active) return cia402::controlword::kDisableVoltage;
+    if (held_back_.at(axis) && node.state() == cia402::State::quick_stop_active)
+      return cia402::controlword::kDisableVoltage;
     return cia402::controlword_towards(Goal::stop, node.state());
   }
   if (state_ == DriverState::configuring && reset_faults_ && node.state() == cia402::State::fault)
@@ -329,12 +306,12 @@ std::uint16_t StepperDriver::controlword_for(const DriveNode& node) const {
 }
 
 void StepperDriver::send_command(std::size_t axis, std::int64_t now_ns) {
-  const DriveNode& node = nodes_.at(axis);
+  DriveNode& node = nodes_.at(axis);
   command_waits_.at(axis) = false;
   // A stop is meant for every drive, also for one that we do not see.
   if (node.phase() != DriveNode::Phase::operational && !latched()) return;
   const double rate = state_ == DriverState::enabled ? shapers_.at(axis).rate_unit_s() : 0.0;
-  const bool accepted = node.command(controlword_for(node), rate, now_ns, out_);
+  const bool accepted = node.command(controlword_for(axis), rate, now_ns, out_);
   command_waits_.at(axis) = !accepted && out_.waits_for_echo(cia301::rpdo1_id(config_.axes.at(axis).node_id));
 }
 

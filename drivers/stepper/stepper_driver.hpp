@@ -1,18 +1,9 @@
-// Two CiA 402 drives, insertion and rotation, as one needle driver. Stands on a can::Bus; knows no files, clocks,
-// messages.
-//
-//   off --(bus open, nobody else commands)--> configuring --(both drives checked, operational)--> ready
-//   ready --enable()--> enabled --disable()--> ready
-//   ready, enabled --(any trouble)--> stopped or fault, latched: quick stop on both axes until rearm()
-//
-// Nothing moves without enable(), nothing recovers from a latched stop without rearm() and enable(). A drive that goes
-// on saying that it is enabled, or says nothing, after a stop has perhaps not heard it: our heartbeat ends then, on
-// which every drive stops by itself.
 #pragma once
 
 #include <array>
 #include <cstdint>
 #include <optional>
+#include <string>
 #include <vector>
 
 #include "drivers/can/bus.hpp"
@@ -20,10 +11,23 @@
 #include "drivers/stepper/follow_watch.hpp"
 #include "drivers/stepper/rate_shaper.hpp"
 #include "drivers/stepper/reason.hpp"
+#include "drivers/stepper/rest_watch.hpp"
 #include "drivers/stepper/stepper_config.hpp"
 #include "drivers/stepper/transmitter.hpp"
 
 namespace bevel::stepper {
+
+/// What is measured of an axis after a stop.
+enum class AxisRest : std::uint8_t {
+  not_stopped,    ///< no stop is in force
+  slowing,        ///< within the travel that its ramp allows
+  at_rest,        ///< stationary, and where it came to rest
+  not_measured,   ///< the drive sends no measurements: it has to stop by its own monitoring of our heartbeat
+  does_not_stop,  ///< moves on although it was stopped
+};
+
+/// What a stop has ordered of an axis so far. Each step is taken if the one before does not bring it to rest.
+enum class StopOrder : std::uint8_t { none, quick_stop, disable_voltage, nmt_stop };
 
 struct MotionSetpoint {
   std::int64_t age_ns = 0;           // since it was made; more than a cycle below zero is refused
@@ -61,6 +65,7 @@ struct DriverCounters {
   std::uint64_t purges = 0;
   std::uint64_t later_stops = 0;          // troubles after the one that is latched
   std::uint64_t heartbeats_withheld = 0;  // stops that a drive did not confirm
+  std::uint64_t stops_escalated = 0;      // axes that did not slow by their quick stop
 };
 
 struct AxesReport {
@@ -72,13 +77,30 @@ struct AxesReport {
   double rotation_rate_rad_s = 0.0;
   std::array<bool, kAxes> position_trusted{};
   std::array<std::uint16_t, kAxes> error_code{};  // last EMCY code or 0x603F
-  std::array<bool, kAxes>
-      stop_unconfirmed{};  // in stopped and fault: our heartbeat ended, so that the drive stops itself
+  std::array<AxisRest, kAxes> rest{};             // in stopped and fault
+  std::array<StopOrder, kAxes> order{};           // in stopped and fault
+  std::array<bool, kAxes> waits_for_boot{};       // in configuring: an NMT reset is sent, the boot-up is awaited
+  bool heartbeat_ended = false;  // in stopped and fault: so that drives that do not confirm the stop end it themselves
   DriverState state = DriverState::off;
-  Stop stop{};  // latched in stopped and fault; in off and configuring what stands in the way, if known
+  Stop stop{};   // latched in stopped and fault; in off and configuring what stands in the way, if known
+  Stop later{};  // the first trouble of a drive or the bus after the latched stop; none if there was none
   DriverCounters counters{};
 };
 
+/// Describes the state in one line for the operator: an axis that does not stop first, then the latched stop, what came
+/// after it, and what is awaited. Empty if there is nothing to report. Allocates.
+std::string describe(const AxesReport& report);
+
+/// Two CiA 402 drives, insertion and rotation, as one needle driver on a can::Bus.
+///
+///   off --(bus open, nobody else commands)--> configuring --(both drives checked, operational)--> ready
+///   ready --enable()--> enabled --disable()--> ready
+///   ready, enabled --(any trouble)--> stopped or fault, latched: quick stop on both axes until rearm()
+///
+/// Nothing moves without enable(). Nothing recovers from a latched stop without rearm() and enable(). A stop counts as
+/// carried out when both axes are measured at rest (RestWatch). An axis that does not slow as its ramp demands gets, in
+/// this order, "disable voltage" (by PDO and by SDO) and NMT stop; the end of our heartbeat, on which drives stop by
+/// themselves, follows where a drive does not confirm or report. Knows no files, clocks or messages.
 class StepperDriver {
  public:
   // bus: must outlive the driver and hear listen_ids(). Throws std::invalid_argument listing every problem of config.
@@ -113,8 +135,8 @@ class StepperDriver {
   void take_in(std::int64_t now_ns);
   void on_frame(const can::Frame& frame, std::int64_t now_ns);
   void on_event(can::BusEvent event, std::int64_t now_ns);
-  void on_trouble(const Stop& trouble);
-  void latch(const Stop& stop);
+  void on_trouble(const Stop& trouble, std::int64_t now_ns);
+  void latch(const Stop& stop, std::int64_t now_ns);
   void purge(std::int64_t now_ns);
   void note_timing(std::int64_t now_ns);
   void supervise_transmission(std::int64_t now_ns);
@@ -124,9 +146,15 @@ class StepperDriver {
   void run_enabled(std::int64_t now_ns, const std::optional<MotionSetpoint>& setpoint);
   void shape(std::int64_t now_ns, const std::array<double, kAxes>& rates);
   void supervise_motion(std::int64_t now_ns);
-  void judge_rest(std::int64_t now_ns);
+  void watch_rest(std::size_t axis, std::int64_t now_ns, double ramp_unit_s2);
+  void measure_rest(std::size_t axis, std::int64_t now_ns);
+  void escalate(std::size_t axis, std::int64_t now_ns);
+  void judge_rest(std::size_t axis, std::int64_t now_ns);
   void supervise_stop(std::int64_t now_ns);
   void supervise_disabling(std::int64_t now_ns);
+  void note_later(const Stop& stop);
+  bool holds(std::size_t axis) const;
+  AxisRest rest_of(std::size_t axis) const;
   void ask_why(std::int64_t now_ns);
   std::array<double, kAxes> wanted_rates(std::int64_t now_ns, const std::optional<MotionSetpoint>& setpoint);
   void transmit(std::int64_t now_ns);
@@ -134,7 +162,7 @@ class StepperDriver {
   void send_command(std::size_t axis, std::int64_t now_ns);
   void send_commands(std::int64_t now_ns);
   void send_stop(std::int64_t now_ns);
-  std::uint16_t controlword_for(const DriveNode& node) const;
+  std::uint16_t controlword_for(std::size_t axis) const;
   bool latched() const { return state_ == DriverState::stopped || state_ == DriverState::fault; }
   bool all_in(cia402::State state) const;
 
@@ -161,10 +189,15 @@ class StepperDriver {
   std::int64_t next_purge_ns_ = INT64_MIN;
   std::int64_t fresh_setpoint_ns_ = 0;  // when the newest usable set-point was made
   bool refusing_setpoints_ = false;
-  // Of a stop: how fast each axis was, whether it has come to rest since, and whether it was behind then.
+  // Of a stop, or of disable(): the watch over each axis, how fast it was, and whether it was held back before it
+  // rested.
+  std::array<RestWatch, kAxes> rests_{};
+  std::array<StopOrder, kAxes> orders_{};
   std::array<double, kAxes> stopped_from_unit_s_{};
   std::array<bool, kAxes> judged_{}, held_back_{};
   std::array<bool, kAxes> stop_confirmed_{};
+  std::int64_t next_nmt_stop_ns_ = 0;
+  Stop later_{};
   std::array<bool, kAxes> command_waits_{};  // for the echo of the one before
   std::array<bool, kAxes> at_limit_{};       // what the statuswords said last
   DriverCounters counters_;

@@ -1,5 +1,6 @@
 // What the driver tells: its report, assembled from the drives and the transmitter.
 #include <algorithm>
+#include <string>
 
 #include "drivers/stepper/stepper_driver.hpp"
 
@@ -35,6 +36,8 @@ AxesReport StepperDriver::report() const {
   report.rotation_rate_rad_s = nodes_[kRotation].rate_unit_s();
   report.state = state_;
   report.stop = stop_;
+  report.later = later_;
+  report.heartbeat_ended = latched() && withhold_heartbeat_;
   report.counters = counters_;
   report.counters.held_back = out_.held_back();
   report.counters.queue_full = bus_.counters().queue_full;
@@ -43,12 +46,53 @@ AxesReport StepperDriver::report() const {
     report.status.at(axis) = status_of(node);
     report.position_trusted.at(axis) = node.position_trusted();
     report.error_code.at(axis) = node.error_code();
-    report.stop_unconfirmed.at(axis) = latched() && withhold_heartbeat_ && !stop_confirmed_.at(axis);
+    report.rest.at(axis) = rest_of(axis);
+    report.order.at(axis) = orders_.at(axis);
+    report.waits_for_boot.at(axis) = state_ == DriverState::configuring && node.waits_for_boot();
     report.counters.missed_pdos += node.counters().missed_pdos;
     report.counters.malformed += node.counters().malformed;
     report.counters.sdo_ignored += node.sdo_ignored();
   }
   return report;
+}
+
+namespace {
+
+std::string axis_name(std::size_t axis) { return axis == kInsertion ? "insertion" : "rotation"; }
+
+std::string describe_rest(const AxesReport& report, std::size_t axis) {
+  const StopOrder order = report.order.at(axis);
+  if (report.rest.at(axis) == AxisRest::not_measured)
+    return axis_name(axis) + ": rest not measured, the drive must stop by its own monitoring of this computer";
+  if (order < StopOrder::disable_voltage) return "";
+  if (report.rest.at(axis) == AxisRest::at_rest)
+    return axis_name(axis) +
+           " DID NOT SLOW by its quick stop and is at rest since its voltage was disabled; check "
+           "0x6085 and the drive's acceleration unit before arming again";
+  return axis_name(axis) + " DOES NOT STOP: switch the drive's power off by hand (quick stop and disable voltage " +
+         (order == StopOrder::nmt_stop ? "and NMT stop have" : "have") + " not brought it to rest)";
+}
+
+void append(std::string& text, const std::string& part) {
+  if (part.empty()) return;
+  if (!text.empty()) text += "; ";
+  text += part;
+}
+
+}  // namespace
+
+std::string describe(const AxesReport& report) {
+  std::string text;
+  for (std::size_t axis = 0; axis < kAxes; ++axis)
+    if (report.order.at(axis) >= StopOrder::disable_voltage) append(text, describe_rest(report, axis));
+  if (report.stop.reason != StopReason::none) append(text, describe(report.stop));
+  if (report.later.reason != StopReason::none) append(text, "since then " + describe(report.later));
+  for (std::size_t axis = 0; axis < kAxes; ++axis) {
+    if (report.order.at(axis) < StopOrder::disable_voltage) append(text, describe_rest(report, axis));
+    if (report.waits_for_boot.at(axis)) append(text, axis_name(axis) + ": reset sent, waiting for boot-up");
+  }
+  if (report.heartbeat_ended) append(text, "a drive did not confirm the stop: this computer's heartbeat was ended");
+  return text;
 }
 
 const char* to_string(DriverState state) {

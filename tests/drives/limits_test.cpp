@@ -174,7 +174,8 @@ TEST(DriveLimits, OneThatTheDriveClipsIsRefused) {
     ASSERT_TRUE(bench.reach(DriverState::fault));
     EXPECT_EQ(bench.reason(), StopReason::configuration_failed);
     EXPECT_EQ(bench.report().stop.axis, 0);
-    EXPECT_EQ(bench.report().stop.code, 0x607D02U);
+    EXPECT_EQ(bench.report().stop.object, (stepper::cia301::ObjectAddress{0x607D, 2}));
+    EXPECT_EQ(bench.report().stop.code, 7000U) << "the value found";
   }
 }
 

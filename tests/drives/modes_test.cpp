@@ -317,8 +317,9 @@ TEST(DriveSupervision, AVelocityFactorThatStaysIsRefused) {
     return true;
   });
   ASSERT_TRUE(bench.reach(DriverState::fault));
-  EXPECT_EQ(bench.reason(), StopReason::configuration_failed);
-  EXPECT_EQ(bench.report().stop.code, 0x609601U);
+  EXPECT_EQ(bench.reason(), StopReason::unit_unsupported);
+  EXPECT_EQ(bench.report().stop.object, (stepper::cia301::ObjectAddress{0x6096, 1}));
+  EXPECT_EQ(bench.report().stop.code, 60U);
 }
 
 }  // namespace

@@ -197,7 +197,8 @@ TEST(Identity, AnotherDeviceIsRefusedBeforeMotion) {
   Bench bench(config);
   ASSERT_TRUE(bench.reach(DriverState::fault));
   EXPECT_EQ(bench.reason(), StopReason::wrong_device);
-  EXPECT_EQ(bench.report().stop.code, 0x101801U);
+  EXPECT_EQ(bench.report().stop.object, (stepper::cia301::ObjectAddress{0x1018, 1}));
+  EXPECT_EQ(bench.report().stop.wanted, 0x1234U);
   EXPECT_EQ(bench.report().stop.axis, 1);
 }
 
@@ -221,6 +222,7 @@ TEST(Configuring, ARefusedWriteNamesItsAbortCode) {
   ASSERT_TRUE(bench.reach(DriverState::fault));
   EXPECT_EQ(bench.reason(), StopReason::sdo_aborted);
   EXPECT_EQ(bench.report().stop.code, 0x06090030U);
+  EXPECT_EQ(bench.report().stop.object, (stepper::cia301::ObjectAddress{0x6007, 0}));
 }
 
 TEST(Configuring, ALostAnswerIsAskedForAgain) {

@@ -1,5 +1,4 @@
-// A drive that never receives its commands, while all else goes through: heartbeats, SYNC, its positions. Only its
-// statusword tells that it does not obey.
+// A drive that never receives its RPDO, while all else goes through: heartbeats, SYNC, SDO, its positions.
 #include <gmock/gmock.h>
 
 #include <cstdio>
@@ -35,7 +34,7 @@ class UnheardStop : public testing::Test {
     const double before_mm = bench.insertion.position_unit(), before_rad = bench.rotation.position_unit();
     bench.run_ms(1000);
     EXPECT_EQ(bench.reason(), reason);
-    EXPECT_EQ(bench.report().state, DriverState::stopped);
+    EXPECT_EQ(bench.report().state, DriverState::fault);
     EXPECT_NEAR(bench.insertion.position_unit(), before_mm, 0.2);  // the last of the ramp
     EXPECT_NEAR(bench.rotation.position_unit(), before_rad, 0.2);
   }
@@ -45,7 +44,7 @@ class UnheardStop : public testing::Test {
     const double before_mm = bench.insertion.position_unit();
     bench.wire.set_tap({});
     bench.run_ms(1000);
-    EXPECT_EQ(bench.report().state, DriverState::stopped);
+    EXPECT_EQ(bench.report().state, DriverState::fault);
     ASSERT_TRUE(bench.driver->rearm());
     ASSERT_TRUE(bench.enable()) << to_string(bench.reason());
     EXPECT_NEAR(bench.insertion.position_unit(), before_mm, 1e-3);
@@ -57,22 +56,32 @@ class UnheardStop : public testing::Test {
   Bench bench;
 };
 
-TEST_F(UnheardStop, EndsInTheDrivesOwnWatch) {
+TEST_F(UnheardStop, IsOrderedBySdo) {
   lose_commands(0x202);
+  bench.driver->stop_now(StopReason::operator_stop, bench.now_ns);
+  expect_rest_within_ms(100);
+  expect_latched(StopReason::operator_stop);
+  EXPECT_EQ(bench.report().counters.stops_escalated, 1U);
+  EXPECT_EQ(bench.report().rest[0], stepper::AxisRest::at_rest);
+  EXPECT_THAT(describe(bench.report()), testing::HasSubstr("rotation DID NOT SLOW"));
+  expect_rearm_works();
+}
+
+TEST_F(UnheardStop, EndsInTheDrivesOwnWatch) {
+  bench.wire.set_tap([](can::Frame& frame) { return frame.id != 0x202 && frame.id != 0x602 && frame.id != 0x000; });
   bench.driver->stop_now(StopReason::operator_stop, bench.now_ns);
   expect_rest_within_ms(200);
   expect_latched(StopReason::operator_stop);
   EXPECT_EQ(bench.report().counters.heartbeats_withheld, 1U);
-  EXPECT_THAT(bench.report().stop_unconfirmed, testing::ElementsAre(false, true));
-  EXPECT_THAT(describe(bench.report().stop, bench.report().stop_unconfirmed), testing::HasSubstr("rotation's drive"));
+  EXPECT_TRUE(bench.report().heartbeat_ended);
   expect_rearm_works();
 }
 
 TEST_F(UnheardStop, DisabledIsALatchedStop) {
   lose_commands(0x201);
   bench.driver->disable();
-  expect_rest_within_ms(400);  // the time of a ramp more
-  expect_latched(StopReason::not_following);
+  expect_rest_within_ms(200);  // the reaction and the quick stop after it
+  expect_latched(StopReason::does_not_stop);
   EXPECT_EQ(bench.report().stop.axis, 0);
   expect_rearm_works();
 }
@@ -82,7 +91,8 @@ TEST_F(UnheardStop, OneThatIsHeardKeepsOurHeartbeat) {
   bench.run_ms(1000);
   EXPECT_EQ(bench.report().counters.heartbeats_withheld, 0U);
   EXPECT_THAT(bench.report().error_code, testing::Each(0));
-  EXPECT_THAT(bench.report().stop_unconfirmed, testing::Each(false));
+  EXPECT_FALSE(bench.report().heartbeat_ended);
+  EXPECT_THAT(bench.report().rest, testing::Each(stepper::AxisRest::at_rest));
 }
 
 }  // namespace

@@ -118,7 +118,7 @@ class BadLine : public testing::TestWithParam<Carrier> {
         EXPECT_NEAR(world.report().insertion_mm, world.drives[0]->position_unit(), 0.5);
         if (seed % 2 == 0) world.driver->stop_now(StopReason::operator_stop, world.now_ns());
       } else {
-        EXPECT_TRUE(world.at_rest()) << describe(world.report().stop);
+        EXPECT_TRUE(world.at_rest()) << describe(world.report());
       }
       world.command.reset();
       const auto ms = world.ms_to_rest();
@@ -140,8 +140,9 @@ class BadLine : public testing::TestWithParam<Carrier> {
   }
 };
 
-// Heartbeats are 30 ms apart and may be missing for 100: of 1 % lost, three in a row are one in 10^6, of 10 % in 10^3.
-TEST_P(BadLine, OneFrameInAHundredLostIsBorne) { EXPECT_EQ(borne_of_twenty({.lost = 0.01}), 20); }
+// Heartbeats are 30 ms apart and may be missing for 100 ms. Three lost in a row are one in 10^6 of 1 % lost frames, so
+// that one run in 750 stops (two drives, each with 333 heartbeats, and the driver's); of 10 % lost they are one in 10^3.
+TEST_P(BadLine, OneFrameInAHundredLostIsBorne) { EXPECT_GE(borne_of_twenty({.lost = 0.01}), 19); }
 TEST_P(BadLine, OneInTenLostIsOftenAStop) { EXPECT_LT(borne_of_twenty({.lost = 0.1}), 20); }
 
 // Nothing that a drive is told adds up, so that twice is the same as once.
