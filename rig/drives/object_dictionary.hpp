@@ -47,6 +47,8 @@ class ObjectDictionary {
 
   void add(std::uint16_t index, std::uint8_t sub, const Object& object) { objects_[{index, sub}] = object; }
 
+  void remove(const Key& key) { objects_.erase(key); }
+
   const Object* find(std::uint16_t index, std::uint8_t sub) const;
   std::uint32_t get(std::uint16_t index, std::uint8_t sub = 0) const;  // throws std::out_of_range
   std::int32_t get_signed(std::uint16_t index, std::uint8_t sub = 0) const;

@@ -21,12 +21,28 @@ std::uint16_t nth(std::uint16_t first, std::size_t n) { return static_cast<std::
 SimulatedDrive::SimulatedDrive(can::Bus& bus, const SimulatedDriveConfig& config)
     : bus_(bus),
       config_(config),
-      od_(factory_dictionary(config.node_id, config.identity)),
+      od_(factory_settings()),
       motion_(config.following_time_s),
-      units_(UnitFactors::of(od_)) {}
+      units_(UnitFactors::of(od_, config_.dialect.velocity_unit)) {}
+
+ObjectDictionary SimulatedDrive::factory_settings() const {
+  ObjectDictionary od = factory_dictionary(config_.node_id, config_.identity);
+  const DriveDialect& dialect = config_.dialect;
+  if (dialect.velocity_unit != 0) {
+    for (const std::uint8_t sub : {std::uint8_t{0}, std::uint8_t{1}, std::uint8_t{2}}) od.remove({0x6096, sub});
+    if (dialect.states_unit) od.add(0x60A9, 0, {4, dialect.velocity_unit, Access::read_only});
+  }
+  for (const auto& key : dialect.lacks) od.remove(key);
+  return od;
+}
+
+void SimulatedDrive::corrupt(std::uint16_t index, std::uint8_t sub, std::uint32_t value) {
+  od_.set(index, sub, value);
+  written(index);
+}
 
 void SimulatedDrive::send(const can::Frame& frame) {
-  if (!silent_) (void)bus_.send(frame);
+  if (!silent_ && !boots_at_ns_) (void)bus_.send(frame);
 }
 
 void SimulatedDrive::send_emergency(std::uint16_t code) {
@@ -37,7 +53,13 @@ void SimulatedDrive::send_emergency(std::uint16_t code) {
   send(frame);
 }
 
+void SimulatedDrive::begin_boot() {
+  boots_at_ns_ = now_ns_ + static_cast<std::int64_t>(config_.dialect.boot_s * 1e9);
+  if (config_.dialect.boot_s == 0.0) boot();
+}
+
 void SimulatedDrive::boot() {
+  boots_at_ns_.reset();
   nmt_ = NmtState::pre_operational;
   master_heard_ns_.reset();
   master_lost_ = false;
@@ -50,20 +72,20 @@ void SimulatedDrive::boot() {
 
 void SimulatedDrive::reset_communication() {
   // Objects 0x1000 to 0x1FFF fall back to their power-on values, the profile's objects stay.
-  od_.restore(factory_dictionary(config_.node_id, config_.identity), 0x1000, 0x1FFF);
-  boot();
+  od_.restore(factory_settings(), 0x1000, 0x1FFF);
+  begin_boot();
 }
 
 void SimulatedDrive::power_cycle() {
-  od_ = factory_dictionary(config_.node_id, config_.identity);
+  od_ = factory_settings();
   power_ = PowerStateMachine{};
-  units_ = UnitFactors::of(od_);
+  units_ = UnitFactors::of(od_, config_.dialect.velocity_unit);
   homing_.forget();
   motion_.let_go();
   zero_increments_ = motion_.position();  // the counter begins anew, the shaft stays where it is
   old_controlword_ = 0;
   following_error_s_ = 0.0;
-  boot();
+  begin_boot();
 }
 
 void SimulatedDrive::raise_fault(std::uint16_t error_code) {
@@ -79,8 +101,9 @@ void SimulatedDrive::step(std::int64_t now_ns) {
   bus_.maintain(now_ns);
   if (!started_) {
     started_ = true;
-    boot();
+    begin_boot();
   }
+  if (boots_at_ns_ && now_ns >= *boots_at_ns_) boot();
   advance(static_cast<double>(elapsed_ns) * 1e-9);
   update_status();
   for (int i = 0; i < kFramesPerStep; ++i) {
@@ -100,6 +123,7 @@ void SimulatedDrive::step(std::int64_t now_ns) {
 void SimulatedDrive::on_frame(const can::Frame& frame, std::int64_t now_ns) {
   const std::uint32_t master = (od_.get(0x1016, 1) >> 16) & 0x7F;
   if (frame.id == 0x000) return on_nmt(frame);
+  if (boots_at_ns_) return;
   if (frame.id == 0x080) return on_sync();
   if (frame.id == 0x600U + config_.node_id) return on_sdo(frame);
   if (master != 0 && frame.id == 0x700U + master) return on_master_heartbeat(now_ns);

@@ -10,6 +10,7 @@
 #include <string>
 
 #include "drivers/can/bus.hpp"
+#include "rig/drives/dialect.hpp"
 #include "rig/drives/drive_motion.hpp"
 #include "rig/drives/homing.hpp"
 #include "rig/drives/object_dictionary.hpp"
@@ -25,6 +26,7 @@ struct SimulatedDriveConfig {
   double following_time_s = 0.004;  // lag of the shaft behind the demand
   Identity identity{};
   LimitSwitches switches{};  // in increments of the shaft, which stands at 0 when the drive is made
+  DriveDialect dialect{};
 };
 
 enum class NmtState : std::uint8_t { stopped = 0x04, operational = 0x05, pre_operational = 0x7F };
@@ -49,6 +51,9 @@ class SimulatedDrive {
   void set_silent(bool silent) { silent_ = silent; }            // its connector is pulled: hears and says nothing
   void set_pdos_frozen(bool frozen) { pdos_frozen_ = frozen; }  // heartbeat alive, PDOs neither sent nor obeyed
   void set_motor_blocked(bool blocked) { motion_.set_blocked(blocked); }
+  void set_power_stage_stuck(bool stuck) { power_stage_stuck_ = stuck; }  // turns on whatever it is ordered
+  // Changes a setting without a frame, as a defect of its memory or another way into the drive would.
+  void corrupt(std::uint16_t index, std::uint8_t sub, std::uint32_t value);
   void power_cycle();                          // all settings are lost, and where its zero was; boot-up
   void raise_fault(std::uint16_t error_code);  // as if a supervision inside the drive had tripped
 
@@ -74,6 +79,8 @@ class SimulatedDrive {
   void send_tpdo(std::size_t pdo);
   void reset_communication();
   void boot();
+  ObjectDictionary factory_settings() const;
+  void begin_boot();
   void send(const can::Frame& frame);
   void send_emergency(std::uint16_t code);
   void advance(double dt_s);
@@ -107,6 +114,8 @@ class SimulatedDrive {
   bool started_ = false;
   bool silent_ = false;
   bool pdos_frozen_ = false;
+  bool power_stage_stuck_ = false;
+  std::optional<std::int64_t> boots_at_ns_;  // set while it boots
   std::int64_t now_ns_ = 0;
   std::int64_t next_heartbeat_ns_ = 0;
   std::optional<std::int64_t> master_heard_ns_;  // set once its heartbeat was heard: only then is it watched

@@ -86,7 +86,9 @@ void SimulatedDrive::advance(double dt_s) {
 
 void SimulatedDrive::advance_cycle(double dt_s) {
   at_limit_ = false;
-  if (power_.moves()) {
+  if (power_stage_stuck_) {
+    motion_.step(dt_s, motion_.demand_per_s(), 1.0);
+  } else if (power_.moves()) {
     advance_homing();
     const double wanted = wanted_increments_s();
     const double stop_ramp = od_.get(0x6085) / units_.velocity_per_increment;
@@ -137,6 +139,7 @@ void SimulatedDrive::update_status() {
   const double position = (motion_.position() - zero_increments_) * units_.position_per_increment;
   od_.set(0x6041, 0, power_.statusword_bits() | kRemote | mode_bits() | (at_limit_ ? kInternalLimit : 0));
   od_.set(0x6064, 0, rounded(position));
+  if (config_.dialect.shows_mode_only_enabled) od_.set(0x6061, 0, power_.moves() ? od_.get(0x6060) : 0);
   od_.set(0x606C, 0, rounded(motion_.velocity_per_s() * units_.velocity_per_increment));
   od_.set(0x60F4, 0, rounded(motion_.following_error() * units_.position_per_increment));
   od_.set(0x60FD, 0, (negative_switch() ? kNegativeSwitch : 0) | (positive_switch() ? kPositiveSwitch : 0));
@@ -186,7 +189,7 @@ void SimulatedDrive::written(std::uint16_t index) {
     case 0x6091:
     case 0x6092:
     case 0x6096:
-      units_ = UnitFactors::of(od_);
+      units_ = UnitFactors::of(od_, config_.dialect.velocity_unit);
       return;
     default:
       return;

@@ -13,6 +13,7 @@ constexpr unsigned kPdoBits = 64;
 constexpr unsigned kExpeditedBytes = 4;
 constexpr std::size_t kSegmentBytes = 7;
 constexpr std::uint8_t kToggle = 0x10;
+constexpr std::uint32_t kNoRtr = 0x40000000;  // bit 30 of a COB-ID
 
 bool between(std::uint16_t index, std::uint16_t first) { return index >= first && index < first + 4; }
 bool is_communication(std::uint16_t index) { return between(index, 0x1400) || between(index, 0x1800); }
@@ -102,6 +103,9 @@ Abort SimulatedDrive::next_segment(std::uint8_t command, can::Frame& answer) {
 
 Abort SimulatedDrive::write(std::uint16_t index, std::uint8_t sub, std::uint32_t value, unsigned bytes) {
   Abort abort = od_.check_write(index, sub, value, bytes);
+  const auto& rejects = config_.dialect.rejects;
+  if (const auto found = rejects.find({index, sub}); abort == Abort::none && found != rejects.end())
+    abort = found->second;
   if (abort == Abort::none && (is_communication(index) || is_mapping(index)))
     abort = check_pdo_setting(index, sub, value);
   if (abort == Abort::none) abort = check_profile_setting(index, sub, value);
@@ -139,6 +143,11 @@ Abort SimulatedDrive::check_pdo_setting(std::uint16_t index, std::uint8_t sub, s
   if (is_communication(index)) {
     // While a PDO is valid its identifier stays: only bit 31 may be set.
     const std::uint32_t now = od_.get(index, 1);
+    const bool bit_30 = (value & kNoRtr) != 0;
+    const bool is_tpdo = index >= 0x1800;
+    if (sub == 1 &&
+        ((config_.dialect.needs_bit_30 && is_tpdo && !bit_30) || (config_.dialect.rejects_bit_30 && bit_30)))
+      return Abort::value_range;
     const bool keeps_id = (value & ~kPdoInvalid) == (now & ~kPdoInvalid);
     return sub == 1 && (now & kPdoInvalid) == 0 && !keeps_id ? Abort::wrong_state : Abort::none;
   }

@@ -26,12 +26,13 @@ class Bench {
  public:
   static constexpr std::int64_t kStart_ns = 1'000'000'000;
 
-  explicit Bench(const stepper::StepperConfig& settings = {}, const rig::LimitSwitches& insertion_switches = {})
+  explicit Bench(const stepper::StepperConfig& settings = {}, const rig::LimitSwitches& insertion_switches = {},
+                 const rig::DriveDialect& insertion_dialect = {})
       : config(settings),
         driver_bus(wire.attach()),
         drive_buses{wire.attach(), wire.attach()},
-        insertion(*drive_buses[0], drive_config(0, insertion_switches)),
-        rotation(*drive_buses[1], drive_config(1, {})),
+        insertion(*drive_buses[0], drive_config(0, insertion_switches, insertion_dialect)),
+        rotation(*drive_buses[1], drive_config(1, {}, {})),
         driver(std::make_unique<stepper::StepperDriver>(*driver_bus, config)) {}
 
   // Runs the world for a while; the set-point is handed in anew in each cycle unless `command` says otherwise.
@@ -95,11 +96,13 @@ class Bench {
   std::int64_t now_ns = kStart_ns;
 
  private:
-  rig::SimulatedDriveConfig drive_config(std::size_t axis, const rig::LimitSwitches& switches) const {
+  rig::SimulatedDriveConfig drive_config(std::size_t axis, const rig::LimitSwitches& switches,
+                                         const rig::DriveDialect& dialect) const {
     rig::SimulatedDriveConfig drive;
     drive.node_id = config.axes.at(axis).node_id;
     drive.counts_per_unit = config.axes.at(axis).counts_per_unit;
     drive.switches = switches;
+    drive.dialect = dialect;
     return drive;
   }
 };
