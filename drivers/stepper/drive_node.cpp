@@ -10,7 +10,7 @@ namespace {
 using cia301::NmtCommand;
 using cia301::NmtState;
 
-constexpr int kSurplusPdos = 8;  // with one frame in a hundred doubled, five occur within minutes
+constexpr int kSurplusPdos = 8;                    // with one frame in a hundred doubled, five occur within minutes
 constexpr std::int64_t kStillRuns_ns = 300 * kMs;  // a drive whose heartbeat goes on so long has not taken a reset
 constexpr std::int64_t kStartPause_ns = 100 * kMs;
 constexpr std::uint8_t kStatusPdoBytes = 6;    // 6041, 606C
@@ -101,13 +101,19 @@ void DriveNode::on_position(const can::Frame& frame, std::int64_t now_ns) {
     position_counts_ +=
         static_cast<std::int32_t>(static_cast<std::uint32_t>(raw) - static_cast<std::uint32_t>(raw_position_));
   } else {
-    position_counts_ = raw;
+    position_counts_ = sampled_counts_ = raw;
     have_position_ = true;
   }
   if (!position_pdo_due_) ++surplus_pdos_;
   raw_position_ = raw;
   position_pdo_ns_ = now_ns;
   position_pdo_due_ = false;
+  if (sync_ns_ > sampled_ns_) {
+    const double elapsed_s = static_cast<double>(sync_ns_ - sampled_ns_) * 1e-9;
+    travel_rate_unit_s_ =
+        static_cast<double>(position_counts_ - sampled_counts_) / (elapsed_s * config_.axes.at(axis_).counts_per_unit);
+    sampled_counts_ = position_counts_;
+  }
   sampled_ns_ = sync_ns_;  // a synchronous PDO holds what was there at the SYNC
   shown_mode_ = frame.data[4];
   // A drive may show no mode while it is not enabled; StepperDriver demands that it is shown while it is.
@@ -275,6 +281,7 @@ AxisSample DriveNode::sample() const {
           status_pdo_ns_,
           position_unit(),
           rate_unit_s(),
+          travel_rate_unit_s_,
           1.0 / std::abs(config_.axes.at(axis_).counts_per_unit),
           1.0 / std::abs(velocity_units())};
 }

@@ -143,6 +143,8 @@ class DriveNode {
   std::int32_t raw_position_ = 0;
   std::int64_t position_counts_ = 0;  // raw_position_ unwrapped
   std::int64_t zero_counts_ = 0;
+  std::int64_t sampled_counts_ = 0;  // position_counts_ at sampled_ns_
+  double travel_rate_unit_s_ = 0.0;
   bool have_position_ = false;
   bool position_trusted_ = true;
   std::int64_t sampled_ns_ = 0;

@@ -61,6 +61,9 @@ class FollowWatch {
     return std::abs(outside) <= kLeast_unit;
   }
 
+  // Integral of the commanded rate since begin().
+  double commanded_unit() const { return told_; }
+
   // The largest rate, without its sign, that was commanded within the allowed lag.
   double fastest_commanded_unit_s() const {
     double fastest = 0;

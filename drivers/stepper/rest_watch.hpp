@@ -11,9 +11,10 @@ struct AxisSample {
   std::int64_t sampled_ns = 0;        ///< steady clock; when the drive took the position
   std::int64_t rate_received_ns = 0;  ///< when the rate was received
   double position_unit = 0.0;
-  double rate_unit_s = 0.0;        ///< as the drive reports it (0x606C)
-  double resolution_unit = 0.0;    ///< one count of the position
-  double resolution_unit_s = 0.0;  ///< one count of the rate
+  double rate_unit_s = 0.0;         ///< as the drive reports it (0x606C)
+  double travel_rate_unit_s = 0.0;  ///< from the newest two positions
+  double resolution_unit = 0.0;     ///< one count of the position
+  double resolution_unit_s = 0.0;   ///< one count of the rate
 };
 
 /// Checks by measurement that a commanded stop is carried out.

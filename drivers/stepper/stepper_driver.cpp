@@ -84,6 +84,7 @@ void StepperDriver::set_zero() {
   for (std::size_t axis = 0; axis < kAxes; ++axis) {
     nodes_.at(axis).set_zero();
     follows_.at(axis).begin(last_step_ns_, 0);
+    scales_.at(axis).begin();
   }
 }
 
@@ -281,6 +282,7 @@ void StepperDriver::run_ready(std::int64_t now_ns) {
     refusing_setpoints_ = false;
     for (std::size_t axis = 0; axis < kAxes; ++axis) {
       follows_.at(axis).begin(now_ns, nodes_.at(axis).position_unit());
+      scales_.at(axis).begin();
       at_limit_.at(axis) = nodes_.at(axis).says_limit();
     }
   } else if (now_ns - enable_since_ns_ > config_.transition_timeout_ns) {

@@ -12,6 +12,7 @@
 #include "drivers/stepper/rate_shaper.hpp"
 #include "drivers/stepper/reason.hpp"
 #include "drivers/stepper/rest_watch.hpp"
+#include "drivers/stepper/scale_watch.hpp"
 #include "drivers/stepper/stepper_config.hpp"
 #include "drivers/stepper/transmitter.hpp"
 
@@ -172,6 +173,7 @@ class StepperDriver {
   std::array<DriveNode, kAxes> nodes_;
   std::array<RateShaper, kAxes> shapers_;
   std::array<FollowWatch, kAxes> follows_;
+  std::array<ScaleWatch, kAxes> scales_;
 
   DriverState state_ = DriverState::off;
   Stop stop_{};

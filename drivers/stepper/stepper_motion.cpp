@@ -103,6 +103,12 @@ void StepperDriver::supervise_motion(std::int64_t now_ns) {
     FollowWatch& follow = follows_.at(axis);
     if (!follow.follows(now_ns, shapers_.at(axis).rate_unit_s(), node.position_unit()))
       return latch({StopReason::not_following, static_cast<int>(axis)}, now_ns);
+    ScaleWatch& scale = scales_.at(axis);
+    scale.add(follow.commanded_unit(), node.position_unit());
+    if (const auto wrong = scale.wrong_scale())
+      return latch({StopReason::wrong_scale, static_cast<int>(axis),
+                    static_cast<std::uint32_t>(std::lround(1000.0 * std::max(*wrong, 0.0)))},
+                   now_ns);
     const double allowed_unit_s = (1 + kOvershoot) * follow.fastest_commanded_unit_s() +
                                   kRateNoise * config_.axes.at(axis).rate_limit_unit_s +
                                   2 * node.sample().resolution_unit_s;

@@ -12,7 +12,7 @@ constexpr double kResting_unit_s = 0.05;
 // From a command to its effect: two cycles, of which one command may be lost, and the drive's own.
 constexpr std::int64_t kDriveReaction_ns = 10 * kMs;
 // Until a drive that has braked reports it: two cycles, and the time in which the lag of its shaft dies out.
-constexpr std::int64_t kSettling_ns = 40 * kMs;
+constexpr std::int64_t kSettling_ns = 20 * kMs;
 // Without voltage, tissue and thread friction stop an axis; a motor that still turns by then is driven.
 constexpr double kCoasting_s = 0.03;
 constexpr std::int64_t kNmtStopPause_ns = 100 * kMs;
@@ -80,12 +80,13 @@ void StepperDriver::note_later(const Stop& stop) {
   if (!same && !caused_by_us && !noted && is_loss(stop.reason)) later_ = stop;
 }
 
-// The fastest that the axis may be going: as it reports, or as it was commanded and has not reported yet.
+// The fastest that the axis may be going: as its positions show, or as it was commanded and they do not show yet. The
+// rate that the drive reports may have another unit, or be of another time.
 void StepperDriver::watch_rest(std::size_t axis, std::int64_t now_ns, double ramp_unit_s2) {
   const AxisSample sample = nodes_.at(axis).sample();
   const double commanded =
       std::max(std::abs(shapers_.at(axis).rate_unit_s()), follows_.at(axis).fastest_commanded_unit_s());
-  const double fastest = std::max(std::abs(sample.rate_unit_s), commanded);
+  const double fastest = std::max(std::abs(sample.travel_rate_unit_s), commanded);
   rests_.at(axis).begin(now_ns, sample, fastest, ramp_unit_s2, reaction_ns(config_),
                         2 * config_.period_ns + kSettling_ns);
 }
@@ -116,7 +117,7 @@ void StepperDriver::escalate(std::size_t axis, std::int64_t now_ns) {
     case StopOrder::quick_stop: {
       ++counters_.stops_escalated;
       orders_.at(axis) = StopOrder::disable_voltage;
-      const double rate = std::abs(nodes_.at(axis).rate_unit_s());
+      const double rate = std::abs(nodes_.at(axis).sample().travel_rate_unit_s);
       watch_rest(axis, now_ns, std::max(rate, kResting_unit_s) / kCoasting_s);
       break;
     }

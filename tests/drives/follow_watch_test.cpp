@@ -5,7 +5,10 @@
 #include <algorithm>
 #include <cmath>
 #include <deque>
+#include <optional>
 #include <random>
+
+#include "drivers/stepper/scale_watch.hpp"
 
 namespace bevel::stepper {
 namespace {
@@ -92,6 +95,43 @@ TEST(FollowWatch, AnAxisThatNeverStartsIsFoundSoonAfterTheLag) {
     if (!watch.follows(cycle * kPeriod_ns, rate, 0)) break;
   }
   EXPECT_LE(cycle, 20);
+}
+
+// Seconds until the scale is found wrong for an axis that turns as the steering law commands, up to a minute.
+std::optional<double> found_wrong_after_s(double scale, unsigned seed) {
+  std::mt19937_64 rng(seed);
+  std::uniform_real_distribution<double> delay_s(0.001, 0.018);
+  std::normal_distribution<double> noise(0.0, 0.002), rate_noise(0.0, 0.5);
+  FollowWatch follow(kLag_ns, kPeriod_ns);
+  ScaleWatch watch;
+  follow.begin(0, 0);
+  Axis axis;
+  double obeyed_after_s = 0;
+  for (int cycle = 1; cycle <= 6000; ++cycle) {
+    obeyed_after_s = std::max(obeyed_after_s - kPeriod_s, delay_s(rng));
+    const double rate = turning_rad_s(cycle) + rate_noise(rng);
+    axis.command(scale * rate, obeyed_after_s);
+    const double stands = axis.advance() + noise(rng);
+    (void)follow.follows(cycle * kPeriod_ns, rate, stands);
+    watch.add(follow.commanded_unit(), stands);
+    if (watch.wrong_scale()) return cycle * kPeriod_s;
+  }
+  return std::nullopt;
+}
+
+TEST(ScaleWatch, FindsAScaleThatIsOffByATenth) {
+  for (const double scale : {0.9, 1.1, 1.5})
+    for (unsigned seed = 1; seed <= 20; ++seed) {
+      const auto after_s = found_wrong_after_s(scale, seed);
+      ASSERT_TRUE(after_s) << scale << ", seed " << seed;
+      EXPECT_LE(*after_s, 10.0) << scale << ", seed " << seed;
+    }
+}
+
+TEST(ScaleWatch, ToleratesWhatAScrewsPitchMayBeOffBy) {
+  for (const double scale : {0.97, 1.0, 1.03})
+    for (unsigned seed = 1; seed <= 20; ++seed)
+      EXPECT_FALSE(found_wrong_after_s(scale, seed)) << scale << ", seed " << seed;
 }
 
 }  // namespace

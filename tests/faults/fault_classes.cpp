@@ -199,6 +199,7 @@ std::vector<FaultClass> fault_classes() {
   };
   words.mend = [](SimulatedLoop& loop) { loop.each_ms = nullptr; };
   classes.push_back(words);
+  std::ranges::move(drive_fault_classes(), std::back_inserter(classes));
   return classes;
 }
 

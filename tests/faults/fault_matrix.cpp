@@ -47,6 +47,10 @@ bool latched(SimulatedLoop& loop) {
   return !loop.controller || !loop.controller->supervisor().moves();
 }
 
+bool declares_no_stop(SimulatedLoop& loop) {
+  return loop.stepper && std::ranges::count(loop.stepper->report().rest, stepper::AxisRest::does_not_stop) > 0;
+}
+
 bool moves(SimulatedLoop& loop) {
   return loop.controller && loop.controller->supervisor().moves() && loop.stepper &&
          loop.stepper->report().state == stepper::DriverState::enabled;
@@ -86,7 +90,7 @@ Verdict run_injection(const std::vector<FaultClass>& classes, std::size_t fault_
     if (said.size() < 4000 && said.find(reasons) == std::string::npos) said += reasons;
   };
   bool showing = !fault.shows;
-  std::int64_t shown_ms = loop.ms, rest_ms = -1;
+  std::int64_t shown_ms = loop.ms, rest_ms = -1, stopped_ms = -1, declared_ms = -1;
   fault.inject(loop, rng);
   double longest_s = kObserved_s;
   for (const std::int64_t from = loop.ms; loop.ms < from + std::llround(1000 * longest_s);) {
@@ -100,6 +104,8 @@ Verdict run_injection(const std::vector<FaultClass>& classes, std::size_t fault_
       }
       showing = shows;
     }
+    if (stopped_ms < 0 && !moves(loop)) stopped_ms = loop.ms;
+    if (declared_ms < 0 && declares_no_stop(loop)) declared_ms = loop.ms;
     if (!loop.at_rest()) rest_ms = -1;
     if (loop.at_rest() && rest_ms < 0) rest_ms = loop.ms;
   }
@@ -107,6 +113,8 @@ Verdict run_injection(const std::vector<FaultClass>& classes, std::size_t fault_
     verdict.showed = false;
     return verdict;
   }
+  if (!showing) shown_ms = stopped_ms;  // found before it had an effect
+  if (fault.defies_stops && rest_ms < 0) rest_ms = declared_ms;
   if (rest_ms < 0) return violates("law 1: never at rest; " + all_reasons(loop));
   verdict.ms_to_rest = static_cast<int>(std::max<std::int64_t>(rest_ms - shown_ms, 0));
   if (verdict.ms_to_rest > kAllowed_ms)

@@ -1,5 +1,6 @@
 // Every fault of every component at any instant of an insertion, in simulated time, judged by the same four laws:
-//   1. both axes rest within 200 ms of the fault, by the true motion of the drives' shafts;
+//   1. both axes rest within 200 ms of the fault, by the true motion of the drives' shafts; where nothing can stop an
+//      axis, the driver declares within 200 ms that it does not stop;
 //   2. the stop is latched;
 //   3. it is declared, with the right cause, on PROCESS_STATUS;
 //   4. nothing moves again without a fresh word of the operator, also when the fault has passed.
@@ -22,14 +23,18 @@ struct FaultClass {
   // One of these is in what a process says of its reason.
   std::vector<std::string> causes;
   // When the fault begins to show: some do nothing until they contradict what is commanded. Empty: at once.
-  std::function<bool(const SimulatedLoop&)> shows;
+  std::function<bool(const SimulatedLoop&)> shows{};
+  // Nothing stops the axis, so that "does not stop" has to be declared instead of rest.
+  bool defies_stops = false;
 };
 std::vector<FaultClass> fault_classes();
+// Those of drives that do not carry out what they acknowledge.
+std::vector<FaultClass> drive_fault_classes();
 
 struct Verdict {
   std::size_t fault_class = 0;
   std::uint64_t seed = 0;
-  int ms_to_rest = -1;    // from the instant at which it shows; -1: never
+  int ms_to_rest = -1;    // from when it shows to rest, or to the declaration that an axis does not stop; -1: never
   bool showed = true;     // false: it did nothing within the time of observation, and the needle went on as it should
   std::string violation;  // "" or which law, and how
 };
