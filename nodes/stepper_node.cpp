@@ -9,7 +9,6 @@ namespace {
 // At a start nearer to the drives' own zero than this, nothing has been inserted yet.
 constexpr double kAtZero_mm = 0.5;
 constexpr double kAtZero_rad = 0.1;
-constexpr double kAtRest_unit_s = 0.05;
 constexpr double kFastestController_hz = 600;  // controller.period_s is at least 2 ms
 
 io::SenderLimits command_limits(const stepper::StepperConfig& config) {
@@ -163,8 +162,8 @@ std::string StepperNode::reason(const stepper::AxesReport& report) const {
 void StepperNode::end() { stop(stepper::StopReason::ending); }
 
 bool StepperNode::at_rest() const {
-  const stepper::AxesReport report = driver_.report();
-  return std::abs(report.insertion_rate_mm_s) < kAtRest_unit_s && std::abs(report.rotation_rate_rad_s) < kAtRest_unit_s;
+  return std::ranges::all_of(driver_.report().rest,
+                             [](stepper::AxisRest rest) { return rest == stepper::AxisRest::at_rest; });
 }
 
 void StepperNode::publish(const stepper::AxesReport& report) {

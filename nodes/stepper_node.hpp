@@ -27,7 +27,7 @@ class StepperNode {
   void step(const Now& now);
   // Quick stop because this process ends; step on until at_rest().
   void end();
-  bool at_rest() const;
+  bool at_rest() const;  // both axes are measured at rest after a stop
 
   LcmPort& port() { return port_; }
   stepper::AxesReport report() const { return driver_.report(); }

@@ -51,10 +51,14 @@ class Check : public testing::Test {
 TEST_F(Check, AGoodRig) {
   const Findings findings = run();
   EXPECT_FALSE(any_failed(findings)) << to_text(findings);
-  ASSERT_EQ(findings.size(), 5U);
-  for (const Finding& finding : findings) EXPECT_EQ(finding.verdict, Verdict::ok) << to_text(findings);
+  ASSERT_EQ(findings.size(), 8U);
+  for (const Finding& finding : findings)
+    EXPECT_EQ(finding.verdict, finding.name == "rotation scale" ? Verdict::not_tried : Verdict::ok)
+        << to_text(findings);
   EXPECT_THAT(findings[1].measured, HasSubstr("Bevel simulated stepper drive, type 0x40192, vendor 0xBEE"));
-  EXPECT_THAT(findings[2].measured, HasSubstr("longest silence 30 ms"));
+  EXPECT_THAT(findings[2].measured, HasSubstr("1 velocity units in one count/s"));
+  EXPECT_THAT(findings[3].measured, HasSubstr("longest silence 30 ms"));
+  EXPECT_THAT(findings[6].measured, HasSubstr("ratio 1.0000"));
 }
 
 TEST_F(Check, LeavesTheDrivesAsTheyWere) {
@@ -134,6 +138,21 @@ TEST_F(Check, AModeThatTheDriveDoesNotHave) {
   config.mode = stepper::VelocityMode::cyclic;
   bus = wire.attach();
   EXPECT_THAT(failed(run()).remedy, HasSubstr("mode of [stepper]"));
+}
+
+TEST_F(Check, AVelocityUnitInRpm) {
+  rig::SimulatedDriveConfig rpm;
+  rpm.dialect.velocity_unit = 0x00B44700;
+  rig::SimulatedDrive drive(*drive_buses[0], rpm);
+  drives[0].set_silent(true);
+  each_ms = [&] { drive.step(now_ns); };
+  const Finding finding = failed(run());
+  EXPECT_EQ(finding.name, "insertion velocity unit");
+  EXPECT_THAT(finding.measured, HasSubstr("60A9 0x00B44700, 6096 absent; not usable"));
+  EXPECT_THAT(finding.remedy, HasSubstr("set counts_per_revolution"));
+  config.axes[0].counts_per_revolution = 51200.0;
+  bus = wire.attach();
+  EXPECT_FALSE(any_failed(run()));
 }
 
 TEST_F(Check, HeartbeatsWithGaps) {

@@ -95,6 +95,8 @@ class Controller:
 
 
 class Rig(unittest.TestCase):
+    exit_status = 0  # of bevel-stepper: 1 if it ends before both axes are measured at rest
+
     def setUp(self):
         if not support.INTERFACE:
             hub = LocalHub(support.PATH)
@@ -112,11 +114,15 @@ class Rig(unittest.TestCase):
 
     def end_stepper(self):
         self.stepper.send_signal(signal.SIGCONT)
-        self.assertEqual(support.end(self.stepper), 0)
+        self.assertEqual(support.end(self.stepper), self.exit_status)
 
     def reach(self, state, longest_s=6):
         support.wait_until(lambda: self.controller.status.state == state, longest_s,
                            lambda: f"state {state}; {self.controller.said()}")
+
+    def reach_reason(self, text, longest_s=2):
+        support.wait_until(lambda: text in self.controller.status.reason, longest_s,
+                           lambda: f"'{text}'; {self.controller.said()}")
 
     def arm(self):
         self.controller.rates = (0.0, 0.0)
@@ -209,11 +215,49 @@ class Faults(Rig):
         self.arm()
         self.insert()
         since = time.monotonic()
+        self.exit_status = 1
         self.drives[0].unplug()
         took_ms = self.ms_to_rest(since)
         self.assertLessEqual(took_ms, 200 * support.PATIENCE)
         self.reach("stopped", 1)
         print(f"python-canopen: both rest {took_ms:.0f} ms after one was unplugged ({self.controller.status.reason})")
+
+    def test_a_stop_that_is_not_carried_out(self):
+        """Quick-stop deceleration of 1 count/s^2: the drive acknowledges the stop and goes on."""
+        self.arm()
+        self.insert()
+        with self.drives[0]._lock:
+            self.drives[0].set_object(0x6085, 1)
+        since = time.monotonic()
+        self.controller.say(STOP)
+        took_ms = self.ms_to_rest(since)
+        self.assertLessEqual(took_ms, 150 * support.PATIENCE)
+        self.reach("fault", 1)
+        self.reach_reason("insertion DID NOT SLOW by its quick stop")
+        self.assertIn("stopped by the operator", self.controller.status.reason)
+        print(f"python-canopen: both rest {took_ms:.0f} ms after a stop whose ramp is missing")
+
+    def test_a_foreign_write(self):
+        """Another node sets 0x6085 = 1 by SDO while the axes move."""
+        self.arm()
+        self.insert()
+        since = time.monotonic()
+        self.drives[1].network.send_message(0x601, bytes([0x23, 0x85, 0x60, 0, 1, 0, 0, 0]))
+        took_ms = self.ms_to_rest(since)
+        self.assertLessEqual(took_ms, 200 * support.PATIENCE)
+        self.reach("fault", 1)
+        self.assertIn("another master commands the drives", self.controller.status.reason)
+
+    def test_a_setting_that_changes(self):
+        """Without a frame on the bus: found by the cyclic read-back."""
+        self.arm()
+        self.insert()
+        with self.drives[0]._lock:
+            self.drives[0].set_object(0x6085, 1)
+        self.reach("fault", 4)
+        self.assertIn("0x6085:00 is 0x1, required 0xF4240", self.controller.status.reason)
+        self.reach_reason("insertion DID NOT SLOW by its quick stop")
+        self.assertLess(abs(self.drives[0].velocity), REST_COUNTS_S)
 
     def test_a_stopped_stepper(self):
         """By SIGSTOP: the drives stop by their own watch, and what it says when it goes on moves nothing."""

@@ -69,6 +69,12 @@ class Drive:
             self._written[index, sub] = (entry[sub] if sub else entry).default
         return self._written[index, sub]
 
+    def set_object(self, index, value, sub=0):
+        """As a defect of its memory would: no write callback, no frame."""
+        self._written[index, sub] = value
+        entry = self.node.object_dictionary[index]
+        self.node.set_data(index, sub, (entry[sub] if sub else entry).encode_raw(value))
+
     def _live(self):
         at_switch = INTERNAL_LIMIT if self._at_switch() else 0
         return {0x6041: self.state | REMOTE | at_switch, 0x6064: round(self.position), 0x606C: round(self.velocity),

@@ -16,13 +16,23 @@ constexpr cia301::ObjectAddress kHeartbeat{0x1017, 0};
 }  // namespace
 
 const std::vector<BusProbe::Job>& BusProbe::jobs() {
-  // The text last but for the heartbeat: a drive may have none.
+  // A drive may have no text and no units.
   static const std::vector<Job> all{{{0x1000, 0}},
                                     {{0x1018, 1}},
                                     {{0x1018, 2}},
                                     {{0x1018, 3}},
                                     {{0x1018, 4}},
                                     {{0x6502, 0}},
+                                    {{0x60A8, 0}, Job::Kind::optional},
+                                    {{0x60A9, 0}, Job::Kind::optional},
+                                    {{0x60AA, 0}, Job::Kind::optional},
+                                    {{0x6096, 1}, Job::Kind::optional},
+                                    {{0x6092, 1}, Job::Kind::optional},
+                                    {{0x6092, 2}, Job::Kind::optional},
+                                    {{0x6091, 1}, Job::Kind::optional},
+                                    {{0x6091, 2}, Job::Kind::optional},
+                                    {{0x608F, 1}, Job::Kind::optional},
+                                    {{0x608F, 2}, Job::Kind::optional},
                                     {kHeartbeat},
                                     {kHeartbeat, Job::Kind::set},
                                     {{0x1008, 0}, Job::Kind::text}};
@@ -94,7 +104,7 @@ void BusProbe::begin_job(std::size_t axis) {
   Asked& asked = asked_.at(axis);
   const Job& job = jobs().at(asked.job);
   const auto heartbeat_ms = static_cast<std::uint32_t>(config_.drive_heartbeat_ns / stepper::kMs);
-  if (job.kind == Job::Kind::number) asked.sdo.upload(job.object);
+  if (job.kind == Job::Kind::number || job.kind == Job::Kind::optional) asked.sdo.upload(job.object);
   if (job.kind == Job::Kind::text) asked.sdo.upload_text(job.object);
   if (job.kind == Job::Kind::set) asked.sdo.download(job.object, heartbeat_ms, 2);
 }
@@ -111,8 +121,9 @@ void BusProbe::end_job(std::size_t axis, bool worked) {
     if (index == 0x6502) drive.modes = asked.sdo.value();
     if (index == 0x1008) drive.name = asked.sdo.text();
     if (index == 0x1017 && job.kind == Job::Kind::number) asked.old_heartbeat_ms = asked.sdo.value();
+    if (auto* stated = drive.units.find(job.object)) *stated = asked.sdo.value();
     if (job.kind == Job::Kind::set) asked.heartbeat_set = true;
-  } else if (job.kind != Job::Kind::text && !drive.refused_object) {
+  } else if (job.kind != Job::Kind::text && job.kind != Job::Kind::optional && !drive.refused_object) {
     drive.refused_object = std::uint32_t{index} << 8 | sub;
     drive.refusal = asked.sdo.abort_code();
   }

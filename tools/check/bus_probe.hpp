@@ -2,7 +2,7 @@
 // does what is sent reach the wire, who are the drives, how evenly do their hearts beat. Pure: time is handed in.
 //
 //   listening --(a master is heard)--> watching, without a frame from us
-//   listening --> asking (SDO: 1000, 1018, 6502, 1008; 1017 is set) --> watching --> restoring (1017) --> done
+//   listening --> asking (SDO: 1000, 1018, 6502, units, 1008; 1017 is set) --> watching --> restoring (1017) --> done
 #pragma once
 
 #include <array>
@@ -13,6 +13,7 @@
 
 #include "drivers/can/bus.hpp"
 #include "drivers/stepper/cia301.hpp"
+#include "drivers/stepper/drive_units.hpp"
 #include "drivers/stepper/stepper_config.hpp"
 
 namespace bevel::tools::check {
@@ -22,6 +23,7 @@ struct DriveMeasured {
   std::uint32_t device_type = 0;                // 1000
   std::array<std::uint32_t, 4> identity{};      // 1018:1-4: vendor, product, revision, serial
   std::uint32_t modes = 0;                      // 6502
+  stepper::StatedUnits units{};                 // 60A8 to 60AA, 6096, 6091, 6092, 608F
   std::string name;                             // 1008; empty where the drive has none
   std::uint32_t heartbeats = 0;                 // heard while watching
   std::int64_t longest_silence_ns = 0;          // between two of them
@@ -54,7 +56,7 @@ class BusProbe {
   enum class Phase : std::uint8_t { listening, asking, watching, restoring, done };
   struct Job {
     stepper::cia301::ObjectAddress object;
-    enum class Kind : std::uint8_t { number, text, set } kind = Kind::number;
+    enum class Kind : std::uint8_t { number, optional, text, set } kind = Kind::number;
   };
   struct Asked {  // of one drive
     stepper::cia301::SdoClient sdo;

@@ -1,7 +1,9 @@
 #include "tools/check/judgement.hpp"
 
 #include <algorithm>
+#include <cmath>
 #include <cstdio>
+#include <numbers>
 #include <sstream>
 
 namespace bevel::tools::check {
@@ -88,6 +90,38 @@ Finding judge_identity(const DriveMeasured& drive, const stepper::AxisConfig& ax
   return judged(name + " drive", true, measured, allowed, "");
 }
 
+// As bevel-stepper decides before it enables a drive. It sets the velocity factor 0x6096 to 1:1 itself.
+Finding judge_velocity_unit(DriveMeasured drive, const stepper::AxisConfig& axis, std::size_t index) {
+  const std::string name = index == stepper::kInsertion ? "insertion" : "rotation";
+  auto& [numerator, divisor] = drive.units.factor;
+  if (numerator) numerator = divisor = 1;
+  const stepper::UnitDecision decision = stepper::scales_of(drive.units, axis);
+  const bool ok = decision.refusal == stepper::StopReason::none;
+  std::string measured = text("60A9 %s, 6096 %s; ",
+                              drive.units.velocity_unit ? text("0x%08X", *drive.units.velocity_unit).c_str() : "absent",
+                              numerator ? "present" : "absent");
+  measured += ok ? text("%g velocity units in one count/s", decision.scales.velocity_per_count_s) : "not usable";
+  const stepper::Stop refusal{
+      .reason = decision.refusal, .axis = static_cast<int>(index), .code = decision.found, .object = decision.object};
+  return judged(name + " velocity unit", ok, measured, "counts/s (6096), or a unit that can be converted",
+                stepper::describe(refusal));
+}
+
+// The axis turns the needle once in 2 pi counts_per_unit. A ratio other than 1 is a gear, or an error that no report of
+// the drive shows.
+Finding judge_rotation_scale(const DriveMeasured& drive, const stepper::AxisConfig& axis) {
+  const auto& [feed, revolutions] = drive.units.feed;
+  const double configured = 2.0 * std::numbers::pi * std::abs(axis.counts_per_unit);
+  if (!feed || !revolutions || *revolutions == 0)
+    return {"rotation scale", Verdict::not_tried, "the drive does not state its counts per revolution (6092)", "", ""};
+  const double stated = static_cast<double>(*feed) / *revolutions;
+  return {"rotation scale", Verdict::not_tried,
+          text("counts_per_unit gives %.0f counts in a revolution of the needle, the drive states %.0f in one of its "
+               "shaft: ratio %.4f (1 without a gear)",
+               configured, stated, configured / stated),
+          "", ""};
+}
+
 Finding judge_heartbeat(const DriveMeasured& drive, const stepper::StepperConfig& config, const std::string& name) {
   // Of the time-out a third is left for what was not seen while it was watched.
   const std::int64_t allowed_ns = config.drive_heartbeat_timeout_ns * 2 / 3;
@@ -129,6 +163,10 @@ Findings judge_bus(const BusMeasured& bus, const stepper::StepperConfig& config,
                           text("not asked: a master commands the drives (heard 0x%X)", *bus.master_id), "", ""});
     } else {
       findings.push_back(judge_identity(bus.drives.at(i), config.axes.at(i), config.mode, name, system_file));
+      if (bus.drives.at(i).answered) {
+        findings.push_back(judge_velocity_unit(bus.drives.at(i), config.axes.at(i), i));
+        if (i == stepper::kRotation) findings.push_back(judge_rotation_scale(bus.drives.at(i), config.axes.at(i)));
+      }
     }
     if (bus.master_id || bus.drives.at(i).answered) findings.push_back(judge_heartbeat(bus.drives.at(i), config, name));
   }
@@ -177,7 +215,7 @@ std::string to_text(const Findings& findings) {
     out << word << "  " << f.name << ": " << f.measured;
     if (!f.allowed.empty()) out << "; allowed: " << f.allowed;
     out << '\n';
-    if (f.verdict == Verdict::failed) out << "        to mend it: " << f.remedy << '\n';
+    if (f.verdict == Verdict::failed) out << "        to fix it: " << f.remedy << '\n';
   }
   return out.str();
 }

@@ -1,4 +1,6 @@
 // bevel-stepper: MOTION_COMMAND in, two CiA 402 drives over CAN (or the rig's local bus), ACTUATOR_STATE out.
+#include <cstdio>
+
 #include "drivers/can/open_bus.hpp"
 #include "nodes/stepper_node.hpp"
 #include "tools/processes/process_main.hpp"
@@ -30,6 +32,9 @@ int main(int argc, char** argv) {
     // The axes are brought to rest before this ends, and others hear of it.
     nodes::run_with_end(
         context.lcm, loop(false), [&] { node.end(); }, loop(true), kLongestStop_s);
-    return 0;
+    if (node.at_rest()) return 0;
+    std::fprintf(stderr, "bevel-stepper: ended before both axes were measured at rest: %s\n",
+                 stepper::describe(node.report()).c_str());
+    return 1;
   });
 }
