@@ -157,9 +157,15 @@ std::string name_of(cia301::ObjectAddress object) {
   return "0x" + hex("%04X", object.index) + ":" + hex("%02X", object.sub);
 }
 
+// Objects of the profile hold numbers, others identifiers and unit codes.
+std::string value_text(cia301::ObjectAddress object, std::uint32_t value) {
+  const bool is_unit = object.index >= 0x60A8 && object.index <= 0x60AA;
+  return object.index >= 0x6000 && !is_unit ? std::to_string(static_cast<std::int32_t>(value)) : hex("0x%X", value);
+}
+
 std::string details_of(const Stop& stop) {
   const std::string object = name_of(stop.object);
-  const std::string found = hex("0x%X", stop.code), wanted = hex("0x%X", stop.wanted);
+  const std::string found = value_text(stop.object, stop.code), wanted = value_text(stop.object, stop.wanted);
   switch (stop.reason) {
     case StopReason::sdo_aborted:
       return object + (stop.is_write ? " = " + wanted : "") + ", abort code " + hex("%08X", stop.code) +

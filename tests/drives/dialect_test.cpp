@@ -189,7 +189,7 @@ TEST(OptionalObjects, AreOptional) {
     rig::DriveDialect dialect;
     dialect.rejects = {{{index, 0}, rig::Abort::no_object}};
     Bench bench({}, {}, dialect);
-    // The simulated drive keeps a value of its own, which is not shown.
+    // Reads are aborted too: the simulated drive itself needs a value, which it hides.
     bench.wire.set_tap([index](can::Frame& frame) {
       const bool answer = frame.id == 0x581 && stepper::cia301::get_u16(frame, 1) == index;
       if (answer && frame.data[0] != 0x60) frame.data[0] = 0x80, stepper::cia301::put_u32(frame, 4, 0x06020000);
@@ -205,13 +205,13 @@ TEST(Refusals, NameObjectValueAbortAndRemedy) {
     rig::ObjectDictionary::Key key;
     const char *object, *remedy;
   };
-  for (const Case& each : {Case{{0x605A, 0}, "0x605A:00 = 0x6,", "quick_stop_option"},
-                           Case{{0x6085, 0}, "0x6085:00 = 0xF4240,", "quick_stop_unit_s2"},
-                           Case{{0x1A00, 1}, "0x1A00:01 = 0x60410010,", "PDO mapping"},
-                           Case{{0x6007, 0}, "0x6007:00 = 0x2,", "connection is lost"},
-                           Case{{0x1016, 1}, "0x1016:01 = 0x7F0064,", "0x1016"},
-                           Case{{0x1017, 0}, "0x1017:00 = 0x1E,", "drive_heartbeat_ms"},
-                           Case{{0x6060, 0}, "0x6060:00 = 0x3,", "stepper.mode"}}) {
+  for (const Case& each :
+       {Case{{0x605A, 0}, "0x605A:00 = 6,", "quick_stop_option"},
+        Case{{0x6085, 0}, "0x6085:00 = 1000000,", "quick_stop_unit_s2"},
+        Case{{0x1A00, 1}, "0x1A00:01 = 0x60410010,", "PDO mapping"},
+        Case{{0x6007, 0}, "0x6007:00 = 2,", "connection is lost"}, Case{{0x1016, 1}, "0x1016:01 = 0x7F0064,", "0x1016"},
+        Case{{0x1017, 0}, "0x1017:00 = 0x1E,", "drive_heartbeat_ms"},
+        Case{{0x6060, 0}, "0x6060:00 = 3,", "stepper.mode"}}) {
     rig::DriveDialect dialect;
     dialect.rejects = {{each.key, rig::Abort::value_range}};
     Bench bench({}, {}, dialect);

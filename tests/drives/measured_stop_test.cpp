@@ -106,7 +106,7 @@ TEST_F(MeasuredStop, DeclaresAnAxisThatMovesAgain) {
   EXPECT_NEAR(bench.insertion.position_unit(), rested_mm, 1e-6);
 }
 
-// By hand, after the drive has let go.
+// An operator may move the axis by hand once the drive no longer holds it.
 TEST_F(MeasuredStop, AllowsAnAxisWithoutVoltageToBeMoved) {
   stepper::StepperConfig config;
   config.quick_stop_option = 2;

@@ -141,7 +141,8 @@ class BadLine : public testing::TestWithParam<Carrier> {
 };
 
 // Heartbeats are 30 ms apart and may be missing for 100 ms. Three lost in a row are one in 10^6 of 1 % lost frames, so
-// that one run in 750 stops (two drives, each with 333 heartbeats, and the driver's); of 10 % lost they are one in 10^3.
+// that one run in 750 stops (two drives, each with 333 heartbeats, and the driver's); of 10 % lost they are one in
+// 10^3.
 TEST_P(BadLine, OneFrameInAHundredLostIsBorne) { EXPECT_GE(borne_of_twenty({.lost = 0.01}), 19); }
 TEST_P(BadLine, OneInTenLostIsOftenAStop) { EXPECT_LT(borne_of_twenty({.lost = 0.1}), 20); }
 

@@ -22,7 +22,7 @@ void order_a_stop(SimulatedLoop& loop, std::mt19937_64& rng) {
   }
 }
 
-// What is reported of such a stop where the axis was slow enough to rest by itself.
+// Reasons of such a stop. The first one is missing if the axis was slow enough to rest by itself.
 std::vector<std::string> causes_of_a_stop(const char* first) {
   return {first, "stopped by the operator", "set-points too old", "needle state stale"};
 }

@@ -255,7 +255,7 @@ class Faults(Rig):
         with self.drives[0]._lock:
             self.drives[0].set_object(0x6085, 1)
         self.reach("fault", 4)
-        self.assertIn("0x6085:00 is 0x1, required 0xF4240", self.controller.status.reason)
+        self.assertIn("0x6085:00 is 1, required 1000000", self.controller.status.reason)
         self.reach_reason("insertion DID NOT SLOW by its quick stop")
         self.assertLess(abs(self.drives[0].velocity), REST_COUNTS_S)
 
