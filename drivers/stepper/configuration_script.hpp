@@ -24,7 +24,7 @@ struct SdoJob {
   enum class Optional : std::uint8_t {
     no,            ///< none
     may_lack,      ///< the drive does not have the object
-    may_be_fixed,  ///< the drive does not have it, or keeps a value of its own; that value must still be `value`
+    may_be_fixed,  ///< the object may be missing, or read-only with the value `value`
     any,           ///< all: the drive may ignore the object
   };
   /// Unit of `amount`. raw: `value` is written as it is.

@@ -266,7 +266,7 @@ void DriveNode::disable_voltage(std::int64_t now_ns, Transmitter& out) {
 bool DriveNode::command(std::uint16_t controlword, double rate_unit_s, std::int64_t now_ns, Transmitter& out) {
   can::Frame frame{cia301::rpdo1_id(node_), 6, {}};
   cia301::put_u16(frame, 0, controlword);
-  // What rounding leaves over is carried on, so that the mean rate is right where the drive's unit is coarse.
+  // The rounding error is added to the next command, so that the mean rate is right if the drive's unit is coarse.
   constexpr double kLargest = std::numeric_limits<std::int32_t>::max();
   const double wanted = rate_unit_s * velocity_units() + (rate_unit_s == 0.0 ? 0.0 : rate_residue_);
   const double rate = std::clamp(std::round(wanted), -kLargest, kLargest);

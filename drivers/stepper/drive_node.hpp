@@ -101,7 +101,7 @@ class DriveNode {
   std::uint8_t node_;
   DriveLimits limits_;
   std::vector<SdoJob> script_;  // ends with kLimitJobs, if there are limits
-  // Of each job: the value that it left in the drive, masked; nothing if the drive lacks the object.
+  // For each job, the value that is now in the drive, masked; empty if the drive lacks the object.
   std::vector<std::optional<std::uint32_t>> settled_;
   cia301::SdoClient sdo_;
   StatedUnits units_{};

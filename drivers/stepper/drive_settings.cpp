@@ -122,7 +122,7 @@ void DriveNode::on_abort(std::int64_t now_ns) {
     return begin_job();
   }
   if (!job.accepts_abort(abort_code)) return job_trouble(StopReason::sdo_aborted, abort_code);
-  // A drive may keep a value of its own where that is the one that is wanted.
+  // A read-only object is accepted if it already has the required value.
   if (!reads && abort_code == cia301::kAbortReadOnly && job.optional == SdoJob::Optional::may_be_fixed) {
     reads_back_ = true;
     return begin_job();

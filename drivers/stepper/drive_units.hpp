@@ -9,7 +9,7 @@
 
 namespace bevel::stepper {
 
-/// What a drive states of its units (CiA 402-2, factor group). Objects that it does not have are empty.
+/// Unit objects of a drive (CiA 402-2, factor group). A member is empty if the drive does not have the object.
 struct StatedUnits {
   std::optional<std::uint32_t> position_unit{};      ///< 0x60A8, SI unit of positions
   std::optional<std::uint32_t> velocity_unit{};      ///< 0x60A9, SI unit of velocities

@@ -74,7 +74,7 @@ std::string describe(const Stop& stop);
 /// Text of an SDO abort code (CiA 301, table 22); "unknown abort code" for others.
 const char* abort_text(std::uint32_t abort_code);
 
-/// What to change if a drive rejects an object or keeps another value of it; "" if nothing specific is known.
+/// Returns what to change if a drive rejects an object or keeps another value; "" if nothing specific is known.
 const char* remedy_for(cia301::ObjectAddress object);
 
 }  // namespace bevel::stepper

@@ -18,7 +18,7 @@
 
 namespace bevel::stepper {
 
-/// What is measured of an axis after a stop.
+/// Measured state of an axis after a stop.
 enum class AxisRest : std::uint8_t {
   not_stopped,    ///< no stop is in force
   slowing,        ///< within the travel that its ramp allows
@@ -27,7 +27,8 @@ enum class AxisRest : std::uint8_t {
   does_not_stop,  ///< moves on although it was stopped
 };
 
-/// What a stop has ordered of an axis so far. Each step is taken if the one before does not bring it to rest.
+/// Strongest order that a stop has sent to an axis. Each order follows if the one before does not bring the axis to
+/// rest.
 enum class StopOrder : std::uint8_t { none, quick_stop, disable_voltage, nmt_stop };
 
 struct MotionSetpoint {
@@ -101,7 +102,7 @@ std::string describe(const AxesReport& report);
 /// Nothing moves without enable(). Nothing recovers from a latched stop without rearm() and enable(). A stop counts as
 /// carried out when both axes are measured at rest (RestWatch). An axis that does not slow as its ramp demands gets, in
 /// this order, "disable voltage" (by PDO and by SDO) and NMT stop; the end of our heartbeat, on which drives stop by
-/// themselves, follows where a drive does not confirm or report. Knows no files, clocks or messages.
+/// themselves, follows where a drive does not confirm or report. Uses no files, clocks or messages.
 class StepperDriver {
  public:
   // bus: must outlive the driver and hear listen_ids(). Throws std::invalid_argument listing every problem of config.
@@ -191,8 +192,7 @@ class StepperDriver {
   std::int64_t next_purge_ns_ = INT64_MIN;
   std::int64_t fresh_setpoint_ns_ = 0;  // when the newest usable set-point was made
   bool refusing_setpoints_ = false;
-  // Of a stop, or of disable(): the watch over each axis, how fast it was, and whether it was held back before it
-  // rested.
+  // Since a stop or disable(): the watch over each axis, its rate at that time, and whether it was blocked.
   std::array<RestWatch, kAxes> rests_{};
   std::array<StopOrder, kAxes> orders_{};
   std::array<double, kAxes> stopped_from_unit_s_{};

@@ -9,7 +9,7 @@ namespace {
 
 constexpr double kHeldBack_unit = 0.04;  // mm or rad that an axis may jump by when it comes free
 constexpr double kResting_unit_s = 0.05;
-// From a command to its effect: two cycles, of which one command may be lost, and the drive's own.
+// A command takes effect after two cycles, because one frame may be lost, and the reaction time of the drive.
 constexpr std::int64_t kDriveReaction_ns = 10 * kMs;
 // Until a drive that has braked reports it: two cycles, and the time in which the lag of its shaft dies out.
 constexpr std::int64_t kSettling_ns = 20 * kMs;
@@ -175,7 +175,7 @@ void StepperDriver::supervise_disabling(std::int64_t now_ns) {
   }
 }
 
-// Asks the drive for what only it knows of a stop.
+// Reads from the drive which limit was reached and which error occurred.
 void StepperDriver::ask_why(std::int64_t now_ns) {
   if (silent_) return;
   if (stop_.reason == StopReason::travel_limit)
@@ -190,7 +190,7 @@ void StepperDriver::judge_rest(std::size_t axis, std::int64_t now_ns) {
   judged_.at(axis) = true;
   FollowWatch& follow = follows_.at(axis);
   follow.follows(now_ns, 0, node.position_unit());
-  // What moved went on by the way of the quick stop, and by what it moved before the command took effect.
+  // A moving axis travels on before the command takes effect, and along the quick-stop ramp.
   const double rate = stopped_from_unit_s_.at(axis);
   const double stopping = 0.5 * rate * std::abs(rate) / config_.axes.at(axis).quick_stop_unit_s2;
   const double behind = std::abs(follow.behind_unit() + stopping);

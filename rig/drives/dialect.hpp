@@ -12,8 +12,8 @@ namespace bevel::rig {
 /// trackers; each difference is a case that a master must handle or refuse.
 struct DriveDialect {
   double boot_s = 0.0;  ///< from a reset to the boot-up message; a reset meanwhile begins the boot anew
-  /// Unit of velocities and accelerations as 0x60A9 codes it; 0: position units per second, by the factor 0x6096, which
-  /// a drive with a unit of its own does not have.
+  /// Unit of velocities and accelerations, coded as 0x60A9, of a drive without 0x6096; 0: position units per second,
+  /// scaled by 0x6096.
   std::uint32_t velocity_unit = 0;
   bool states_unit = true;                         ///< false: the unit is fixed, and no object states it
   bool needs_bit_30 = false;                       ///< of the COB-ID of a TPDO
