@@ -84,6 +84,18 @@ case $case in
     grep -q "another bevel-camera" "$work/second.txt" || fail "does not say why"
     wait $pid || fail "the insertion ended with status $?"
     ;;
+  second_operator)  # the client of docs/operator.md
+    sed -n '/^```python/,/^```/p' "$source/docs/operator.md" | grep -v '^```' >"$work/client.py"
+    export PYTHONPATH=$bin/../lcmtypes/python:$source/.deps/lcm
+    python3 -c 'import bevel, lcm' 2>/dev/null || skip "no Python binding of LCM here"
+    python3 "$work/client.py" >"$work/client.txt" 2>&1 & client=$!
+    sleep 0.5
+    "${demo[@]}" >"$work/demo.txt" 2>&1; status=$?
+    kill $client 2>/dev/null || fail "the client ended by itself"
+    wait $client 2>/dev/null
+    [ $status -eq 1 ] || fail "exit status $status, wanted 1"
+    grep -q "another operator program sends OPERATOR_HEARTBEAT" "$work/demo.txt" || fail "does not report why"
+    ;;
   parent_killed)  # nobody is left to say stop; the children hear of it
     "${demo[@]}" >"$work/demo.txt" 2>&1 & pid=$!
     wait_for steering

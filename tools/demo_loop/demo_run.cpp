@@ -112,7 +112,7 @@ int run_demo(const DemoOptions& options) {
   lcm::LCM& lcm = *opened;
   nodes::catch_signals();
   const Eigen::Vector3d target(options.target_mm[0], options.target_mm[1], options.target_mm[2]);
-  nodes::claim_name(lcm, config.lcm_url, "bevel-demo");
+  nodes::claim_operator(lcm, config.lcm_url, "bevel-demo");
   SteeringSession session(lcm, log_path, target,
                           options.retract_to_mm >= 0 ? std::optional(options.retract_to_mm) : std::nullopt);
   nodes::LcmPort(lcm).publish_text(io::channel::kConfig, config.text);
