@@ -152,7 +152,7 @@ template <>
 const char* find_inconsistency(const steering_target_t& m) {
   return m.tolerance_mm >= 0.0 ? nullptr : "tolerance_mm";
 }
-// A run that did not draw a session cannot be told from another one.
+// A run that did not draw a session cannot be distinguished from another one.
 template <>
 const char* find_inconsistency(const operator_heartbeat_t& m) {
   return m.session > 0 ? nullptr : "session";

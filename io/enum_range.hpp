@@ -1,7 +1,7 @@
 #pragma once
 /// \file
 /// Range of an enumeration, computed by the compiler from its enumerators, so that a bound of the checked decode cannot
-/// differ from the enumeration that it stands for.
+/// differ from its enumeration.
 #include <cstdint>
 #include <string_view>
 
@@ -29,7 +29,7 @@ consteval std::int32_t last_code() {
     return from;
 }
 
-/// Returns the union of the enumerators of \p Flags, each of which is one bit.
+/// Returns the union of the enumerators of \p Flags; each enumerator is one bit.
 template <class Flags, int bit = 0>
 consteval std::int32_t all_flags() {
   constexpr int kBits = 31;  // of a non-negative int32

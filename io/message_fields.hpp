@@ -39,7 +39,7 @@ inline constexpr double kLargestInformation_per_mm2 = 1e12;   // a standard devi
 inline constexpr double kLargestInformation_per_rad2 = 1e12;  // a standard deviation of 1 urad
 inline constexpr double kLargestPlainNumber = 1e12;
 // Numbers of cameras, counts, and the status of a measurement: 0 is usable, every other value is a reason of its sender
-// why it is not, and senders of other makers have reasons of their own.
+// why it is not, and senders of other makers define other reasons.
 inline constexpr std::int32_t kAnyCode = std::numeric_limits<std::int32_t>::max();
 
 template <class Message, class Type>

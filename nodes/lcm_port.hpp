@@ -106,7 +106,7 @@ class LcmPort {
   // For tests of the stop path: what this process sends passes through the injector.
   void inject(std::unique_ptr<FaultInjector> injector) { injector_ = std::move(injector); }
 
-  /// Counts the message that is being handled as rejected: the node refuses it for a reason of its own.
+  /// Counts the message that is being handled as rejected: the node refuses it by a check that the port does not have.
   void reject() {
     --counters_.received;
     ++counters_.rejected;

@@ -13,7 +13,7 @@ namespace bevel::nodes {
 class LcmPort;
 
 /// Sends the heartbeat of one run of an operator program. The main loop of the program calls beat(), so that the
-/// heartbeat ends when that loop hangs; a thread of its own would outlive the loop.
+/// heartbeat ends when that loop hangs; a separate thread would outlive the loop.
 class OperatorHeartbeat {
  public:
   /// Draws the session of this run. \p port must outlive this.
@@ -47,7 +47,7 @@ class OperatorWatch {
   /// Returns why no operator program counts as alive, with the remedy; "" if is_fresh(now).
   std::string problem(const Now& now) const;
 
-  /// Returns a remark on a second operator program that was refused within the last 5 s; "" if there is none.
+  /// Returns a remark on a second operator program that was refused within the last 5 s, otherwise "".
   std::string second_operator(const Now& now) const;
 
   /// Accepts any session next: the wall clock was set, and time stamps from before and after do not compare.

@@ -1,4 +1,4 @@
-// The bound of each integer code of each message is that of the enumeration that it stands for.
+// The bound of each integer code of each message is the last value of its enumeration.
 #include <gtest/gtest.h>
 
 #include <map>
@@ -52,7 +52,7 @@ TEST(WireCodes, EachHasTheBoundOfItsEnumeration) {
   EXPECT_EQ(codes_of<process_status_t>(), (Table{{"state_code", static_cast<std::int32_t>(ProcessState::fault)}}));
   EXPECT_EQ(codes_of<needle_state_t>(),
             (Table{{"rank", 3}, {"health", all_flags<estimator::Health>()}, {"reset_count", kAnyCode}}));
-  // Other senders have reasons of their own; every status but 0 is "not usable".
+  // Senders of other makers define other reasons; every status but 0 means "not usable".
   EXPECT_EQ(codes_of<tip_measurement_t>(), (Table{{"camera", kAnyCode}, {"status", kAnyCode}}));
   EXPECT_EQ(codes_of<tip_heading_t>(), (Table{{"camera", kAnyCode}, {"status", kAnyCode}}));
   EXPECT_TRUE(codes_of<needle_shaft_t>().empty());

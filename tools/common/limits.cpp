@@ -21,7 +21,7 @@ namespace {
 
 // bevel-rig has the most open at once: 24, with the drives, a camera and a listener on its sockets. Twice that.
 constexpr int kFreeFiles = 48;
-// Address space of a node beside its code: receive buffers of LCM, the history of the filter, pictures.
+// Address space of a node in addition to its code: receive buffers of LCM, the history of the filter, pictures.
 constexpr std::size_t kFreeBytes = std::size_t{64} << 20U;
 
 std::string text_of(rlim_t limit) { return limit == RLIM_INFINITY ? "unlimited" : std::to_string(limit); }
