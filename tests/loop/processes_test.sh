@@ -148,8 +148,8 @@ case $case in
     wait $pid; status=$?
     [ $status -eq 1 ] || fail "exit status $status, wanted 1"
     ;;
-  operator_hung)  # TRIALS SEED: bevel-demo under SIGSTOP in flight
-    "$bin/kill_study" "$bin" "$work/demo.toml" "$work/out" "unix:$work/s-can.sock" "${4:-3}" "${5:-1}" bevel-demo STOP ||
+  operator_stopped | operator_hung)  # TRIALS SEED: bevel-demo under SIGSTOP in flight
+    "$bin/kill_study" "$bin" "$work/demo.toml" "$work/out" "unix:$work/s-can.sock" "${4:-2}" "${5:-1}" bevel-demo STOP ||
       fail "see above"
     ;;
   fault)

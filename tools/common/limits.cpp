@@ -19,7 +19,7 @@
 namespace bevel::tools {
 namespace {
 
-// bevel-rig has the most open at once: 24, with the drives, a camera and a listener on its sockets. Twice that.
+// In the demo bevel-rig has 28 files open, the most of all programs; the rest is for further clients of its sockets.
 constexpr int kFreeFiles = 48;
 // Address space of a node in addition to its code: receive buffers of LCM, the history of the filter, pictures.
 constexpr std::size_t kFreeBytes = std::size_t{64} << 20U;
