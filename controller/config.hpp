@@ -60,6 +60,8 @@ enum class Law { arcs, flip, spin };
 struct ControllerConfig {
   Law law = Law::arcs;
   double period_s = 0.02;
+  // Largest age of the operator program's heartbeat while the needle moves, and when it is armed or started.
+  double operator_timeout_s = 0.5;
   ShaftConfig shaft;
   SteeringLimits limits;
   SteeringGains gains;

@@ -80,6 +80,8 @@ const char* to_string(Reason reason) {
       return "drawn back in a channel whose end is not known since a reset";
     case Reason::way_in_unknown:
       return "its way in was not watched, so it is not drawn back by itself: draw it out by hand";
+    case Reason::operator_silent:
+      return "operator program does not respond";
     case Reason::ending:
       return "told to end";
   }

@@ -25,6 +25,7 @@ enum class Reason {
   resting_tip_moved,   // the estimate moved while the axes rested
   off_the_axes,        // the tip is said to be farther from the entry than the needle was inserted
   input_refused,       // what comes in cannot be trusted: two senders, motion that cannot be, the clock was set
+  operator_silent,     // the operator program's heartbeat is missing or too old during motion
   ending,              // the process was told to end
   path_blocked,        // no path to the target keeps clear of the obstacles; how near the best one comes
   obstacle_near,       // the tip is within an obstacle's clearance; what is left of that, negative

@@ -152,6 +152,11 @@ template <>
 const char* find_inconsistency(const steering_target_t& m) {
   return m.tolerance_mm >= 0.0 ? nullptr : "tolerance_mm";
 }
+// A run that did not draw a session cannot be distinguished from another one.
+template <>
+const char* find_inconsistency(const operator_heartbeat_t& m) {
+  return m.session > 0 ? nullptr : "session";
+}
 
 }  // namespace
 
@@ -225,6 +230,7 @@ template Decoded<motion_command_t> checked_decode(const void*, std::size_t) noex
 template Decoded<needle_state_t> checked_decode(const void*, std::size_t) noexcept;
 template Decoded<needle_shaft_t> checked_decode(const void*, std::size_t) noexcept;
 template Decoded<steering_target_t> checked_decode(const void*, std::size_t) noexcept;
+template Decoded<operator_heartbeat_t> checked_decode(const void*, std::size_t) noexcept;
 template Decoded<process_status_t> checked_decode(const void*, std::size_t) noexcept;
 template std::optional<DecodeError> check_fields(const tip_measurement_t&) noexcept;
 template std::optional<DecodeError> check_fields(const tip_heading_t&) noexcept;
@@ -233,6 +239,7 @@ template std::optional<DecodeError> check_fields(const motion_command_t&) noexce
 template std::optional<DecodeError> check_fields(const needle_state_t&) noexcept;
 template std::optional<DecodeError> check_fields(const needle_shaft_t&) noexcept;
 template std::optional<DecodeError> check_fields(const steering_target_t&) noexcept;
+template std::optional<DecodeError> check_fields(const operator_heartbeat_t&) noexcept;
 template std::optional<DecodeError> check_fields(const process_status_t&) noexcept;
 
 }  // namespace bevel::io

@@ -3,7 +3,7 @@
 // visit_fields(message, visitor) calls, in the order of the fields,
 //   visitor.time(name, value)                         int64 us since the epoch; positive
 //   visitor.count(name, value)                        int64 counter; not negative
-//   visitor.code(name, value, lowest, highest)        int32 with a bounded meaning
+//   visitor.code(name, value, lowest, highest)        int32; the bounds of an enumeration come from it (enum_range.hpp)
 //   visitor.number(name, values, size, largest)       doubles; finite and |value| <= largest
 //   visitor.text(name, value)                         string
 // `message` may be const or not; so may the values. The bounds are no physical limits (those belong to the
@@ -14,6 +14,7 @@
 #include <bevel/motion_command_t.hpp>
 #include <bevel/needle_shaft_t.hpp>
 #include <bevel/needle_state_t.hpp>
+#include <bevel/operator_heartbeat_t.hpp>
 #include <bevel/process_status_t.hpp>
 #include <bevel/steering_target_t.hpp>
 #include <bevel/tip_heading_t.hpp>
@@ -21,6 +22,12 @@
 #include <cstdint>
 #include <limits>
 #include <type_traits>
+
+#include "controller/request.hpp"
+#include "estimator/health.hpp"
+#include "io/enum_range.hpp"
+#include "io/process_state.hpp"
+#include "model/samples.hpp"
 
 namespace bevel::io {
 
@@ -31,6 +38,8 @@ inline constexpr double kLargestRate_rad_s = 1e5;
 inline constexpr double kLargestInformation_per_mm2 = 1e12;   // a standard deviation of 1 nm
 inline constexpr double kLargestInformation_per_rad2 = 1e12;  // a standard deviation of 1 urad
 inline constexpr double kLargestPlainNumber = 1e12;
+// Numbers of cameras, counts, and the status of a measurement: 0 is usable, every other value is a reason of its sender
+// why it is not, and senders of other makers define other reasons.
 inline constexpr std::int32_t kAnyCode = std::numeric_limits<std::int32_t>::max();
 
 template <class Message, class Type>
@@ -60,8 +69,8 @@ template <MessageOf<actuator_state_t> Message, class Visitor>
 void visit_fields(Message& m, Visitor&& v) {
   v.time("utime", m.utime);
   v.count("seq", m.seq);
-  v.code("axis_status[0]", m.axis_status[0], 0, 4);
-  v.code("axis_status[1]", m.axis_status[1], 0, 4);
+  v.code("axis_status[0]", m.axis_status[0], 0, last_code<model::AxisStatus>());
+  v.code("axis_status[1]", m.axis_status[1], 0, last_code<model::AxisStatus>());
   v.number("insertion_mm", &m.insertion_mm, 1, kLargestLength_mm);
   v.number("insertion_rate_mm_s", &m.insertion_rate_mm_s, 1, kLargestRate_mm_s);
   v.number("rotation_rad", &m.rotation_rad, 1, kLargestAngle_rad);
@@ -72,7 +81,7 @@ template <MessageOf<motion_command_t> Message, class Visitor>
 void visit_fields(Message& m, Visitor&& v) {
   v.time("utime", m.utime);
   v.count("seq", m.seq);
-  v.code("mode", m.mode, 0, 1);
+  v.code("mode", m.mode, 0, last_code<model::MotionMode>());
   v.number("insertion_rate_mm_s", &m.insertion_rate_mm_s, 1, kLargestRate_mm_s);
   v.number("rotation_rate_rad_s", &m.rotation_rate_rad_s, 1, kLargestRate_rad_s);
 }
@@ -89,8 +98,8 @@ void visit_fields(Message& m, Visitor&& v) {
   v.number("lambda2", &m.lambda2, 1, 1e3);
   v.number("covariance", m.covariance, 81, kLargestPlainNumber);
   v.number("test_ratio", &m.test_ratio, 1, kLargestPlainNumber);
-  v.code("rank", m.rank, 0, 3);
-  v.code("health", m.health, 0, kAnyCode);
+  v.code("rank", m.rank, 0, 3);  // axes of {A}
+  v.code("health", m.health, 0, all_flags<estimator::Health>());
   v.code("reset_count", m.reset_count, 0, kAnyCode);
 }
 
@@ -107,10 +116,17 @@ template <MessageOf<steering_target_t> Message, class Visitor>
 void visit_fields(Message& m, Visitor&& v) {
   v.time("utime", m.utime);
   v.count("seq", m.seq);
-  v.code("request", m.request, 0, 8);
+  v.code("request", m.request, 0, last_code<controller::Request>());
   for (auto& session : m.session) v.count("session", session);
   v.number("position_mm", m.position_mm, 3, kLargestLength_mm);
   v.number("tolerance_mm", &m.tolerance_mm, 1, kLargestLength_mm);
+}
+
+template <MessageOf<operator_heartbeat_t> Message, class Visitor>
+void visit_fields(Message& m, Visitor&& v) {
+  v.time("utime", m.utime);
+  v.count("seq", m.seq);
+  v.count("session", m.session);
 }
 
 template <MessageOf<process_status_t> Message, class Visitor>
@@ -120,6 +136,7 @@ void visit_fields(Message& m, Visitor&& v) {
   v.count("session", m.session);
   v.text("process", m.process);
   v.text("state", m.state);
+  v.code("state_code", m.state_code, 0, last_code<ProcessState>());
   v.text("reason", m.reason);
   v.number("loop_period_s", &m.loop_period_s, 1, kLargestPlainNumber);
   v.number("loop_run_max_s", &m.loop_run_max_s, 1, kLargestPlainNumber);

@@ -21,6 +21,7 @@ inline constexpr const char* kNeedleState = "NEEDLE_STATE";
 inline constexpr const char* kNeedleShaft = "NEEDLE_SHAFT";
 inline constexpr const char* kNeedleTruth = "NEEDLE_TRUTH";
 inline constexpr const char* kSteeringTarget = "STEERING_TARGET";
+inline constexpr const char* kOperatorHeartbeat = "OPERATOR_HEARTBEAT";
 inline constexpr const char* kProcessStatus = "PROCESS_STATUS";
 inline constexpr const char* kConfig = "CONFIG";  // the bytes are the configuration's text
 }  // namespace channel

@@ -7,6 +7,9 @@
 
 namespace bevel::model {
 
+/// Values of MotionCommand::mode.
+enum class MotionMode : std::int32_t { stop = 0, run = 1 };
+
 enum class AxisStatus : std::int32_t { off = 0, ready = 1, enabled = 2, quick_stop = 3, fault = 4 };
 
 struct TipMeasurement {
@@ -40,7 +43,7 @@ struct ActuatorState {
 struct MotionCommand {
   std::int64_t utime = 0;  // us since the epoch, time of validity
   std::int64_t seq = 0;
-  std::int32_t mode = 0;  // 0 stop, 1 run
+  std::int32_t mode = 0;  // see MotionMode
   double insertion_rate_mm_s = 0;
   double rotation_rate_rad_s = 0;
 };

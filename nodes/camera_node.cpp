@@ -120,7 +120,7 @@ CameraNode::Outcome CameraNode::step(const Now& now, int timeout_ms) {
   }
   constexpr std::int64_t kRemarkPeriod_ns = 500'000'000;  // its counts would make each frame news
   if (now.ns - remarked_ns_ >= kRemarkPeriod_ns) remark_ = remark(), remarked_ns_ = now.ns;
-  status_.report("running", remark_);
+  status_.report(io::ProcessState::running, remark_);
   if (std::holds_alternative<camera::FrameTimeout>(result)) return Outcome::nothing;
   if (std::holds_alternative<camera::EndOfFrames>(result)) return Outcome::ended;
   if (const auto* failure = std::get_if<camera::SourceFailure>(&result)) {

@@ -42,7 +42,26 @@ void claim_on_the_network(lcm::LCM& lcm, const std::string& name) {
   if (heard) throw std::runtime_error("another " + name + " is heard on this network; two would fight over the needle");
 }
 
+void refuse_second_operator(lcm::LCM& lcm) {
+  bool heard = false;
+  {
+    LcmPort port(lcm);
+    port.subscribe<operator_heartbeat_t>(io::channel::kOperatorHeartbeat,
+                                         [&heard](const operator_heartbeat_t&) { heard = true; });
+    run_to_end(lcm, {0.02, {}, [&](const Now&, double) { return !heard && !stop_requested(); }}, kListen_s);
+  }
+  if (heard)
+    throw std::runtime_error(
+        "another operator program sends OPERATOR_HEARTBEAT on this network; end it first: one program operates the "
+        "needle");
+}
+
 }  // namespace
+
+void claim_operator(lcm::LCM& lcm, const std::string& lcm_url, const std::string& name) {
+  claim_on_this_machine(lcm_url, name);
+  refuse_second_operator(lcm);
+}
 
 void claim_name(lcm::LCM& lcm, const std::string& lcm_url, const std::string& name) {
   claim_on_this_machine(lcm_url, name);

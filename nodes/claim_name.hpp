@@ -10,4 +10,9 @@ namespace bevel::nodes {
 // One rig is one LCM network: `lcm_url` as the process uses it.
 void claim_name(lcm::LCM& lcm, const std::string& lcm_url, const std::string& name);
 
+/// Claims the name of an operator program, as claim_name() does, and refuses it where the heartbeat of another operator
+/// program arrives within 0.6 s.
+/// @throws std::runtime_error naming the other program and the remedy
+void claim_operator(lcm::LCM& lcm, const std::string& lcm_url, const std::string& name);
+
 }  // namespace bevel::nodes

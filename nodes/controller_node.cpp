@@ -16,11 +16,32 @@ namespace {
 constexpr double kLateStop_s = 0.1;
 constexpr double kSeenToMove_mm = 0.1;     // of insertion within which an estimate must have moved
 constexpr double kFastestCycle_hz = 1200;  // of drives
+constexpr std::int64_t kRefusalShown_ns = 5'000'000'000;
 constexpr double kFastestState_hz = 3200;  // the estimator sends one for each cycle and each reading
 
 io::SenderLimits input_limits(double age_s, double fastest_hz) {
   const auto age_us = std::llround(age_s * 1e6);
   return {.longest_age_us = age_us, .fastest_hz = fastest_hz, .silence_us = age_us};
+}
+
+io::ProcessState to_process_state(controller::State state) {
+  switch (state) {
+    case controller::State::off:
+      return io::ProcessState::off;
+    case controller::State::armed:
+      return io::ProcessState::armed;
+    case controller::State::steering:
+      return io::ProcessState::steering;
+    case controller::State::retracting:
+      return io::ProcessState::retracting;
+    case controller::State::hold:
+      return io::ProcessState::hold;
+    case controller::State::stopped:
+      return io::ProcessState::stopped;
+    case controller::State::fault:
+      return io::ProcessState::fault;
+  }
+  return io::ProcessState::fault;
 }
 
 bool latched(controller::State state) {
@@ -61,8 +82,8 @@ ControllerNode::ControllerNode(lcm::LCM& lcm, const SystemConfig& config)
       supervisor_(config.controller, model::AugmentedNeedle(config.needle, config.live_effects.active).needle(),
                   config.live_effects.active),
       status_(port_, "bevel-controller", config.controller.period_s),
-      words_(port_, status_, Receiver::controller,
-             [this](Word word, const steering_target_t& m) { on_word(word, m); }) {
+      words_(port_, status_, Receiver::controller, [this](Word word, const steering_target_t& m) { on_word(word, m); }),
+      operator_(config.controller.operator_timeout_s) {
   const io::MotionBounds bounds = motion_bounds(config.stepper);
   port_.on_trouble = [this](const InputTrouble& trouble) { on_trouble(trouble); };
   port_.subscribe<needle_state_t>(
@@ -92,6 +113,10 @@ ControllerNode::ControllerNode(lcm::LCM& lcm, const SystemConfig& config)
         supervisor_.set_actuator(io::to_sample(m));
       },
       io::axes_check(bounds));
+  // The watch of the operator refuses a second sender without a stop: it cannot move the needle.
+  port_.subscribe<operator_heartbeat_t>(io::channel::kOperatorHeartbeat, [this](const operator_heartbeat_t& m) {
+    if (!operator_.hear(m, port_.now(), supervisor_.moves())) port_.reject();
+  });
 }
 
 // An estimate moves with the axes, if only by its prediction.
@@ -108,7 +133,18 @@ void ControllerNode::check_alive(const needle_state_t& m) {
                 0});
 }
 
+// Requests that lead to motion need an operator program that is alive.
+bool ControllerNode::is_refused(Word word) {
+  if (word != Word::arm && word != Word::arm_to_retract && word != Word::start && word != Word::retract) return false;
+  const std::string problem = operator_.problem(port_.now());
+  operator_refusal_ =
+      problem.empty() ? "" : "request " + std::to_string(static_cast<int>(word)) + " is refused: " + problem;
+  operator_refused_ns_ = port_.now().ns;
+  return !problem.empty();
+}
+
 void ControllerNode::on_word(Word word, const steering_target_t& m) {
+  if (is_refused(word)) return;
   if (word == Word::arm || word == Word::arm_to_retract) {
     port_.forget_senders();
     detail_.clear();  // of the stop before: what this arm is refused for is another
@@ -119,6 +155,7 @@ void ControllerNode::on_word(Word word, const steering_target_t& m) {
 }
 
 void ControllerNode::on_trouble(const InputTrouble& trouble) {
+  if (trouble.kind == InputTrouble::Kind::clock_step) operator_.restart();
   if (latched(supervisor_.status().state)) return;
   stop(controller::Reason::input_refused, describe(trouble));
 }
@@ -160,6 +197,8 @@ void ControllerNode::step(const Now& now, double late_s) {
   }
   if (status_.name_taken())
     stop(controller::Reason::input_refused, "another bevel-controller is heard on this network");
+  if (supervisor_.moves() && !operator_.is_fresh(now))
+    stop(controller::Reason::operator_silent, operator_.problem(now));
   // While it moves each estimate is a step of its own, and the period only fills the gaps.
   const bool stepped = supervisor_.moves() && stepped_ns_ != 0 &&
                        static_cast<double>(now.ns - stepped_ns_) * 1e-9 < 0.5 * config_.period_s;
@@ -184,7 +223,12 @@ void ControllerNode::report() {
   }
   if (!detail_.empty()) reason += ": " + detail_;
   if (s.reason == controller::Reason::none) reason = words_.refusal();
-  status_.report(controller::to_string(s.state), reason);
+  const auto add = [&reason](const std::string& remark) {
+    if (!remark.empty()) reason += (reason.empty() ? "" : "; ") + remark;
+  };
+  if (port_.now().ns - operator_refused_ns_ < kRefusalShown_ns) add(operator_refusal_);
+  add(operator_.second_operator(port_.now()));
+  status_.report(to_process_state(s.state), reason);
 }
 
 }  // namespace bevel::nodes

@@ -4,6 +4,7 @@
 #include <array>
 
 #include "controller/supervisor.hpp"
+#include "nodes/operator_heartbeat.hpp"
 #include "nodes/operator_words.hpp"
 #include "nodes/system_config.hpp"
 
@@ -30,6 +31,7 @@ class ControllerNode {
  private:
   void check_alive(const needle_state_t& m);
   void on_word(Word word, const steering_target_t& m);
+  bool is_refused(Word word);
   void on_trouble(const InputTrouble& trouble);
   void stop(controller::Reason reason, std::string detail = "");
   void command(double elapsed_s);
@@ -43,6 +45,9 @@ class ControllerNode {
   double bending_sd_mm_ = 0;
   StatusReporter status_;
   OperatorWords words_;
+  OperatorWatch operator_;
+  std::string operator_refusal_;          // why the newest request for motion was refused
+  std::int64_t operator_refused_ns_ = 0;  // steady
   std::array<double, 3> same_position_mm_{};
   double insertion_mm_ = 0, same_since_insertion_mm_ = 0;
   std::int64_t stepped_ns_ = 0;  // steady; of the last period

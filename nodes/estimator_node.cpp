@@ -249,6 +249,7 @@ void EstimatorNode::step(const Now& now) {
   port_.rethrow();
   if (status_.name_taken() && !input_refused_) {
     input_refused_ = true;
+    status_.renew_session();
     remark_ = "another bevel-estimator is heard on this network";
   }
   if (now.ns - described_ns_ >= kDescribed_ns) {  // numbers that change all the time
@@ -260,7 +261,7 @@ void EstimatorNode::step(const Now& now) {
   std::string reason = estimator::describe_health(health());
   for (const std::string& more : {innovation_text_, entry_text_, nuisance_text_, remark_, words_.refusal()})
     if (!more.empty()) reason += "; " + more;
-  status_.report(axes_ ? "running" : "waiting", reason);
+  status_.report(axes_ ? io::ProcessState::running : io::ProcessState::waiting, reason);
 }
 
 }  // namespace bevel::nodes

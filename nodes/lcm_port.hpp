@@ -8,6 +8,7 @@
 #include <bevel/motion_command_t.hpp>
 #include <bevel/needle_shaft_t.hpp>
 #include <bevel/needle_state_t.hpp>
+#include <bevel/operator_heartbeat_t.hpp>
 #include <bevel/process_status_t.hpp>
 #include <bevel/steering_target_t.hpp>
 #include <bevel/tip_heading_t.hpp>
@@ -104,6 +105,12 @@ class LcmPort {
 
   // For tests of the stop path: what this process sends passes through the injector.
   void inject(std::unique_ptr<FaultInjector> injector) { injector_ = std::move(injector); }
+
+  /// Counts the message that is being handled as rejected: the node refuses it by a check that the port does not have.
+  void reject() {
+    --counters_.received;
+    ++counters_.rejected;
+  }
 
   // Raises what a handler threw.
   void rethrow();

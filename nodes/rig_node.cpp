@@ -114,7 +114,7 @@ void RigNode::step(const Now& now) {
     take_heading(now);
   }
   publish_headings(now_ns);
-  status_.report("running", "");
+  status_.report(io::ProcessState::running, "");
 }
 
 void RigNode::move_plant(std::int64_t now_ns) {

@@ -52,6 +52,7 @@ void catch_signals() {
   sigaction(SIGINT, &action, nullptr);
   sigaction(SIGTERM, &action, nullptr);
   std::signal(SIGPIPE, SIG_IGN);
+  std::signal(SIGXFSZ, SIG_IGN);  // a log at the limit of file sizes is a write error, as on a full disk
 }
 
 bool stop_requested() { return stop_flag; }

@@ -8,7 +8,8 @@ namespace bevel::nodes {
 namespace {
 
 constexpr std::int64_t kStatusPeriod_ns = 500'000'000;
-constexpr int kStopBits = 20;  // of a session: a million stops of one run
+constexpr std::int64_t kOtherGone_ns = 3 * kStatusPeriod_ns;  // two lost messages in a row are no end of a process
+constexpr int kStopBits = 20;                                 // of a session: a million stops of one run
 
 std::int64_t draw_run() {
   std::random_device source;
@@ -21,19 +22,24 @@ StatusReporter::StatusReporter(LcmPort& port, std::string process, double period
   message_.process = std::move(process);
   message_.loop_period_s = period_s;
   message_.session = run_ << kStopBits;
-  // The port may outlive this: what it calls holds all that it needs.
+  // The port may outlive this: the handler owns what it writes.
   port_.subscribe<process_status_t>(io::channel::kProcessStatus,
-                                    [name = message_.process, run = run_, taken = name_taken_](const auto& m) {
-                                      if (m.process == name && m.session >> kStopBits != run) *taken = true;
+                                    [&port, name = message_.process, run = run_, other_ns = other_ns_](const auto& m) {
+                                      if (m.process == name && m.session >> kStopBits != run) *other_ns = port.now().ns;
                                     });
 }
 
-void StatusReporter::report(const std::string& state, const std::string& reason) {
+bool StatusReporter::name_taken() const { return *other_ns_ && port_.now().ns - **other_ns_ <= kOtherGone_ns; }
+
+void StatusReporter::report(io::ProcessState state, const std::string& reason) {
   const Now& now = port_.now();
-  const bool changed = state != message_.state || reason != message_.reason || message_.session != last_session_;
+  const auto code = static_cast<std::int32_t>(state);
+  const bool changed = message_.seq == 0 || code != message_.state_code || reason != message_.reason ||
+                       message_.session != last_session_;
   if (!changed && now.ns - last_ns_ < kStatusPeriod_ns) return;
   message_.utime = now.utime;
-  message_.state = state;
+  message_.state = io::to_string(state);
+  message_.state_code = code;
   message_.reason = reason;
   const LoopTimes loop = take_loop_times();
   message_.loop_late_max_s = loop.late_max_s;

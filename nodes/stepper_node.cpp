@@ -22,6 +22,32 @@ bool is_latched(const stepper::AxesReport& report) {
   return report.state == stepper::DriverState::stopped || report.state == stepper::DriverState::fault;
 }
 
+io::ProcessState to_process_state(stepper::DriverState state) {
+  switch (state) {
+    case stepper::DriverState::off:
+      return io::ProcessState::off;
+    case stepper::DriverState::configuring:
+      return io::ProcessState::configuring;
+    case stepper::DriverState::ready:
+      return io::ProcessState::ready;
+    case stepper::DriverState::enabled:
+      return io::ProcessState::enabled;
+    case stepper::DriverState::stopped:
+      return io::ProcessState::stopped;
+    case stepper::DriverState::fault:
+      return io::ProcessState::fault;
+  }
+  return io::ProcessState::fault;
+}
+
+// ACTUATOR_STATE carries the driver's numbers; readers use the model's.
+static_assert(static_cast<int>(stepper::AxisStatus::off) == static_cast<int>(model::AxisStatus::off));
+static_assert(static_cast<int>(stepper::AxisStatus::ready) == static_cast<int>(model::AxisStatus::ready));
+static_assert(static_cast<int>(stepper::AxisStatus::enabled) == static_cast<int>(model::AxisStatus::enabled));
+static_assert(static_cast<int>(stepper::AxisStatus::quick_stop) == static_cast<int>(model::AxisStatus::quick_stop));
+static_assert(static_cast<int>(stepper::AxisStatus::fault) == static_cast<int>(model::AxisStatus::fault));
+static_assert(io::last_code<stepper::AxisStatus>() == io::last_code<model::AxisStatus>());
+
 }  // namespace
 
 StepperNode::StepperNode(lcm::LCM& lcm, can::Bus& bus, const stepper::StepperConfig& config)
@@ -35,9 +61,8 @@ StepperNode::StepperNode(lcm::LCM& lcm, can::Bus& bus, const stepper::StepperCon
                                     [this](const motion_command_t& m) { on_command(m); });
   // A second way for a stop, should the first be what is broken.
   port_.subscribe<process_status_t>(io::channel::kProcessStatus, [this](const process_status_t& m) {
-    const bool stopped = m.state == "stopped" || m.state == "fault";
-    // One that came to rest before it was told is stopped too; a status of before the arm is none.
-    if (m.process == "bevel-controller" && stopped && (driver_.moving() || ran_since_armed_))
+    // A controller whose needle is at rest already is stopped too. A status from before the arm request is ignored.
+    if (m.process == "bevel-controller" && io::is_latched_stop(m.state_code) && (driver_.moving() || ran_since_armed_))
       stop(stepper::StopReason::controller_stop);
   });
 }
@@ -47,8 +72,9 @@ void StepperNode::on_command(const motion_command_t& m) {
   const std::int64_t age_us = std::max<std::int64_t>(model::age_us(port_.now().utime, m.utime), 0);
   setpoint_made_ns_ = port_.now().ns - age_us * 1000;  // the watch has bounded the age
   const bool ran = setpoint_ && setpoint_->run;
-  ran_since_armed_ = ran_since_armed_ || m.mode == 1;
-  setpoint_ = stepper::MotionSetpoint{0, m.mode == 1, m.insertion_rate_mm_s, m.rotation_rate_rad_s};
+  const bool run_wanted = m.mode == static_cast<std::int32_t>(model::MotionMode::run);
+  ran_since_armed_ = ran_since_armed_ || run_wanted;
+  setpoint_ = stepper::MotionSetpoint{0, run_wanted, m.insertion_rate_mm_s, m.rotation_rate_rad_s};
   // A stop does not wait for the next cycle.
   if (ran && !setpoint_->run && driver_.moving()) return stop(stepper::StopReason::controller_stop);
   setpoint_->age_ns = age_us * 1000;
@@ -150,7 +176,7 @@ void StepperNode::step(const Now& now) {
   enable_if_wanted(report);
   note_latch();
   if (report.sampled_ns > published_ns_) publish(report);
-  status_.report(stepper::to_string(report.state), reason(report));
+  status_.report(to_process_state(report.state), reason(report));
 }
 
 std::string StepperNode::reason(const stepper::AxesReport& report) const {

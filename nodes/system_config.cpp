@@ -53,6 +53,9 @@ controller::Obstacle read_obstacle(Section s) {
 void read_controller(Section s, controller::ControllerConfig& c) {
   s.read("period_s", c.period_s, optional,
          in_range(0.002, 0.03).because("set-points must be renewed before the driver takes them for old"));
+  s.read(
+      "operator_timeout_s", c.operator_timeout_s, optional,
+      in_range(0.1, 5).because("the needle is steered on, unrecorded, for so long after the operator program hangs"));
   s.read("law", c.law, optional,
          io::Choices<controller::Law>{
              {"arcs", controller::Law::arcs}, {"flip", controller::Law::flip}, {"spin", controller::Law::spin}});

@@ -8,6 +8,7 @@
 #include <nlohmann/json.hpp>
 #include <ostream>
 #include <stdexcept>
+#include <system_error>
 #include <thread>
 
 #include "proof/commitment.hpp"
@@ -66,9 +67,14 @@ void in_parallel(int count, int jobs, const std::function<void(int)>& work) {
       }
     }
   };
-  std::vector<std::thread> threads;
-  for (int j = 0; j < jobs; ++j) threads.emplace_back(serve);
-  for (std::thread& thread : threads) thread.join();
+  {
+    std::vector<std::jthread> threads;
+    try {
+      for (int j = 0; j < jobs; ++j) threads.emplace_back(serve);
+    } catch (const std::system_error&) {  // a thread is refused: the others do its work
+      if (threads.empty()) throw;
+    }
+  }
   if (failure) std::rethrow_exception(failure);
 }
 

@@ -7,6 +7,7 @@
 #include <nlohmann/json.hpp>
 
 #include "estimator/health.hpp"
+#include "io/process_state.hpp"
 
 namespace bevel::view {
 
@@ -196,6 +197,13 @@ LiveView::Row LiveView::row_now() const {
   return row;
 }
 
+namespace {
+bool moves(std::int32_t state_code) {
+  const auto state = static_cast<io::ProcessState>(state_code);
+  return state == io::ProcessState::steering || state == io::ProcessState::retracting;
+}
+}  // namespace
+
 std::string LiveView::snapshot(const Moment& now) {
   json j;
   j["insertion"] = beginnings_;
@@ -257,6 +265,8 @@ std::string LiveView::snapshot(const Moment& now) {
     const auto& m = status.message;
     processes.push_back({{"name", name},
                          {"state", m.state},
+                         {"stopped", io::is_latched_stop(m.state_code)},
+                         {"moves", moves(m.state_code)},
                          {"reason", m.reason},
                          {"run_max_ms", 1e3 * m.loop_run_max_s},
                          {"late_max_ms", 1e3 * m.loop_late_max_s},

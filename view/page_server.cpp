@@ -20,7 +20,6 @@
 namespace bevel::view {
 namespace {
 
-constexpr int kMostPages = 16;
 constexpr auto kPulse = std::chrono::seconds(1);  // a comment, so that a page that is gone is noticed
 
 sockaddr_in loopback(int port) {
@@ -81,7 +80,7 @@ struct PageServer::Impl {
   void routes() {
     server.set_tcp_nodelay(true);
     server.set_keep_alive_max_count(1);  // an end does not wait for connections that might be used again
-    server.new_task_queue = [] { return new httplib::ThreadPool(kMostPages + 4); };
+    server.new_task_queue = [] { return new httplib::ThreadPool(kThreads - 1); };
     server.set_default_headers({{"Cache-Control", "no-store"}, {"X-Content-Type-Options", "nosniff"}});
     server.set_pre_routing_handler([](const httplib::Request& request, httplib::Response& response) {
       if (is_this_machine(request.get_header_value("Host"))) return httplib::Server::HandlerResponse::Unhandled;

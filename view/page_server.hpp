@@ -13,6 +13,8 @@ namespace bevel::view {
 class PageServer {
  public:
   using Picture = std::function<std::string(std::int32_t camera, std::int64_t count)>;
+  static constexpr int kMostPages = 16;            ///< pages that may be open at once
+  static constexpr int kThreads = kMostPages + 5;  ///< that serve them: one accepts, four answer other requests
 
   // A port that is open before anything is served; 0 takes one that is free. Throws std::runtime_error naming the port
   // and why it cannot be had.

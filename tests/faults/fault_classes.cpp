@@ -199,6 +199,17 @@ std::vector<FaultClass> fault_classes() {
   };
   words.mend = [](SimulatedLoop& loop) { loop.each_ms = nullptr; };
   classes.push_back(words);
+
+  // Its last heartbeat is up to 50 ms old; the fault is there once the heartbeat has timed out.
+  FaultClass hung;
+  hung.name = "operator:hung";
+  hung.causes = {"operator program does not respond"};
+  hung.inject = [](SimulatedLoop& loop, std::mt19937_64&) { loop.operator_hangs = true; };
+  hung.mend = [](SimulatedLoop& loop) { loop.operator_hangs = false; };
+  hung.shows = [](const SimulatedLoop& loop) {
+    return static_cast<double>(loop.ms - loop.heartbeat_ms) > 1e3 * loop.config.controller.operator_timeout_s;
+  };
+  classes.push_back(hung);
   std::ranges::move(drive_fault_classes(), std::back_inserter(classes));
   return classes;
 }

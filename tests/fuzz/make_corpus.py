@@ -36,12 +36,13 @@ NEEDLE = message("needle_state_t", measurement_utime=UTIME - 9, orientation_wxyz
                  covariance=[float(i % 10 == 0) for i in range(81)], rank=3)
 SHAFT = message("needle_shaft_t", bending_mm=40.0, bending_sd_mm=8.0, guide_mm=15.0)
 TARGET = message("steering_target_t", request=1, position_mm=[4, -10, 95], tolerance_mm=0.5)
-STATUS = message("process_status_t", process="bevel-estimator", state="running", reason="", loop_period_s=0.02)
+HEARTBEAT = message("operator_heartbeat_t", session=7)
+STATUS = message("process_status_t", process="bevel-estimator", state="running", state_code=1, reason="", loop_period_s=0.02)
 
 
 def decode():
     for name, data in [("tip", TIP), ("heading", HEADING), ("actuator", ACTUATOR), ("command", COMMAND), ("needle", NEEDLE), ("shaft", SHAFT),
-                       ("target", TARGET), ("status", STATUS)]:
+                       ("target", TARGET), ("heartbeat", HEARTBEAT), ("status", STATUS)]:
         keep("checked_decode", name, data)
     keep("checked_decode", "empty", b"")
     keep("checked_decode", "trailing_byte", TIP + b"\0")

@@ -284,6 +284,32 @@ TEST(Recording, sorts_channels_counts_rejects_and_skips_what_it_does_not_know) {
   EXPECT_THAT(recording.describe_faults(), ::testing::HasSubstr("TIP_MEASUREMENT: 1 refused (size)"));
 }
 
+// PROCESS_STATUS gained state_code: its events in older logs have another fingerprint, and four bytes less.
+TEST(Recording, CountsAProcessStatusOfAnOlderLogAsSkippedAndStaysIntact) {
+  process_status_t status{};
+  status.utime = 1'700'000'000'000'000;
+  status.process = "bevel-controller";
+  status.state = "stopped";
+  Bytes older = encode(status);
+  older[0] ^= 1U;
+  older.erase(older.end() - 4, older.end());
+  EXPECT_FALSE(checked_decode<process_status_t>(older.data(), older.size()));
+  const TemporaryLog file("older.lcm");
+  {
+    LogWriter writer(file.path());
+    writer.write_message(1, channel::kTipMeasurement, tip(1));
+    writer.write(2, channel::kProcessStatus, older);
+    writer.write(3, channel::kProcessStatus, older);
+    writer.write_message(4, channel::kActuatorState, actuator(4));
+    writer.close();
+  }
+  const Recording recording = read_recording(file.path());
+  EXPECT_EQ(recording.skipped_channels.at(channel::kProcessStatus), 2);
+  EXPECT_EQ(recording.tips.size() + recording.actuators.size(), 2U);
+  EXPECT_EQ(recording.rejected(), 0);
+  EXPECT_TRUE(recording.intact());
+}
+
 TEST(Recording, speed) {
   const TemporaryLog file("speed.lcm");
   constexpr int kEvents = 200'000;

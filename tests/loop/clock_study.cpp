@@ -114,7 +114,8 @@ class Study {
     std::printf("    %s\n", rig_.states().c_str());
     if (ms < 0) problem("does not rest");
     if (ms > 1e-6 * static_cast<double>(test::kToRest_ns)) problem("rests too late");
-    if (rig_.said("bevel-controller").state != "stopped") problem("the controller has not latched a stop");
+    if (rig_.state_of("bevel-controller") != io::ProcessState::stopped)
+      problem("the controller has not latched a stop");
     for (const char* process : test::kProcesses)
       if (!watch.heard.contains(process)) problem(std::string("not a word from ") + process);
     // Who has a clock that was set and inputs that stop has to say so, and the others that they are not believed.

@@ -36,6 +36,7 @@
 
 #include "drivers/can/open_bus.hpp"
 #include "drivers/stepper/cia301.hpp"
+#include "io/process_state.hpp"
 #include "nodes/runtime.hpp"
 #include "nodes/system_config.hpp"
 
@@ -105,13 +106,14 @@ class Bench {
     const std::int64_t end_ns = now().ns + 8000 * kMs;
     while (now().ns < end_ns && !enabled()) {
       publish("MOTION_COMMAND", 0.0);
-      if (stepper_.state == "ready") say_arm();
+      if (is(io::ProcessState::ready)) say_arm();
       hear_for(20 * kMs);
     }
     return enabled();
   }
   std::string said() const { return stepper_.state + ": " + stepper_.reason; }
-  bool enabled() const { return stepper_.state == "enabled"; }
+  bool is(io::ProcessState state) const { return stepper_.state_code == static_cast<std::int32_t>(state); }
+  bool enabled() const { return is(io::ProcessState::enabled); }
 
   // ns; nothing where it took longer than kLongest_ns.
   std::optional<std::int64_t> hop() {

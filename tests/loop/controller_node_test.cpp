@@ -37,6 +37,7 @@ std::vector<model::MotionCommand> commands_of(const SystemConfig& config, int pe
   lcm::LCM lcm("memq://");
   LcmPort port(lcm);
   ControllerNode node(lcm, config);
+  OperatorHeartbeat heartbeat(port);
   std::int64_t session = 0;
   port.subscribe<process_status_t>(io::channel::kProcessStatus,
                                    [&](const process_status_t& m) { session = m.session; });
@@ -62,6 +63,7 @@ std::vector<model::MotionCommand> commands_of(const SystemConfig& config, int pe
     const Now now{utime * 1000, utime};
     node.tell_time(now);
     port.tell_time(now);
+    heartbeat.beat();
     port.publish(io::channel::kNeedleState, state);
     port.publish(io::channel::kActuatorState, io::to_message(axes));
     pump(lcm);

@@ -21,13 +21,15 @@ constexpr std::int64_t kDriverGivenUp_ns = 110 * kMs;
 
 constexpr std::int64_t kRested_ns = 50 * kMs;  // shorter is the end of a stop, in which an axis may swing
 
-bool latched(const std::string& state) { return state == "stopped" || state == "fault"; }
+using io::ProcessState;
+
+bool latched(const process_status_t& status) { return io::is_latched_stop(status.state_code); }
 
 }  // namespace
 
 LiveRig::LiveRig(const std::string& bin, const std::string& config_path, const std::string& out,
                  const std::map<std::string, std::vector<std::string>>& prefix)
-    : config_(nodes::load_system_config(config_path)), lcm_(config_.lcm_url), port_(lcm_) {
+    : config_(nodes::load_system_config(config_path)), lcm_(config_.lcm_url), port_(lcm_), heartbeat_(port_) {
   if (!lcm_.good()) throw std::runtime_error("LCM does not start");
   std::filesystem::create_directories(out);
   port_.subscribe<process_status_t>(
@@ -89,7 +91,8 @@ void LiveRig::look() {
   const nodes::Now now = nodes::now();
   if (looked_ns_ != 0) watch_.observer_late_ns = std::max(watch_.observer_late_ns, now.ns - looked_ns_);
   looked_ns_ = now.ns;
-  port_.tell_time(now);
+  port_.tell_time({now.ns, now.utime + clock_us});
+  heartbeat_.beat();
   nodes::pump(lcm_);
   if (listener_) {
     listener_->listen();
@@ -114,10 +117,10 @@ void LiveRig::judge(std::int64_t now_ns) {
     if (watch_.declared_ns == 0) watch_.declared_ns = now_ns;
     started_ = false;
   }
-  const std::string& controller = said("bevel-controller").state;
-  const bool contradiction = (controller == "armed" || controller == "steering" ||
-                              controller == "retracting" || controller == "hold") &&
-                             latched(said("bevel-stepper").state);
+  const ProcessState controller = state_of("bevel-controller");
+  const bool contradiction = (controller == ProcessState::armed || controller == ProcessState::steering ||
+                              controller == ProcessState::retracting || controller == ProcessState::hold) &&
+                             latched(said("bevel-stepper"));
   if (!contradiction) contradiction_ns_ = now_ns;
   watch_.armed_with_fault_ns = std::max(watch_.armed_with_fault_ns, now_ns - contradiction_ns_);
 }
@@ -152,9 +155,8 @@ void LiveRig::aim_ahead() {
 bool LiveRig::arm(double within_s) {
   std::int64_t next_ns = 0;
   return run(within_s, [&] {
-    const std::string& controller = said("bevel-controller").state;
-    const std::string& axes = said("bevel-stepper").state;
-    if (controller == "armed" && axes == "enabled") return true;
+    const ProcessState controller = state_of("bevel-controller"), axes = state_of("bevel-stepper");
+    if (controller == ProcessState::armed && axes == ProcessState::enabled) return true;
     const std::int64_t now_ns = nodes::now().ns;
     const bool seen = estimate && estimator::lost(estimate->health) == 0;
     // Who lost sight of the axes for a while asks; counters and needle are where they were, and the operator knows.
@@ -162,8 +164,10 @@ bool LiveRig::arm(double within_s) {
       return said(process).reason.find("or confirm") != std::string::npos;
     };
     const bool asks = asks_to_confirm("bevel-stepper") || asks_to_confirm("bevel-estimator");
-    const bool wants = controller != "armed" || latched(axes) || asks;
-    if (now_ns >= next_ns && wants && (seen || latched(controller) || latched(axes)) && !controller.empty()) {
+    const bool stopped = latched(said("bevel-stepper"));
+    const bool wants = controller != ProcessState::armed || stopped || asks;
+    const bool heard_of = said_.contains("bevel-controller");
+    if (now_ns >= next_ns && wants && (seen || latched(said("bevel-controller")) || stopped) && heard_of) {
       next_ns = now_ns + kWordPeriod_ns;
       if (asks) say(nodes::Word::confirm);
       say(nodes::Word::arm);
@@ -186,8 +190,10 @@ bool LiveRig::steer(double within_s, double steered_s) {
   return false;
 }
 
-bool LiveRig::stop_declared() const {
-  return latched(said("bevel-controller").state) || latched(said("bevel-stepper").state);
+bool LiveRig::stop_declared() const { return latched(said("bevel-controller")) || latched(said("bevel-stepper")); }
+
+io::ProcessState LiveRig::state_of(const std::string& process) const {
+  return static_cast<ProcessState>(said(process).state_code);
 }
 
 const process_status_t& LiveRig::said(const std::string& process) const {

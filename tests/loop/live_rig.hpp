@@ -12,6 +12,7 @@
 #include <string>
 #include <vector>
 
+#include "nodes/operator_heartbeat.hpp"
 #include "nodes/operator_words.hpp"
 #include "nodes/system_config.hpp"
 #include "tests/loop/bus_listener.hpp"
@@ -51,7 +52,8 @@ class LiveRig {
   // A stop by the controller's or the driver's own word.
   bool stop_declared() const;
   const process_status_t& said(const std::string& process) const;
-  std::string states() const;  // every process's last word
+  io::ProcessState state_of(const std::string& process) const;  // waiting before its first status
+  std::string states() const;                                   // every process's last word
   // A process that is no longer there, or that LCM or the bus failed: not what any of these studies is about.
   std::string broken();
 
@@ -84,6 +86,7 @@ class LiveRig {
   Eigen::Vector3d target_mm_{2, -3, 100};
   lcm::LCM lcm_;
   nodes::LcmPort port_;
+  nodes::OperatorHeartbeat heartbeat_;
   tools::ProcessGroup processes_;
   std::unique_ptr<BusListener> listener_;
   std::map<std::string, process_status_t> said_;

@@ -145,7 +145,7 @@ class Study {
     if (rig_.moving() && rig_.stop_declared()) problem("moves though stopped");
   }
   void judge_rest() {
-    if (!rig_.stop_declared() && rig_.said("bevel-controller").state != "armed")
+    if (!rig_.stop_declared() && rig_.state_of("bevel-controller") != io::ProcessState::armed)
       problem("at rest, and nobody says why");
     if (!rig_.at_rest()) problem("does not rest");
     if (rig_.watch().moved_again) problem("moves again by itself");

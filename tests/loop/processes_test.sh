@@ -84,6 +84,18 @@ case $case in
     grep -q "another bevel-camera" "$work/second.txt" || fail "does not say why"
     wait $pid || fail "the insertion ended with status $?"
     ;;
+  second_operator)  # the client of docs/operator.md
+    sed -n '/^```python/,/^```/p' "$source/docs/operator.md" | grep -v '^```' >"$work/client.py"
+    export PYTHONPATH=$bin/../lcmtypes/python:$source/.deps/lcm
+    python3 -c 'import bevel, lcm' 2>/dev/null || skip "no Python binding of LCM here"
+    python3 "$work/client.py" >"$work/client.txt" 2>&1 & client=$!
+    sleep 0.5
+    "${demo[@]}" >"$work/demo.txt" 2>&1; status=$?
+    kill $client 2>/dev/null || fail "the client ended by itself"
+    wait $client 2>/dev/null
+    [ $status -eq 1 ] || fail "exit status $status, wanted 1"
+    grep -q "another operator program sends OPERATOR_HEARTBEAT" "$work/demo.txt" || fail "does not report why"
+    ;;
   parent_killed)  # nobody is left to say stop; the children hear of it
     "${demo[@]}" >"$work/demo.txt" 2>&1 & pid=$!
     wait_for steering
@@ -113,6 +125,32 @@ case $case in
     "${demo[@]}" >"$work/demo.txt" 2>&1; status=$?
     [ $status -eq 1 ] || fail "exit status $status, wanted 1"
     grep -q "insertion.lcm" "$work/demo.txt" || fail "does not name the file"
+    ;;
+  log_at_limit)  # in flight: the write fails, and the needle is stopped
+    (ulimit -f 1200; exec "${demo[@]}") >"$work/demo.txt" 2>&1; status=$?
+    [ $status -eq 1 ] || fail "exit status $status, wanted 1"
+    grep -q "controller steering" "$work/demo.txt" || fail "the limit was reached before it steered"
+    grep -q "stopped because nothing is recorded" "$work/demo.txt" || fail "does not report why"
+    ;;
+  log_blocks)  # in flight: bevel-demo hangs in a write, as on a disk that does not answer
+    logger=$(command -v lcm-logger || echo "$source/.deps/lcm/bin/lcm-logger")
+    [ -x "$logger" ] || skip "no lcm-logger here"
+    mkdir -p "$work/out"
+    mkfifo "$work/out/insertion.lcm"
+    (head -c 1200000 >/dev/null; exec sleep 60) <"$work/out/insertion.lcm" & reader=$!
+    "$logger" --quiet "$work/second.lcm" 2>/dev/null & second=$!
+    "${demo[@]}" >"$work/demo.txt" 2>&1 & pid=$!
+    wait_for steering
+    for _ in $(seq 150); do grep -aq "operator program does not respond" "$work/second.lcm" && break; sleep 0.1; done
+    kill $second; wait $second
+    grep -aq "operator program does not respond" "$work/second.lcm" || fail "the needle was not stopped"
+    kill $reader; wait $reader 2>/dev/null
+    wait $pid; status=$?
+    [ $status -eq 1 ] || fail "exit status $status, wanted 1"
+    ;;
+  operator_stopped | operator_hung)  # TRIALS SEED: bevel-demo under SIGSTOP in flight
+    "$bin/kill_study" "$bin" "$work/demo.toml" "$work/out" "unix:$work/s-can.sock" "${4:-2}" "${5:-1}" bevel-demo STOP ||
+      fail "see above"
     ;;
   fault)
     "${demo[@]}" --fault camera:off@5s >"$work/demo.txt" 2>&1; status=$?

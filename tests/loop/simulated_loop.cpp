@@ -110,6 +110,7 @@ void SimulatedLoop::step_one_ms() {
   if (stepper) stepper->tell_time(at);
   if (estimator) estimator->tell_time(at);
   if (controller) controller->tell_time(at);
+  if (!operator_hangs && heartbeat.beat()) heartbeat_ms = ms;
   rig->step(at);
   if (ms % 33 == 0)
     for (const int which : {0, 1})

@@ -17,6 +17,7 @@
 #include "drivers/can/memory_bus.hpp"
 #include "nodes/controller_node.hpp"
 #include "nodes/estimator_node.hpp"
+#include "nodes/operator_heartbeat.hpp"
 #include "nodes/rig_node.hpp"
 #include "nodes/stepper_node.hpp"
 
@@ -81,10 +82,13 @@ class SimulatedLoop {
   std::unique_ptr<nodes::EstimatorNode> estimator;
   std::unique_ptr<nodes::ControllerNode> controller;
   nodes::LcmPort camera_port{lcm};
+  nodes::OperatorHeartbeat heartbeat{port};
+  bool operator_hangs = false;  // it sends no heartbeat then
   See see;
   std::mt19937_64 rng;
   std::int64_t latency_us = 50'000;
   std::int64_t clock_offset_us = 0;
+  std::int64_t heartbeat_ms = 0;  // of the newest heartbeat
   std::int64_t ms = 0, target_seq = 0, start_ns = 1'000'000'000;
   bool real_can = false;
   std::map<std::string, process_status_t> statuses;

@@ -23,11 +23,11 @@ TEST(ProcessStatus, TellsTheLongestStepTheLatestStartAndTheOverrunsOfTheLoop) {
   int steps = 0;
   run_periodic(lcm, {kPeriod_s, {}, [&](const Now&, double) {
                        if (++steps == 1) std::this_thread::sleep_for(150ms);  // so that the next starts 50 ms late
-                       if (steps == 2) status.report("running", "");
+                       if (steps == 2) status.report(io::ProcessState::running, "");
                        return steps < 2;
                      }});
-  status.report("stopped", "");
-  status.report("gone", "");
+  status.report(io::ProcessState::stopped, "");
+  status.report(io::ProcessState::fault, "");
   pump(lcm);
   ASSERT_EQ(said.size(), 3U);
   EXPECT_GE(said[0].loop_run_max_s, 0.15);
@@ -53,8 +53,8 @@ TEST(ProcessStatus, TellsTheLongestRunOfAProcessThatItsInputDrives) {
     status.note_run(0.02);
     status.note_run(0.01);
     port.tell_time({1'000, 1});
-    status.report("running", "");
-    status.report("stopped", "");
+    status.report(io::ProcessState::running, "");
+    status.report(io::ProcessState::stopped, "");
   })
       .join();
   pump(lcm);
@@ -70,16 +70,54 @@ TEST(ProcessStatus, KnowsAnotherRunOfItsOwnProcess) {
   StatusReporter status(port, "bevel-test", 0), stranger(other_port, "bevel-other", 0);
   port.tell_time(now());
   other_port.tell_time(now());
-  status.report("running", "");
+  status.report(io::ProcessState::running, "");
   status.renew_session();  // the same run after a stop
-  status.report("running", "");
-  stranger.report("running", "");
+  status.report(io::ProcessState::running, "");
+  stranger.report(io::ProcessState::running, "");
   pump(lcm);
   EXPECT_FALSE(status.name_taken());
   StatusReporter second(other_port, "bevel-test", 0);
-  second.report("running", "");
+  second.report(io::ProcessState::running, "");
   pump(lcm);
   EXPECT_TRUE(status.name_taken());
+}
+
+TEST(ProcessStatus, ForgetsAnotherRunThatIsSilent) {
+  lcm::LCM lcm("memq://");
+  LcmPort port(lcm), other_port(lcm);
+  StatusReporter status(port, "bevel-test", 0), second(other_port, "bevel-test", 0);
+  Now at{1'000'000'000, 1'700'000'000'000'000};
+  const auto pass_ms = [&](std::int64_t ms) {
+    at.ns += ms * 1'000'000;
+    at.utime += ms * 1000;
+    port.tell_time(at);
+    other_port.tell_time(at);
+  };
+  pass_ms(0);
+  second.report(io::ProcessState::running, "");
+  pump(lcm);
+  pass_ms(1500);  // three periods
+  EXPECT_TRUE(status.name_taken());
+  pass_ms(1);
+  EXPECT_FALSE(status.name_taken());
+  second.report(io::ProcessState::running, "");  // it is back
+  pump(lcm);
+  EXPECT_TRUE(status.name_taken());
+}
+
+TEST(ProcessStatus, CarriesItsStateAsANumberAndAsText) {
+  lcm::LCM lcm("memq://");
+  LcmPort port(lcm);
+  process_status_t said{};
+  port.subscribe<process_status_t>(io::channel::kProcessStatus, [&said](const process_status_t& m) { said = m; });
+  StatusReporter status(port, "bevel-test", 0);
+  port.tell_time(now());
+  for (const auto state : {io::ProcessState::waiting, io::ProcessState::enabled, io::ProcessState::fault}) {
+    status.report(state, "");
+    pump(lcm);
+    EXPECT_EQ(said.state_code, static_cast<std::int32_t>(state));
+    EXPECT_EQ(said.state, io::to_string(state));
+  }
 }
 
 }  // namespace

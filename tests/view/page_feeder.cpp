@@ -10,6 +10,7 @@
 #include <opencv2/imgcodecs.hpp>
 #include <thread>
 
+#include "io/process_state.hpp"
 #include "view/live_view.hpp"
 #include "view/page_server.hpp"
 
@@ -77,6 +78,7 @@ int main() {
     status.utime = at.utime;
     status.process = "bevel-controller";
     status.state = "stopped";
+    status.state_code = static_cast<std::int32_t>(io::ProcessState::stopped);
     status.reason = "measurements stale <b>0.25 s</b>";
     picture.on(status, at);
     server.publish(picture.snapshot(at));

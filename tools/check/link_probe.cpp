@@ -36,7 +36,8 @@ struct Ears {
 
 MulticastMeasured measure_multicast(lcm::LCM& lcm) {
   MulticastMeasured measured;
-  measured.started = lcm.good();
+  // The second starts the receiver; a subscription crashes where that fails.
+  measured.started = lcm.good() && lcm.getFileno() >= 0;
   if (!measured.started) return measured;
   Ears ears;
   lcm::Subscription* const subscription = lcm.subscribe(kChannel, &Ears::on_message, &ears);
@@ -121,8 +122,9 @@ Findings check_all(const nodes::SystemConfig& config, const std::string& lcm_url
   Findings all;
   const auto add = [&all](const Findings& more) { all.insert(all.end(), more.begin(), more.end()); };
   lcm::LCM lcm(lcm_url);
-  all.push_back(judge_multicast(measure_multicast(lcm)));
-  if (lcm.good()) {
+  const MulticastMeasured multicast = measure_multicast(lcm);
+  all.push_back(judge_multicast(multicast));
+  if (multicast.started) {
     CameraEars ears(lcm);
     add(check_bus(config.stepper, can, system_file, [&ears] { ears.listen(); }));
     while (ears.listened_ns() < kCameraListen_ns && !nodes::stop_requested()) lcm.handleTimeout(10);

@@ -4,9 +4,11 @@
 #include <algorithm>
 #include <cctype>
 #include <cstdio>
+#include <new>
 
 #include "io/config.hpp"
 #include "tools/common/exit_status.hpp"
+#include "tools/common/limits.hpp"
 
 namespace bevel::tools {
 
@@ -141,7 +143,12 @@ int CommandLine::run(int argc, char** argv, const std::function<int()>& body) {
     return impl_->app.exit(e) == 0 ? kOk : kUsage;
   }
   try {
+    require_limits();
     return body();
+  } catch (const std::bad_alloc&) {
+    std::fprintf(stderr, "%s: out of memory; raise the limit of address space (ulimit -v unlimited) or free memory\n",
+                 impl_->app.get_name().c_str());
+    return kFailed;
   } catch (const std::exception& e) {
     std::fprintf(stderr, "%s: %s\n", impl_->app.get_name().c_str(), e.what());
     return kFailed;

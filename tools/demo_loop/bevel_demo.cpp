@@ -9,7 +9,6 @@
 int main(int argc, char** argv) {
   using namespace bevel;
   tools::DemoOptions options;
-  options.programs = std::filesystem::read_symlink("/proc/self/exe").parent_path().string();
   tools::CommandLine command_line(
       "bevel-demo", "Steers a simulated needle with all five processes and a rendered camera in the loop.");
   std::string plant = "kinematic", config;
@@ -28,6 +27,7 @@ int main(int argc, char** argv) {
       .option("--fault", options.fault,
               "break something and show the stop: COMPONENT:KIND@SECONDSs, as in camera:off@5s");
   return command_line.run(argc, argv, [&] {
+    options.programs = std::filesystem::read_symlink("/proc/self/exe").parent_path().string();
     options.config_path =
         !config.empty() ? config : tools::shipped_file(plant == "beam" ? "config/beam.toml" : "config/demo.toml");
     return tools::run_demo(options);

@@ -9,6 +9,7 @@
 
 #include "nodes/claim_name.hpp"
 #include "nodes/fault_injector.hpp"
+#include "nodes/open_lcm.hpp"
 #include "nodes/system_config.hpp"
 #include "tools/demo_loop/loop_figures.hpp"
 #include "tools/demo_loop/process_group.hpp"
@@ -107,11 +108,11 @@ int run_demo(const DemoOptions& options) {
   if (!options.fault.empty()) (void)nodes::parse_fault(options.fault);  // before anything is started
   std::filesystem::create_directories(options.out);
   const std::string log_path = options.out + "/insertion.lcm";
-  lcm::LCM lcm(config.lcm_url);
-  if (!lcm.good()) throw std::runtime_error("LCM does not start; is multicast routed? (see docs/running.md)");
+  const auto opened = nodes::open_lcm(config.lcm_url);
+  lcm::LCM& lcm = *opened;
   nodes::catch_signals();
   const Eigen::Vector3d target(options.target_mm[0], options.target_mm[1], options.target_mm[2]);
-  nodes::claim_name(lcm, config.lcm_url, "bevel-demo");
+  nodes::claim_operator(lcm, config.lcm_url, "bevel-demo");
   SteeringSession session(lcm, log_path, target,
                           options.retract_to_mm >= 0 ? std::optional(options.retract_to_mm) : std::nullopt);
   nodes::LcmPort(lcm).publish_text(io::channel::kConfig, config.text);

@@ -16,7 +16,7 @@ constexpr double kThere_mm = 0.1;  // of the depth to be drawn back to: what the
 
 SteeringSession::SteeringSession(lcm::LCM& lcm, const std::string& log_path, const Eigen::Vector3d& target_mm,
                                  std::optional<double> retract_to_mm)
-    : lcm_(lcm), port_(lcm), log_(log_path), target_mm_(target_mm), retract_to_mm_(retract_to_mm) {
+    : lcm_(lcm), port_(lcm), heartbeat_(port_), log_(log_path), target_mm_(target_mm), retract_to_mm_(retract_to_mm) {
   everything_ = lcm_.subscribe(".*", &SteeringSession::on_any, this);
   everything_->setQueueCapacity(2000);
   port_.subscribe<process_status_t>(io::channel::kProcessStatus,
@@ -63,9 +63,15 @@ std::int64_t SteeringSession::session_of(const std::string& process) const {
   return found == processes_.end() ? 0 : found->second.session;
 }
 
-std::string SteeringSession::state_of(const std::string& process) const {
+std::optional<io::ProcessState> SteeringSession::state_of(const std::string& process) const {
   const auto found = processes_.find(process);
-  return found == processes_.end() ? "not heard of" : found->second.state;
+  if (found == processes_.end()) return std::nullopt;
+  return static_cast<io::ProcessState>(found->second.state_code);
+}
+
+std::string SteeringSession::state_text(const std::string& process) const {
+  const auto state = state_of(process);
+  return state ? io::to_string(*state) : "no status";
 }
 
 std::string SteeringSession::reason() const {
@@ -79,19 +85,21 @@ std::string SteeringSession::reason() const {
 SteeringSession::Progress SteeringSession::step(const nodes::Now& now) {
   if (start_ns_ == 0) start_ns_ = now.ns;
   if (!log_failure_.empty()) return Progress::stopped;
+  heartbeat_.beat();
   print_progress(now);
-  const std::string controller = state_of("bevel-controller");
-  if (steering_seen_ && controller == "hold") {
+  using io::ProcessState;
+  const auto controller = state_of("bevel-controller");
+  if (steering_seen_ && controller == ProcessState::hold) {
     if (arrived_ns_ == 0) arrived_ns_ = now.ns;
     if (now.ns - arrived_ns_ <= kSettle_ns) return Progress::going_on;
     return retract_to_mm_ ? draw_back(now) : Progress::arrived;
   }
-  if (controller == "retracting" && !retracting_seen_) {
+  if (controller == ProcessState::retracting && !retracting_seen_) {
     retracting_seen_ = true;
     arrived_ns_ = 0;  // it is told anew when it holds again
   }
-  if (controller == "steering") steering_seen_ = true;
-  if (controller == "stopped" || controller == "fault") {
+  if (controller == ProcessState::steering) steering_seen_ = true;
+  if (controller == ProcessState::stopped || controller == ProcessState::fault) {
     // Before the start most reasons pass, and the words are said again; that of a target does not.
     const std::string& why = processes_["bevel-controller"].reason;
     if (steering_seen_ || why.starts_with(controller::to_string(controller::Reason::target_unreachable)))
@@ -100,11 +108,12 @@ SteeringSession::Progress SteeringSession::step(const nodes::Now& now) {
   if (steering_seen_ || now.ns < next_word_ns_) return Progress::going_on;
   // The operator's words, repeated until they take effect.
   next_word_ns_ = now.ns + kWordPeriod_ns;
-  const std::string stepper = state_of("bevel-stepper");
+  const auto stepper = state_of("bevel-stepper");
   const bool seen = estimate_ && estimator::lost(estimate_->health) == 0;
-  if (controller == "armed" && stepper == "enabled") {
+  if (controller == ProcessState::armed && stepper == ProcessState::enabled) {
     say(nodes::Word::start);
-  } else if (seen && controller != "armed" && (stepper == "ready" || stepper == "enabled")) {
+  } else if (seen && controller != ProcessState::armed &&
+             (stepper == ProcessState::ready || stepper == ProcessState::enabled)) {
     say(nodes::Word::arm);
   }
   return Progress::going_on;
@@ -124,8 +133,8 @@ void SteeringSession::print_progress(const nodes::Now& now) {
   if (now.ns < next_print_ns_) return;
   next_print_ns_ = now.ns + kPrintPeriod_ns;
   const double t = static_cast<double>(now.ns - start_ns_) * 1e-9;
-  std::printf("%5.1f s  controller %-12s axes %-12s", t, state_of("bevel-controller").c_str(),
-              state_of("bevel-stepper").c_str());
+  std::printf("%5.1f s  controller %-12s axes %-12s", t, state_text("bevel-controller").c_str(),
+              state_text("bevel-stepper").c_str());
   if (estimate_) {
     const Eigen::Vector3d at(estimate_->position_mm[0], estimate_->position_mm[1], estimate_->position_mm[2]);
     std::printf(" tip %6.1f %6.1f %6.1f mm  to go %5.1f mm", at.x(), at.y(), at.z(), (target_mm_ - at).norm());

@@ -1,12 +1,14 @@
 #pragma once
-// One insertion from the operator's side: everything on LCM recorded to a log, the target armed and started as soon as
-// the processes are ready, progress printed, and the end recognised.
+// The operator program of one insertion: records everything on LCM to a log, arms and starts as soon as the processes
+// are ready, prints progress and recognises the end. One loop does all of it, the operator's heartbeat included: when
+// the log cannot be written or blocks, the heartbeat ends and bevel-controller stops the needle.
 #include <Eigen/Core>
 #include <map>
 #include <optional>
 #include <string>
 
 #include "io/log_writer.hpp"
+#include "nodes/operator_heartbeat.hpp"
 #include "nodes/operator_words.hpp"
 #include "nodes/runtime.hpp"
 
@@ -37,11 +39,14 @@ class SteeringSession {
   void say(nodes::Word word, const Eigen::Vector3d& position_mm);
   Progress draw_back(const nodes::Now& now);
   void print_progress(const nodes::Now& now);
-  std::string state_of(const std::string& process) const;
+  /// Returns the newest state of \p process; nothing before its first status.
+  std::optional<io::ProcessState> state_of(const std::string& process) const;
+  std::string state_text(const std::string& process) const;
   std::int64_t session_of(const std::string& process) const;
 
   lcm::LCM& lcm_;
   nodes::LcmPort port_;
+  nodes::OperatorHeartbeat heartbeat_;
   io::LogWriter log_;
   lcm::Subscription* everything_;
   Eigen::Vector3d target_mm_;

@@ -7,6 +7,7 @@
 #include <stdexcept>
 
 #include "nodes/claim_name.hpp"
+#include "nodes/open_lcm.hpp"
 
 namespace bevel::tools {
 
@@ -27,8 +28,8 @@ int process_main(CommandLine& command_line, int argc, char** argv, const Process
       if (const std::string refused = nodes::try_realtime(realtime_priority); !refused.empty())
         std::fprintf(stderr, "%s: %s; running without\n", name(config).c_str(), refused.c_str());
     if (lcm_url.empty()) lcm_url = config.lcm_url;
-    lcm::LCM lcm(lcm_url);
-    if (!lcm.good()) throw std::runtime_error("LCM does not start; is multicast routed? (see docs/running.md)");
+    const auto opened = nodes::open_lcm(lcm_url);
+    lcm::LCM& lcm = *opened;
     ProcessContext context{config, lcm, {}, nodes::now().ns};
     if (!fault.empty()) context.fault = nodes::parse_fault(fault);
     nodes::claim_name(lcm, lcm_url, name(config));

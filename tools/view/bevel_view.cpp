@@ -8,8 +8,10 @@
 #include <limits>
 #include <stdexcept>
 
+#include "nodes/open_lcm.hpp"
 #include "nodes/runtime.hpp"
 #include "tools/common/command_line.hpp"
+#include "tools/common/limits.hpp"
 #include "view/view_node.hpp"
 
 namespace {
@@ -46,8 +48,10 @@ int main(int argc, char** argv) {
     if (!command.empty()) return start_with_port(command, socket);
     nodes::catch_signals();
     if (parent != 0) nodes::end_with(parent);
-    lcm::LCM lcm(lcm_url);
-    if (!lcm.good()) throw std::runtime_error("LCM does not start; is multicast routed? (see docs/running.md)");
+    const auto opened = nodes::open_lcm(lcm_url);
+    lcm::LCM& lcm = *opened;
+    // The library that serves the page ends the program where one of its threads is refused.
+    tools::require_threads(view::PageServer::kThreads);
     view::ViewNode node(lcm, socket);
     std::printf("watch at %s\n", node.address().c_str());
     std::fflush(stdout);

@@ -378,7 +378,6 @@ async function showPicture(shown, p) {
   }
 }
 
-const kBadStates = ['stopped', 'fault', 'lost'];
 function drawTables() {
   document.querySelector('#cameras tbody').replaceChildren(...state.tips.map(t => {
     const old = age(t.age_s) > kStale_s.camera;
@@ -388,7 +387,7 @@ function drawTables() {
   }));
   document.querySelector('#processes tbody').replaceChildren(...state.processes.map(p => {
     const old = age(p.age_s) > kStale_s.process;
-    return row([[p.name], [p.state, kBadStates.includes(p.state) ? 'bad' : 'good'], [p.reason], [fixed(p.run_max_ms, 1)],
+    return row([[p.name], [p.state, p.stopped ? 'bad' : 'good'], [p.reason], [fixed(p.run_max_ms, 1)],
       [fixed(p.late_max_ms, 1)], [p.overruns, p.overruns ? 'bad' : ''], [p.received], [p.rejected, p.rejected ? 'bad' : ''],
       [fixed(age(p.age_s), 1)]], old);
   }));
@@ -406,11 +405,11 @@ function drawHead() {
   if (!state) return;
   badge('mode', state.played_back ? 'played back: ' + new Date(state.utime / 1000).toISOString().slice(0, 19) + 'Z' : 'live', 'quiet');
   const says = name => state.processes.find(p => p.name === name);
-  const stopped = state.processes.find(p => kBadStates.includes(p.state));
+  const stopped = state.processes.find(p => p.stopped);
   const who = stopped || says('bevel-controller') || state.processes[0];
   if (!who) return;
   const old = age(who.age_s) > kStale_s.process;
-  badge('state', old ? `${who.name} silent` : who.state, old || stopped ? 'bad' : who.state === 'steering' || who.state === 'retracting' ? 'good' : '');
+  badge('state', old ? `${who.name} silent` : who.state, old || stopped ? 'bad' : who.moves ? 'good' : '');
   byId('reason').textContent = who.reason ? `${who.name}: ${who.reason}` : '';
 }
 
