@@ -164,7 +164,7 @@ std::string value_text(cia301::ObjectAddress object, std::uint32_t value) {
 }
 
 std::string details_of(const Stop& stop) {
-  const std::string object = name_of(stop.object);
+  std::string object = name_of(stop.object);
   const std::string found = value_text(stop.object, stop.code), wanted = value_text(stop.object, stop.wanted);
   switch (stop.reason) {
     case StopReason::sdo_aborted:
