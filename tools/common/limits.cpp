@@ -94,10 +94,9 @@ void require_threads(int count) {
     changed.notify_all();
   }
   if (!refused.empty())
-    throw std::runtime_error("a thread is refused (" + refused + "), " + std::to_string(count) +
-                             " are required; raise the limits of processes, of " +
-                             text_of(limit_of(RLIMIT_NPROC).rlim_cur) + ", and of address space: ulimit -u 4096, " +
-                             "ulimit -v unlimited");
+    throw std::runtime_error("a thread is refused (" + refused + "), required: " + std::to_string(count) +
+                             "; the limit of processes is " + text_of(limit_of(RLIMIT_NPROC).rlim_cur) +
+                             ", raise it: ulimit -u 4096; and that of address space: ulimit -v unlimited");
 }
 
 void require_limits() {
