@@ -178,7 +178,7 @@ std::vector<SdoJob> configuration_script(const StepperConfig& config, std::size_
   script.set({0x1016, 1}, 4,
              static_cast<std::uint32_t>(config.master_id) << 16 |
                  static_cast<std::uint32_t>(config.master_heartbeat_timeout_ns / kMs));
-  script.write({0x1029, 1}, 1, 0, Optional::any);
+  script.set({0x1029, 1}, 1, 0, Optional::any);
   constexpr std::uint32_t kQuickStopOnLoss = 3, kDisableVoltageOnLoss = 2;
   script.set({0x6007, 0}, 2, kQuickStopOnLoss, Optional::may_lack).fallback = kDisableVoltageOnLoss;
 
@@ -188,7 +188,7 @@ std::vector<SdoJob> configuration_script(const StepperConfig& config, std::size_
   script.map_pdo(0x1801, 0x1A01, cia301::tpdo2_id(node), kEverySync, {{0x6064, 32}, {0x6061, 8}});
 
   script.set({0x605A, 0}, 2, static_cast<std::uint16_t>(config.quick_stop_option), Optional::may_be_fixed);
-  script.write({0x605E, 0}, 2, 2, Optional::any);  // fault: quick-stop ramp, then no torque
+  script.set({0x605E, 0}, 2, 2, Optional::any);  // fault: quick-stop ramp, then no torque
   const double counts = std::abs(axis.counts_per_unit);
   if (axis.following_error_unit > 0.0) {
     script.set({0x6065, 0}, 4, static_cast<std::uint32_t>(std::lround(axis.following_error_unit * counts)));
@@ -199,8 +199,8 @@ std::vector<SdoJob> configuration_script(const StepperConfig& config, std::size_
   script.set_quantity({0x6084, 0}, Quantity::acceleration, axis.acceleration_unit_s2 * counts);
   script.set_quantity({0x6085, 0}, Quantity::acceleration, axis.quick_stop_unit_s2 * counts);
   if (cyclic) {
-    script.write({0x60C2, 1}, 1, static_cast<std::uint32_t>(config.period_ns / kMs), Optional::any);
-    script.write({0x60C2, 2}, 1, kMilliseconds, Optional::any);
+    script.set({0x60C2, 1}, 1, static_cast<std::uint32_t>(config.period_ns / kMs), Optional::any);
+    script.set({0x60C2, 2}, 1, kMilliseconds, Optional::any);
   }
   script.write({0x60FF, 0}, 4, 0);
   script.write({0x6060, 0}, 1, mode);

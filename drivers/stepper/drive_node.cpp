@@ -147,6 +147,7 @@ void DriveNode::on_heartbeat(const can::Frame& frame, std::int64_t now_ns) {
   reads_back_ = falls_back_ = false;
   units_ = {};
   scales_ = {};
+  unanswered_ = 0;
   std::ranges::fill(settled_, std::nullopt);
   retries_ = 0;
   job_since_ns_ = now_ns;

@@ -166,8 +166,9 @@ void DriveNode::monitor(std::int64_t now_ns, Transmitter& out) {
     const bool ended = !sdo_.frame_to_send() && sdo_.status() != Status::waiting;
     if (ended) judge_monitored(now_ns);
   } else if (now_ns >= next_monitor_ns_ && sdo_.status() == Status::idle) {
-    for (std::size_t i = 0; i < script_.size() && !settled_.at(monitored_); ++i)
-      monitored_ = (monitored_ + 1) % script_.size();
+    std::size_t looked = 0;
+    while (!settled_.at(monitored_) && looked++ < script_.size()) monitored_ = (monitored_ + 1) % script_.size();
+    if (!settled_.at(monitored_)) return;
     sdo_.upload(script_.at(monitored_).object);
     monitoring_ = true;
     next_monitor_ns_ = now_ns + kMonitorEvery_periods * config_.period_ns;

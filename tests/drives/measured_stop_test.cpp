@@ -160,7 +160,8 @@ TEST_F(MeasuredStop, FindsEachSettingThatChanges) {
   for (const Changed& each :
        {Changed{0x6085, 0, 1}, Changed{0x6084, 0, 1}, Changed{0x6083, 0, 1}, Changed{0x607F, 0, 1},
         Changed{0x605A, 0, 0}, Changed{0x6007, 0, 0}, Changed{0x1016, 1, 0}, Changed{0x1017, 0, 60},
-        Changed{0x6096, 1, 2}, Changed{0x1800, 2, 255}, Changed{0x1A01, 1, 0x60640020}}) {
+        Changed{0x605E, 0, 0}, Changed{0x1029, 1, 1}, Changed{0x6096, 1, 2}, Changed{0x1800, 2, 255},
+        Changed{0x1A01, 1, 0x60640020}}) {
     Bench world;
     ASSERT_TRUE(world.enable());
     world.run_ms(100);
