@@ -19,8 +19,8 @@ constexpr std::int64_t kNmtStopPause_ns = 100 * kMs;
 
 std::int64_t reaction_ns(const StepperConfig& config) { return 2 * config.period_ns + kDriveReaction_ns; }
 
-// Whether a trouble can be a consequence of the stop itself, or of the end of our heartbeat.
-bool is_loss(StopReason reason) {
+// True for a trouble that is reported in addition to the stop that came before it.
+bool is_reported_later(StopReason reason) {
   switch (reason) {
     case StopReason::drive_heartbeat_lost:
     case StopReason::drive_reset:
@@ -77,7 +77,7 @@ void StepperDriver::note_later(const Stop& stop) {
   const bool same = stop.reason == stop_.reason && stop.axis == stop_.axis;
   const bool caused_by_us = withhold_heartbeat_ || std::ranges::count(orders_, StopOrder::nmt_stop) > 0;
   const bool noted = later_.reason != StopReason::none && later_.reason != StopReason::pdo_lost;
-  if (!same && !caused_by_us && !noted && is_loss(stop.reason)) later_ = stop;
+  if (!same && !caused_by_us && !noted && is_reported_later(stop.reason)) later_ = stop;
 }
 
 // The fastest that the axis may be going: as its positions show, or as it was commanded and they do not show yet. The
