@@ -30,8 +30,11 @@ io::SenderLimits axes_limits(const estimator::HealthLimits& limits) {
   return {.longest_age_us = age_us, .fastest_hz = kFastestCycle_hz, .silence_us = age_us};
 }
 
-estimator::EstimatorConfig live(estimator::EstimatorConfig config) {
+estimator::EstimatorConfig live(estimator::EstimatorConfig config, const io::MotionBounds& bounds) {
   config.start_at_axes = true;
+  config.axes.gap_s = config.limits.actuator_age_s;
+  config.axes.insertion_rate_mm_s = bounds.insertion_rate_mm_s;
+  config.axes.rotation_rate_rad_s = bounds.rotation_rate_rad_s;
   return config;
 }
 
@@ -116,8 +119,8 @@ needle_shaft_t shaft_message(const estimator::Estimate& estimate, double guide_m
 EstimatorNode::EstimatorNode(lcm::LCM& lcm, const estimator::EstimatorConfig& config, const io::MotionBounds& bounds)
     : bounds_(bounds),
       port_(lcm),
-      estimator_(live(config)),
-      entry_line_(live(config)),
+      estimator_(live(config, bounds)),
+      entry_line_(live(config, bounds)),
       status_(port_, "bevel-estimator", kPeriod_s),
       words_(port_, status_, Receiver::estimator, [this](Word word, const steering_target_t&) { on_word(word); }),
       cameras_(config.limits.measurement_silence_s),
@@ -140,9 +143,10 @@ EstimatorNode::EstimatorNode(lcm::LCM& lcm, const estimator::EstimatorConfig& co
 }
 
 void EstimatorNode::on_axes(const actuator_state_t& m) {
-  // Axes that are off do not move: what jumps is their zero, and the estimate begins where they now count from.
-  const bool new_zero =
-      axes_ && io::at_rest_and_off(*axes_) && io::at_rest_and_off(m) && io::check_jump(*axes_, m, bounds_);
+  // Numbers that begin anew are of another driver, which has a zero of its own. Axes that are off do not move, so that
+  // a jump is a new zero; others jump only where an operator has armed after the jump was refused. The estimate begins
+  // where they now count from.
+  const bool new_zero = axes_ && (m.seq < axes_->seq || io::check_jump(*axes_, m, bounds_));
   axes_ = m;
   if (new_zero) entry_.restart();
   if (entry_.see_axes(m.insertion_mm) || new_zero) restart();
@@ -196,6 +200,7 @@ void EstimatorNode::on_word(Word word) {
   port_.forget_senders();
   cameras_.restart();
   headings_.restart();
+  estimator_.forget_rejects();
   input_refused_ = false;
   remark_.clear();
 }
@@ -252,6 +257,7 @@ void EstimatorNode::step(const Now& now) {
     remark_ = "another bevel-estimator is heard on this network";
   }
   if (now.ns - described_ns_ >= kDescribed_ns) {  // numbers that change all the time
+    innovations_.forget_silent(now.utime);
     innovation_text_ = describe(innovations_);
     entry_text_ = describe(entry_line_);
     nuisance_text_ = describe(estimator_.estimate(now.utime).state.nuisance);
