@@ -10,12 +10,30 @@
 #include "model/age.hpp"
 
 namespace bevel::estimator {
+namespace {
+
+double square(double x) { return x * x; }
+
+// About body x and y.
+double largest_tilt_variance(const FilterState& state) {
+  return state.covariance.diagonal().segment<2>(3).maxCoeff();
+}
+
+// To what standard deviation a heading must be known for steps from it to be run again: about that of an insertion's
+// start, for which running them again was validated.
+double known_heading_sd(const Prior& prior) {
+  constexpr double kLeast_rad = 0.03;
+  return std::max(kLeast_rad, 1.5 * std::hypot(prior.tilt_sd_rad, prior.variation.entry_angle_rad));
+}
+
+}  // namespace
 
 NeedleEstimator::NeedleEstimator(const EstimatorConfig& config, std::size_t history)
     : filter_(config),
       past_(config.effects.empty() && config.prior.bending_mm == 0 && !config.nuisance.any()
                 ? static_cast<std::size_t>(std::max(config.relinearised_steps, 0))
                 : 0),
+      known_heading_sd_rad_(known_heading_sd(config.prior)),
       walked_(std::make_unique_for_overwrite<WalkedStep[]>(past_.room())) {
   pool_.resize(std::max<std::size_t>(history, 8));
   order_.reserve(pool_.size());
@@ -73,7 +91,10 @@ void NeedleEstimator::restart_past(const FilterState& start) {
 }
 
 void NeedleEstimator::remember(const Node& before, const Node& node) {
-  const bool first = !past_started_, reset = node.state.reset_count != before.state.reset_count;
+  // Steps from a heading that is hardly known would be run again along paths that the model does not hold for: the past
+  // begins where it is known.
+  const bool first = !past_started_ || !(largest_tilt_variance(before.state) < square(known_heading_sd_rad_));
+  const bool reset = node.state.reset_count != before.state.reset_count;
   if (first || reset) restart_past(first ? before.state : node.state);
   // In the channel too: what the readings there share is not in the past's.
   const double forgotten =
@@ -364,8 +385,7 @@ Estimate NeedleEstimator::describe(const FilterState& state, std::int64_t utime,
   }
   const double largest_variance = state.covariance.diagonal().head<3>().maxCoeff();
   if (!(largest_variance < limits.position_sd_mm * limits.position_sd_mm)) result.health |= kUncertain;
-  const double tilt_variance = state.covariance.diagonal().segment<2>(3).maxCoeff();
-  if (!(tilt_variance < limits.heading_sd_rad * limits.heading_sd_rad)) result.health |= kHeadingUncertain;
+  if (!(largest_tilt_variance(state) < square(limits.heading_sd_rad))) result.health |= kHeadingUncertain;
   // A source that is gone is rejected no more.
   const auto rejects = [&](std::int32_t in_row, std::int64_t heard_utime) {
     return older_than(heard_utime, limits.rejects_forgotten_s) ? 0 : in_row;

@@ -129,6 +129,7 @@ class NeedleEstimator {
   std::vector<std::uint32_t> free_;
   std::size_t processed_ = 0;             // nodes before this index hold a posterior
   Past past_;                             // what has left the history, from its start or the last reset
+  double known_heading_sd_rad_;           // at which the past begins
   std::unique_ptr<WalkedStep[]> walked_;  // room to run it again in: sized once, memory comes as it is used
   bool past_started_ = false;
   bool past_waits_ = false;        // for a needle that was drawn back
