@@ -56,12 +56,11 @@ bool NeedleFilter::cut_straight_sized(FilterState& state, double insertion_mm) c
 
 void NeedleFilter::cut_straight(FilterState& state, double insertion_mm) const {
   if (insertion_mm == 0) return;
-  state.outside_model = !(ten_states_ ? cut_straight_sized<10>(state, insertion_mm)
-                                      : cut_straight_sized<9>(state, insertion_mm));
+  state.outside_model =
+      !(ten_states_ ? cut_straight_sized<10>(state, insertion_mm) : cut_straight_sized<9>(state, insertion_mm));
 }
 
-void NeedleFilter::widen_by_gap(FilterState& state, double insertion_mm, double rotation_rad,
-                                double duration_s) const {
+void NeedleFilter::widen_by_gap(FilterState& state, double insertion_mm, double rotation_rad, double duration_s) const {
   const double k2 = square(state.curvature_per_mm) + std::max(state.covariance(6, 6), 0.0);
   const double net_mm = std::abs(insertion_mm);
   const double widest_mm = std::max(std::sqrt(2 / std::max(k2, 1e-12)) * kWidestTilt_rad, net_mm);

@@ -7,17 +7,17 @@ namespace bevel::estimator {
 
 enum Health : std::int32_t {
   kHealthy = 0,
-  kNoMeasurement = 1,     // none accepted since the start or the last reset
-  kMeasurementStale = 2,  // the newest measurement is too old
-  kActuatorStale = 4,     // the newest actuator state is too old, so the estimate is too
-  kUncertain = 8,         // position variance above its bound
-  kRejecting = 16,        // the gate refused more measurements in a row than outliers are
-  kOutsideModel = 32,     // the pose left the domain of the slip law; propagation stopped
-  kNotFromEntry = 64,     // began with the needle in the tissue: its path up to there is not known
-  kCameraSilent = 128,    // a camera that was heard is heard no more
-  kCameraFrozen = 256,    // a camera says the same to the last bit while the needle moves
-  kInputRefused = 512,    // two senders, or motion that cannot be; until armed anew
-  kUnsure = 1024,         // the gate refused the newest readings: outliers perhaps; slow down until they pass
+  kNoMeasurement = 1,        // none accepted since the start or the last reset
+  kMeasurementStale = 2,     // the newest measurement is too old
+  kActuatorStale = 4,        // the newest actuator state is too old, so the estimate is too
+  kUncertain = 8,            // position variance above its bound
+  kRejecting = 16,           // the gate refused more measurements in a row than outliers are
+  kOutsideModel = 32,        // the pose left the domain of the slip law; propagation stopped
+  kNotFromEntry = 64,        // began with the needle in the tissue: its path up to there is not known
+  kCameraSilent = 128,       // a camera that was heard is heard no more
+  kCameraFrozen = 256,       // a camera says the same to the last bit while the needle moves
+  kInputRefused = 512,       // two senders, or motion that cannot be; until armed anew
+  kUnsure = 1024,            // the gate refused the newest readings: outliers perhaps; slow down until they pass
   kHeadingUncertain = 2048,  // heading variance above its bound
   // Why the last reset was declared (ResetCause): set for kResetReported_us after it, and until the estimate is within
   // its bounds again.
@@ -50,9 +50,7 @@ constexpr std::int32_t reset_bit(ResetCause cause) {
 inline constexpr std::int64_t kResetReported_us = 1'000'000;
 
 /// Bits with which an estimate must not be steered by: all but kUnsure and the causes of resets.
-constexpr std::int32_t lost(std::int32_t health) {
-  return health & ~(static_cast<std::int32_t>(kUnsure) | kResetBits);
-}
+constexpr std::int32_t lost(std::int32_t health) { return health & ~(static_cast<std::int32_t>(kUnsure) | kResetBits); }
 
 std::string describe_health(std::int32_t health);
 

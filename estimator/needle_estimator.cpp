@@ -15,9 +15,7 @@ namespace {
 double square(double x) { return x * x; }
 
 // About body x and y.
-double largest_tilt_variance(const FilterState& state) {
-  return state.covariance.diagonal().segment<2>(3).maxCoeff();
-}
+double largest_tilt_variance(const FilterState& state) { return state.covariance.diagonal().segment<2>(3).maxCoeff(); }
 
 // To what standard deviation a heading must be known for steps from it to be run again: about that of an insertion's
 // start, for which running them again was validated.

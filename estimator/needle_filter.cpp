@@ -280,8 +280,7 @@ template <int kSize>
 Update NeedleFilter::update_sized(FilterState& state, const model::TipMeasurement& measurement) const {
   SeenAxes seen = seen_axes(measurement.information_per_mm2);
   if (seen.rank == 0) return {};  // sees nothing: no rejection either
-  const auto camera =
-      static_cast<std::size_t>(std::clamp<std::int32_t>(measurement.camera, 0, kCamerasCounted - 1));
+  const auto camera = static_cast<std::size_t>(std::clamp<std::int32_t>(measurement.camera, 0, kCamerasCounted - 1));
   std::uint8_t& camera_rejects = state.camera_rejects_in_row.at(camera);
   std::int64_t& camera_utime = state.camera_utime.at(camera);
   if (is_forgotten(camera_utime, measurement.utime)) camera_rejects = 0;

@@ -66,7 +66,7 @@ std::vector<Rates> draw_motion(Unseen kind, int gap_ms, std::mt19937_64& rng) {
 
 struct Passed {
   bool in_domain = true;
-  bool reset_before = false;  // the filter took the bevel for turned over: a k of the prior's far end
+  bool reset_before = false;     // the filter took the bevel for turned over: a k of the prior's far end
   std::array<double, 3> nees{};  // at the end of the gap, after half a second at rest, after 40 mm more
   Estimate after;
   std::int64_t in_gap = 0;
@@ -149,8 +149,8 @@ TEST(Gap, UnseenMotionWithinTheLimitsStaysWithinTheCovariance) {
         EXPECT_GT(one.in_gap, 0);
         for (std::size_t n = 0; n < nees.size(); ++n) nees.at(n) += one.nees.at(n) / (9 * kRuns);
       }
-      std::cout << kNames.at(static_cast<std::size_t>(k)) << ", " << gap_s << " s: " << nees[0] << " " << nees[1]
-                << " " << nees[2] << ", redrawn " << redrawn << "\n";
+      std::cout << kNames.at(static_cast<std::size_t>(k)) << ", " << gap_s << " s: " << nees[0] << " " << nees[1] << " "
+                << nees[2] << ", redrawn " << redrawn << "\n";
       // After longer ones the heading is reported as too uncertain, and nothing is steered by it.
       const std::size_t checked = gap_s > 2 ? 2 : 3;
       for (std::size_t n = 0; n < checked; ++n)

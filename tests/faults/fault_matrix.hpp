@@ -23,6 +23,8 @@ struct FaultClass {
   std::vector<std::string> causes;
   // When the fault begins to show: some do nothing until they contradict what is commanded. Empty: at once.
   std::function<bool(const SimulatedLoop&)> shows;
+  // Once it is taken back: what else must hold, "" or what does not. Empty: nothing.
+  std::function<std::string(const SimulatedLoop&)> judge = nullptr;
 };
 std::vector<FaultClass> fault_classes();
 

@@ -199,9 +199,10 @@ Replay replay_log(std::span<const std::uint8_t> log, const std::string& name, co
     row.test_ratio = estimate.newest_update.test_ratio;
     row.health = estimate.health;
     if (!is_finite(estimate))
-      throw std::runtime_error(name + ": the estimate is not finite from " +
-                               std::to_string(static_cast<double>(actuator.utime - result.states.front().utime) * 1e-6) +
-                               " s on; check the measurements before that time, and the model file");
+      throw std::runtime_error(
+          name + ": the estimate is not finite from " +
+          std::to_string(static_cast<double>(actuator.utime - result.states.front().utime) * 1e-6) +
+          " s on; check the measurements before that time, and the model file");
   }
   result.processor_s = processor_s() - start_processor_s;
   result.run_s = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
