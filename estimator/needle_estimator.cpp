@@ -163,7 +163,7 @@ void NeedleEstimator::add(const model::ActuatorState& actuator) {
   }
   made->insertion_mm = actuator.insertion_mm;
   made->rotation_rad = actuator.rotation_rad;
-  made->axes_utime = actuator.utime;
+  made->axes = {actuator.utime, actuator.insertion_mm, actuator.rotation_rad, actuator.axis_status};
   if (index == 0) {
     made->state = filter_.config().start_at_axes ? filter_.inserted(made->insertion_mm, made->rotation_rad)
                                                  : filter_.initial(made->insertion_mm, made->rotation_rad);
@@ -243,7 +243,7 @@ void NeedleEstimator::shift_time(std::int64_t by_us) {
     for (std::int64_t& utime : n.state.camera_utime)
       if (utime != 0) utime += by_us;
     if (n.state.heading_utime != 0) n.state.heading_utime += by_us;
-    n.axes_utime += by_us;
+    n.axes.utime += by_us;
     ++n.state.reset_count;
     n.state.reset_cause = ResetCause::clock_set;
     n.state.reset_utime = n.utime;
@@ -252,9 +252,21 @@ void NeedleEstimator::shift_time(std::int64_t by_us) {
   past_started_ = false;  // its states carry other times
 }
 
-bool NeedleEstimator::is_gap(std::int64_t from_utime, std::int64_t to_utime) const {
+// Longer than motion may be interpolated over. Drives that report that they are not enabled, before and after, and that
+// stand where they stood, are at rest in between: bevel-stepper reports nothing while it resets them for an arm.
+bool NeedleEstimator::is_gap(const Reported& from, const Reported& to) const {
+  constexpr double kRelaxes_mm = 0.1, kRelaxes_rad = 0.1;  // a motor that is switched off
   const double gap_s = filter_.config().axes.gap_s;
-  return gap_s > 0 && static_cast<double>(to_utime - from_utime) * 1e-6 > gap_s;
+  if (!(gap_s > 0 && static_cast<double>(to.utime - from.utime) * 1e-6 > gap_s)) return false;
+  const auto has = [&](model::AxisStatus status) {
+    const auto wanted = static_cast<std::int32_t>(status);
+    return std::ranges::count(from.status, wanted) + std::ranges::count(to.status, wanted);
+  };
+  const bool known = has(model::AxisStatus::off) < 4;  // recordings without a status have that of drives that are off
+  const bool at_rest = known && has(model::AxisStatus::enabled) == 0 &&
+                       std::abs(to.insertion_mm - from.insertion_mm) < kRelaxes_mm &&
+                       std::abs(to.rotation_rad - from.rotation_rad) < kRelaxes_rad;
+  return !at_rest;
 }
 
 // False in a gap: the axes are then left where they were before it.
@@ -265,12 +277,12 @@ bool NeedleEstimator::interpolate(std::size_t index) {
   const Node& a = node(before);
   n.insertion_mm = a.insertion_mm;
   n.rotation_rad = a.rotation_rad;
-  n.axes_utime = node(index - 1).axes_utime;
+  n.axes = node(index - 1).axes;
   if (n.utime == a.utime) return true;  // needs no later actuator state
   std::size_t after = index + 1;
   while (node(after).kind != Kind::actuator) ++after;
   const Node& b = node(after);
-  if (is_gap(n.axes_utime, b.utime)) return false;
+  if (is_gap(n.axes, b.axes)) return false;
   const double share = static_cast<double>(n.utime - a.utime) / static_cast<double>(b.utime - a.utime);
   n.insertion_mm += share * (b.insertion_mm - a.insertion_mm);
   n.rotation_rad += share * (b.rotation_rad - a.rotation_rad);
@@ -294,8 +306,8 @@ void NeedleEstimator::process_from(std::size_t index) {
     }
     const double insertion_mm = n.insertion_mm - previous.insertion_mm;
     const double rotation_rad = n.rotation_rad - previous.rotation_rad;
-    if (n.kind == Kind::actuator && is_gap(previous.axes_utime, n.utime))
-      filter_.pass_gap(n.state, insertion_mm, rotation_rad, static_cast<double>(n.utime - previous.axes_utime) * 1e-6,
+    if (n.kind == Kind::actuator && is_gap(previous.axes, n.axes))
+      filter_.pass_gap(n.state, insertion_mm, rotation_rad, static_cast<double>(n.utime - previous.axes.utime) * 1e-6,
                        n.utime);
     else
       filter_.predict(n.state, insertion_mm, rotation_rad, static_cast<double>(n.utime - previous.utime) * 1e-6);

@@ -89,6 +89,12 @@ class NeedleEstimator {
   // Less is how far an axis at rest is read differently.
   static constexpr double kDrawnBack_mm = 0.01;
   enum class Kind : std::uint8_t { actuator, position, heading };
+  // What an actuator state reported.
+  struct Reported {
+    std::int64_t utime = 0;
+    double insertion_mm = 0, rotation_rad = 0;
+    std::array<std::int32_t, 2> status{};
+  };
   struct Node {
     std::int64_t utime = 0;
     Kind kind = Kind::actuator;
@@ -97,7 +103,7 @@ class NeedleEstimator {
     bool applied_before = false;
     bool counted_in_gap = false;
     bool rejects_forgotten = false;  // when it is applied again, its rejection does not count
-    std::int64_t axes_utime = 0;     // of the newest actuator state up to it
+    Reported axes;                   // the newest actuator state up to it
     double insertion_mm = 0;
     double rotation_rad = 0;
     Moved moved;                        // since the node before, by the model
@@ -119,7 +125,7 @@ class NeedleEstimator {
   void restart_past(const FilterState& start);
   void relinearise_if_due();
   bool interpolate(std::size_t index);
-  bool is_gap(std::int64_t from_utime, std::int64_t to_utime) const;
+  bool is_gap(const Reported& from, const Reported& to) const;
   Estimate describe(const FilterState& state, std::int64_t utime, const Update& newest_update,
                     std::int64_t now_utime) const;
 

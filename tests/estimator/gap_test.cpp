@@ -176,6 +176,26 @@ TEST(Gap, AnIntervalWithinTheAgeLimitIsInterpolatedAsBefore) {
   EXPECT_EQ(a.reset_count, 0);
 }
 
+// While it resets drives for an arm the stepper reports nothing. Drives that are not enabled, before and after, and
+// that stand where they stood, have not moved.
+TEST(Gap, DrivesThatAreNotEnabledAndStandWhereTheyStoodHaveNotMoved) {
+  for (const auto& [before, after, moved_mm, gap] :
+       {std::tuple(3, 0, 0.0, false), std::tuple(2, 2, 0.0, true), std::tuple(3, 0, 0.5, true),
+        std::tuple(3, 2, 0.0, true), std::tuple(0, 0, 0.0, true)}) {
+    NeedleEstimator estimator(agar_config());
+    for (int i = 0; i < 20; ++i) {
+      model::ActuatorState axes;
+      axes.utime = testing::kStart_utime + std::int64_t{10'000} * i + (i >= 10 ? 600'000 : 0);
+      axes.seq = i;
+      axes.axis_status = {i < 10 ? before : after, i < 10 ? before : 3 * (after != 0)};
+      axes.insertion_mm = 20 + (i >= 10 ? moved_mm : 0);
+      estimator.add(axes);
+    }
+    const auto now = testing::kStart_utime + 790'000;
+    EXPECT_EQ(estimator.estimate(now).state.reset_count, gap ? 1 : 0) << before << after << moved_mm;
+  }
+}
+
 // One report that arrives late, within a gap, ends it: what was measured is applied, and nothing is reset.
 TEST(Gap, AReportThatArrivesLateClosesIt) {
   std::mt19937_64 rng(62);

@@ -184,7 +184,8 @@ FaultClass gap_of_axes() {
   return c;
 }
 
-// One camera of two is wrong until it is rejected, and then gone.
+// One camera of two is wrong until it is rejected, and then gone. It shows with its second rejected measurement: one
+// alone is an outlier, which the gate keeps out.
 FaultClass rejected_camera_vanishes() {
   FaultClass c;
   c.name = "camera:rejected, vanishes";
@@ -201,6 +202,9 @@ FaultClass rejected_camera_vanishes() {
       m.position_mm[camera == 0 ? 1 : 0] += off_mm;
       return m;
     };
+  };
+  c.shows = [](const SimulatedLoop& loop) {
+    return loop.needle_state && (loop.needle_state->health & (estimator::kUnsure | estimator::kRejecting)) != 0;
   };
   c.mend = [](SimulatedLoop& loop) { loop.run(1); };
   c.judge = [](const SimulatedLoop& loop) -> std::string {
