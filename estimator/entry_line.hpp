@@ -10,9 +10,9 @@
 // with the entry point (x0, y0), the slope (a, b), the relative error c of the bend, the bevel's roll r, and lambda1,
 // lambda2 and a stiff shaft's bending length in their own standard deviations: which way a needle slips looks like a
 // slope until it is turned. Of slope and bend next to nothing is held beforehand, of the others the filter's priors.
-// What is measured along z is left out: a slope is not seen there. Errors that neighbouring measurements of a camera
-// share (ReadingNoise) make each worth less than its information says: NeedleFilter::worth, which over many of them is
-// their effective sample size. Lengths in mm, angles in rad; nothing allocates.
+// Measurements along z are left out: they contain no slope. Autocorrelated errors of a camera (ReadingNoise) reduce the
+// information of each measurement by NeedleFilter::worth, so that many of them count by their effective sample size.
+// Lengths in mm, angles in rad; nothing allocates.
 #include <array>
 #include <cstdint>
 

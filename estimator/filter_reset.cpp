@@ -1,4 +1,4 @@
-// Declared resets of the filter: the pose is no longer trusted, and its covariance says so.
+// Declared resets of the filter: the pose is no longer trusted, and its covariance is widened accordingly.
 #include <algorithm>
 #include <cmath>
 #include <tuple>

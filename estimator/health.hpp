@@ -14,8 +14,8 @@ enum Health : std::int32_t {
   kRejecting = 16,           // the gate refused more measurements in a row than outliers are
   kOutsideModel = 32,        // the pose left the domain of the slip law; propagation stopped
   kNotFromEntry = 64,        // began with the needle in the tissue: its path up to there is not known
-  kCameraSilent = 128,       // a camera that was heard is heard no more
-  kCameraFrozen = 256,       // a camera says the same to the last bit while the needle moves
+  kCameraSilent = 128,       // a camera stopped sending
+  kCameraFrozen = 256,       // a camera sends the same values to the last bit while the needle moves
   kInputRefused = 512,       // two senders, or motion that cannot be; until armed anew
   kUnsure = 1024,            // the gate refused the newest readings: outliers perhaps; slow down until they pass
   kHeadingUncertain = 2048,  // heading variance above its bound

@@ -89,7 +89,7 @@ class NeedleEstimator {
   // Less is how far an axis at rest is read differently.
   static constexpr double kDrawnBack_mm = 0.01;
   enum class Kind : std::uint8_t { actuator, position, heading };
-  // What an actuator state reported.
+  // Positions and status of an actuator state.
   struct Reported {
     std::int64_t utime = 0;
     double insertion_mm = 0, rotation_rad = 0;

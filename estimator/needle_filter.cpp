@@ -53,7 +53,7 @@ SeenAxes seen_axes(const Eigen::Matrix3d& information) {
 }
 
 // Much of a measurement's information at once moves a state that is hardly known by more than its linearisation holds:
-// a correction of tilt w and position v moves the tip by w x v / 2 beside what the measurement asks for. It is then
+// a correction of tilt w and position v moves the tip by w x v / 2 in addition to v. The information is then
 // applied in parts, each with kGrowth times the information of the one before, and linearised anew in between
 // (recursive update filter: Zanetti 2012, IEEE TAC 57(2)). The first part corrects half of the error.
 constexpr double kGrowth = 4;

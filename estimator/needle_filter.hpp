@@ -277,7 +277,7 @@ class NeedleFilter {
   model::AugmentedState augmented(const FilterState& state) const;
   // blur_mm2: what the effects do not know of it, along the axes of {A}.
   model::TipReading reading(const FilterState& state, Eigen::Vector3d* blur_mm2 = nullptr) const;
-  // By how much the tip may have strayed; aside and tilt alike along both axes across the needle.
+  // Variance of an unknown path at its end; that of offset and tilt is the same along both axes across the needle.
   struct Widening {
     double aside_mm2 = 0, aside_with_tilt_mm_rad = 0, tilt_rad2 = 0, along_mm2 = 0;
   };

@@ -102,8 +102,8 @@ constexpr double kMatrixTolerance = 1e-6;
 // leaves of a rotated matrix, the square of 1e-16 of its entries.
 constexpr double kSmallestEntry = 1e-150;
 
-// What every covariance or information matrix satisfies: symmetric and positive semi-definite to rounding, each entry
-// zero or large enough to compute with. `unit2`: the square of the unit in which row and column i are looked at.
+// Checks that a matrix is symmetric and positive semi-definite to rounding, and that each entry is zero or large enough
+// to compute with. `unit2`: the square of the unit by which row and column i are scaled.
 template <std::size_t kRows>
 bool could_be_covariance(const double* matrix, const std::array<double, kRows>& unit2) {
   std::array<std::array<double, kRows>, kRows> L{};  // first the matrix in those units, then its Cholesky factor
@@ -136,14 +136,14 @@ bool could_be_covariance(const double* matrix, const std::array<double, kRows>& 
   return true;
 }
 
-// Of a measurement: no information at all, or that of a standard deviation that a measurement can have. Along an axis
-// that is hardly seen, rounding of the others is all there is.
+// Checks the information of a measurement: none at all, or that of a standard deviation that a measurement can have.
+// Along an axis that is hardly observed an entry is rounding of the others, so all are scaled by the trace.
 bool could_be_information(const double* matrix, double smallest) {
   const double trace = matrix[0] + matrix[4] + matrix[8];
   return could_be_covariance<3>(matrix, {trace, trace, trace}) && (trace == 0.0 || trace >= smallest);
 }
 
-// Of the estimate, whose rows have units of their own.
+// Checks the covariance of an estimate. Its rows have different units, so each is scaled by its standard deviation.
 bool could_be_state_covariance(const double* matrix) {
   std::array<double, 9> variance{};
   for (std::size_t i = 0; i < variance.size(); ++i) variance[i] = matrix[10 * i];

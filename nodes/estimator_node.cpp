@@ -143,9 +143,9 @@ EstimatorNode::EstimatorNode(lcm::LCM& lcm, const estimator::EstimatorConfig& co
 }
 
 void EstimatorNode::on_axes(const actuator_state_t& m) {
-  // Numbers that begin anew are of another driver, which has a zero of its own. Axes that are off do not move, so that
-  // a jump is a new zero; others jump only where an operator has armed after the jump was refused. The estimate begins
-  // where they now count from.
+  // A sequence that begins anew is that of a restarted driver, which has another zero. A jump is a new zero too: axes
+  // that are off do not move, and a jump of others arrives here only after an operator has armed. The estimate begins
+  // at the reported position.
   const bool new_zero = axes_ && (m.seq < axes_->seq || io::check_jump(*axes_, m, bounds_));
   axes_ = m;
   if (new_zero) entry_.restart();

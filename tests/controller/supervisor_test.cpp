@@ -58,7 +58,7 @@ TEST_F(SupervisorTest, EveryConditionStopsWithinOnePeriodAndLatches) {
          v.reset_count = 1;
          supervisor.set_needle(v);
        }},
-      // What a reset makes uncertain is not the reason.
+      // A position that is uncertain after a reset is a consequence of the reset, not the reason.
       {Reason::state_reset,
        [&] {
          auto v = view(now);

@@ -104,8 +104,8 @@ TEST(EntryLine, FindsAFrameThatIsTurnedByTwoDegreesWithinThirtyMillimetres) {
   EXPECT_EQ(EntryLine::kTo_mm, 30);
 }
 
-// Errors that neighbouring frames share, AR(1) of 0.9 from frame to frame, as [estimator.reading_noise] is told of
-// them. Without it each frame counts as one more measurement, and the noise passes for a slope.
+// Measurement errors are AR(1) with 0.9 from frame to frame, as [estimator.reading_noise] configures them. A filter
+// that ignores the configuration counts each frame as an independent measurement and reports the noise as a slope.
 TEST(EntryLine, CountsFramesOfAutocorrelatedNoiseByTheirEffectiveNumber) {
   constexpr unsigned kSeed = 35;
   constexpr int kInsertions = 100;

@@ -10,8 +10,8 @@ namespace {
 
 using testing::agar_config;
 
-// Two cameras, of which the second is 5 mm off from `from_s` and silent from `until_s` on; and a heading sensor that
-// points backwards in between.
+// Simulates two cameras and a heading sensor. The second camera is 5 mm off from `from_s` on, and the sensor points
+// backwards; both are silent after `gone_s`.
 class Vanishing {
  public:
   Vanishing() : estimator(agar_config()) {}

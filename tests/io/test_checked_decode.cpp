@@ -238,7 +238,7 @@ TEST(CheckedDecodeHeading, it_must_have_unit_length_unless_the_sender_says_that_
   EXPECT_TRUE(check_fields(message));
 }
 
-// Three rows of which each pair could be one: correlations of -0.6 make an eigenvalue of -0.2.
+// Each pair of rows is a valid matrix, all three are not: correlations of -0.6 give an eigenvalue of -0.2.
 TEST(CheckedDecodeMatrix, RefusesAnIndefiniteMatrix) {
   auto tip = valid_message<tip_measurement_t>();
   auto state = valid_message<needle_state_t>();

@@ -58,7 +58,7 @@ TEST_P(GapLoop, AStalledDriverLeavesAHeadingAsUncertainAsStated) {
   EXPECT_LT(pose_nees(), allowed_);
 }
 
-// Its messages are numbered from zero again, and its zero is one of its own: nobody watched how the axes came there.
+// The new driver numbers its messages from zero and has another zero of the axes, so that their way in is not known.
 TEST_P(GapLoop, ADriverStartedAgainIsNotTrustedUntilConfirmed) {
   insert_to(GetParam().depth_mm);
   stepper.reset();

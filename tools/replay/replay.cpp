@@ -118,8 +118,8 @@ void compare(Replay& result, const std::vector<needle_state_t>& truths, const es
   figures.roll_rmse_rad = std::sqrt(roll2 / n);
 }
 
-// What bounds the axes of a recording between its actuator states. One that reports slowly has no gap in each interval:
-// a gap is longer than four of its typical periods, at 100 Hz less than AxisLimits::gap_s.
+// Limits of the axes of a recording. A log with a long period has no gap in each period: a gap is longer than four
+// typical periods, which at 100 Hz is less than AxisLimits::gap_s.
 estimator::AxisLimits axes_of(const io::Recording& recording, estimator::AxisLimits axes, bool rates_of_log) {
   constexpr double kPeriods = 4;
   std::vector<std::pair<std::int64_t, const model::ActuatorState*>> sorted;
