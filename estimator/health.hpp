@@ -45,9 +45,9 @@ constexpr std::int32_t reset_bit(ResetCause cause) {
   return cause == ResetCause::none ? 0 : kResetByRejects << (static_cast<int>(cause) - 1);
 }
 
-/// Time for which the cause of a reset is reported, us: the controller acts on the first estimate after it, and an
-/// operator reads status at 2 Hz.
-inline constexpr std::int64_t kResetReported_us = 1'000'000;
+/// Time for which the cause of a reset is in the health word, us: the controller acts on an estimate within its age limit
+/// of 80 ms.
+inline constexpr std::int64_t kResetReported_us = 200'000;
 
 /// Bits with which an estimate must not be steered by: all but kUnsure and the causes of resets.
 constexpr std::int32_t lost(std::int32_t health) { return health & ~(static_cast<std::int32_t>(kUnsure) | kResetBits); }

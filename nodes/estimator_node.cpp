@@ -14,6 +14,7 @@ namespace {
 
 constexpr double kPeriod_s = 0.01;
 constexpr std::int64_t kDescribed_ns = 500'000'000;
+constexpr std::int64_t kResetShown_us = 5'000'000;  // the cause of a reset in the status, long enough to be read
 constexpr double kFastestCamera_hz = 1000, kFastestCycle_hz = 1200;
 // How late a picture may be and still count; the history of the filter is shorter at 100 Hz.
 constexpr std::int64_t kLatestPicture_us = 600'000;
@@ -263,7 +264,9 @@ void EstimatorNode::step(const Now& now) {
     nuisance_text_ = describe(estimator_.estimate(now.utime).state.nuisance);
     described_ns_ = now.ns;
   }
-  std::string reason = estimator::describe_health(health());
+  const estimator::FilterState state = estimator_.estimate(now.utime).state;
+  const bool is_shown = model::age_us(now.utime, state.reset_utime) < kResetShown_us;
+  std::string reason = estimator::describe_health(health() | (is_shown ? estimator::reset_bit(state.reset_cause) : 0));
   for (const std::string& more : {innovation_text_, entry_text_, nuisance_text_, remark_, words_.refusal()})
     if (!more.empty()) reason += "; " + more;
   status_.report(axes_ ? "running" : "waiting", reason);
