@@ -139,6 +139,8 @@ bool Supervisor::check_inputs(std::int64_t now_utime) {
   if (!(n.pose.p_mm.allFinite() && n.pose.R.allFinite() && std::isfinite(n.curvature_per_mm) &&
         std::isfinite(n.lambda1_per_rad) && std::isfinite(n.lambda2)))
     return refuse(Reason::state_not_finite, 0, "");
+  // In motion a reset is the cause, and an estimate that is uncertain after it the consequence.
+  if (moves() && !check_reset()) return false;
   if (n.health != 0) return refuse(Reason::state_unhealthy, n.health, "(health word)");
   if (!(n.position_variance_mm2 <= safety.position_sd_mm * safety.position_sd_mm))
     return refuse(Reason::state_uncertain, std::sqrt(n.position_variance_mm2), "mm standard deviation");
@@ -263,7 +265,6 @@ model::MotionCommand Supervisor::step(std::int64_t now_utime, double elapsed_s) 
     return command;
   }
   resting_.reset();
-  if (!check_reset()) return command;
   if (status_.state == State::retracting) return retract(command, dt_s);
   rendezvous_.plan(now_utime, to_go_mm(), config_.limits.insertion_rate_mm_s);
   if (!see_path(elapsed_s)) return command;
@@ -300,7 +301,7 @@ model::MotionCommand Supervisor::run(model::MotionCommand command, const Rates& 
 
 bool Supervisor::check_reset() {
   if (needle_state_->reset_count == reset_count_) return true;
-  stop(Reason::state_reset, needle_state_->reset_count, "resets");
+  stop(Reason::state_reset, needle_state_->reset_cause, "(health word)");
   return false;
 }
 

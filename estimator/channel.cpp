@@ -23,13 +23,13 @@ Channel::Part Channel::next(double target_mm) const {
   return part;
 }
 
-void Channel::pass(const Part& part, double rotation_rad) {
-  if (!part.cut_before && part.to_mm > front_mm_) cut(part.to_mm, rotation_rad);
+void Channel::pass(const Part& part, double rotation_rad, bool bend_known) {
+  if (!part.cut_before && part.to_mm > front_mm_) cut(part.to_mm, rotation_rad, bend_known);
   inserted_mm_ = part.to_mm;
   rolled_rad_ += rotation_rad;
 }
 
-void Channel::cut(double to_mm, double rotation_rad) {
+void Channel::cut(double to_mm, double rotation_rad, bool bend_known) {
   const double from_mm = front_mm_, length_mm = to_mm - from_mm;
   for (auto c = static_cast<std::size_t>(from_mm / kCell_mm); front_mm_ < to_mm; ++c) {
     const double end_mm = std::min(to_mm, kCell_mm * static_cast<double>(c + 1));
@@ -37,7 +37,7 @@ void Channel::cut(double to_mm, double rotation_rad) {
     if (c < kCells && part_mm > 0) {
       if (front_mm_ <= kCell_mm * static_cast<double>(c)) cells_[c].setZero();
       const double roll_rad = rolled_rad_ + rotation_rad * (0.5 * (front_mm_ + end_mm) - from_mm) / length_mm;
-      cells_[c] += (part_mm * Eigen::Vector2d(std::cos(roll_rad), std::sin(roll_rad))).cast<float>();
+      if (bend_known) cells_[c] += (part_mm * Eigen::Vector2d(std::cos(roll_rad), std::sin(roll_rad))).cast<float>();
     }
     front_mm_ = std::max(front_mm_, end_mm);
   }

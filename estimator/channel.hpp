@@ -36,11 +36,12 @@ class Channel {
   double drawn_back_mm() const { return front_mm_ - inserted_mm_; }
 
   Part next(double target_mm) const;
-  // Takes in that part, made while the shaft turned by so much at a constant rate.
-  void pass(const Part& part, double rotation_rad);
+  /// Takes in that part, made while the shaft turned by so much at a constant rate.
+  /// @param bend_known false: nothing is known of how the bevel stood while it was cut; the channel is kept straight.
+  void pass(const Part& part, double rotation_rad, bool bend_known = true);
 
  private:
-  void cut(double to_mm, double rotation_rad);
+  void cut(double to_mm, double rotation_rad, bool bend_known);
 
   double inserted_mm_ = 0, rolled_rad_ = 0, front_mm_ = 0;
   std::array<Eigen::Vector2f, kCells> cells_{};  // direction of the bevel times length, mm

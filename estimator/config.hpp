@@ -81,6 +81,20 @@ struct HealthLimits {
   double measurement_silence_s = 0.1;  // since one arrived, by the steady clock: two lost frames pass, three do not
   double actuator_age_s = 0.08;
   double position_sd_mm = 3.0;  // largest standard deviation along any axis
+  // Largest standard deviation of the heading about body x or y. Three of them are the 1 rad up to which the slip law
+  // was validated (kDefaultGammaMax_rad): a wider heading may be outside the model, and linearisation about it fails.
+  double heading_sd_rad = 1.0 / 3.0;
+  // A source of measurements that was silent for so long is judged anew: its rejects in a row are forgotten. Ten times
+  // measurement_silence_s, after which the node has reported the silent camera.
+  double rejects_forgotten_s = 1.0;
+};
+
+/// What bounds the motion of the axes between two actuator states. An interval longer than gap_s is a gap: the path
+/// of the axes within it is unknown, and is not interpolated (NeedleFilter::pass_gap).
+struct AxisLimits {
+  double gap_s = 0.08;                // longest interval in which motion is interpolated; 0: any
+  double insertion_rate_mm_s = 20.0;  // no axis is faster
+  double rotation_rate_rad_s = 12.0;
 };
 
 struct EstimatorConfig {
@@ -90,6 +104,7 @@ struct EstimatorConfig {
   NuisancePrior nuisance;
   Gate gate;
   HealthLimits limits;
+  AxisLimits axes;
   // What the model file says that the bicycle leaves out, with its parameters held: applied in propagation, and in the
   // measurement (offset, camera, latency). None: the plain model, bit for bit.
   std::vector<model::ActiveEffect> effects;

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <utility>
 
 namespace bevel::estimator {
@@ -27,6 +28,8 @@ void EntryLine::restart() {
   inserted_mm_ = deepest_mm_ = 0;
   passed_ = 0;
   readings_ = 0;
+  forgotten_ = 0;
+  forgotten_at_.fill(-std::numeric_limits<double>::infinity());
   const Prior& prior = filter_.config().prior;
   const double aside_mm2 = square(prior.position_sd_mm) + square(prior.variation.entry_point_mm);
   mean_.setZero();
@@ -49,15 +52,18 @@ void EntryLine::add(const model::ActuatorState& axes) {
     began_ = true;
   } else if (deepest_mm_ <= kTo_mm) {
     const double by_mm = axes.insertion_mm - from_mm_ - inserted_mm_, by_rad = axes.rotation_rad - rotation_rad_;
+    forgotten_ += filter_.forgotten(by_mm, by_rad, static_cast<double>(axes.utime - axes_utime_) * 1e-6);
     filter_.predict_mean(nominal_, by_mm, by_rad);
     for (FilterState& needle : needles_) filter_.predict_mean(needle, by_mm, by_rad);
   }
   inserted_mm_ = axes.insertion_mm - from_mm_;
   deepest_mm_ = std::max(deepest_mm_, inserted_mm_);
   rotation_rad_ = axes.rotation_rad;
+  axes_utime_ = axes.utime;
   Passed& passed = past_[passed_++ % kPast];
   // Beyond, nothing is followed any more: one that is drawn back from there is not looked at again.
-  passed = {axes.utime, deepest_mm_ <= kTo_mm ? inserted_mm_ : deepest_mm_, filter_.tip_pose(nominal_).p_mm};
+  passed = {axes.utime, deepest_mm_ <= kTo_mm ? inserted_mm_ : deepest_mm_, forgotten_,
+            filter_.tip_pose(nominal_).p_mm};
   for (int i = 0; i < kNeedles; ++i)
     passed.beside_mm.col(i) = (filter_.tip_pose(needles_[i]).p_mm - passed.p_mm).head<2>();
 }
@@ -73,6 +79,10 @@ void EntryLine::add(const model::TipMeasurement& measurement) {
   if (!began_ || measurement.status != 0) return;
   const Passed* passed = at(measurement.utime);
   if (!passed || passed->inserted_mm <= 0 || passed->inserted_mm > kTo_mm) return;
+  double& forgotten_at = forgotten_at_[measurement.camera == 0 ? 0 : 1];
+  const double worth = filter_.worth(std::max(passed->forgotten - forgotten_at, 0.0));
+  if (!(worth > 0)) return;  // nothing was forgotten since the last: it is the same error again
+  forgotten_at = std::max(forgotten_at, passed->forgotten);
   const Eigen::Vector3d& p = passed->p_mm;
   Eigen::Matrix<double, 2, kUnknowns> H;
   H.leftCols<6>() << 1, 0, p.z(), 0, p.x(), -p.y(),  //
@@ -91,9 +101,10 @@ void EntryLine::add(const model::TipMeasurement& measurement) {
     if (!(information > 1e-9)) continue;
     const Unknowns h = H.transpose() * axis;
     const Unknowns Ph = covariance_ * h;
-    const double variance_mm2 = h.dot(Ph) + 1 / information;
+    const double known_mm2 = h.dot(Ph);
     const double along_mm = axis.dot(measurement.position_mm.head<2>() - p.head<2>()) - h.dot(mean_);
-    if (!(square(along_mm) < kGate * variance_mm2)) continue;
+    if (!(square(along_mm) < kGate * (known_mm2 + 1 / information))) continue;
+    const double variance_mm2 = known_mm2 + 1 / (worth * information);
     mean_ += Ph * (along_mm / variance_mm2);
     covariance_ -= Ph * Ph.transpose() / variance_mm2;
     ++readings_;

@@ -10,8 +10,9 @@
 // with the entry point (x0, y0), the slope (a, b), the relative error c of the bend, the bevel's roll r, and lambda1,
 // lambda2 and a stiff shaft's bending length in their own standard deviations: which way a needle slips looks like a
 // slope until it is turned. Of slope and bend next to nothing is held beforehand, of the others the filter's priors.
-// What the reading says along z is left out: a slope is not seen there. Lengths in mm, angles in rad; nothing
-// allocates.
+// Measurements along z are left out: they contain no slope. Autocorrelated errors of a camera (ReadingNoise) reduce the
+// information of each measurement by NeedleFilter::worth, so that many of them count by their effective sample size.
+// Lengths in mm, angles in rad; nothing allocates.
 #include <array>
 #include <cstdint>
 
@@ -50,6 +51,7 @@ class EntryLine {
   struct Passed {
     std::int64_t utime = 0;
     double inserted_mm = 0;
+    double forgotten = 0;  // of shared errors, since it began
     Eigen::Vector3d p_mm = Eigen::Vector3d::Zero();
     Eigen::Matrix<double, 2, kNeedles> beside_mm = Eigen::Matrix<double, 2, kNeedles>::Zero();
   };
@@ -62,6 +64,9 @@ class EntryLine {
   bool began_ = false;
   double deepest_mm_ = 0;
   double inserted_mm_ = 0, from_mm_ = 0, rotation_rad_ = 0;
+  double forgotten_ = 0;
+  std::array<double, 2> forgotten_at_{};  // when cameras 0 and 1 were last used
+  std::int64_t axes_utime_ = 0;
   std::array<Passed, kPast> past_{};
   std::size_t passed_ = 0;
   Unknowns mean_;

@@ -5,6 +5,8 @@
 
 namespace bevel::estimator {
 
+inline constexpr double kStraight_per_mm = 1e-5;  // radius 100 m: less is no bend over any insertion
+
 template <int kSize>
 using Error = Eigen::Matrix<double, kSize, 1>;
 template <int kSize>

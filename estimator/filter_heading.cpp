@@ -124,6 +124,8 @@ Update NeedleFilter::update_heading(FilterState& state, const model::TipHeading&
   const Angles angles = angles_of(measurement, predicted.along);
   const int rank = angles.seen.rank;
   if (rank == 0) return {};  // sees nothing: no rejection either
+  if (is_forgotten(state.heading_utime, measurement.utime)) state.heading_rejects_in_row = 0;
+  state.heading_utime = std::max(state.heading_utime, measurement.utime);
   Update result;
   if (angles.cosine > 0) {
     if constexpr (kSize == kAllStates) {

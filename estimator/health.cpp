@@ -15,6 +15,12 @@ std::string describe_health(std::int32_t health) {
       {kCameraFrozen, "a camera is frozen"},
       {kInputRefused, "input cannot be trusted"},
       {kUnsure, "unsure, newest measurements refused"},
+      {kHeadingUncertain, "heading too uncertain: retract to the entry point, or measure the heading"},
+      {kResetByRejects, "reset: measurements rejected one after the other"},
+      {kResetByBevel, "reset: the bevel is on the other side"},
+      {kResetByGap, "reset: motion of the axes was not reported for a time"},
+      {kResetByRestart, "reset: begun anew"},
+      {kResetByClock, "reset: the clock was set"},
   };
   std::string text;
   for (const auto& [bit, word] : kWords)

@@ -19,11 +19,17 @@ class InnovationWatch {
 
   // Of one reading as it was first judged, accepted or not. Allocates once for each channel.
   void see(std::int32_t channel, std::int64_t utime, double mahalanobis2, int rank) {
+    if (!std::isfinite(mahalanobis2)) return;
     Channel& c = channels_[channel];
     const double since_s = c.utime == 0 ? 0.0 : std::max(model::age_s(utime, c.utime), 0.0);
     const double kept = std::exp(-since_s / window_s_);
     c.squares = kept * c.squares + mahalanobis2, c.axes = kept * c.axes + rank;
     c.utime = std::max(c.utime, utime);
+  }
+
+  /// Drops the cameras that were silent for the whole window: nothing is known of them now.
+  void forget_silent(std::int64_t now_utime) {
+    std::erase_if(channels_, [&](const auto& c) { return model::age_s(now_utime, c.second.utime) > window_s_; });
   }
 
   struct Channel {

@@ -4,17 +4,34 @@
 #include <cmath>
 #include <limits>
 #include <tuple>
+#include <utility>
 
 #include "estimator/health.hpp"
 #include "model/age.hpp"
 
 namespace bevel::estimator {
+namespace {
+
+double square(double x) { return x * x; }
+
+// About body x and y.
+double largest_tilt_variance(const FilterState& state) { return state.covariance.diagonal().segment<2>(3).maxCoeff(); }
+
+// To what standard deviation a heading must be known for steps from it to be run again: about that of an insertion's
+// start, for which running them again was validated.
+double known_heading_sd(const Prior& prior) {
+  constexpr double kLeast_rad = 0.03;
+  return std::max(kLeast_rad, 1.5 * std::hypot(prior.tilt_sd_rad, prior.variation.entry_angle_rad));
+}
+
+}  // namespace
 
 NeedleEstimator::NeedleEstimator(const EstimatorConfig& config, std::size_t history)
     : filter_(config),
       past_(config.effects.empty() && config.prior.bending_mm == 0 && !config.nuisance.any()
                 ? static_cast<std::size_t>(std::max(config.relinearised_steps, 0))
                 : 0),
+      known_heading_sd_rad_(known_heading_sd(config.prior)),
       walked_(std::make_unique_for_overwrite<WalkedStep[]>(past_.room())) {
   pool_.resize(std::max<std::size_t>(history, 8));
   order_.reserve(pool_.size());
@@ -44,7 +61,7 @@ NeedleEstimator::Node* NeedleEstimator::insert(std::int64_t utime, Kind kind, st
   made.kind = kind;
   made.camera = camera;
   made.seq = seq;
-  made.applied_before = false;
+  made.applied_before = made.counted_in_gap = made.rejects_forgotten = false;
   return &made;
 }
 
@@ -72,7 +89,10 @@ void NeedleEstimator::restart_past(const FilterState& start) {
 }
 
 void NeedleEstimator::remember(const Node& before, const Node& node) {
-  const bool first = !past_started_, reset = node.state.reset_count != before.state.reset_count;
+  // Steps from a heading that is hardly known would be run again along paths that the model does not hold for: the past
+  // begins where it is known.
+  const bool first = !past_started_ || !(largest_tilt_variance(before.state) < square(known_heading_sd_rad_));
+  const bool reset = node.state.reset_count != before.state.reset_count;
   if (first || reset) restart_past(first ? before.state : node.state);
   // In the channel too: what the readings there share is not in the past's.
   const double forgotten =
@@ -143,10 +163,12 @@ void NeedleEstimator::add(const model::ActuatorState& actuator) {
   }
   made->insertion_mm = actuator.insertion_mm;
   made->rotation_rad = actuator.rotation_rad;
+  made->axes = {actuator.utime, actuator.insertion_mm, actuator.rotation_rad, actuator.axis_status};
   if (index == 0) {
     made->state = filter_.config().start_at_axes ? filter_.inserted(made->insertion_mm, made->rotation_rad)
                                                  : filter_.initial(made->insertion_mm, made->rotation_rad);
     made->state.reset_count = resets_before_;
+    if (restarted_) made->state.reset_cause = ResetCause::restarted, made->state.reset_utime = actuator.utime;
   }
   // Measurements since the previous actuator state are interpolated anew.
   std::size_t from = index;
@@ -198,6 +220,16 @@ void NeedleEstimator::restart() {
   past_started_ = false;
   newest_update_ = {};
   newest_update_utime_ = 0;
+  restarted_ = true;
+}
+
+void NeedleEstimator::forget_rejects() {
+  for (const std::uint32_t slot : order_) {
+    Node& n = pool_[slot];
+    n.rejects_forgotten = true;
+    n.state.rejects_in_row = n.state.heading_rejects_in_row = 0;
+    n.state.camera_rejects_in_row = {};
+  }
 }
 
 void NeedleEstimator::shift_time(std::int64_t by_us) {
@@ -208,28 +240,53 @@ void NeedleEstimator::shift_time(std::int64_t by_us) {
     n.heading.utime += by_us;
     if (n.state.measurement_utime != 0) n.state.measurement_utime += by_us;
     if (n.state.reading_utime != 0) n.state.reading_utime += by_us;
+    for (std::int64_t& utime : n.state.camera_utime)
+      if (utime != 0) utime += by_us;
+    if (n.state.heading_utime != 0) n.state.heading_utime += by_us;
+    n.axes.utime += by_us;
     ++n.state.reset_count;
+    n.state.reset_cause = ResetCause::clock_set;
+    n.state.reset_utime = n.utime;
   }
   newest_update_utime_ += by_us;
   past_started_ = false;  // its states carry other times
 }
 
-void NeedleEstimator::interpolate(std::size_t index) {
+// Longer than motion may be interpolated over. Drives that report that they are not enabled, before and after, and that
+// stand where they stood, are at rest in between: bevel-stepper reports nothing while it resets them for an arm.
+bool NeedleEstimator::is_gap(const Reported& from, const Reported& to) const {
+  constexpr double kRelaxes_mm = 0.1, kRelaxes_rad = 0.1;  // a motor that is switched off
+  const double gap_s = filter_.config().axes.gap_s;
+  if (!(gap_s > 0 && static_cast<double>(to.utime - from.utime) * 1e-6 > gap_s)) return false;
+  const auto has = [&](model::AxisStatus status) {
+    const auto wanted = static_cast<std::int32_t>(status);
+    return std::ranges::count(from.status, wanted) + std::ranges::count(to.status, wanted);
+  };
+  const bool known = has(model::AxisStatus::off) < 4;  // recordings without a status have that of drives that are off
+  const bool at_rest = known && has(model::AxisStatus::enabled) == 0 &&
+                       std::abs(to.insertion_mm - from.insertion_mm) < kRelaxes_mm &&
+                       std::abs(to.rotation_rad - from.rotation_rad) < kRelaxes_rad;
+  return !at_rest;
+}
+
+// False in a gap: the axes are then left where they were before it.
+bool NeedleEstimator::interpolate(std::size_t index) {
   Node& n = node(index);
   std::size_t before = index - 1;
   while (before > 0 && node(before).kind != Kind::actuator) --before;
   const Node& a = node(before);
-  if (n.utime == a.utime) {  // needs no later actuator state
-    n.insertion_mm = a.insertion_mm;
-    n.rotation_rad = a.rotation_rad;
-    return;
-  }
+  n.insertion_mm = a.insertion_mm;
+  n.rotation_rad = a.rotation_rad;
+  n.axes = node(index - 1).axes;
+  if (n.utime == a.utime) return true;  // needs no later actuator state
   std::size_t after = index + 1;
   while (node(after).kind != Kind::actuator) ++after;
   const Node& b = node(after);
+  if (is_gap(n.axes, b.axes)) return false;
   const double share = static_cast<double>(n.utime - a.utime) / static_cast<double>(b.utime - a.utime);
-  n.insertion_mm = a.insertion_mm + share * (b.insertion_mm - a.insertion_mm);
-  n.rotation_rad = a.rotation_rad + share * (b.rotation_rad - a.rotation_rad);
+  n.insertion_mm += share * (b.insertion_mm - a.insertion_mm);
+  n.rotation_rad += share * (b.rotation_rad - a.rotation_rad);
+  return true;
 }
 
 void NeedleEstimator::process_from(std::size_t index) {
@@ -239,10 +296,21 @@ void NeedleEstimator::process_from(std::size_t index) {
   for (std::size_t i = std::max<std::size_t>(index, 1); i < end; ++i) {
     Node& n = node(i);
     const Node& previous = node(i - 1);
-    if (n.kind != Kind::actuator) interpolate(i);
+    const bool known = n.kind == Kind::actuator || interpolate(i);
     n.state = previous.state;
-    filter_.predict(n.state, n.insertion_mm - previous.insertion_mm, n.rotation_rad - previous.rotation_rad,
-                    static_cast<double>(n.utime - previous.utime) * 1e-6);
+    if (!known) {
+      n.moved = {};
+      n.update = {};
+      if (!std::exchange(n.counted_in_gap, true)) ++counters_of(n.kind).in_gap;
+      continue;
+    }
+    const double insertion_mm = n.insertion_mm - previous.insertion_mm;
+    const double rotation_rad = n.rotation_rad - previous.rotation_rad;
+    if (n.kind == Kind::actuator && is_gap(previous.axes, n.axes))
+      filter_.pass_gap(n.state, insertion_mm, rotation_rad, static_cast<double>(n.utime - previous.axes.utime) * 1e-6,
+                       n.utime);
+    else
+      filter_.predict(n.state, insertion_mm, rotation_rad, static_cast<double>(n.utime - previous.utime) * 1e-6);
     n.moved = {n.state.pose.p_mm - previous.state.pose.p_mm, n.state.pose.R.col(2) - previous.state.pose.R.col(2),
                filter_.motion_of(n.state) - filter_.motion_of(previous.state)};
     if (n.kind == Kind::actuator) continue;
@@ -258,6 +326,11 @@ void NeedleEstimator::process_from(std::size_t index) {
       observer_(observer_context_, applied);
     } else {
       apply();
+    }
+    if (n.rejects_forgotten && !n.update.accepted && !n.update.reset) {
+      n.state.rejects_in_row = previous.state.rejects_in_row;
+      n.state.camera_rejects_in_row = previous.state.camera_rejects_in_row;
+      n.state.heading_rejects_in_row = previous.state.heading_rejects_in_row;
     }
     n.applied_before = true;
     if (position && n.utime >= newest_update_utime_) newest_update_ = n.update, newest_update_utime_ = n.utime;
@@ -322,13 +395,23 @@ Estimate NeedleEstimator::describe(const FilterState& state, std::int64_t utime,
   }
   const double largest_variance = state.covariance.diagonal().head<3>().maxCoeff();
   if (!(largest_variance < limits.position_sd_mm * limits.position_sd_mm)) result.health |= kUncertain;
+  if (!(largest_tilt_variance(state) < square(limits.heading_sd_rad))) result.health |= kHeadingUncertain;
+  // A source that is gone is rejected no more.
+  const auto rejects = [&](std::int32_t in_row, std::int64_t heard_utime) {
+    return older_than(heard_utime, limits.rejects_forgotten_s) ? 0 : in_row;
+  };
   const Gate& gate = filter_.config().gate;
-  const int camera_rejects = std::ranges::max(state.camera_rejects_in_row);
-  if (std::max({state.rejects_in_row, state.heading_rejects_in_row, camera_rejects}) >= gate.rejects_before_unhealthy)
+  std::int32_t of_one = rejects(state.heading_rejects_in_row, state.heading_utime);
+  for (std::size_t camera = 0; camera < state.camera_utime.size(); ++camera)
+    of_one = std::max(of_one, rejects(state.camera_rejects_in_row.at(camera), state.camera_utime.at(camera)));
+  if (std::max(rejects(state.rejects_in_row, state.reading_utime), of_one) >= gate.rejects_before_unhealthy)
     result.health |= kRejecting;
-  else if (std::max(state.heading_rejects_in_row, camera_rejects) >= gate.rejects_before_unsure)
+  else if (of_one >= gate.rejects_before_unsure)
     result.health |= kUnsure;
   if (state.outside_model) result.health |= kOutsideModel;
+  constexpr std::int32_t kUntilKnown = kNoMeasurement | kUncertain | kHeadingUncertain;
+  if ((result.health & kUntilKnown) != 0 || model::age_us(now_utime, state.reset_utime) < kResetReported_us)
+    result.health |= reset_bit(state.reset_cause);
   return result;
 }
 

@@ -3,7 +3,9 @@
 // own capture time and rolled forward, so that shuffled input gives the same state as sorted input, bit for bit.
 //
 // Actuator states and measurements become nodes ordered by time. A measurement between two actuator states is applied
-// at positions interpolated between them; one that is newer than the newest actuator state waits for the next.
+// at positions interpolated between them; one that is newer than the newest actuator state waits for the next. Two
+// actuator states farther apart than AxisLimits::gap_s are the ends of a gap: what was measured in it is not applied,
+// since nobody knows where the axes were, and the state passes it by NeedleFilter::pass_gap, a declared reset.
 #include <cstdint>
 #include <memory>
 #include <vector>
@@ -18,7 +20,8 @@ struct ReadingCounters {
   std::int64_t not_usable = 0;  // status other than 0, or no axis seen
   std::int64_t too_old = 0;     // older than the history
   std::int64_t duplicate = 0;
-  std::int64_t late = 0;  // arrived behind a newer node: the history was rolled back
+  std::int64_t late = 0;    // arrived behind a newer node: the history was rolled back
+  std::int64_t in_gap = 0;  // taken where the motion of the axes is not known (AxisLimits::gap_s): not applied
 };
 
 struct Counters {
@@ -49,6 +52,9 @@ class NeedleEstimator {
 
   // Begins anew, a declared reset, with the next actuator state.
   void restart();
+  /// Forgets how many measurements in a row were rejected, of each source. For an operator's arm command: a source that
+  /// is still rejected is reported again after Gate::rejects_before_unhealthy.
+  void forget_rejects();
   // The clock that stamps everything was set by so much: what is known stays, under its new times; a declared reset.
   void shift_time(std::int64_t by_us);
 
@@ -83,12 +89,21 @@ class NeedleEstimator {
   // Less is how far an axis at rest is read differently.
   static constexpr double kDrawnBack_mm = 0.01;
   enum class Kind : std::uint8_t { actuator, position, heading };
+  // Positions and status of an actuator state.
+  struct Reported {
+    std::int64_t utime = 0;
+    double insertion_mm = 0, rotation_rad = 0;
+    std::array<std::int32_t, 2> status{};
+  };
   struct Node {
     std::int64_t utime = 0;
     Kind kind = Kind::actuator;
     std::int32_t camera = 0;
     std::int64_t seq = 0;
     bool applied_before = false;
+    bool counted_in_gap = false;
+    bool rejects_forgotten = false;  // when it is applied again, its rejection does not count
+    Reported axes;                   // the newest actuator state up to it
     double insertion_mm = 0;
     double rotation_rad = 0;
     Moved moved;                        // since the node before, by the model
@@ -109,7 +124,8 @@ class NeedleEstimator {
   void remember(const Node& before, const Node& node);
   void restart_past(const FilterState& start);
   void relinearise_if_due();
-  void interpolate(std::size_t index);
+  bool interpolate(std::size_t index);
+  bool is_gap(const Reported& from, const Reported& to) const;
   Estimate describe(const FilterState& state, std::int64_t utime, const Update& newest_update,
                     std::int64_t now_utime) const;
 
@@ -119,6 +135,7 @@ class NeedleEstimator {
   std::vector<std::uint32_t> free_;
   std::size_t processed_ = 0;             // nodes before this index hold a posterior
   Past past_;                             // what has left the history, from its start or the last reset
+  double known_heading_sd_rad_;           // at which the past begins
   std::unique_ptr<WalkedStep[]> walked_;  // room to run it again in: sized once, memory comes as it is used
   bool past_started_ = false;
   bool past_waits_ = false;        // for a needle that was drawn back
@@ -133,6 +150,7 @@ class NeedleEstimator {
   Update newest_update_;
   std::int64_t newest_update_utime_ = 0;
   std::int32_t resets_before_ = 0;  // declared by restarts
+  bool restarted_ = false;          // the next actuator state is the first after one
   Observer observer_ = nullptr;
   void* observer_context_ = nullptr;
 };

@@ -17,12 +17,12 @@ namespace {
 
 constexpr double kLambda2Max = 0.9;                             // (24) with room: 1 - lambda2 stays away from zero
 constexpr double kWheelbaseMin_mm = 2, kWheelbaseMax_mm = 990;  // of the model's (1, 1000), with room
-constexpr double kStraight_per_mm = 1e-5;                       // radius 100 m: less is no bend over any insertion
-constexpr double kSureOfSide = 3;  // standard deviations: then a bevel mounted wrong is the likelier
 constexpr double kBendingMin_mm = 5, kBendingMax_mm = 200;
 constexpr double kVarianceFloor = 1e-14;
 constexpr double kAtEntry_mm = 1.0;  // not inserted yet: within what an entry point is met by
 constexpr std::int32_t kCamerasCounted = 4;
+// Less has no finite inverse. What a bench can measure is bounded by the checked decode.
+constexpr double kSmallestInformation = std::numeric_limits<double>::min();
 
 double square(double x) { return x * x; }
 
@@ -45,11 +45,29 @@ SeenAxes seen_axes(const Eigen::Matrix3d& information) {
     seen.axes = eigen.eigenvectors();
   }
   for (int i = 0; i < 3; ++i)
-    if (values[i] > kRankTolerance * values[2] && values[i] > 0) {
+    if (values[i] > kRankTolerance * values[2] && values[i] >= kSmallestInformation) {
       seen.variance[i] = 1 / values[i];
       ++seen.rank;
     }
   return seen;
+}
+
+// Much of a measurement's information at once moves a state that is hardly known by more than its linearisation holds:
+// a correction of tilt w and position v moves the tip by w x v / 2 in addition to v. The information is then
+// applied in parts, each with kGrowth times the information of the one before, and linearised anew in between
+// (recursive update filter: Zanetti 2012, IEEE TAC 57(2)). The first part corrects half of the error.
+constexpr double kGrowth = 4;
+constexpr int kMostParts = 16;
+constexpr std::array<double, 3> kNoGate = {std::numeric_limits<double>::max(), std::numeric_limits<double>::max(),
+                                           std::numeric_limits<double>::max()};
+
+int parts_of(const FilterState& state, const SeenAxes& seen) {
+  const double aside_mm2 = state.covariance.diagonal().head<3>().maxCoeff();
+  const double tilt_rad2 = state.covariance.diagonal().segment<2>(3).maxCoeff();
+  const double noise_mm2 = seen.variance[2];  // along the axis that is seen best
+  if (!(0.25 * tilt_rad2 * aside_mm2 > noise_mm2)) return 1;
+  return std::clamp(1 + static_cast<int>(std::ceil(std::log(aside_mm2 / noise_mm2) / std::log(kGrowth))), 1,
+                    kMostParts);
 }
 
 }  // namespace
@@ -109,18 +127,6 @@ FilterState NeedleFilter::inserted(double insertion_mm, double rotation_rad) con
   return state;
 }
 
-// An arc of the curvature that the prior allows, to any side: its end lies k L^2 / 2 aside and k^2 L^3 / 6 short, and
-// is inclined by k L.
-void NeedleFilter::widen_by_bend(FilterState& state, double inserted_mm) const {
-  const double length_mm = std::abs(inserted_mm);
-  const double k = std::abs(config_.prior.needle.curvature_per_mm) + insertion_curvature_sd_per_mm(config_.prior);
-  const double bend_rad = k * length_mm;
-  const double aside_mm = 0.5 * bend_rad * length_mm, short_mm = square(bend_rad) * length_mm / 6;
-  Eigen::Matrix<double, 6, 1> variance;
-  variance << square(aside_mm), square(aside_mm), square(short_mm), square(bend_rad), square(bend_rad), 0;
-  state.covariance.diagonal().head<6>() += variance;
-}
-
 model::SlipParameters NeedleFilter::slip_of(const FilterState& state) const {
   model::SlipParameters slip = slip_;
   slip.lambda1_per_rad = state.lambda1_per_rad;
@@ -137,13 +143,39 @@ void NeedleFilter::predict(FilterState& state, double insertion_mm, double rotat
                                                  : predict_with_effects<9>(state, increment));
     return;
   }
-  const auto cutting = [&](double by_mm, double by_rad) { predict_cutting(state, by_mm, by_rad); };
-  if (!has_nuisance_) return follow(state, insertion_mm, rotation_rad, true, cutting);
+  predict_by(
+      state, insertion_mm, rotation_rad, duration_s,
+      [&](double by_mm, double by_rad) { predict_cutting(state, by_mm, by_rad); }, true);
+}
+
+template <class Cutting>
+void NeedleFilter::predict_by(FilterState& state, double insertion_mm, double rotation_rad, double duration_s,
+                              const Cutting& cutting, bool bend_known) const {
+  if (!has_nuisance_) return follow(state, insertion_mm, rotation_rad, true, cutting, bend_known);
   const Eigen::Vector3d before_mm = state.pose.p_mm;
   const TipTurn turn = follow_windup(state, insertion_mm, rotation_rad);
-  follow(state, insertion_mm, turn.rad, true, cutting);
+  follow(state, insertion_mm, turn.rad, true, cutting, bend_known);
   spread_turn(state, turn.by_windup);
   if (duration_s > 0) state.nuisance.tip_velocity_mm_s = (state.pose.p_mm - before_mm) / duration_s;
+}
+
+void NeedleFilter::pass_gap(FilterState& state, double insertion_mm, double rotation_rad, double duration_s,
+                            std::int64_t utime) const {
+  if (!config_.effects.empty()) {
+    predict(state, insertion_mm, rotation_rad, duration_s);
+  } else {
+    if (coloured_) forget_shared(state, std::exp(-forgotten(insertion_mm, rotation_rad, duration_s)));
+    predict_by(
+        state, insertion_mm, rotation_rad, duration_s,
+        [&](double by_mm, double by_rad) {
+          predict_cutting(state, 0, by_rad / 2);
+          cut_straight(state, by_mm);
+          predict_cutting(state, 0, by_rad / 2);
+        },
+        false);
+  }
+  widen_by_gap(state, insertion_mm, rotation_rad, duration_s);
+  begin_reset(state, ResetCause::gap, utime);
 }
 
 void NeedleFilter::predict_cutting(FilterState& state, double insertion_mm, double rotation_rad) const {
@@ -170,7 +202,7 @@ bool NeedleFilter::mean_cutting(FilterState& state, double insertion_mm, double 
 // alone: it is turned after the part, which begins with the bevel as the channel has it so far.
 template <class Cutting>
 void NeedleFilter::follow(FilterState& state, double insertion_mm, double rotation_rad, bool with_covariance,
-                          const Cutting& cutting) const {
+                          const Cutting& cutting, bool bend_known) const {
   if (insertion_mm == 0 && rotation_rad == 0) return;
   if (!config_.through_channel) return cutting(insertion_mm, rotation_rad);
   Channel& channel = state.channel;
@@ -192,7 +224,7 @@ void NeedleFilter::follow(FilterState& state, double insertion_mm, double rotati
         outside = outside || state.outside_model;
       }
     }
-    channel.pass(part, by_rad);
+    channel.pass(part, by_rad, bend_known);
     first = false;
   }
   state.outside_model = outside;
@@ -248,13 +280,19 @@ template <int kSize>
 Update NeedleFilter::update_sized(FilterState& state, const model::TipMeasurement& measurement) const {
   SeenAxes seen = seen_axes(measurement.information_per_mm2);
   if (seen.rank == 0) return {};  // sees nothing: no rejection either
+  const auto camera = static_cast<std::size_t>(std::clamp<std::int32_t>(measurement.camera, 0, kCamerasCounted - 1));
+  std::uint8_t& camera_rejects = state.camera_rejects_in_row.at(camera);
+  std::int64_t& camera_utime = state.camera_utime.at(camera);
+  if (is_forgotten(camera_utime, measurement.utime)) camera_rejects = 0;
+  if (is_forgotten(state.reading_utime, measurement.utime)) state.rejects_in_row = 0;
+  camera_utime = std::max(camera_utime, measurement.utime);
   state.reading_utime = std::max(state.reading_utime, measurement.utime);
   if constexpr (kHasShared<kSize>) {
     seen.coloured = config_.reading.correlated_share * seen.variance;
     seen.variance -= seen.coloured;
     seen.first_error = measurement.camera == 0 ? 0 : 3;
   }
-  const auto apply = [&]() -> Update {
+  const auto apply_once = [&](const std::array<double, 3>& gate) -> Update {
     if constexpr (kSize == kAllStates) {
       Eigen::Matrix<double, 3, 10> by_state = Eigen::Matrix<double, 3, 10>::Zero();
       by_state.leftCols<3>() = state.pose.R;
@@ -262,32 +300,46 @@ Update NeedleFilter::update_sized(FilterState& state, const model::TipMeasuremen
       if (stiff_ && pressing(state) < 1) at_mm = drawn_back_tip(state, by_state);
       ByNuisance by_nuisance;
       const Eigen::Vector3d seen_mm = seen_by_camera(state, measurement.camera, at_mm, by_nuisance);
-      return update_all(state, by_state, by_nuisance, seen, measurement.position_mm - seen_mm, gate_);
+      return update_all(state, by_state, by_nuisance, seen, measurement.position_mm - seen_mm, gate);
     } else {
       if constexpr (kOwn<kSize> == 10)
         if (stiff_ && pressing(state) < 1) {
           Eigen::Matrix<double, 3, 10> by_state;
           const Eigen::Vector3d at_mm = drawn_back_tip(state, by_state);
-          return update_seen<kSize, 10>(state, by_state, seen, measurement.position_mm - at_mm, gate_);
+          return update_seen<kSize, 10>(state, by_state, seen, measurement.position_mm - at_mm, gate);
         }
       if (config_.effects.empty())
-        return update_seen<kSize, 3>(state, state.pose.R, seen, measurement.position_mm - state.pose.p_mm, gate_);
+        return update_seen<kSize, 3>(state, state.pose.R, seen, measurement.position_mm - state.pose.p_mm, gate);
       Eigen::Vector3d blur_mm2;
       const model::TipReading at = reading(state, &blur_mm2);
       seen.shared = seen.axes.cwiseAbs2().transpose() * blur_mm2;
-      return update_seen<kSize, kOwn<kSize>>(state, at.D, seen, measurement.position_mm - at.position_mm, gate_);
+      return update_seen<kSize, kOwn<kSize>>(state, at.D, seen, measurement.position_mm - at.position_mm, gate);
     }
   };
+  const auto apply = [&]() -> Update {
+    const int parts = parts_of(state, seen);
+    if (parts == 1) return apply_once(gate_);
+    const FilterState before = state;
+    const Update whole = apply_once(gate_);
+    if (!whole.accepted) return whole;
+    state = before;
+    const Eigen::Vector3d variance = seen.variance;
+    const double all = (std::pow(kGrowth, parts) - 1) / (kGrowth - 1);
+    for (int i = 0; i < parts; ++i) {
+      seen.variance = variance * (all / std::pow(kGrowth, i));
+      apply_once(kNoGate);
+    }
+    seen.variance = variance;
+    return whole;
+  };
   Update result = apply();
-  std::uint8_t& camera_rejects = state.camera_rejects_in_row.at(
-      static_cast<std::size_t>(std::clamp<std::int32_t>(measurement.camera, 0, kCamerasCounted - 1)));
   if (result.accepted) {
     state.measurement_utime = measurement.utime;
     state.rejects_in_row = 0;
     camera_rejects = 0;
     keep_in_domain<kSize>(state);
     if (bends_to_the_other_side(state)) {
-      declare_reset(state, result.innovation.norm());
+      declare_reset(state, result.innovation.norm(), measurement.utime);
       if (apply().accepted) state.measurement_utime = measurement.utime;
       keep_in_domain<kSize>(state);
       result.reset = true;
@@ -296,19 +348,11 @@ Update NeedleFilter::update_sized(FilterState& state, const model::TipMeasuremen
   }
   if (camera_rejects < std::numeric_limits<std::uint8_t>::max()) ++camera_rejects;
   if (++state.rejects_in_row < config_.gate.rejects_before_reset) return result;
-  declare_reset(state, result.innovation.norm());
+  declare_reset(state, result.innovation.norm(), measurement.utime);
   const Update reached = apply();  // the reset begins with what was measured, or it would be followed by another
   result.reset = true;
   if (reached.accepted) state.measurement_utime = measurement.utime;
   return result;
-}
-
-// Readings that take k to straight, so far from what the prior has, say that the bevel is on the other side; where the
-// prior is wider than that, or once the bevel was turned over, they say that the needle hardly bends.
-bool NeedleFilter::bends_to_the_other_side(const FilterState& state) const {
-  const double side = side_of_bend();
-  return side != 0 && !state.turned_over && side * state.curvature_per_mm <= kStraight_per_mm &&
-         std::abs(config_.prior.needle.curvature_per_mm) > kSureOfSide * insertion_curvature_sd_per_mm(config_.prior);
 }
 
 double NeedleFilter::side_of_bend() const {
@@ -370,31 +414,5 @@ template void NeedleFilter::keep_in_domain<10>(FilterState&) const;
 template void NeedleFilter::keep_in_domain<15>(FilterState&) const;
 template void NeedleFilter::keep_in_domain<16>(FilterState&) const;
 template void NeedleFilter::keep_in_domain<kAllStates>(FilterState&) const;
-
-void NeedleFilter::declare_reset(FilterState& state, double reach_mm) const {
-  // The pose is believed no more; the parameters are, but less: their prior widths come back, correlations go.
-  const FilterState prior = initial();
-  const Gate& gate = config_.gate;
-  if (bends_to_the_other_side(state)) {
-    state.pose.R = state.pose.R * Eigen::Vector3d(-1, -1, 1).asDiagonal();
-    state.curvature_per_mm = prior.curvature_per_mm;
-    state.turned_over = true;
-  }
-  state.covariance = prior.covariance;
-  state.tenth_covariance.setZero();
-  state.tenth_variance = prior.tenth_variance;
-  state.covariance.diagonal().head<6>() << Eigen::Vector3d::Constant(
-      square(std::max(gate.reset_position_sd_mm, reach_mm))),
-      square(gate.reset_tilt_sd_rad), square(gate.reset_tilt_sd_rad),
-      std::max(square(gate.reset_tilt_sd_rad), prior.covariance(5, 5));
-  widen_by_bend(state, state.pose.p_mm.z());
-  state.shared = {};
-  begin_nuisance(state);
-  state.rejects_in_row = 0;
-  state.camera_rejects_in_row = {};
-  state.heading_rejects_in_row = 0;
-  state.measurement_utime = 0;
-  ++state.reset_count;
-}
 
 }  // namespace bevel::estimator

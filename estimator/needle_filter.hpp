@@ -16,6 +16,7 @@
 #include "estimator/channel.hpp"
 #include "estimator/config.hpp"
 #include "estimator/end_motion.hpp"
+#include "estimator/health.hpp"
 #include "estimator/nuisance.hpp"
 #include "model/kinematics.hpp"
 #include "model/samples.hpp"
@@ -62,7 +63,11 @@ struct FilterState {
   std::int32_t rejects_in_row = 0;
   std::array<std::uint8_t, 4> camera_rejects_in_row{};  // cameras 0 to 3; higher numbers share the last
   std::int32_t heading_rejects_in_row = 0;              // of any camera; they bring no reset
+  std::array<std::int64_t, 4> camera_utime{};           // newest position of each, accepted or not
+  std::int64_t heading_utime = 0;                       // newest heading of any camera, accepted or not
   std::int32_t reset_count = 0;
+  ResetCause reset_cause = ResetCause::none;  // of the newest reset
+  std::int64_t reset_utime = 0;
   bool turned_over = false;  // a reset put the bevel on the other side; it does so once
   bool outside_model = false;
   Channel channel;
@@ -145,6 +150,14 @@ class NeedleFilter {
   // model has no answer the pose stays, and outside_model is set.
   void predict(FilterState& state, double insertion_mm, double rotation_rad, double duration_s = 0) const;
 
+  /// Moves the state across a gap: an interval in which the axes were not observed and moved by \p insertion_mm and
+  /// \p rotation_rad in all. Their path is known only by the rates that no axis exceeds (AxisLimits), so the mean goes
+  /// straight and the covariance is widened by every path within those (filter_gap.cpp). A declared reset.
+  /// @param duration_s length of the gap
+  /// @param utime time of its end, us
+  void pass_gap(FilterState& state, double insertion_mm, double rotation_rad, double duration_s,
+                std::int64_t utime) const;
+
   // The same without the covariance, for what is only predicted.
   void predict_mean(FilterState& state, double insertion_mm, double rotation_rad, double duration_s = 0) const;
 
@@ -204,7 +217,15 @@ class NeedleFilter {
   bool mean_cutting(FilterState& state, double insertion_mm, double rotation_rad) const;
   template <class Cutting>
   void follow(FilterState& state, double insertion_mm, double rotation_rad, bool with_covariance,
-              const Cutting& cutting) const;
+              const Cutting& cutting, bool bend_known = true) const;
+  template <class Cutting>
+  void predict_by(FilterState& state, double insertion_mm, double rotation_rad, double duration_s,
+                  const Cutting& cutting, bool bend_known) const;
+  void cut_straight(FilterState& state, double insertion_mm) const;
+  template <int kSize>
+  bool cut_straight_sized(FilterState& state, double insertion_mm) const;
+  void widen_by_gap(FilterState& state, double insertion_mm, double rotation_rad, double duration_s) const;
+  static void begin_reset(FilterState& state, ResetCause cause, std::int64_t utime);
   bool draw_through(FilterState& state, const Channel::Part& part, bool with_covariance) const;
   // How much of the bevel's force is left: less than all of it where the tip was drawn back from what it has cut.
   double pressing(const FilterState& state) const;
@@ -250,13 +271,19 @@ class NeedleFilter {
   template <int kSize>
   void keep_in_domain(FilterState& state) const;
   bool bends_to_the_other_side(const FilterState& state) const;
+  bool is_forgotten(std::int64_t heard_utime, std::int64_t utime) const;
   double side_of_bend() const;  // the prior's sign of k; 0 of a prior that has none
   model::SlipParameters slip_of(const FilterState& state) const;
   model::AugmentedState augmented(const FilterState& state) const;
   // blur_mm2: what the effects do not know of it, along the axes of {A}.
   model::TipReading reading(const FilterState& state, Eigen::Vector3d* blur_mm2 = nullptr) const;
+  // Variance of an unknown path at its end; that of offset and tilt is the same along both axes across the needle.
+  struct Widening {
+    double aside_mm2 = 0, aside_with_tilt_mm_rad = 0, tilt_rad2 = 0, along_mm2 = 0;
+  };
+  static void widen_pose(FilterState& state, const Widening& by);
   void widen_by_bend(FilterState& state, double inserted_mm) const;
-  void declare_reset(FilterState& state, double reach_mm) const;
+  void declare_reset(FilterState& state, double reach_mm, std::int64_t utime) const;
 
   EstimatorConfig config_;
   std::array<double, 3> gate_{};  // chi-square quantile by rank

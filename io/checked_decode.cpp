@@ -1,6 +1,7 @@
 #include "io/checked_decode.hpp"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <utility>
 
@@ -95,19 +96,58 @@ class FieldCheck {
   std::optional<DecodeError> error_;
 };
 
-// Symmetric to rounding and with no negative variance: what every covariance or information matrix satisfies.
-bool could_be_covariance(const double* matrix, std::size_t rows) {
-  for (std::size_t i = 0; i < rows; ++i) {
-    if (matrix[i * rows + i] < 0.0) return false;
-    for (std::size_t j = 0; j < i; ++j) {
-      const double above = matrix[j * rows + i];
-      const double below = matrix[i * rows + j];
-      const double scale = std::sqrt(matrix[i * rows + i]) * std::sqrt(matrix[j * rows + j]);
-      if (std::abs(above - below) > 1e-6 * scale + 1e-12) return false;
-      if (std::abs(above) > (1.0 + 1e-6) * scale + 1e-12) return false;  // a correlation beyond one
+// Rounding of a sender that computes in single precision, relative to the standard deviations of row and column.
+constexpr double kMatrixTolerance = 1e-6;
+// The product of two smaller numbers underflows, so that no arithmetic with them is safe. It is far below what rounding
+// leaves of a rotated matrix, the square of 1e-16 of its entries.
+constexpr double kSmallestEntry = 1e-150;
+
+// Checks that a matrix is symmetric and positive semi-definite to rounding, and that each entry is zero or large enough
+// to compute with. `unit2`: the square of the unit by which row and column i are scaled.
+template <std::size_t kRows>
+bool could_be_covariance(const double* matrix, const std::array<double, kRows>& unit2) {
+  std::array<std::array<double, kRows>, kRows> L{};  // first the matrix in those units, then its Cholesky factor
+  for (std::size_t i = 0; i < kRows; ++i) {
+    if (matrix[i * kRows + i] < 0.0) return false;
+    for (std::size_t j = 0; j <= i; ++j) {
+      const double above = matrix[j * kRows + i], below = matrix[i * kRows + j];
+      for (const double entry : {above, below})
+        if (entry != 0.0 && std::abs(entry) < kSmallestEntry) return false;
+      const double scale = std::sqrt(matrix[i * kRows + i]) * std::sqrt(matrix[j * kRows + j]);
+      if (std::abs(above - below) > kMatrixTolerance * scale + 1e-12) return false;
+      if (std::abs(above) > (1.0 + kMatrixTolerance) * scale + 1e-12) return false;  // a correlation beyond one
+      const double unit = std::sqrt(unit2[i]) * std::sqrt(unit2[j]);
+      L[i][j] = unit > 0.0 ? 0.5 * (above + below) / unit : 0.0;
     }
+    L[i][i] += kRows * kMatrixTolerance;  // a matrix that is singular to rounding passes
   }
+  for (std::size_t j = 0; j < kRows; ++j)
+    for (std::size_t i = j; i < kRows; ++i) {
+      double left = L[i][j];
+      for (std::size_t k = 0; k < j; ++k) left -= L[i][k] * L[j][k];
+      if (i > j) {
+        L[i][j] = left / L[j][j];
+      } else if (left > 0.0) {
+        L[j][j] = std::sqrt(left);
+      } else {
+        return false;
+      }
+    }
   return true;
+}
+
+// Checks the information of a measurement: none at all, or that of a standard deviation that a measurement can have.
+// Along an axis that is hardly observed an entry is rounding of the others, so all are scaled by the trace.
+bool could_be_information(const double* matrix, double smallest) {
+  const double trace = matrix[0] + matrix[4] + matrix[8];
+  return could_be_covariance<3>(matrix, {trace, trace, trace}) && (trace == 0.0 || trace >= smallest);
+}
+
+// Checks the covariance of an estimate. Its rows have different units, so each is scaled by its standard deviation.
+bool could_be_state_covariance(const double* matrix) {
+  std::array<double, 9> variance{};
+  for (std::size_t i = 0; i < variance.size(); ++i) variance[i] = matrix[10 * i];
+  return could_be_covariance<9>(matrix, variance);
 }
 
 double dot(const double* a, const double* b) { return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]; }
@@ -119,16 +159,14 @@ const char* find_inconsistency(const Message&) {
 }
 template <>
 const char* find_inconsistency(const tip_measurement_t& m) {
-  return could_be_covariance(m.information_per_mm2, 3) ? nullptr : "information_per_mm2";
+  return could_be_information(m.information_per_mm2, kSmallestInformation_per_mm2) ? nullptr : "information_per_mm2";
 }
 // A camera that says it sees nothing has no heading to give, and may leave it zero.
 template <>
 const char* find_inconsistency(const tip_heading_t& m) {
   const double length = std::sqrt(dot(m.heading, m.heading));
   if (std::abs(length - 1.0) > kHeadingTolerance && !(m.status != 0 && length == 0.0)) return "heading";
-  if (!could_be_covariance(m.information_per_rad2, 3)) return "information_per_rad2";
-  // With no variance negative, no correlation beyond one and nothing along the heading, no other eigenvalue is
-  // negative: neither the sum of the two that are left nor their product is.
+  if (!could_be_information(m.information_per_rad2, kSmallestInformation_per_rad2)) return "information_per_rad2";
   const double* W = m.information_per_rad2;
   const double largest = W[0] + W[4] + W[8];
   for (std::size_t row = 0; row < 3; ++row)
@@ -140,7 +178,7 @@ const char* find_inconsistency(const needle_state_t& m) {
   double squared = 0.0;
   for (const double q : m.orientation_wxyz) squared += q * q;
   if (std::abs(squared - 1.0) > 1e-3) return "orientation_wxyz";
-  return could_be_covariance(m.covariance, 9) ? nullptr : "covariance";
+  return could_be_state_covariance(m.covariance) ? nullptr : "covariance";
 }
 template <>
 const char* find_inconsistency(const needle_shaft_t& m) {

@@ -77,6 +77,8 @@ void read_estimator_config(Section section, estimator::EstimatorConfig& config) 
               in_range(0.02, 0.12).because(kStop));
   limits.read("actuator_age_s", config.limits.actuator_age_s, optional, in_range(0.01, 0.12).because(kStop));
   limits.read("position_sd_mm", config.limits.position_sd_mm, optional, in_range(0.05, 10));
+  limits.read("heading_sd_rad", config.limits.heading_sd_rad, optional,
+              in_range(0.02, 0.5).because("three standard deviations stay below pi/2, the slip law's limit"));
 }
 
 }  // namespace bevel::io

@@ -37,6 +37,9 @@ inline constexpr double kLargestAngle_rad = 1e7;  // a shaft turned at 10 rev/s 
 inline constexpr double kLargestRate_rad_s = 1e5;
 inline constexpr double kLargestInformation_per_mm2 = 1e12;   // a standard deviation of 1 nm
 inline constexpr double kLargestInformation_per_rad2 = 1e12;  // a standard deviation of 1 urad
+// Smallest trace of an information matrix that is not zero.
+inline constexpr double kSmallestInformation_per_mm2 = 1e-6;   // a standard deviation of 1 m
+inline constexpr double kSmallestInformation_per_rad2 = 1e-2;  // a standard deviation of 10 rad
 inline constexpr double kLargestPlainNumber = 1e12;
 // Numbers of cameras, counts, and the status of a measurement: 0 is usable, every other value is a reason of its sender
 // why it is not, and senders of other makers define other reasons.

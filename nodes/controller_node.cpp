@@ -71,6 +71,7 @@ controller::NeedleView to_view(const needle_state_t& m) {
   v.health = estimator::lost(m.health);
   v.unsure = (m.health & estimator::kUnsure) != 0;
   v.reset_count = m.reset_count;
+  v.reset_cause = m.health & estimator::kResetBits;
   v.from_entry = (m.health & estimator::kNotFromEntry) == 0;
   return v;
 }
@@ -215,7 +216,10 @@ void ControllerNode::report() {
   const controller::Status& s = supervisor_.status();
   std::string reason = controller::to_string(s.reason);
   char number[96];
-  if (s.reason == controller::Reason::state_unhealthy) {
+  if (s.reason == controller::Reason::state_reset) {
+    const auto cause = static_cast<std::int32_t>(s.value);
+    if (cause != 0) reason += ": " + estimator::describe_health(cause);
+  } else if (s.reason == controller::Reason::state_unhealthy) {
     reason += ": " + estimator::describe_health(static_cast<std::int32_t>(s.value));
   } else if (s.reason != controller::Reason::none && s.unit[0] != '\0') {
     std::snprintf(number, sizeof number, " (%.3g %s)", s.value, s.unit);

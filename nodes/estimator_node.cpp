@@ -14,6 +14,7 @@ namespace {
 
 constexpr double kPeriod_s = 0.01;
 constexpr std::int64_t kDescribed_ns = 500'000'000;
+constexpr std::int64_t kResetShown_us = 5'000'000;  // the cause of a reset in the status, long enough to be read
 constexpr double kFastestCamera_hz = 1000, kFastestCycle_hz = 1200;
 // How late a picture may be and still count; the history of the filter is shorter at 100 Hz.
 constexpr std::int64_t kLatestPicture_us = 600'000;
@@ -30,8 +31,11 @@ io::SenderLimits axes_limits(const estimator::HealthLimits& limits) {
   return {.longest_age_us = age_us, .fastest_hz = kFastestCycle_hz, .silence_us = age_us};
 }
 
-estimator::EstimatorConfig live(estimator::EstimatorConfig config) {
+estimator::EstimatorConfig live(estimator::EstimatorConfig config, const io::MotionBounds& bounds) {
   config.start_at_axes = true;
+  config.axes.gap_s = config.limits.actuator_age_s;
+  config.axes.insertion_rate_mm_s = bounds.insertion_rate_mm_s;
+  config.axes.rotation_rate_rad_s = bounds.rotation_rate_rad_s;
   return config;
 }
 
@@ -116,8 +120,8 @@ needle_shaft_t shaft_message(const estimator::Estimate& estimate, double guide_m
 EstimatorNode::EstimatorNode(lcm::LCM& lcm, const estimator::EstimatorConfig& config, const io::MotionBounds& bounds)
     : bounds_(bounds),
       port_(lcm),
-      estimator_(live(config)),
-      entry_line_(live(config)),
+      estimator_(live(config, bounds)),
+      entry_line_(live(config, bounds)),
       status_(port_, "bevel-estimator", kPeriod_s),
       words_(port_, status_, Receiver::estimator, [this](Word word, const steering_target_t&) { on_word(word); }),
       cameras_(config.limits.measurement_silence_s),
@@ -140,9 +144,10 @@ EstimatorNode::EstimatorNode(lcm::LCM& lcm, const estimator::EstimatorConfig& co
 }
 
 void EstimatorNode::on_axes(const actuator_state_t& m) {
-  // Axes that are off do not move: what jumps is their zero, and the estimate begins where they now count from.
-  const bool new_zero =
-      axes_ && io::at_rest_and_off(*axes_) && io::at_rest_and_off(m) && io::check_jump(*axes_, m, bounds_);
+  // A sequence that begins anew is that of a restarted driver, which has another zero. A jump is a new zero too: axes
+  // that are off do not move, and a jump of others arrives here only after an operator has armed. The estimate begins
+  // at the reported position.
+  const bool new_zero = axes_ && (m.seq < axes_->seq || io::check_jump(*axes_, m, bounds_));
   axes_ = m;
   if (new_zero) entry_.restart();
   if (entry_.see_axes(m.insertion_mm) || new_zero) restart();
@@ -196,6 +201,7 @@ void EstimatorNode::on_word(Word word) {
   port_.forget_senders();
   cameras_.restart();
   headings_.restart();
+  estimator_.forget_rejects();
   input_refused_ = false;
   remark_.clear();
 }
@@ -253,12 +259,15 @@ void EstimatorNode::step(const Now& now) {
     remark_ = "another bevel-estimator is heard on this network";
   }
   if (now.ns - described_ns_ >= kDescribed_ns) {  // numbers that change all the time
+    innovations_.forget_silent(now.utime);
     innovation_text_ = describe(innovations_);
     entry_text_ = describe(entry_line_);
     nuisance_text_ = describe(estimator_.estimate(now.utime).state.nuisance);
     described_ns_ = now.ns;
   }
-  std::string reason = estimator::describe_health(health());
+  const estimator::FilterState state = estimator_.estimate(now.utime).state;
+  const bool is_shown = model::age_us(now.utime, state.reset_utime) < kResetShown_us;
+  std::string reason = estimator::describe_health(health() | (is_shown ? estimator::reset_bit(state.reset_cause) : 0));
   for (const std::string& more : {innovation_text_, entry_text_, nuisance_text_, remark_, words_.refusal()})
     if (!more.empty()) reason += "; " + more;
   status_.report(axes_ ? io::ProcessState::running : io::ProcessState::waiting, reason);

@@ -370,6 +370,8 @@ SystemConfig load_system_config(const std::string& path) {
   c.controller.shaft = {c.estimator.prior.bending_mm, c.estimator.prior.guide_mm};
   read_controller(file.section("controller", optional), c.controller);
   read_stepper(file.section("stepper", optional), c.stepper);
+  c.estimator.axes = {c.estimator.limits.actuator_age_s, c.stepper.axes[stepper::kInsertion].rate_limit_unit_s,
+                      c.stepper.axes[stepper::kRotation].rate_limit_unit_s};
   read_source(file.section("source", optional), c.source);
   for (const Section& s : file.sections("camera", optional)) c.cameras.push_back(read_camera(s, folder));
   if (c.source.kind == camera::SourceKind::device)

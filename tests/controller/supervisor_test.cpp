@@ -58,6 +58,15 @@ TEST_F(SupervisorTest, EveryConditionStopsWithinOnePeriodAndLatches) {
          v.reset_count = 1;
          supervisor.set_needle(v);
        }},
+      // A position that is uncertain after a reset is a consequence of the reset, not the reason.
+      {Reason::state_reset,
+       [&] {
+         auto v = view(now);
+         v.reset_count = 1;
+         v.health = 8;
+         v.position_variance_mm2 = 100;
+         supervisor.set_needle(v);
+       }},
       {Reason::state_not_finite,
        [&] {
          auto v = view(now);

@@ -6,6 +6,7 @@
 #include <iostream>
 #include <numbers>
 
+#include "tests/estimator/coloured.hpp"
 #include "tests/estimator/play.hpp"
 
 namespace bevel::estimator {
@@ -101,6 +102,46 @@ TEST(EntryLine, FindsAFrameThatIsTurnedByTwoDegreesWithinThirtyMillimetres) {
     EXPECT_GE(share.said, 90) << "slopes of insertions, and a lambda that is hardly known, hide some";
   }
   EXPECT_EQ(EntryLine::kTo_mm, 30);
+}
+
+// Measurement errors are AR(1) with 0.9 from frame to frame, as [estimator.reading_noise] configures them. A filter
+// that ignores the configuration counts each frame as an independent measurement and reports the noise as a slope.
+TEST(EntryLine, CountsFramesOfAutocorrelatedNoiseByTheirEffectiveNumber) {
+  constexpr unsigned kSeed = 35;
+  constexpr int kInsertions = 100;
+  constexpr double kFrame_s = 0.033, kRho = 0.9;
+  const testing::Colour noise{.share = 0.99, .correlation_s = -kFrame_s / std::log(kRho)};
+  const double sigma_mm = 0.4;
+  const auto said_of = [&](const Eigen::Vector3d& turned_rad, bool coloured, bool told) {
+    std::mt19937_64 rng(kSeed);
+    EstimatorConfig config = agar_config();
+    config.prior.tilt_sd_rad = config.entry_slope_sd_rad / 1.35;
+    if (told) config.reading = {.correlated_share = noise.share, .correlation_s = noise.correlation_s};
+    testing::InsertionPlan plan;
+    plan.cameras = 2;
+    plan.length_mm = 40;
+    plan.sigma_mm = coloured ? sigma_mm * std::sqrt(1 - noise.share) : sigma_mm;
+    int said = 0;
+    for (int i = 0; i < kInsertions; ++i) {
+      auto drawn = testing::draw_insertion(config.prior, plan, rng);
+      if (coloured) testing::colour(drawn.data, noise, sigma_mm, plan.rate_mm_s, rng);
+      said += watched(config, drawn.data, turned_rad).is_turned() ? 1 : 0;
+    }
+    return said;
+  };
+  const Eigen::Vector3d turned(0.14, 0, 0);  // 8 degrees: what these few independent measurements can show
+  const int untold = said_of({0, 0, 0}, true, false), told = said_of({0, 0, 0}, true, true);
+  const int white = said_of({0, 0, 0}, false, false);
+  const int found = said_of(turned, true, true), found_white = said_of(turned, false, false);
+  std::cout << "seed " << kSeed << ", of " << kInsertions << " insertions, noise of " << sigma_mm
+            << " mm: reported falsely with AR(1) " << kRho << " " << untold << " if not configured, " << told
+            << " if configured, with white noise " << white << "; of those turned by 8 degrees " << found
+            << " with AR(1) configured, " << found_white << " with white noise\n";
+  EXPECT_GE(untold, 20) << "or the noise is no test of it";
+  EXPECT_LE(told, 5);
+  EXPECT_LE(white, 5);
+  EXPECT_GE(found, 90);
+  EXPECT_GE(found_white, 95);
 }
 
 TEST(EntryLine, SaysNothingBeforeItIsDeepEnoughOrWhereItDidNotBeginAtTheEntry) {

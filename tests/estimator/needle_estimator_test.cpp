@@ -169,6 +169,7 @@ TEST(NeedleEstimator, AJumpOfThreeFramesIsRejectedAndOneForEverIsADeclaredReset)
     play(estimator, data);
     const Estimate estimate = estimator.estimate(data.actuators.back().utime);
     EXPECT_EQ(estimate.state.reset_count, for_ever ? 1 : 0);
+    EXPECT_EQ(estimate.state.reset_cause, for_ever ? ResetCause::measurements_rejected : ResetCause::none);
     EXPECT_EQ(estimate.health, kHealthy) << describe_health(estimate.health);
     const Eigen::Vector3d seen = data.final_pose.p_mm + Eigen::Vector3d(for_ever ? 5 : 0, 0, 0);
     EXPECT_LT((estimate.state.pose.p_mm - seen).norm(), 0.4);
@@ -221,7 +222,12 @@ TEST(NeedleEstimator, TheCurvatureNeverChangesItsSideWithoutADeclaredReset) {
         while (next < data.measurements.size() && data.measurements[next].utime < actuator.utime)
           estimator.add(data.measurements[next++]);
         estimator.add(actuator);
-        ASSERT_GT(side * estimator.estimate(actuator.utime).state.curvature_per_mm, 0);
+        const Estimate now = estimator.estimate(actuator.utime);
+        ASSERT_GT(side * now.state.curvature_per_mm, 0);
+        if (now.state.reset_count > 0 && actuator.utime - now.state.reset_utime < 500'000) {
+          EXPECT_EQ(now.state.reset_cause, ResetCause::bevel_turned_over);
+          EXPECT_NE(describe_health(now.health).find("reset: the bevel is on the other side"), std::string::npos);
+        }
       }
       const Estimate end = estimator.estimate(data.actuators.back().utime);
       EXPECT_EQ(end.state.reset_count, known ? 1 : 0);

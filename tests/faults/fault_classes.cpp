@@ -3,6 +3,9 @@
 #include <algorithm>
 #include <cmath>
 
+#include "estimator/health.hpp"
+#include "model/lie.hpp"
+
 namespace bevel::test {
 namespace {
 
@@ -156,6 +159,61 @@ FaultClass drive_fault(Component component, FaultKind kind) {
   return c;
 }
 
+// ACTUATOR_STATE is not published for a time while the driver works on, and comes again: what the axes did meanwhile
+// nobody has observed.
+FaultClass gap_of_axes() {
+  FaultClass c;
+  c.name = "stepper:gap";
+  c.causes = causes_of_silence(Component::stepper);
+  c.inject = [](SimulatedLoop& loop, std::mt19937_64& rng) {
+    loop.injector(Component::stepper)->begin(FaultKind::off, loop.ns(), rng());
+    const auto length_ms = std::uniform_int_distribution<std::int64_t>(200, 700)(rng);
+    loop.each_ms = [&loop, until = loop.ms + length_ms] {
+      if (loop.ms == until && loop.stepper) loop.stepper->port().inject(nullptr);
+    };
+  };
+  c.mend = [](SimulatedLoop& loop) { loop.each_ms = nullptr; };
+  c.judge = [](const SimulatedLoop& loop) -> std::string {
+    const estimator::Estimate e = loop.estimator->estimator().estimate(loop.utime());
+    if (e.state.reset_cause != estimator::ResetCause::gap) return "the estimate passed the gap without a reset";
+    const model::Vector6d error = model::log_se3(e.tip.inverse() * loop.rig->plant().tip());
+    const double nees = error.dot(e.state.covariance.topLeftCorner<6, 6>().ldlt().solve(error));
+    // A chi-square of six exceeds it once in ten million times.
+    return nees < 42 ? "" : "pose NEES " + std::to_string(nees) + " after the gap";
+  };
+  return c;
+}
+
+// One camera of two is wrong until it is rejected, and then gone. It shows with its second rejected measurement: one
+// alone is an outlier, which the gate keeps out.
+FaultClass rejected_camera_vanishes() {
+  FaultClass c;
+  c.name = "camera:rejected, vanishes";
+  c.causes = {"rejecting measurements", "a camera fell silent"};
+  c.inject = [](SimulatedLoop& loop, std::mt19937_64& rng) {
+    const int which = static_cast<int>(rng() & 1U);
+    const double off_mm = std::uniform_real_distribution<double>(6, 20)(rng);
+    loop.see = [&loop, which, off_mm, gone = std::optional<std::int64_t>{}](
+                   const Eigen::Vector3d& tip, std::int64_t, int camera) mutable -> std::optional<tip_measurement_t> {
+      tip_measurement_t m = loop.picture(tip, camera);
+      if (camera != which) return m;
+      if (!gone && loop.needle_state && (loop.needle_state->health & estimator::kRejecting) != 0) gone = loop.ms;
+      if (gone) return std::nullopt;
+      m.position_mm[camera == 0 ? 1 : 0] += off_mm;
+      return m;
+    };
+  };
+  c.shows = [](const SimulatedLoop& loop) {
+    return loop.needle_state && (loop.needle_state->health & (estimator::kUnsure | estimator::kRejecting)) != 0;
+  };
+  c.mend = [](SimulatedLoop& loop) { loop.run(1); };
+  c.judge = [](const SimulatedLoop& loop) -> std::string {
+    const bool rejecting = (loop.needle_state->health & estimator::kRejecting) != 0;
+    return rejecting ? "still \"rejecting measurements\" of a camera that is gone" : "";
+  };
+  return c;
+}
+
 }  // namespace
 
 std::vector<FaultClass> fault_classes() {
@@ -210,6 +268,8 @@ std::vector<FaultClass> fault_classes() {
     return static_cast<double>(loop.ms - loop.heartbeat_ms) > 1e3 * loop.config.controller.operator_timeout_s;
   };
   classes.push_back(hung);
+  classes.push_back(gap_of_axes());
+  classes.push_back(rejected_camera_vanishes());
   std::ranges::move(drive_fault_classes(), std::back_inserter(classes));
   return classes;
 }

@@ -129,6 +129,8 @@ Verdict run_injection(const std::vector<FaultClass>& classes, std::size_t fault_
   if (std::abs(loop.rig->drive(0).position_unit() - at_mm) > kMoved_mm ||
       std::abs(loop.rig->drive(1).position_unit() - at_rad) > kMoved_rad)
     return violates("law 4: moved again without a word; " + all_reasons(loop));
+  if (fault.judge)
+    if (const std::string wrong = fault.judge(loop); !wrong.empty()) return violates(wrong + "; " + all_reasons(loop));
   return verdict;
 }
 

@@ -26,6 +26,8 @@ struct FaultClass {
   std::function<bool(const SimulatedLoop&)> shows{};
   // Nothing stops the axis, so that "does not stop" has to be declared instead of rest.
   bool defies_stops = false;
+  // Once it is taken back: what else must hold, "" or what does not. Empty: nothing.
+  std::function<std::string(const SimulatedLoop&)> judge = nullptr;
 };
 std::vector<FaultClass> fault_classes();
 // Those of drives that do not carry out what they acknowledge.

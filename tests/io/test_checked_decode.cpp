@@ -245,6 +245,50 @@ TEST(CheckedDecodeHeading, it_must_have_unit_length_unless_the_sender_says_that_
   EXPECT_TRUE(check_fields(message));
 }
 
+// Each pair of rows is a valid matrix, all three are not: correlations of -0.6 give an eigenvalue of -0.2.
+TEST(CheckedDecodeMatrix, RefusesAnIndefiniteMatrix) {
+  auto tip = valid_message<tip_measurement_t>();
+  auto state = valid_message<needle_state_t>();
+  for (int i = 0; i < 3; ++i)
+    for (int j = 0; j < 3; ++j) {
+      tip.information_per_mm2[3 * i + j] = i == j ? 100.0 : -60.0;
+      state.covariance[9 * (i + 3) + j + 3] = i == j ? 1e-4 : -0.6e-4;
+    }
+  ASSERT_TRUE(check_fields(tip));
+  EXPECT_STREQ(check_fields(tip)->field, "information_per_mm2");
+  ASSERT_TRUE(check_fields(state));
+  EXPECT_STREQ(check_fields(state)->field, "covariance");
+  for (int i = 0; i < 9; ++i) tip.information_per_mm2[i] = i % 4 == 0 ? 100.0 : -50.0;  // rank two
+  EXPECT_FALSE(check_fields(tip));
+}
+
+// Entries whose inverse, or whose square, is no number; and an information matrix that no measurement has.
+TEST(CheckedDecodeMatrix, RefusesEntriesThatNoMeasurementHas) {
+  for (const double tiny : {5e-324, 1e-310, 1e-200}) {
+    for (const int entry : {0, 4, 8}) {
+      auto tip = valid_message<tip_measurement_t>();
+      tip.information_per_mm2[entry] = tiny;
+      EXPECT_TRUE(check_fields(tip)) << tiny << " at " << entry;
+    }
+    auto tip = valid_message<tip_measurement_t>();
+    tip.information_per_mm2[1] = tip.information_per_mm2[3] = tiny;
+    EXPECT_TRUE(check_fields(tip)) << tiny << " off the diagonal";
+    auto state = valid_message<needle_state_t>();
+    state.covariance[60] = tiny;
+    EXPECT_TRUE(check_fields(state)) << tiny;
+    auto heading = valid_message<tip_heading_t>();
+    heading.information_per_rad2[0] = tiny;
+    EXPECT_TRUE(check_fields(heading)) << tiny;
+  }
+  auto tip = valid_message<tip_measurement_t>();
+  for (int i = 0; i < 3; ++i) tip.information_per_mm2[4 * i] = 1e-8;
+  EXPECT_TRUE(check_fields(tip)) << "a standard deviation of 10 m";
+  for (int i = 0; i < 3; ++i) tip.information_per_mm2[4 * i] = 1e-3;
+  EXPECT_FALSE(check_fields(tip)) << "a standard deviation of 32 mm";
+  for (int i = 0; i < 3; ++i) tip.information_per_mm2[4 * i] = 0;
+  EXPECT_FALSE(check_fields(tip)) << "nothing is seen";
+}
+
 TEST(CheckedDecodeHeading, its_information_is_across_it_alone_and_positive_semidefinite) {
   const Eigen::Vector3d along = Eigen::Vector3d(0.2, -0.4, 1).normalized();
   const Eigen::Vector3d a = along.unitOrthogonal(), b = along.cross(a);

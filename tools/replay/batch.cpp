@@ -110,6 +110,7 @@ int run(const BatchOptions& options, std::ostream& out, std::ostream& err) {
   replay_options.effects = setup.effects;
   replay_options.discrepancies = setup.discrepancies;
   replay_options.use_headings = !options.without_headings;
+  replay_options.rates_of_log = options.system_path.empty();  // a model file does not give the rig's
   std::vector<estimator::EstimatorConfig> configs(logs.size(), setup.config);
   if (options.held_out) configs = held_out_configs(replay_logs(logs, configs, replay_options), options.width);
   replay_options.ahead_mm = options.ahead_mm;

@@ -67,6 +67,13 @@ model::TipMeasurement with_noise(model::TipMeasurement m, const std::vector<Nois
   return m;
 }
 
+bool is_finite(const estimator::Estimate& estimate) {
+  const estimator::FilterState& s = estimate.state;
+  return s.pose.p_mm.allFinite() && s.pose.R.allFinite() && std::isfinite(s.curvature_per_mm) &&
+         std::isfinite(s.lambda1_per_rad) && std::isfinite(s.lambda2) && s.covariance.allFinite() &&
+         (s.covariance.diagonal().array() >= 0).all() && s.tenth_variance >= 0;
+}
+
 // The estimate at a truth's time: the state row before it, moved by the share of the increment.
 void compare(Replay& result, const std::vector<needle_state_t>& truths, const estimator::NeedleFilter& filter) {
   double position2 = 0, lateral2 = 0, tilt2 = 0, roll2 = 0;
@@ -111,6 +118,31 @@ void compare(Replay& result, const std::vector<needle_state_t>& truths, const es
   figures.roll_rmse_rad = std::sqrt(roll2 / n);
 }
 
+// Limits of the axes of a recording. A log with a long period has no gap in each period: a gap is longer than four
+// typical periods, which at 100 Hz is less than AxisLimits::gap_s.
+estimator::AxisLimits axes_of(const io::Recording& recording, estimator::AxisLimits axes, bool rates_of_log) {
+  constexpr double kPeriods = 4;
+  std::vector<std::pair<std::int64_t, const model::ActuatorState*>> sorted;
+  for (const model::ActuatorState& a : recording.actuators) sorted.emplace_back(a.utime, &a);
+  std::ranges::stable_sort(sorted, {}, &decltype(sorted)::value_type::first);
+  std::vector<double> periods_s;
+  double fastest_mm_s = 0, fastest_rad_s = 0;
+  for (std::size_t i = 1; i < sorted.size(); ++i) {
+    const model::ActuatorState &a = *sorted[i - 1].second, &b = *sorted[i].second;
+    const double period_s = static_cast<double>(b.utime - a.utime) * 1e-6;
+    if (!(period_s > 0)) continue;
+    periods_s.push_back(period_s);
+    fastest_mm_s = std::max(fastest_mm_s, std::abs(b.insertion_mm - a.insertion_mm) / period_s);
+    fastest_rad_s = std::max(fastest_rad_s, std::abs(b.rotation_rad - a.rotation_rad) / period_s);
+  }
+  if (periods_s.empty() || !(axes.gap_s > 0)) return axes;
+  const auto middle = periods_s.begin() + static_cast<std::ptrdiff_t>(periods_s.size() / 2);
+  std::ranges::nth_element(periods_s, middle);
+  axes.gap_s = std::max(axes.gap_s, kPeriods * *middle);
+  if (rates_of_log) axes.insertion_rate_mm_s = fastest_mm_s, axes.rotation_rate_rad_s = fastest_rad_s;
+  return axes;
+}
+
 // Insertion (mm) and rotation (rad) of the base at a time, between actuator states.
 Eigen::Vector2d axes_at(const Replay& replay, std::int64_t utime) {
   const auto after = std::lower_bound(replay.states.begin(), replay.states.end(), utime,
@@ -135,19 +167,19 @@ Replay replay_log(std::span<const std::uint8_t> log, const std::string& name, co
                   const ReplayOptions& options) {
   Replay result;
   result.name = name;
-  result.config = config;
-  // An actuator state takes about 100 bytes of a log, a measurement 170.
-  result.states.reserve(log.size() / 150 + 16);
-  result.innovations.reserve(log.size() / 250 + 16);
-  estimator::NeedleEstimator estimator(config, options.history);
-  Sink sink{&result.innovations, &result.headings, &estimator.filter()};
-  estimator.observe(&Sink::take, &sink);
-
   const auto start = std::chrono::steady_clock::now();
   const double start_processor_s = processor_s();
   const io::Recording recording = io::read_recording(log);
   io::require_usable(name, recording);
   result.remarks = recording.remarks(name);
+  result.config = config;
+  result.config.axes = axes_of(recording, config.axes, options.rates_of_log);
+  // An actuator state takes about 100 bytes of a log, a measurement 170.
+  result.states.reserve(log.size() / 150 + 16);
+  result.innovations.reserve(log.size() / 250 + 16);
+  estimator::NeedleEstimator estimator(result.config, options.history);
+  Sink sink{&result.innovations, &result.headings, &estimator.filter()};
+  estimator.observe(&Sink::take, &sink);
   for (const io::Arrival& arrival : recording.arrivals) {
     if (arrival.channel == io::Arrival::Channel::tip)
       estimator.add(with_noise(recording.tips[arrival.index], options.noise_by_axis));
@@ -166,6 +198,11 @@ Replay replay_log(std::span<const std::uint8_t> log, const std::string& name, co
     if (!config.effects.empty()) result.effects.push_back(estimate.state.effects);
     row.test_ratio = estimate.newest_update.test_ratio;
     row.health = estimate.health;
+    if (!is_finite(estimate))
+      throw std::runtime_error(
+          name + ": the estimate is not finite from " +
+          std::to_string(static_cast<double>(actuator.utime - result.states.front().utime) * 1e-6) +
+          " s on; check the measurements before that time, and the model file");
   }
   result.processor_s = processor_s() - start_processor_s;
   result.run_s = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();

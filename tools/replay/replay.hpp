@@ -97,6 +97,8 @@ struct ReplayOptions {
   std::size_t history = 64;
   bool use_headings = true;  // false: as if the log had none
   double ahead_mm = 0;       // for replay_logs: 0, nothing is predicted
+  // The rates that no axis exceeds in a gap: false, of the configuration; true, the fastest that the log has.
+  bool rates_of_log = false;
   // Replaces each measurement's information by that of this noise, per axis; empty: as the camera says.
   std::vector<NoiseColour> noise_by_axis{};
   // Of the model file, for replay_logs: some effects are a recording's own.

@@ -232,6 +232,9 @@ void print(std::ostream& out, const Replay& replay, double ahead_mm) {
       static_cast<long long>(replay.counters.actuators), static_cast<long long>(replay.counters.actuators_refused),
       static_cast<long long>(c.offered), static_cast<long long>(c.not_usable), static_cast<long long>(c.too_old),
       static_cast<long long>(c.duplicate), static_cast<long long>(c.late));
+  if (c.in_gap > 0)
+    out << text_of("  GAP          %lld measurements not applied: ACTUATOR_STATE had gaps of more than %g s\n",
+                   static_cast<long long>(c.in_gap), replay.config.axes.gap_s);
   if (replay.refused_messages > 0)
     out << "  REFUSED      " << replay.refused_messages << " messages that do not decode\n";
   if (!replay.damage.intact()) out << "  DAMAGED LOG  " << replay.damage.describe() << "\n";

@@ -105,6 +105,7 @@ controller::NeedleView view_of(const estimator::Estimate& estimate) {
   view.health = estimator::lost(estimate.health);
   view.unsure = (estimate.health & estimator::kUnsure) != 0;
   view.reset_count = estimate.state.reset_count;
+  view.reset_cause = estimate.health & estimator::kResetBits;
   return view;
 }
 
