@@ -95,6 +95,10 @@ void read_controller(Section s, controller::ControllerConfig& c) {
   f.read("resting_motion_rad", safety.resting_motion_rad, optional, in_range(0.02, 1));
   f.read("enabling_s", safety.enabling_s, optional, in_range(0.1, 30));
   f.read("target_miss_max_mm", safety.target_miss_max_mm, optional, in_range(0.05, 20));
+  f.read("arrival_tolerance_mm", safety.arrival_tolerance_mm, optional, in_range(0.05, 20));
+  f.read("target_lost", safety.target_lost, optional,
+         io::Choices<controller::TargetLost>{{"warn", controller::TargetLost::warn},
+                                             {"stop", controller::TargetLost::stop}});
   for (const Section& one : s.sections("obstacle", optional)) {
     c.obstacles.push_back(read_obstacle(one));
     if (c.law != controller::Law::arcs) s.fail("obstacle", "needs law = \"arcs\": no other goes round obstacles");

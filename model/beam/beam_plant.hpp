@@ -25,6 +25,7 @@
 // not couple neighbouring springs.
 #include <Eigen/Core>
 #include <cstddef>
+#include <limits>
 #include <vector>
 
 #include "model/beam/cut_path.hpp"
@@ -36,6 +37,11 @@ namespace bevel::model {
 struct BeamPlantConfig {
   double bending_stiffness_N_mm2 = 1.6e4;  // EI; 18 gauge steel
   double foundation_modulus_kPa = 20.0;  // k at once, force per mm of shaft and mm of displacement; 1 kPa = 1e-3 N/mm^2
+  /// A second layer of tissue below this depth, mm; infinity: uniform tissue. There the modulus and the bevel's force
+  /// are these.
+  double layer_from_mm = std::numeric_limits<double>::infinity();
+  double layer_modulus_kPa = 20.0;
+  double layer_force_N = 0.5;
   double relaxing_fraction = 0.0;        // part of k that relaxes, in [0, 1)
   double relaxation_time_s = 1.0;        // of that part, at constant displacement; > 0
   double bevel_force_N = 0.5;            // lateral, toward the bevel's side, while the bevel cuts; >= 0

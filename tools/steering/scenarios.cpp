@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstdlib>
 #include <numbers>
 #include <random>
 #include <type_traits>
@@ -168,6 +169,7 @@ struct Beam {
   bool obstacle = false;
   bool way_point = false;
   bool retract = false;
+  bool layered = false;  // a second layer from 30 to 60 mm on, drawn as a needle of which nothing is given
   static constexpr bool by_flips = false, gated = false;
 };
 // The software is told a curvature and a bending length, each off by up to 30 %, and a bicycle's slip of none.
@@ -181,6 +183,11 @@ Trial beam(const Beam& kind, std::uint64_t seed) {
   config.relaxing_fraction = kind.relaxing_fraction;
   config.relaxation_time_s = 3;
   config.max_depth_mm = 150;
+  if (kind.layered) {
+    config.layer_from_mm = draw.uniform(30, 60);
+    config.layer_modulus_kPa = draw.log_uniform(2, 100);
+    config.layer_force_N = draw.uniform(0.2, 1);
+  }
   const model::NeedleParameters deep = rig::bicycle_of(config);
   const double bending_mm = std::pow(4 * config.bending_stiffness_N_mm2 / (1e-3 * config.foundation_modulus_kPa), 0.25);
   estimator::Prior& prior = trial.believed.estimator.prior;
@@ -204,6 +211,46 @@ Trial beam(const Beam& kind, std::uint64_t seed) {
   return trial;
 }
 
+// EXPERIMENT
+double env(const char* n, double d) { const char* v = std::getenv(n); return v ? std::atof(v) : d; }
+struct Shipped { double modulus_kPa = 0, force_N = 0; bool obstacle=false, way_point=false, retract=false, by_flips=false, gated=false; };
+Trial shipped(const Shipped& kind, std::uint64_t seed) {
+  Draw draw(seed);
+  Trial trial;
+  estimator::Prior& prior = trial.believed.estimator.prior;
+  trial.believed.estimator.through_channel = true;
+  prior.needle = agar();
+  trial.believed.estimator.relinearised_steps = static_cast<int>(env("RELIN", 2048));
+  trial.believed.estimator.process.curvature_per_mm *= env("QK", 1);
+  prior.bending_mm = env("B", 0);
+  prior.bending_sd_mm = env("BSD", 0);
+  prior.guide_mm = env("G", 0);
+  prior.lambda1_sd_per_rad = env("L1SD", 0.15);
+  prior.lambda2_sd = env("L2SD", 0.08);
+  prior.curvature_sd_per_mm = env("KSD", 0.001);
+  const double off = env("OFF", 0.0), kscale = 1 + off * draw.uniform(-1, 1);
+  model::NeedleParameters truth = agar();
+  if (kind.modulus_kPa > 0) {
+    model::BeamPlantConfig config;
+    config.foundation_modulus_kPa = kind.modulus_kPa;
+    config.bevel_force_N = kind.force_N;
+    config.max_depth_mm = 150;
+    truth = rig::bicycle_of(config);
+    trial.needle = {.bicycle = truth, .beam = config};
+    trial.rig.make_plant = [config] { return std::make_unique<rig::BeamNeedle>(config); };
+  } else {
+    trial.needle = {.bicycle = truth, .effects = {}, .roll_rad = 0};
+    trial.rig.make_plant = [needle = trial.needle] {
+      return std::make_unique<rig::KinematicPlant>(needle.bicycle, needle.effects, 0, model::OwnValues{}, rig::Cut::kept);
+    };
+  }
+  if (env("KTOLD", 1) > 0) { prior.needle.curvature_per_mm = truth.curvature_per_mm * kscale; }
+  if (env("SLIPTOLD", 0) > 0) { prior.needle.lambda1_per_rad = truth.lambda1_per_rad; prior.needle.lambda2 = truth.lambda2; }
+  trial.believed.controller.shaft = {prior.bending_mm, prior.guide_mm};
+  trial.target_mm = draw_target(draw, truth.curvature_per_mm);
+  trial.rig.cameras = cameras(2);
+  return trial;
+}
 enum class Row { table, floor, apart };  // of the table; with what the true tip would bring; by its name alone
 template <class Kind>
 Scenario scenario(Row row, const char* name, const char* what, const Kind& kind,
@@ -237,7 +284,14 @@ const std::vector<Scenario>& scenarios() {
       scenario<Beam>(Row::floor, "beam-100-1", "beam, 100 kPa, 1 N", {100, 1}, beam),
       scenario<Beam>(Row::floor, "beam-50-1", "beam, 50 kPa, 1 N", {50, 1}, beam),
       scenario<Beam>(Row::floor, "beam-20-0.5", "beam, 20 kPa, 0.5 N", {20, 0.5}, beam),
+      scenario<Shipped>(Row::apart, "x-nominal", "", {}, shipped),
+      scenario<Shipped>(Row::apart, "x-50", "", {50, 1}, shipped),
+      scenario<Shipped>(Row::apart, "x-20", "", {20, 0.5}, shipped),
+      scenario<Shipped>(Row::apart, "x-100", "", {100, 0.3}, shipped),
       scenario<Beam>(Row::apart, "beam-any", "beam, 2 to 100 kPa, 0.2 to 1 N", {}, beam),
+      scenario<Beam>(Row::table, "beam-layered",
+                     "beam, two layers of 2 to 100 kPa and 0.2 to 1 N, the second from 30 to 60 mm on",
+                     {.layered = true}, beam),
       scenario<Beam>(Row::apart, "beam-relaxing", "beam, 20 kPa, 0.5 N, of which 30 % relax in 3 s",
                      {.modulus_kPa = 20, .force_N = 0.5, .relaxing_fraction = 0.3}, beam),
       scenario<Beam>(Row::floor, "beam-windup", "beam, 100 kPa, 1 N, wind-up of 0.5 rad at 100 mm, unknown",
