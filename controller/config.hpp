@@ -45,7 +45,7 @@ struct SafetyLimits {
   double axis_delay_s = 0.12;      // from a command to the report of what it did
   double resting_motion_mm = 0.5;  // by which axes that are told to rest may move
   double resting_motion_rad = 0.2;
-  double enabling_s = 3.0;          // from armed to both axes enabled
+  double enabling_s = 3.0;  // from armed to both axes enabled
   /// Predicted miss, mm, above which a target is refused before insertion and the needle stops during insertion.
   double target_miss_max_mm = 5.0;
   /// Largest distance, mm, from the tip to the target that counts as an arrival, unless the target has a tolerance of

@@ -165,7 +165,7 @@ bool Supervisor::check_inputs(std::int64_t now_utime) {
   const double left_mm = route_.clearance_left_mm(n.pose.p_mm), lateral = n.pose.p_mm.head<2>().norm();
   // Back along the way that it came leads out of both.
   if (!for_retraction_ && left_mm < 0) return refuse(Reason::obstacle_near, left_mm, "mm of its clearance left");
-  if (!for_retraction_ && !(lateral <= safety.lateral_max_mm)) 
+  if (!for_retraction_ && !(lateral <= safety.lateral_max_mm))
     return refuse_outside(lateral, {"distance of the tip from the z axis", 0, safety.lateral_max_mm,
                                     "arm for a retraction (request 9), or raise controller.safety.lateral_max_mm"});
   // Tissue that moves with its camera, and an entry point that was not quite met, are within the bound on the error.

@@ -62,8 +62,8 @@ struct Status {
   /// prediction when this was found, or when it had grown by half a millimetre since.
   bool target_lost = false;
   Miss lost_miss;
-  SteeringGeometry geometry;     // of Law::spin
-  ArcGeometry arc;               // of Law::arcs and Law::flip
+  SteeringGeometry geometry;  // of Law::spin
+  ArcGeometry arc;            // of Law::arcs and Law::flip
 };
 
 /// Returns the reason of \p status as text for the operator: place, value, allowed range and remedy where there are

@@ -122,8 +122,8 @@ std::string describe(const Status& s) {
   if (s.reason == Reason::arrived || s.reason == Reason::missed) {
     text += ": " + text_of(s.miss);
   } else if (s.allowed.place[0] != '\0') {
-    std::snprintf(number, sizeof number, ": %s is %.4g %s; allowed %.4g to %.4g mm%s%s", s.allowed.place, s.value, s.unit,
-                  s.allowed.least, s.allowed.most, s.allowed.remedy[0] != '\0' ? ": " : "", s.allowed.remedy);
+    std::snprintf(number, sizeof number, ": %s is %.4g %s; allowed %.4g to %.4g mm%s%s", s.allowed.place, s.value,
+                  s.unit, s.allowed.least, s.allowed.most, s.allowed.remedy[0] != '\0' ? ": " : "", s.allowed.remedy);
     text += number;
   } else if (s.unit[0] != '\0') {
     std::snprintf(number, sizeof number, " (%.3g %s)", s.value, s.unit);

@@ -342,6 +342,19 @@ void check_states_of_cameras(Section s, const SystemConfig& c) {
   }
 }
 
+// A shaft that bends, unless the file gives its length or something that the filter does not estimate beside it:
+// effects, the wheelbase or headings.
+void assume_shaft(Section prior, bool has_effects, SystemConfig& c) {
+  const bool takes_headings =
+      c.rig.heading.sd_rad > 0 || std::ranges::any_of(c.cameras, [](const auto& camera) { return camera.headings; });
+  estimator::Prior& own = c.estimator.prior;
+  if (prior.has("bending_mm") || has_effects || takes_headings || own.wheelbase_sd_mm > 0) return;
+  const estimator::Prior given = own;
+  estimator::assume_unknown_shaft(own);
+  if (prior.has("bending_sd_mm")) own.bending_sd_mm = given.bending_sd_mm;
+  if (prior.has("guide_mm")) own.guide_mm = given.guide_mm;
+}
+
 }  // namespace
 
 SystemConfig load_system_config(const std::string& path) {
@@ -359,7 +372,6 @@ SystemConfig load_system_config(const std::string& path) {
   c.estimator.prior.variation = believed.variation.value_or(model::Variation{});
   c.estimator.through_channel = true;  // a needle in tissue; recordings of a model are replayed without a system file
   io::read_estimator_config(file.section("estimator", optional), c.estimator);
-  c.controller.shaft = {c.estimator.prior.bending_mm, c.estimator.prior.guide_mm};
   read_controller(file.section("controller", optional), c.controller);
   read_stepper(file.section("stepper", optional), c.stepper);
   read_source(file.section("source", optional), c.source);
@@ -383,6 +395,8 @@ SystemConfig load_system_config(const std::string& path) {
         .section("heading", optional)
         .fail("camera", "is " + std::to_string(c.rig.heading.camera) +
                             ", which a [[camera]] has; allowed: a number of its own, 0 to 15");
+  assume_shaft(file.section("estimator", optional).section("prior", optional), !believed.effects.empty(), c);
+  c.controller.shaft = {c.estimator.prior.bending_mm, c.estimator.prior.guide_mm};
   file.finish();
   c.live_effects = io::live_effects(believed.effects, believed.discrepancies);
   c.effects = std::move(believed.effects);

@@ -3,6 +3,7 @@
 #include "nodes/needle_pose.hpp"
 #include "report/page.hpp"
 #include "tools/demo_loop/loop_figures.hpp"
+#include "tools/demo_loop/steering_session.hpp"
 
 namespace bevel::tools {
 namespace {
@@ -147,8 +148,9 @@ std::vector<report::Fact> facts_of(const LoopFigures& f) {
 
 void add_tables(report::Page& page, const LoopFigures& f) {
   const auto row = [](const char* name, const char* format, double value, double sd, double truth) {
-    return std::vector<std::string>{name, text(format, value), text(format, sd), text(format, truth),
-                                    text("%+.1f", (value - truth) / sd)};
+    const bool is_estimated = sd > 0;  // else it is held at the configured value
+    return std::vector<std::string>{name, text(format, value), is_estimated ? text(format, sd) : "held",
+                                    text(format, truth), is_estimated ? text("%+.1f", (value - truth) / sd) : "-"};
   };
   page.table({"parameter", "estimate", "standard deviation", "truth", "off by (standard deviations)"},
              {row("k (1/mm)", "%.5f", f.curvature_per_mm, f.curvature_sd_per_mm, f.truth->curvature_per_mm),
@@ -178,11 +180,18 @@ void write_loop_report(const std::string& log_path, const LoopFigures& f, double
   const Column truth = column(log.truths, start), estimate = column(log.estimates, start);
   report::Page page("One insertion");
   char headline[160];
-  std::snprintf(headline, sizeof headline, "The tip came to rest %.2f mm from the target", f.targeting_error_mm);
-  page.verdict(f.targeting_error_mm <= tolerance_mm ? report::Tone::good : report::Tone::bad, headline,
-               "True tip of the simulated needle, whose curvature and lambda are not what the software believed at the "
-               "start; the camera's pictures were rendered and tracked.",
-               facts_of(f));
+  const bool reported = reports_arrival(f.outcome), is_near = f.targeting_error_mm <= tolerance_mm;
+  std::snprintf(headline, sizeof headline, "%s: the true tip came to rest %.2f mm from the target",
+                reported && is_near ? "Arrived"
+                : reported          ? "Missed, and an arrival was reported"
+                                    : "Missed, as reported",
+                f.targeting_error_mm);
+  page.verdict(
+      reported && is_near ? report::Tone::good : report::Tone::bad, headline,
+      "The controller reports: " + (f.outcome.empty() ? std::string("no outcome") : f.outcome) +
+          ". True tip of the simulated needle, whose curvature and lambda are not what the software believed at the "
+          "start; the camera's pictures were rendered and tracked.",
+      facts_of(f));
   add_tables(page, f);
   page.heading("Path");
   page.space(path_in_space(truth, estimate, f.target_mm),

@@ -3,7 +3,6 @@
 #include <Eigen/Cholesky>
 #include <algorithm>
 #include <cmath>
-#include <cstdlib>
 #include <deque>
 #include <map>
 #include <random>
@@ -176,8 +175,7 @@ Insertion steer(const SteeredRig& rig, const Believed& believed, const Eigen::Ve
   // A rig whose camera is late has its limit set for that: it is not what is looked at here.
   settings.limits.measurement_age_s += plant->model().latency_s().value;
   estimator::NeedleEstimator estimator(settings);
-  estimator::EstimatorConfig es = settings; if (const char* v = std::getenv("EBSD")) es.prior.bending_sd_mm = std::atof(v); if (const char* v = std::getenv("EB")) es.prior.bending_mm = std::atof(v);
-  estimator::EntryLine entry(es);
+  estimator::EntryLine entry(entry_line_config(settings));
   controller::ControllerConfig config = believed.controller;
   config.through_channel = settings.through_channel && settings.effects.empty();
   const model::NeedleParameters needle = model::AugmentedNeedle(settings.prior.needle, settings.effects).needle();

@@ -243,7 +243,8 @@ int run_targets(const TargetsOptions& options, std::ostream& out) {
   }
   out << "seed " << options.seed
       << "; errors in mm, of the insertions that came to rest at the depth of their target\n\n"
-      << "| scenario | law | targets | median | mean +- sd | 95 % | worst | at depth, % | arrived | missed as reported | "
+      << "| scenario | law | targets | median | mean +- sd | 95 % | worst | at depth, % | arrived | missed as reported "
+         "| "
          "missed and not reported | refused before | turns per 100 mm | feed, mm/s | estimate to tip | pose NEES / 6 | "
          "stopped |\n| --- | --- | --- | --- | --- | --- | --- | --- | --- | --- | --- | --- | --- | --- | --- | --- | "
          "--- |\n";
