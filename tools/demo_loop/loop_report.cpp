@@ -1,6 +1,7 @@
 #include <cmath>
 
 #include "nodes/needle_pose.hpp"
+#include "report/numbers.hpp"
 #include "report/page.hpp"
 #include "tools/demo_loop/loop_figures.hpp"
 #include "tools/demo_loop/steering_session.hpp"
@@ -118,7 +119,7 @@ Figure parameter_figure(const std::vector<needle_state_t>& states, std::int64_t 
   figure.y_label = "lambda1 (1/rad), lambda2";
   std::vector<double> t, l1, l1_low, l1_high, l2, l2_low, l2_high;
   for (const needle_state_t& m : states) {
-    const double s1 = std::sqrt(m.covariance[70]), s2 = std::sqrt(m.covariance[80]);
+    const double s1 = std::sqrt(std::max(m.covariance[70], 0.0)), s2 = std::sqrt(std::max(m.covariance[80], 0.0));
     t.push_back(static_cast<double>(m.utime - start_utime) * 1e-6);
     l1.push_back(m.lambda1_per_rad), l1_low.push_back(m.lambda1_per_rad - 2 * s1),
         l1_high.push_back(m.lambda1_per_rad + 2 * s1);
@@ -148,9 +149,8 @@ std::vector<report::Fact> facts_of(const LoopFigures& f) {
 
 void add_tables(report::Page& page, const LoopFigures& f) {
   const auto row = [](const char* name, const char* format, double value, double sd, double truth) {
-    const bool is_estimated = sd > 0;  // else it is held at the configured value
-    return std::vector<std::string>{name, text(format, value), is_estimated ? text(format, sd) : "held",
-                                    text(format, truth), is_estimated ? text("%+.1f", (value - truth) / sd) : "-"};
+    return std::vector<std::string>{name, text(format, value), sd > 0 ? text(format, sd) : "held", text(format, truth),
+                                    report::in_deviations(value - truth, sd)};
   };
   page.table({"parameter", "estimate", "standard deviation", "truth", "off by (standard deviations)"},
              {row("k (1/mm)", "%.5f", f.curvature_per_mm, f.curvature_sd_per_mm, f.truth->curvature_per_mm),
