@@ -37,6 +37,7 @@ void Supervisor::clear_reason() {
   status_.unit = "";
   status_.allowed = {};
   status_.target_lost = false;
+  beyond_since_mm_.reset();
 }
 
 void Supervisor::request(Request request, const std::optional<Target>& target, std::int64_t now_utime) {

@@ -175,7 +175,8 @@ class Supervisor {
   // Where a target that moves was at the closest approach, and the standard deviation of that.
   Eigen::Vector3d met_mm_ = Eigen::Vector3d::Zero();
   double met_sd_mm_ = 0;
-  bool was_outside_ = false;  // the newest position of a target that moves lay outside the workspace
+  std::optional<double> beyond_since_mm_;  // of insertion: the predicted miss has exceeded the tolerance since
+  bool was_outside_ = false;               // the newest position of a target that moves lay outside the workspace
   Eigen::Vector3d aim_mm_ = Eigen::Vector3d::Zero();  // the target, or where the path to it is a look-ahead later
   ArcLaw arcs_;
   Rates rates_;

@@ -9,6 +9,9 @@ namespace bevel::controller {
 namespace {
 
 constexpr double kReportedAgain_mm = 0.5;  // growth of a predicted miss that is reported anew
+// Insertion during which the prediction has to persist. An estimate that begins in the tissue finds its heading within
+// some millimetres of motion, and its covariance is of a linear filter.
+constexpr double kLostAfter_mm = 5;
 
 std::string text_of(const Miss& miss) {
   char text[96];
@@ -74,9 +77,18 @@ bool Supervisor::check_miss() {
   if (!route_.is_needed() && !(status_.arc.in_domain && status_.arc.ahead_mm > 0)) return true;  // no prediction
   status_.miss = predicted_miss();
   const Miss& miss = status_.miss;
-  const bool stops = config_.safety.target_lost == TargetLost::stop;
+  const SafetyLimits& safety = config_.safety;
+  const double inserted_mm = actuator_->insertion_mm;
+  if (!miss.exceeds(std::min(miss.tolerance_mm, safety.target_miss_max_mm))) {
+    beyond_since_mm_.reset();
+    if (miss.distance_mm <= miss.tolerance_mm) status_.target_lost = false;
+    return true;
+  }
+  if (!beyond_since_mm_) beyond_since_mm_ = inserted_mm;
+  if (inserted_mm - *beyond_since_mm_ < kLostAfter_mm) return true;
+  const bool stops = safety.target_lost == TargetLost::stop;
   const double stop_above_mm =
-      stops ? std::min(miss.tolerance_mm, config_.safety.target_miss_max_mm) : config_.safety.target_miss_max_mm;
+      stops ? std::min(miss.tolerance_mm, safety.target_miss_max_mm) : safety.target_miss_max_mm;
   if (miss.exceeds(stop_above_mm)) {
     stop(Reason::target_unreachable, miss.distance_mm, "mm",
          {"predicted miss", 0, stop_above_mm,
@@ -84,13 +96,9 @@ bool Supervisor::check_miss() {
                 : "retract and arm again, or raise controller.safety.target_miss_max_mm"});
     return false;
   }
-  if (miss.exceeds(miss.tolerance_mm)) {
-    if (!status_.target_lost || miss.distance_mm > status_.lost_miss.distance_mm + kReportedAgain_mm)
-      status_.lost_miss = miss;
-    status_.target_lost = true;
-  } else if (miss.distance_mm <= miss.tolerance_mm) {
-    status_.target_lost = false;
-  }
+  if (!status_.target_lost || miss.distance_mm > status_.lost_miss.distance_mm + kReportedAgain_mm)
+    status_.lost_miss = miss;
+  status_.target_lost = true;
   return true;
 }
 

@@ -68,20 +68,22 @@ class ArrivalTest : public SupervisorTest {
     EXPECT_NEAR(supervisor.status().miss.distance_mm, off_mm, 0.01);
     EXPECT_NEAR(supervisor.status().miss.sd_mm, sd_mm, 1e-9);
   }
-  // One step 20 mm before the target's depth, the target off_mm aside of the line of the shaft.
-  void step_20_mm_before(double off_mm) {
+  // From 26 to 20 mm before the target's depth, the target off_mm aside of the line of the shaft.
+  void step_20_mm_before(double off_mm, double last_z_mm = 80) {
     begin();
     supervisor.request(Request::arm, Target{{2, -8, 100}, 0}, now);
     supervisor.request(Request::start, std::nullopt, now);
     ASSERT_EQ(supervisor.status().state, State::steering) << describe(supervisor.status());
-    now += 20'000;
-    NeedleView v = view(now);
-    v.pose.p_mm = {2 + off_mm, -8, 80};
-    supervisor.set_needle(v);
-    model::ActuatorState a = axes(now, last);
-    a.insertion_mm = 81;
-    supervisor.set_actuator(a);
-    last = supervisor.step(now, 0.02);
+    for (double z_mm = 74; z_mm <= last_z_mm && supervisor.status().state == State::steering; ++z_mm) {
+      now += 20'000;
+      NeedleView v = view(now);
+      v.pose.p_mm = {2 + off_mm, -8, z_mm};
+      supervisor.set_needle(v);
+      model::ActuatorState a = axes(now, last);
+      a.insertion_mm = z_mm + 1;
+      supervisor.set_actuator(a);
+      last = supervisor.step(now, 0.02);
+    }
   }
   double worst_s = 0;
 };
@@ -186,7 +188,9 @@ TEST_F(ArrivalTest, ATargetThatLeavesTheReachableSetIsReportedOrStopsTheNeedle) 
   step_20_mm_before(4);
   EXPECT_EQ(supervisor.status().state, State::steering);
   EXPECT_TRUE(supervisor.status().target_lost);
-  EXPECT_THAT(describe(supervisor.status()), HasSubstr("left the reachable set: predicted 2."));
+  EXPECT_THAT(describe(supervisor.status()), HasSubstr("left the reachable set: predicted "));
+  step_20_mm_before(8, 78);
+  EXPECT_EQ(supervisor.status().state, State::steering) << "not for 5 mm yet";
   step_20_mm_before(8);
   EXPECT_EQ(supervisor.status().state, State::stopped) << "above target_miss_max_mm";
   EXPECT_EQ(supervisor.status().reason, Reason::target_unreachable);

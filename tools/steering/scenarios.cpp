@@ -168,7 +168,7 @@ struct Beam {
   bool obstacle = false;
   bool way_point = false;
   bool retract = false;
-  bool layered = false;  // a second layer from 30 to 60 mm on, drawn as a needle of which nothing is given
+  bool layered = false;  // a second layer begins 30 to 60 mm deep; its modulus and force are drawn
   static constexpr bool by_flips = false, gated = false;
 };
 // The software is told a curvature and a bending length, each off by up to 30 %, and a bicycle's slip of none.

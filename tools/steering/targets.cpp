@@ -40,8 +40,8 @@ constexpr std::array<LawTried, 6> kLaws{
 // Errors are of the insertions that came to rest at the depth of their target, near it or not.
 struct Figures {
   int targets = 0, at_depth = 0, refused = 0;
-  // By the controller's report and by the true tip, of all targets. A needle that was stopped on the way because the
-  // target had left the reachable set is a reported miss.
+  // The controller's report compared with the true tip. A needle that was stopped on the way because the target had
+  // left the reachable set is a reported miss.
   int arrived = 0, missed_as_reported = 0, missed_unreported = 0;
   int reported_in_vain = 0;  // of the reported misses: the true tip is within the tolerance
   double median_mm = 0, mean_mm = 0, sd_mm = 0, at_95_mm = 0, worst_mm = 0;
