@@ -51,9 +51,7 @@ TEST(BeamLoop, WithoutIt_TheFilterRejectsWhatItSees) {
       << "tip to target " << (loop.tip() - Eigen::Vector3d(6, -5, 100)).norm();
 }
 
-// A file that says nothing of the shaft, in soft tissue: 50 kPa and 1 N, 20 kPa and 0.5 N. By its [needle] k is off by
-// 15
-// %.
+// A file without [estimator.prior] in soft tissue (50 kPa and 1 N, 20 kPa and 0.5 N) and in gel. Its k is off by 15 %.
 TEST(BeamLoop, TheDefaultConfigurationArrivesInSoftTissueAndInGel) {
   struct Tissue {
     const char* rig;
