@@ -36,7 +36,7 @@ enum class Reason {
   way_in_unknown,      // to be drawn back, and nobody watched it go in; how much of it is inserted
   law_without_path,    // way-points or obstacles with a law that does not follow a path
   target_outside,      // a commanded target or way-point lies outside the workspace of the tip
-  // Of the state hold; motion is not stopped by a fault.
+  // The following are reasons of the state hold. No fault has stopped the needle.
   held,            // by the operator
   coming_to_rest,  // at the closest approach to the target; the outcome follows once the axes are stationary
   arrived,         // within the arrival tolerance, the uncertainty of the estimate included

@@ -172,7 +172,7 @@ class Supervisor {
   bool way_points_lost_ = false;  // more than there is room for
   void forget_way_points() { way_points_ = {}, way_points_lost_ = false; }
   bool pauses_for_path_ = false;
-  // Where a target that moves was at the closest approach, and the standard deviation of that.
+  // Position of a moving target at the closest approach, and its standard deviation.
   Eigen::Vector3d met_mm_ = Eigen::Vector3d::Zero();
   double met_sd_mm_ = 0;
   std::optional<double> beyond_since_mm_;  // of insertion: the predicted miss has exceeded the tolerance since

@@ -120,8 +120,8 @@ struct EstimatorConfig {
   bool start_at_axes = false;
 };
 
-/// The shaft of a needle of which nothing is configured: in soft tissue it bends over 30 to 45 mm (steel, 1.27 mm, 20
-/// to 50 kPa), in stiff gel over less than a millimetre. The mean is small because the derivatives of the swing grow
+/// Bending length of the shaft where none is configured. In soft tissue it is 30 to 45 mm (steel of 1.27 mm, 20 to
+/// 50 kPa), in stiff gel below a millimetre. The mean is small because the derivatives of the swing grow
 /// with the bending length: from a small one the filter converges on both, from 40 mm it loses a needle that does not
 /// bend (docs/steering.md). Three standard deviations above the mean lie in the softest tissue.
 inline constexpr double kUnknownBending_mm = 5, kUnknownBendingSd_mm = 12;

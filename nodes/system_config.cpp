@@ -342,7 +342,7 @@ void check_states_of_cameras(Section s, const SystemConfig& c) {
   }
 }
 
-// A shaft that bends, unless the file gives its length or something that the filter does not estimate beside it:
+// Assumes a shaft that bends, unless the file has the key, or something that the filter does not combine with it:
 // effects, the wheelbase or headings.
 void assume_shaft(Section prior, bool has_effects, SystemConfig& c) {
   const bool takes_headings =
