@@ -18,7 +18,6 @@ constexpr double kTurnAway_rad = std::numbers::pi / 3, kRestAway_rad = 0.2;
 constexpr double kEitherWay_rad = 0.8 * std::numbers::pi;  // a turn this long may as well go the other way round
 constexpr double kBrakingShare = 0.6;                      // of the acceleration, for an axis that follows late
 constexpr double kConvergence_per_s = 8;                   // at the end of a turn
-constexpr double kOutside_mm = 1;                          // up to here the needle may be turned by any angle
 constexpr double kTurned_rad = 0.02;                       // a half turn is at its end
 constexpr double kNearly_rad = 0.3;                        // from here on the feed is not slowed for a turn
 
@@ -80,9 +79,12 @@ ArcGeometry arc_geometry(const model::Pose& tip, const model::NeedleParameters& 
   return g;
 }
 
-double arc_miss_mm(const ArcGeometry& geometry) {
+double arc_miss_mm(const ArcGeometry& geometry, bool by_half_turns) {
   if (!geometry.in_domain || geometry.ahead_mm <= 0) return std::numeric_limits<double>::infinity();
-  return std::max(0.0, geometry.aim_mm.norm() - geometry.reach_mm);
+  const double aside_mm = geometry.aim_mm.norm();
+  if (!by_half_turns) return std::max(0.0, aside_mm - geometry.reach_mm);
+  const double within_mm = aside_mm * std::abs(std::cos(geometry.facing_rad));
+  return std::hypot(aside_mm * std::sin(geometry.facing_rad), std::max(0.0, within_mm - geometry.reach_mm));
 }
 
 // At rest, by half turns from where the bevel stands, each to its end, and none before the last one has had an effect.

@@ -44,9 +44,14 @@ struct BendUncertainty {
 ArcGeometry arc_geometry(const model::Pose& tip, const model::NeedleParameters& needle, const ShaftConfig& shaft,
                          const Eigen::Vector3d& target_mm, const BendUncertainty& uncertain = {});
 
-// The least that can still be missed by: what lies out of reach. Infinite for a target that lies behind, and outside
-// the model's domain.
-double arc_miss_mm(const ArcGeometry& geometry);
+/// Returns the distance, mm, at which a needle that is steered on passes the target, in the plane through the target
+/// perpendicular to the shaft: the part of W beyond the reach. Every law that may turn during insertion comes to this.
+/// @param by_half_turns steered by half turns only (Law::flip in tissue): the part of W across the plane of the bevel
+///     stays.
+/// @return infinity for a target behind the tip and outside the model's domain.
+double arc_miss_mm(const ArcGeometry& geometry, bool by_half_turns = false);
+/// Insertion, mm, up to which the needle may be turned by any angle under Law::flip: it is not in the tissue yet.
+inline constexpr double kOutside_mm = 1;
 
 class ArcLaw {
  public:

@@ -53,11 +53,13 @@ bool ArcWalk::to_plane(model::Pose middle, const Eigen::Vector3d& point_mm, cons
   const double longest_mm = shaft_.bending_mm > 0 ? kDrawnStep_mm : kSlackStep_mm;
   for (int i = 0; i < kMostSteps; ++i) {
     const double step_mm = step_to_plane_mm(middle, point_mm, along, longest_mm);
-    if (step_mm <= 0) break;
+    if (step_mm <= 0) {
+      at_mm = tip_mm(middle, share);
+      return true;
+    }
     if (!step(middle, share, step_mm)) return false;
   }
-  at_mm = tip_mm(middle, share);
-  return true;
+  return false;
 }
 
 }  // namespace bevel::controller

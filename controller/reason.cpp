@@ -84,8 +84,33 @@ const char* to_string(Reason reason) {
       return "operator program does not respond";
     case Reason::ending:
       return "told to end";
+    case Reason::target_outside:
+      return "target outside the workspace";
+    case Reason::held:
+      return "held by the operator";
+    case Reason::coming_to_rest:
+      return "at the closest approach, coming to rest";
+    case Reason::arrived:
+      return "arrived";
+    case Reason::missed:
+      return "missed the target";
+    case Reason::retracted:
+      return "retracted";
   }
   return "?";
+}
+
+bool refuses_target(Reason reason) {
+  switch (reason) {
+    case Reason::target_outside:
+    case Reason::target_unreachable:
+    case Reason::path_blocked:
+    case Reason::way_point_unreachable:
+    case Reason::law_without_path:
+      return true;
+    default:
+      return false;
+  }
 }
 
 }  // namespace bevel::controller

@@ -36,8 +36,18 @@ enum class Reason {
   channel_unknown,     // drawn back, and the estimator declared a reset since it was at the end of its channel
   way_in_unknown,      // to be drawn back, and nobody watched it go in; how much of it is inserted
   law_without_path,    // way-points or obstacles with a law that does not follow a path
+  target_outside,      // a commanded target or way-point lies outside the workspace of the tip
+  // The following are reasons of the state hold. No fault has stopped the needle.
+  held,            // by the operator
+  coming_to_rest,  // at the closest approach to the target; the outcome follows once the axes are stationary
+  arrived,         // within the arrival tolerance, the uncertainty of the estimate included
+  missed,          // at the depth of the target, outside the arrival tolerance
+  retracted,       // to the commanded depth
 };
 const char* to_string(State state);
 const char* to_string(Reason reason);
+
+/// Returns whether \p reason refuses the commanded target itself, so that the same command is refused again.
+bool refuses_target(Reason reason);
 
 }  // namespace bevel::controller

@@ -27,8 +27,9 @@ class Rendezvous {
   // Plans the meeting for a tip that still has about ahead_mm to go at no more than rate_mm_s.
   void plan(std::int64_t now_utime, double ahead_mm, double rate_mm_s);
   const Eigen::Vector3d& target_mm() const { return target_mm_; }
-  // How well it is known where the target will be then.
-  double target_sd_mm() const { return track_.position_sd_mm(meeting_utime_); }
+  /// Returns the standard deviation, mm, of the target's position at the meeting: 0 for a target that was commanded
+  /// once, whose position is exact.
+  double target_sd_mm() const { return track_.is_fixed() ? 0 : track_.position_sd_mm(meeting_utime_); }
   // Above this the tip would be there too early.
   double rate_limit_mm_s(std::int64_t now_utime, double ahead_mm) const;
 

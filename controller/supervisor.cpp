@@ -20,13 +20,24 @@ Supervisor::Supervisor(const ControllerConfig& config, const model::NeedleParame
       rendezvous_(config.follow),
       route_(config.obstacles) {}
 
-void Supervisor::stop(Reason reason, double value, const char* unit) {
+void Supervisor::stop(Reason reason, double value, const char* unit, const Allowed& allowed) {
   rates_ = {};
   if (status_.state == State::stopped || status_.state == State::fault) return;  // the first reason stays
   status_.state = reason == Reason::state_not_finite || reason == Reason::outside_model ? State::fault : State::stopped;
   status_.reason = reason;
   status_.value = value;
   status_.unit = unit;
+  status_.allowed = allowed;
+  status_.target_lost = false;
+}
+
+void Supervisor::clear_reason() {
+  status_.reason = Reason::none;
+  status_.value = 0;
+  status_.unit = "";
+  status_.allowed = {};
+  status_.target_lost = false;
+  beyond_since_mm_.reset();
 }
 
 void Supervisor::request(Request request, const std::optional<Target>& target, std::int64_t now_utime) {
@@ -36,7 +47,7 @@ void Supervisor::request(Request request, const std::optional<Target>& target, s
       stop(Reason::operator_stop, 0, "");
       return;
     case Request::hold:
-      if (moves()) status_.state = State::hold;
+      if (moves()) hold(Reason::held);
       resting_.reset();
       return;
     case Request::start:
@@ -51,13 +62,14 @@ void Supervisor::request(Request request, const std::optional<Target>& target, s
       reset_count_ = needle_state_->reset_count;
       arcs_.restart();
       forget_way_points();
+      clear_reason();
       status_.state = State::steering;
       return;
     case Request::follow: {
       if (!in_motion_states() || for_retraction_ || !target || !target->position_mm.allFinite() ||
           !check_inputs(now_utime))
         return;
-      rendezvous_.observe(target->utime_or(now_utime), target->position_mm);
+      if (!follow_target(*target, now_utime)) return;
       if (status_.state != State::retracting) check_reach(now_utime);  // which goes nowhere now; seen when it starts
       return;
     }
@@ -69,6 +81,7 @@ void Supervisor::request(Request request, const std::optional<Target>& target, s
       }
       way_points_.add(
           {target->position_mm, target->tolerance_mm > 0 ? target->tolerance_mm : kWayPointTolerance_mm, true});
+      is_inside(target->position_mm);  // refused now, and again by an arm: it is kept until it is forgotten
       return;
     case Request::retract:
       return start_retraction(target, now_utime);
@@ -81,10 +94,9 @@ void Supervisor::request(Request request, const std::optional<Target>& target, s
   }
   const bool to_retract = request == Request::arm_to_retract;
   if (moves() || (!to_retract && (!target || !target->position_mm.allFinite()))) return;
-  status_.state = State::off;  // re-arming is this explicit word, and it clears a latched reason
-  status_.reason = Reason::none;
-  status_.value = 0;
-  status_.unit = "";
+  status_.state = State::off;  // re-arming is this explicit command, and it clears a latched reason
+  clear_reason();
+  status_.miss = {};
   rates_ = {};
   for_retraction_ = to_retract;
   if (to_retract) {
@@ -93,24 +105,26 @@ void Supervisor::request(Request request, const std::optional<Target>& target, s
     return;
   }
   if (way_points_lost_) return stop(Reason::way_points_too_many, static_cast<double>(kMostWayPoints), "at most");
-  if (!check_inputs(now_utime)) return;
-  aim_mm_ = target->position_mm;
   PathPoints told = way_points_;
   told.add({target->position_mm, config_.safety.target_miss_max_mm, true});
-  if (told.count > 1)  // one by itself is judged by its predicted miss
-    for (const PathPoint& point : told.all())
-      if (!(point.at_mm.z() <= config_.safety.depth_max_mm &&
-            point.at_mm.head<2>().norm() <= config_.safety.lateral_max_mm))
-        return stop(Reason::workspace, point.at_mm.norm(), "mm from the entry, of a point that was told");
+  // Before anything is computed from them: the cost of a prediction grows with the distance.
+  for (const PathPoint& point : told.all())
+    if (!is_inside(point.at_mm)) return;
+  if (!check_inputs(now_utime)) return;
+  aim_mm_ = target->position_mm;
   route_.restart(told);
-  status_.predicted_miss_mm = predicted_miss_mm(target->position_mm);
-  if (told.count == 1 && !(status_.predicted_miss_mm <= config_.safety.target_miss_max_mm))
-    return stop(Reason::target_unreachable, status_.predicted_miss_mm, "mm predicted miss");
+  const double miss_mm = predicted_miss_mm(target->position_mm);
+  status_.miss = {miss_mm, 0, target->tolerance_mm > 0 ? target->tolerance_mm : config_.safety.arrival_tolerance_mm};
+  if (told.count == 1 && !(miss_mm <= config_.safety.target_miss_max_mm))
+    return stop(Reason::target_unreachable, miss_mm, "mm",
+                {"predicted miss", 0, config_.safety.target_miss_max_mm,
+                 "choose a target within reach, or raise controller.safety.target_miss_max_mm"});
   if (route_.is_needed()) {
     if (config_.law != Law::arcs) return stop(Reason::law_without_path, 0, "");
     if (route_.plan(path_start()) == Route::Way::blocked) return stop_without_path();
   }
   target_ = target;
+  was_outside_ = false;
   rendezvous_.restart(target->utime_or(now_utime), target->position_mm);
   await_axes();
 }
@@ -149,16 +163,24 @@ bool Supervisor::check_inputs(std::int64_t now_utime) {
     return refuse(Reason::actuator_stale, age_s(actuator_->utime), "s old");
   const double depth = n.pose.p_mm.z();
   if (!(depth >= safety.depth_min_mm && (for_retraction_ || depth <= safety.depth_max_mm)))
-    return refuse(Reason::workspace, depth, "mm deep");
+    return refuse_outside(depth, {"z of the tip", safety.depth_min_mm, safety.depth_max_mm,
+                                  "arm for a retraction (request 9), or raise controller.safety.depth_max_mm"});
   const double left_mm = route_.clearance_left_mm(n.pose.p_mm), lateral = n.pose.p_mm.head<2>().norm();
   // Back along the way that it came leads out of both.
   if (!for_retraction_ && left_mm < 0) return refuse(Reason::obstacle_near, left_mm, "mm of its clearance left");
-  if (!for_retraction_ && !(lateral <= safety.lateral_max_mm)) return refuse(Reason::workspace, lateral, "mm lateral");
+  if (!for_retraction_ && !(lateral <= safety.lateral_max_mm))
+    return refuse_outside(lateral, {"distance of the tip from the z axis", 0, safety.lateral_max_mm,
+                                    "arm for a retraction (request 9), or raise controller.safety.lateral_max_mm"});
   // Tissue that moves with its camera, and an entry point that was not quite met, are within the bound on the error.
   const double beyond = n.pose.p_mm.norm() - std::abs(actuator_->insertion_mm);
   if (!(beyond <= safety.position_sd_mm + kDeviations * std::sqrt(n.position_variance_mm2)))
     return refuse(Reason::off_the_axes, beyond, "mm too far");
   return true;
+}
+
+bool Supervisor::refuse_outside(double value, const Allowed& allowed) {
+  stop(Reason::workspace, value, "mm", allowed);
+  return false;
 }
 
 // Of the target where it will be; with a route the whole path is looked at, in the next period.
@@ -167,9 +189,10 @@ bool Supervisor::check_reach(std::int64_t now_utime) {
   if (route_.is_needed()) return true;
   // A prediction that is hardly one yet is no reason.
   const double allowed_mm = config_.safety.target_miss_max_mm + kTargetDeviations * rendezvous_.target_sd_mm();
-  const double miss_mm = predicted_miss_mm(rendezvous_.target_mm(), allowed_mm);
+  const double miss_mm = predicted_miss_mm(rendezvous_.target_mm());
   if (miss_mm <= allowed_mm) return true;
-  stop(Reason::target_unreachable, miss_mm, "mm predicted miss");
+  stop(Reason::target_unreachable, miss_mm, "mm",
+       {"predicted miss", 0, allowed_mm, "retract and arm again, or raise controller.safety.target_miss_max_mm"});
   return false;
 }
 
@@ -258,6 +281,7 @@ model::MotionCommand Supervisor::step(std::int64_t now_utime, double elapsed_s) 
   if (!moves()) {
     rates_ = ramp(rates_, {}, dt_s, config_.limits);
     if (!check_rest(now_utime)) return command;
+    settle(now_utime);
     commands_.remember(now_utime, rates_);
     command.mode = status_.state == State::hold ? 1 : 0;
     command.insertion_rate_mm_s = rates_.insertion_mm_s;
@@ -272,20 +296,17 @@ model::MotionCommand Supervisor::step(std::int64_t now_utime, double elapsed_s) 
     stop(Reason::outside_model, model::tilt_rad(needle_state_->pose), "rad tilt");
     return command;
   }
-  const bool arcs = by_arcs();
-  const double ahead_mm = arcs ? status_.arc.ahead_mm : status_.geometry.ahead_mm;
+  const double ahead_mm = by_arcs() ? status_.arc.ahead_mm : status_.geometry.ahead_mm;
   Rates wanted;
   if (pauses_for_path_ || needle_state_->unsure) {
     // Nothing is inserted until there is a path, and readings are believed.
   } else if (ahead_mm <= 0) {  // closest approach: what still turns comes to rest by the ramp
-    status_.state = State::hold;
+    hold(Reason::coming_to_rest);
+    met_mm_ = rendezvous_.target_mm(), met_sd_mm_ = rendezvous_.target_sd_mm();
   } else {
     wanted = steer(now_utime);
   }
-  if (ahead_mm > 0)
-    status_.predicted_miss_mm = route_.is_needed() ? std::max(0.0, -route_.outlook().slack_mm)
-                                : arcs             ? arc_miss_mm(status_.arc)
-                                                   : status_.geometry.aim_mm.norm();
+  if (moves() && !pauses_for_path_ && !needle_state_->unsure && !check_miss()) return command;
   return run(command, wanted, dt_s);
 }
 

@@ -8,9 +8,9 @@
 #include <string>
 
 #include "controller/arc_law.hpp"
+#include "controller/arrival.hpp"
 #include "controller/axis_model.hpp"
 #include "controller/command_watch.hpp"
-#include "controller/reach.hpp"
 #include "controller/reason.hpp"
 #include "controller/rendezvous.hpp"
 #include "controller/request.hpp"
@@ -29,6 +29,7 @@ struct NeedleView {
   double bending_mm = 0;  // of a stiff shaft; 0: as configured
   BendUncertainty uncertain;
   double position_variance_mm2 = 0;  // largest along any axis
+  double heading_variance_rad2 = 0;  // of the shaft's direction, the larger of the two body axes
   std::int32_t health = 0;           // not zero: it must not be steered by
   bool unsure = false;  // it doubts its newest readings: come to rest, and go on when they are believed again
   std::int32_t reset_count = 0;
@@ -38,9 +39,16 @@ struct NeedleView {
 
 struct Target {
   Eigen::Vector3d position_mm = Eigen::Vector3d::Zero();
-  double tolerance_mm = 0;  // 0: the configured one
+  double tolerance_mm = 0;  ///< distance, mm, that counts as an arrival; 0: SafetyLimits::arrival_tolerance_mm
   std::int64_t utime = 0;   // when it was there; 0: now
   std::int64_t utime_or(std::int64_t now_utime) const { return utime != 0 ? utime : now_utime; }
+};
+
+/// The place of a refused value and the range that is allowed there; the value is Status::value.
+struct Allowed {
+  const char* place = "";  ///< empty: the reason has no range
+  double least = 0, most = 0;
+  const char* remedy = "";
 };
 
 struct Status {
@@ -48,10 +56,20 @@ struct Status {
   Reason reason = Reason::none;
   double value = 0;  // the value behind the reason (an age, a miss, a rate...), in `unit`
   const char* unit = "";
-  double predicted_miss_mm = 0;  // of the best constant inputs, updated while steering
-  SteeringGeometry geometry;     // of Law::spin
-  ArcGeometry arc;               // of Law::arcs and Law::flip
+  Allowed allowed;
+  /// Prediction while armed and steering, if the law steers on; the final one after Reason::arrived and missed.
+  Miss miss;
+  /// While steering: the predicted miss exceeds the tolerance by more than its uncertainty. `lost_miss` is the
+  /// prediction when this was found, or when it had grown by half a millimetre since.
+  bool target_lost = false;
+  Miss lost_miss;
+  SteeringGeometry geometry;  // of Law::spin
+  ArcGeometry arc;            // of Law::arcs and Law::flip
 };
+
+/// Returns the reason of \p status as text for the operator: place, value, allowed range and remedy where there are
+/// any; the miss with its uncertainty and tolerance after an insertion, and while the target is lost. Allocates.
+std::string describe(const Status& status);
 
 class Supervisor {
  public:
@@ -101,7 +119,16 @@ class Supervisor {
   const Rates& commanded() const { return rates_; }  // by the last step
 
  private:
-  void stop(Reason reason, double value, const char* unit);
+  void stop(Reason reason, double value, const char* unit, const Allowed& allowed = {});
+  void clear_reason();
+  void hold(Reason reason);
+  bool is_inside(const Eigen::Vector3d& target_mm);
+  bool refuse_outside(double value, const Allowed& allowed);
+  bool follow_target(const Target& target, std::int64_t now_utime);
+  double arrival_tolerance_mm() const;
+  Miss predicted_miss() const;
+  bool check_miss();
+  void settle(std::int64_t now_utime);
   bool check_inputs(std::int64_t now_utime);
   bool all_enabled() const;
   bool see_enabled(std::int64_t now_utime);
@@ -126,8 +153,8 @@ class Supervisor {
   bool see_geometry();
   double to_go_mm() const;
   bool by_arcs() const { return config_.law != Law::spin; }
-  // Where it comes to no more than enough_mm, not necessarily the least.
-  double predicted_miss_mm(const Eigen::Vector3d& target_mm, double enough_mm = 0) const;
+  double predicted_miss_mm(const Eigen::Vector3d& target_mm) const;
+  bool by_half_turns() const;
   bool check_reach(std::int64_t now_utime);
   model::NeedleParameters needle_now() const;
   ShaftConfig shaft_now() const;
@@ -146,6 +173,11 @@ class Supervisor {
   bool way_points_lost_ = false;  // more than there is room for
   void forget_way_points() { way_points_ = {}, way_points_lost_ = false; }
   bool pauses_for_path_ = false;
+  // Position of a moving target at the closest approach, and its standard deviation.
+  Eigen::Vector3d met_mm_ = Eigen::Vector3d::Zero();
+  double met_sd_mm_ = 0;
+  std::optional<double> beyond_since_mm_;  // of insertion: the predicted miss has exceeded the tolerance since
+  bool was_outside_ = false;               // the newest position of a target that moves lay outside the workspace
   Eigen::Vector3d aim_mm_ = Eigen::Vector3d::Zero();  // the target, or where the path to it is a look-ahead later
   ArcLaw arcs_;
   Rates rates_;

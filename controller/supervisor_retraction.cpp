@@ -19,11 +19,14 @@ void Supervisor::start_retraction(const std::optional<Target>& target, std::int6
   if (status_.state == State::armed && !axes_were_enabled_ && !see_enabled(now_utime)) return;
   if (!check_inputs(now_utime) || !check_axes()) return;
   const double to_mm = target ? target->position_mm.z() : std::nan("");
-  if (!(to_mm >= 0 && to_mm <= actuator_->insertion_mm)) return stop(Reason::retraction_refused, to_mm, "mm");
+  if (!(to_mm >= 0 && to_mm <= actuator_->insertion_mm))
+    return stop(Reason::retraction_refused, to_mm, "mm",
+                {"position_mm[2] of the request", 0, actuator_->insertion_mm, "choose a depth that is inserted"});
   if (config_.through_channel && !way_in_watched_)
     return stop(Reason::way_in_unknown, actuator_->insertion_mm, "mm inserted");
   if (!moves()) reset_count_ = needle_state_->reset_count;
   retract_to_mm_ = to_mm;
+  clear_reason();
   status_.state = State::retracting;
 }
 
@@ -34,7 +37,7 @@ model::MotionCommand Supervisor::retract(model::MotionCommand command, double dt
   const double to_go_mm = actuator_->insertion_mm + age_s * actuator_->insertion_rate_mm_s - retract_to_mm_;
   Rates wanted;
   if (to_go_mm <= kThere_mm) {
-    status_.state = State::hold;
+    hold(Reason::retracted);
   } else if (!needle_state_->unsure && rates_.insertion_mm_s <= 0 && rates_.rotation_rad_s == 0) {
     const double braking = std::sqrt(2 * kBrakingShare * limits.insertion_acceleration_mm_s2 * to_go_mm);
     wanted.insertion_mm_s = -std::min(limits.retraction_rate_mm_s, braking);

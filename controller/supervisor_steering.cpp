@@ -24,13 +24,13 @@ ShaftConfig Supervisor::shaft_now() const {
   return shaft;
 }
 
-double Supervisor::predicted_miss_mm(const Eigen::Vector3d& target_mm, double enough_mm) const {
+bool Supervisor::by_half_turns() const { return config_.law == Law::flip && actuator_->insertion_mm > kOutside_mm; }
+
+// If the law steers on from here. A target behind the tip is missed by its distance.
+double Supervisor::predicted_miss_mm(const Eigen::Vector3d& target_mm) const {
   const model::Pose tip = cutting_tip();
-  if (shaft_now().bending_mm > 0) {
-    const ArcGeometry arc = arc_geometry(tip, needle_now(), shaft_now(), target_mm);
-    return arc.in_domain && arc.ahead_mm <= 0 ? (target_mm - tip.p_mm).norm() : arc_miss_mm(arc);
-  }
-  return predict_reach(tip, needle_now(), target_mm, config_.safety.target_miss_max_mm, enough_mm).miss_mm;
+  const ArcGeometry arc = arc_geometry(tip, needle_now(), shaft_now(), target_mm);
+  return arc.in_domain && arc.ahead_mm <= 0 ? (target_mm - tip.p_mm).norm() : arc_miss_mm(arc, by_half_turns());
 }
 
 // To the plane through the target across the needle.
@@ -81,10 +81,8 @@ bool Supervisor::see_path(double elapsed_s) {
 
 bool Supervisor::see_geometry() {
   const model::Pose tip = cutting_tip();
-  if (by_arcs()) {
-    status_.arc = arc_geometry(tip, needle_now(), shaft_now(), aim_mm_, needle_state_->uncertain);
-    return status_.arc.in_domain;
-  }
+  status_.arc = arc_geometry(tip, needle_now(), shaft_now(), aim_mm_, needle_state_->uncertain);
+  if (by_arcs()) return status_.arc.in_domain;
   status_.geometry = steering_geometry(tip, needle_now(), aim_mm_, config_.limits.insertion_rate_mm_s,
                                        config_.gains.parameter_uncertainty, shaft_now());
   return status_.geometry.in_domain;
@@ -92,7 +90,8 @@ bool Supervisor::see_geometry() {
 
 // What the law wants at this instant, without ramps.
 Rates Supervisor::steer(std::int64_t now_utime) {
-  const double tolerance_mm = target_->tolerance_mm > 0 ? target_->tolerance_mm : config_.gains.tolerance_mm;
+  // Below the arrival tolerance, or the law would leave all of it unused.
+  const double tolerance_mm = std::min(arrival_tolerance_mm(), config_.gains.tolerance_mm);
   const double rotation_rad = actuator_->rotation_rad;
   Rates wanted;
   double ahead_mm = 0, off_rad = 0;

@@ -31,6 +31,8 @@ class TargetTrack {
   // target, with which it begins anew; one is left out.
   void observe(std::int64_t utime, const Eigen::Vector3d& position_mm);
   bool empty() const { return empty_; }
+  /// Returns whether there is one position only, from which no motion is predicted.
+  bool is_fixed() const { return at_rest_; }
 
   // By the frequencies' mean. Before the first position: zeros.
   Eigen::Vector3d position_mm(std::int64_t utime) const;

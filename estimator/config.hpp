@@ -1,5 +1,6 @@
 #pragma once
 // What the estimator believes before it has seen anything, and how much it lets the model err.
+#include <algorithm>
 #include <cmath>
 #include <vector>
 
@@ -133,6 +134,31 @@ struct EstimatorConfig {
   // turned. False: wherever the axes stand at first is the entry, as in recordings made elsewhere.
   bool start_at_axes = false;
 };
+
+/// Bending length of the shaft where none is configured. In soft tissue it is 30 to 45 mm (steel of 1.27 mm, 20 to
+/// 50 kPa), in stiff gel below a millimetre. The mean is small because the derivatives of the swing grow
+/// with the bending length: from a small one the filter converges on both, from 40 mm it loses a needle that does not
+/// bend (docs/steering.md). Three standard deviations above the mean lie in the softest tissue.
+inline constexpr double kUnknownBending_mm = 5, kUnknownBendingSd_mm = 12;
+/// Distance from the guide to the entry point where none is configured, mm.
+inline constexpr double kUnknownGuide_mm = 15;
+
+/// Sets the bending length of \p prior to that of an unknown shaft.
+inline void assume_unknown_shaft(Prior& prior) {
+  prior.bending_mm = kUnknownBending_mm;
+  prior.bending_sd_mm = kUnknownBendingSd_mm;
+  prior.guide_mm = kUnknownGuide_mm;
+}
+
+/// Returns \p config for the entry line (entry_line.hpp), which is linear in the bending length between its mean and
+/// one standard deviation above: that range has to span soft tissue, or a shaft that bends there looks like a slope.
+inline EstimatorConfig entry_line_config(EstimatorConfig config) {
+  constexpr double kSoftTissueBending_mm = 30;  // at 50 to 100 kPa, steel of 1.27 mm
+  Prior& prior = config.prior;
+  if (prior.bending_mm > 0 && prior.bending_sd_mm > 0)
+    prior.bending_sd_mm = std::max(prior.bending_sd_mm, kSoftTissueBending_mm - prior.bending_mm);
+  return config;
+}
 
 inline bool takes_midpoint(const EstimatorConfig& config, double insertion_mm, double rotation_rad) {
   return config.midpoint_derivatives && std::abs(insertion_mm) <= 0.5 && std::abs(rotation_rad) <= 0.05;

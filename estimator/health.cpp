@@ -8,7 +8,9 @@ std::string describe_health(std::int32_t health) {
       {kMeasurementStale, "measurements stale"},
       {kActuatorStale, "actuator state stale"},
       {kUncertain, "position too uncertain"},
-      {kRejecting, "rejecting measurements"},
+      {kRejecting,
+       "rejecting measurements: a camera or the needle model does not match the system file; check the calibration, "
+       "[needle] and [estimator.prior] bending_mm, bending_sd_mm, guide_mm (docs/steering.md)"},
       {kOutsideModel, "outside the model's domain"},
       {kNotFromEntry, "not there from the entry: retract to the entry point, or confirm"},
       {kCameraSilent, "a camera fell silent"},

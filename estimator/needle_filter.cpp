@@ -17,7 +17,8 @@ namespace {
 
 constexpr double kLambda2Max = 0.9;                             // (24) with room: 1 - lambda2 stays away from zero
 constexpr double kWheelbaseMin_mm = 2, kWheelbaseMax_mm = 990;  // of the model's (1, 1000), with room
-constexpr double kBendingMin_mm = 5, kBendingMax_mm = 200;
+constexpr double kBendingMin_mm = 0.2,  // as good as a shaft that does not bend: a swing of 0.1 um at k = 0.005 / mm
+    kBendingMax_mm = 200;
 constexpr double kVarianceFloor = 1e-14;
 constexpr double kAtEntry_mm = 1.0;  // not inserted yet: within what an entry point is met by
 constexpr std::int32_t kCamerasCounted = 4;

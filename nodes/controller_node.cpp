@@ -68,6 +68,7 @@ controller::NeedleView to_view(const needle_state_t& m) {
   Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> eigen;
   eigen.computeDirect(position, Eigen::EigenvaluesOnly);
   v.position_variance_mm2 = eigen.eigenvalues()[2];
+  v.heading_variance_rad2 = std::max(m.covariance[9 * 3 + 3], m.covariance[9 * 4 + 4]);
   v.health = estimator::lost(m.health);
   v.unsure = (m.health & estimator::kUnsure) != 0;
   v.reset_count = m.reset_count;
@@ -214,22 +215,16 @@ void ControllerNode::end() {
 
 void ControllerNode::report() {
   const controller::Status& s = supervisor_.status();
-  std::string reason = controller::to_string(s.reason);
-  char number[96];
-  if (s.reason == controller::Reason::state_reset) {
-    const auto cause = static_cast<std::int32_t>(s.value);
-    if (cause != 0) reason += ": " + estimator::describe_health(cause);
-  } else if (s.reason == controller::Reason::state_unhealthy) {
-    reason += ": " + estimator::describe_health(static_cast<std::int32_t>(s.value));
-  } else if (s.reason != controller::Reason::none && s.unit[0] != '\0') {
-    std::snprintf(number, sizeof number, " (%.3g %s)", s.value, s.unit);
-    reason += number;
-  }
+  const bool is_health = s.reason == controller::Reason::state_unhealthy ||
+                         (s.reason == controller::Reason::state_reset && s.value != 0);
+  std::string reason = is_health ? std::string(controller::to_string(s.reason)) + ": " +
+                                       estimator::describe_health(static_cast<std::int32_t>(s.value))
+                                 : controller::describe(s);
   if (!detail_.empty()) reason += ": " + detail_;
-  if (s.reason == controller::Reason::none) reason = words_.refusal();
   const auto add = [&reason](const std::string& remark) {
     if (!remark.empty()) reason += (reason.empty() ? "" : "; ") + remark;
   };
+  if (!latched(s.state)) add(words_.refusal());
   if (port_.now().ns - operator_refused_ns_ < kRefusalShown_ns) add(operator_refusal_);
   add(operator_.second_operator(port_.now()));
   status_.report(to_process_state(s.state), reason);

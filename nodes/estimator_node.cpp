@@ -62,7 +62,9 @@ std::string describe(const estimator::InnovationWatch& innovations) {
     if (channel.is_too_large()) too_large += (too_large.empty() ? " " : ", ") + std::to_string(camera);
   }
   if (too_large.empty()) return text;
-  return text + " of what is expected: too large of camera" + too_large + ": model or camera is not what the file says";
+  return text + " of what is expected: too large of camera" + too_large +
+         ": a camera or the needle model does not match the system file; check the calibration, [needle] and "
+         "[estimator.prior] bending_mm, bending_sd_mm, guide_mm (docs/steering.md)";
 }
 
 std::string describe(const estimator::Nuisance& nuisance) {
@@ -121,7 +123,7 @@ EstimatorNode::EstimatorNode(lcm::LCM& lcm, const estimator::EstimatorConfig& co
     : bounds_(bounds),
       port_(lcm),
       estimator_(live(config, bounds)),
-      entry_line_(live(config, bounds)),
+      entry_line_(entry_line_config(live(config, bounds))),
       status_(port_, "bevel-estimator", kPeriod_s),
       words_(port_, status_, Receiver::estimator, [this](Word word, const steering_target_t&) { on_word(word); }),
       cameras_(config.limits.measurement_silence_s),

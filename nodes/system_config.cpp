@@ -98,6 +98,10 @@ void read_controller(Section s, controller::ControllerConfig& c) {
   f.read("resting_motion_rad", safety.resting_motion_rad, optional, in_range(0.02, 1));
   f.read("enabling_s", safety.enabling_s, optional, in_range(0.1, 30));
   f.read("target_miss_max_mm", safety.target_miss_max_mm, optional, in_range(0.05, 20));
+  f.read("arrival_tolerance_mm", safety.arrival_tolerance_mm, optional, in_range(0.05, 20));
+  f.read("target_lost", safety.target_lost, optional,
+         io::Choices<controller::TargetLost>{{"warn", controller::TargetLost::warn},
+                                             {"stop", controller::TargetLost::stop}});
   for (const Section& one : s.sections("obstacle", optional)) {
     c.obstacles.push_back(read_obstacle(one));
     if (c.law != controller::Law::arcs) s.fail("obstacle", "needs law = \"arcs\": no other goes round obstacles");
@@ -350,6 +354,19 @@ void check_states_of_cameras(Section s, const SystemConfig& c) {
   }
 }
 
+// Assumes a shaft that bends, unless the file has the key, or something that the filter does not combine with it:
+// effects, the wheelbase or headings.
+void assume_shaft(Section prior, bool has_effects, SystemConfig& c) {
+  const bool takes_headings =
+      c.rig.heading.sd_rad > 0 || std::ranges::any_of(c.cameras, [](const auto& camera) { return camera.headings; });
+  estimator::Prior& own = c.estimator.prior;
+  if (prior.has("bending_mm") || has_effects || takes_headings || own.wheelbase_sd_mm > 0) return;
+  const estimator::Prior given = own;
+  estimator::assume_unknown_shaft(own);
+  if (prior.has("bending_sd_mm")) own.bending_sd_mm = given.bending_sd_mm;
+  if (prior.has("guide_mm")) own.guide_mm = given.guide_mm;
+}
+
 }  // namespace
 
 SystemConfig load_system_config(const std::string& path) {
@@ -367,7 +384,6 @@ SystemConfig load_system_config(const std::string& path) {
   c.estimator.prior.variation = believed.variation.value_or(model::Variation{});
   c.estimator.through_channel = true;  // a needle in tissue; recordings of a model are replayed without a system file
   io::read_estimator_config(file.section("estimator", optional), c.estimator);
-  c.controller.shaft = {c.estimator.prior.bending_mm, c.estimator.prior.guide_mm};
   read_controller(file.section("controller", optional), c.controller);
   read_stepper(file.section("stepper", optional), c.stepper);
   c.estimator.axes = {c.estimator.limits.actuator_age_s, c.stepper.axes[stepper::kInsertion].rate_limit_unit_s,
@@ -393,6 +409,8 @@ SystemConfig load_system_config(const std::string& path) {
         .section("heading", optional)
         .fail("camera", "is " + std::to_string(c.rig.heading.camera) +
                             ", which a [[camera]] has; allowed: a number of its own, 0 to 15");
+  assume_shaft(file.section("estimator", optional).section("prior", optional), !believed.effects.empty(), c);
+  c.controller.shaft = {c.estimator.prior.bending_mm, c.estimator.prior.guide_mm};
   file.finish();
   c.live_effects = io::live_effects(believed.effects, believed.discrepancies);
   c.effects = std::move(believed.effects);

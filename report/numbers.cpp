@@ -8,6 +8,7 @@
 namespace bevel::report {
 
 std::string fixed(double value, int decimals) {
+  if (!std::isfinite(value)) return "-";
   char text[400];  // the largest double has 309 digits before the point
   std::snprintf(text, sizeof text, "%.*f", decimals, value);
   // "-0.00" says nothing that "0.00" does not.
@@ -38,7 +39,14 @@ std::string measured(double value, int digits) {
   return std::isfinite(value) ? fixed(value, decimals_for(value, digits)) : "-";
 }
 
+std::string in_deviations(double difference, double sd) {
+  if (!(sd > 0) || !std::isfinite(difference / sd)) return "-";
+  const std::string text = fixed(difference / sd, 1);
+  return text.starts_with('-') ? text : "+" + text;
+}
+
 std::string format_significant(double value, int digits) {
+  if (!std::isfinite(value)) return "-";
   char buffer[64];
   std::snprintf(buffer, sizeof buffer, "%.*g", digits, value);
   return buffer;

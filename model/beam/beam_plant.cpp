@@ -45,6 +45,9 @@ void BeamPlantConfig::validate() const {
   require_positive("bevel_length_mm", bevel_length_mm);
   require_not_negative("guide_gap_mm", guide_gap_mm);
   require_not_negative("windup_at_100mm_rad", windup_at_100mm_rad);
+  require(layer_from_mm >= 0.0, "layer_from_mm", layer_from_mm, ">= 0, infinity for none");
+  require_positive("layer_modulus_kPa", layer_modulus_kPa);
+  require_not_negative("layer_force_N", layer_force_N);
   require_positive("max_depth_mm", max_depth_mm);
   require_positive("element_length_mm", element_length_mm);
   require_positive("cell_length_mm", cell_length_mm);
@@ -54,7 +57,8 @@ void BeamPlantConfig::validate() const {
 BeamPlant::BeamPlant(const BeamPlantConfig& config)
     : config_(validated(config)),
       beam_(config.bending_stiffness_N_mm2, config.element_length_mm, config.guide_gap_mm, config.max_depth_mm),
-      cut_({config.foundation_modulus_kPa * kN_mm2PerKPa, config.relaxing_fraction, config.relaxation_time_s},
+      cut_({config.foundation_modulus_kPa * kN_mm2PerKPa, config.relaxing_fraction, config.relaxation_time_s,
+            config.layer_from_mm, config.layer_modulus_kPa / config.foundation_modulus_kPa},
            config.cell_length_mm, config.max_depth_mm),
       windup_(config.windup_at_100mm_rad) {}
 
@@ -116,7 +120,8 @@ double BeamPlant::bevel_force_N() const {
   // length behind, and during entry the part that is already in.
   const double behind_mm = std::max(0.0, cut_.front_mm() - fed_mm_);
   const double pressing = (std::min(fed_mm_, config_.bevel_length_mm) - behind_mm) / config_.bevel_length_mm;
-  return config_.bevel_force_N * std::clamp(pressing, 0.0, 1.0);
+  return (fed_mm_ < config_.layer_from_mm ? config_.bevel_force_N : config_.layer_force_N) *
+         std::clamp(pressing, 0.0, 1.0);
 }
 
 Eigen::Vector3d BeamPlant::tip_heading() const {

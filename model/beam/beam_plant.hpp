@@ -25,6 +25,7 @@
 // not couple neighbouring springs.
 #include <Eigen/Core>
 #include <cstddef>
+#include <limits>
 #include <vector>
 
 #include "model/beam/cut_path.hpp"
@@ -36,17 +37,22 @@ namespace bevel::model {
 struct BeamPlantConfig {
   double bending_stiffness_N_mm2 = 1.6e4;  // EI; 18 gauge steel
   double foundation_modulus_kPa = 20.0;  // k at once, force per mm of shaft and mm of displacement; 1 kPa = 1e-3 N/mm^2
-  double relaxing_fraction = 0.0;        // part of k that relaxes, in [0, 1)
-  double relaxation_time_s = 1.0;        // of that part, at constant displacement; > 0
-  double bevel_force_N = 0.5;            // lateral, toward the bevel's side, while the bevel cuts; >= 0
-  double bevel_length_mm = 3.5;          // the force falls to none as the tip backs off the uncut tissue by this
-  double guide_gap_mm = 15.0;            // from the guide's mouth to the tissue; the shaft is free in between
-  double windup_at_100mm_rad = 0.0;      // lag of the tip's roll at 100 mm inserted, see windup.hpp; 0 = stiff shaft
-  bool feed_is_arc_length = true;        // false: small slopes, z is the depth, which is what is fed
-  double max_depth_mm = 200.0;           // room is kept for this depth
-  double element_length_mm = 2.0;        // of the beam's elements
-  double cell_length_mm = 0.5;           // of the tissue's memory
-  double max_step_mm = 0.5;              // longer feeds are cut into steps of at most this
+  /// A second layer of tissue below this depth, mm; infinity: uniform tissue. There the modulus and the bevel's force
+  /// are these.
+  double layer_from_mm = std::numeric_limits<double>::infinity();
+  double layer_modulus_kPa = 20.0;
+  double layer_force_N = 0.5;
+  double relaxing_fraction = 0.0;    // part of k that relaxes, in [0, 1)
+  double relaxation_time_s = 1.0;    // of that part, at constant displacement; > 0
+  double bevel_force_N = 0.5;        // lateral, toward the bevel's side, while the bevel cuts; >= 0
+  double bevel_length_mm = 3.5;      // the force falls to none as the tip backs off the uncut tissue by this
+  double guide_gap_mm = 15.0;        // from the guide's mouth to the tissue; the shaft is free in between
+  double windup_at_100mm_rad = 0.0;  // lag of the tip's roll at 100 mm inserted, see windup.hpp; 0 = stiff shaft
+  bool feed_is_arc_length = true;    // false: small slopes, z is the depth, which is what is fed
+  double max_depth_mm = 200.0;       // room is kept for this depth
+  double element_length_mm = 2.0;    // of the beam's elements
+  double cell_length_mm = 0.5;       // of the tissue's memory
+  double max_step_mm = 0.5;          // longer feeds are cut into steps of at most this
 
   // Throws std::invalid_argument naming the field, its value and what is allowed.
   void validate() const;

@@ -37,7 +37,9 @@ void CutPath::add_springs(HermiteBeam& beam, double dt_s) const {
     const Cell& cell = cells_[c];
     const Lateral load =
         stiffness * cell.anchor_mm + relaxing * (s.keep * cell.dashpot_mm + s.before * cell.stretch_mm);
-    beam.add_spring(cell_mm_ * static_cast<double>(c) + 0.5 * length_mm, length_mm * stiffness, length_mm * load);
+    const double depth_mm = cell_mm_ * static_cast<double>(c);
+    const double share = (depth_mm < spring_.layer_from_mm ? 1 : spring_.layer_share) * length_mm;
+    beam.add_spring(depth_mm + 0.5 * length_mm, share * stiffness, share * load);
   }
 }
 

@@ -8,6 +8,7 @@
 // q is stepped exactly for an e that varies linearly over the step, so the step may be long beside T.
 #include <complex>
 #include <cstddef>
+#include <limits>
 #include <vector>
 
 #include "model/beam/hermite_beam.hpp"
@@ -18,6 +19,8 @@ struct TissueSpring {
   double modulus_N_mm2;      // k, at once; force per mm of displacement and mm of shaft
   double relaxing_fraction;  // r, 0 (elastic) to below 1
   double relaxation_time_s;  // T > 0
+  double layer_from_mm = std::numeric_limits<double>::infinity();  // below this depth k is this many times as large
+  double layer_share = 1;
 };
 
 class CutPath {

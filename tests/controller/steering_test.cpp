@@ -9,7 +9,7 @@
 #include <random>
 #include <vector>
 
-#include "controller/reach.hpp"
+#include "controller/arc_law.hpp"
 #include "tests/controller/agar.hpp"
 
 namespace bevel::controller {
@@ -88,7 +88,8 @@ TEST(SteeringLaw, KinematicInsertionsEndAtTheTarget) {
     truth.lambda1_per_rad *= 1 + 0.3 * unit(rng);
     const Eigen::Vector3d target(15 * unit(rng), 15 * unit(rng), 100 + 20 * unit(rng));
     model::Pose tip;
-    if (!predict_reach(tip, believed, target, 0.5).reachable || !predict_reach(tip, truth, target, 0.5).reachable)
+    if (!(arc_miss_mm(arc_geometry(tip, believed, {}, target)) <= 0.5) ||
+        !(arc_miss_mm(arc_geometry(tip, truth, {}, target)) <= 0.5))
       continue;
     Rates rates;
     double rotation = 0;
@@ -116,33 +117,13 @@ TEST(SteeringLaw, KinematicInsertionsEndAtTheTarget) {
   EXPECT_LT(misses[190], 0.5);
 }
 
-TEST(Reach, TellsAReachableTargetFromOneToTheSide) {
-  model::Pose tip;
-  EXPECT_TRUE(predict_reach(tip, agar(), {0, -10, 100}, 0.3).reachable);
-  EXPECT_TRUE(predict_reach(tip, agar(), {6, 6, 100}, 0.3).reachable);
-  const Reach far = predict_reach(tip, agar(), {0, 60, 60}, 0.3);
-  EXPECT_FALSE(far.reachable);
-  EXPECT_GT(far.miss_mm, 20);
-}
-
-TEST(Reach, EndedAtWhatIsEnoughSaysTheSame) {
-  constexpr unsigned kSeed = 29;
-  constexpr double kTolerance_mm = 2;
-  std::mt19937 random(kSeed);
-  std::uniform_real_distribution<double> uniform(-1, 1);
-  int reached = 0;
-  for (int i = 0; i < 300; ++i) {
-    const Eigen::Vector3d target(30 * uniform(random), 30 * uniform(random), 80 + 20 * uniform(random));
-    const Reach best = predict_reach({}, agar(), target, kTolerance_mm);
-    const Reach enough = predict_reach({}, agar(), target, kTolerance_mm, kTolerance_mm);
-    EXPECT_EQ(enough.reachable, best.reachable) << "seed " << kSeed << ", target " << target.transpose();
-    if (!best.reachable) {
-      EXPECT_EQ(enough.miss_mm, best.miss_mm);
-    }
-    if (best.reachable) ++reached;
-  }
-  EXPECT_GT(reached, 50);
-  EXPECT_LT(reached, 250);
+TEST(PredictedMiss, IsZeroWithinReachAndTheDistanceThatIsLackingBeyond) {
+  const auto miss_mm = [](const Eigen::Vector3d& target_mm) {
+    return arc_miss_mm(arc_geometry({}, agar(), {}, target_mm));
+  };
+  EXPECT_LT(miss_mm({0, -10, 100}), 0.3);
+  EXPECT_LT(miss_mm({6, 6, 100}), 0.3);
+  EXPECT_GT(miss_mm({0, 60, 60}), 20);
 }
 
 }  // namespace

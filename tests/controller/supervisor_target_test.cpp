@@ -99,7 +99,7 @@ TEST_F(SupervisorTest, WayPointsThatCannotFollowOneAnotherAreRefused) {
   supervisor.request(Request::stop, std::nullopt, now);
   supervisor.request(Request::way_point, Target{{0, 0, 1e4}, 1.0}, now);
   supervisor.request(Request::arm, Target{{2, -8, 100}, 0}, now);
-  EXPECT_EQ(supervisor.status().reason, Reason::workspace);
+  EXPECT_EQ(supervisor.status().reason, Reason::target_outside);
 }
 
 TEST_F(SupervisorTest, FollowsATargetThatMovesAndStopsWhereItGoesOutOfReach) {

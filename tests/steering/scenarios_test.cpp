@@ -15,7 +15,8 @@ TEST(Scenarios, ThoseOfANeedleAloneHaveNoOtherCamerasTargetsOrEffects) {
   EXPECT_THAT(alone, ::testing::UnorderedElementsAre("kinematic", "kinematic-30", "roll", "beam-100-0.3", "beam-100-1",
                                                      "beam-50-1", "beam-20-0.5", "beam-any", "beam-relaxing",
                                                      "beam-windup", "beam-windup-state", "beam-any-windup-in-vain",
-                                                     "windup-in-vain", "late-in-vain", "good-guide"));
+                                                     "windup-in-vain", "late-in-vain", "good-guide", "default",
+                                                     "default-50-1", "default-20-0.5", "beam-layered"));
 }
 
 }  // namespace

@@ -8,6 +8,7 @@
 #include <random>
 #include <stdexcept>
 
+#include "controller/arc_law.hpp"
 #include "diagnosis/parallel.hpp"
 #include "tools/steering/model_rig.hpp"
 
@@ -61,7 +62,7 @@ TargetingFigure summarised(const std::vector<steering::Insertion>& insertions, d
   for (const steering::Insertion& one : insertions) {
     figure.miss_mm.push_back(one.miss_mm);
     turned_rad += one.turned_rad;
-    if (one.arrived) continue;
+    if (one.at_depth) continue;
     ++figure.stopped;
     ++reasons[one.reason == controller::Reason::none ? "not there in time" : controller::to_string(one.reason)];
   }
@@ -84,7 +85,7 @@ std::vector<Eigen::Vector3d> choose_targets(const model::NeedleParameters& needl
     for (int i = 0; i < kDirections; ++i) {
       const double angle = 2 * std::numbers::pi * (i + 0.25) / kDirections;
       const Eigen::Vector3d target(radius_mm * std::cos(angle), radius_mm * std::sin(angle), depth_mm);
-      if (controller::predict_reach({}, needle, target, 1).reachable) targets.push_back(target);
+      if (controller::arc_miss_mm(controller::arc_geometry({}, needle, {}, target)) <= 1) targets.push_back(target);
     }
   }
   if (targets.empty())

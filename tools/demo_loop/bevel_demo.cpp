@@ -1,5 +1,6 @@
 // bevel-demo: starts the five processes, steers the simulated needle to a target, records, reports, ends everything.
-// Exit status: 0 the needle arrived within the tolerance, 1 it did not or something failed, 2 usage, 130 interrupted.
+// Exit status: 0 the needle arrived within the tolerance, as the controller reports and by the true tip; 1 it did not,
+// or something failed; 2 usage; 130 interrupted.
 #include <filesystem>
 
 #include "tools/common/command_line.hpp"
@@ -21,7 +22,8 @@ int main(int argc, char** argv) {
       .option("--out", options.out, "folder for log, report and the processes' output")
       .option("--retract-to", options.retract_to_mm,
               "draw it back along its path once it has arrived, until so much is inserted, mm; below 0: not", -1, 400)
-      .option("--tolerance", options.tolerance_mm, "largest miss that counts as success, mm", 0.01, 100)
+      .option("--tolerance", options.tolerance_mm,
+              "largest miss that counts as an arrival, mm; without, controller.safety.arrival_tolerance_mm", 0.05, 20)
       .option("--time-limit", options.time_limit_s, "give up after, s", 1, 3600)
       .flag("--view", options.view, "show it on a live page while it runs")
       .option("--fault", options.fault,

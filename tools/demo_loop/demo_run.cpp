@@ -30,7 +30,7 @@ std::string tail_of(const std::string& path) {
 
 constexpr double kFarewell_s = 0.3;  // for the stop and what follows it to reach the log
 
-enum class End { arrived, stopped, died, timed_out, interrupted };
+enum class End { at_depth, stopped, died, timed_out, interrupted };
 
 End steer(SteeringSession& session, ProcessGroup& processes, lcm::LCM& lcm, const DemoOptions& options) {
   End end = End::interrupted;
@@ -44,7 +44,7 @@ End steer(SteeringSession& session, ProcessGroup& processes, lcm::LCM& lcm, cons
       end = End::died;
       return false;
     }
-    if (progress == SteeringSession::Progress::arrived) end = End::arrived;
+    if (progress == SteeringSession::Progress::at_depth) end = End::at_depth;
     if (progress == SteeringSession::Progress::stopped) end = End::stopped;
     const double elapsed_s = static_cast<double>(now.ns - start_ns) * 1e-9;
     if (progress == SteeringSession::Progress::going_on && elapsed_s > options.time_limit_s) {
@@ -113,7 +113,7 @@ int run_demo(const DemoOptions& options) {
   nodes::catch_signals();
   const Eigen::Vector3d target(options.target_mm[0], options.target_mm[1], options.target_mm[2]);
   nodes::claim_operator(lcm, config.lcm_url, "bevel-demo");
-  SteeringSession session(lcm, log_path, target,
+  SteeringSession session(lcm, log_path, target, options.tolerance_mm,
                           options.retract_to_mm >= 0 ? std::optional(options.retract_to_mm) : std::nullopt);
   nodes::LcmPort(lcm).publish_text(io::channel::kConfig, config.text);
 
@@ -149,17 +149,24 @@ int run_demo(const DemoOptions& options) {
     case End::stopped:
       std::fprintf(stderr, "bevel-demo: the needle was stopped: %s\n", session.reason().c_str());
       return 1;
-    case End::arrived:
+    case End::at_depth:
       break;
   }
   const LoopFigures figures = loop_figures(log_path);
+  const double tolerance_mm =
+      options.tolerance_mm > 0 ? options.tolerance_mm : config.controller.safety.arrival_tolerance_mm;
   std::printf("\n%s\n", to_text(figures).c_str());
-  write_loop_report(log_path, figures, options.tolerance_mm, options.out + "/report.html");
+  write_loop_report(log_path, figures, tolerance_mm, options.out + "/report.html");
   std::printf("report %s/report.html, log %s\n", options.out.c_str(), log_path.c_str());
-  if (figures.targeting_error_mm <= options.tolerance_mm) return clean ? 0 : 1;
-  std::fprintf(stderr, "bevel-demo: missed by %.2f mm, more than %.2f mm\n", figures.targeting_error_mm,
-               options.tolerance_mm);
-  return 1;
+  std::fflush(stdout);
+  const bool missed = reports_miss(session.outcome());
+  if (missed) std::fprintf(stderr, "bevel-demo: %s\n", session.outcome().c_str());
+  if (!(figures.targeting_error_mm <= tolerance_mm)) {
+    std::fprintf(stderr, "bevel-demo: the true tip is %.2f mm from the target, tolerance %.2f mm%s\n",
+                 figures.targeting_error_mm, tolerance_mm, missed ? "" : "; the controller reported an arrival");
+    return 1;
+  }
+  return clean && !missed ? 0 : 1;
 }
 
 }  // namespace bevel::tools

@@ -10,13 +10,30 @@
 #include "io/file_bytes.hpp"
 #include "io/log_reader.hpp"
 #include "io/messages.hpp"
+#include "tools/demo_loop/steering_session.hpp"
 
 namespace bevel::tools {
 namespace {
 
 Eigen::Vector3d position(const needle_state_t& m) { return {m.position_mm[0], m.position_mm[1], m.position_mm[2]}; }
 
-double standard_deviation(const needle_state_t& m, std::size_t i) { return std::sqrt(m.covariance[10 * i]); }
+double standard_deviation(const needle_state_t& m, std::size_t i) {
+  return std::sqrt(std::max(m.covariance[10 * i], 0.0));
+}
+
+// The last arrival or miss on PROCESS_STATUS.
+std::string reported_outcome(const std::string& log_path) {
+  const io::FileBytes file(log_path);
+  io::LogReader reader(file.bytes());
+  std::string outcome;
+  while (const auto event = reader.next()) {
+    if (event->channel != io::channel::kProcessStatus) continue;
+    const auto m = io::checked_decode<process_status_t>(event->data.data(), event->data.size());
+    if (m && m->process == "bevel-controller" && (reports_arrival(m->reason) || reports_miss(m->reason)))
+      outcome = m->reason;
+  }
+  return outcome;
+}
 
 // Truth between its samples; nothing outside them.
 std::optional<Eigen::Vector3d> truth_at(const std::vector<needle_state_t>& truths, std::int64_t utime) {
@@ -131,6 +148,7 @@ LoopFigures loop_figures(const std::string& log_path) {
   f.measurements_unusable =
       std::count_if(log.tips.begin(), log.tips.end(), [](const auto& m) { return m.status != 0; });
   f.rejected_messages = log.rejected();
+  f.outcome = reported_outcome(log_path);
   measure_latencies(log_path, f);
   return f;
 }
@@ -138,6 +156,7 @@ LoopFigures loop_figures(const std::string& log_path) {
 std::string to_text(const LoopFigures& f) {
   char text[2048];
   std::snprintf(text, sizeof text,
+                "controller reports                     %s\n"
                 "targeting error (true tip to target)   %.3f mm, target (%.1f, %.1f, %.1f) mm\n"
                 "estimator error (estimate to true tip) %.3f mm at the end, %.3f mm RMS, %.3f mm largest\n"
                 "curvature  %.5f +- %.5f /mm   (truth %.5f)\n"
@@ -150,12 +169,12 @@ std::string to_text(const LoopFigures& f) {
                 "           camera to command     p50 %.1f ms, p99 %.1f ms (%zu, in motion)\n"
                 "           measurement to command p50 %.2f ms, p99 %.2f ms (%zu)\n"
                 "period     of commands           p50 %.2f ms, p99 %.2f ms (%zu)\n",
-                f.targeting_error_mm, f.target_mm.x(), f.target_mm.y(), f.target_mm.z(), f.estimator_error_end_mm,
-                f.estimator_error_rms_mm, f.estimator_error_max_mm, f.curvature_per_mm, f.curvature_sd_per_mm,
-                f.truth->curvature_per_mm, f.lambda1_per_rad, f.lambda1_sd_per_rad, f.truth->lambda1_per_rad, f.lambda2,
-                f.lambda2_sd, f.truth->lambda2, f.inserted_mm, f.turned_rev,
-                f.turned_rev / std::max(f.inserted_mm, 1.0) * 100, f.command_rate_hz, f.estimate_rate_hz,
-                f.measurement_rate_hz, static_cast<long long>(f.measurements),
+                f.outcome.empty() ? "no outcome" : f.outcome.c_str(), f.targeting_error_mm, f.target_mm.x(),
+                f.target_mm.y(), f.target_mm.z(), f.estimator_error_end_mm, f.estimator_error_rms_mm,
+                f.estimator_error_max_mm, f.curvature_per_mm, f.curvature_sd_per_mm, f.truth->curvature_per_mm,
+                f.lambda1_per_rad, f.lambda1_sd_per_rad, f.truth->lambda1_per_rad, f.lambda2, f.lambda2_sd,
+                f.truth->lambda2, f.inserted_mm, f.turned_rev, f.turned_rev / std::max(f.inserted_mm, 1.0) * 100,
+                f.command_rate_hz, f.estimate_rate_hz, f.measurement_rate_hz, static_cast<long long>(f.measurements),
                 static_cast<long long>(f.measurements_unusable), static_cast<long long>(f.rejected_messages),
                 f.camera_to_measurement_ms.p50, f.camera_to_measurement_ms.p99, f.camera_to_measurement_ms.count,
                 f.camera_to_command_ms.p50, f.camera_to_command_ms.p99, f.camera_to_command_ms.count,

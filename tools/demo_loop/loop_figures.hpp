@@ -19,6 +19,7 @@ Percentiles percentiles(std::vector<double> values);
 struct LoopFigures {
   Eigen::Vector3d target_mm = Eigen::Vector3d::Zero();
   double targeting_error_mm = 0;      // true tip to target at the end
+  std::string outcome;                // that the controller reported at depth; empty if none
   double estimator_error_end_mm = 0;  // estimate to true tip at the end
   double estimator_error_rms_mm = 0;  // over the run, at the estimates' own times
   double estimator_error_max_mm = 0;

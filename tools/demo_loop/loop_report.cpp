@@ -1,8 +1,10 @@
 #include <cmath>
 
 #include "nodes/needle_pose.hpp"
+#include "report/numbers.hpp"
 #include "report/page.hpp"
 #include "tools/demo_loop/loop_figures.hpp"
+#include "tools/demo_loop/steering_session.hpp"
 
 namespace bevel::tools {
 namespace {
@@ -117,7 +119,7 @@ Figure parameter_figure(const std::vector<needle_state_t>& states, std::int64_t 
   figure.y_label = "lambda1 (1/rad), lambda2";
   std::vector<double> t, l1, l1_low, l1_high, l2, l2_low, l2_high;
   for (const needle_state_t& m : states) {
-    const double s1 = std::sqrt(m.covariance[70]), s2 = std::sqrt(m.covariance[80]);
+    const double s1 = std::sqrt(std::max(m.covariance[70], 0.0)), s2 = std::sqrt(std::max(m.covariance[80], 0.0));
     t.push_back(static_cast<double>(m.utime - start_utime) * 1e-6);
     l1.push_back(m.lambda1_per_rad), l1_low.push_back(m.lambda1_per_rad - 2 * s1),
         l1_high.push_back(m.lambda1_per_rad + 2 * s1);
@@ -147,8 +149,8 @@ std::vector<report::Fact> facts_of(const LoopFigures& f) {
 
 void add_tables(report::Page& page, const LoopFigures& f) {
   const auto row = [](const char* name, const char* format, double value, double sd, double truth) {
-    return std::vector<std::string>{name, text(format, value), text(format, sd), text(format, truth),
-                                    text("%+.1f", (value - truth) / sd)};
+    return std::vector<std::string>{name, text(format, value), sd > 0 ? text(format, sd) : "held", text(format, truth),
+                                    report::in_deviations(value - truth, sd)};
   };
   page.table({"parameter", "estimate", "standard deviation", "truth", "off by (standard deviations)"},
              {row("k (1/mm)", "%.5f", f.curvature_per_mm, f.curvature_sd_per_mm, f.truth->curvature_per_mm),
@@ -178,11 +180,18 @@ void write_loop_report(const std::string& log_path, const LoopFigures& f, double
   const Column truth = column(log.truths, start), estimate = column(log.estimates, start);
   report::Page page("One insertion");
   char headline[160];
-  std::snprintf(headline, sizeof headline, "The tip came to rest %.2f mm from the target", f.targeting_error_mm);
-  page.verdict(f.targeting_error_mm <= tolerance_mm ? report::Tone::good : report::Tone::bad, headline,
-               "True tip of the simulated needle, whose curvature and lambda are not what the software believed at the "
-               "start; the camera's pictures were rendered and tracked.",
-               facts_of(f));
+  const bool reported = reports_arrival(f.outcome), is_near = f.targeting_error_mm <= tolerance_mm;
+  std::snprintf(headline, sizeof headline, "%s: the true tip came to rest %.2f mm from the target",
+                reported && is_near ? "Arrived"
+                : reported          ? "Missed, and an arrival was reported"
+                                    : "Missed, as reported",
+                f.targeting_error_mm);
+  page.verdict(
+      reported && is_near ? report::Tone::good : report::Tone::bad, headline,
+      "The controller reports: " + (f.outcome.empty() ? std::string("no outcome") : f.outcome) +
+          ". True tip of the simulated needle, whose curvature and lambda are not what the software believed at the "
+          "start; the camera's pictures were rendered and tracked.",
+      facts_of(f));
   add_tables(page, f);
   page.heading("Path");
   page.space(path_in_space(truth, estimate, f.target_mm),

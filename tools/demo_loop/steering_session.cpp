@@ -12,11 +12,32 @@ constexpr std::int64_t kWordPeriod_ns = 300'000'000;
 constexpr std::int64_t kPrintPeriod_ns = 2'000'000'000;
 constexpr std::int64_t kSettle_ns = 500'000'000;
 constexpr double kThere_mm = 0.1;  // of the depth to be drawn back to: what the controller holds at, and its ramp
+
+bool opens_with(const std::string& text, controller::Reason reason) {
+  return text.starts_with(controller::to_string(reason));
+}
+
+bool refuses_the_target(const std::string& text) {
+  for (int i = 0; i <= static_cast<int>(controller::Reason::retracted); ++i)
+    if (const auto reason = static_cast<controller::Reason>(i); controller::refuses_target(reason))
+      if (opens_with(text, reason)) return true;
+  return false;
+}
+
 }  // namespace
 
+bool reports_arrival(const std::string& reason) { return opens_with(reason, controller::Reason::arrived); }
+bool reports_miss(const std::string& reason) { return opens_with(reason, controller::Reason::missed); }
+
 SteeringSession::SteeringSession(lcm::LCM& lcm, const std::string& log_path, const Eigen::Vector3d& target_mm,
-                                 std::optional<double> retract_to_mm)
-    : lcm_(lcm), port_(lcm), heartbeat_(port_), log_(log_path), target_mm_(target_mm), retract_to_mm_(retract_to_mm) {
+                                 double tolerance_mm, std::optional<double> retract_to_mm)
+    : lcm_(lcm),
+      port_(lcm),
+      heartbeat_(port_),
+      log_(log_path),
+      target_mm_(target_mm),
+      tolerance_mm_(tolerance_mm),
+      retract_to_mm_(retract_to_mm) {
   everything_ = lcm_.subscribe(".*", &SteeringSession::on_any, this);
   everything_->setQueueCapacity(2000);
   port_.subscribe<process_status_t>(io::channel::kProcessStatus,
@@ -45,6 +66,7 @@ void SteeringSession::say(nodes::Word word, const Eigen::Vector3d& position_mm) 
   m.utime = nodes::now().utime;
   m.seq = seq_++;
   m.request = static_cast<std::int32_t>(word);
+  m.tolerance_mm = tolerance_mm_;
   for (int i = 0; i < 3; ++i) m.position_mm[i] = position_mm[i];
   const char* const receivers[] = {"bevel-controller", "bevel-stepper", "bevel-estimator"};  // as nodes::Receiver
   for (int i = 0; i < 3; ++i) m.session[i] = session_of(receivers[i]);
@@ -90,20 +112,21 @@ SteeringSession::Progress SteeringSession::step(const nodes::Now& now) {
   using io::ProcessState;
   const auto controller = state_of("bevel-controller");
   if (steering_seen_ && controller == ProcessState::hold) {
-    if (arrived_ns_ == 0) arrived_ns_ = now.ns;
-    if (now.ns - arrived_ns_ <= kSettle_ns) return Progress::going_on;
-    return retract_to_mm_ ? draw_back(now) : Progress::arrived;
+    const std::string& outcome = processes_["bevel-controller"].reason;
+    if (reports_arrival(outcome) || reports_miss(outcome)) outcome_ = outcome;
+    if (outcome_.empty()) return Progress::going_on;  // not at rest yet
+    if (at_depth_ns_ == 0) at_depth_ns_ = now.ns;
+    if (now.ns - at_depth_ns_ <= kSettle_ns) return Progress::going_on;
+    return retract_to_mm_ ? draw_back(now) : Progress::at_depth;
   }
   if (controller == ProcessState::retracting && !retracting_seen_) {
     retracting_seen_ = true;
-    arrived_ns_ = 0;  // it is told anew when it holds again
+    at_depth_ns_ = 0;  // counted anew when it holds again
   }
   if (controller == ProcessState::steering) steering_seen_ = true;
   if (controller == ProcessState::stopped || controller == ProcessState::fault) {
-    // Before the start most reasons pass, and the words are said again; that of a target does not.
-    const std::string& why = processes_["bevel-controller"].reason;
-    if (steering_seen_ || why.starts_with(controller::to_string(controller::Reason::target_unreachable)))
-      return Progress::stopped;
+    // Before the start most reasons pass, and the commands are repeated; the refusal of a target does not pass.
+    if (steering_seen_ || refuses_the_target(processes_["bevel-controller"].reason)) return Progress::stopped;
   }
   if (steering_seen_ || now.ns < next_word_ns_) return Progress::going_on;
   // The operator's words, repeated until they take effect.
@@ -122,7 +145,7 @@ SteeringSession::Progress SteeringSession::step(const nodes::Now& now) {
 // It holds: at the target, or where it was to be drawn back to.
 SteeringSession::Progress SteeringSession::draw_back(const nodes::Now& now) {
   // A way that is short may be over before a status has told of it.
-  if (retracting_seen_ || (inserted_mm_ && *inserted_mm_ <= *retract_to_mm_ + kThere_mm)) return Progress::arrived;
+  if (retracting_seen_ || (inserted_mm_ && *inserted_mm_ <= *retract_to_mm_ + kThere_mm)) return Progress::at_depth;
   if (now.ns < next_word_ns_) return Progress::going_on;
   next_word_ns_ = now.ns + kWordPeriod_ns;
   say(nodes::Word::retract, {0, 0, *retract_to_mm_});

@@ -14,18 +14,27 @@
 
 namespace bevel::tools {
 
+/// Returns whether the reason of bevel-controller's status (process_status_t.reason) reports an arrival, or a miss.
+bool reports_arrival(const std::string& reason);
+bool reports_miss(const std::string& reason);
+
 class SteeringSession {
  public:
-  // retract_to_mm: where it has arrived it is drawn back until so much is inserted.
-  SteeringSession(lcm::LCM& lcm, const std::string& log_path, const Eigen::Vector3d& target_mm,
+  /// @param tolerance_mm largest miss that counts as an arrival, mm; 0: the controller's configured one.
+  /// @param retract_to_mm inserted depth, mm, to which the needle is retracted after the outcome is reported.
+  SteeringSession(lcm::LCM& lcm, const std::string& log_path, const Eigen::Vector3d& target_mm, double tolerance_mm,
                   std::optional<double> retract_to_mm = {});
   ~SteeringSession();
 
-  enum class Progress { going_on, arrived, stopped };
+  /// at_depth: the controller has reported an outcome, an arrival or a miss, and a retraction is complete.
+  enum class Progress { going_on, at_depth, stopped };
   // Call about every 10 ms.
   Progress step(const nodes::Now& now);
   // The operator's stop, sent also when the session ends early.
   void stop();
+  /// Outcome that the controller reports at the depth of the target, with the miss, its uncertainty and the tolerance;
+  /// empty before.
+  const std::string& outcome() const { return outcome_; }
   // Why the log cannot be written any more; "" while it can. The needle is stopped then: what is not recorded is lost.
   const std::string& log_failure() const { return log_failure_; }
   // Why the needle was stopped, or what is still waited for.
@@ -50,7 +59,9 @@ class SteeringSession {
   io::LogWriter log_;
   lcm::Subscription* everything_;
   Eigen::Vector3d target_mm_;
+  double tolerance_mm_;
   std::optional<double> retract_to_mm_;
+  std::string outcome_;
   bool retracting_seen_ = false;
   std::map<std::string, process_status_t> processes_;
   std::optional<needle_state_t> estimate_;
@@ -59,7 +70,7 @@ class SteeringSession {
   std::int64_t start_ns_ = 0;
   std::int64_t next_word_ns_ = 0;
   std::int64_t next_print_ns_ = 0;
-  std::int64_t arrived_ns_ = 0;
+  std::int64_t at_depth_ns_ = 0;
   std::int64_t seq_ = 0;
   bool steering_seen_ = false;
   std::string log_failure_;

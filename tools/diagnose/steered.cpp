@@ -8,6 +8,7 @@
 #include <random>
 #include <stdexcept>
 
+#include "controller/arc_law.hpp"
 #include "diagnosis/parallel.hpp"
 #include "diagnosis/statistics/median.hpp"
 #include "io/live_effects.hpp"
@@ -61,9 +62,10 @@ std::vector<Eigen::Vector3d> draw_targets(int count, const std::array<double, 2>
     const double angle_rad = 2 * std::numbers::pi * share(random);
     const double z_mm = std::lerp(depth_mm[0], depth_mm[1], share(random));
     const Eigen::Vector3d target_mm(aside_mm * std::cos(angle_rad), aside_mm * std::sin(angle_rad), z_mm);
-    if (controller::predict_reach({}, one, target_mm, kTolerance_mm).reachable &&
-        controller::predict_reach({}, other, target_mm, kTolerance_mm).reachable)
-      targets.push_back(target_mm);
+    const auto is_reached = [&](const model::NeedleParameters& needle) {
+      return controller::arc_miss_mm(controller::arc_geometry({}, needle, {}, target_mm)) <= kTolerance_mm;
+    };
+    if (is_reached(one) && is_reached(other)) targets.push_back(target_mm);
   }
   return targets;
 }
@@ -72,7 +74,7 @@ SteeredFigures figures_of(const std::vector<steering::Insertion>& insertions) {
   std::vector<double> miss_mm;
   std::map<std::string, int> reasons;
   for (const auto& one : insertions) {
-    if (one.arrived)
+    if (one.at_depth)
       miss_mm.push_back(one.miss_mm);
     else
       ++reasons[one.reason == controller::Reason::none ? "not there in time" : controller::to_string(one.reason)];

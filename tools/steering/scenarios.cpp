@@ -168,6 +168,7 @@ struct Beam {
   bool obstacle = false;
   bool way_point = false;
   bool retract = false;
+  bool layered = false;  // a second layer begins 30 to 60 mm deep; its modulus and force are drawn
   static constexpr bool by_flips = false, gated = false;
 };
 // The software is told a curvature and a bending length, each off by up to 30 %, and a bicycle's slip of none.
@@ -181,6 +182,11 @@ Trial beam(const Beam& kind, std::uint64_t seed) {
   config.relaxing_fraction = kind.relaxing_fraction;
   config.relaxation_time_s = 3;
   config.max_depth_mm = 150;
+  if (kind.layered) {
+    config.layer_from_mm = draw.uniform(30, 60);
+    config.layer_modulus_kPa = draw.log_uniform(2, 100);
+    config.layer_force_N = draw.uniform(0.2, 1);
+  }
   const model::NeedleParameters deep = rig::bicycle_of(config);
   const double bending_mm = std::pow(4 * config.bending_stiffness_N_mm2 / (1e-3 * config.foundation_modulus_kPa), 0.25);
   estimator::Prior& prior = trial.believed.estimator.prior;
@@ -201,6 +207,42 @@ Trial beam(const Beam& kind, std::uint64_t seed) {
   trial.rig.cameras = cameras(2);
   trial.needle = {.bicycle = deep, .beam = config};
   trial.rig.make_plant = [config] { return std::make_unique<rig::BeamNeedle>(config); };
+  return trial;
+}
+
+// As shipped: what a system file leaves out is by default, and its [needle] has k deep in this tissue, off by up to 30
+// %.
+struct Shipped {
+  double modulus_kPa = 0, force_N = 0;  // 0: the filter's own model
+  static constexpr bool obstacle = false, way_point = false, retract = false, by_flips = false, gated = false;
+};
+Trial shipped(const Shipped& kind, std::uint64_t seed) {
+  Draw draw(seed);
+  Trial trial;
+  model::NeedleParameters truth = agar();
+  if (kind.modulus_kPa > 0) {
+    model::BeamPlantConfig config;
+    config.foundation_modulus_kPa = kind.modulus_kPa;
+    config.bevel_force_N = kind.force_N;
+    config.max_depth_mm = 150;
+    truth = rig::bicycle_of(config);
+    trial.needle = {.bicycle = truth, .beam = config};
+    trial.rig.make_plant = [config] { return std::make_unique<rig::BeamNeedle>(config); };
+  } else {
+    trial.needle = {.bicycle = truth};
+    trial.rig.make_plant = [truth] {
+      return std::make_unique<rig::KinematicPlant>(truth, std::vector<model::ActiveEffect>{}, 0, model::OwnValues{},
+                                                   rig::Cut::kept);
+    };
+  }
+  estimator::Prior& prior = trial.believed.estimator.prior;
+  prior.needle = agar();
+  prior.needle.curvature_per_mm = truth.curvature_per_mm * draw.uniform(0.7, 1.3);
+  assume_unknown_shaft(prior);
+  trial.believed.estimator.through_channel = true;
+  trial.believed.controller.shaft = {prior.bending_mm, prior.guide_mm};
+  trial.target_mm = draw_target(draw, std::min(truth.curvature_per_mm, prior.needle.curvature_per_mm));
+  trial.rig.cameras = cameras(2);
   return trial;
 }
 
@@ -238,6 +280,14 @@ const std::vector<Scenario>& scenarios() {
       scenario<Beam>(Row::floor, "beam-50-1", "beam, 50 kPa, 1 N", {50, 1}, beam),
       scenario<Beam>(Row::floor, "beam-20-0.5", "beam, 20 kPa, 0.5 N", {20, 0.5}, beam),
       scenario<Beam>(Row::apart, "beam-any", "beam, 2 to 100 kPa, 0.2 to 1 N", {}, beam),
+      scenario<Shipped>(Row::table, "default", "as shipped, the filter's own model, k off by up to 30 %", {}, shipped),
+      scenario<Shipped>(Row::table, "default-50-1", "as shipped, beam, 50 kPa, 1 N, k off by up to 30 %", {50, 1},
+                        shipped),
+      scenario<Shipped>(Row::table, "default-20-0.5", "as shipped, beam, 20 kPa, 0.5 N, k off by up to 30 %", {20, 0.5},
+                        shipped),
+      scenario<Beam>(Row::table, "beam-layered",
+                     "beam, two layers of 2 to 100 kPa and 0.2 to 1 N, the second from 30 to 60 mm on",
+                     {.layered = true}, beam),
       scenario<Beam>(Row::apart, "beam-relaxing", "beam, 20 kPa, 0.5 N, of which 30 % relax in 3 s",
                      {.modulus_kPa = 20, .force_N = 0.5, .relaxing_fraction = 0.3}, beam),
       scenario<Beam>(Row::floor, "beam-windup", "beam, 100 kPa, 1 N, wind-up of 0.5 rad at 100 mm, unknown",

@@ -102,6 +102,7 @@ controller::NeedleView view_of(const estimator::Estimate& estimate) {
   view.uncertain = {std::sqrt(estimate.state.covariance(6, 6)),
                     estimate.state.bending_mm > 0 ? std::sqrt(estimate.state.tenth_variance) : 0};
   view.position_variance_mm2 = estimate.state.covariance.diagonal().head<3>().maxCoeff();
+  view.heading_variance_rad2 = estimate.state.covariance.diagonal().segment<2>(3).maxCoeff();
   view.health = estimator::lost(estimate.health);
   view.unsure = (estimate.health & estimator::kUnsure) != 0;
   view.reset_count = estimate.state.reset_count;
@@ -149,10 +150,14 @@ class Pilot {
   bool holds() const {
     return yardstick_ ? yardstick_->arrived() : supervisor_.status().state == controller::State::hold;
   }
+  bool comes_to_rest() const { return reason() == controller::Reason::coming_to_rest; }
   controller::Reason reason() const {
+    using controller::Reason;
     if (!yardstick_) return supervisor_.status().reason;
-    return moves() || holds() ? controller::Reason::none : controller::Reason::state_unhealthy;
+    return moves() ? Reason::none : !holds() ? Reason::state_unhealthy : Reason::held;
   }
+  controller::Miss reported() const { return supervisor_.status().miss; }
+  bool has_report() const { return !yardstick_; }
 
  private:
   controller::Supervisor supervisor_;
@@ -171,7 +176,7 @@ Insertion steer(const SteeredRig& rig, const Believed& believed, const Eigen::Ve
   // A rig whose camera is late has its limit set for that: it is not what is looked at here.
   settings.limits.measurement_age_s += plant->model().latency_s().value;
   estimator::NeedleEstimator estimator(settings);
-  estimator::EntryLine entry(settings);
+  estimator::EntryLine entry(entry_line_config(settings));
   controller::ControllerConfig config = believed.controller;
   config.through_channel = settings.through_channel && settings.effects.empty();
   const model::NeedleParameters needle = model::AugmentedNeedle(settings.prior.needle, settings.effects).needle();
@@ -185,6 +190,7 @@ Insertion steer(const SteeredRig& rig, const Believed& believed, const Eigen::Ve
                       static_cast<std::int32_t>(model::AxisStatus::enabled)};
   std::int64_t next_frame_us = 0;
   bool started = false;
+  std::optional<Eigen::Vector3d> met_mm;  // the target when the needle stopped
   // To the target before, drawn back from it, to the target itself.
   enum class Leg { before, back, last } leg = believed.before ? Leg::before : Leg::last;
   WayIn way;
@@ -207,7 +213,7 @@ Insertion steer(const SteeredRig& rig, const Believed& believed, const Eigen::Ve
       if (leg == Leg::before) way.pass(axes.insertion_mm, tip_mm);
       if (leg == Leg::back)
         result.off_the_path_mm = std::max(result.off_the_path_mm, way.distance_mm(axes.insertion_mm, tip_mm));
-      if (started) result.duration_s += tick_s;
+      if (started && !met_mm) result.duration_s += tick_s;
     }
     if (us % kActuatorPeriod_us == 0) {
       axes.utime = utime;
@@ -236,12 +242,15 @@ Insertion steer(const SteeredRig& rig, const Believed& believed, const Eigen::Ve
       started = true;
     };
     if (!started) go(leg == Leg::before ? believed.before->target_mm : target_mm);
-    if (rig.target_mm && us % kFollow_us == 0) pilot.request(Request::follow, target_now(), utime);
+    if (rig.target_mm && !met_mm && us % kFollow_us == 0) pilot.request(Request::follow, target_now(), utime);
     const controller::Rates rates = pilot.step(view, axes, utime);
     axes.insertion_rate_mm_s = rates.insertion_mm_s;
     axes.rotation_rate_rad_s = rates.rotation_rad_s;
     if (pilot.moves()) continue;
+    if (!met_mm) met_mm = target_now();
+    if (pilot.comes_to_rest()) continue;
     if (leg == Leg::last || !pilot.holds()) break;
+    met_mm.reset();
     if (leg == Leg::before) {
       leg = Leg::back;
       result.before_miss_mm = (plant->tip().p_mm - believed.before->target_mm).norm();
@@ -252,10 +261,11 @@ Insertion steer(const SteeredRig& rig, const Believed& believed, const Eigen::Ve
     }
   }
   result.inserted_mm = axes.insertion_mm;
-  result.arrived = leg == Leg::last && pilot.holds();
+  result.at_depth = leg == Leg::last && pilot.holds();
   result.reason = pilot.reason();
+  if (pilot.has_report()) result.reported = pilot.reported();
   if (!way_point_miss_mm.empty()) result.way_point_miss_mm = std::ranges::max(way_point_miss_mm);
-  result.miss_mm = (plant->tip().p_mm - target_now()).norm();
+  result.miss_mm = (plant->tip().p_mm - met_mm.value_or(target_now())).norm();
   const estimator::Estimate last = estimator.estimate(axes.utime);
   result.estimate_error_mm = (last.tip.p_mm - plant->tip().p_mm).norm();
   const model::Vector6d error = model::log_se3(last.tip.inverse() * plant->tip());

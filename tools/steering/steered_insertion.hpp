@@ -59,9 +59,11 @@ struct Believed {
 };
 
 struct Insertion {
-  double miss_mm = 0;  // true tip to target where it came to rest
-  bool arrived = false;
-  controller::Reason reason = controller::Reason::none;  // why not
+  double miss_mm = 0;     // true tip to target where it came to rest
+  bool at_depth = false;  ///< it came to the closest approach to the target and stopped there, near it or not
+  /// The outcome that the controller reports at depth; of a law it is compared with, by the same rule.
+  controller::Miss reported;
+  controller::Reason reason = controller::Reason::none;  ///< of the controller's state at the end
   double turned_frame_said_mm = 0;                       // of insertion; 0: it was not
   double estimate_error_mm = 0;                          // estimate to true tip, at the end
   double pose_nees = 0;   // at the end, of six degrees of freedom: one each if the estimate's covariance is right

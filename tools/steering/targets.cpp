@@ -37,9 +37,13 @@ constexpr std::array<LawTried, 6> kLaws{
      {.name = "bang-bang", .law = controller::Law::spin, .yardstick = YardstickLaw::bang_bang},
      {.name = "flip", .law = controller::Law::flip}}};
 
-// Of those that came to rest at the target's depth.
+// Errors are of the insertions that came to rest at the depth of their target, near it or not.
 struct Figures {
-  int targets = 0, arrived = 0, refused = 0;
+  int targets = 0, at_depth = 0, refused = 0;
+  // The controller's report compared with the true tip. A needle that was stopped on the way because the target had
+  // left the reachable set is a reported miss.
+  int arrived = 0, missed_as_reported = 0, missed_unreported = 0;
+  int reported_in_vain = 0;  // of the reported misses: the true tip is within the tolerance
   double median_mm = 0, mean_mm = 0, sd_mm = 0, at_95_mm = 0, worst_mm = 0;
   double turns_per_100mm = 0, feed_mm_s = 0, estimate_error_mm = 0, pose_nees_per_axis = 0;
   std::vector<double> turned_frame_said_mm{};  // of insertion, of all targets
@@ -60,8 +64,9 @@ Figures figures_of(const std::vector<Insertion>& all) {
     if (one.turned_frame_said_mm > 0) f.turned_frame_said_mm.push_back(one.turned_frame_said_mm);
     if (one.nearest_mm < 0) ++f.touched;
     f.nearest_mm = std::min(f.nearest_mm, one.nearest_mm);
-    if (!one.arrived) {
+    if (!one.at_depth) {
       using controller::Reason;
+      if (one.inserted_mm > 0 && one.reason == Reason::target_unreachable) ++f.missed_as_reported;
       if (one.inserted_mm == 0 && (one.reason == Reason::target_unreachable || one.reason == Reason::path_blocked ||
                                    one.reason == Reason::way_point_unreachable))
         ++f.refused;
@@ -69,7 +74,12 @@ Figures figures_of(const std::vector<Insertion>& all) {
         ++f.stopped[one.reason == controller::Reason::none ? "not there in time" : to_string(one.reason)];
       continue;
     }
-    ++f.arrived;
+    ++f.at_depth;
+    if (const controller::Miss& reported = one.reported; reported.tolerance_mm > 0) {
+      const bool is_near = one.miss_mm <= reported.tolerance_mm;
+      ++(!reported.is_within() ? f.missed_as_reported : is_near ? f.arrived : f.missed_unreported);
+      if (!reported.is_within() && is_near) ++f.reported_in_vain;
+    }
     f.way_point_miss_mm = std::max(f.way_point_miss_mm, one.way_point_miss_mm);
     f.off_the_path_mm = std::max(f.off_the_path_mm, one.off_the_path_mm);
     f.drawn_back_error_mm = std::max(f.drawn_back_error_mm, one.drawn_back_error_mm);
@@ -94,16 +104,25 @@ Figures figures_of(const std::vector<Insertion>& all) {
 }
 
 std::string row_of(const std::string& scenario, const char* law, const Figures& f) {
-  std::array<char, 256> text{};
+  std::array<char, 320> text{};
+  // The laws that the controller's are compared with report nothing.
+  const std::string outcomes = f.arrived + f.missed_as_reported + f.missed_unreported == 0 && f.at_depth > 0
+                                   ? " |  | "
+                                   : std::to_string(f.arrived) + " | " + std::to_string(f.missed_as_reported) + " | " +
+                                         std::to_string(f.missed_unreported);
   std::snprintf(text.data(), text.size(),
-                "| %s | %s | %d | %.2f | %.2f +- %.2f | %.2f | %.2f | %.1f | %d | %.1f | %.2f | %.2f | %.2f |",
+                "| %s | %s | %d | %.2f | %.2f +- %.2f | %.2f | %.2f | %.1f | %s | %d | %.1f | %.2f | %.2f | %.2f |",
                 scenario.c_str(), law, f.targets, f.median_mm, f.mean_mm, f.sd_mm, f.at_95_mm, f.worst_mm,
-                100.0 * f.arrived / std::max(f.targets, 1), f.refused, f.turns_per_100mm, f.feed_mm_s,
-                f.estimate_error_mm, f.pose_nees_per_axis);
+                100.0 * f.at_depth / std::max(f.targets, 1), outcomes.c_str(), f.refused, f.turns_per_100mm,
+                f.feed_mm_s, f.estimate_error_mm, f.pose_nees_per_axis);
   std::string row = text.data();
-  if (f.arrived == 0)
-    row = "| " + scenario + " | " + law + " | " + std::to_string(f.targets) + " | | | | | 0.0 | " +
+  if (f.at_depth == 0)
+    row = "| " + scenario + " | " + law + " | " + std::to_string(f.targets) + " | | | | | 0.0 | " + outcomes + " | " +
           std::to_string(f.refused) + " | | | | |";
+  else if (f.at_depth == 1)  // one value has no standard deviation
+    row.replace(row.find(" +- "), row.find(" | ", row.find(" +- ")) - row.find(" +- "), "");
+  if (f.reported_in_vain > 0)
+    row += " " + std::to_string(f.reported_in_vain) + " of the reported misses within the tolerance;";
   for (const auto& [reason, count] : f.stopped) row += " " + std::to_string(count) + " " + reason + ";";
   if (const auto& said_mm = f.turned_frame_said_mm; !said_mm.empty()) {
     std::snprintf(text.data(), text.size(), " frame said to be turned: %zu, half of them by %.0f mm, all by %.0f;",
@@ -133,7 +152,11 @@ nlohmann::json json_of(const Scenario& scenario, const char* law, const Figures&
           {"what", scenario.what},
           {"law", law},
           {"targets", f.targets},
+          {"at_depth", f.at_depth},
           {"arrived", f.arrived},
+          {"missed_as_reported", f.missed_as_reported},
+          {"missed_unreported", f.missed_unreported},
+          {"reported_in_vain", f.reported_in_vain},
           {"refused", f.refused},
           {"stopped", f.stopped},
           {"turned_frame_said_mm", f.turned_frame_said_mm},
@@ -218,11 +241,13 @@ int run_targets(const TargetsOptions& options, std::ostream& out) {
     file.open(options.json);
     if (!file) throw std::runtime_error(options.json + ": cannot be written");
   }
-  out << "seed " << options.seed << "; mm, of those that arrived\n\n"
-      << "| scenario | law | targets | median | mean +- sd | 95 % | worst | arrived, % | refused before | turns per "
-         "100 "
-         "mm | feed, mm/s | estimate to tip | pose NEES / 6 | stopped |\n| --- | --- | --- | --- | --- | --- | --- | "
-         "--- | --- | --- | --- | --- | --- | --- |\n";
+  out << "seed " << options.seed
+      << "; errors in mm, of the insertions that came to rest at the depth of their target\n\n"
+      << "| scenario | law | targets | median | mean +- sd | 95 % | worst | at depth, % | arrived | missed as reported "
+         "| "
+         "missed and not reported | refused before | turns per 100 mm | feed, mm/s | estimate to tip | pose NEES / 6 | "
+         "stopped |\n| --- | --- | --- | --- | --- | --- | --- | --- | --- | --- | --- | --- | --- | --- | --- | --- | "
+         "--- |\n";
   nlohmann::json all = nlohmann::json::array();
   std::size_t insertions_all = 0;
   for (const Row& row : rows) insertions_all += static_cast<std::size_t>(row.targets);
