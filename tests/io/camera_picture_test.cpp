@@ -6,9 +6,9 @@
 
 #include <cmath>
 #include <limits>
-#include <opencv2/imgcodecs.hpp>
 #include <random>
 
+#include "drivers/camera/decode.hpp"
 #include "nodes/camera_pictures.hpp"
 
 namespace bevel::io {
@@ -49,7 +49,7 @@ TEST(CameraPicture, shows_the_tip_where_it_says_it_is) {
       const cv::Point2d tip(share.x * size.width, share.y * size.height);
       const auto arrived = decode_bytes(encode(example(size, tip)));
       ASSERT_TRUE(arrived) << describe(*arrived.error);
-      const cv::Mat gray = cv::imdecode(arrived->jpeg, cv::IMREAD_GRAYSCALE);
+      const cv::Mat gray = camera::decode_gray(arrived->jpeg).gray;
       ASSERT_EQ(gray.size(), cv::Size(arrived->width_px, arrived->height_px));
       EXPECT_LE(std::max(gray.cols, gray.rows), 320);
       EXPECT_LT(arrived->jpeg_size, 20'000);

@@ -75,6 +75,7 @@ int fit_pictures(const camera::Board& board, const Options& o, std::ostream& out
   const auto say_left_out = [&err](const std::vector<camera::LeftOut>& all) {
     for (const auto& left : all) err << "left out: " << left.name << ": " << left.why << '\n';
   };
+  for (const std::string& remark : pictures.remarks) err << remark << '\n';
   say_left_out(pictures.left_out);  // also if too little is left
   camera::Calibrated got = camera::calibrate(board, pictures.input);
   got.calibration.made_utc = utc_now();

@@ -45,6 +45,7 @@ struct Pictures {
   camera::Shot fiducial;  // no sightings if there is none
   std::vector<camera::LeftOut> left_out;
   int unreadable = 0;
+  std::vector<std::string> remarks;  // on orientation tags and bit depths, once per folder
 };
 // Throws std::invalid_argument: a folder without pictures, pictures of different sizes.
 Pictures read_pictures(const camera::Board& board, const Options& options);

@@ -2,9 +2,10 @@
 #include <cctype>
 #include <filesystem>
 #include <map>
-#include <opencv2/imgcodecs.hpp>
+#include <set>
 #include <stdexcept>
 
+#include "drivers/camera/decode.hpp"
 #include "drivers/camera/frame_source.hpp"
 #include "tools/calibrate/calibrate_tool.hpp"
 
@@ -48,17 +49,14 @@ class Reader {
 
   // Corners in one picture; none, with the reason noted, where there is no board.
   camera::Sighting read(const fs::path& file, size_t camera) {
-    cv::Mat gray;
-    try {
-      gray = cv::imread(file.string(), cv::IMREAD_GRAYSCALE);
-    } catch (const cv::Exception&) {
-      gray.release();
-    }
+    const camera::DecodedImage image = camera::read_gray(file);
+    const cv::Mat& gray = image.gray;
     if (gray.empty()) {
       ++out_.unreadable;
       out_.left_out.push_back({file.string(), "not a readable picture"});
       return {};
     }
+    note_format(file, image);
     cv::Size& size = out_.input.sizes_px[camera];
     if (first_[camera].empty()) first_[camera] = file.string(), size = gray.size();
     if (gray.size() != size)
@@ -73,7 +71,18 @@ class Reader {
   }
 
  private:
+  // The first image of each folder that carries an orientation tag or uses part of its bits stands for all of them.
+  void note_format(const fs::path& file, const camera::DecodedImage& image) {
+    const std::string folder = file.parent_path().string();
+    if (image.orientation != 1 && oriented_.insert(folder).second)
+      out_.remarks.push_back(camera::orientation_remark(file.string(), image.orientation));
+    if (image.bits != 8 && image.bits != 16 && scaled_.insert(folder).second)
+      out_.remarks.push_back("'" + file.string() + "' uses " + std::to_string(image.bits) +
+                             " of its 16 bits per sample; they are scaled to 8 bits");
+  }
+
   const camera::Board& board_;
+  std::set<std::string> oriented_, scaled_;  // folders that have a remark
   std::vector<std::string> first_;
   Pictures& out_;
 };
