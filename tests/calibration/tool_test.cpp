@@ -246,6 +246,70 @@ TEST_F(Tool, TwelveBitPicturesAreScaled) {
               900, 9);
 }
 
+// Sets of views from poor to good: "Good" implies that the lens is right, and a single orientation of the board is
+// never good, however well it predicts further views of the same orientation.
+TEST(CalibrationVerdict, GoodImpliesThatTheLensIsDetermined) {
+  const camera::Board board(kBoard);
+  const test::TrueCamera truth;
+  int good = 0, others = 0;
+  for (const double tilt : {0.0, 0.03, 0.1, 0.2, 0.45})
+    for (unsigned seed = 1; seed <= 4; ++seed) {
+      std::mt19937_64 random(seed);
+      std::uniform_real_distribution<double> any(-1, 1);
+      std::vector<camera::Shot> shots;
+      for (int s = 0; s < 16; ++s) {
+        const cv::Matx33d R = test::turned(0.25 + tilt * any(random), -0.2 + tilt * any(random), 0.5 * any(random));
+        const cv::Vec3d middle(25 * any(random), 18 * any(random), 160 + 20 * any(random));
+        const auto place = test::place_board(board, middle, R);
+        shots.push_back({std::to_string(s), false, {test::see(truth, board, place, false, 0.1, random)}});
+      }
+      try {
+        const camera::Calibrated got = camera::calibrate(board, test::input_of({truth}, shots));
+        const Verdict verdict = verdict_of(got);
+        const double off = std::abs(got.calibration.cameras[0].model.lens.parameters[camera::kFx] / truth.fx - 1);
+        std::printf("tilt %.2f, seed %u: %s, fx off by %.2f %%, lens to %.2f %%, orientations: %d\n", tilt, seed,
+                    verdict.title.c_str(), 100 * off, 100 * lens_error(got, 0), got.tilts[0]);
+        const bool is_good = verdict.title.starts_with("Good");
+        if (is_good) {
+          EXPECT_LT(off, 0.012) << "four standard errors of 0.3 %";
+        }
+        if (tilt == 0.0) {
+          EXPECT_FALSE(is_good) << "one orientation";
+        }
+        if (tilt > 0.4) {
+          EXPECT_TRUE(is_good) << verdict.reason;
+        }
+        ++(is_good ? good : others);
+      } catch (const std::exception& error) {
+        std::printf("tilt %.2f, seed %u: refused: %s\n", tilt, seed, error.what());
+        EXPECT_LT(tilt, 0.2);
+        ++others;
+      }
+    }
+  EXPECT_GE(good, 4);
+  EXPECT_GE(others, 4);
+}
+
+// One view 16 times, as an issue reported it.
+TEST_F(Tool, OnePictureSixteenTimesIsRefused) {
+  Options o = options();
+  o.immersed.clear();
+  o.air = {path("same")};
+  o.out_folder = path("out-same");
+  fs::create_directories(path("same"));
+  fs::path first;
+  for (const auto& entry : fs::directory_iterator(path("air0")))
+    if (entry.path().filename() != "empty.png" && (first.empty() || entry.path() < first)) first = entry.path();
+  for (int i = 0; i < 16; ++i) fs::copy_file(first, fs::path(path("same")) / ("view" + std::to_string(i) + ".png"));
+  std::ostringstream out, err;
+  try {
+    run(o, out, err);
+    ADD_FAILURE() << "accepted: " << out.str();
+  } catch (const std::invalid_argument& error) {
+    EXPECT_THAT(error.what(), HasSubstr("15 more repeat the view of another picture"));
+  }
+}
+
 // What was said before the refusal.
 std::string expect_refused(const Options& o, const std::vector<std::string>& words) {
   std::ostringstream out, err;

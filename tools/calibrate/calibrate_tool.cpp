@@ -112,6 +112,8 @@ int fit_pictures(const camera::Board& board, const Options& o, std::ostream& out
     out << "camera " << got.numbers[c] << ": " << fit.pictures << " pictures, " << fit.corners << " corners, RMS "
         << format_significant(fit.rms_px) << " px, held out " << format_significant(fit.held_out_rms_px) << " px\n";
   }
+  const Verdict verdict = verdict_of(got);
+  out << verdict.title << ": " << verdict.reason << '\n';
   for (const auto& t : got.triangulation)
     out << (t.immersed ? "immersed" : "in air") << ": corners of boards held out, by both cameras, "
         << format_significant(t.shape_rms_mm) << " mm from the board's shape"
@@ -121,6 +123,7 @@ int fit_pictures(const camera::Board& board, const Options& o, std::ostream& out
         << '\n';
   out << "frame {A}: " << told.frame << '\n' << told.yaml_path << ", " << o.out_folder << "/report.html\n";
   say_left_out(got.left_out);
+  if (verdict.tone == Verdict::Tone::bad) return tools::kFailed;
   return pictures.unreadable > 0 ? tools::kDamagedInput : tools::kOk;
 }
 

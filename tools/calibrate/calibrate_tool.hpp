@@ -58,6 +58,18 @@ struct Told {
   std::string yaml_path;
   std::vector<std::string> tables;  // [[camera]] of a system file
 };
+/// Largest standard error of the focal lengths and the principal point of a camera, relative to fx: what a length of
+/// one mm is wrong by, in mm.
+double lens_error(const camera::Calibrated& calibrated, std::size_t camera);
+
+/// Whether a calibration can be used: from the error on pictures that were held out, the standard errors of the lens,
+/// the orientations of the board, systematic residuals, and the part of the image that the board covered.
+struct Verdict {
+  enum class Tone { good, warning, bad } tone = Tone::good;
+  std::string title, reason;
+};
+Verdict verdict_of(const camera::Calibrated& calibrated);
+
 void write_report(const camera::Calibrated& calibrated, const Told& told, const std::string& folder);
 void write_figures(const camera::Calibrated& calibrated, const std::string& folder);  // figures.json
 
