@@ -310,6 +310,37 @@ TEST_F(Tool, OnePictureSixteenTimesIsRefused) {
   }
 }
 
+// A legacy board is recognised and reported; pictures of both kinds of board are refused.
+TEST_F(Tool, ALegacyBoardIsRecognisedAndReported) {
+  const camera::Board board(kBoard);
+  std::vector<test::BoardPlace> places;
+  const auto shots = test::shots_of({(*cameras_)[0]}, board, 10, 0, 0, kSeed, &places);
+  Options o = options();
+  o.immersed.clear();
+  o.air = {path("legacy")};
+  o.out_folder = path("out-legacy");
+  fs::create_directories(path("legacy"));
+  for (size_t s = 0; s < shots.size(); ++s)
+    cv::imwrite((fs::path(path("legacy")) / shots[s].name).string(),
+                test::photograph((*cameras_)[0], board, places[s], false, kSeed + s, camera::CharucoPattern::legacy));
+  EXPECT_EQ(run(o, out_, err_), 0) << err_.str();
+  EXPECT_THAT(out_.str(), HasSubstr("legacy pattern (marker 0 in the first square"));
+  EXPECT_NE(test::text_of(path("out-legacy/report.html")).find("legacy pattern"), std::string::npos);
+  const auto& lens = camera::load_calibration(path("out-legacy/cameras.yaml")).cameras[0].model.lens.parameters;
+  EXPECT_NEAR(lens[camera::kFx], 900, 9);
+  EXPECT_NEAR(lens[camera::kCx], 325, 4);
+  EXPECT_NEAR(lens[camera::kCy], 236, 4);
+  cv::imwrite((fs::path(path("legacy")) / "zz.png").string(),
+              test::photograph((*cameras_)[0], board, places[0], false, kSeed));
+  try {
+    run(o, out_, err_);
+    ADD_FAILURE() << "accepted";
+  } catch (const std::invalid_argument& error) {
+    EXPECT_THAT(error.what(), HasSubstr("zz.png' shows a board with the current ChArUco pattern"));
+    EXPECT_THAT(error.what(), HasSubstr("allowed: one board in all pictures"));
+  }
+}
+
 // What was said before the refusal.
 std::string expect_refused(const Options& o, const std::vector<std::string>& words) {
   std::ostringstream out, err;

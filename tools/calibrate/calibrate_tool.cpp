@@ -81,6 +81,12 @@ int fit_pictures(const camera::Board& board, const Options& o, std::ostream& out
   got.calibration.made_utc = utc_now();
   Told told;
   told.board = in_words(o);
+  if (pictures.pattern) {
+    told.board += pictures.pattern == camera::CharucoPattern::legacy
+                      ? ", legacy pattern (marker 0 in the first square: OpenCV up to 4.5.5, calib.io)"
+                      : ", current pattern (first square black)";
+    out << "board: " << told.board << '\n';
+  }
   told.left_out = pictures.left_out;
   told.left_out.insert(told.left_out.end(), got.left_out.begin(), got.left_out.end());
   if (!pictures.fiducial.seen.empty()) {

@@ -2,6 +2,7 @@
 // bevel-calibrate: pictures of a board to a YAML of cameras and a page that says how good they are; the frame {A} from
 // a fiducial or from the log of a straight insertion; a board to print; how late the stamps of cameras are.
 #include <iosfwd>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -45,10 +46,13 @@ struct Pictures {
   camera::Shot fiducial;  // no sightings if there is none
   std::vector<camera::LeftOut> left_out;
   int unreadable = 0;
-  std::vector<std::string> remarks;  // on orientation tags and bit depths, once per folder
+  std::optional<camera::CharucoPattern> pattern;  // of the board, if it has two and was found
+  std::vector<std::string> remarks;               // on orientation tags and bit depths, once per folder
 };
-// Throws std::invalid_argument: a folder without pictures, pictures of different sizes.
+// Throws std::invalid_argument: a folder without pictures, pictures of different sizes or of boards with different
+// patterns.
 Pictures read_pictures(const camera::Board& board, const Options& options);
+std::string name_of(camera::CharucoPattern pattern);
 
 // What the page tells beside the calibration.
 struct Told {

@@ -64,13 +64,27 @@ class Reader {
                                   " as '" + first_[camera] +
                                   "', the first of this camera; a calibration holds for one size");
     camera::Sighting seen = board_.find(gray);
-    if (seen.ids.empty())
-      out_.left_out.push_back({file.string(), "no board of " + std::to_string(board_.spec().columns) + " x " +
-                                                  std::to_string(board_.spec().rows) + " squares found in it"});
+    if (seen.ids.empty()) {
+      const std::string none = "no board of " + std::to_string(board_.spec().columns) + " x " +
+                               std::to_string(board_.spec().rows) + " squares found in it";
+      out_.left_out.push_back({file.string(), seen.rejected.empty() ? none : none + ": " + seen.rejected});
+      return seen;
+    }
+    note_pattern(file, seen);
     return seen;
   }
 
  private:
+  // All pictures are of one board.
+  void note_pattern(const fs::path& file, const camera::Sighting& seen) {
+    if (!board_.has_two_patterns() || seen.ids.size() < static_cast<size_t>(camera::kFewestCorners)) return;
+    if (!out_.pattern) out_.pattern = seen.pattern, patterned_ = file.string();
+    if (*out_.pattern != seen.pattern)
+      throw std::invalid_argument("'" + file.string() + "' shows a board with the " + name_of(seen.pattern) +
+                                  " ChArUco pattern, '" + patterned_ + "' one with the " + name_of(*out_.pattern) +
+                                  "; allowed: one board in all pictures");
+  }
+
   // The first image of each folder that carries an orientation tag or uses part of its bits stands for all of them.
   void note_format(const fs::path& file, const camera::DecodedImage& image) {
     const std::string folder = file.parent_path().string();
@@ -82,12 +96,17 @@ class Reader {
   }
 
   const camera::Board& board_;
+  std::string patterned_;                    // the picture that gave out_.pattern
   std::set<std::string> oriented_, scaled_;  // folders that have a remark
   std::vector<std::string> first_;
   Pictures& out_;
 };
 
 }  // namespace
+
+std::string name_of(camera::CharucoPattern pattern) {
+  return pattern == camera::CharucoPattern::legacy ? "legacy" : "current";
+}
 
 Pictures read_pictures(const camera::Board& board, const Options& options) {
   const size_t cameras = options.air.size();
