@@ -31,8 +31,8 @@ class FrameSource {
   /// Waits at most `timeout`; sources that read files never wait. After EndOfFrames it keeps answering EndOfFrames.
   virtual FrameResult next(std::chrono::milliseconds timeout) = 0;
 
-  /// Describes a property of the frames so far that users should know, such as an orientation tag that is ignored;
-  /// empty if there is none.
+  /// Describes a property of the frames so far that users should know, such as an orientation tag that is ignored.
+  /// Returns an empty text if all frames were ordinary.
   virtual std::string remark() const { return {}; }
 };
 

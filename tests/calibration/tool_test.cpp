@@ -371,6 +371,12 @@ TEST_F(Tool, WhatIsWrongIsNamed) {
   expect_refused(o, {"camera 0: pictures in air with a board are 0, allowed: 6 or more"});
   o.air = {path("air0"), path("air1"), path("air0")};
   expect_refused(o, {"--air has 3 folders, allowed: 1 or 2"});
+  o.air = {path("air0"), path("air1") + "/../air0"};
+  expect_refused(o, {"air0' is the same folder as one of --air", "allowed: a folder of its own for each camera"});
+  o.air = {path("air0")};
+  o.immersed = {path("air0") + "/"};
+  expect_refused(o, {"--immersed", "is the same folder as one of --air"});
+  o.immersed.clear();
   // Another board than the one in the pictures: its markers are known, but lie elsewhere on it.
   o.air = {path("air0"), path("air1")};
   o.board.columns = 9;

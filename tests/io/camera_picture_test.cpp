@@ -68,6 +68,16 @@ TEST(CameraPicture, shows_the_tip_where_it_says_it_is) {
     }
 }
 
+// A decorator that dropped the remark would hide an ignored orientation tag while pictures are published.
+TEST(KeptFrame, PassesOnTheRemarkOfItsSource) {
+  class Source : public camera::FrameSource {
+   public:
+    camera::FrameResult next(std::chrono::milliseconds /*timeout*/) override { return camera::EndOfFrames{}; }
+    std::string remark() const override { return "carries orientation tag 6"; }
+  };
+  EXPECT_EQ(nodes::KeptFrame(std::make_unique<Source>()).remark(), "carries orientation tag 6");
+}
+
 TEST(CameraPicture, without_a_tip_is_a_picture_all_the_same) {
   camera::TipObservation lost = seen_at({0, 0});
   lost.status = camera::TipStatus::lost;

@@ -41,6 +41,21 @@ std::vector<fs::path> pictures_in(const std::string& folder) {
   return files;
 }
 
+// The same pictures in two folders would place two cameras at one point, or a board in air and in the gel at once.
+void require_different_folders(const Options& options) {
+  std::map<fs::path, std::string> options_by_folder;
+  for (const auto& [option, folders] : {std::pair("--air", &options.air), {"--immersed", &options.immersed}})
+    for (const std::string& folder : *folders) {
+      std::error_code error;
+      const fs::path path = fs::canonical(folder, error);
+      if (error) continue;  // pictures_in() reports it
+      const auto [at, is_new] = options_by_folder.emplace(path, option);
+      if (!is_new)
+        throw std::invalid_argument(std::string(option) + " '" + folder + "' is the same folder as one of " +
+                                    at->second + "; allowed: a folder of its own for each camera and medium");
+    }
+}
+
 class Reader {
  public:
   Reader(const camera::Board& board, size_t cameras, Pictures& out) : board_(board), first_(cameras), out_(out) {
@@ -85,7 +100,7 @@ class Reader {
                                   "; allowed: one board in all pictures");
   }
 
-  // The first image of each folder that carries an orientation tag or uses part of its bits stands for all of them.
+  // One remark per folder: the images of a camera have the same format.
   void note_format(const fs::path& file, const camera::DecodedImage& image) {
     const std::string folder = file.parent_path().string();
     if (image.orientation != 1 && oriented_.insert(folder).second)
@@ -120,6 +135,7 @@ Pictures read_pictures(const camera::Board& board, const Options& options) {
   if (options.numbers.size() < cameras)
     throw std::invalid_argument("--numbers has " + std::to_string(options.numbers.size()) +
                                 " values, allowed: " + std::to_string(cameras) + " or more");
+  require_different_folders(options);
   Pictures out;
   out.input.options = options.fit;
   for (size_t c = 0; c < cameras; ++c) out.input.numbers.push_back(static_cast<int>(options.numbers[c]));

@@ -13,12 +13,11 @@ namespace bevel::camera {
 namespace {
 
 constexpr int kMarkers = 250;
-// Where corners or markers do not belong to the board they are off by a square or more; distortion and noise leave
-// a few hundredths.
+// Corners and markers of another board are off by a square or more; distortion and noise leave a few hundredths.
 constexpr double kMisplaced_squares = 0.25;
 
-// Whether corners lie in the picture as they do on the board, up to a lens: where the board has other columns or rows
-// than this one its markers are taken for others, and corners lie squares beside where a plane would show them.
+// Returns whether the corners fit a plane, up to lens distortion. They do not if the board in the picture has other
+// columns or rows than this one.
 bool lie_as_on(const Board& board, const Sighting& seen) {
   constexpr size_t kFewest = 8;  // fewer are not used, and four always fit
   if (seen.ids.size() < kFewest) return true;

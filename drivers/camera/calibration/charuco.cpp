@@ -74,8 +74,8 @@ Charuco::Charuco(const BoardSpec& spec, CharucoPattern pattern)
   const Sighting all = find_corners(drawn, find_markers(drawn));
   const int corners = (spec.columns - 1) * (spec.rows - 1);
   if (static_cast<int>(all.ids.size()) != corners)
-    throw std::invalid_argument("board: of its own drawing " + std::to_string(all.ids.size()) + " of " +
-                                std::to_string(corners) + " corners are found, allowed: all; marker_mm is " +
+    throw std::invalid_argument("board: the detector finds " + std::to_string(all.ids.size()) + " of " +
+                                std::to_string(corners) + " corners in a drawing, allowed: all; marker_mm is " +
                                 number_text(spec.marker_mm) + " of square_mm " + number_text(spec.square_mm));
   cv::Point2d off;
   for (size_t i = 0; i < all.ids.size(); ++i) {
