@@ -372,7 +372,7 @@ TEST_F(Tool, WhatIsWrongIsNamed) {
   o.air = {path("air0"), path("air1"), path("air0")};
   expect_refused(o, {"--air has 3 folders, allowed: 1 or 2"});
   o.air = {path("air0"), path("air1") + "/../air0"};
-  expect_refused(o, {"air0' is the same folder as one of --air", "allowed: a folder of its own for each camera"});
+  expect_refused(o, {"air0' is the same folder as one of --air", "allowed: different folders for all cameras"});
   o.air = {path("air0")};
   o.immersed = {path("air0") + "/"};
   expect_refused(o, {"--immersed", "is the same folder as one of --air"});

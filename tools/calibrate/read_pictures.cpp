@@ -41,7 +41,7 @@ std::vector<fs::path> pictures_in(const std::string& folder) {
   return files;
 }
 
-// The same pictures in two folders would place two cameras at one point, or a board in air and in the gel at once.
+// With the same pictures twice, two cameras would have one pose, or a board would be in air and in the gel at once.
 void require_different_folders(const Options& options) {
   std::map<fs::path, std::string> options_by_folder;
   for (const auto& [option, folders] : {std::pair("--air", &options.air), {"--immersed", &options.immersed}})
@@ -52,7 +52,7 @@ void require_different_folders(const Options& options) {
       const auto [at, is_new] = options_by_folder.emplace(path, option);
       if (!is_new)
         throw std::invalid_argument(std::string(option) + " '" + folder + "' is the same folder as one of " +
-                                    at->second + "; allowed: a folder of its own for each camera and medium");
+                                    at->second + "; allowed: different folders for all cameras and media");
     }
 }
 
