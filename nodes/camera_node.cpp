@@ -96,8 +96,8 @@ std::string CameraNode::end_recording() {
 
 std::string CameraNode::remark() const {
   const camera::CameraCounters& c = pipeline_->counters();
-  std::string text;
-  if (c.lost_frames > 0) text = std::to_string(c.lost_frames) + " frames lost";
+  std::string text = pipeline_->source_remark();
+  if (c.lost_frames > 0) text += (text.empty() ? "" : "; ") + (std::to_string(c.lost_frames) + " frames lost");
   if (c.stamped_on_arrival > 0 && !latency_known_)
     text += std::string(text.empty() ? "" : "; ") +
             "the driver tells no capture times, and no latency_s is set (bevel-calibrate --latency)";

@@ -20,6 +20,7 @@ class KeptFrame : public camera::FrameSource {
  public:
   explicit KeptFrame(std::unique_ptr<camera::FrameSource> source) : source_(std::move(source)) {}
   camera::FrameResult next(std::chrono::milliseconds timeout) override;
+  std::string remark() const override { return source_->remark(); }
   const camera::Frame& frame() const { return frame_; }  // empty before the first
 
  private:

@@ -2,10 +2,10 @@
 
 #include <algorithm>
 #include <ctime>
-#include <opencv2/imgcodecs.hpp>
 #include <opencv2/imgproc.hpp>
 
 #include "drivers/camera/capture_device.hpp"
+#include "drivers/camera/decode.hpp"
 
 namespace bevel::camera {
 namespace {
@@ -49,7 +49,7 @@ std::string name_of_fourcc(uint32_t fourcc) {
   return name;
 }
 
-cv::Mat gray_of(const PixelLayout& layout, std::span<const uint8_t> bytes) {
+cv::Mat gray_of(const PixelLayout& layout, std::span<const uint8_t> bytes, int* orientation) {
   cv::Mat gray;
   switch (layout.fourcc) {
     case V4L2_PIX_FMT_GREY:
@@ -62,16 +62,12 @@ cv::Mat gray_of(const PixelLayout& layout, std::span<const uint8_t> bytes) {
     case V4L2_PIX_FMT_UYVY:
       if (const cv::Mat picture = packed(layout, bytes, 2); !picture.empty()) cv::extractChannel(picture, gray, 1);
       return gray;
-    case V4L2_PIX_FMT_MJPEG:
-      if (bytes.empty()) return gray;
-      try {
-        gray = cv::imdecode(cv::Mat(1, static_cast<int>(bytes.size()), CV_8UC1, const_cast<uint8_t*>(bytes.data())),
-                            cv::IMREAD_GRAYSCALE);
-      } catch (const cv::Exception&) {
-        return {};
-      }
-      if (gray.cols != layout.width_px || gray.rows != layout.height_px) return {};
-      return gray;
+    case V4L2_PIX_FMT_MJPEG: {
+      const DecodedImage image = decode_gray(bytes);
+      if (image.gray.cols != layout.width_px || image.gray.rows != layout.height_px) return gray;
+      if (orientation != nullptr) *orientation = image.orientation;
+      return image.gray;
+    }
     default:
       return gray;
   }

@@ -58,8 +58,10 @@ bool is_readable(uint32_t fourcc);
 uint32_t fourcc_from(const std::string& name);
 std::string name_of_fourcc(uint32_t fourcc);
 
-/// Brightness, CV_8UC1, a copy; empty where there are fewer bytes than the layout needs or no JPEG can be read.
-cv::Mat gray_of(const PixelLayout& layout, std::span<const uint8_t> bytes);
+/// Returns the brightness of a frame, CV_8UC1, as a copy; empty if there are fewer bytes than the layout needs or the
+/// JPEG cannot be decoded.
+/// @param orientation receives the EXIF orientation of an MJPEG frame, 1 to 8, which is not applied; may be null
+cv::Mat gray_of(const PixelLayout& layout, std::span<const uint8_t> bytes, int* orientation = nullptr);
 
 /// Both clocks at one moment.
 struct ClockPair {

@@ -36,7 +36,9 @@ std::optional<FrameResult> DeviceSource::newest() {
   }
   if (!best) return std::nullopt;
   Frame frame;
-  frame.gray = gray_of(device_->layout(), best->bytes);
+  int orientation = 1;
+  frame.gray = gray_of(device_->layout(), best->bytes, &orientation);
+  if (orientation_ == 1) orientation_ = orientation;
   device_->give_back(best->index);
   if (frame.gray.empty()) return std::nullopt;  // fewer bytes than a picture has: lost, as its number shows
   frame.capture_utime = stamp.utime;

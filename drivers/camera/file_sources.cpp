@@ -2,7 +2,6 @@
 #include <algorithm>
 #include <cctype>
 #include <cmath>
-#include <opencv2/imgcodecs.hpp>
 #include <opencv2/imgproc.hpp>
 
 #include "drivers/camera/frame_sources.hpp"
@@ -76,14 +75,13 @@ FolderSource::FolderSource(const SourceConfig& config) : config_(config) {
 
 FrameResult FolderSource::next(std::chrono::milliseconds /*timeout*/) {
   if (next_ >= files_.size()) return EndOfFrames{};
+  const std::string name = files_[next_].string();
+  const DecodedImage image = read_gray(name, bits_);
+  bits_ = std::max(bits_, image.bits);
+  if (remark_.empty()) remark_ = orientation_remark(name, image.orientation);
   Frame frame;
-  try {
-    frame.gray = cv::imread(files_[next_].string(), cv::IMREAD_GRAYSCALE);
-  } catch (const cv::Exception&) {
-    frame.gray.release();  // larger than OpenCV reads
-  }
+  frame.gray = image.gray;
   if (frame.gray.empty()) {
-    const std::string name = files_[next_].string();
     next_ = files_.size();
     return SourceFailure{"'" + name + "': not a readable image"};
   }
@@ -103,6 +101,11 @@ VideoSource::VideoSource(const SourceConfig& config) : config_(config) {
   if (!std::filesystem::is_regular_file(config.path, error))
     throw SourceError("source path '" + config.path + "': not a file");
   if (!capture_.open(config.path)) throw SourceError("source path '" + config.path + "': no decoder opens it as video");
+  // Containers of phones state a rotation that OpenCV applies by default.
+  capture_.set(cv::CAP_PROP_ORIENTATION_AUTO, 0);
+  if (const auto rotation_deg = std::llround(capture_.get(cv::CAP_PROP_ORIENTATION_META)); rotation_deg != 0)
+    remark_ = "'" + config.path + "' states a rotation of " + std::to_string(rotation_deg) +
+              " degrees; the frames are not rotated: rows and columns are those of the sensor";
   const double rate_hz = capture_.get(cv::CAP_PROP_FPS);
   if (std::isfinite(rate_hz) && rate_hz > 0.1 && rate_hz < 1e4)
     config_.period_us = static_cast<int64_t>(std::llround(1e6 / rate_hz));

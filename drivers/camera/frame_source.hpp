@@ -30,6 +30,10 @@ class FrameSource {
 
   /// Waits at most `timeout`; sources that read files never wait. After EndOfFrames it keeps answering EndOfFrames.
   virtual FrameResult next(std::chrono::milliseconds timeout) = 0;
+
+  /// Describes a property of the frames so far that users should know, such as an orientation tag that is ignored.
+  /// Returns an empty text if all frames were ordinary.
+  virtual std::string remark() const { return {}; }
 };
 
 /// Bad configuration or a source that cannot be opened. what() names the key, the value and what is allowed.

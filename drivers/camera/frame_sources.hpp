@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "drivers/camera/capture_device.hpp"
+#include "drivers/camera/decode.hpp"
 #include "drivers/camera/frame_recorder.hpp"
 #include "drivers/camera/frame_source.hpp"
 
@@ -19,6 +20,7 @@ class FolderSource : public FrameSource {
  public:
   explicit FolderSource(const SourceConfig& config);
   FrameResult next(std::chrono::milliseconds timeout) override;
+  std::string remark() const override { return remark_; }
   const std::vector<std::filesystem::path>& files() const { return files_; }
 
  private:
@@ -26,6 +28,8 @@ class FolderSource : public FrameSource {
   std::vector<std::filesystem::path> files_;
   std::vector<RecordedFrame> recorded_;  // of the files, or empty
   size_t next_ = 0;
+  int bits_ = 8;  // per sample, at least, of the files so far: one brightness scale for all of them
+  std::string remark_;
 };
 
 /// Stamped by the container's own times, from its first frame on. A file that ends before the length that it states is
@@ -34,6 +38,7 @@ class VideoSource : public FrameSource {
  public:
   explicit VideoSource(const SourceConfig& config);
   FrameResult next(std::chrono::milliseconds timeout) override;
+  std::string remark() const override { return remark_; }
 
  private:
   std::optional<std::string> missing() const;
@@ -43,6 +48,7 @@ class VideoSource : public FrameSource {
   int64_t seq_ = 0;
   int64_t last_us_ = 0;  // of the last frame, in the file's time
   bool ended_ = false;
+  std::string remark_;
 };
 
 /// Video4Linux: the newest frame that the driver calls whole, by its own number and capture time.
@@ -51,6 +57,7 @@ class DeviceSource : public FrameSource {
   explicit DeviceSource(const SourceConfig& config);
   DeviceSource(const SourceConfig& config, std::unique_ptr<CaptureDevice> device, std::function<ClockPair()> clocks);
   FrameResult next(std::chrono::milliseconds timeout) override;
+  std::string remark() const override { return orientation_remark(config_.path, orientation_); }
 
  private:
   std::optional<FrameResult> newest();
@@ -59,6 +66,7 @@ class DeviceSource : public FrameSource {
   std::unique_ptr<CaptureDevice> device_;
   std::function<ClockPair()> clocks_;
   BufferCount count_;
+  int orientation_ = 1;  // of the first MJPEG frame that carries another
   bool failed_ = false;
 };
 

@@ -71,6 +71,8 @@ class CameraPipeline {
   std::function<void(const cv::Mat& gray, const TipObservation&)> on_tracked;
 
   const CameraCounters& counters() const { return counters_; }
+  /// FrameSource::remark() of its source.
+  std::string source_remark() const { return source_->remark(); }
 
  private:
   struct Eye {

@@ -196,6 +196,72 @@ TEST(Fit, BadInputNamesTheThing) {
   }
 }
 
+std::vector<Shot> copies_of(const TrueCamera& camera, int count, double noise_px, double shake_mm) {
+  std::mt19937_64 random(kSeed + 6);
+  std::uniform_real_distribution<double> any(-1, 1);
+  std::vector<Shot> shots;
+  Sighting first;
+  for (int s = 0; s < count; ++s) {
+    const cv::Vec3d shake(shake_mm * any(random), shake_mm * any(random), shake_mm * any(random));
+    const auto place = test::place_board(board(), test::kBox_mm + shake, test::turned(0.4, 0.3, 0.1));
+    Sighting seen = test::see(camera, board(), place, false, noise_px, random);
+    if (s == 0) first = seen;
+    shots.push_back({"copy" + std::to_string(s) + ".png", false, {noise_px == 0 && shake_mm == 0 ? first : seen}});
+  }
+  return shots;
+}
+
+// A copy looks like a picture that was held out and is predicted by the one that it repeats.
+TEST(Fit, CopiesOfOneViewAreRefused) {
+  const TrueCamera camera;
+  for (const auto& [noise_px, shake_mm] : {std::pair(0.0, 0.0), {kNoise_px, 0.0}, {kNoise_px, 0.5}}) {
+    try {
+      const auto got = calibrate(board(), test::input_of({camera}, copies_of(camera, 16, noise_px, shake_mm)));
+      ADD_FAILURE() << "accepted with fx " << got.calibration.cameras[0].model.lens.parameters[kFx];
+    } catch (const std::invalid_argument& error) {
+      EXPECT_NE(std::string(error.what()).find("pictures in air with a board are 1, allowed: 6"), std::string::npos)
+          << error.what();
+      EXPECT_NE(std::string(error.what()).find("15 more repeat the view of another picture"), std::string::npos)
+          << error.what();
+    }
+  }
+}
+
+// Each of 12 views three times: the fit, its standard errors and its held-out figure are those of the 12.
+TEST(Fit, CopiesDoNotReduceTheStandardErrors) {
+  const std::vector<TrueCamera> cameras{TrueCamera{}};
+  const auto once = test::shots_of(cameras, board(), 12, 0, kNoise_px, kSeed + 7);
+  auto thrice = once;
+  for (const char* copy : {"b", "c"})
+    for (const Shot& shot : once) thrice.push_back({copy + shot.name, false, shot.seen});
+  const Calibrated alone = calibrate(board(), test::input_of(cameras, once));
+  const Calibrated repeated = calibrate(board(), test::input_of(cameras, thrice));
+  EXPECT_EQ(repeated.left_out.size(), 24U);
+  EXPECT_EQ(repeated.pictures.size(), 12U);
+  EXPECT_NE(repeated.left_out[0].why.find("allowed: 6.4 px or more"), std::string::npos) << repeated.left_out[0].why;
+  const FitFigures &a = alone.calibration.cameras[0].fit, &b = repeated.calibration.cameras[0].fit;
+  for (size_t i = 0; i < kLensParameters; ++i) EXPECT_NEAR(b.lens_sd[i], a.lens_sd[i], 0.01 * a.lens_sd[i]);
+  EXPECT_NEAR(b.held_out_rms_px, a.held_out_rms_px, 1e-3);
+}
+
+TEST(Fit, CountsTheOrientationsOfTheBoard) {
+  const std::vector<TrueCamera> cameras{TrueCamera{}};
+  Rig rig;
+  std::vector<Shot> shots;
+  // Turns about the normal and shifts are no other orientation; 8 degrees are not, 25 degrees are.
+  const double eight = 8 * CV_PI / 180, twenty_five = 25 * CV_PI / 180;
+  for (const auto& [R, tilts] : {std::pair(test::turned(0, 0, 0), 1),
+                                 {test::turned(0, 0, 1.5), 1},
+                                 {test::turned(eight, 0, 0), 1},
+                                 {test::turned(twenty_five, 0, 0), 2},
+                                 {test::turned(0, -twenty_five, 0), 3},
+                                 {test::turned(0, -twenty_five, 0.7), 3}}) {
+    shots.push_back({"", false, {{{0}, {{1, 1}}}}});
+    rig.boards.push_back(Pose::from(R, {1.0 * tilts, 2, 200}));
+    EXPECT_EQ(distinct_tilts(shots, rig, 0), tilts);
+  }
+}
+
 // Boards that are all square to the camera leave the focal length and their distance the same thing.
 TEST(Fit, BoardsThatAreNeverTurnedAreRefused) {
   const TrueCamera camera;

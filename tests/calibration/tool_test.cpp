@@ -10,9 +10,11 @@
 #include <sstream>
 
 #include "drivers/camera/calibrated_view.hpp"
+#include "drivers/camera/decode.hpp"
 #include "io/log_writer.hpp"
 #include "io/messages.hpp"
 #include "tests/calibration/true_optics.hpp"
+#include "tests/camera/exif.hpp"
 #include "tests/support/temporary_folder.hpp"
 #include "tools/calibrate/calibrate_tool.hpp"
 
@@ -194,6 +196,151 @@ TEST_F(Tool, AnUnreadablePictureIsToldByTheStatus) {
   fs::remove(fs::path(path("air0")) / "broken.png");
 }
 
+// Phones and some cameras tag their images with an orientation; the lens of the sensor does not turn with it.
+TEST_F(Tool, OrientationTagsInThePicturesChangeNothing) {
+  Options o = options();
+  o.immersed.clear();
+  std::vector<double> lenses[2];
+  for (const int orientation : {0, 6}) {
+    const std::string folder = path("phone" + std::to_string(orientation));
+    fs::create_directories(folder);
+    for (const auto& entry : fs::directory_iterator(path("air0"))) {
+      const auto jpeg = test::jpeg_of(camera::read_gray(entry.path()).gray, orientation);
+      std::ofstream(fs::path(folder) / (entry.path().stem().string() + ".jpg"), std::ios::binary)
+          .write(reinterpret_cast<const char*>(jpeg.data()), static_cast<std::streamsize>(jpeg.size()));
+    }
+    o.air = {folder};
+    o.out_folder = path("out-phone");
+    std::ostringstream err;
+    ASSERT_EQ(run(o, out_, err), 0);
+    const std::string remark = "carries orientation tag 6; the image is not rotated";
+    const auto first = err.str().find(remark);
+    EXPECT_EQ(first != std::string::npos, orientation == 6) << err.str();
+    if (orientation == 6) {
+      EXPECT_EQ(err.str().find(remark, first + 1), std::string::npos) << "printed once per folder";
+    }
+    const auto lens = camera::load_calibration(path("out-phone/cameras.yaml")).cameras[0].model.lens;
+    EXPECT_EQ(lens.picture_px, cv::Size(640, 480));
+    lenses[orientation == 6].assign(lens.parameters.begin(), lens.parameters.end());
+  }
+  // OpenCV's corner search runs in threads: its sums differ in the last digits.
+  for (size_t i = 0; i < lenses[0].size(); ++i) EXPECT_NEAR(lenses[0][i], lenses[1][i], 1e-3);
+}
+
+// A 12-bit sensor fills the low 12 of the 16 bits of a PNG.
+TEST_F(Tool, TwelveBitPicturesAreScaled) {
+  Options o = options();
+  o.immersed.clear();
+  const std::string folder = path("deep");
+  fs::create_directories(folder);
+  for (const auto& entry : fs::directory_iterator(path("air0"))) {
+    cv::Mat deep;
+    camera::read_gray(entry.path()).gray.convertTo(deep, CV_16U, 4095.0 / 255.0);
+    cv::imwrite((fs::path(folder) / entry.path().filename()).string(), deep);
+  }
+  o.air = {folder};
+  o.out_folder = path("out-deep");
+  ASSERT_EQ(run(o, out_, err_), 0) << err_.str();
+  EXPECT_THAT(err_.str(), HasSubstr("uses 12 of its 16 bits per sample; they are scaled to 8 bits"));
+  EXPECT_NEAR(camera::load_calibration(path("out-deep/cameras.yaml")).cameras[0].model.lens.parameters[camera::kFx],
+              900, 9);
+}
+
+// Sets of views from poor to good: "Good" implies that the lens is right, and a single orientation of the board is
+// never good, however well it predicts further views of the same orientation.
+TEST(CalibrationVerdict, GoodImpliesThatTheLensIsDetermined) {
+  const camera::Board board(kBoard);
+  const test::TrueCamera truth;
+  int good = 0, others = 0;
+  for (const double tilt : {0.0, 0.03, 0.1, 0.2, 0.45})
+    for (unsigned seed = 1; seed <= 4; ++seed) {
+      std::mt19937_64 random(seed);
+      std::uniform_real_distribution<double> any(-1, 1);
+      std::vector<camera::Shot> shots;
+      for (int s = 0; s < 16; ++s) {
+        const cv::Matx33d R = test::turned(0.25 + tilt * any(random), -0.2 + tilt * any(random), 0.5 * any(random));
+        const cv::Vec3d middle(25 * any(random), 18 * any(random), 160 + 20 * any(random));
+        const auto place = test::place_board(board, middle, R);
+        shots.push_back({std::to_string(s), false, {test::see(truth, board, place, false, 0.1, random)}});
+      }
+      try {
+        const camera::Calibrated got = camera::calibrate(board, test::input_of({truth}, shots));
+        const Verdict verdict = verdict_of(got);
+        const double off = std::abs(got.calibration.cameras[0].model.lens.parameters[camera::kFx] / truth.fx - 1);
+        std::printf("tilt %.2f, seed %u: %s, fx off by %.2f %%, lens to %.2f %%, orientations: %d\n", tilt, seed,
+                    verdict.title.c_str(), 100 * off, 100 * lens_error(got, 0), got.tilts[0]);
+        const bool is_good = verdict.title.starts_with("Good");
+        if (is_good) {
+          EXPECT_LT(off, 0.012) << "four standard errors of 0.3 %";
+        }
+        if (tilt == 0.0) {
+          EXPECT_FALSE(is_good) << "one orientation";
+        }
+        if (tilt > 0.4) {
+          EXPECT_TRUE(is_good) << verdict.reason;
+        }
+        ++(is_good ? good : others);
+      } catch (const std::exception& error) {
+        std::printf("tilt %.2f, seed %u: refused: %s\n", tilt, seed, error.what());
+        EXPECT_LT(tilt, 0.2);
+        ++others;
+      }
+    }
+  EXPECT_GE(good, 4);
+  EXPECT_GE(others, 4);
+}
+
+// One view 16 times, as an issue reported it.
+TEST_F(Tool, OnePictureSixteenTimesIsRefused) {
+  Options o = options();
+  o.immersed.clear();
+  o.air = {path("same")};
+  o.out_folder = path("out-same");
+  fs::create_directories(path("same"));
+  fs::path first;
+  for (const auto& entry : fs::directory_iterator(path("air0")))
+    if (entry.path().filename() != "empty.png" && (first.empty() || entry.path() < first)) first = entry.path();
+  for (int i = 0; i < 16; ++i) fs::copy_file(first, fs::path(path("same")) / ("view" + std::to_string(i) + ".png"));
+  std::ostringstream out, err;
+  try {
+    run(o, out, err);
+    ADD_FAILURE() << "accepted: " << out.str();
+  } catch (const std::invalid_argument& error) {
+    EXPECT_THAT(error.what(), HasSubstr("15 more repeat the view of another picture"));
+  }
+}
+
+// A legacy board is recognised and reported; pictures of both kinds of board are refused.
+TEST_F(Tool, ALegacyBoardIsRecognisedAndReported) {
+  const camera::Board board(kBoard);
+  std::vector<test::BoardPlace> places;
+  const auto shots = test::shots_of({(*cameras_)[0]}, board, 10, 0, 0, kSeed, &places);
+  Options o = options();
+  o.immersed.clear();
+  o.air = {path("legacy")};
+  o.out_folder = path("out-legacy");
+  fs::create_directories(path("legacy"));
+  for (size_t s = 0; s < shots.size(); ++s)
+    cv::imwrite((fs::path(path("legacy")) / shots[s].name).string(),
+                test::photograph((*cameras_)[0], board, places[s], false, kSeed + s, camera::CharucoPattern::legacy));
+  EXPECT_EQ(run(o, out_, err_), 0) << err_.str();
+  EXPECT_THAT(out_.str(), HasSubstr("legacy pattern (marker 0 in the first square"));
+  EXPECT_NE(test::text_of(path("out-legacy/report.html")).find("legacy pattern"), std::string::npos);
+  const auto& lens = camera::load_calibration(path("out-legacy/cameras.yaml")).cameras[0].model.lens.parameters;
+  EXPECT_NEAR(lens[camera::kFx], 900, 9);
+  EXPECT_NEAR(lens[camera::kCx], 325, 4);
+  EXPECT_NEAR(lens[camera::kCy], 236, 4);
+  cv::imwrite((fs::path(path("legacy")) / "zz.png").string(),
+              test::photograph((*cameras_)[0], board, places[0], false, kSeed));
+  try {
+    run(o, out_, err_);
+    ADD_FAILURE() << "accepted";
+  } catch (const std::invalid_argument& error) {
+    EXPECT_THAT(error.what(), HasSubstr("zz.png' shows a board with the current ChArUco pattern"));
+    EXPECT_THAT(error.what(), HasSubstr("allowed: one board in all pictures"));
+  }
+}
+
 // What was said before the refusal.
 std::string expect_refused(const Options& o, const std::vector<std::string>& words) {
   std::ostringstream out, err;
@@ -224,6 +371,12 @@ TEST_F(Tool, WhatIsWrongIsNamed) {
   expect_refused(o, {"camera 0: pictures in air with a board are 0, allowed: 6 or more"});
   o.air = {path("air0"), path("air1"), path("air0")};
   expect_refused(o, {"--air has 3 folders, allowed: 1 or 2"});
+  o.air = {path("air0"), path("air1") + "/../air0"};
+  expect_refused(o, {"air0' is the same folder as one of --air", "allowed: different folders for all cameras"});
+  o.air = {path("air0")};
+  o.immersed = {path("air0") + "/"};
+  expect_refused(o, {"--immersed", "is the same folder as one of --air"});
+  o.immersed.clear();
   // Another board than the one in the pictures: its markers are known, but lie elsewhere on it.
   o.air = {path("air0"), path("air1")};
   o.board.columns = 9;
@@ -251,7 +404,7 @@ TEST_F(Tool, ABoardToPrintIsFoundInItsOwnPicture) {
   Options o = options();
   o.print_board = path("board.png");
   EXPECT_EQ(run(o, out_, err_), 0);
-  EXPECT_EQ(camera::Board(kBoard).find(cv::imread(o.print_board, cv::IMREAD_GRAYSCALE)).ids.size(), 35U);
+  EXPECT_EQ(camera::Board(kBoard).find(camera::read_gray(o.print_board).gray).ids.size(), 35U);
   o.print_board = path("board.svg");
   EXPECT_EQ(run(o, out_, err_), 0);
   EXPECT_GT(fs::file_size(o.print_board), 5000U);

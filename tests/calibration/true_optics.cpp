@@ -120,10 +120,10 @@ Sighting see(const TrueCamera& camera, const Board& board, const BoardPlace& pla
 }
 
 cv::Mat photograph(const TrueCamera& camera, const Board& board, const BoardPlace& place, bool immersed,
-                   std::uint64_t seed) {
+                   std::uint64_t seed, camera::CharucoPattern pattern) {
   constexpr int kPrint_px = 80, kFine = 2;  // a square of the print; subpixels each way
   cv::Mat print;
-  cv::GaussianBlur(board.drawing(kPrint_px), print, {}, 1.2);
+  cv::GaussianBlur(board.drawing(kPrint_px, pattern), print, {}, 1.2);
   const double px_per_mm = kPrint_px / board.spec().square_mm;
   // The same lens takes many pictures.
   static std::vector<double> last_lens;

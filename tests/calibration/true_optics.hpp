@@ -52,7 +52,7 @@ camera::Sighting see(const TrueCamera& camera, const camera::Board& board, const
 
 // A picture of the board: gray wall, blur of the optics, noise.
 cv::Mat photograph(const TrueCamera& camera, const camera::Board& board, const BoardPlace& place, bool immersed,
-                   std::uint64_t seed);
+                   std::uint64_t seed, camera::CharucoPattern pattern = camera::CharucoPattern::current);
 
 // Two cameras about 70 degrees apart that look at a box of gel, its middle at `kBox`, each through a wall of its own.
 // World: first camera.

@@ -5,11 +5,11 @@
 #include <cmath>
 #include <cstdio>
 #include <fstream>
-#include <opencv2/imgcodecs.hpp>
 #include <random>
 #include <sstream>
 #include <stdexcept>
 
+#include "drivers/camera/decode.hpp"
 #include "drivers/camera/frame_source.hpp"
 
 namespace bevel::test {
@@ -59,7 +59,7 @@ std::vector<SeenFrame> track_folders(const fs::path& root, const camera::Tracker
     camera::TipTracker tracker(config, px_per_mm);
     int64_t seq = 0;
     for (const std::string& file : files) {
-      const cv::Mat gray = cv::imread((folder / file).string(), cv::IMREAD_GRAYSCALE);
+      const cv::Mat gray = camera::read_gray(folder / file).gray;
       if (gray.empty()) throw std::runtime_error((folder / file).string() + ": no picture");
       ++seq;
       if (frames == Frames::alone) tracker = camera::TipTracker(config, px_per_mm);

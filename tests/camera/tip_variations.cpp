@@ -9,6 +9,7 @@
 #include <random>
 #include <string>
 
+#include "drivers/camera/decode.hpp"
 #include "tests/camera/real_tips.hpp"
 
 namespace {
@@ -76,7 +77,7 @@ std::vector<Variation> variations() {
     return Variation{"JPEG quality " + std::to_string(quality), [quality](const cv::Mat& in) {
                        std::vector<uchar> bytes;
                        cv::imencode(".jpg", in, bytes, {cv::IMWRITE_JPEG_QUALITY, quality});
-                       return cv::imdecode(bytes, cv::IMREAD_GRAYSCALE);
+                       return bevel::camera::decode_gray(bytes).gray;
                      }};
   };
   const Variation noisy{"noise of 5 gray", [](const cv::Mat& in) {
@@ -134,8 +135,7 @@ int main(int argc, char** argv) {
     double squared = 0.0;
     for (const test::TipLabel& label : labels) {
       if (label.set != set) continue;
-      const cv::Mat gray =
-          cv::imread((std::filesystem::path(argv[1]) / label.folder / label.file).string(), cv::IMREAD_GRAYSCALE);
+      const cv::Mat gray = bevel::camera::read_gray(std::filesystem::path(argv[1]) / label.folder / label.file).gray;
       if (gray.empty()) {
         std::fprintf(stderr, "tip_variations: %s/%s is no picture\n", label.folder.c_str(), label.file.c_str());
         return 1;

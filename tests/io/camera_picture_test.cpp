@@ -6,9 +6,9 @@
 
 #include <cmath>
 #include <limits>
-#include <opencv2/imgcodecs.hpp>
 #include <random>
 
+#include "drivers/camera/decode.hpp"
 #include "nodes/camera_pictures.hpp"
 
 namespace bevel::io {
@@ -49,7 +49,7 @@ TEST(CameraPicture, shows_the_tip_where_it_says_it_is) {
       const cv::Point2d tip(share.x * size.width, share.y * size.height);
       const auto arrived = decode_bytes(encode(example(size, tip)));
       ASSERT_TRUE(arrived) << describe(*arrived.error);
-      const cv::Mat gray = cv::imdecode(arrived->jpeg, cv::IMREAD_GRAYSCALE);
+      const cv::Mat gray = camera::decode_gray(arrived->jpeg).gray;
       ASSERT_EQ(gray.size(), cv::Size(arrived->width_px, arrived->height_px));
       EXPECT_LE(std::max(gray.cols, gray.rows), 320);
       EXPECT_LT(arrived->jpeg_size, 20'000);
@@ -66,6 +66,16 @@ TEST(CameraPicture, shows_the_tip_where_it_says_it_is) {
       EXPECT_EQ(arrived->seq, 41);
       EXPECT_EQ(arrived->camera, 1);
     }
+}
+
+// A decorator that dropped the remark would hide an ignored orientation tag while pictures are published.
+TEST(KeptFrame, PassesOnTheRemarkOfItsSource) {
+  class Source : public camera::FrameSource {
+   public:
+    camera::FrameResult next(std::chrono::milliseconds /*timeout*/) override { return camera::EndOfFrames{}; }
+    std::string remark() const override { return "carries orientation tag 6"; }
+  };
+  EXPECT_EQ(nodes::KeptFrame(std::make_unique<Source>()).remark(), "carries orientation tag 6");
 }
 
 TEST(CameraPicture, without_a_tip_is_a_picture_all_the_same) {

@@ -75,11 +75,18 @@ int fit_pictures(const camera::Board& board, const Options& o, std::ostream& out
   const auto say_left_out = [&err](const std::vector<camera::LeftOut>& all) {
     for (const auto& left : all) err << "left out: " << left.name << ": " << left.why << '\n';
   };
+  for (const std::string& remark : pictures.remarks) err << remark << '\n';
   say_left_out(pictures.left_out);  // also if too little is left
   camera::Calibrated got = camera::calibrate(board, pictures.input);
   got.calibration.made_utc = utc_now();
   Told told;
   told.board = in_words(o);
+  if (pictures.pattern) {
+    told.board += pictures.pattern == camera::CharucoPattern::legacy
+                      ? ", legacy pattern (marker 0 in the first square: OpenCV up to 4.5.5, calib.io)"
+                      : ", current pattern (first square black)";
+    out << "board: " << told.board << '\n';
+  }
   told.left_out = pictures.left_out;
   told.left_out.insert(told.left_out.end(), got.left_out.begin(), got.left_out.end());
   if (!pictures.fiducial.seen.empty()) {
@@ -111,6 +118,8 @@ int fit_pictures(const camera::Board& board, const Options& o, std::ostream& out
     out << "camera " << got.numbers[c] << ": " << fit.pictures << " pictures, " << fit.corners << " corners, RMS "
         << format_significant(fit.rms_px) << " px, held out " << format_significant(fit.held_out_rms_px) << " px\n";
   }
+  const Verdict verdict = verdict_of(got);
+  out << verdict.title << ": " << verdict.reason << '\n';
   for (const auto& t : got.triangulation)
     out << (t.immersed ? "immersed" : "in air") << ": corners of boards held out, by both cameras, "
         << format_significant(t.shape_rms_mm) << " mm from the board's shape"
@@ -120,6 +129,7 @@ int fit_pictures(const camera::Board& board, const Options& o, std::ostream& out
         << '\n';
   out << "frame {A}: " << told.frame << '\n' << told.yaml_path << ", " << o.out_folder << "/report.html\n";
   say_left_out(got.left_out);
+  if (verdict.tone == Verdict::Tone::bad) return tools::kFailed;
   return pictures.unreadable > 0 ? tools::kDamagedInput : tools::kOk;
 }
 

@@ -2,6 +2,7 @@
 // bevel-calibrate: pictures of a board to a YAML of cameras and a page that says how good they are; the frame {A} from
 // a fiducial or from the log of a straight insertion; a board to print; how late the stamps of cameras are.
 #include <iosfwd>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -45,9 +46,13 @@ struct Pictures {
   camera::Shot fiducial;  // no sightings if there is none
   std::vector<camera::LeftOut> left_out;
   int unreadable = 0;
+  std::optional<camera::CharucoPattern> pattern;  // of the board, if it has two and was found
+  std::vector<std::string> remarks;               // on orientation tags and bit depths, once per folder
 };
-// Throws std::invalid_argument: a folder without pictures, pictures of different sizes.
+// Throws std::invalid_argument: a folder without pictures, pictures of different sizes or of boards with different
+// patterns.
 Pictures read_pictures(const camera::Board& board, const Options& options);
+std::string name_of(camera::CharucoPattern pattern);
 
 // What the page tells beside the calibration.
 struct Told {
@@ -57,6 +62,18 @@ struct Told {
   std::string yaml_path;
   std::vector<std::string> tables;  // [[camera]] of a system file
 };
+/// Largest standard error of the focal lengths and the principal point of a camera, relative to fx: what a length of
+/// one mm is wrong by, in mm.
+double lens_error(const camera::Calibrated& calibrated, std::size_t camera);
+
+/// Whether a calibration can be used: from the error on pictures that were held out, the standard errors of the lens,
+/// the orientations of the board, systematic residuals, and the part of the image that the board covered.
+struct Verdict {
+  enum class Tone { good, warning, bad } tone = Tone::good;
+  std::string title, reason;
+};
+Verdict verdict_of(const camera::Calibrated& calibrated);
+
 void write_report(const camera::Calibrated& calibrated, const Told& told, const std::string& folder);
 void write_figures(const camera::Calibrated& calibrated, const std::string& folder);  // figures.json
 

@@ -2,9 +2,10 @@
 #include <cctype>
 #include <filesystem>
 #include <map>
-#include <opencv2/imgcodecs.hpp>
+#include <set>
 #include <stdexcept>
 
+#include "drivers/camera/decode.hpp"
 #include "drivers/camera/frame_source.hpp"
 #include "tools/calibrate/calibrate_tool.hpp"
 
@@ -40,6 +41,21 @@ std::vector<fs::path> pictures_in(const std::string& folder) {
   return files;
 }
 
+// With the same pictures twice, two cameras would have one pose, or a board would be in air and in the gel at once.
+void require_different_folders(const Options& options) {
+  std::map<fs::path, std::string> options_by_folder;
+  for (const auto& [option, folders] : {std::pair("--air", &options.air), {"--immersed", &options.immersed}})
+    for (const std::string& folder : *folders) {
+      std::error_code error;
+      const fs::path path = fs::canonical(folder, error);
+      if (error) continue;  // pictures_in() reports it
+      const auto [at, is_new] = options_by_folder.emplace(path, option);
+      if (!is_new)
+        throw std::invalid_argument(std::string(option) + " '" + folder + "' is the same folder as one of " +
+                                    at->second + "; allowed: different folders for all cameras and media");
+    }
+}
+
 class Reader {
  public:
   Reader(const camera::Board& board, size_t cameras, Pictures& out) : board_(board), first_(cameras), out_(out) {
@@ -48,17 +64,14 @@ class Reader {
 
   // Corners in one picture; none, with the reason noted, where there is no board.
   camera::Sighting read(const fs::path& file, size_t camera) {
-    cv::Mat gray;
-    try {
-      gray = cv::imread(file.string(), cv::IMREAD_GRAYSCALE);
-    } catch (const cv::Exception&) {
-      gray.release();
-    }
+    const camera::DecodedImage image = camera::read_gray(file);
+    const cv::Mat& gray = image.gray;
     if (gray.empty()) {
       ++out_.unreadable;
       out_.left_out.push_back({file.string(), "not a readable picture"});
       return {};
     }
+    note_format(file, image);
     cv::Size& size = out_.input.sizes_px[camera];
     if (first_[camera].empty()) first_[camera] = file.string(), size = gray.size();
     if (gray.size() != size)
@@ -66,19 +79,49 @@ class Reader {
                                   " as '" + first_[camera] +
                                   "', the first of this camera; a calibration holds for one size");
     camera::Sighting seen = board_.find(gray);
-    if (seen.ids.empty())
-      out_.left_out.push_back({file.string(), "no board of " + std::to_string(board_.spec().columns) + " x " +
-                                                  std::to_string(board_.spec().rows) + " squares found in it"});
+    if (seen.ids.empty()) {
+      const std::string none = "no board of " + std::to_string(board_.spec().columns) + " x " +
+                               std::to_string(board_.spec().rows) + " squares found in it";
+      out_.left_out.push_back({file.string(), seen.rejected.empty() ? none : none + ": " + seen.rejected});
+      return seen;
+    }
+    note_pattern(file, seen);
     return seen;
   }
 
  private:
+  // All pictures are of one board.
+  void note_pattern(const fs::path& file, const camera::Sighting& seen) {
+    if (!board_.has_two_patterns() || seen.ids.size() < static_cast<size_t>(camera::kFewestCorners)) return;
+    if (!out_.pattern) out_.pattern = seen.pattern, patterned_ = file.string();
+    if (*out_.pattern != seen.pattern)
+      throw std::invalid_argument("'" + file.string() + "' shows a board with the " + name_of(seen.pattern) +
+                                  " ChArUco pattern, '" + patterned_ + "' one with the " + name_of(*out_.pattern) +
+                                  "; allowed: one board in all pictures");
+  }
+
+  // One remark per folder: the images of a camera have the same format.
+  void note_format(const fs::path& file, const camera::DecodedImage& image) {
+    const std::string folder = file.parent_path().string();
+    if (image.orientation != 1 && oriented_.insert(folder).second)
+      out_.remarks.push_back(camera::orientation_remark(file.string(), image.orientation));
+    if (image.bits != 8 && image.bits != 16 && scaled_.insert(folder).second)
+      out_.remarks.push_back("'" + file.string() + "' uses " + std::to_string(image.bits) +
+                             " of its 16 bits per sample; they are scaled to 8 bits");
+  }
+
   const camera::Board& board_;
+  std::string patterned_;                    // the picture that gave out_.pattern
+  std::set<std::string> oriented_, scaled_;  // folders that have a remark
   std::vector<std::string> first_;
   Pictures& out_;
 };
 
 }  // namespace
+
+std::string name_of(camera::CharucoPattern pattern) {
+  return pattern == camera::CharucoPattern::legacy ? "legacy" : "current";
+}
 
 Pictures read_pictures(const camera::Board& board, const Options& options) {
   const size_t cameras = options.air.size();
@@ -92,6 +135,7 @@ Pictures read_pictures(const camera::Board& board, const Options& options) {
   if (options.numbers.size() < cameras)
     throw std::invalid_argument("--numbers has " + std::to_string(options.numbers.size()) +
                                 " values, allowed: " + std::to_string(cameras) + " or more");
+  require_different_folders(options);
   Pictures out;
   out.input.options = options.fit;
   for (size_t c = 0; c < cameras; ++c) out.input.numbers.push_back(static_cast<int>(options.numbers[c]));

@@ -2,6 +2,7 @@
 #include <cmath>
 #include <filesystem>
 #include <fstream>
+#include <limits>
 #include <nlohmann/json.hpp>
 #include <sstream>
 
@@ -20,6 +21,10 @@ using report::Page;
 constexpr int kCellsAcross = 8, kCellsDown = 6, kCells = kCellsAcross * kCellsDown;
 constexpr double kGood_px = 0.3, kFair_px = 1.0;
 constexpr double kSeenShare = 0.5;  // of the cells
+// Standard error of the lens relative to its focal length: 0.3 mm and 1 mm over a needle path of 100 mm.
+constexpr double kGoodLens = 0.003, kFairLens = 0.01;
+// Orientations of the board. Without skew two determine a camera matrix, with one more they are checked (Zhang 2000).
+constexpr int kFairTilts = 2, kGoodTilts = 3;
 
 struct Cell {
   cv::Point2d sum_px, place_px;
@@ -140,39 +145,61 @@ double worst_held_out_px(const Calibrated& got) {
   return worst;
 }
 
-void tell_verdict(const Calibrated& got, Page& page, const std::vector<report::Fact>& facts) {
-  const double worst_px = worst_held_out_px(got);
-  double ratio = 0, seen = 1;
+}  // namespace
+
+double lens_error(const Calibrated& got, std::size_t camera) {
+  const auto& c = got.calibration.cameras[camera];
+  const auto& sd = c.fit.lens_sd;
+  const double largest_px = std::max({sd[camera::kFx], sd[camera::kFy], sd[camera::kCx], sd[camera::kCy]});
+  return largest_px / c.model.lens.parameters[camera::kFx];
+}
+
+Verdict verdict_of(const Calibrated& got) {
+  const double held_out_px = worst_held_out_px(got);
+  double ratio = 0, seen = 1, error = 0;
+  int tilts = std::numeric_limits<int>::max();
   for (size_t c = 0; c < got.numbers.size(); ++c) {
     ratio = std::max(ratio, systematic_ratio(got, c));
     seen = std::min(seen, 1.0 * covered(cells_of(got, c)) / kCells);
+    error = std::max(error, lens_error(got, c));
+    tilts = std::min(tilts, got.tilts[c]);
   }
-  if (worst_px > kFair_px)
-    page.verdict(
-        report::Tone::bad, "Do not use it",
-        "Pictures held out are missed by more than a pixel. Is the board flat, are its squares as long as was said, "
-        "did focus or zoom change between pictures?",
-        facts);
-  else if (worst_px > kGood_px || ratio > 3)
-    page.verdict(
-        report::Tone::warning, "To be improved",
-        worst_px > kGood_px
-            ? "Pictures held out are missed by more than 0.3 px: sharper pictures, a flatter board, more of them."
-            : "Residuals are alike over parts of the picture, more than chance would have them: the red lines "
-              "below. A board that is not flat, or a lens that needs --k3.",
-        facts);
-  else if (seen < kSeenShare)
-    page.verdict(report::Tone::warning, "Good where the board was",
-                 "Pictures that were not fitted are met as well as the corners can be found, but the board was seen in "
-                 "less than half of "
-                 "a picture. If the needle goes where the maps below are empty, take pictures with the board there.",
-                 facts);
-  else
-    page.verdict(report::Tone::good, "Good",
-                 "Pictures that were not fitted are met as well as the corners can be found.", facts);
+  const std::string turn = "turn the board by 20 to 40 degrees to all sides and take more pictures.";
+  const std::string error_text = "The standard error of focal length or principal point is " +
+                                 format_significant(100 * error, 2) + " % of the focal length, allowed: ";
+  const std::string tilts_text = "The board has " + std::to_string(tilts) + " orientation" + (tilts == 1 ? "" : "s") +
+                                 " that differ by " + format_significant(camera::kDistinctTilt_deg) +
+                                 " degrees or more, allowed: " + std::to_string(kGoodTilts) + " or more; " + turn;
+  using enum Verdict::Tone;
+  if (held_out_px > kFair_px)
+    return {bad, "Do not use it",
+            "The error on pictures that were held out is " + format_significant(held_out_px) +
+                " px, allowed: " + format_significant(kFair_px) +
+                " px. Check that the board is flat, that --square-mm is the measured "
+                "side of a square, and that focus and zoom did not change between pictures."};
+  if (error > kFairLens)
+    return {bad, "Do not use it", error_text + format_significant(100 * kFairLens) + " %; " + turn};
+  if (tilts < kFairTilts) return {bad, "Do not use it", tilts_text};
+  if (held_out_px > kGood_px)
+    return {warning, "To be improved",
+            "The error on pictures that were held out is " + format_significant(held_out_px) + " px, allowed: " +
+                format_significant(kGood_px) + " px. Take more and sharper pictures of a flatter board."};
+  if (error > kGoodLens)
+    return {warning, "To be improved", error_text + format_significant(100 * kGoodLens) + " %; " + turn};
+  if (tilts < kGoodTilts) return {warning, "To be improved", tilts_text};
+  if (ratio > 3)
+    return {warning, "To be improved",
+            "The mean residuals in parts of the image (red lines below) are " + format_significant(ratio, 2) +
+                " times what chance leaves, allowed: 3. The board is not flat, or the lens needs --k3."};
+  if (seen < kSeenShare)
+    return {
+        warning, "Good where the board was",
+        "The corners of the board cover " + format_significant(100 * seen, 2) +
+            " % of the image. If the needle goes where the maps below are empty, take pictures of the board there."};
+  return {good, "Good",
+          "Pictures that were held out are predicted to the precision of the corners, and the lens is determined to " +
+              format_significant(100 * error, 2) + " % of the focal length."};
 }
-
-}  // namespace
 
 double systematic_ratio(const Calibrated& got, std::size_t camera) {
   double means = 0, squares = 0;
@@ -194,7 +221,9 @@ void write_report(const Calibrated& got, const Told& told, const std::string& fo
     const auto& fit = got.calibration.cameras[c].fit;
     facts.push_back({"camera " + std::to_string(got.numbers[c]) + ", held out",
                      format_significant(fit.held_out_rms_px) + " px",
-                     "RMS of what was fitted: " + format_significant(fit.rms_px) + " px"});
+                     "RMS of what was fitted: " + format_significant(fit.rms_px) + " px; lens to " +
+                         format_significant(100 * lens_error(got, c), 2) + " % of its focal length, " +
+                         std::to_string(got.tilts[c]) + " orientations of the board"});
   }
   for (const auto& t : got.triangulation)
     facts.push_back({t.immersed ? "corners in the gel" : "corners in air", format_significant(t.shape_rms_mm) + " mm",
@@ -203,7 +232,11 @@ void write_report(const Calibrated& got, const Told& told, const std::string& fo
     if (t.immersed)
       facts.push_back({"if refraction were ignored", format_significant(t.misplaced_without_wall_mm) + " mm",
                        "beside where they are"});
-  tell_verdict(got, page, facts);
+  const Verdict verdict = verdict_of(got);
+  page.verdict(verdict.tone == Verdict::Tone::good      ? report::Tone::good
+               : verdict.tone == Verdict::Tone::warning ? report::Tone::warning
+                                                        : report::Tone::bad,
+               verdict.title, verdict.reason, facts);
   page.paragraph("Board: " + told.board + ". Made " + got.calibration.made_utc + ".");
   page.heading("The frame {A}").paragraph(told.frame);
 
@@ -254,7 +287,9 @@ void write_figures(const Calibrated& got, const std::string& folder) {
                        {"held_out_rms_px", fit.held_out_rms_px},
                        {"systematic_ratio", systematic_ratio(got, c)},
                        {"cells_covered", covered(cells_of(got, c))},
-                       {"cells", kCells}});
+                       {"cells", kCells},
+                       {"lens_standard_error", lens_error(got, c)},
+                       {"orientations", got.tilts[c]}});
   }
   for (const auto& t : got.triangulation)
     boards.push_back({{"immersed", t.immersed},
@@ -264,7 +299,10 @@ void write_figures(const Calibrated& got, const std::string& folder) {
                       {"shape_without_wall_rms_mm", t.shape_without_wall_rms_mm}});
   const std::string path = (std::filesystem::path(folder) / "figures.json").string();
   std::ofstream out(path);
-  out << nlohmann::json{{"cameras", cameras}, {"held_out_boards", boards}, {"corners_left_out", got.corners_left_out}}
+  out << nlohmann::json{{"verdict", verdict_of(got).title},
+                        {"cameras", cameras},
+                        {"held_out_boards", boards},
+                        {"corners_left_out", got.corners_left_out}}
              .dump(2)
       << '\n';
   out.close();

@@ -116,6 +116,13 @@ function stepOf(span, count) {
   return [1, 2, 5, 10].map(f => f * unit).find(s => s >= raw);
 }
 
+// Labels of an axis whose ticks are `step` apart: as many decimals as tell neighbours apart, the same for all of them.
+function labelsOf(values, step) {
+  let decimals = 0;
+  while (decimals < 12 && Math.abs(step * 10 ** decimals - Math.round(step * 10 ** decimals)) > 1e-6 * step * 10 ** decimals) ++decimals;
+  return values.map(v => v === null ? '' : Number(v.toFixed(decimals)) === 0 ? (0).toFixed(decimals) : v.toFixed(decimals));
+}
+
 // Everything that the drawings must hold.
 function reach() {
   const all = path.slice();
@@ -142,12 +149,12 @@ function drawPlane(id, axis) {
   const lateral = stepOf(2 * half, 5), along = stepOf(deep - z0, 5);
   for (let v = Math.ceil(-half / lateral) * lateral; v <= half; v += lateral) {
     stroke(context, [[left, y(v)], [width - right, y(v)]], line, 1);
-    context.fillText(+v.toFixed(3), left - 4, y(v) + 4);
+    context.fillText(labelsOf([v], lateral)[0], left - 4, y(v) + 4);
   }
   context.textAlign = 'center';
   for (let v = 0; v <= deep; v += along) {
     stroke(context, [[x(v), top], [x(v), height - bottom]], line, 1);
-    context.fillText(+v.toFixed(3), x(v), height - 6);
+    context.fillText(labelsOf([v], along)[0], x(v), height - 6);
   }
   stroke(context, path.map(p => [x(p[2]), y(p[axis])]), style('--estimate'), 2);
   if (state.target) {
@@ -243,11 +250,11 @@ class Chart {
     this.holder = document.createElement('div');
     this.holder.className = 'chart';
     byId('charts').append(this.holder);
-    const axis = { stroke: style('--faint'), grid: { stroke: style('--line'), width: 1 }, ticks: { stroke: style('--line') }, font: '11px system-ui' };
+    const axis = { values: (_, ticks, index, space, step) => labelsOf(ticks, step), stroke: style('--faint'), grid: { stroke: style('--line'), width: 1 }, ticks: { stroke: style('--line') }, font: '11px system-ui' };
     this.plot = new uPlot({
       title: unit ? `${title} (${unit})` : title, width: 400, height: 130, cursor: { sync: { key: 'time' } },
       scales: { x: { time: false }, y: scale },
-      axes: [axis, { ...axis, size: 60 }],
+      axes: [axis, { ...axis, size: (_, labels) => Math.max(60, 18 + 7 * Math.max(0, ...(labels || []).map(l => l.length))) }],
       series: [{ label: 's', value: (_, v) => fixed(v, 2) }].concat(series.map(([label, , colour, dashed]) =>
         ({ label, stroke: style(colour), width: 1.5, dash: dashed ? [5, 4] : [], spanGaps: true,
            value: (_, v) => v === null || v === undefined ? '–' : String(+v.toPrecision(4)) }))),
@@ -324,9 +331,20 @@ function row(cells, old) {
 
 // ---- what the cameras see
 
-const pictures = new Map();  // by camera: its figure, and which picture is on it
-function captionPicture(shown, p) {
-  shown.caption.textContent = `camera ${p.camera} · ${shown.tip || 'tip not found'} · ${fixed(age(p.age_s), 1)} s old`;
+const pictures = new Map();  // by camera: its figure and the picture in it
+
+// Age in seconds of the picture that is shown, or of the announced one until the first has arrived.
+function pictureAge(shown, announced) {
+  if (shown.tip === undefined) return age(announced.age_s);
+  return shown.age_s + (still ? 0 : (performance.now() - shown.drawn) / 1000);
+}
+
+function captionPicture(shown, announced) {
+  const old_s = pictureAge(shown, announced);
+  shown.figure.className = old_s > kStale_s.picture ? 'old' : '';
+  // The tip belongs to the picture: there is nothing to report of a picture that has not arrived.
+  const text = shown.tip === undefined ? 'waiting for the picture' : `${shown.tip} · ${fixed(old_s, 1)} s old`;
+  shown.caption.textContent = `camera ${announced.camera} · ${text}`;
 }
 
 function drawPictures() {
@@ -341,7 +359,6 @@ function drawPictures() {
       byId('pictures').append(figure);
       pictures.set(p.camera, shown = { figure, canvas, caption, count: 0, asking: false });
     }
-    shown.figure.className = age(p.age_s) > kStale_s.picture ? 'old' : '';
     captionPicture(shown, p);
     if (shown.count !== p.count && !shown.asking) showPicture(shown, p);
   }
@@ -349,6 +366,7 @@ function drawPictures() {
 
 async function showPicture(shown, p) {
   shown.asking = true;
+  const [asked_s, asked] = [age(p.age_s), performance.now()];
   try {
     const answer = await fetch(`/picture/${p.camera}/${p.count}`);
     if (!answer.ok) { shown.count = p.count; return; }  // there is a newer one by now
@@ -357,7 +375,9 @@ async function showPicture(shown, p) {
     [canvas.width, canvas.height] = [picture.width, picture.height];
     context.drawImage(picture, 0, 0);
     shown.count = p.count;
-    shown.tip = p.tip_px ? `tip at ${p.tip_px.map(v => fixed(v, 0)).join(', ')} px` : '';
+    shown.drawn = performance.now();
+    shown.age_s = asked_s + (still ? 0 : (shown.drawn - asked) / 1000);
+    shown.tip = p.tip_px ? `tip at ${p.tip_px.map(v => fixed(v, 0)).join(', ')} px` : 'tip not found';
     captionPicture(shown, p);
     shown.figure.dataset.shown = `${picture.width} x ${picture.height}`;
     if (!p.tip_px) return;

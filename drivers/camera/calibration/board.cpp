@@ -2,62 +2,28 @@
 
 #include <algorithm>
 #include <cmath>
-#include <map>
-#include <opencv2/aruco/charuco.hpp>
 #include <opencv2/calib3d.hpp>
 #include <opencv2/imgproc.hpp>
 #include <stdexcept>
 
+#include "drivers/camera/calibration/charuco.hpp"
 #include "drivers/camera/calibration/number_text.hpp"
 
 namespace bevel::camera {
-
-struct Board::Charuco {
-  cv::Ptr<cv::aruco::Dictionary> dictionary;
-  cv::Ptr<cv::aruco::CharucoBoard> board;
-  std::map<int, int> ours;  // number of a corner, by OpenCV's
-  cv::Point2d shift_px;  // of its corners: some versions count pixels from their edge, 0.5 more than the rest of OpenCV
-
-  Sighting find(const cv::Mat& gray) const {
-    std::vector<std::vector<cv::Point2f>> markers;
-    std::vector<int> marker_ids;
-    cv::aruco::detectMarkers(gray, dictionary, markers, marker_ids, cv::aruco::DetectorParameters::create());
-    Sighting out;
-    if (marker_ids.empty()) return out;
-    std::vector<cv::Point2f> corners;
-    std::vector<int> ids;
-    cv::aruco::interpolateCornersCharuco(markers, marker_ids, gray, board, corners, ids);
-    for (size_t i = 0; i < ids.size(); ++i) {
-      out.ids.push_back(ids[i]);
-      out.px.push_back(cv::Point2d(corners[i]) - shift_px);
-    }
-    return out;
-  }
-};
-
 namespace {
 
 constexpr int kMarkers = 250;
+// Corners and markers of another board are off by a square or more; distortion and noise leave a few hundredths.
+constexpr double kMisplaced_squares = 0.25;
 
-// Whether corners lie in the picture as they do on the board, up to a lens: where the board has other columns or rows
-// than this one its markers are taken for others, and corners lie squares beside where a plane would show them.
+// Returns whether the corners fit a plane, up to lens distortion. They do not if the board in the picture has other
+// columns or rows than this one.
 bool lie_as_on(const Board& board, const Sighting& seen) {
   constexpr size_t kFewest = 8;  // fewer are not used, and four always fit
   if (seen.ids.size() < kFewest) return true;
   std::vector<cv::Point2d> on_board;
   for (const int id : seen.ids) on_board.emplace_back(board.corner_mm(id)[0], board.corner_mm(id)[1]);
-  const cv::Mat homography = cv::findHomography(on_board, seen.px);
-  if (homography.empty()) return false;
-  std::vector<cv::Point2d> shown, next = on_board, shown_next;
-  for (cv::Point2d& p : next) p.x += board.spec().square_mm;
-  cv::perspectiveTransform(on_board, shown, homography);
-  cv::perspectiveTransform(next, shown_next, homography);
-  std::vector<double> off_squares;
-  for (size_t i = 0; i < shown.size(); ++i)
-    off_squares.push_back(cv::norm(seen.px[i] - shown[i]) / std::max(1e-9, cv::norm(shown_next[i] - shown[i])));
-  const auto middle = off_squares.begin() + static_cast<std::ptrdiff_t>(off_squares.size() / 2);
-  std::nth_element(off_squares.begin(), middle, off_squares.end());
-  return *middle < 0.25;
+  return misfit_squares(on_board, seen.px, board.spec().square_mm) < kMisplaced_squares;
 }
 
 // Chessboards come in any of the orders that look alike; `grid` is turned so that it runs as printed.
@@ -98,28 +64,8 @@ void check(const BoardSpec& spec) {
 Board::Board(const BoardSpec& spec) : spec_(spec) {
   check(spec);
   if (spec.kind == BoardKind::chessboard) return;
-  charuco_ = std::make_unique<Charuco>();
-  charuco_->dictionary = cv::aruco::getPredefinedDictionary(cv::aruco::DICT_5X5_250);
-  charuco_->board = cv::aruco::CharucoBoard::create(spec.columns, spec.rows, static_cast<float>(spec.square_mm),
-                                                    static_cast<float>(spec.marker_mm), charuco_->dictionary);
-  // Versions of OpenCV number corners from above or below: asked of the drawing itself.
-  constexpr int kSquare_px = 64;
-  const Sighting all = charuco_->find(drawing(kSquare_px));
-  cv::Point2d off;
-  for (size_t i = 0; i < all.ids.size(); ++i) {
-    // Its edges lie between two pixels, half a pixel before the centre of the second.
-    const cv::Point2d square = (all.px[i] + cv::Point2d(0.5, 0.5)) / kSquare_px - cv::Point2d(1.5, 1.5);
-    const cv::Point2d whole(std::round(square.x), std::round(square.y));
-    off += (square - whole) * kSquare_px;
-    charuco_->ours[all.ids[i]] = static_cast<int>(whole.y * (spec.columns - 1) + whole.x);
-  }
-  // Whole halves: the rest is what the corners of so perfect a picture are found to.
-  if (!all.ids.empty()) off /= static_cast<double>(all.ids.size());
-  charuco_->shift_px = {std::round(2.0 * off.x) / 2.0, std::round(2.0 * off.y) / 2.0};
-  if (static_cast<int>(charuco_->ours.size()) != corners())
-    throw std::invalid_argument("board: of its own drawing " + std::to_string(charuco_->ours.size()) + " of " +
-                                std::to_string(corners()) + " corners are found, allowed: all; marker_mm is " +
-                                number_text(spec.marker_mm) + " of square_mm " + number_text(spec.square_mm));
+  charuco_ = std::make_unique<Charuco>(spec, CharucoPattern::current);
+  if (spec.rows % 2 == 0) legacy_ = std::make_unique<Charuco>(spec, CharucoPattern::legacy);
 }
 
 Board::~Board() = default;
@@ -131,9 +77,22 @@ cv::Vec3d Board::corner_mm(int id) const {
 
 Sighting Board::find(const cv::Mat& gray) const {
   if (charuco_) {
-    Sighting theirs = charuco_->find(gray);
-    for (int& id : theirs.ids) id = charuco_->ours.at(id);
-    return lie_as_on(*this, theirs) ? theirs : Sighting{};
+    const FoundMarkers markers = charuco_->find_markers(gray);
+    if (markers.ids.size() < 2) return {};
+    double misfit = charuco_->misfit_squares(markers);
+    const Charuco* fits = charuco_.get();
+    if (const double other = legacy_ ? legacy_->misfit_squares(markers) : misfit; other < misfit)
+      misfit = other, fits = legacy_.get();
+    Sighting seen = fits->find_corners(gray, markers);
+    if (misfit < kMisplaced_squares && lie_as_on(*this, seen)) return seen;
+    Sighting none;
+    if (std::isfinite(misfit))
+      none.rejected = std::to_string(markers.ids.size()) + " markers are " +
+                      number_text(std::round(100 * misfit) / 100) + " squares from where a board of " +
+                      std::to_string(spec_.columns) + " x " + std::to_string(spec_.rows) +
+                      " squares has them, allowed: " + number_text(kMisplaced_squares) +
+                      (legacy_ ? " (current and legacy pattern)" : "") + "; check --columns and --rows";
+    return none;
   }
   const cv::Size inner(spec_.columns - 1, spec_.rows - 1);
   std::vector<cv::Point2f> grid;
@@ -148,14 +107,11 @@ Sighting Board::find(const cv::Mat& gray) const {
   return out;
 }
 
-cv::Mat Board::drawing(int px_per_square) const {
+cv::Mat Board::drawing(int px_per_square, CharucoPattern pattern) const {
+  if (charuco_) return (pattern == CharucoPattern::legacy && legacy_ ? legacy_ : charuco_)->drawing(px_per_square);
   const int margin = px_per_square / 2;
   const cv::Size size(spec_.columns * px_per_square + 2 * margin, spec_.rows * px_per_square + 2 * margin);
   cv::Mat out(size, CV_8UC1, cv::Scalar(255));
-  if (charuco_) {
-    charuco_->board->draw(size, out, margin);
-    return out;
-  }
   for (int row = 0; row < spec_.rows; ++row)
     for (int col = row % 2; col < spec_.columns; col += 2)
       out(cv::Rect(margin + col * px_per_square, margin + row * px_per_square, px_per_square, px_per_square)) = 0;

@@ -11,6 +11,12 @@ namespace bevel::camera {
 
 enum class BoardKind { chessboard, charuco };
 
+/// Which squares of a ChArUco board carry markers. The patterns differ for even numbers of rows only.
+enum class CharucoPattern {
+  current,  ///< the first square, top left, is black: OpenCV 4.6 and later
+  legacy,   ///< the first square carries marker 0 if the number of rows is even: OpenCV up to 4.5.5, calib.io
+};
+
 /// ChArUco markers are the first of OpenCV's DICT_5X5_250.
 struct BoardSpec {
   BoardKind kind = BoardKind::charuco;
@@ -20,13 +26,17 @@ struct BoardSpec {
   double marker_mm = 4.5;  ///< ChArUco only
 };
 
+class Charuco;
+
 /// Throws std::invalid_argument naming the key, the value and what is allowed.
 void check(const BoardSpec& spec);
 
 /// Corners found in one picture; empty if there was no board.
 struct Sighting {
   std::vector<int> ids;
-  std::vector<cv::Point2d> px;  ///< as long as ids; the centre of the first pixel is 0, 0
+  std::vector<cv::Point2d> px;                       ///< as long as ids; the centre of the first pixel is 0, 0
+  CharucoPattern pattern = CharucoPattern::current;  ///< that fits; ChArUco only
+  std::string rejected{};  ///< why a board that was seen is not used; empty if none was seen, or it is used
 };
 
 class Board {
@@ -44,18 +54,21 @@ class Board {
   /// looks the same upside down: good for a lens, not for the pose of a second camera.
   bool oriented() const { return spec_.kind == BoardKind::charuco || (spec_.columns + spec_.rows) % 2 == 1; }
 
-  /// `gray`: CV_8UC1. Of a chessboard all corners or none.
+  /// Finds the corners; all or none of a chessboard. A ChArUco board may have either pattern: the one that fits the
+  /// markers is used. A board whose markers fit neither is rejected.
+  /// @param gray CV_8UC1
   Sighting find(const cv::Mat& gray) const;
+  /// Whether the two patterns of this board differ.
+  bool has_two_patterns() const { return legacy_ != nullptr; }
 
   /// As printed, with a white margin of half a square; CV_8UC1.
-  cv::Mat drawing(int px_per_square) const;
+  cv::Mat drawing(int px_per_square, CharucoPattern pattern = CharucoPattern::current) const;
   /// The same as SVG in true size, for printing without scaling.
   std::string drawing_svg() const;
 
  private:
-  struct Charuco;  // OpenCV's own, whose numbering and axes differ between its versions
   BoardSpec spec_;
-  std::unique_ptr<Charuco> charuco_;
+  std::unique_ptr<Charuco> charuco_, legacy_;  // null: a chessboard; no other pattern
 };
 
 }  // namespace bevel::camera

@@ -33,19 +33,26 @@ void require_pictures(const Board& board, const CalibrationInput& in) {
 }
 
 // After all that is left out: whether what is left is enough.
-void require_enough(const CalibrationInput& in, const std::vector<Shot>& shots) {
+void require_enough(const CalibrationInput& in, const std::vector<Shot>& shots, const Copies& copies) {
+  const auto repeated = [&copies](size_t camera, bool immersed) -> std::string {
+    const int number = copies[camera][immersed ? 1 : 0];
+    if (number == 0) return {};
+    return "; " + std::to_string(number) +
+           " more repeat the view of another picture: turn the board by 20 to 40 degrees and move it between pictures";
+  };
   const auto count = [&](auto&& of) { return static_cast<int>(std::ranges::count_if(shots, of)); };
   for (size_t c = 0; c < in.numbers.size(); ++c) {
     const int in_air = count([&](const Shot& s) { return !s.immersed && !s.seen[c].ids.empty(); });
     if (in_air < kFewestPictures)
       throw std::invalid_argument("camera " + std::to_string(in.numbers[c]) + ": pictures in air with a board are " +
                                   std::to_string(in_air) + ", allowed: " + std::to_string(kFewestPictures) +
-                                  " or more, better 15 to 30");
+                                  " or more, better 15 to 30" + repeated(c, false));
     const int immersed = count([&](const Shot& s) { return s.immersed && !s.seen[c].ids.empty(); });
     const bool any = count([](const Shot& s) { return s.immersed; }) > 0;
     if (any && immersed < 3)
       throw std::invalid_argument("camera " + std::to_string(in.numbers[c]) + ": immersed pictures with a board are " +
-                                  std::to_string(immersed) + ", allowed: none of any camera, or 3 or more, better 8");
+                                  std::to_string(immersed) + ", allowed: none of any camera, or 3 or more, better 8" +
+                                  repeated(c, true));
   }
   if (in.numbers.size() < 2) return;
   const int together = count([](const Shot& s) { return !s.seen[0].ids.empty() && !s.seen[1].ids.empty(); });
@@ -182,20 +189,22 @@ Calibrated calibrate(const Board& board, const CalibrationInput& input) {
   Calibrated out;
   out.numbers = input.numbers;
   out.shots = input.shots;
+  const Copies copies = leave_out_copies(input, out.shots, out.left_out);
   drop_empty(input, out, nullptr);
-  require_enough(input, out.shots);
+  require_enough(input, out.shots, copies);
   Rig rig = start_rig(board, out.shots, input.sizes_px, input.options);
   fit_rig(board, out.shots, input.options, 1.0, rig);
   leave_out_pictures(input, rig, board, out);
   drop_empty(input, out, &rig);
-  require_enough(input, out.shots);
+  require_enough(input, out.shots, copies);
   fit_rig(board, out.shots, input.options, 1.0, rig);
   leave_out_corners(rig, board, out);
   drop_empty(input, out, &rig);
-  require_enough(input, out.shots);
+  require_enough(input, out.shots, copies);
   fit_rig(board, out.shots, input.options, 0.0, rig);
   out.sd = deviations(board, out.shots, input.options, rig);
   out.rig = std::move(rig);
+  for (size_t c = 0; c < input.numbers.size(); ++c) out.tilts.push_back(distinct_tilts(out.shots, out.rig, c));
   fill_figures(input, board, out);
   set_provisional_frame(board, out);
   hold_out(board, input, out);

@@ -1,6 +1,7 @@
 #pragma once
 // Sightings of a board into calibrated cameras, in the order of the files: a start (start.cpp), the fit with what is
 // far out left out, pictures held out (held_out.cpp). Pure: no files, no clock.
+#include <array>
 #include <cstdint>
 
 #include "drivers/camera/calibration/bundle.hpp"
@@ -12,6 +13,13 @@ namespace bevel::camera {
 inline constexpr int kFewestPictures = 6;
 /// Fewer corners in a picture are no picture.
 inline constexpr int kFewestCorners = 8;
+
+/// Two pictures show the same view if the corners differ by less than this share of the image width, RMS. Distortion
+/// and perspective change by less than 1 % over such a displacement, so the second picture adds nothing about the lens.
+inline constexpr double kSameViewShare = 0.01;
+/// Boards whose normals differ by less than this have the same orientation: half of the smallest tilt that is asked
+/// for.
+inline constexpr double kDistinctTilt_deg = 10.0;
 
 struct LeftOut {
   std::string name, why;
@@ -50,6 +58,7 @@ struct Calibrated {
   std::vector<LeftOut> left_out;
   std::vector<TriangulationFigures> triangulation;  ///< in air, immersed; where there are two cameras
   int corners_left_out = 0;
+  std::vector<int> tilts;  ///< by camera: board orientations that differ by kDistinctTilt_deg or more
 };
 
 struct CalibrationInput {
@@ -62,6 +71,18 @@ struct CalibrationInput {
 /// Throws std::invalid_argument (what is wrong with the input: the thing, the value, what is allowed) or
 /// std::runtime_error (the fit failed or leaves something undetermined).
 Calibrated calibrate(const Board& board, const CalibrationInput& input);
+
+/// Numbers of repeated views, by camera: in air, immersed.
+using Copies = std::vector<std::array<int, 2>>;
+/// Empties the sightings that repeat the view of an earlier shot (kSameViewShare) and appends them to `left_out`.
+/// Copies are not independent: they reduce the standard errors without reason, and a copy that is held out is predicted
+/// by the picture that it repeats. views.cpp.
+Copies leave_out_copies(const CalibrationInput& input, std::vector<Shot>& shots, std::vector<LeftOut>& left_out);
+
+/// Number of board orientations that one camera sees, each at least kDistinctTilt_deg from the others. Each orientation
+/// gives two constraints on the camera matrix, parallel boards give no more than one of them: Zhang, "A flexible new
+/// technique for camera calibration", PAMI 2000, sections 3.1 and 4. views.cpp.
+int distinct_tilts(const std::vector<Shot>& shots, const Rig& rig, size_t camera);
 
 /// First guess of everything; start.cpp.
 Rig start_rig(const Board& board, const std::vector<Shot>& shots, const std::vector<cv::Size>& sizes_px,
