@@ -1,10 +1,10 @@
 #include <algorithm>
 #include <cmath>
 #include <filesystem>
-#include <fstream>
 #include <nlohmann/json.hpp>
 #include <sstream>
 
+#include "io/result_file.hpp"
 #include "report/numbers.hpp"
 #include "report/page.hpp"
 #include "tools/calibrate/calibrate_tool.hpp"
@@ -263,12 +263,11 @@ void write_figures(const Calibrated& got, const std::string& folder) {
                       {"misplaced_without_wall_mm", t.misplaced_without_wall_mm},
                       {"shape_without_wall_rms_mm", t.shape_without_wall_rms_mm}});
   const std::string path = (std::filesystem::path(folder) / "figures.json").string();
-  std::ofstream out(path);
-  out << nlohmann::json{{"cameras", cameras}, {"held_out_boards", boards}, {"corners_left_out", got.corners_left_out}}
-             .dump(2)
-      << '\n';
-  out.close();
-  if (!out) throw std::runtime_error(path + ": cannot be written");
+  io::write_result_file(
+      path,
+      nlohmann::json{{"cameras", cameras}, {"held_out_boards", boards}, {"corners_left_out", got.corners_left_out}}
+              .dump(2) +
+          "\n");
 }
 
 }  // namespace bevel::calibrate
