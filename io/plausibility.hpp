@@ -69,7 +69,7 @@ Judgement judge(std::span<const model::TipHeading> headings);
 struct Coverage {
   std::size_t inside = 0,
               outside = 0;  ///< measurements within the time of the axes, and kOutsideAxes_s or more outside
-  std::string faults;       ///< one line per camera with too large a share outside; "" if there is none
+  std::string faults;       ///< one line per camera with too large a share outside, possibly empty
 };
 
 /// Compares the times of one channel's measurements with those of the axes.
