@@ -15,7 +15,7 @@ namespace bevel::proof {
 namespace {
 
 constexpr std::array<const char*, 6> kSystem{"/usr", "/bin", "/sbin", "/lib", "/lib32", "/lib64"};
-// Of /etc, what the dynamic linker, interpreters, time and fonts need; the rest describes this machine.
+// Files of /etc that the dynamic linker, interpreters, time and fonts need; the others describe this machine.
 constexpr std::array<const char*, 9> kOfEtc{"/etc/ld.so.cache",  "/etc/ld.so.conf",    "/etc/ld.so.conf.d",
                                             "/etc/alternatives", "/etc/localtime",     "/etc/passwd",
                                             "/etc/group",        "/etc/nsswitch.conf", "/etc/fonts"};

@@ -1,4 +1,4 @@
-// Where the seed of a campaign comes from.
+// The seed of a campaign: from a file, from the campaign, or random.
 #include "proof/seed.hpp"
 
 #include <gmock/gmock.h>
