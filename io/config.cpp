@@ -21,6 +21,7 @@
 #include <sstream>
 
 #include "io/file_bytes.hpp"
+#include "io/toml_limits.hpp"
 
 namespace bevel::io {
 
@@ -352,6 +353,7 @@ ConfigFile ConfigFile::parse(std::string_view text, const std::string& name) {
   auto contents = std::make_unique<ConfigContents>();
   contents->name = name;
   contents->text = text;
+  if (const std::string excess = toml_limit_exceeded(text, name); !excess.empty()) throw ConfigError({excess});
   try {
     contents->root = toml::parse(contents->text, name);
   } catch (const toml::parse_error& error) {

@@ -104,6 +104,7 @@ inline constexpr const char* kCommands = "motion_command.csv";
 inline constexpr const char* kEstimates = "needle_state.csv";
 inline constexpr const char* kTruths = "needle_truth.csv";
 inline constexpr const char* kConfig = "config.toml";
+inline constexpr const char* kRows = "rows.toml";  // number of rows of each table; written last
 inline constexpr const char* kArrival = "arrival";  // the last column of tips, headings and axes
 }  // namespace exported
 

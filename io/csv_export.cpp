@@ -3,12 +3,12 @@
 #include <array>
 #include <charconv>
 #include <filesystem>
-#include <fstream>
 #include <stdexcept>
 
 #include "io/csv_columns.hpp"
 #include "io/log_order.hpp"
 #include "io/messages.hpp"
+#include "io/result_file.hpp"
 
 namespace bevel::io {
 namespace {
@@ -51,17 +51,13 @@ class Line {
   bool names_, started_ = false;
 };
 
-void write_text(const std::string& path, const std::string& text) {
-  std::ofstream file(path, std::ios::binary);
-  file << text;
-  file.flush();
-  if (!file) throw std::runtime_error(path + ": cannot be written");
-}
-
 }  // namespace
 
 std::vector<std::pair<std::string, std::int64_t>> export_csv(const Recording& recording, const std::string& folder) {
   fs::create_directories(folder);
+  const std::string counts = folder + "/" + exported::kRows;
+  fs::remove(counts);
+  std::string rows_of_tables;
   std::vector<std::pair<std::string, std::int64_t>> done;
   const auto write_file = [&](const char* name, const auto& rows, const std::vector<std::size_t>* arrivals) {
     const std::string path = folder + "/" + name;
@@ -79,8 +75,9 @@ std::vector<std::pair<std::string, std::int64_t>> export_csv(const Recording& re
     add(as_message(rows.front()), true, 0);
     for (std::size_t i = 0; i < rows.size(); ++i)
       add(as_message(rows[i]), false, arrivals == nullptr ? 0 : arrivals->at(i));
-    write_text(path, text);
+    write_result_file(path, text);
     done.emplace_back(path, static_cast<std::int64_t>(rows.size()));
+    rows_of_tables += fs::path(name).stem().string() + " = " + std::to_string(rows.size()) + "\n";
   };
   const ArrivalNumbers numbers(recording);
   write_file(exported::kTips, recording.tips, &numbers.tips);
@@ -91,7 +88,13 @@ std::vector<std::pair<std::string, std::int64_t>> export_csv(const Recording& re
   write_file(exported::kTruths, recording.truths, nullptr);
   const std::string config = folder + "/" + exported::kConfig;
   fs::remove(config);
-  if (!recording.config.empty() && !done.empty()) write_text(config, recording.config);
+  if (!recording.config.empty() && !done.empty()) {
+    write_result_file(config, recording.config);
+    rows_of_tables += "config_bytes = " + std::to_string(recording.config.size()) + "\n";
+  }
+  if (!done.empty())
+    write_result_file(
+        counts, "# Rows of each table; bevel-import refuses a table with another number of rows.\n" + rows_of_tables);
   return done;
 }
 

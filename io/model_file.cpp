@@ -1,13 +1,11 @@
 #include "io/model_file.hpp"
 
 #include <algorithm>
-#include <cerrno>
 #include <cmath>
-#include <cstring>
 #include <filesystem>
-#include <fstream>
 #include <limits>
 
+#include "io/result_file.hpp"
 #include "io/toml_text.hpp"
 
 namespace bevel::io {
@@ -191,11 +189,6 @@ std::string to_toml(const ModelFile& model) {
   return text;
 }
 
-void save_model_file(const ModelFile& model, const std::string& path) {
-  std::ofstream file(path, std::ios::binary);
-  file << to_toml(model);
-  file.close();
-  if (!file) throw std::runtime_error(path + ": cannot be written: " + std::strerror(errno));
-}
+void save_model_file(const ModelFile& model, const std::string& path) { write_result_file(path, to_toml(model)); }
 
 }  // namespace bevel::io

@@ -262,6 +262,35 @@ Judgement judge(std::span<const model::TipHeading> headings) {
   return judge_cameras(headings, " /rad2", [](const auto&, const auto&) { return Agreement(); });
 }
 
+Coverage compare_times(const std::map<int, std::vector<std::int64_t>>& utimes,
+                       std::span<const model::ActuatorState> actuators, const std::string& channel) {
+  Coverage coverage;
+  if (actuators.empty()) {
+    for (const auto& [camera, times] : utimes) coverage.inside += times.size();
+    return coverage;
+  }
+  const auto [first, last] = std::ranges::minmax_element(actuators, {}, &model::ActuatorState::utime);
+  const auto since_start_s = [start = first->utime](std::int64_t utime) {
+    return (static_cast<double>(utime) - static_cast<double>(start)) * 1e-6;
+  };
+  const double end_s = since_start_s(last->utime);
+  for (const auto& [camera, times] : utimes) {
+    const auto outside = static_cast<std::size_t>(std::ranges::count_if(times, [&](std::int64_t utime) {
+      return since_start_s(utime) < -kOutsideAxes_s || since_start_s(utime) > end_s + kOutsideAxes_s;
+    }));
+    coverage.outside += outside;
+    coverage.inside += times.size() - outside;
+    if (static_cast<double>(outside) <= kLargestShareOutside * static_cast<double>(times.size())) continue;
+    const auto [earliest, latest] = std::ranges::minmax(times);
+    coverage.faults += std::to_string(outside) + " of " + std::to_string(times.size()) + " " + channel + " of camera " +
+                       std::to_string(camera) +
+                       " are outside the time of ACTUATOR_STATE: " + number(since_start_s(earliest)) + " to " +
+                       number(since_start_s(latest)) + " s, allowed " + number(-kOutsideAxes_s) + " to " +
+                       number(end_s + kOutsideAxes_s) + " s; if the clocks differ, correct the stamps of one of them\n";
+  }
+  return coverage;
+}
+
 std::string describe(const std::vector<Oddity>& oddities, const std::string& channel, std::int64_t start_utime) {
   std::map<std::pair<Oddity::Kind, bool>, std::vector<const Oddity*>> kinds;
   for (const Oddity& oddity : oddities) kinds[{oddity.kind, oddity.left_out}].push_back(&oddity);

@@ -7,6 +7,7 @@
 #pragma once
 
 #include <cstdint>
+#include <map>
 #include <span>
 #include <string>
 #include <vector>
@@ -30,6 +31,13 @@ inline constexpr double kLongestPause_s = 3600;
 inline constexpr double kFarthestOutlier_mm = 100;
 // A camera that is surer of one frame than of those around it, by this ratio of information (10 in standard deviation).
 inline constexpr double kSurerByRatio = 100;
+
+// A measurement this long before the first or after the last axis sample is outside the recorded motion. Measurements
+// arrive up to 0.5 s after their time, and programs of one rig start within a second.
+inline constexpr double kOutsideAxes_s = 1;
+// Share of a camera's measurements outside the recorded motion above which the recording counts as damaged. Below it, a
+// camera ran before or after the drives.
+inline constexpr double kLargestShareOutside = 0.2;
 
 struct Oddity {
   enum class Kind {
@@ -56,6 +64,20 @@ Judgement judge(std::span<const model::TipMeasurement> tips, std::span<const mod
 // By stamps, cameras and claims of precision alone: a heading that is turned about for a frame is a tracker's mistake,
 // and the estimator has its gate for it.
 Judgement judge(std::span<const model::TipHeading> headings);
+
+/// Time of measurements relative to that of the axes.
+struct Coverage {
+  std::size_t inside = 0,
+              outside = 0;  ///< measurements within the time of the axes, and kOutsideAxes_s or more outside
+  std::string faults;       ///< one line per camera with too large a share outside, possibly empty
+};
+
+/// Compares the times of one channel's measurements with those of the axes.
+/// @param utimes  time of each measurement (us), by camera number
+/// @param actuators  in any order; without any, everything counts as inside
+/// @param channel  start of each line: "TIP_MEASUREMENT"
+Coverage compare_times(const std::map<int, std::vector<std::int64_t>>& utimes,
+                       std::span<const model::ActuatorState> actuators, const std::string& channel);
 
 // A line for each kind, with the first of its kind: "1 ACTUATOR_STATE at 3.21 s: ...; left out". Times count from
 // start_utime.

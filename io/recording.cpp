@@ -76,6 +76,13 @@ void drop(Recording& recording, Arrival::Channel channel, std::vector<Sample>& s
     if (a.channel == channel) a.index = place[a.index];
 }
 
+template <class Sample>
+std::map<int, std::vector<std::int64_t>> times_by_camera(const std::vector<Sample>& samples) {
+  std::map<int, std::vector<std::int64_t>> times;
+  for (const Sample& sample : samples) times[sample.camera].push_back(sample.utime);
+  return times;
+}
+
 void leave_out_the_implausible(Recording& recording) {
   Judgement axes = judge(recording.actuators);
   drop(recording, Arrival::Channel::actuator, recording.actuators, axes.left_out);
@@ -88,6 +95,11 @@ void leave_out_the_implausible(Recording& recording) {
   Judgement headings = judge(recording.headings);
   drop(recording, Arrival::Channel::heading, recording.headings, headings.left_out);
   recording.heading_oddities = std::move(headings.oddities);
+  recording.coverage = compare_times(times_by_camera(recording.tips), sorted, channel::kTipMeasurement);
+  const Coverage of_headings = compare_times(times_by_camera(recording.headings), sorted, channel::kTipHeading);
+  recording.coverage.inside += of_headings.inside;
+  recording.coverage.outside += of_headings.outside;
+  recording.coverage.faults += of_headings.faults;
 }
 
 std::string one_line(std::string text) {
@@ -131,7 +143,7 @@ std::string Recording::describe_faults() const {
   }
   return text + describe(actuator_oddities, channel::kActuatorState, start_utime) +
          describe(tip_oddities, channel::kTipMeasurement, start_utime) +
-         describe(heading_oddities, channel::kTipHeading, start_utime);
+         describe(heading_oddities, channel::kTipHeading, start_utime) + coverage.faults;
 }
 
 std::string Recording::remarks(const std::string& name) const {
@@ -153,6 +165,9 @@ std::string Recording::refusal() const {
     if (oddity.kind == Oddity::Kind::motion && !oddity.left_out)
       return "damaged beyond use: " + one_line(describe({oddity}, channel::kActuatorState, actuators.front().utime)) +
              ", so that where the base was is not known";
+  if (coverage.inside == 0 && coverage.outside > 0)
+    return "no measurement within the time of the axes, so that the motion to each measurement is unknown: " +
+           one_line(coverage.faults);
   const std::string axes = too_much_left_out(actuator_oddities, actuators.size(), channel::kActuatorState);
   if (!axes.empty()) return axes;
   const std::string positions = too_much_left_out(tip_oddities, tips.size(), channel::kTipMeasurement);

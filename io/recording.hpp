@@ -41,6 +41,7 @@ struct Recording {
   std::map<std::string, RejectCounts> rejects;           // channel -> counts; only channels with rejects
   std::map<std::string, std::int64_t> skipped_channels;  // channels that this reader does not decode -> messages
   std::vector<Oddity> tip_oddities, heading_oddities, actuator_oddities;  // what was left out of each, and what lasts
+  Coverage coverage;        // tips and headings relative to the time of the axes
   std::string file_change;  // how the file changed while it was read; "" if it did not
   LogDamage damage;
   std::int64_t events = 0;
@@ -49,13 +50,13 @@ struct Recording {
   std::int64_t rejected() const;
   bool intact() const {
     return damage.intact() && rejected() == 0 && tip_oddities.empty() && heading_oddities.empty() &&
-           actuator_oddities.empty() && file_change.empty();
+           actuator_oddities.empty() && coverage.faults.empty() && file_change.empty();
   }
   std::string describe_faults() const;  // one line per kind of fault; "" if intact
   // The same for stderr: each line opens with the log's name.
   std::string remarks(const std::string& name) const;
   // Why nothing can be made of it, "" if something can: no event, no usable message, a motion that no rig makes and
-  // that lasts, or more than a fifth of a channel left out.
+  // that lasts, no measurement within the time of the axes, or more than a fifth of a channel left out.
   std::string refusal() const;
 };
 

@@ -156,7 +156,7 @@ bool examine(const CampaignOptions& options, const fs::path& program, int number
   ToolRun run{program,
               fs::absolute(folders.given),
               fs::absolute(unfinished),
-              fs::absolute(options.out / "sealed"),
+              fs::absolute(options.out),
               fs::absolute(folders.trial / "console.txt"),
               {},
               options.limit_s,

@@ -30,7 +30,7 @@ struct CampaignOptions {
   int jobs = 2;                            // trials at a time
   double limit_s = 600;                    // a trial that takes longer is an abstention
   bool generate_only = false;
-  bool unsealed = false;  // without namespaces, where the kernel has none; the result says so
+  bool unsealed = false;  // without a sandbox, where bubblewrap cannot work; the result reports that
   CampaignWatch watch;
 };
 

@@ -1,10 +1,8 @@
 #pragma once
-// A root of its own for one process tree: the system's programs and libraries, the given folder read-only, the output
-// folder, nothing else. Linux namespaces (user, mount, process, network, IPC); no privileges needed where the kernel
-// lets users make namespaces. Inside, no path leads to the rest of the disk, /proc shows only the process's own tree,
-// and there is no network.
-#include <sys/types.h>
-
+/// \file
+/// Sandbox of one process tree, by bubblewrap: the system's programs and libraries, the given folder read-only, the
+/// output folder, and nothing else. Inside, no path leads to the rest of the disk, /proc shows only the processes of
+/// the sandbox, and there are no network, no capabilities, no further user namespaces and no variables of the caller.
 #include <filesystem>
 #include <string>
 #include <vector>
@@ -14,54 +12,20 @@ namespace bevel::proof {
 namespace fs = std::filesystem;
 
 struct SandboxView {
-  fs::path program;                // bound at its own path, with the libraries it needs
+  fs::path program;                // bound at its path, with the libraries that it needs
   fs::path given;                  // seen as /case, read-only
   fs::path output;                 // seen as /out
-  std::vector<fs::path> readable;  // folders seen at their own paths, read-only
+  std::vector<fs::path> readable;  // folders bound at their paths, read-only
 };
 
-// Everything that the child needs, made before the fork: between fork and exec nothing may allocate.
-class SandboxPlan {
- public:
-  // `secret` must not be inside anything that is seen: throws std::runtime_error naming both otherwise, or where
-  // `program` or a folder does not exist. `root` is an empty folder to build in.
-  SandboxPlan(const SandboxView& view, const fs::path& secret, const fs::path& root);
+/// Program of bubblewrap, a Debian package.
+inline constexpr const char* kBubblewrap = "/usr/bin/bwrap";
 
-  // In the child: enters the namespaces and the new root, forks, and returns in the grandchild, which is to exec; the
-  // process in between ends with the grandchild's status. A step that fails is reported as bytes on `fault_pipe` and
-  // ends the child.
-  void enter(int fault_pipe) const;
-  // Reads what enter() reported: "" if nothing.
-  static std::string fault(int fault_pipe);
-
- private:
-  struct Bind {
-    std::string source;
-    std::string target;
-    bool folder;
-    bool writable;
-    unsigned long keep_flags;  // of the source's file system; a user namespace may not drop them
-  };
-  struct Link {
-    std::string target;
-    std::string path;
-  };
-  void add(const fs::path& source, const fs::path& inside, bool writable);
-  void add_folders(const fs::path& inside);
-  void build_root(int fault_pipe) const;
-  void leave_old_root(int fault_pipe) const;
-
-  std::string root_;
-  std::string old_root_;
-  std::string proc_;
-  std::string uid_map_;
-  std::string gid_map_;
-  std::vector<std::string> folders_;
-  std::vector<Bind> binds_;
-  std::vector<Link> links_;
-};
-
-// Libraries outside the system's folders that the dynamic linker would load for it; none for a script.
-std::vector<fs::path> libraries_of(const fs::path& program);
+/// Options for bubblewrap, each ended by a zero byte, as `--args FD` reads them: on a command line they would be
+/// visible inside, in /proc/1/cmdline.
+/// @param secret  folder whose files must not be visible
+/// @throws std::runtime_error if bubblewrap is not installed, if the program or a folder does not exist, or if one of
+///   them contains \p secret or is in it
+std::string sandbox_options(const SandboxView& view, const fs::path& secret);
 
 }  // namespace bevel::proof

@@ -10,7 +10,7 @@ struct ToolRun {
   fs::path program;
   fs::path given;    // the case: model.toml and logs
   fs::path output;   // exists, empty
-  fs::path secret;   // what must stay out of sight
+  fs::path secret;   // folder that must not be visible: the campaign, with truths and seed
   fs::path console;  // the tool's stdout and stderr go to this file
   std::vector<fs::path> readable;
   double limit_s = 600;

@@ -13,6 +13,7 @@
 
 #include "io/log_writer.hpp"
 #include "io/messages.hpp"
+#include "io/result_file.hpp"
 #include "model/samples.hpp"
 #include "proof/commitment.hpp"
 
@@ -149,14 +150,7 @@ TrialFolders::TrialFolders(const fs::path& out, int number)
 
 void write_atomically(const fs::path& path, const std::string& text) {
   fs::create_directories(path.parent_path());
-  const fs::path unfinished = path.string() + ".unfinished." + std::to_string(::getpid());
-  {
-    std::ofstream file(unfinished, std::ios::binary);
-    file << text;
-    file.close();
-    if (!file) throw std::runtime_error(unfinished.string() + ": cannot be written");
-  }
-  fs::rename(unfinished, path);
+  io::write_result_file(path.string(), text);
 }
 
 std::string read_text(const fs::path& path) {

@@ -1,12 +1,11 @@
 #include "report/page.hpp"
 
 #include <algorithm>
-#include <cerrno>
 #include <cstdlib>
 #include <cstring>
-#include <fstream>
 #include <stdexcept>
 
+#include "io/result_file.hpp"
 #include "io/sha256.hpp"
 #include "report/assets.hpp"
 #include "report/figure_svg.hpp"
@@ -204,11 +203,6 @@ std::string Page::html() const {
          "<main>\n<h1>" + escape_html(title_) + "</h1>\n" + body_ + "</main>\n" + scripts + "</body></html>\n";
 }
 
-void Page::save(const std::string& path) const {
-  std::ofstream file(path, std::ios::binary);
-  file << html();
-  file.close();
-  if (!file) throw std::runtime_error(path + ": cannot be written: " + std::strerror(errno));
-}
+void Page::save(const std::string& path) const { io::write_result_file(path, html()); }
 
 }  // namespace bevel::report

@@ -23,12 +23,25 @@ constexpr std::int64_t kPlayedBack_us = 5'000'000;
 // Twenty rows a second for ten minutes; after that every second row of the older half goes.
 constexpr std::size_t kMostRows = 12'000;
 constexpr std::size_t kMostOfPath = 4'000;
-constexpr std::size_t kMostPictures = 16;  // cameras of a rig; a stranger's numbers shall not fill the memory
+// A rig has up to four cameras and seven processes. Numbers and names of other senders must not fill the memory.
+constexpr std::size_t kMostCameras = 16;
+constexpr std::size_t kMostProcesses = 32;
+constexpr double kForgotten_s = 60;  // an entry without a message for so long makes place for a new one
 
 // JSON has no NaN.
 json figure(double value) { return std::isfinite(value) ? json(value) : json(nullptr); }
 
 double age_s(const Moment& arrived, const Moment& now) { return static_cast<double>(now.ns - arrived.ns) * 1e-9; }
+
+/// Returns whether `entries` has or can have an entry of that key; removes the oldest one where that is necessary.
+template <class Entries>
+bool make_place(Entries& entries, const typename Entries::key_type& key, std::size_t most, const Moment& now) {
+  if (entries.size() < most || entries.contains(key)) return true;
+  const auto oldest = std::ranges::min_element(entries, {}, [](const auto& entry) { return entry.second.arrived.ns; });
+  if (age_s(oldest->second.arrived, now) < kForgotten_s) return false;
+  entries.erase(oldest);
+  return true;
+}
 
 template <class Container>
 void thin(Container& values) {
@@ -123,7 +136,7 @@ void LiveView::extend_path(const needle_state_t& m) {
 
 void LiveView::on(const tip_measurement_t& message, const Moment& now) {
   begin_anew_if(message.utime);
-  take(tips_, message.camera, message, now);
+  if (make_place(tips_, message.camera, kMostCameras, now)) take(tips_, message.camera, message, now);
 }
 
 void LiveView::on(const actuator_state_t& message, const Moment& now) {
@@ -151,12 +164,11 @@ void LiveView::on(const steering_target_t& message, const Moment& now) {
 }
 
 void LiveView::on(const process_status_t& message, const Moment& now) {
-  take(processes_, message.process, message, now);
+  if (make_place(processes_, message.process, kMostProcesses, now)) take(processes_, message.process, message, now);
 }
 
 void LiveView::on(const camera_picture_t& message, const Moment& now) {
-  if (pictures_.size() < kMostPictures || pictures_.contains(message.camera))
-    take(pictures_, message.camera, message, now);
+  if (make_place(pictures_, message.camera, kMostCameras, now)) take(pictures_, message.camera, message, now);
 }
 
 std::string LiveView::picture(std::int32_t camera, std::int64_t count) const {

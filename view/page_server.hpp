@@ -3,29 +3,36 @@
 // snapshot, not a queue of old ones.
 #pragma once
 
+#include <chrono>
 #include <cstdint>
 #include <functional>
 #include <memory>
 #include <string>
+#include <vector>
 
 namespace bevel::view {
 
 class PageServer {
  public:
   using Picture = std::function<std::string(std::int32_t camera, std::int64_t count)>;
-  static constexpr int kMostPages = 16;            ///< pages that may be open at once
-  static constexpr int kThreads = kMostPages + 5;  ///< that serve them: one accepts, four answer other requests
+  static constexpr int kMostPages = 16;                      ///< pages that may be open at once
+  static constexpr int kMostConnections = 64;                ///< at once; a browser opens up to six for a page
+  static constexpr int kMostOfPeer = 48;                     ///< connections from one address
+  static constexpr std::chrono::seconds kLongestRequest{5};  ///< from the connection to the end of the request
+  static constexpr std::chrono::seconds kLongestWrite{10};   ///< without progress: the peer does not read
+  static constexpr int kThreads = 1;                         ///< that serve all of them
 
   // A port that is open before anything is served; 0 takes one that is free. Throws std::runtime_error naming the port
   // and why it cannot be had.
   static int open_port(int port);
 
-  // Takes over what open_port() returned, in this process or in the one that started it, and serves from threads of
-  // its own, which call `history` too, and `picture` for the JPEG of a camera and count ("": there
-  // is none).
+  /// Serves from a separate thread, which calls \p history and \p picture.
+  /// @param socket  of open_port(), in this process or in the one that started it; closed by this object
+  /// @param picture  returns the JPEG of a camera and count, "" if it does not exist
+  /// @param hosts  names, in lower case, by which the page may be requested in addition to those of this machine
   PageServer(
       int socket, std::function<std::string()> history,
-      Picture picture = [](std::int32_t, std::int64_t) { return std::string(); });
+      Picture picture = [](std::int32_t, std::int64_t) { return std::string(); }, std::vector<std::string> hosts = {});
   ~PageServer();  // ends the pages' connections
   PageServer(const PageServer&) = delete;
   PageServer& operator=(const PageServer&) = delete;

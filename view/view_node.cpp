@@ -1,10 +1,12 @@
 #include "view/view_node.hpp"
 
+#include <utility>
+
 #include "io/camera_picture.hpp"
 
 namespace bevel::view {
 
-ViewNode::ViewNode(lcm::LCM& lcm, int socket)
+ViewNode::ViewNode(lcm::LCM& lcm, int socket, std::vector<std::string> hosts)
     : port_(lcm),
       server_(
           socket,
@@ -15,7 +17,8 @@ ViewNode::ViewNode(lcm::LCM& lcm, int socket)
           [this](std::int32_t camera, std::int64_t count) {
             const std::lock_guard lock(mutex_);
             return picture_.picture(camera, count);
-          }) {
+          },
+          std::move(hosts)) {
   watch<tip_measurement_t>(io::channel::kTipMeasurement);
   watch<actuator_state_t>(io::channel::kActuatorState);
   watch<motion_command_t>(io::channel::kMotionCommand);

@@ -1,4 +1,4 @@
-// The live page wired to LCM: hears every channel of the loop, says nothing on any.
+// The live page wired to LCM: subscribes to every channel of the loop and publishes nothing.
 #pragma once
 
 #include <lcm/lcm-cpp.hpp>
@@ -12,8 +12,10 @@ namespace bevel::view {
 
 class ViewNode {
  public:
-  // The LCM must be good and outlive the node; `socket` as PageServer::open_port() returns it.
-  ViewNode(lcm::LCM& lcm, int socket);
+  /// @param lcm  must be good and outlive the node
+  /// @param socket  of PageServer::open_port()
+  /// @param hosts  further names by which the page may be requested, in lower case
+  ViewNode(lcm::LCM& lcm, int socket, std::vector<std::string> hosts = {});
 
   void tell_time(const nodes::Now& now) { port_.tell_time(now); }
   // Publishes a snapshot; the rate of the page is that of these calls.

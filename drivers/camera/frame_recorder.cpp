@@ -149,13 +149,22 @@ std::string FrameRecorder::write(const Entry& entry) {
   frame.file =
       std::to_string(frame.utime) + "-" + std::to_string(frame.camera) + "-" + std::to_string(frame.seq) + ".png";
   const std::string path = (folder_ / frame.file).string();
+  std::vector<unsigned char> picture;
   bool good = false;
   try {
-    good = cv::imwrite(path, entry.gray, {cv::IMWRITE_PNG_COMPRESSION, 1});  // quick; higher saves a tenth
+    good = cv::imencode(".png", entry.gray, picture, {cv::IMWRITE_PNG_COMPRESSION, 1});  // higher saves a tenth
   } catch (const cv::Exception&) {
     good = false;
   }
-  if (!good) return "'" + path + "' cannot be written";
+  if (!good) return "'" + path + "' cannot be encoded";
+  std::ofstream file(path, std::ios::binary);
+  file.write(reinterpret_cast<const char*>(picture.data()), static_cast<std::streamsize>(picture.size()));
+  file.close();
+  if (!file) {
+    std::error_code ignored;
+    fs::remove(path, ignored);
+    return "'" + path + "' cannot be written; is the disk full?";
+  }
   index_ << line_of(frame) << std::flush;
   return index_ ? "" : "'" + (folder_ / kFrameIndex).string() + "' cannot be written";
 }

@@ -4,6 +4,7 @@
 #pragma once
 
 #include <cstdint>
+#include <memory>
 #include <stop_token>
 #include <string>
 #include <vector>
@@ -11,6 +12,7 @@
 #include "drivers/can/local_wire.hpp"
 #include "drivers/can/read_ahead.hpp"
 #include "drivers/can/socket_bus.hpp"
+#include "drivers/socket_file.hpp"
 
 namespace bevel::can {
 
@@ -35,9 +37,9 @@ class LocalBus final : public SocketBus {
 
 class LocalHub {
  public:
-  // Binds the socket. A path left by a hub that died is taken over; throws std::runtime_error when another hub serves
-  // it.
-  explicit LocalHub(std::string path);
+  /// Binds the socket; a socket file whose hub has ended is replaced.
+  /// @throws std::runtime_error if another process serves the path, or if the path names a file that is no socket
+  explicit LocalHub(const std::string& path);
   ~LocalHub();
   LocalHub(const LocalHub&) = delete;
   LocalHub& operator=(const LocalHub&) = delete;
@@ -53,7 +55,7 @@ class LocalHub {
   void pass_on_from(int client);
   void drop(int client);
 
-  std::string path_;
+  std::unique_ptr<SocketFile> file_;
   int listen_fd_ = -1;
   int epoll_fd_ = -1;
   std::vector<int> clients_;

@@ -23,14 +23,6 @@ std::runtime_error failure(const std::string& path, const std::string& what) {
   return std::runtime_error("local bus '" + path + "': " + what + " (" + std::strerror(errno) + ")");
 }
 
-bool somebody_serves(const sockaddr_un& address) {
-  const int fd = ::socket(AF_UNIX, SOCK_SEQPACKET | SOCK_NONBLOCK | SOCK_CLOEXEC, 0);
-  if (fd < 0) return false;
-  const bool answered = ::connect(fd, reinterpret_cast<const sockaddr*>(&address), sizeof address) == 0;
-  ::close(fd);
-  return answered;
-}
-
 void watch(int epoll_fd, int fd) {
   epoll_event event{};
   event.events = EPOLLIN;
@@ -40,19 +32,18 @@ void watch(int epoll_fd, int fd) {
 
 }  // namespace
 
-LocalHub::LocalHub(std::string path) : path_(std::move(path)) {
-  const sockaddr_un address = wire::address_of(path_);
-  if (somebody_serves(address)) throw std::runtime_error("local bus '" + path_ + "': another hub serves it already");
-  (void)::unlink(path_.c_str());
+LocalHub::LocalHub(const std::string& path) {
+  const sockaddr_un address = wire::address_of(path);
   listen_fd_ = ::socket(AF_UNIX, SOCK_SEQPACKET | SOCK_NONBLOCK | SOCK_CLOEXEC, 0);
-  if (listen_fd_ < 0) throw failure(path_, "no socket");
-  epoll_fd_ = epoll_create1(EPOLL_CLOEXEC);
-  if (epoll_fd_ < 0 || ::bind(listen_fd_, reinterpret_cast<const sockaddr*>(&address), sizeof address) != 0 ||
-      ::listen(listen_fd_, kBacklog) != 0) {
-    const auto error = failure(path_, "cannot be served");
+  if (listen_fd_ < 0) throw failure(path, "no socket");
+  try {
+    file_ = std::make_unique<SocketFile>(listen_fd_, address, "local bus '" + path + "'");
+    epoll_fd_ = epoll_create1(EPOLL_CLOEXEC);
+    if (epoll_fd_ < 0 || ::listen(listen_fd_, kBacklog) != 0) throw failure(path, "cannot be served");
+  } catch (...) {
     ::close(listen_fd_);
     if (epoll_fd_ >= 0) ::close(epoll_fd_);
-    throw error;
+    throw;
   }
   watch(epoll_fd_, listen_fd_);
 }
@@ -61,7 +52,6 @@ LocalHub::~LocalHub() {
   for (const int client : clients_) ::close(client);
   ::close(epoll_fd_);
   ::close(listen_fd_);
-  (void)::unlink(path_.c_str());
 }
 
 void LocalHub::accept_all() {

@@ -29,30 +29,21 @@ sockaddr_un address_of(const std::string& path) {
   return address;
 }
 
-/// The socket API is written for this cast.
-const sockaddr* generic(const sockaddr_un& address) { return reinterpret_cast<const sockaddr*>(&address); }
-
-bool somebody_answers(const sockaddr_un& address) {
-  const int fd = socket(AF_UNIX, SOCK_STREAM | SOCK_CLOEXEC, 0);
-  const bool answers = connect(fd, generic(address), sizeof address) == 0;
-  close(fd);
-  return answers;
-}
-
 }  // namespace
 
-FrameServer::FrameServer(const std::string& socket_path) : path_(socket_path) {
-  const sockaddr_un address = address_of(path_);
-  if (somebody_answers(address)) throw std::runtime_error("frame server path '" + path_ + "': another server is there");
-  unlink(path_.c_str());  // left behind by a server that died
+FrameServer::FrameServer(const std::string& socket_path) {
+  const sockaddr_un address = address_of(socket_path);
+  const std::string name = "frame server path '" + socket_path + "'";
   listener_ = socket(AF_UNIX, SOCK_STREAM | SOCK_CLOEXEC | SOCK_NONBLOCK, 0);
   wake_ = eventfd(0, EFD_CLOEXEC | EFD_NONBLOCK);
-  if (listener_ < 0 || wake_ < 0 || bind(listener_, generic(address), sizeof address) != 0 ||
-      listen(listener_, 8) != 0) {
-    const std::string reason = std::strerror(errno);
+  try {
+    if (listener_ < 0 || wake_ < 0) throw std::runtime_error(name + ": " + std::strerror(errno));
+    file_ = std::make_unique<SocketFile>(listener_, address, name);
+    if (listen(listener_, 8) != 0) throw std::runtime_error(name + ": " + std::strerror(errno));
+  } catch (...) {
     if (listener_ >= 0) close(listener_);
     if (wake_ >= 0) close(wake_);
-    throw std::runtime_error("frame server path '" + path_ + "': " + reason);
+    throw;
   }
   thread_ = std::thread([this] { run(); });
 }
@@ -64,7 +55,6 @@ FrameServer::~FrameServer() {
   for (const Client& client : clients_list_) close(client.socket);
   close(listener_);
   close(wake_);
-  unlink(path_.c_str());
 }
 
 void FrameServer::wake() const {

@@ -11,12 +11,15 @@
 #include <vector>
 
 #include "drivers/camera/frame.hpp"
+#include "drivers/socket_file.hpp"
 
 namespace bevel::rig {
 
 class FrameServer {
  public:
-  /// Throws std::runtime_error if `socket_path` is too long, another server answers there, or it cannot be bound.
+  /// Binds the socket; a socket file whose server has ended is replaced.
+  /// @throws std::runtime_error if \p socket_path is too long or names a file that is no socket, if another process
+  ///   serves it, or if it cannot be bound
   explicit FrameServer(const std::string& socket_path);
   ~FrameServer();
   FrameServer(const FrameServer&) = delete;
@@ -41,7 +44,7 @@ class FrameServer {
   bool send_some(Client& client);
   void wake() const;
 
-  std::string path_;
+  std::unique_ptr<SocketFile> file_;
   int listener_ = -1;
   int wake_ = -1;
   std::mutex mutex_;  // guards clients_list_

@@ -1,9 +1,11 @@
+#include <gmock/gmock.h>
 #include <gtest/gtest.h>
 #include <sys/socket.h>
 #include <sys/un.h>
 #include <unistd.h>
 
 #include <cstring>
+#include <filesystem>
 #include <fstream>
 #include <opencv2/imgcodecs.hpp>
 #include <thread>
@@ -11,6 +13,7 @@
 #include "drivers/camera/frame_source.hpp"
 #include "drivers/camera/frame_stream.hpp"
 #include "rig/camera/frame_server.hpp"
+#include "tests/support/stale_socket.hpp"
 #include "tests/support/temporary_folder.hpp"
 
 namespace bevel::camera {
@@ -185,9 +188,18 @@ TEST(FrameStream, SecondServerIsRefusedADeadOnesSocketIsTakenOver) {
     const rig::FrameServer first(path);
     EXPECT_THROW(rig::FrameServer second(path), std::runtime_error);
   }
-  std::ofstream(path) << "left behind";
+  test::leave_stale_socket(path, SOCK_STREAM);
   EXPECT_NO_THROW(rig::FrameServer again(path));
   EXPECT_THROW(rig::FrameServer(std::string(300, 'x')), std::runtime_error);
+}
+
+TEST(FrameStream, AnOrdinaryFileAtItsPathIsRefusedAndKept) {
+  const test::TemporaryFolder folder;
+  const std::string path = folder / "insertion.lcm";
+  std::ofstream(path) << "a recording";
+  EXPECT_THAT([&] { const rig::FrameServer server(path); },
+              testing::ThrowsMessage<std::runtime_error>(testing::HasSubstr("the path is a regular file; allowed: ")));
+  EXPECT_EQ(std::filesystem::file_size(path), 11U);
 }
 
 TEST(FrameStream, EndWhenTheServerGoes) {

@@ -199,8 +199,8 @@ def furnish(folder):
     (folder / "build").mkdir()
     (folder / "build/bin").symlink_to(BUILD / "bin")
     (folder / "tools").symlink_to(ROOT / "tools")
-    subprocess.run([BUILD / "bin/bevel-blindtrial", "--trials", "1", "--seed", "8", "--out", folder / "trials",
-                    "--generate-only"], check=True, stdout=subprocess.DEVNULL)
+    subprocess.run([BUILD / "bin/bevel-blindtrial", "--trials", "1", "--seed-file", "-", "--out", folder / "trials",
+                    "--generate-only"], check=True, stdout=subprocess.DEVNULL, input=b"8")
     case = next((folder / "trials/trials").glob("t*/case"))
     logs = sorted(case.glob("rec*.lcm"))
     shutil.copy(case / "model.toml", folder)

@@ -1,9 +1,12 @@
 // The local bus over real sockets: echo, broadcast, filters, and what happens when the hub goes and comes.
+#include <gmock/gmock.h>
 #include <gtest/gtest.h>
 #include <sys/socket.h>
 #include <sys/un.h>
 #include <unistd.h>
 
+#include <filesystem>
+#include <fstream>
 #include <memory>
 #include <stdexcept>
 #include <string>
@@ -110,6 +113,43 @@ TEST_F(LocalBusTest, ASecondHubIsRefusedAndADeadOneReplaced) {
   ASSERT_EQ(::bind(dead, reinterpret_cast<const sockaddr*>(&address), sizeof address), 0);
   ::close(dead);
   EXPECT_NO_THROW(hub_ = std::make_unique<LocalHub>(path_));
+}
+
+TEST_F(LocalBusTest, OrdinaryFilesAtItsPathAreRefusedAndKept) {
+  for (const char* name : {"insertion.lcm", "folder", "link"}) {
+    const std::string path = (folder_ / name).string();
+    if (name == std::string("folder"))
+      std::filesystem::create_directory(path);
+    else if (name == std::string("link"))
+      std::filesystem::create_symlink(folder_ / "insertion.lcm", path);
+    else
+      std::ofstream(path) << "a recording";
+    EXPECT_THAT([&] { const LocalHub hub(path); }, testing::ThrowsMessage<std::runtime_error>(
+                                                       testing::HasSubstr("; allowed: a path that does not exist yet")))
+        << name;
+    EXPECT_TRUE(std::filesystem::exists(path)) << name;
+  }
+  std::ifstream kept(folder_ / "insertion.lcm");
+  EXPECT_EQ(std::string(std::istreambuf_iterator<char>(kept), {}), "a recording");
+}
+
+TEST_F(LocalBusTest, ASocketOfAnotherProgramIsRefusedAndKept) {
+  const std::string path = (folder_ / "frames").string();
+  sockaddr_un address = wire::address_of(path);
+  const int other = ::socket(AF_UNIX, SOCK_STREAM, 0);
+  ASSERT_EQ(::bind(other, reinterpret_cast<const sockaddr*>(&address), sizeof address), 0);
+  ASSERT_EQ(::listen(other, 1), 0);
+  EXPECT_THAT([&] { const LocalHub hub(path); },
+              testing::ThrowsMessage<std::runtime_error>(testing::HasSubstr("another process serves it already")));
+  EXPECT_TRUE(std::filesystem::exists(path));
+  ::close(other);
+}
+
+TEST_F(LocalBusTest, AFileThatTookTheSocketsPlaceIsKept) {
+  std::filesystem::remove(path_);
+  std::ofstream(path_) << "a recording";
+  hub_.reset();
+  EXPECT_TRUE(std::filesystem::is_regular_file(path_));
 }
 
 TEST_F(LocalBusTest, RubbishFromAClientIsNotPassedOn) {

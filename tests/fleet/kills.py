@@ -74,8 +74,9 @@ def make_cases(options, folder):
     made = 0
     number = options.cases // 4 + 1
     while made < options.cases:
-        subprocess.run([options.build / "bin/bevel-blindtrial", "--trials", str(number), "--seed", str(options.seed),
-                        "--out", trials, "--generate-only"], check=True, stdout=subprocess.DEVNULL)
+        subprocess.run([options.build / "bin/bevel-blindtrial", "--trials", str(number), "--seed-file", "-",
+                        "--out", trials, "--generate-only"], check=True, stdout=subprocess.DEVNULL,
+                       input=str(options.seed).encode())
         shutil.rmtree(folder, ignore_errors=True)
         made = 0
         for trial in sorted(trials.glob("trials/t*/case")):

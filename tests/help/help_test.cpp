@@ -98,6 +98,11 @@ TEST_F(Help, OfEveryProgramIsSafeQuickAndAlike) {
     for (const char* argument : {"--help", "-h"}) expect_help(program, argument);
 }
 
+TEST_F(Help, OfEveryProgramFailsWhereItCannotBeWritten) {
+  for (const std::string& program : programs())
+    EXPECT_EQ(std::system((program + " --help >/dev/full 2>" + at("err")).c_str()), 1 << 8) << program;
+}
+
 TEST_F(Help, OfEveryScriptIsSafeQuickAndAlike) {
   ASSERT_GT(scripts().size(), 10U);
   for (const std::string& script : scripts())

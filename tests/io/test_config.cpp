@@ -11,6 +11,8 @@ using ::testing::AllOf;
 using ::testing::ElementsAre;
 using ::testing::HasSubstr;
 using ::testing::SizeIs;
+using ::testing::StartsWith;
+using ::testing::ThrowsMessage;
 
 enum class Slip { isotropic, bevel_plane };
 
@@ -213,6 +215,47 @@ TEST(Config, a_file_that_cannot_be_read_is_named) {
       },
       ConfigError);
   EXPECT_THROW(ConfigFile::load("/tmp"), ConfigError);
+}
+
+std::string repeated(const std::string& part, int times) {
+  std::string text;
+  for (int i = 0; i < times; ++i) text += part;
+  return text;
+}
+
+// Each of these overflowed the stack of the parser.
+TEST(ConfigLimits, a_key_of_many_parts_is_refused_with_its_line) {
+  const std::string parts = repeated("a.", 299'999);
+  const std::string spaced = repeated("\"a\" . ", 50'000);
+  for (const std::string& key :
+       {parts + "a = 1", "[" + parts + "a]", "[[" + parts + "a]]", "x = {" + parts + "a = 1}", spaced + "a = 1"})
+    EXPECT_THAT([&] { ConfigFile::parse("first = 1\n" + key + "\n", "test.toml"); },
+                ThrowsMessage<ConfigError>(AllOf(StartsWith("test.toml:2: a key has "),
+                                                 HasSubstr(" parts; allowed at most 16; correct or remove"))))
+        << key.substr(0, 12);
+}
+
+TEST(ConfigLimits, deep_nesting_is_refused_with_its_line) {
+  for (const std::string& value :
+       {repeated("[", 100'000), repeated("[", 40) + repeated("]", 40), repeated("{a = ", 40) + "1" + repeated("}", 40)})
+    EXPECT_THAT([&] { ConfigFile::parse("first = 1\na = " + value + "\n", "test.toml"); },
+                ThrowsMessage<ConfigError>(AllOf(StartsWith("test.toml:2: arrays or tables are nested "),
+                                                 HasSubstr(" deep; allowed at most 16; "))));
+}
+
+TEST(ConfigLimits, a_large_file_is_refused_before_it_is_parsed) {
+  EXPECT_THAT([] { ConfigFile::parse(std::string(2'000'000, '#'), "test.toml"); },
+              ThrowsMessage<ConfigError>(StartsWith("test.toml: has 2000000 bytes; allowed at most 1048576; ")));
+}
+
+TEST(ConfigLimits, text_and_comments_count_neither_as_keys_nor_as_nesting) {
+  const std::string dots = repeated(".", 50), brackets = repeated("[", 50);
+  const std::string odd = dots + brackets + "#";
+  ConfigFile file =
+      ConfigFile::parse("# it's " + odd + "\na = \"\\\"" + odd + "\" # \"\nb = '" + odd + "\\'\nc = \"\"\"\n\"" + odd +
+                            "\"\"\"\"\nd = '''" + odd + "'''\ne = [[1.5, 2.5], [3.5]]\n",
+                        "test.toml");
+  for (const char* key : {"a", "b", "c", "d", "e"}) EXPECT_TRUE(file.root().has(key)) << key;
 }
 
 TEST(Config, nearest_name_counts_swapped_neighbours_as_one_slip) {

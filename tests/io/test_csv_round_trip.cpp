@@ -82,6 +82,51 @@ TEST_F(RoundTrip, AnExportThatReplacesOneLeavesNothingOfIt) {
   EXPECT_FALSE(fs::exists(folder / "csv/tip_heading.csv"));
 }
 
+TEST_F(RoundTrip, AFolderThatWasCutAnywhereIsRefused) {
+  export_csv(test::OddRecordings(3).recording(), path("csv"));
+  const auto whole = files_in(path("csv"));
+  int refused = 0, cuts = 0;
+  for (const auto& [name, text] : whole) {
+    if (!name.ends_with(".csv")) continue;
+    for (std::size_t size = 0; size < text.size(); size += 7, ++cuts) {
+      folder.write("csv/" + name, text.substr(0, size));
+      try {
+        import_exported(path("csv"));
+      } catch (const std::runtime_error&) {
+        ++refused;
+      }
+    }
+    const std::string up_to_a_row = text.substr(0, text.rfind('\n', text.size() - 2) + 1);
+    folder.write("csv/" + name, up_to_a_row);
+    EXPECT_THAT([&] { import_exported(path("csv")); },
+                ::testing::ThrowsMessage<std::runtime_error>(HasSubstr("The folder is incomplete")));
+    fs::remove(folder / "csv" / name);
+    EXPECT_THROW(import_exported(path("csv")), std::runtime_error) << name;
+    folder.write("csv/" + name, text);
+  }
+  EXPECT_GT(cuts, 200);
+  EXPECT_EQ(refused, cuts);
+  EXPECT_NO_THROW(import_exported(path("csv")));
+}
+
+TEST_F(RoundTrip, AConfigurationThatWasCutIsRefused) {
+  Recording recording = test::OddRecordings(3).recording();
+  recording.config = "[recording]\nclock = \"none\"\n";
+  export_csv(recording, path("csv"));
+  folder.write("csv/config.toml", "[recording]\n");
+  EXPECT_THAT([&] { import_exported(path("csv")); },
+              ::testing::ThrowsMessage<std::runtime_error>(
+                  HasSubstr("config.toml: has 12 bytes; rows.toml lists 27. The folder is incomplete")));
+}
+
+TEST_F(RoundTrip, ATableThatWasChangedOnPurposeIsReadWithoutTheCounts) {
+  export_csv(test::OddRecordings(3).recording(), path("csv"));
+  const std::string text = test::text_of(folder / "csv/actuator_state.csv");
+  folder.write("csv/actuator_state.csv", text.substr(0, text.rfind('\n', text.size() - 2) + 1));
+  fs::remove(folder / "csv/rows.toml");
+  EXPECT_NO_THROW(import_exported(path("csv")));
+}
+
 TEST_F(RoundTrip, WhatIsNoExportIsRefusedWithItsPlace) {
   const auto refusal = [&](const std::string& name, const std::string& text) {
     fs::create_directories(folder / "csv");

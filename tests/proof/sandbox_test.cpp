@@ -4,12 +4,13 @@
 
 #include <fcntl.h>
 #include <gmock/gmock.h>
-#include <sched.h>
-#include <sys/wait.h>
 #include <unistd.h>
 
+#include <csignal>
+#include <cstdlib>
 #include <thread>
 
+#include "proof/libraries.hpp"
 #include "proof/tool_run.hpp"
 #include "proof/trial_files.hpp"
 #include "tests/proof/script_tool.hpp"
@@ -21,18 +22,14 @@ namespace {
 using testing::HasSubstr;
 using testing::Not;
 
-bool namespaces_work() {
-  const pid_t child = ::fork();
-  if (child == 0) ::_exit(::unshare(CLONE_NEWUSER | CLONE_NEWNS | CLONE_NEWPID) == 0 ? 0 : 1);
-  int status = 1;
-  ::waitpid(child, &status, 0);
-  return status == 0;
+bool sandboxes_work() {
+  return std::system((std::string(kBubblewrap) + " --unshare-all --ro-bind / / true 2>/dev/null").c_str()) == 0;
 }
 
 class Sandbox : public testing::Test {
  protected:
   void SetUp() override {
-    if (!namespaces_work()) GTEST_SKIP() << "this kernel does not let users make namespaces";
+    if (!sandboxes_work()) GTEST_SKIP() << "bubblewrap is not installed, or the kernel lets users make no namespaces";
     fs::create_directories(folder_ / "case");
     fs::create_directories(folder_ / "out");
     write_atomically(folder_ / "case" / "rec01.lcm", "a log");
@@ -115,6 +112,101 @@ TEST_F(Sandbox, TheOldRootCannotBeMountedAgain) {
                                          "; umount /case; umount -l /; cat /case/../sealed/t0000.json; ls /.old",
                                      true);
   EXPECT_THAT(sealed, Not(HasSubstr("THE TRUTH")));
+}
+
+// The seed of a campaign was on the command line of its program, which was /proc/1 inside.
+TEST_F(Sandbox, NoCommandLineOfTheCallerIsVisible) {
+  const std::string attempt = "for p in /proc/[0-9]*; do tr '\\0' ' ' <$p/cmdline; done";
+  EXPECT_THAT(console(attempt, false), HasSubstr("test_proof_runs"));
+  const std::string sealed = console(attempt, true);
+  EXPECT_THAT(sealed, HasSubstr("bwrap --args 3"));
+  EXPECT_THAT(sealed, Not(HasSubstr("test_proof_runs")));
+  EXPECT_THAT(sealed, Not(HasSubstr((folder_ / "out").string())));
+}
+
+TEST_F(Sandbox, NoVariableOfTheCallerIsVisible) {
+  ::setenv("BEVEL_TEST_SECRET", "THE SEED", 1);
+  const std::string attempt = "cat /proc/[0-9]*/environ; env";
+  // This program's own environment, as /proc shows it, is that of its start: a child has the variable.
+  const std::string unsealed = console("cat /proc/[0-9]*/environ", false);
+  EXPECT_THAT(unsealed, HasSubstr("LANG=C.UTF-8"));
+  const std::string sealed = console(attempt, true);
+  EXPECT_THAT(sealed, Not(HasSubstr("THE SEED")));
+  EXPECT_THAT(sealed, HasSubstr("HOME=/tmp"));
+  for (const char* name : {"PWD=/root", "OLDPWD=/", "USER=", "LOGNAME=", "SHELL=", "LD_", "SSH_", "TERM="})
+    EXPECT_THAT(sealed, Not(HasSubstr(name))) << name;
+  ::unsetenv("BEVEL_TEST_SECRET");
+}
+
+TEST_F(Sandbox, ThereAreNoCapabilitiesAndNoneCanBeGained) {
+  const std::string sealed = console("grep -E '^(Cap|NoNewPrivs)' /proc/self/status", true);
+  for (const char* set : {"CapInh", "CapPrm", "CapEff", "CapBnd", "CapAmb"})
+    EXPECT_THAT(sealed, HasSubstr(std::string(set) + ":\t0000000000000000")) << set;
+  EXPECT_THAT(sealed, HasSubstr("NoNewPrivs:\t1"));
+}
+
+TEST_F(Sandbox, NoNamespaceWithCapabilitiesCanBeMade) {
+  const std::string attempt =
+      "unshare -rm sh -c 'mount -o remount,bind,rw /case; echo no > /case/rec01.lcm; "
+      "grep CapEff /proc/self/status'";
+  const std::string sealed = console(attempt, true);
+  EXPECT_THAT(sealed, Not(HasSubstr("CapEff:\t000001ffffffffff")));
+  EXPECT_EQ(read_text(folder_ / "case" / "rec01.lcm"), "a log");
+}
+
+TEST_F(Sandbox, WhatIsReadOnlyCannotBeMountedWritable) {
+  const std::string sealed = console(
+      "for at in / /case /usr /etc /tool; do mount -o remount,bind,rw $at && echo REMOUNTED; done; mount -t tmpfs t "
+      "/case && echo MOUNTED; echo no > /case/rec01.lcm && echo WRITTEN; touch /usr/bevel-test && echo WRITTEN; touch "
+      "/bevel-test && echo WRITTEN",
+      true);
+  for (const char* done : {"REMOUNTED", "MOUNTED", "WRITTEN"}) EXPECT_THAT(sealed, Not(HasSubstr(done)));
+  EXPECT_FALSE(fs::exists("/usr/bevel-test"));
+  EXPECT_EQ(read_text(folder_ / "case" / "rec01.lcm"), "a log");
+}
+
+// The path of a campaign may tell the number of the trial, or a seed.
+TEST_F(Sandbox, MountsDoNotShowThePathOfTheCase) {
+  const std::string sealed = console("cat /proc/self/mountinfo /proc/mounts", true);
+  EXPECT_THAT(sealed, HasSubstr(" /case "));
+  EXPECT_THAT(sealed, Not(HasSubstr((folder_ / "case").string())));
+  EXPECT_THAT(sealed, Not(HasSubstr((folder_ / "out").string())));
+}
+
+TEST_F(Sandbox, ProcDoesNotDescribeTheMachine) {
+  const std::string attempt = "cat /proc/cmdline /proc/keys /proc/sched_debug /proc/modules; ls /proc/acpi /proc/fs";
+  EXPECT_NE(console("cat /proc/cmdline", false), "");
+  EXPECT_THAT(console("(" + attempt + ") 2>/dev/null", true), testing::MatchesRegex("(/proc/[a-z]*:|\n)*"));
+}
+
+// ldd loads the audit library of a program, and runs its code outside.
+TEST_F(Sandbox, NoCodeOfTheToolRunsToFindItsLibraries) {
+  const fs::path tool = BEVEL_AUDITED_TOOL, mark = BEVEL_AUDIT_MARK;
+  fs::remove(mark);
+  libraries_of(tool);
+  ToolRun run = run_of("true", true);
+  run.program = tool;
+  const std::atomic<int> stop{0};
+  run_tool(run, stop);
+  EXPECT_FALSE(fs::exists(mark));
+  (void)!std::system(("ldd '" + tool.string() + "' >/dev/null 2>&1").c_str());
+  EXPECT_TRUE(fs::exists(mark)) << "or the test proves nothing";
+}
+
+TEST_F(Sandbox, AFolderWithinTheSecretIsRefused) {
+  const std::atomic<int> stop{0};
+  ToolRun run = run_of("true", true);
+  run.readable = {folder_ / "sealed"};
+  EXPECT_THAT([&] { run_tool(run, stop); },
+              testing::ThrowsMessage<std::runtime_error>(HasSubstr("which the tool under test can read")));
+}
+
+TEST_F(Sandbox, OutputIsCopiedWithoutWhatLinksAndDevicesLeadTo) {
+  const std::string truth = secret().string();
+  console("ln -s " + truth + " /out/link; mkfifo /out/fifo; mkdir /out/folder; echo yes > /out/folder/file", true);
+  EXPECT_TRUE(fs::is_symlink(folder_ / "out" / "link"));
+  EXPECT_FALSE(fs::exists(folder_ / "out" / "fifo"));
+  EXPECT_EQ(read_text(folder_ / "out" / "folder" / "file"), "yes\n");
 }
 
 TEST_F(Sandbox, ExitStatusComesThrough) {

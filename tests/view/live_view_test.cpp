@@ -177,6 +177,28 @@ TEST(LiveView, AnotherInsertionBeginsAnew) {
 }
 
 // Hours of it, at the rate of the page: memory and the time of a reload stay bounded, the whole stays in sight.
+TEST(LiveView, ShowsALimitedNumberOfCamerasAndProcesses) {
+  LiveView view;
+  for (int i = 0; i < 1000; ++i) {
+    view.on(tip(3, i), at(3));
+    process_status_t status{};
+    status.process = "process-" + std::to_string(i);
+    view.on(status, at(3));
+  }
+  json shown = json::parse(view.snapshot(at(3)));
+  EXPECT_EQ(shown["tips"].size(), 16U);
+  EXPECT_EQ(shown["processes"].size(), 32U);
+  // An entry that is silent for more than a minute makes place for a new one.
+  process_status_t status{};
+  status.process = "bevel-controller";
+  view.on(status, at(10));
+  EXPECT_THAT(view.snapshot(at(10)), testing::Not(testing::HasSubstr("bevel-controller")));
+  view.on(status, at(70));
+  shown = json::parse(view.snapshot(at(70)));
+  EXPECT_EQ(shown["processes"].size(), 32U);
+  EXPECT_EQ(shown["processes"][0]["name"], "bevel-controller");
+}
+
 TEST(LiveView, ALongSessionStaysBounded) {
   LiveView view;
   constexpr int kSteps = 60'000;

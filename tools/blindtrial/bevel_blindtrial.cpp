@@ -3,6 +3,7 @@
 #include <iostream>
 
 #include "proof/campaign.hpp"
+#include "proof/seed.hpp"
 #include "proof/trial.hpp"
 #include "tools/common/command_line.hpp"
 #include "tools/common/progress_line.hpp"
@@ -11,14 +12,16 @@ int main(int argc, char** argv) {
   bevel::proof::CampaignOptions o;
   std::string out;
   std::string diagnose;
-  int seed = 1;
+  std::string seed_file;
   bool describe = false;
   bevel::tools::CommandLine command_line(
       "bevel-blindtrial",
       "A blind trial of a mismatch tool: physics concealed and sealed, verdicts hashed, then scored.");
   command_line.example("bevel-blindtrial --trials 3 --out trials --diagnose build/bin/bevel-diagnose")
       .option("--trials", o.trials, "number of trials", 1, 10000)
-      .option("--seed", seed, "the same seed draws the same trials", 0, 2147483647)
+      .option("--seed-file", seed_file,
+              "file with the seed, a whole number from 0 on, or - for standard input; the same seed draws the same "
+              "trials; without it that of --out, or a random one")
       .option("--varied", o.population.varied, "share of trials whose insertions differ", 0.0, 1.0)
       .option("--edition", o.population.edition,
               "of the distribution; 1, with --varied 0: that of the first nine campaigns", 1, bevel::proof::kEditions)
@@ -31,7 +34,7 @@ int main(int argc, char** argv) {
       .option("--jobs", o.jobs, "trials at a time", 1, 64)
       .option("--limit-s", o.limit_s, "a trial that takes longer counts as an abstention, s", 1, 86400)
       .flag("--generate-only", o.generate_only, "draw and seal the trials, run nothing")
-      .flag("--unsealed", o.unsealed, "run the tool without namespaces; the result says so")
+      .flag("--unsealed", o.unsealed, "run the tool without a sandbox; the result reports that")
       .flag("--describe", describe, "print the distribution that trials are drawn from")
       .check([&]() -> std::string {
         if (describe) return "";
@@ -45,7 +48,7 @@ int main(int argc, char** argv) {
     }
     o.out = out;
     o.diagnose = diagnose;
-    o.seed = static_cast<std::uint64_t>(seed);
+    o.seed = bevel::proof::seed_of(seed_file, o.out);
     bevel::tools::ProgressLine line(bevel::tools::ProgressLine::as_stderr_is());
     o.watch = {.begin = [&](const auto& what, auto pieces, auto jobs) { line.begin(what, pieces, jobs); },
                .one_done = [&] { line.one_done(); },

@@ -2,13 +2,13 @@
 
 #include <chrono>
 #include <filesystem>
-#include <fstream>
 #include <iomanip>
 #include <opencv2/imgcodecs.hpp>
 #include <ostream>
 #include <sstream>
 
 #include "io/recording.hpp"
+#include "io/result_file.hpp"
 #include "report/numbers.hpp"
 #include "tools/common/exit_status.hpp"
 
@@ -36,18 +36,16 @@ std::string in_words(const Options& o) {
 
 void print_board(const camera::Board& board, const std::string& path, std::ostream& out) {
   const std::string extension = fs::path(path).extension().string();
-  bool good = false;
   if (extension == ".svg") {
-    std::ofstream file(path);
-    file << board.drawing_svg();
-    file.close();
-    good = static_cast<bool>(file);
+    io::write_result_file(path, board.drawing_svg());
   } else if (extension == ".png") {
-    good = cv::imwrite(path, board.drawing(140));
+    std::vector<unsigned char> picture;
+    if (!cv::imencode(extension, board.drawing(140), picture))
+      throw std::runtime_error("--board '" + path + "': the picture cannot be encoded");
+    io::write_result_file(path, {reinterpret_cast<const char*>(picture.data()), picture.size()});
   } else {
     throw std::invalid_argument("--board '" + path + "' ends in '" + extension + "', allowed: .svg, .png");
   }
-  if (!good) throw std::runtime_error("--board '" + path + "': cannot be written");
   out << path
       << (extension == ".svg" ? ": print it at 100 %, without fitting it to the page"
                               : ": print it so that a square has the side you will give")

@@ -1,11 +1,11 @@
 #include <algorithm>
 #include <cmath>
 #include <filesystem>
-#include <fstream>
 #include <limits>
 #include <nlohmann/json.hpp>
 #include <sstream>
 
+#include "io/result_file.hpp"
 #include "report/numbers.hpp"
 #include "report/page.hpp"
 #include "tools/calibrate/calibrate_tool.hpp"
@@ -298,15 +298,12 @@ void write_figures(const Calibrated& got, const std::string& folder) {
                       {"misplaced_without_wall_mm", t.misplaced_without_wall_mm},
                       {"shape_without_wall_rms_mm", t.shape_without_wall_rms_mm}});
   const std::string path = (std::filesystem::path(folder) / "figures.json").string();
-  std::ofstream out(path);
-  out << nlohmann::json{{"verdict", verdict_of(got).title},
-                        {"cameras", cameras},
-                        {"held_out_boards", boards},
-                        {"corners_left_out", got.corners_left_out}}
-             .dump(2)
-      << '\n';
-  out.close();
-  if (!out) throw std::runtime_error(path + ": cannot be written");
+  io::write_result_file(path, nlohmann::json{{"verdict", verdict_of(got).title},
+                                             {"cameras", cameras},
+                                             {"held_out_boards", boards},
+                                             {"corners_left_out", got.corners_left_out}}
+                                          .dump(2) +
+                                      "\n");
 }
 
 }  // namespace bevel::calibrate

@@ -10,6 +10,7 @@
 #include <utility>
 
 #include "drivers/can/open_bus.hpp"
+#include "nodes/open_lcm.hpp"
 #include "nodes/runtime.hpp"
 
 namespace bevel::tools::check {
@@ -121,6 +122,7 @@ Findings check_all(const nodes::SystemConfig& config, const std::string& lcm_url
                    const std::string& system_file) {
   Findings all;
   const auto add = [&all](const Findings& more) { all.insert(all.end(), more.begin(), more.end()); };
+  nodes::warn_of_lcm_url(lcm_url);
   lcm::LCM lcm(lcm_url);
   const MulticastMeasured multicast = measure_multicast(lcm);
   all.push_back(judge_multicast(multicast));

@@ -3,7 +3,10 @@
 #include <CLI/CLI.hpp>
 #include <algorithm>
 #include <cctype>
+#include <cerrno>
 #include <cstdio>
+#include <cstring>
+#include <iostream>
 #include <new>
 
 #include "io/config.hpp"
@@ -43,6 +46,19 @@ std::string unknown_option(const CLI::App& app, int argc, char** argv) {
     return "unknown option " + given + (likely ? "; did you mean " + nearest + "?" : "");
   }
   return "";
+}
+
+/// Returns \p status, or kFailed if standard output could not be written completely: on a full disk, the last part of
+/// it is refused only when it is flushed.
+int status_with_output(const std::string& program, int status) {
+  errno = 0;
+  std::cout.flush();
+  const bool is_flushed = std::fflush(stdout) == 0;
+  if (is_flushed && !std::cout.bad() && std::ferror(stdout) == 0) return status;
+  const std::string reason = errno != 0 ? std::strerror(errno) : "an earlier write failed";
+  std::fprintf(stderr, "%s: standard output cannot be written (%s); free space or redirect it to another place\n",
+               program.c_str(), reason.c_str());
+  return status == kOk || status == kDamagedInput ? kFailed : status;
 }
 
 }  // namespace
@@ -140,11 +156,11 @@ int CommandLine::run(int argc, char** argv, const std::function<int()>& body) {
     for (const auto& check : impl_->checks)
       if (const std::string problem = check(); !problem.empty()) throw CLI::ValidationError(problem);
   } catch (const CLI::ParseError& e) {
-    return impl_->app.exit(e) == 0 ? kOk : kUsage;
+    return impl_->app.exit(e) == 0 ? status_with_output(impl_->app.get_name(), kOk) : kUsage;
   }
   try {
     require_limits();
-    return body();
+    return status_with_output(impl_->app.get_name(), body());
   } catch (const std::bad_alloc&) {
     std::fprintf(stderr, "%s: out of memory; raise the limit of address space (ulimit -v unlimited) or free memory\n",
                  impl_->app.get_name().c_str());

@@ -9,7 +9,8 @@
 #include <cstring>
 #include <stdexcept>
 #include <system_error>
-#include <utility>
+
+#include "io/result_file.hpp"
 
 namespace bevel::diagnose {
 namespace fs = std::filesystem;
@@ -52,47 +53,6 @@ class SignalsWait {
   sigset_t before_{};
 };
 
-// A file beside its place; gone with its owner unless it took the place.
-class Pending {
- public:
-  Pending(const fs::path& folder, const std::string& name, const std::string& text) : place_(folder / name) {
-    std::string pattern = (folder / ("." + name + ".XXXXXX")).string();
-    const int descriptor = ::mkstemp(pattern.data());
-    if (descriptor < 0) fail(folder, "no file can be made in it");
-    path_ = pattern;
-    const mode_t mask = ::umask(0);  // mkstemp gives a file to its owner alone
-    ::umask(mask);
-    std::size_t done = 0;
-    while (done < text.size()) {
-      const ssize_t size = ::write(descriptor, text.data() + done, text.size() - done);
-      if (size < 0 && errno != EINTR) break;
-      if (size > 0) done += static_cast<std::size_t>(size);
-    }
-    const bool whole = done == text.size() && ::fchmod(descriptor, 0666 & ~mask) == 0 && ::fsync(descriptor) == 0;
-    const int reason = errno;
-    ::close(descriptor);
-    if (whole) return;
-    ::unlink(path_.c_str());  // a constructor that throws has no destructor
-    errno = reason;
-    fail(place_, "cannot be written");
-  }
-  ~Pending() {
-    if (!path_.empty()) ::unlink(path_.c_str());
-  }
-  Pending(Pending&& other) noexcept : place_(std::move(other.place_)), path_(std::exchange(other.path_, {})) {}
-  Pending(const Pending&) = delete;
-  Pending& operator=(const Pending&) = delete;
-  Pending& operator=(Pending&&) = delete;
-
-  void take_place() {
-    if (::rename(path_.c_str(), place_.c_str()) != 0) fail(place_, "cannot be put in place");
-    path_.clear();
-  }
-
- private:
-  fs::path place_, path_;
-};
-
 }  // namespace
 
 void check_writable(const fs::path& folder) {
@@ -112,14 +72,14 @@ void write_together(const fs::path& folder, const std::vector<ResultFile>& files
   std::error_code error;
   fs::create_directories(folder, error);
   if (error) throw std::runtime_error(folder.string() + ": cannot be made: " + error.message());
-  std::vector<Pending> pending;
+  std::vector<io::PendingFile> pending;
   pending.reserve(files.size());
   for (const auto& file : files) {
     if (fs::is_directory(folder / file.name)) {
       errno = EISDIR;
       fail(folder / file.name, "cannot be replaced");
     }
-    if (file.text) pending.emplace_back(folder, file.name, *file.text);
+    if (file.text) pending.emplace_back((folder / file.name).string(), *file.text);
   }
   if (!files.empty()) fs::remove(folder / files.back().name);
   for (const auto& file : files)

@@ -2,13 +2,13 @@
 
 #include <algorithm>
 #include <filesystem>
-#include <fstream>
 #include <ostream>
 #include <stdexcept>
 
 #include "io/find_logs.hpp"
 #include "io/model_file.hpp"
 #include "io/recording.hpp"
+#include "io/result_file.hpp"
 #include "tools/common/exit_status.hpp"
 
 namespace bevel::identify {
@@ -42,11 +42,6 @@ Insertion read_insertion(const std::string& path, std::ostream& err, std::vector
   std::stable_sort(recording.actuators.begin(), recording.actuators.end(), by_time);
   std::stable_sort(recording.tips.begin(), recording.tips.end(), by_time);
   return make_insertion(fs::path(path).stem().string(), recording.actuators, recording.tips);
-}
-
-void write_text(const fs::path& path, const std::string& text) {
-  std::ofstream file(path);
-  if (!(file << text << std::flush)) throw std::runtime_error(path.string() + ": cannot be written");
 }
 
 }  // namespace
@@ -103,7 +98,7 @@ int run(const Options& options, std::ostream& out, std::ostream& err) {
     const fs::path folder(options.out_folder);
     fs::create_directories(folder);
     io::save_model_file({result.chosen, {}}, (folder / "model.toml").string());
-    write_text(folder / "figures.json", figures_json(result));
+    io::write_result_file((folder / "figures.json").string(), figures_json(result));
     save_report(result, (folder / "report.html").string());
     out << "\nwritten: " << (folder / "model.toml").string() << ", figures.json, report.html\n";
   }

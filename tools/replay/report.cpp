@@ -5,12 +5,13 @@
 #include <cstdio>
 #include <filesystem>
 #include <map>
-#include <memory>
 #include <ostream>
 #include <sstream>
 #include <stdexcept>
+#include <utility>
 
 #include "estimator/health.hpp"
+#include "io/result_file.hpp"
 #include "report/page.hpp"
 
 namespace bevel::replay {
@@ -40,24 +41,19 @@ Eigen::Vector3d position_sd_mm(const estimator::FilterState& state) {
 
 class CsvFile {
  public:
-  CsvFile(const std::string& path, const char* header) : file_(std::fopen(path.c_str(), "w")), path_(path) {
-    if (!file_) throw std::runtime_error(path + ": cannot be written");
-    std::fprintf(file_.get(), "%s\n", header);
-  }
+  CsvFile(std::string path, const char* header) : path_(std::move(path)), text_(std::string(header) + "\n") {}
   template <class... Values>
   void row(const char* format, Values... values) {
-    std::fprintf(file_.get(), format, values...);
+    const auto size = static_cast<std::size_t>(std::snprintf(nullptr, 0, format, values...));
+    const std::size_t from = text_.size();
+    text_.resize(from + size + 1);  // snprintf() ends with a zero
+    std::snprintf(text_.data() + from, size + 1, format, values...);
+    text_.pop_back();
   }
-  void close() {
-    if (std::fflush(file_.get()) != 0) throw std::runtime_error(path_ + ": cannot be written to its end");
-  }
+  void close() const { io::write_result_file(path_, text_); }
 
  private:
-  struct Close {
-    void operator()(std::FILE* file) const { std::fclose(file); }
-  };
-  std::unique_ptr<std::FILE, Close> file_;
-  std::string path_;
+  std::string path_, text_;
 };
 
 void write_csv(const Replay& replay, const std::string& stem) {

@@ -5,7 +5,6 @@
 #include <cmath>
 #include <cstdio>
 #include <ctime>
-#include <fstream>
 #include <limits>
 #include <map>
 #include <nlohmann/json.hpp>
@@ -16,6 +15,7 @@
 #include <utility>
 
 #include "diagnosis/parallel.hpp"
+#include "io/result_file.hpp"
 #include "tools/common/progress_line.hpp"
 #include "tools/steering/scenarios.hpp"
 
@@ -236,11 +236,7 @@ int run_targets(const TargetsOptions& options, std::ostream& out) {
   const std::vector<Row> rows = rows_of(options);
   if (rows.empty())
     throw std::runtime_error("--law \"" + options.law + "\" is not tried in --scenario " + options.scenario);
-  std::ofstream file;
-  if (!options.json.empty()) {
-    file.open(options.json);
-    if (!file) throw std::runtime_error(options.json + ": cannot be written");
-  }
+  if (!options.json.empty()) io::require_writable(options.json);  // before hours of work
   out << "seed " << options.seed
       << "; errors in mm, of the insertions that came to rest at the depth of their target\n\n"
       << "| scenario | law | targets | median | mean +- sd | 95 % | worst | at depth, % | arrived | missed as reported "
@@ -273,7 +269,8 @@ int run_targets(const TargetsOptions& options, std::ostream& out) {
   for (const Row& row : rows)
     if (std::exchange(before, row.scenario) != row.scenario)
       out << "- " << row.scenario->name << ": " << row.scenario->what << "\n";
-  if (file.is_open()) file << nlohmann::json{{"seed", options.seed}, {"rows", all}}.dump(1) << "\n";
+  if (!options.json.empty())
+    io::write_result_file(options.json, nlohmann::json{{"seed", options.seed}, {"rows", all}}.dump(1) + "\n");
   return 0;
 }
 

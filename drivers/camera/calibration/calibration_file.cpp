@@ -260,15 +260,18 @@ Calibration load_calibration(const std::string& path) {
 }
 
 void save_calibration(const Calibration& calibration, const std::string& path) {
-  const std::string beside = path + ".part";
+  const std::string unfinished = path + ".part";
+  std::error_code error;
   {
-    std::ofstream out(beside, std::ios::binary | std::ios::trunc);
+    std::ofstream out(unfinished, std::ios::binary | std::ios::trunc);
     out << to_yaml(calibration);
     out.close();
-    if (!out) throw CalibrationError(beside + ": cannot be written");
+    if (!out) {
+      std::filesystem::remove(unfinished, error);
+      throw CalibrationError(path + ": cannot be written; is the disk full, or the folder write-protected?");
+    }
   }
-  std::error_code error;
-  std::filesystem::rename(beside, path, error);
+  std::filesystem::rename(unfinished, path, error);
   if (error) throw CalibrationError(path + ": cannot be written: " + error.message());
 }
 
