@@ -1,7 +1,9 @@
 #include "io/csv_export.hpp"
 
 #include <array>
+#include <cerrno>
 #include <charconv>
+#include <cstring>
 #include <filesystem>
 #include <fstream>
 #include <stdexcept>
@@ -51,24 +53,53 @@ class Line {
   bool names_, started_ = false;
 };
 
-void write_text(const std::string& path, const std::string& text) {
-  std::ofstream file(path, std::ios::binary);
-  file << text;
-  file.flush();
-  if (!file) throw std::runtime_error(path + ": cannot be written");
-}
+constexpr std::array kFiles{exported::kTips,      exported::kHeadings, exported::kAxes,  exported::kCommands,
+                            exported::kEstimates, exported::kTruths,   exported::kConfig};
+
+// Files are complete here before they get their place. The destructor removes what has none.
+class UnfinishedFolder {
+ public:
+  explicit UnfinishedFolder(const std::string& path) : path_(path) {
+    fs::remove_all(path_);  // of an export that was killed
+    fs::create_directories(path_);
+  }
+  ~UnfinishedFolder() {
+    std::error_code ignored;
+    fs::remove_all(path_, ignored);
+  }
+  UnfinishedFolder(const UnfinishedFolder&) = delete;
+  UnfinishedFolder& operator=(const UnfinishedFolder&) = delete;
+
+  void write(const char* name, const std::string& text) const {
+    const fs::path path = path_ / name;
+    std::ofstream file(path, std::ios::binary);
+    file << text;
+    file.close();
+    if (!file) throw std::runtime_error(path.string() + ": cannot be written: " + std::strerror(errno));
+  }
+  // Replaces the files of an earlier export in `folder`; other files stay.
+  void move_to(const fs::path& folder) const {
+    fs::create_directories(folder);
+    for (const char* name : kFiles) {
+      if (fs::exists(path_ / name))
+        fs::rename(path_ / name, folder / name);
+      else
+        fs::remove(folder / name);
+    }
+  }
+
+ private:
+  fs::path path_;
+};
 
 }  // namespace
 
 std::vector<std::pair<std::string, std::int64_t>> export_csv(const Recording& recording, const std::string& folder) {
-  fs::create_directories(folder);
+  const fs::path unfinished = fs::path(folder).lexically_normal() / ".";
+  const UnfinishedFolder parts(unfinished.parent_path().string() + ".unfinished");
   std::vector<std::pair<std::string, std::int64_t>> done;
   const auto write_file = [&](const char* name, const auto& rows, const std::vector<std::size_t>* arrivals) {
-    const std::string path = folder + "/" + name;
-    if (rows.empty()) {
-      fs::remove(path);  // of an export before, which would be taken for this one's
-      return;
-    }
+    if (rows.empty()) return;
     std::string text;
     const auto add = [&](const auto& message, bool names, std::size_t arrival) {
       Line line(text, names);
@@ -79,8 +110,8 @@ std::vector<std::pair<std::string, std::int64_t>> export_csv(const Recording& re
     add(as_message(rows.front()), true, 0);
     for (std::size_t i = 0; i < rows.size(); ++i)
       add(as_message(rows[i]), false, arrivals == nullptr ? 0 : arrivals->at(i));
-    write_text(path, text);
-    done.emplace_back(path, static_cast<std::int64_t>(rows.size()));
+    parts.write(name, text);
+    done.emplace_back(folder + "/" + name, static_cast<std::int64_t>(rows.size()));
   };
   const ArrivalNumbers numbers(recording);
   write_file(exported::kTips, recording.tips, &numbers.tips);
@@ -89,9 +120,9 @@ std::vector<std::pair<std::string, std::int64_t>> export_csv(const Recording& re
   write_file(exported::kCommands, recording.commands, nullptr);
   write_file(exported::kEstimates, recording.estimates, nullptr);
   write_file(exported::kTruths, recording.truths, nullptr);
-  const std::string config = folder + "/" + exported::kConfig;
-  fs::remove(config);
-  if (!recording.config.empty() && !done.empty()) write_text(config, recording.config);
+  if (done.empty()) return done;
+  if (!recording.config.empty()) parts.write(exported::kConfig, recording.config);
+  parts.move_to(folder);
   return done;
 }
 
