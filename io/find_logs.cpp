@@ -56,9 +56,16 @@ bool is_before(const std::string& a, const std::string& b) {
   return a.size() != b.size() ? a.size() < b.size() : a < b;
 }
 
+// Number of a rotated log, not the kind of file: lcmlog-2026-03-02.00.
+bool is_numbered(const fs::path& path) {
+  const std::string extension = path.extension().string();
+  return extension.size() > 1 && std::isdigit(static_cast<unsigned char>(extension[1])) != 0;
+}
+
 // The last folders of a path and its name: "monday_rec01" for 1 folder.
 std::string name_with_folders(const fs::path& path, std::size_t folders, bool whole) {
-  std::string name = (whole || path.extension() != ".lcm" ? path.filename() : path.stem()).string();
+  whole = whole || is_numbered(path) || fs::is_directory(path);
+  std::string name = (whole ? path.filename() : path.stem()).string();
   for (fs::path rest = path.parent_path(); folders > 0 && rest.has_filename(); rest = rest.parent_path(), --folders)
     name = rest.filename().string() + "_" + name;
   return name;
@@ -68,20 +75,20 @@ std::string name_with_folders(const fs::path& path, std::size_t folders, bool wh
 
 bool is_log_name(const std::string& file_name) {
   const fs::path path(file_name);
-  const fs::path base =
-      is_number(path.extension().string().substr(std::min<std::size_t>(1, path.extension().string().size())))
-          ? path.stem()
-          : path;
-  if (base.extension() == ".lcm") return true;
+  const std::string extension = path.extension().string();
+  const bool has_number = !extension.empty() && is_number(extension.substr(1));
+  if ((has_number ? path.stem() : path).extension() == ".lcm") return true;
   // lcm-logger's own name is lcmlog-%Y-%m-%d, with a number behind it.
-  return file_name.starts_with("lcmlog-") && (base != path || !path.has_extension());
+  return file_name.starts_with("lcmlog-") && (has_number || extension.empty());
 }
 
 std::vector<std::string> find_logs(const std::vector<std::string>& paths) {
   std::vector<std::string> logs;
   std::set<fs::path> known;
   const auto add = [&](const std::string& log) {
-    if (known.insert(fs::weakly_canonical(log)).second) logs.push_back(log);
+    if (!known.insert(fs::weakly_canonical(log)).second)
+      throw std::runtime_error(log + ": given twice; give each log once");
+    logs.push_back(log);
   };
   for (const std::string& path : paths) {
     if (!fs::is_directory(path)) {
@@ -109,7 +116,10 @@ std::vector<std::string> result_names(const std::vector<std::string>& logs) {
     bool whole = false;
   };
   std::vector<Named> all;
-  for (const std::string& log : logs) all.push_back({fs::absolute(log).lexically_normal(), ""});
+  for (const std::string& log : logs) {
+    const fs::path path = fs::absolute(log).lexically_normal();
+    all.push_back({path.has_filename() ? path : path.parent_path(), ""});  // "csv/rec01/"
+  }
   std::size_t deepest = 0;
   for (Named& one : all) {
     one.name = name_with_folders(one.path, 0, false);

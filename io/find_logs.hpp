@@ -15,14 +15,16 @@ bool is_log_name(const std::string& file_name);
 /// In a folder a log is a file with a log's name (is_log_name), or a file whose name ends in a number or has no
 /// extension and whose content starts as a log does (`lcm-logger -i rec` writes `rec.00`). Files that are given are
 /// returned as they are. A file that is given twice, or that is in a folder that is given too, is returned once.
-/// @throws std::runtime_error naming a path that does not exist, or a folder without a log
+/// @throws std::runtime_error naming a path that does not exist, a folder without a log, or a log that is given twice,
+/// also as a file of a folder
 std::vector<std::string> find_logs(const std::vector<std::string>& paths);
 
 /// Returns a name for the results of each log; no two are equal.
 ///
-/// The name is the file's without `.lcm`. Names that would be equal get the file's whole name, or as many folders of
-/// the path as it takes to tell them apart: `monday_rec01` and `tuesday_rec01`.
-/// @param logs paths of different files
+/// The name is the file's without its extension, but with the number of a rotated log. Names that would be equal get
+/// the file's whole name, or as many folders of the path as it takes to tell them apart: `monday_rec01` and
+/// `tuesday_rec01`.
+/// @param logs paths of different files or folders
 std::vector<std::string> result_names(const std::vector<std::string>& logs);
 
 }  // namespace bevel::io

@@ -57,12 +57,6 @@ void check_motion_known(const std::string& name, std::vector<model::ActuatorStat
   }
 }
 
-void check_each_once(const std::vector<std::string>& logs) {
-  std::map<fs::path, std::string> known;
-  for (const auto& log : logs)
-    if (!known.emplace(fs::weakly_canonical(log), log).second) throw std::runtime_error(log + ": given twice");
-}
-
 // The last `parts` parts of a path: "monday/insertion.lcm" for 2.
 std::string end_of(const fs::path& path, std::size_t parts) {
   fs::path end;
@@ -107,7 +101,6 @@ namespace {
 class Reader {
  public:
   void add_all(const std::vector<std::string>& logs, const std::string& group, bool changed) {
-    check_each_once(logs);
     const auto names = names_of(logs);
     for (std::size_t i = 0; i < logs.size(); ++i) add(logs[i], group + names[i], changed);
   }

@@ -3,11 +3,12 @@
 #include <algorithm>
 #include <cstdio>
 #include <filesystem>
-#include <map>
+#include <set>
 #include <stdexcept>
 
 #include "io/csv_export.hpp"
 #include "io/csv_import.hpp"
+#include "io/find_logs.hpp"
 #include "io/mcap_export.hpp"
 #include "tools/common/exit_status.hpp"
 
@@ -35,20 +36,15 @@ std::vector<std::string> csv_files(const std::vector<std::string>& paths) {
   return files;
 }
 
-// OUT/NAME.lcm for each, NAME that of the recording. One must not replace another's.
+// OUT/NAME.lcm for each recording; no two are equal.
 std::vector<std::string> log_paths(const std::vector<std::string>& recordings, const std::string& out_folder) {
-  std::map<std::string, std::string> taken;
+  std::set<fs::path> known;
+  for (const std::string& recording : recordings)
+    if (!known.insert(fs::weakly_canonical(recording)).second)
+      throw std::runtime_error(recording + ": given twice; give each recording once");
   std::vector<std::string> logs;
-  for (const std::string& recording : recordings) {
-    fs::path path = fs::path(recording).lexically_normal();
-    if (!path.has_filename()) path = path.parent_path();  // "csv/rec01/"
-    const std::string name = fs::is_directory(path) ? path.filename().string() : path.stem().string();
-    const auto [other, is_new] = taken.emplace(name, recording);
-    if (!is_new)
-      throw std::runtime_error(other->second + " and " + recording + ": would both become " + name +
-                               ".lcm; import them into different folders");
+  for (const std::string& name : io::result_names(recordings))
     logs.push_back((fs::path(out_folder) / (name + ".lcm")).string());
-  }
   return logs;
 }
 
