@@ -5,7 +5,8 @@
 namespace bevel::view {
 
 ViewNode::ViewNode(lcm::LCM& lcm, int socket)
-    : port_(lcm),
+    : lcm_(lcm),
+      port_(lcm),
       server_(
           socket,
           [this] {
@@ -27,6 +28,17 @@ ViewNode::ViewNode(lcm::LCM& lcm, int socket)
     const std::lock_guard lock(mutex_);
     picture_.on_truth(message, moment());
   });
+  config_ = lcm_.subscribe(io::channel::kConfig, &ViewNode::on_config, this);
+}
+
+ViewNode::~ViewNode() {
+  if (config_ != nullptr) lcm_.unsubscribe(config_);
+}
+
+// The text itself is not shown.
+void ViewNode::on_config(const lcm::ReceiveBuffer*, const std::string&) {
+  const std::lock_guard lock(mutex_);
+  picture_.on_config();
 }
 
 template <class Message>

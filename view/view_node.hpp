@@ -14,6 +14,9 @@ class ViewNode {
  public:
   // The LCM must be good and outlive the node; `socket` as PageServer::open_port() returns it.
   ViewNode(lcm::LCM& lcm, int socket);
+  ~ViewNode();
+  ViewNode(const ViewNode&) = delete;
+  ViewNode& operator=(const ViewNode&) = delete;
 
   void tell_time(const nodes::Now& now) { port_.tell_time(now); }
   // Publishes a snapshot; the rate of the page is that of these calls.
@@ -23,8 +26,11 @@ class ViewNode {
  private:
   template <class Message>
   void watch(const char* channel);
+  void on_config(const lcm::ReceiveBuffer* buffer, const std::string& channel);
   Moment moment() const { return {port_.now().ns, port_.now().utime}; }
 
+  lcm::LCM& lcm_;
+  lcm::Subscription* config_ = nullptr;
   std::mutex mutex_;  // of the picture, which the server's threads read for its history
   LiveView picture_;
   nodes::LcmPort port_;
