@@ -7,6 +7,7 @@
 #include <utility>
 #include <vector>
 
+#include "io/csv_import.hpp"
 #include "io/csv_table.hpp"
 #include "tests/support/run_program.hpp"
 #include "tests/support/temporary_folder.hpp"
@@ -31,6 +32,9 @@ class CsvHeaderLine : public ::testing::Test {
     }
   }
   static constexpr const char* kRows = "0.000000 1.500000\n0.100000 2.500000\n";
+  static constexpr const char* kMap =
+      "[time]\ncolumn = \"t\"\nunit = \"s\"\n[tip]\naxes = [\"x\", \"y\", \"z\"]\nunit = \"mm\"\n"
+      "sigma_mm = [0.2, 0.2, 0.2]\n[insertion]\ncolumn = \"depth\"\nunit = \"mm\"\n";
   test::TemporaryFolder folder;
 };
 
@@ -104,11 +108,28 @@ TEST_F(CsvHeaderLine, NamesOfNumbersAreNames) {
   EXPECT_FALSE(table.next());
 }
 
+TEST_F(CsvHeaderLine, ASecondInsertionIsRefusedWithItsRow) {
+  const ColumnMap map = load_column_map(folder.write("map.toml", kMap));
+  std::string rows = "t,depth,x,y,z\n";
+  int i = 0;
+  const auto add = [&](int depth_mm) {
+    rows += std::to_string(0.1 * i++) + "," + std::to_string(depth_mm) + ",0,0," + std::to_string(depth_mm) + "\n";
+  };
+  for (int depth = 0; depth <= 30; ++depth) add(depth);
+  for (int depth = 29; depth >= 0; --depth) add(depth);
+  EXPECT_NO_THROW(import_csv(folder.write("own.csv", rows), map)) << "withdrawn at the end";
+  for (int depth = 1; depth <= 30; ++depth) add(depth);
+  try {
+    import_csv(folder.write("own.csv", rows), map);
+    ADD_FAILURE() << "taken";
+  } catch (const std::runtime_error& e) {
+    EXPECT_THAT(e.what(), HasSubstr("own.csv:62: a second insertion begins"));
+  }
+}
+
 // One file that cannot be used takes nothing from the others, and leaves nothing of its own.
 TEST_F(CsvHeaderLine, AFolderWithOneBadFileIsImportedBesidesIt) {
-  folder.write("map.toml",
-               "[time]\ncolumn = \"t\"\nunit = \"s\"\n[tip]\naxes = [\"x\", \"y\", \"z\"]\nunit = \"mm\"\n"
-               "sigma_mm = [0.2, 0.2, 0.2]\n[insertion]\ncolumn = \"depth\"\nunit = \"mm\"\n");
+  folder.write("map.toml", kMap);
   std::string rows = "t,depth,x,y,z\n";
   for (int i = 0; i < 30; ++i)
     rows += std::to_string(0.1 * i) + "," + std::to_string(i) + ",0,0," + std::to_string(i) + "\n";

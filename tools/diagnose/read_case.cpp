@@ -9,6 +9,7 @@
 #include "io/file_bytes.hpp"
 #include "io/find_logs.hpp"
 #include "io/recording_clock.hpp"
+#include "io/second_insertion.hpp"
 #include "io/sha256.hpp"
 #include "tools/diagnose/figures.hpp"
 
@@ -83,6 +84,7 @@ std::vector<std::string> names_of(const std::vector<std::string>& logs) {
 
 std::string judge_damage(const std::string& name, const io::Recording& recording) {
   io::require_usable(name, recording);
+  io::require_one_insertion(name, recording.actuators);
   const std::string faults = one_line(recording.describe_faults());
   const double lost = static_cast<double>(recording.damage.skipped_bytes + recording.damage.torn_tail_bytes);
   if (lost > kLargestLoss * static_cast<double>(recording.bytes) ||

@@ -9,6 +9,7 @@
 #include "io/find_logs.hpp"
 #include "io/model_file.hpp"
 #include "io/recording.hpp"
+#include "io/second_insertion.hpp"
 #include "tools/common/exit_status.hpp"
 
 namespace bevel::identify {
@@ -39,6 +40,7 @@ Insertion read_insertion(const std::string& path, const std::string& name, std::
   if (!remarks.empty()) faults.push_back(remarks.substr(0, remarks.size() - 1));
   err << remarks;
   io::require_usable(path, recording);
+  io::require_one_insertion(path, recording.actuators);
   const auto by_time = [](const auto& a, const auto& b) { return a.utime < b.utime; };
   std::stable_sort(recording.actuators.begin(), recording.actuators.end(), by_time);
   std::stable_sort(recording.tips.begin(), recording.tips.end(), by_time);
