@@ -12,7 +12,7 @@ namespace bevel::io::mcap {
 namespace {
 
 constexpr std::size_t kMostPlaces = 8;  // of one fault, that are told one by one
-// Of all compressed chunks: the largest file without compression (kLargestMcap_bytes).
+// Limit for all compressed chunks together: the largest file without compression (kLargestMcap_bytes).
 constexpr std::size_t kLargestTotal_bytes = std::size_t{3} << 30U;
 
 // Takes fields from a record's content. What is not there is 0 or empty, and is_whole() says so.
@@ -58,7 +58,7 @@ std::optional<Record> record_at(std::string_view bytes) {
 }
 
 struct Channel {
-  std::string topic, encoding;  // of their own: the chunk that they are from may have been decompressed
+  std::string topic, encoding;  // copies: the chunk may have been decompressed
   bool operator==(const Channel&) const = default;
 };
 
@@ -239,7 +239,7 @@ class Reader {
     if (handler_.on_message) handler_.on_message(message);
   }
 
-  // `is_cut`: the record leads beyond the file, and its content is what is left of the file.
+  // `is_cut`: the record leads beyond the file, and the content ends with the file.
   void take_chunk(std::size_t at, const Record& record, bool is_cut = false) {
     Fields fields(record.content);
     fields.whole<std::uint64_t>(), fields.whole<std::uint64_t>();
@@ -253,9 +253,8 @@ class Reader {
     is_cut = stored.size() < stored_size;
     if (compression.empty()) {
       if (size != stored_size)
-        return damage_.note(
-            Fault::record, at,
-            "a chunk of " + std::to_string(stored_size) + " bytes that says it has " + std::to_string(size));
+        return damage_.note(Fault::record, at,
+                            "a chunk of " + std::to_string(stored_size) + " bytes declares " + std::to_string(size));
       if (take_records(at, stored, is_cut, crc, static_cast<std::size_t>(stored.data() - file_.data())) && crc != 0 &&
           !is_cut)
         checked_.push_back({static_cast<std::size_t>(stored.data() - file_.data()), stored.size(), crc});

@@ -115,7 +115,8 @@ std::int64_t sort_by_receipt(std::vector<LogEvent>& events) {
   return count;
 }
 
-// The same where the tool wrote times of receipt of its own: tips, headings and axes stand in one block each.
+// Sorts the arrivals by event time if tips, headings and axes stand in one block each: the tool that sorted the log by
+// channel also replaced the times of receipt.
 std::int64_t sort_by_event_time(Recording& recording) {
   const auto utime_of = [&](const Arrival& a) {
     switch (a.channel) {
@@ -138,7 +139,7 @@ std::int64_t sort_by_event_time(Recording& recording) {
     newest_us = std::max(newest_us, utime_of(a));
   }
   if (count == 0) return 0;
-  // Of equal times the axes come first: a measurement is compared with where the axes are.
+  // At equal times the axes come first: a measurement is compared with where the axes are.
   std::ranges::stable_sort(recording.arrivals, {}, [&](const Arrival& a) {
     return std::pair(utime_of(a), a.channel == Arrival::Channel::actuator ? 0 : 1);
   });

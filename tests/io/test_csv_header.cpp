@@ -127,7 +127,7 @@ TEST_F(CsvHeaderLine, ASecondInsertionIsRefusedWithItsRow) {
   }
 }
 
-// One file that cannot be used takes nothing from the others, and leaves nothing of its own.
+// One file that cannot be used takes nothing from the others, and leaves no log.
 TEST_F(CsvHeaderLine, AFolderWithOneBadFileIsImportedBesidesIt) {
   folder.write("map.toml", kMap);
   std::string rows = "t,depth,x,y,z\n";

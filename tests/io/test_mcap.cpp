@@ -247,7 +247,7 @@ TEST_F(McapFile, AnyGoodJsonIsReadAndAnyOtherIsNamed) {
   }
 }
 
-// Scripts add fields of their own, and JavaScript and pandas write integers as 1.0.
+// Scripts add fields, and JavaScript and pandas write integers as 1.0.
 TEST_F(McapFile, UnknownFieldsAndIntegersWithAPointAreRead) {
   mcap::Writer file(path("rec.mcap"));
   const auto channel = file.add_channel("MOTION_COMMAND", "bevel.motion_command", "{}");

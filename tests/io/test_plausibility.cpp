@@ -224,7 +224,7 @@ std::vector<model::ActuatorState> axes_at_depths(const std::vector<double>& dept
 
 TEST(SecondInsertion, BeginsWhereTheNeedleWasOut) {
   EXPECT_EQ(second_insertion(axes_at_depths({0, 20, 60, 30, 0.5, 0, 5, 20})), 5U);
-  EXPECT_EQ(second_insertion(axes_at_depths({100, 160, 100, 160})), 2U) << "an axis with a zero of its own";
+  EXPECT_EQ(second_insertion(axes_at_depths({100, 160, 100, 160})), 2U) << "an axis that does not start at 0";
   EXPECT_EQ(second_insertion(axes_at_depths({0, 69, 0, 69})), 2U) << "two logs, one behind the other";
   // The order of the log is not that of time.
   std::vector<model::ActuatorState> shuffled = axes_at_depths({0, 20, 60, 30, 0, 20});
