@@ -16,6 +16,8 @@ find_path(TOMLPLUSPLUS_INCLUDE_DIR toml++/toml.h REQUIRED)
 # By pkg-config: Debian's library is compiled, and the layout of its classes depends on the macros that it was built with.
 find_package(PkgConfig REQUIRED)
 pkg_check_modules(httplib REQUIRED IMPORTED_TARGET cpp-httplib)
+pkg_check_modules(zstd REQUIRED IMPORTED_TARGET libzstd)
+pkg_check_modules(lz4 REQUIRED IMPORTED_TARGET liblz4)
 add_library(bevel_http INTERFACE)
 target_link_libraries(bevel_http INTERFACE PkgConfig::httplib OpenSSL::SSL)
 include(BevelLcm)

@@ -51,20 +51,50 @@ class Line {
   bool names_, started_ = false;
 };
 
+constexpr std::array kFiles{exported::kTips,      exported::kHeadings, exported::kAxes,   exported::kCommands,
+                            exported::kEstimates, exported::kTruths,   exported::kConfig, exported::kRows};
+
+// Files are complete here before they get their place. The destructor removes what has none.
+class UnfinishedFolder {
+ public:
+  explicit UnfinishedFolder(const std::string& path) : path_(path) {
+    fs::remove_all(path_);  // of an export that was killed
+    fs::create_directories(path_);
+  }
+  ~UnfinishedFolder() {
+    std::error_code ignored;
+    fs::remove_all(path_, ignored);
+  }
+  UnfinishedFolder(const UnfinishedFolder&) = delete;
+  UnfinishedFolder& operator=(const UnfinishedFolder&) = delete;
+
+  void write(const char* name, const std::string& text) const { write_result_file((path_ / name).string(), text); }
+  // Replaces the files of an earlier export in `folder`; other files stay. The list of rows comes last, so that a
+  // folder with one is complete.
+  void move_to(const fs::path& folder) const {
+    fs::create_directories(folder);
+    fs::remove(folder / exported::kRows);
+    for (const char* name : kFiles) {
+      if (fs::exists(path_ / name))
+        fs::rename(path_ / name, folder / name);
+      else
+        fs::remove(folder / name);
+    }
+  }
+
+ private:
+  fs::path path_;
+};
+
 }  // namespace
 
 std::vector<std::pair<std::string, std::int64_t>> export_csv(const Recording& recording, const std::string& folder) {
-  fs::create_directories(folder);
-  const std::string counts = folder + "/" + exported::kRows;
-  fs::remove(counts);
+  const fs::path unfinished = fs::path(folder).lexically_normal() / ".";
+  const UnfinishedFolder parts(unfinished.parent_path().string() + ".unfinished");
   std::string rows_of_tables;
   std::vector<std::pair<std::string, std::int64_t>> done;
   const auto write_file = [&](const char* name, const auto& rows, const std::vector<std::size_t>* arrivals) {
-    const std::string path = folder + "/" + name;
-    if (rows.empty()) {
-      fs::remove(path);  // of an export before, which would be taken for this one's
-      return;
-    }
+    if (rows.empty()) return;
     std::string text;
     const auto add = [&](const auto& message, bool names, std::size_t arrival) {
       Line line(text, names);
@@ -75,8 +105,8 @@ std::vector<std::pair<std::string, std::int64_t>> export_csv(const Recording& re
     add(as_message(rows.front()), true, 0);
     for (std::size_t i = 0; i < rows.size(); ++i)
       add(as_message(rows[i]), false, arrivals == nullptr ? 0 : arrivals->at(i));
-    write_result_file(path, text);
-    done.emplace_back(path, static_cast<std::int64_t>(rows.size()));
+    parts.write(name, text);
+    done.emplace_back(folder + "/" + name, static_cast<std::int64_t>(rows.size()));
     rows_of_tables += fs::path(name).stem().string() + " = " + std::to_string(rows.size()) + "\n";
   };
   const ArrivalNumbers numbers(recording);
@@ -86,15 +116,14 @@ std::vector<std::pair<std::string, std::int64_t>> export_csv(const Recording& re
   write_file(exported::kCommands, recording.commands, nullptr);
   write_file(exported::kEstimates, recording.estimates, nullptr);
   write_file(exported::kTruths, recording.truths, nullptr);
-  const std::string config = folder + "/" + exported::kConfig;
-  fs::remove(config);
-  if (!recording.config.empty() && !done.empty()) {
-    write_result_file(config, recording.config);
+  if (done.empty()) return done;
+  if (!recording.config.empty()) {
+    parts.write(exported::kConfig, recording.config);
     rows_of_tables += "config_bytes = " + std::to_string(recording.config.size()) + "\n";
   }
-  if (!done.empty())
-    write_result_file(
-        counts, "# Rows of each table; bevel-import refuses a table with another number of rows.\n" + rows_of_tables);
+  parts.write(exported::kRows,
+              "# Rows of each table; bevel-import refuses a table with another number of rows.\n" + rows_of_tables);
+  parts.move_to(folder);
   return done;
 }
 

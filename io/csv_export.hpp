@@ -13,7 +13,8 @@
 
 namespace bevel::io {
 
-// Makes `folder`, and replaces what an export before left in it. Returns each file with its number of rows. Throws
+// Makes `folder`, and replaces the files of an earlier export in it. All files are written to `folder`.unfinished
+// first, so that an export that fails changes nothing. Returns each file with its number of rows. Throws
 // std::runtime_error naming a file it cannot write.
 std::vector<std::pair<std::string, std::int64_t>> export_csv(const Recording& recording, const std::string& folder);
 

@@ -11,6 +11,7 @@
 #include "io/log_writer.hpp"
 #include "io/messages.hpp"
 #include "io/recording_clock.hpp"
+#include "io/second_insertion.hpp"
 
 namespace bevel::io {
 namespace {
@@ -54,6 +55,18 @@ int leave_out_without_base(PlacedReadings& readings, const std::string& tip_path
                              " (" + base_path + "): they have no time in common. Are the units and clocks the same? " +
                              "offset_s in [time] or [base.time] is added to a clock");
   return static_cast<int>(gone);
+}
+
+void require_one_insertion(const PlacedReadings& readings, const std::string& base_path) {
+  std::vector<model::ActuatorState> base;
+  for (const auto& p : readings.base) base.push_back(p.sample);
+  const auto second = second_insertion(base);
+  if (second)
+    throw std::runtime_error(base_path + ":" + std::to_string(readings.base[*second].line) +
+                             ": a second insertion begins: here the needle is back at the entry point, and below it is "
+                             "inserted again by more than " +
+                             format_number(kInserted_mm) +
+                             " mm. Allowed: one insertion in each file. Cut the file at this row");
 }
 
 template <class Sample>
@@ -145,6 +158,7 @@ ImportedRecording import_csv(const std::string& csv_path, const ColumnMap& map, 
   leave_out_the_implausible(readings, csv_path, base_file, out.left_out);
   out.rows_implausible = static_cast<int>(out.left_out.size());
   out.rows_without_base += leave_out_without_base(readings, csv_path, base_file);
+  require_one_insertion(readings, base_file);
   out.far_tips = require_tip_follows_base(readings, csv_path);
   finish(readings, map, csv_path, base_file, out);
   return out;

@@ -15,87 +15,34 @@ constexpr std::string_view kByteOrderMark = "\xEF\xBB\xBF";
 constexpr std::size_t kNamesShown = 12;
 constexpr std::size_t kTwice = std::string::npos;  // in place of a column's number
 
-std::string_view trimmed(std::string_view text) {
-  const auto first = text.find_first_not_of(" \t\r");
-  if (first == std::string_view::npos) return {};
-  return text.substr(first, text.find_last_not_of(" \t\r") - first + 1);
-}
-
-char separator_of(std::string_view header) {
-  bool quoted = false, semicolon = false;
-  for (const char c : header) {
-    if (c == '"') quoted = !quoted;
-    if (!quoted && c == '\t') return '\t';
-    if (!quoted && c == ';') semicolon = true;
-  }
-  return semicolon ? ';' : ',';
-}
-
 }  // namespace
 
-CsvTable::CsvTable(const std::string& path) : path_(path), text_(read_text_file(path)) {
+CsvTable::CsvTable(const std::string& path) : path_(path), text_(read_text_file(path)), lines_("") {
   if (text_.starts_with("\xFF\xFE") || text_.starts_with("\xFE\xFF"))
     throw std::runtime_error(path + ": is UTF-16; allowed: UTF-8, in a spreadsheet \"CSV UTF-8\"");
-  if (text_.starts_with(kByteOrderMark)) at_ = kByteOrderMark.size();
-  std::string_view header;
-  do {
-    if (!next_line(header)) throw std::runtime_error(path + ": is empty");
-  } while (trimmed(header).empty() || trimmed(header).starts_with('#'));
-  separator_ = separator_of(header);
-  names_ = split(header);
-  for (std::size_t i = 0; i < names_.size(); ++i)
-    if (!index_.emplace(names_[i], i).second) index_[names_[i]] = kTwice;
-}
-
-bool CsvTable::next_line(std::string_view& line) {
-  if (at_ >= text_.size()) return false;
-  const std::size_t end = std::min(text_.find('\n', at_), text_.size());
-  line = std::string_view(text_).substr(at_, end - at_);
-  at_ = end + 1;
-  ++line_;
-  return true;
-}
-
-std::vector<std::string> CsvTable::split(std::string_view line) const {
-  std::vector<std::string> cells;
-  std::string cell;  // what stands in quotes, as it is
-  std::size_t from = 0;
-  bool quoted = false, had_quotes = false;
-  const auto end_cell = [&](std::size_t to) {
-    cells.push_back(had_quotes ? std::string(trimmed(cell)) : std::string(trimmed(line.substr(from, to - from))));
-    cell.clear();
-    had_quotes = false;
-    from = to + 1;
-  };
-  for (std::size_t i = 0; i < line.size(); ++i) {
-    const char c = line[i];
-    if (c == '"' && quoted && i + 1 < line.size() && line[i + 1] == '"') {
-      cell += line[++i];
-    } else if (c == '"') {
-      quoted = !quoted;
-      had_quotes = true;
-    } else if (c == separator_ && !quoted) {
-      end_cell(i);
-    } else {
-      cell += c;
-    }
-  }
-  if (quoted) throw std::runtime_error(place(line_) + "a quote (\") is opened and not closed in this line");
-  end_cell(line.size());
-  return cells;
+  lines_ = CsvLines(std::string_view(text_).substr(text_.starts_with(kByteOrderMark) ? kByteOrderMark.size() : 0));
+  header_ = find_header(path, lines_);
+  for (std::size_t i = 0; i < header_.names.size(); ++i)
+    if (!index_.emplace(header_.names[i], i).second) index_[header_.names[i]] = kTwice;
 }
 
 bool CsvTable::next() {
   std::string_view line;
-  while (next_line(line)) {
-    if (trimmed(line).empty()) continue;
-    cells_ = split(line);
-    while (cells_.size() > names_.size() && cells_.back().empty()) cells_.pop_back();
-    if (cells_.size() != names_.size())
+  const std::size_t columns = header_.names.size();
+  while (lines_.next(line)) {
+    if (trimmed_cell(line).empty()) continue;
+    auto cells = split_cells(line, header_.separator);
+    if (!cells) throw std::runtime_error(place(lines_.number()) + "a quote (\") is opened and not closed in this line");
+    cells_ = std::move(*cells);
+    if (cells_.size() != columns && is_comment(line)) continue;
+    while (cells_.size() > columns && cells_.back().empty()) cells_.pop_back();
+    if (cells_.size() != columns)
       throw std::runtime_error(
-          place(line_) + "has " + std::to_string(cells_.size()) + " cells, and the header names " +
-          std::to_string(names_.size()) +
-          (cells_.size() > names_.size() && separator_ == ',' ? "; decimal commas need another separator" : ""));
+          place(lines_.number()) + "has " + std::to_string(cells_.size()) + " cells, and the header (line " +
+          std::to_string(header_.line) + ") names " + std::to_string(columns) +
+          (columns == 1 ? "; if line " + std::to_string(header_.line) + " is a note, put a # before it"
+           : cells_.size() > columns && header_.separator == ',' ? "; decimal commas need another separator"
+                                                                 : ""));
     return true;
   }
   return false;
@@ -105,11 +52,15 @@ const std::string& CsvTable::text(const std::string& column) const {
   const auto found = index_.find(column);
   if (found == index_.end()) {
     std::string all;
-    for (std::size_t i = 0; i < std::min(names_.size(), kNamesShown); ++i)
-      all += (i > 0 ? ", '" : "'") + names_[i] + "'";
-    if (names_.size() > kNamesShown) all += ", ...";
-    throw std::runtime_error(path_ + ": no column '" + column + "'; the nearest is '" + nearest_name(column, names_) +
-                             "'; there are " + all);
+    for (std::size_t i = 0; i < std::min(header_.names.size(), kNamesShown); ++i)
+      all += (i > 0 ? ", '" : "'") + header_.names[i] + "'";
+    if (header_.names.size() > kNamesShown) all += ", ...";
+    throw std::runtime_error(path_ + ": no column '" + column + "'; the nearest is '" +
+                             nearest_name(column, header_.names) + "'; there are " + all +
+                             (header_.is_numbers
+                                  ? "; line " + std::to_string(header_.line) +
+                                        " holds numbers: put a line with the names of the columns before it"
+                                  : ""));
   }
   if (found->second == kTwice)
     throw std::runtime_error(path_ + ": column '" + column + "' is there twice; which one is meant?");
@@ -120,7 +71,7 @@ std::optional<double> CsvTable::number(const std::string& column) {
   std::string cell = text(column);
   if (cell.empty() || std::ranges::find(unseen_, cell) != unseen_.end()) return std::nullopt;
   const bool point = cell.find('.') != std::string::npos, comma = cell.find(',') != std::string::npos;
-  if (comma && (point || separator_ == ','))
+  if (comma && (point || header_.separator == ','))
     fail(column,
          "in which the comma may mark thousands; allowed: no thousands marks, and a decimal comma only where "
          "another character separates the cells");
@@ -150,12 +101,15 @@ std::optional<std::int64_t> CsvTable::integer(const std::string& column) const {
 }
 
 void CsvTable::fail(const std::string& column, const std::string& why) const {
-  throw std::runtime_error(place(line_) + "column '" + column + "' is '" + text(column) + "', " + why);
+  throw std::runtime_error(place(line()) + "column '" + column + "' is '" + text(column) + "', " + why);
 }
 
 std::string CsvTable::format() const {
-  const std::string between = separator_ == '\t' ? "tabs" : std::string("'") + separator_ + "'";
-  return between + " between cells" + (mark_ == ',' ? ", decimal comma" : "");
+  std::string between = std::string("'") + header_.separator + "'";
+  if (header_.separator == '\t') between = "tabs";
+  if (header_.separator == kBlanks) between = "blanks";
+  return between + " between cells" + (mark_ == ',' ? ", decimal comma" : "") +
+         (header_.is_commented ? ", header in the comment of line " + std::to_string(header_.line) : "");
 }
 
 }  // namespace bevel::io

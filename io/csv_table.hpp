@@ -1,9 +1,10 @@
-// One CSV file, a row at a time, as spreadsheets and scripts write them: separated by comma, semicolon or tab, numbers
-// with a point or a comma, with or without quotes and a byte order mark. Comments (#) and empty lines may precede the
-// header. Every fault names file, line and column.
+// One CSV file, read row by row, as spreadsheets and scripts write them: separated by comma, semicolon, pipe, tab or
+// blanks, numbers with a point or a comma, with or without quotes and a byte order mark, lines ended by LF, CR LF or
+// CR. csv_header.hpp describes which line is the header. Comments (# or %) and empty lines are skipped, but a comment
+// below the header with as many cells as a row is read as a row. Every error names file, line and column.
 //
-// The separator is the header's: tab if it has one, else semicolon, else comma. A comma is a decimal mark where it does
-// not separate cells; a file that uses both marks is refused, since one of them may mark thousands.
+// A comma is a decimal mark where it does not separate cells; a file that uses both marks is refused, since one of them
+// may mark thousands.
 #pragma once
 
 #include <cstdint>
@@ -13,12 +14,16 @@
 #include <string_view>
 #include <vector>
 
+#include "io/csv_header.hpp"
+
 namespace bevel::io {
 
 class CsvTable {
  public:
   // Reads the file whole, and its header. Throws std::runtime_error as all of these do.
   explicit CsvTable(const std::string& path);
+  CsvTable(const CsvTable&) = delete;  // lines_ refers to text_
+  CsvTable& operator=(const CsvTable&) = delete;
 
   // Cells that mean what an empty one does: nothing was seen. As they stand in the file: "nan", "-9999".
   void set_unseen(std::vector<std::string> unseen) { unseen_ = std::move(unseen); }
@@ -35,18 +40,15 @@ class CsvTable {
   [[noreturn]] void fail(const std::string& column, const std::string& why) const;
   std::string place(int line) const { return path_ + ":" + std::to_string(line) + ": "; }
   const std::string& path() const { return path_; }
-  int line() const { return line_; }  // of the row, from 1
-  std::string format() const;         // "cells between ';', decimal comma"
+  int line() const { return lines_.number(); }  // of the row, from 1
+  std::string format() const;                   // "cells between ';', decimal comma"
 
  private:
-  bool next_line(std::string_view& line);
-  std::vector<std::string> split(std::string_view line) const;
-
   std::string path_, text_;
-  std::size_t at_ = 0;
-  int line_ = 0;
-  char separator_ = ',', mark_ = 0;  // mark: of decimals; 0 until one was seen
-  std::vector<std::string> names_, unseen_;
+  CsvLines lines_;
+  CsvHeader header_;
+  char mark_ = 0;  // of decimals; 0 until one was seen
+  std::vector<std::string> unseen_;
   std::map<std::string, std::size_t> index_;
   std::vector<std::string> cells_;
 };

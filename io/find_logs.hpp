@@ -1,13 +1,31 @@
 #pragma once
-// Which logs are meant by paths.
+/// \file
+/// Which logs are meant by paths, and the names of their results.
 #include <string>
 #include <vector>
 
 namespace bevel::io {
 
-/// Returns files as they are, and of folders the .lcm files in the order of their names.
-/// @throws std::runtime_error for a path that does not exist, a folder without a log, or a log whose name without the
-///   extension has only dots
+/// Returns true for the names that lcm-logger gives to logs: `*.lcm`, `lcmlog-*`, each also with the number of a
+/// rotated, split or incremented log (`rec.lcm.00`, `lcmlog-2026-03-02.01`).
+bool is_log_name(const std::string& file_name);
+
+/// Expands folders into the logs in them, sorted by name, numbers in names by value.
+///
+/// In a folder a log is a file with a log's name (is_log_name), or a file whose name ends in a number or has no
+/// extension and whose content starts as a log does (`lcm-logger -i rec` writes `rec.00`). Files that are given are
+/// returned as they are. A file that is given twice, or that is in a folder that is given too, is returned once.
+/// @throws std::runtime_error naming a path that does not exist, a folder without a log, or a log that is given twice,
+/// also as a file of a folder, or a log whose name
+/// without the extension has only dots
 std::vector<std::string> find_logs(const std::vector<std::string>& paths);
+
+/// Returns a name for the results of each log; no two are equal.
+///
+/// The name is the file's without its extension, but with the number of a rotated log. Names that would be equal get
+/// the file's whole name, or as many folders of the path as it takes to tell them apart: `monday_rec01` and
+/// `tuesday_rec01`.
+/// @param logs paths of different files or folders
+std::vector<std::string> result_names(const std::vector<std::string>& logs);
 
 }  // namespace bevel::io

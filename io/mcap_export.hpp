@@ -22,14 +22,15 @@ void export_mcap(const Recording& recording, const std::string& path);
 struct ImportedMcap {
   Recording recording;
   std::string faults;  // one line per fault, "" if intact
+  std::string notes;   // one line per channel with fields that are not read
   bool intact() const { return faults.empty(); }
   // The same for stderr: each line opens with the file's name.
   std::string remarks(const std::string& name) const;
 };
 
 // Also files that tools/bevel-mcap made before there was this, and such files written anew by other tools. What is
-// damaged is left out and said. Throws std::runtime_error for what is no MCAP, has nothing of a recording in it, or
-// needs what is not read here, a compression above all.
+// damaged is left out and reported. Throws std::runtime_error for what is no MCAP, has no message of a recording in it,
+// or has a chunk of another compression than zstd and lz4.
 ImportedMcap import_mcap(std::string_view file);
 // Throws also where the file cannot be read; each message begins with its name.
 ImportedMcap import_mcap_file(const std::string& path);

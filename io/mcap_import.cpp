@@ -1,7 +1,9 @@
 #include <algorithm>
+#include <cmath>
 #include <filesystem>
 #include <limits>
 #include <nlohmann/json.hpp>
+#include <set>
 #include <sstream>
 #include <stdexcept>
 
@@ -23,7 +25,7 @@ class FromObject {
     const auto field = find(name);
     if (field == object_.end() || !fits(*field, value))
       return fail(name, "is no whole number that this field can have");
-    value = field->template get<Integer>();
+    value = as_integer<Integer>(*field);
   }
   void number(const char* name, double& value) {
     const auto field = find(name);
@@ -43,38 +45,52 @@ class FromObject {
     std::int64_t value = 0;
     const auto field = find(exported::kArrival);
     if (field == object_.end() || !fits(*field, value)) return std::nullopt;
-    return field->get<std::int64_t>();
+    return as_integer<std::int64_t>(*field);
   }
-  // "" if all was there, and nothing else.
-  std::string fault() const {
-    if (!fault_.empty()) return fault_;
-    return taken_ == object_.size() ? "" : "has fields that these messages have not";
+  // "" if all was there.
+  const std::string& fault() const { return fault_; }
+  // Fields that the message does not have.
+  void add_unknown(std::set<std::string>& names) const {
+    if (taken_.size() == object_.size()) return;
+    for (const auto& [name, value] : object_.items())
+      if (!taken_.contains(name) && names.size() < kMostUnknown) names.insert(name.substr(0, kLongestName));
   }
 
  private:
   nlohmann::json::const_iterator find(const std::string& name) {
     const auto field = object_.find(name);
-    if (field != object_.end()) ++taken_;
+    if (field != object_.end()) taken_.insert(name);
     return field;
   }
   template <class Integer>
   static bool fits(const nlohmann::json& field, Integer) {
     constexpr auto kLargest = std::numeric_limits<Integer>::max();
+    // 1.0 is an integer in JSON. Doubles beyond 2^53 are not exact.
+    if (field.is_number_float()) {
+      const auto value = field.get<double>();
+      return std::trunc(value) == value && std::abs(value) <= std::min(0x1p53, static_cast<double>(kLargest)) &&
+             value >= static_cast<double>(std::numeric_limits<Integer>::min());
+    }
     if (field.is_number_unsigned()) return field.get<std::uint64_t>() <= static_cast<std::uint64_t>(kLargest);
     return field.is_number_integer() && field.get<std::int64_t>() >= std::numeric_limits<Integer>::min();
+  }
+  template <class Integer>
+  static Integer as_integer(const nlohmann::json& field) {
+    return field.is_number_float() ? static_cast<Integer>(field.get<double>()) : field.get<Integer>();
   }
   void fail(const char* name, const char* why) {
     if (fault_.empty()) fault_ = "'" + std::string(name) + "' " + why;
   }
   const nlohmann::json& object_;
-  std::size_t taken_ = 0;
+  static constexpr std::size_t kMostUnknown = 8, kLongestName = 40;  // for a message that fits on some lines
+  std::set<std::string> taken_;
   std::string fault_;
 };
 
 // "" and the message, or why there is none.
 template <class Message>
 std::string parse(const JsonLayout& layout, std::string_view json, Message& message,
-                  std::optional<std::int64_t>& arrival) {
+                  std::optional<std::int64_t>& arrival, std::set<std::string>& unknown) {
   JsonReader reader(layout, json);
   visit_columns(message, reader);
   std::int64_t number = 0;
@@ -87,7 +103,8 @@ std::string parse(const JsonLayout& layout, std::string_view json, Message& mess
     FromObject fields(object);
     visit_columns(message, fields);
     if (layout.numbers_arrivals()) arrival = fields.arrival();
-    if (std::string fault = fields.fault(); !fault.empty()) return fault;
+    if (!fields.fault().empty()) return fields.fault();
+    fields.add_unknown(unknown);
   }
   if (const auto error = check_fields(message)) return "would be refused by readers (" + describe(*error) + ")";
   return "";
@@ -100,11 +117,17 @@ class ChannelReader {
   ChannelReader(const char* topic, bool numbers_arrivals)
       : topic_(topic), layout_(JsonLayout::of<Message>(numbers_arrivals)) {}
   const char* topic() const { return topic_; }
+  // A line, or "".
+  std::string note() const {
+    std::string names;
+    for (const std::string& name : unknown_) names += (names.empty() ? "'" : ", '") + name + "'";
+    return names.empty() ? "" : std::string(topic_) + " has fields that are not read: " + names + "\n";
+  }
 
   void take(const mcap::Message& one, mcap::Damage& damage) {
     Row row{.sequence = one.sequence};
     std::optional<std::int64_t> arrival;
-    const std::string fault = parse(layout_, one.data, row.message, arrival);
+    const std::string fault = parse(layout_, one.data, row.message, arrival, unknown_);
     if (!fault.empty()) {
       damage.note(mcap::Fault::message, one.offset,
                   "message " + std::to_string(one.sequence) + " of " + topic_ + " " + fault + "; left out");
@@ -131,6 +154,7 @@ class ChannelReader {
   const char* topic_;
   JsonLayout layout_;
   std::vector<Row> rows_;
+  std::set<std::string> unknown_;
   bool in_order_ = true;
 };
 
@@ -146,6 +170,9 @@ struct Channels {
       (void)((one.topic == readers.topic() ? (require_json(one), readers.take(one, damage), true) : false) || ...);
     };
     offer(tips, actuators, headings, commands, estimates, truths);
+  }
+  std::string notes() const {
+    return tips.note() + headings.note() + actuators.note() + commands.note() + estimates.note() + truths.note();
   }
   void give(Recording& recording) {
     ArrivalsByNumber arrivals;
@@ -176,9 +203,9 @@ struct Channels {
 }  // namespace
 
 std::string ImportedMcap::remarks(const std::string& name) const {
-  std::istringstream lines(faults);
   std::string text, line;
-  while (std::getline(lines, line)) text += name + ": damaged: " + line + "\n";
+  for (std::istringstream lines(faults); std::getline(lines, line);) text += name + ": damaged: " + line + "\n";
+  for (std::istringstream lines(notes); std::getline(lines, line);) text += name + ": " + line + "\n";
   return text;
 }
 
@@ -186,22 +213,23 @@ ImportedMcap import_mcap(std::string_view file) {
   ImportedMcap out;
   Channels channels;
   mcap::Damage unusable;
-  const mcap::Damage damage = mcap::read(
-      file, {.on_message =
-                 [&](const mcap::Message& one) {
-                   ++out.recording.events;
-                   channels.take(one, unusable);
-                 },
-             .on_attachment =
-                 [&](const mcap::Attachment& one) {
-                   if (one.name == exported::kConfig) out.recording.config = one.data;
-                 }});
+  const mcap::Damage damage = mcap::read(file, {.on_message =
+                                                    [&](const mcap::Message& one) {
+                                                      ++out.recording.events;
+                                                      channels.take(one, unusable);
+                                                    },
+                                                .on_attachment =
+                                                    [&](const mcap::Attachment& one) {
+                                                      if (one.name == exported::kConfig)
+                                                        out.recording.config = one.data;
+                                                    }});
   for (const mcap::Damage::Place& place : damage.places)
     if (place.fault == mcap::Fault::magic || place.fault == mcap::Fault::compression)
       throw std::runtime_error(place.what);
   out.recording.bytes = static_cast<std::int64_t>(file.size());
   channels.give(out.recording);
   out.faults = damage.describe() + unusable.describe();
+  out.notes = channels.notes();
   const Recording& r = out.recording;
   if (r.arrivals.empty() && r.commands.empty() && r.estimates.empty() && r.truths.empty())
     throw std::runtime_error("no message that can be used, of " + std::to_string(r.events) + " on any channel" +

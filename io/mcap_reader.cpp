@@ -5,12 +5,15 @@
 #include <map>
 #include <optional>
 
+#include "io/mcap_compression.hpp"
 #include "io/mcap_container.hpp"
 
 namespace bevel::io::mcap {
 namespace {
 
 constexpr std::size_t kMostPlaces = 8;  // of one fault, that are told one by one
+// Limit for all compressed chunks together: the largest file without compression (kLargestMcap_bytes).
+constexpr std::size_t kLargestTotal_bytes = std::size_t{3} << 30U;
 
 // Takes fields from a record's content. What is not there is 0 or empty, and is_whole() says so.
 class Fields {
@@ -55,7 +58,7 @@ std::optional<Record> record_at(std::string_view bytes) {
 }
 
 struct Channel {
-  std::string_view topic, encoding;
+  std::string topic, encoding;  // copies: the chunk may have been decompressed
   bool operator==(const Channel&) const = default;
 };
 
@@ -81,8 +84,8 @@ class Reader {
                        " that the file says it has");
     if (summary_.attachments && *summary_.attachments != attachments_)
       damage_.note(Fault::missing, summary_start_,
-                   std::to_string(attachments_) + " attachments were read of " +
-                       std::to_string(*summary_.attachments) + " that the file says it has");
+                   std::to_string(attachments_) + " attachments were read of " + std::to_string(*summary_.attachments) +
+                       " that the file says it has");
     return std::move(damage_);
   }
 
@@ -152,6 +155,8 @@ class Reader {
         damage_.note(Fault::record, at,
                      (record ? "a footer before the data's end" : "a record that leads beyond the file") +
                          std::string("; ") + std::to_string(end - at) + " bytes are not read");
+        if (!goes_on && !record && static_cast<Op>(static_cast<std::uint8_t>(file_[at])) == Op::chunk)
+          take_chunk(at, {Op::chunk, file_.substr(std::min(at + kRecordHead, file_.size()))}, true);
         if (!goes_on) return;
         at = end;
         continue;
@@ -210,7 +215,7 @@ class Reader {
     Fields fields(record.content);
     const auto id = fields.whole<std::uint16_t>();
     fields.whole<std::uint16_t>();  // its schema; what the messages are is known by the topic
-    const Channel channel{fields.text(), fields.text()};
+    const Channel channel{std::string(fields.text()), std::string(fields.text())};
     if (fields.is_whole()) channels_.try_emplace(id, channel);
     return fields.is_whole();
   }
@@ -234,34 +239,70 @@ class Reader {
     if (handler_.on_message) handler_.on_message(message);
   }
 
-  void take_chunk(std::size_t at, const Record& record) {
+  // `is_cut`: the record leads beyond the file, and the content ends with the file.
+  void take_chunk(std::size_t at, const Record& record, bool is_cut = false) {
     Fields fields(record.content);
     fields.whole<std::uint64_t>(), fields.whole<std::uint64_t>();
     const auto size = fields.whole<std::uint64_t>();
     const auto crc = fields.whole<std::uint32_t>();
     const std::string_view compression = fields.text();
-    const std::string_view records = fields.bytes();
-    if (!fields.is_whole()) return damage_.note(Fault::record, at, "a chunk's fields lead beyond it");
-    if (!compression.empty())
-      return damage_.note(Fault::compression, at,
-                          "a chunk's compression is '" + std::string(compression.substr(0, 16)) +
-                              "'; allowed: none (other MCAP tools write such a file anew without)");
-    if (size != records.size())
+    const auto stored_size = fields.whole<std::uint64_t>();
+    if (!fields.is_whole() || (stored_size > fields.left().size() && !is_cut))
+      return is_cut ? void() : damage_.note(Fault::record, at, "a chunk's fields lead beyond it");
+    const std::string_view stored = fields.left().substr(0, stored_size);
+    is_cut = stored.size() < stored_size;
+    if (compression.empty()) {
+      if (size != stored_size)
+        return damage_.note(Fault::record, at,
+                            "a chunk of " + std::to_string(stored_size) + " bytes declares " + std::to_string(size));
+      if (take_records(at, stored, is_cut, crc, static_cast<std::size_t>(stored.data() - file_.data())) && crc != 0 &&
+          !is_cut)
+        checked_.push_back({static_cast<std::size_t>(stored.data() - file_.data()), stored.size(), crc});
+      return;
+    }
+    if (size > std::min(kLargestChunk_bytes, kLargestTotal_bytes - decompressed_bytes_))
       return damage_.note(Fault::record, at,
-                          "a chunk of " + std::to_string(records.size()) + " bytes that says it has " +
-                              std::to_string(size));
-    if (crc != 0 && crc32_of(records) != crc)
-      return damage_.note(Fault::crc, at,
-                          "a chunk of " + std::to_string(size) + " bytes has not its CRC-32; it is left out");
-    const auto start = static_cast<std::size_t>(records.data() - file_.data());
-    if (crc != 0) checked_.push_back({start, records.size(), crc});
+                          "a chunk declares " + std::to_string(size) +
+                              " bytes after decompression; allowed: " + std::to_string(kLargestChunk_bytes) + ", and " +
+                              std::to_string(kLargestTotal_bytes) + " of all chunks; it is left out");
+    const auto records = decompress(compression, stored, size);
+    if (!records)
+      return damage_.note(
+          Fault::compression, at,
+          "a chunk's compression is '" + std::string(compression.substr(0, 16)) + "'; allowed: none, zstd, lz4");
+    decompressed_bytes_ += records->size();
+    if (records->size() != size && !is_cut)
+      return damage_.note(Fault::record, at,
+                          "a chunk of " + std::string(compression) + " has not the " + std::to_string(size) +
+                              " bytes that it declares; it is left out");
+    take_records(at, *records, is_cut, crc, std::nullopt);
+  }
+
+  // Returns whether the records were taken. `start`: where they are in the file, if they are.
+  bool take_records(std::size_t at, std::string_view records, bool is_cut, std::uint32_t crc,
+                    std::optional<std::size_t> start) {
+    if (!is_cut && crc != 0 && crc32_of(records) != crc) {
+      damage_.note(Fault::crc, at,
+                   "a chunk of " + std::to_string(records.size()) + " bytes has not its CRC-32; it is left out");
+      return false;
+    }
+    const std::uint64_t messages_before = messages_;
     for (std::size_t in = 0; in < records.size();) {
       const auto inside = record_at(records.substr(in));
-      if (!inside || (inside->op != Op::schema && inside->op != Op::channel && inside->op != Op::message))
-        return damage_.note(Fault::record, start + in, "a record that cannot be in a chunk, or leads beyond it");
-      take_record(start + in, *inside);
+      if (!inside && is_cut) break;
+      if (!inside || (inside->op != Op::schema && inside->op != Op::channel && inside->op != Op::message)) {
+        damage_.note(Fault::record, start.value_or(at) + (start ? in : 0),
+                     "a record that cannot be in a chunk, or leads beyond it");
+        break;
+      }
+      take_record(start ? *start + in : at, *inside);
       in += kRecordHead + inside->content.size();
     }
+    if (is_cut)
+      damage_.note(Fault::cut, at,
+                   "a chunk is cut off; the " + std::to_string(messages_ - messages_before) +
+                       " messages before the cut are used, which its CRC-32 cannot confirm");
+    return true;
   }
 
   void take_attachment(std::size_t at, const Record& record) {
@@ -290,6 +331,7 @@ class Reader {
   std::map<std::uint16_t, Channel> channels_;
   std::vector<Checked> checked_;
   std::uint64_t messages_ = 0, attachments_ = 0;
+  std::size_t decompressed_bytes_ = 0;
 };
 
 }  // namespace

@@ -1,6 +1,7 @@
-// Reads what is in an MCAP file, from bytes in memory, and says what cannot be. Lengths in the file are compared with
-// the bytes that are there and with nothing else: none is allocated by, none leads outside. Every record is looked at
-// where it stands, from the first on; the summary serves to go on behind damage, and to say how much is missing.
+// Reads what is in an MCAP file, from bytes in memory, and reports what cannot be read. Lengths in the file are
+// compared with the bytes that are there: none is used for an allocation, none leads outside. The size of a compressed
+// chunk is limited. Records are read in the order of the file; the summary serves to continue behind damage, and to
+// report how much is missing. Of a chunk that the end of the file cuts off, the records before the cut are read.
 #pragma once
 
 #include <cstdint>
@@ -16,7 +17,7 @@ enum class Fault : std::uint8_t {
   record,       // a length that leads beyond the file or what the record is in, or fields that do not fit into it
   cut,          // the file does not end as one does
   crc,          // a CRC-32 that is not that of the bytes
-  compression,  // a chunk that has one; none is read here
+  compression,  // of a chunk, neither zstd nor lz4
   channel,      // a message of a channel that the file does not say
   missing,      // fewer messages or attachments than the summary says
   message,      // for the caller: what a message says cannot be used
@@ -37,13 +38,13 @@ struct Damage {
   std::string describe() const;  // a line a place
 };
 
-// Views into the file.
+// Views into the file, or into a decompressed chunk: valid until the handler returns.
 struct Message {
   std::string_view topic, encoding;  // the channel's: "json"
   std::uint32_t sequence = 0;
   std::uint64_t log_time_ns = 0;
   std::string_view data;
-  std::uint64_t offset = 0;
+  std::uint64_t offset = 0;  // in the file; that of the chunk if it is compressed
 };
 struct Attachment {
   std::string_view name, media_type, data;

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <limits>
+#include <set>
 #include <sstream>
 #include <stdexcept>
 
@@ -12,6 +13,9 @@ namespace bevel::io {
 namespace {
 
 constexpr double kLargestShareLeftOut = 0.2;
+// Messages of one rig are delayed by less. Cameras lag by tenths of a second, and estimators keep 0.3 s
+// (estimator/needle_estimator.hpp).
+constexpr std::int64_t kLongestDelay_us = 1'000'000;
 
 // False if the message was refused.
 template <class Message, class Store>
@@ -102,6 +106,58 @@ void leave_out_the_implausible(Recording& recording) {
   recording.coverage.faults += of_headings.faults;
 }
 
+std::int64_t count_late(std::int64_t time_us, std::int64_t newest_us) {
+  return newest_us != std::numeric_limits<std::int64_t>::min() && time_us < newest_us - kLongestDelay_us ? 1 : 0;
+}
+
+// A log that a tool has sorted by channel: each channel is in the order of receipt, the whole log is not. A wall clock
+// that was set, and a damaged time stamp, show in a channel too; such a log stays as it is. Returns how many events
+// were received more than a second before one that stands above them.
+std::int64_t sort_by_receipt(std::vector<LogEvent>& events) {
+  std::map<std::string_view, std::int64_t> newest_of_channel;
+  std::int64_t newest_us = std::numeric_limits<std::int64_t>::min(), count = 0;
+  for (const LogEvent& event : events) {
+    auto& newest = newest_of_channel.try_emplace(event.channel, event.timestamp_us).first->second;
+    if (event.timestamp_us < newest) return 0;
+    newest = event.timestamp_us;
+    count += count_late(event.timestamp_us, newest_us);
+    newest_us = std::max(newest_us, event.timestamp_us);
+  }
+  if (count > 0) std::ranges::stable_sort(events, {}, &LogEvent::timestamp_us);
+  return count;
+}
+
+// Sorts the arrivals by event time if tips, headings and axes stand in one block each: the tool that sorted the log by
+// channel also replaced the times of receipt.
+std::int64_t sort_by_event_time(Recording& recording) {
+  const auto utime_of = [&](const Arrival& a) {
+    switch (a.channel) {
+      case Arrival::Channel::tip:
+        return recording.tips[a.index].utime;
+      case Arrival::Channel::heading:
+        return recording.headings[a.index].utime;
+      case Arrival::Channel::actuator:
+        return recording.actuators[a.index].utime;
+    }
+    return std::int64_t{0};
+  };
+  std::set<Arrival::Channel> channels;
+  std::int64_t newest_us = std::numeric_limits<std::int64_t>::min(), count = 0;
+  for (std::size_t i = 0; i < recording.arrivals.size(); ++i) {
+    const Arrival& a = recording.arrivals[i];
+    const bool is_same_block = i > 0 && recording.arrivals[i - 1].channel == a.channel;
+    if (!is_same_block && !channels.insert(a.channel).second) return 0;
+    count += count_late(utime_of(a), newest_us);
+    newest_us = std::max(newest_us, utime_of(a));
+  }
+  if (count == 0) return 0;
+  // At equal times the axes come first: a measurement is compared with where the axes are.
+  std::ranges::stable_sort(recording.arrivals, {}, [&](const Arrival& a) {
+    return std::pair(utime_of(a), a.channel == Arrival::Channel::actuator ? 0 : 1);
+  });
+  return count;
+}
+
 std::string one_line(std::string text) {
   while (text.ends_with('\n')) text.pop_back();
   return text;
@@ -128,6 +184,9 @@ std::string Recording::describe_faults() const {
   std::string text;
   if (!file_change.empty()) text += file_change + "\n";
   if (!damage.intact()) text += "log: " + damage.describe() + "\n";
+  if (out_of_order > 0)
+    text += "log: " + std::to_string(out_of_order) + " of " + std::to_string(events) +
+            " events stand behind later ones, as in a log that is sorted by channel; they were sorted by time\n";
   for (const auto& [channel, counts] : rejects) {
     for (std::size_t fault = 0; fault < counts.size(); ++fault) {
       if (counts[fault] == 0) continue;
@@ -178,12 +237,14 @@ Recording read_recording(std::span<const std::uint8_t> log) {
   Recording recording;
   recording.bytes = static_cast<std::int64_t>(log.size());
   LogReader reader(log);
-  while (const auto event = reader.next()) {
-    ++recording.events;
-    add_event(recording, *event);
-  }
+  std::vector<LogEvent> events;
+  while (const auto event = reader.next()) events.push_back(*event);
+  recording.events = std::ssize(events);
   recording.damage = reader.damage();
+  recording.out_of_order = sort_by_receipt(events);
+  for (const LogEvent& event : events) add_event(recording, event);
   leave_out_the_implausible(recording);
+  recording.out_of_order += sort_by_event_time(recording);
   return recording;
 }
 

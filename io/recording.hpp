@@ -44,13 +44,14 @@ struct Recording {
   Coverage coverage;        // tips and headings relative to the time of the axes
   std::string file_change;  // how the file changed while it was read; "" if it did not
   LogDamage damage;
+  std::int64_t out_of_order = 0;  // events that stood behind later ones of other channels; they are sorted by time
   std::int64_t events = 0;
   std::int64_t bytes = 0;
 
   std::int64_t rejected() const;
   bool intact() const {
     return damage.intact() && rejected() == 0 && tip_oddities.empty() && heading_oddities.empty() &&
-           actuator_oddities.empty() && coverage.faults.empty() && file_change.empty();
+           actuator_oddities.empty() && coverage.faults.empty() && file_change.empty() && out_of_order == 0;
   }
   std::string describe_faults() const;  // one line per kind of fault; "" if intact
   // The same for stderr: each line opens with the log's name.

@@ -215,8 +215,8 @@ void ControllerNode::end() {
 
 void ControllerNode::report() {
   const controller::Status& s = supervisor_.status();
-  const bool is_health = s.reason == controller::Reason::state_unhealthy ||
-                         (s.reason == controller::Reason::state_reset && s.value != 0);
+  const bool is_health =
+      s.reason == controller::Reason::state_unhealthy || (s.reason == controller::Reason::state_reset && s.value != 0);
   std::string reason = is_health ? std::string(controller::to_string(s.reason)) + ": " +
                                        estimator::describe_health(static_cast<std::int32_t>(s.value))
                                  : controller::describe(s);

@@ -16,8 +16,11 @@ using json = nlohmann::json;
 namespace {
 
 constexpr double kNone = std::numeric_limits<double>::quiet_NaN();
-// Data that lies this far from what came before is another insertion's: another log is played, or one from its start.
+// Data this much newer than before belong to another insertion.
 constexpr std::int64_t kGap_us = 10'000'000;
+// Data this much older than before on the same channel (for measurements: of the same camera) belong to another
+// playback. The stamps of one sender grow; messages that the network delays differ by less than a second.
+constexpr std::int64_t kBackward_us = 1'000'000;
 // A message this much older or newer than the clock was not made now: it is played back.
 constexpr std::int64_t kPlayedBack_us = 5'000'000;
 // Twenty rows a second for ten minutes; after that every second row of the older half goes.
@@ -109,17 +112,31 @@ void LiveView::take(std::map<Key, Newest<Message>>& newest, const Key& key, cons
   newest.insert_or_assign(key, Newest<Message>{message, now, count});
 }
 
-void LiveView::begin_anew_if(std::int64_t utime) {
-  const bool another = first_utime_ == 0 || utime < newest_utime_ - kGap_us || utime > newest_utime_ + kGap_us;
+void LiveView::on_config() { is_new_config_ = true; }
+
+void LiveView::begin_anew_if(std::int64_t utime, Source source, std::int32_t camera) {
+  if (utime <= 0) return;
+  std::int64_t& newest_of_source = newest_of_[{source, camera}];
+  const bool another =
+      first_utime_ == 0 || is_new_config_ || utime < newest_of_source - kBackward_us || utime > newest_utime_ + kGap_us;
   if (!another) {
+    newest_of_source = std::max(newest_of_source, utime);
     newest_utime_ = std::max(newest_utime_, utime);
     return;
   }
-  first_utime_ = newest_utime_ = utime;
+  is_new_config_ = false;
+  newest_of_.clear();
+  newest_of_[{source, camera}] = first_utime_ = newest_utime_ = utime;
   ++beginnings_;
   rows_.clear();
   path_.clear();
   test_ratio_.clear();
+  // Nothing of the insertion before is drawn. Counts of positions and pictures go on: pages recognise them by these.
+  axes_.reset();
+  command_.reset();
+  needle_.reset();
+  truth_.reset();
+  target_.reset();
 }
 
 void LiveView::extend_path(const needle_state_t& m) {
@@ -135,20 +152,23 @@ void LiveView::extend_path(const needle_state_t& m) {
 }
 
 void LiveView::on(const tip_measurement_t& message, const Moment& now) {
-  begin_anew_if(message.utime);
+  begin_anew_if(message.utime, Source::tip, message.camera);
   if (make_place(tips_, message.camera, kMostCameras, now)) take(tips_, message.camera, message, now);
 }
 
 void LiveView::on(const actuator_state_t& message, const Moment& now) {
-  begin_anew_if(message.utime);
+  begin_anew_if(message.utime, Source::axes);
   take(axes_, message, now);
   new_row_ = true;
 }
 
-void LiveView::on(const motion_command_t& message, const Moment& now) { take(command_, message, now); }
+void LiveView::on(const motion_command_t& message, const Moment& now) {
+  begin_anew_if(message.utime, Source::command);
+  take(command_, message, now);
+}
 
 void LiveView::on(const needle_state_t& message, const Moment& now) {
-  begin_anew_if(message.utime);
+  begin_anew_if(message.utime, Source::needle);
   if (!needle_ || needle_->message.reset_count != message.reset_count) path_.clear();
   take(needle_, message, now);
   for (const auto& [camera, tip] : tips_)
@@ -160,7 +180,9 @@ void LiveView::on(const needle_state_t& message, const Moment& now) {
 void LiveView::on(const steering_target_t& message, const Moment& now) {
   constexpr std::int32_t kSetTarget = 1;
   // As armed: a way-point and a target that moves carry places of their own, a stop has none.
-  if (message.request == kSetTarget) take(target_, message, now);
+  if (message.request != kSetTarget) return;
+  begin_anew_if(message.utime, Source::target);
+  take(target_, message, now);
 }
 
 void LiveView::on(const process_status_t& message, const Moment& now) {
@@ -178,7 +200,10 @@ std::string LiveView::picture(std::int32_t camera, std::int64_t count) const {
   return {jpeg.begin(), jpeg.end()};
 }
 
-void LiveView::on_truth(const needle_state_t& message, const Moment& now) { take(truth_, message, now); }
+void LiveView::on_truth(const needle_state_t& message, const Moment& now) {
+  begin_anew_if(message.utime, Source::truth);
+  take(truth_, message, now);
+}
 
 LiveView::Row LiveView::row_now() const {
   Row row{static_cast<double>(newest_utime_ - first_utime_) * 1e-6, {}};

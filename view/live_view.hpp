@@ -14,6 +14,7 @@
 #include <map>
 #include <optional>
 #include <string>
+#include <utility>
 #include <vector>
 
 namespace bevel::view {
@@ -35,6 +36,8 @@ class LiveView {
   void on(const process_status_t& message, const Moment& now);
   void on(const camera_picture_t& message, const Moment& now);
   void on_truth(const needle_state_t& message, const Moment& now);  // of a simulated rig
+  // CONFIG opens a log: the next message with a time begins another insertion.
+  void on_config();
 
   // What is so now, as JSON: the newest of every kind with its age, and one row of the charts. Adds that row to the
   // history where there is something new; call it at the rate at which the charts are to run.
@@ -65,7 +68,9 @@ class LiveView {
     std::array<double, 10> values;
   };
   Row row_now() const;
-  void begin_anew_if(std::int64_t utime);
+  enum class Source : std::uint8_t { tip, axes, command, needle, truth, target };
+  // Another insertion begins with a message that is far from those before it, or is the first one after CONFIG.
+  void begin_anew_if(std::int64_t utime, Source source, std::int32_t camera = 0);
   void extend_path(const needle_state_t& state);
 
   std::map<std::int32_t, Newest<tip_measurement_t>> tips_;     // by camera
@@ -79,8 +84,10 @@ class LiveView {
   std::vector<Row> rows_;
   std::vector<std::array<double, 3>> path_;
   double path_step_mm_ = 0.2;
-  std::int64_t first_utime_ = 0, newest_utime_ = 0;  // of the data
-  std::int64_t beginnings_ = 0;                      // counts insertions, so that a page knows when to begin anew
+  std::int64_t first_utime_ = 0, newest_utime_ = 0;                    // of the data
+  std::map<std::pair<Source, std::int32_t>, std::int64_t> newest_of_;  // utime by source and camera
+  bool is_new_config_ = false;
+  std::int64_t beginnings_ = 0;  // counts insertions, so that a page knows when to begin anew
   bool new_row_ = false;
 };
 

@@ -7,7 +7,8 @@
 namespace bevel::view {
 
 ViewNode::ViewNode(lcm::LCM& lcm, int socket, std::vector<std::string> hosts)
-    : port_(lcm),
+    : lcm_(lcm),
+      port_(lcm),
       server_(
           socket,
           [this] {
@@ -30,6 +31,17 @@ ViewNode::ViewNode(lcm::LCM& lcm, int socket, std::vector<std::string> hosts)
     const std::lock_guard lock(mutex_);
     picture_.on_truth(message, moment());
   });
+  config_ = lcm_.subscribe(io::channel::kConfig, &ViewNode::on_config, this);
+}
+
+ViewNode::~ViewNode() {
+  if (config_ != nullptr) lcm_.unsubscribe(config_);
+}
+
+// The text itself is not shown.
+void ViewNode::on_config(const lcm::ReceiveBuffer*, const std::string&) {
+  const std::lock_guard lock(mutex_);
+  picture_.on_config();
 }
 
 template <class Message>

@@ -70,6 +70,45 @@ class Table(InFolder):
         self.assertEqual([(c.name, c.rig, c.model, c.logs) for c in of_csv],
                          [(c.name, c.rig, c.model, c.logs) for c in of_folder])
 
+    def test_tables_of_spreadsheets_are_read(self):
+        self.case("a"), self.case("b", logs=("1", "2", "3"))
+        header = ["case", "rig", "date", "model", "logs"]
+        rows = [["a", "A", "2026-03-01", "cases/a/model.toml", "cases/a"],
+                ["b", "A", "2026-03-02", "cases/b/model.toml", "cases/b/rec01.lcm; cases/b/rec02.lcm"]]
+
+        def text(separator, end, quote):
+            cells = [f'"{cell}"' if quote and ";" in cell else cell for row in [header, *rows] for cell in row]
+            lines = [separator.join(cells[i:i + 5]) for i in range(0, 15, 5)]
+            return end.join(lines) + end
+
+        wanted = cases.read_fleet(self.table(text(",", "\n", False)))
+        self.assertEqual([len(case.logs) for case in wanted], [2, 2])
+        for what in (text(";", "\n", True), text("|", "\n", False), text("\t", "\r\n", False), text(",", "\r", False),
+                     "sep=;\r\n" + text(";", "\r\n", True), "\ufeffsep=|\n" + text("|", "\n", False),
+                     "# " + text(",", "\n", False), "# bench A\n\n" + text(";", "\n", True),
+                     text(";", ";;\n", True) + ";;;;;;\n",
+                     text(",", "\n", False).replace("\n", "\r\n", 1)):
+            with open(self.folder / "fleet.csv", "w", newline="", encoding="utf-8") as file:
+                file.write(what)
+            self.assertEqual(cases.read_fleet(self.folder / "fleet.csv"), wanted, what)
+        self.assertIn("stand in quotes", self.fault(self.table(text(";", "\n", False))))
+        self.assertIn("allowed: sep=", self.fault(self.table("sep=:\n" + text(",", "\n", False))))
+        (self.folder / "fleet.csv").write_bytes("case,rig,date,model,logs\nä,A,,m,l\n".encode("cp1252"))
+        self.assertIn('"CSV UTF-8"', self.fault(self.folder / "fleet.csv"))
+
+    def test_folders_have_logs_by_the_names_of_lcm_logger(self):
+        case = self.case("a", logs=())
+        log = struct.pack(">I", cases.LOG_SYNC)
+        for name, begin in (("lcmlog-2026-03-02.00", b""), ("lcmlog-2026-03-02.01", b""), ("rec.lcm.10", b""),
+                            ("rec.lcm.2", b""), ("run.00", log), ("run", log), ("notes.00", b"text"), ("Makefile", b"all"),
+                            ("rec.lcm.unfinished", log), ("rec.lcm.bak", log)):
+            (case / name).write_bytes(begin)
+        (case / "sub.lcm").mkdir()
+        for found in (cases.read_fleet(self.folder / "cases"), cases.read_fleet(self.table(
+                "case,rig,date,model,logs\na,A,,cases/a/model.toml,cases/a\n"))):
+            self.assertEqual([log.name for log in found[0].logs],
+                             ["lcmlog-2026-03-02.00", "lcmlog-2026-03-02.01", "rec.lcm.2", "rec.lcm.10", "run", "run.00"])
+
     def test_a_date_that_is_not_written_is_that_of_the_first_event(self):
         when = datetime.datetime(2026, 4, 5, 6, 7, 8, 250000)
         utime = int((when - datetime.datetime(1970, 1, 1)).total_seconds() * 1e6)
@@ -211,6 +250,17 @@ class Whole(AsAWhole):
         self.out = self.folder / "by dask"  # and a folder's name with a space
         self.fleet("--engine", "dask", "-q", status=3)
         self.assertEqual(verdicts, {key: (self.out / "results" / key / "verdict.json").read_bytes() for key in verdicts})
+
+    def test_braces_and_blanks_in_paths_are_taken_as_they_are(self):
+        self.folder = self.folder / "in_{run} {{1}} 'a' $HOME %s {wildcards.key}"
+        self.out = self.folder / "out_{x} {"
+        self.case("A/{1}"), self.case("A/2")
+        program = self.folder / "stand {in}.py"
+        shutil.copy2(STAND_IN, program)
+        for engine in ("snakemake", "dask"):
+            self.out = self.out.with_name(self.out.name + engine)
+            self.fleet("--engine", engine, program=program)
+            self.assertEqual([row["case"] for row in self.rows() if row["verdict"]], ["A/2", "A/{1}"])
 
     def test_interrupted_it_leaves_nothing_half_and_goes_on(self):
         for i in range(2):

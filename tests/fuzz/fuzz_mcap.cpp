@@ -25,7 +25,7 @@ Walk walk(std::string_view file) {
   const io::mcap::Damage damage =
       io::mcap::read(file, {.on_message =
                                 [&](const io::mcap::Message& m) {
-                                  BEVEL_MUST(lies_in_file(m.topic) && lies_in_file(m.encoding) && lies_in_file(m.data));
+                                  // Not of a decompressed chunk, nor topics: the address sanitizer checks these.
                                   BEVEL_MUST(m.offset < file.size());
                                   ++found.messages;
                                   found.bytes += m.data.size();
@@ -36,7 +36,6 @@ Walk walk(std::string_view file) {
                                   BEVEL_MUST(lies_in_file(a.data));
                                   ++found.attachments;
                                 }});
-  BEVEL_MUST(found.bytes <= file.size());
   BEVEL_MUST(damage.intact() == damage.describe().empty());
   found.damage = damage.describe();
   return found;

@@ -128,8 +128,9 @@ TEST_F(OwnCsv, SpreadsheetsOfOtherCountriesAreRead) {
 TEST_F(OwnCsv, WhatATableLeavesOpenIsRefusedWithItsLine) {
   const std::string header = "t,depth,roll,x,y,z\n", row = "0,0,0,0,0,0\n";
   for (const auto& [text, said] : std::vector<std::pair<std::string, std::string>>{
-           {header + row + "0,1,0,0,1,0,0,0\n", "own.csv:3: has 8 cells, and the header names 6; decimal commas need"},
-           {header + row + "0.1,0,0,0\n", "own.csv:3: has 4 cells, and the header names 6"},
+           {header + row + "0,1,0,0,1,0,0,0\n",
+            "own.csv:3: has 8 cells, and the header (line 1) names 6; decimal commas need"},
+           {header + row + "0.1,0,0,0\n", "own.csv:3: has 4 cells, and the header (line 1) names 6"},
            {header + row + "0.1,\"1,000\",0,0,0,0\n", "own.csv:3: column 'depth' is '1,000', in which the comma may"},
            {"t;depth;roll;x;y;z\n0;0;0.5;0;0;0\n1;1,5;0;0;0;0\n",
             "own.csv:3: column 'depth' is '1,5', but numbers above have '.' for a decimal mark"},

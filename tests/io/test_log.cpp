@@ -2,6 +2,8 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <functional>
+
 #include <chrono>
 #include <cstdlib>
 #include <random>
@@ -348,6 +350,69 @@ TEST(LogInterop, pythons_event_log_and_ours_agree) {
   ASSERT_EQ(recording.tips.size(), 3U);
   EXPECT_DOUBLE_EQ(recording.tips[2].position_mm.z(), 3.0);
   EXPECT_EQ(recording.tips[2].utime, tip(3).utime);
+}
+
+// 3 s of axes and tips as a tool leaves them that sorts by channel: with the times of receipt, or with its own.
+Bytes sorted_by_channel(bool own_times) {
+  const TemporaryLog file("sorted.lcm");
+  LogWriter writer(file.path());
+  std::int64_t own = 1'700'000'100'000'000;
+  for (std::int64_t i = 0; i < 300; ++i)
+    writer.write_message(own_times ? ++own : actuator(i).utime + 500, channel::kActuatorState, actuator(i));
+  for (std::int64_t i = 0; i < 90; ++i)
+    writer.write_message(own_times ? ++own : tip(i).utime + 40'000, channel::kTipMeasurement, tip(i));
+  writer.close();
+  return file.bytes();
+}
+
+TEST(Recording, OfALogSortedByChannelIsSortedByTimeAndCounted) {
+  for (const bool own_times : {false, true}) {
+    const Bytes log = sorted_by_channel(own_times);
+    const Recording r = read_recording(log);
+    ASSERT_EQ(r.arrivals.size(), 390U);
+    std::int64_t newest = 0, latest_by = 0;
+    for (const Arrival& a : r.arrivals) {
+      const std::int64_t utime =
+          a.channel == Arrival::Channel::tip ? r.tips[a.index].utime : r.actuators[a.index].utime;
+      latest_by = std::max(latest_by, newest - utime);
+      newest = std::max(newest, utime);
+    }
+    EXPECT_LE(latest_by, own_times ? 0 : 40'000) << "the delay of the camera, where the log has it";
+    EXPECT_EQ(r.tips.size(), 90U);
+    EXPECT_FALSE(r.intact());
+    EXPECT_THAT(r.describe_faults(), ::testing::HasSubstr("events stand behind later ones"));
+    EXPECT_EQ(r.refusal(), "");
+  }
+}
+
+// A camera that lags by two seconds, and a wall clock that was set, are in the log as they were live.
+TEST(Recording, LeavesTheOrderOfReceiptAsItWas) {
+  const auto arrivals_of = [](const std::function<void(LogWriter&)>& fill) {
+    const TemporaryLog file("live.lcm");
+    LogWriter writer(file.path());
+    fill(writer);
+    writer.close();
+    const Recording r = read_recording(file.bytes());
+    EXPECT_EQ(r.out_of_order, 0);
+    std::string order;
+    for (const Arrival& a : r.arrivals) order += a.channel == Arrival::Channel::tip ? 't' : 'a';
+    return order;
+  };
+  const std::string lagging = arrivals_of([](LogWriter& writer) {
+    for (std::int64_t i = 0; i < 600; ++i) {
+      writer.write_message(actuator(i).utime, channel::kActuatorState, actuator(i));
+      if (i >= 200 && i % 4 == 0) writer.write_message(actuator(i).utime, channel::kTipMeasurement, tip((i - 200) / 4));
+    }
+  });
+  EXPECT_EQ(lagging.substr(0, 206), std::string(201, 'a') + "taaaa");
+  const std::string set_back = arrivals_of([](LogWriter& writer) {
+    for (std::int64_t i = 0; i < 10; ++i) {
+      const std::int64_t back_us = i < 5 ? 0 : 3'600'000'000;
+      writer.write_message(actuator(i).utime - back_us, channel::kActuatorState, actuator(i));
+      writer.write_message(actuator(i).utime - back_us, channel::kTipMeasurement, tip(i));
+    }
+  });
+  EXPECT_EQ(set_back, "atatatatatatatatatat");
 }
 
 }  // namespace

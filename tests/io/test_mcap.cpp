@@ -1,6 +1,8 @@
 // MCAP: what goes out comes back to the last bit, and what is damaged is said and harms nobody.
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
+#include <lz4frame.h>
+#include <zstd.h>
 
 #include <filesystem>
 #include <set>
@@ -59,6 +61,15 @@ std::string small_file(const std::string& path) {
   return test::text_of(path);
 }
 
+Recording actuators_alone(int count) {
+  Recording r;
+  for (int i = 0; i < count; ++i) {
+    r.arrivals.push_back({Arrival::Channel::actuator, r.actuators.size()});
+    r.actuators.push_back({1'700'000'000'000'000 + std::int64_t{10'000} * i, i, {2, 2}, 1e-3 * i, 0.1, 1e-4 * i, 0.01});
+  }
+  return r;
+}
+
 TEST_F(McapFile, LogMcapLogIsTheSameLogByteForByte) {
   int unseen = 0, negative_zeros = 0;
   for (unsigned seed = 0; seed < 100; ++seed) {
@@ -108,8 +119,9 @@ TEST_F(McapFile, ThePrograms) {
   EXPECT_FALSE(fs::exists(path("logs/foreign.lcm")));
   fs::create_directories(folder / "other");
   fs::copy_file(path("rec.lcm"), folder / "other/rec.lcm");
-  EXPECT_THAT(run("bevel-export", "-o " + path("two") + " " + path("rec.lcm") + " " + path("other/rec.lcm"), 1),
-              HasSubstr("would both become rec"));
+  run("bevel-export", "--format mcap -o " + path("two") + " " + path("rec.lcm") + " " + path("other/rec.lcm"), 0);
+  EXPECT_TRUE(fs::exists(path("two/other_rec.mcap")));
+  EXPECT_TRUE(fs::exists(path("two/" + folder.path().filename().string() + "_rec.mcap")));
 }
 
 TEST_F(McapFile, EachFlippedByteIsTold) {
@@ -169,12 +181,7 @@ TEST_F(McapFile, LengthsThatLeadAnywhereLeadNowhere) {
 }
 
 TEST_F(McapFile, ADamagedChunkCostsItselfAndIsCounted) {
-  Recording r;
-  for (int i = 0; i < 5000; ++i) {
-    r.arrivals.push_back({Arrival::Channel::actuator, r.actuators.size()});
-    r.actuators.push_back({1'700'000'000'000'000 + std::int64_t{10'000} * i, i, {2, 2}, 1e-3 * i, 0.1, 1e-4 * i, 0.01});
-  }
-  std::string file = exported(r);
+  std::string file = exported(actuators_alone(5000));
   file[file.size() / 2] ^= 1;
   const ImportedMcap some = import_mcap(file);
   EXPECT_THAT(some.faults, HasSubstr("has not its CRC-32; it is left out"));
@@ -227,7 +234,8 @@ TEST_F(McapFile, AnyGoodJsonIsReadAndAnyOtherIsNamed) {
       {R"({"utime":5,"seq":0,"mode":5000000000,"insertion_rate_mm_s":0,"rotation_rate_rad_s":0})", "'mode' is no"},
       {R"({"utime":5,"seq":0,"mode":1,"insertion_rate_mm_s":"0","rotation_rate_rad_s":0})", "'insertion_rate_mm_s' is"},
       {R"({"utime":5,"seq":0,"mode":1,"insertion_rate_mm_s":0,"rotation_rate_rad_s":nan})", "not finite"},
-      {R"({"utime":5,"seq":0,"mode":1,"insertion_rate_mm_s":0,"rotation_rate_rad_s":0,"x":1})", "fields that these"},
+      {R"({"utime":1e300,"seq":0,"mode":1,"insertion_rate_mm_s":0,"rotation_rate_rad_s":0})", "'utime' is no whole"},
+      {R"({"utime":5,"seq":0,"mode":-3e9,"insertion_rate_mm_s":0,"rotation_rate_rad_s":0})", "'mode' is no whole"},
       {R"({"utime":5,"seq":0,"mode":7,"insertion_rate_mm_s":0,"rotation_rate_rad_s":0})", "out of range"}};
   for (const auto& [json, why] : wrong) {
     const ImportedMcap one = import({as_written, json});
@@ -236,6 +244,103 @@ TEST_F(McapFile, AnyGoodJsonIsReadAndAnyOtherIsNamed) {
     EXPECT_EQ(one.recording.commands.size(), 1U) << json;
     const auto alone = [&, message = json] { import({message}); };
     EXPECT_THAT(alone, ThrowsMessage<std::runtime_error>(HasSubstr("no message that can be used")));
+  }
+}
+
+// Scripts add fields, and JavaScript and pandas write integers as 1.0.
+TEST_F(McapFile, UnknownFieldsAndIntegersWithAPointAreRead) {
+  mcap::Writer file(path("rec.mcap"));
+  const auto channel = file.add_channel("MOTION_COMMAND", "bevel.motion_command", "{}");
+  file.write(channel, 0, 0,
+             R"({"utime":1.7e15,"seq":3.0,"mode":1.0,"insertion_rate_mm_s":1,"rotation_rate_rad_s":2,"mood":"good"})");
+  file.close();
+  const ImportedMcap got = import_mcap_file(path("rec.mcap"));
+  EXPECT_TRUE(got.intact()) << got.faults;
+  ASSERT_EQ(got.recording.commands.size(), 1U);
+  EXPECT_EQ(got.recording.commands[0].utime, 1'700'000'000'000'000);
+  EXPECT_EQ(got.recording.commands[0].seq, 3);
+  EXPECT_EQ(got.remarks("rec"), "rec: MOTION_COMMAND has fields that are not read: 'mood'\n");
+}
+
+std::string compressed(const std::string& name, const std::string& bytes) {
+  std::string out(std::max(::ZSTD_compressBound(bytes.size()), ::LZ4F_compressFrameBound(bytes.size(), nullptr)), 0);
+  out.resize(name == "zstd" ? ::ZSTD_compress(out.data(), out.size(), bytes.data(), bytes.size(), 3)
+                            : ::LZ4F_compressFrame(out.data(), out.size(), bytes.data(), bytes.size(), nullptr));
+  return out;
+}
+
+template <class Integer>
+std::string field(Integer value) {
+  std::string out(sizeof value, 0);
+  mcap::put(out.data(), value);
+  return out;
+}
+
+// The data of `file` with each chunk compressed, and no summary. `size`: what a chunk declares, if that is not true.
+std::string with_compressed_chunks(const std::string& file, const std::string& name, std::uint64_t size = 0) {
+  std::string out(mcap::kMagic);
+  for (std::size_t at = mcap::kMagic.size(); at < file.size();) {
+    const auto op = static_cast<mcap::Op>(file[at]);
+    const auto length = mcap::get<std::uint64_t>(file.data() + at + 1);
+    std::string content = file.substr(at + mcap::kRecordHead, length);
+    at += mcap::kRecordHead + length;
+    if (op == mcap::Op::chunk) {
+      const std::string stored = compressed(name, content.substr(40));
+      content = content.substr(0, 28) + field(static_cast<std::uint32_t>(name.size())) + name +
+                field(std::uint64_t{stored.size()}) + stored;
+      if (size != 0) mcap::put(content.data() + 16, size);
+    }
+    if (op == mcap::Op::data_end) content.assign(4, 0);  // no CRC-32 of the data
+    out += std::string(1, static_cast<char>(op)) + field(std::uint64_t{content.size()}) + content;
+    if (op == mcap::Op::data_end) break;
+  }
+  return out + std::string(1, static_cast<char>(mcap::Op::footer)) + field(std::uint64_t{20}) + std::string(20, 0) +
+         std::string(mcap::kMagic);
+}
+
+TEST_F(McapFile, CompressedChunksAreRead) {
+  const std::string file = exported(actuators_alone(5000));
+  const Got whole = read_all(file);
+  for (const std::string name : {"zstd", "lz4"}) {
+    const std::string small = with_compressed_chunks(file, name);
+    ASSERT_LT(small.size(), file.size() / 2);
+    const Got got = read_all(small);
+    EXPECT_TRUE(got.damage.intact()) << name << ": " << got.damage.describe();
+    EXPECT_EQ(got.messages, whole.messages) << name;
+
+    std::string flipped = small;
+    flipped[small.size() / 2] ^= 0x10;
+    const Got less = read_all(flipped);
+    EXPECT_FALSE(less.damage.intact()) << name;
+    EXPECT_GT(less.messages.size(), 2000U) << name;
+    EXPECT_LT(less.messages.size(), 5000U) << name;
+
+    for (const std::uint64_t size : {std::uint64_t{1}, std::uint64_t{1} << 20U, ~std::uint64_t{0}}) {
+      const Got none = read_all(with_compressed_chunks(file, name, size));
+      EXPECT_TRUE(none.messages.empty()) << name;
+      EXPECT_TRUE(none.damage.has(mcap::Fault::record)) << name;
+    }
+  }
+}
+
+// A recorder that is killed leaves half a chunk: all messages that are there are read.
+TEST_F(McapFile, OfAChunkThatIsCutTheMessagesBeforeTheCutAreRead) {
+  const std::string file = exported(actuators_alone(5000));
+  const std::size_t messages_end = file.find("\"seq\":4000,");
+  const Got got = read_all(std::string_view(file).substr(0, messages_end));
+  EXPECT_EQ(got.messages.size(), 4000U);
+  EXPECT_THAT(got.damage.describe(), HasSubstr("a chunk is cut off"));
+  const ImportedMcap imported = import_mcap(std::string_view(file).substr(0, messages_end));
+  EXPECT_EQ(imported.recording.actuators.size(), 4000U);
+  EXPECT_FALSE(imported.intact());
+  // Decoders give whole blocks only; chunks before the cut are read in any case.
+  for (const std::string name : {"zstd", "lz4"}) {
+    const std::string small = with_compressed_chunks(file, name);
+    const Got some = read_all(std::string_view(small).substr(0, small.size() / 2));
+    EXPECT_GT(some.messages.size(), 2000U) << name;
+    EXPECT_LT(some.messages.size(), 5000U) << name;
+    const Got whole = read_all(file);
+    for (std::size_t i = 0; i < some.messages.size(); ++i) ASSERT_EQ(some.messages[i], whole.messages[i]) << name;
   }
 }
 

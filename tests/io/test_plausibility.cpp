@@ -5,6 +5,7 @@
 #include <filesystem>
 
 #include "io/recording.hpp"
+#include "io/second_insertion.hpp"
 #include "tests/support/shared_recordings.hpp"
 
 namespace bevel::io {
@@ -211,6 +212,35 @@ TEST(Plausibility, NoneOfThePracticeRecordingsIsCalledDamaged) {
   }
   std::printf("%d recordings\n", logs);
   EXPECT_GT(logs, 100);
+}
+
+// Depths over time, 10 mm a step.
+std::vector<model::ActuatorState> axes_at_depths(const std::vector<double>& depths_mm) {
+  std::vector<model::ActuatorState> out;
+  for (const double depth_mm : depths_mm)
+    out.push_back({.utime = 1'000'000 + 1'000'000 * std::ssize(out), .seq = std::ssize(out), .insertion_mm = depth_mm});
+  return out;
+}
+
+TEST(SecondInsertion, BeginsWhereTheNeedleWasOut) {
+  EXPECT_EQ(second_insertion(axes_at_depths({0, 20, 60, 30, 0.5, 0, 5, 20})), 5U);
+  EXPECT_EQ(second_insertion(axes_at_depths({100, 160, 100, 160})), 2U) << "an axis that does not start at 0";
+  EXPECT_EQ(second_insertion(axes_at_depths({0, 69, 0, 69})), 2U) << "two logs, one behind the other";
+  // The order of the log is not that of time.
+  std::vector<model::ActuatorState> shuffled = axes_at_depths({0, 20, 60, 30, 0, 20});
+  std::swap(shuffled[1], shuffled[4]);
+  EXPECT_THAT([&] { require_one_insertion("rec.lcm", shuffled); },
+              ::testing::ThrowsMessage<std::runtime_error>(::testing::AllOf(
+                  ::testing::HasSubstr("rec.lcm: holds more than one insertion"), ::testing::HasSubstr("4.000 s"))));
+}
+
+TEST(SecondInsertion, IsNoneWhereTheNeedleStaysInOrOut) {
+  EXPECT_FALSE(second_insertion({}));
+  EXPECT_FALSE(second_insertion(axes_at_depths({0, 20, 60, 60})));
+  EXPECT_FALSE(second_insertion(axes_at_depths({0, 20, 60, 30, 0, 0})));
+  EXPECT_FALSE(second_insertion(axes_at_depths({0, 20, 60, 30, 2, 60}))) << "withdrawn partly";
+  EXPECT_FALSE(second_insertion(axes_at_depths({0, 5, 0, 5, 0, 60}))) << "touched, and moved back";
+  EXPECT_FALSE(second_insertion(axes_at_depths({0, 60, 0, 5, 0}))) << "moved outside";
 }
 
 }  // namespace

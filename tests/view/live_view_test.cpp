@@ -176,6 +176,54 @@ TEST(LiveView, AnotherInsertionBeginsAnew) {
   EXPECT_TRUE(history["rows"][0].empty());
 }
 
+// A log of two seconds, played twice: its second playback starts less than ten seconds back.
+TEST(LiveView, APlaybackOfTheSameLogBeginsAnew) {
+  LiveView view;
+  steering_target_t target{};
+  target.request = 1;
+  const auto play = [&](double from_s) {
+    for (int i = 0; i < 40; ++i) {
+      const double s = from_s + 0.05 * i;
+      view.on(axes(s), at(s));
+      view.on(tip(s - 0.04, 0), at(s));
+      view.on(tip(s - 0.3, 1), at(s));
+      view.on(needle(s, i), at(s));
+      if (i == 20) target.utime = at(s).utime, view.on(target, at(s));
+      (void)view.snapshot(at(s));
+    }
+  };
+  play(1);
+  const std::int64_t first = json::parse(view.snapshot(at(3)))["insertion"];
+  play(1);
+  json history = json::parse(view.history());
+  EXPECT_EQ(history["insertion"], first + 1);
+  EXPECT_EQ(history["path_mm"].size(), 40U);
+  view.on(axes(1), at(3));
+  EXPECT_FALSE(json::parse(view.snapshot(at(3))).contains("target")) << "of the playback before";
+}
+
+TEST(LiveView, AConfigBeginsAnew) {
+  LiveView view;
+  view.on(needle(1, 1), at(1));
+  const std::int64_t first = json::parse(view.snapshot(at(1)))["insertion"];
+  view.on_config();
+  view.on(needle(1.5, 2), at(1.5));
+  view.on(needle(1.6, 3), at(1.6));
+  const json history = json::parse(view.history());
+  EXPECT_EQ(history["insertion"], first + 1);
+  EXPECT_EQ(history["path_mm"].size(), 2U);
+}
+
+// A camera that lags, or a clock of another computer, is not another playback.
+TEST(LiveView, ADelayedCameraDoesNotBeginAnew) {
+  LiveView view;
+  for (int i = 0; i < 100; ++i) {
+    view.on(axes(5 + 0.05 * i), at(0.05 * i));
+    view.on(tip(3 + 0.05 * i, 0), at(0.05 * i));
+  }
+  EXPECT_EQ(json::parse(view.snapshot(at(5)))["insertion"], 1);
+}
+
 // Hours of it, at the rate of the page: memory and the time of a reload stay bounded, the whole stays in sight.
 TEST(LiveView, ShowsALimitedNumberOfCamerasAndProcesses) {
   LiveView view;

@@ -302,8 +302,8 @@ void write_figures(const Calibrated& got, const std::string& folder) {
                                              {"cameras", cameras},
                                              {"held_out_boards", boards},
                                              {"corners_left_out", got.corners_left_out}}
-                                          .dump(2) +
-                                      "\n");
+                                      .dump(2) +
+                                  "\n");
 }
 
 }  // namespace bevel::calibrate

@@ -6,12 +6,17 @@ import difflib
 import hashlib
 import json
 import pathlib
+import re
 import struct
 import tomllib
 
 COLUMNS = ("case", "rig", "date", "model", "logs")
 LOG_HEADER = struct.Struct(">IQQ")  # of an LCM log's event: sync word, number, time in us
 LOG_SYNC = 0xEDA1DA01
+SEPARATORS = (",", ";", "\t", "|")
+# As io/find_logs.hpp: lcm-logger's names, also of rotated and split logs.
+LOG_NAME = re.compile(r"(.*\.lcm(\.\d+)?|lcmlog-[^.]*(\.\d+)?)")
+MAYBE_LOG_NAME = re.compile(r"[^.]+|.*\.\d+")  # a log if it begins as one
 
 
 class Fault(Exception):
@@ -38,7 +43,9 @@ def read_fleet(path):
         raise Fault(f"{path}: is no fleet; allowed: .csv, .toml, or a folder of case folders")
     try:
         rows = from_csv(path) if path.suffix == ".csv" else from_toml(path)
-    except (UnicodeDecodeError, csv.Error) as reason:
+    except UnicodeDecodeError as reason:
+        raise Fault(f"{path}: {reason}; allowed: UTF-8, in a spreadsheet \"CSV UTF-8\"") from None
+    except csv.Error as reason:
         raise Fault(f"{path}: {reason}") from None
     faults, cases, places = [], [], {}
     for place, row in rows:
@@ -57,6 +64,26 @@ def read_fleet(path):
     return cases
 
 
+def is_log(path):
+    """Whether a file of a folder is a log, by its name or else by how it begins."""
+    name = path.name
+    if name.startswith(".") or path.is_dir():
+        return False
+    if LOG_NAME.fullmatch(name):
+        return True
+    if not MAYBE_LOG_NAME.fullmatch(name) or not path.is_file():
+        return False
+    with open(path, "rb") as file:
+        return file.read(4) == LOG_SYNC.to_bytes(4, "big")
+
+
+def logs_in(folder):
+    """Its logs, numbers in names by value: rec.lcm.2 before rec.lcm.10."""
+    return sorted((path for path in folder.iterdir() if is_log(path)),
+                  key=lambda path: [(int(part), "") if part.isdigit() else (-1, part)
+                                    for part in re.split(r"([0-9]+)", path.name)])
+
+
 def check_columns(names, place):
     for name in names:
         if name not in COLUMNS:
@@ -65,24 +92,56 @@ def check_columns(names, place):
             raise Fault(f"{place}: unknown column '{name}'{hint}")
 
 
+def separated_lines(file, place):
+    """The separator of a table and its lines, without comments and the line `sep=;` that spreadsheets put first."""
+    lines = list(file)
+    separator = None
+    if lines and lines[0].strip().strip('"').lower().startswith("sep="):
+        separator = lines[0].strip("\r\n").strip('"')[4:5]
+        if separator not in SEPARATORS:
+            raise Fault(f"{place}:1: the separator in {lines[0].strip()!r} is not known; allowed: sep= with a comma, "
+                        "semicolon, pipe or tab")
+        lines[0] = "\n"
+    for i, line in enumerate(lines):  # blank, so that line numbers stay
+        if not line.strip():
+            continue
+        behind = line.lstrip("# \t")
+        if line.startswith("#") and behind.strip() and re.split("[;,|\t]", behind)[0].strip(' "\r\n') in COLUMNS:
+            lines[i] = line = behind  # a header behind a comment mark
+        if line.startswith("#"):
+            lines[i] = "\n"
+            continue
+        return separator or max(SEPARATORS, key=line.count), lines
+    return ",", lines
+
+
 def from_csv(path):
     with open(path, newline="", encoding="utf-8-sig") as file:
-        lines = csv.reader(file, strict=True)
-        columns = next(lines, [])
-        check_columns(columns, f"{path}:1")
-        for name in COLUMNS:
-            if columns.count(name) != 1 and not (name == "date" and name not in columns):
-                raise Fault(f"{path}:1: {'no column' if name not in columns else 'twice the column'} '{name}'")
-        rows = []
-        for cells in lines:
-            if not cells:
-                continue
-            place = f"{path}:{lines.line_num}"
-            if len(cells) != len(columns):
-                raise Fault(f"{place}: has {len(cells)} cells, and the header names {len(columns)}")
-            row = dict(zip(columns, cells))
-            row["logs"] = [log.strip() for log in row["logs"].split(";") if log.strip()]
-            rows.append((place, row))
+        separator, text = separated_lines(file, path)
+    lines = csv.reader(text, strict=True, delimiter=separator, skipinitialspace=True)
+    columns = next((cells for cells in lines if cells), [])
+    header = max(1, lines.line_num)
+    columns = [name.strip() for name in columns]
+    while columns and not columns[-1]:
+        columns.pop()
+    check_columns(columns, f"{path}:{header}")
+    for name in COLUMNS:
+        if columns.count(name) != 1 and not (name == "date" and name not in columns):
+            raise Fault(f"{path}:{header}: {'no column' if name not in columns else 'twice the column'} '{name}'")
+    rows = []
+    for cells in lines:
+        while len(cells) > len(columns) and not cells[-1].strip():
+            cells.pop()
+        if not any(cell.strip() for cell in cells):
+            continue
+        place = f"{path}:{lines.line_num}"
+        if len(cells) != len(columns):
+            hint = '; several logs in a table with semicolons stand in quotes: "a.lcm; b.lcm"' \
+                if separator == ";" and len(cells) > len(columns) else ""
+            raise Fault(f"{place}: has {len(cells)} cells, and the header names {len(columns)}{hint}")
+        row = dict(zip(columns, cells))
+        row["logs"] = [log.strip() for log in row["logs"].split(";") if log.strip()]
+        rows.append((place, row))
     return rows
 
 
@@ -120,9 +179,9 @@ def from_row(row, folder):
     logs = []
     for name in row["logs"]:
         log = folder / name
-        found = sorted(log.glob("*.lcm")) if log.is_dir() else [log]
+        found = logs_in(log) if log.is_dir() else [log]
         if not found:
-            raise Fault(f"logs '{log}' is a folder without any .lcm")
+            raise Fault(f"logs '{log}' is a folder without any log (*.lcm, lcmlog-*)")
         if not found[0].is_file():
             raise Fault(f"log '{log}' is no file")
         logs += found
@@ -157,7 +216,7 @@ def date_of(written, logs):
 def from_folder(folder):
     cases = []
     for model in sorted(folder.rglob("model.toml")):
-        logs = sorted(model.parent.glob("*.lcm"))
+        logs = logs_in(model.parent)
         if not logs:
             continue
         inside = model.parent.relative_to(folder)
@@ -165,7 +224,7 @@ def from_folder(folder):
         name = str(inside) if inside.parts else folder.resolve().name
         cases.append(Case(name, str(rig), date_of("", logs), model.resolve(), [log.resolve() for log in logs]))
     if not cases:
-        raise Fault(f"{folder}: no folder in it has both a model.toml and a .lcm")
+        raise Fault(f"{folder}: no folder in it has both a model.toml and a log (*.lcm, lcmlog-*)")
     return cases
 
 

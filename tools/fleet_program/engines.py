@@ -32,6 +32,7 @@ def command_line(folder, options):
         "--cores", str((options.jobs + READY) * options.threads)]
     return [sys.executable, "-m", "snakemake", "--snakefile", str(HERE / "Snakefile"), "--directory", str(folder),
             "--configfile", str(folder / "config.json"), "--runtime-source-cache-path", str(folder / "cache"), *where,
+            "--nolock",  # the folder is of this run alone, and Snakemake takes braces in a lock's path for wildcards
             "--keep-going", "--retries", str(RETRIES), "--scheduler", "greedy", "--nocolor", *options.passed_on]
 
 

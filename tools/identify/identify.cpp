@@ -9,6 +9,7 @@
 #include "io/model_file.hpp"
 #include "io/recording.hpp"
 #include "io/result_file.hpp"
+#include "io/second_insertion.hpp"
 #include "tools/common/exit_status.hpp"
 
 namespace bevel::identify {
@@ -32,16 +33,18 @@ FitOptions fit_options(const Options& options, const model::NeedleParameters& st
   return options.bicycle ? bicycle_options(fit) : fit;
 }
 
-Insertion read_insertion(const std::string& path, std::ostream& err, std::vector<std::string>& faults) {
+Insertion read_insertion(const std::string& path, const std::string& name, std::ostream& err,
+                         std::vector<std::string>& faults) {
   io::Recording recording = io::read_recording(path);
   const std::string remarks = recording.remarks(path);
   if (!remarks.empty()) faults.push_back(remarks.substr(0, remarks.size() - 1));
   err << remarks;
   io::require_usable(path, recording);
+  io::require_one_insertion(path, recording.actuators);
   const auto by_time = [](const auto& a, const auto& b) { return a.utime < b.utime; };
   std::stable_sort(recording.actuators.begin(), recording.actuators.end(), by_time);
   std::stable_sort(recording.tips.begin(), recording.tips.end(), by_time);
-  return make_insertion(fs::path(path).stem().string(), recording.actuators, recording.tips);
+  return make_insertion(name, recording.actuators, recording.tips);
 }
 
 }  // namespace
@@ -63,8 +66,10 @@ Identification identify(const Options& options, std::ostream& err) {
   result.start = model.needle;
   result.method = options.method;
   result.prior = options.prior;
-  for (const auto& log : io::find_logs(options.logs))
-    result.insertions.push_back(read_insertion(log, err, result.faults));
+  const auto logs = io::find_logs(options.logs);
+  const auto names = io::result_names(logs);
+  for (std::size_t i = 0; i < logs.size(); ++i)
+    result.insertions.push_back(read_insertion(logs[i], names[i], err, result.faults));
 
   const FitOptions fit = fit_options(options, model.needle);
   result.fit = fit_from_many_starts(result.insertions, fit);

@@ -2,7 +2,6 @@
 
 #include <cstdio>
 #include <filesystem>
-#include <map>
 #include <stdexcept>
 
 #include "io/csv_export.hpp"
@@ -22,8 +21,8 @@ void write_csv(const io::Recording& recording, const std::string& log, const std
 }
 
 void write_mcap(const io::Recording& recording, const std::string& log, const std::string& path) {
-  const std::size_t messages = recording.arrivals.size() + recording.commands.size() + recording.estimates.size() +
-                               recording.truths.size();
+  const std::size_t messages =
+      recording.arrivals.size() + recording.commands.size() + recording.estimates.size() + recording.truths.size();
   if (messages == 0) throw std::runtime_error(log + ": " + recording.refusal());
   fs::create_directories(fs::path(path).parent_path());
   io::export_mcap(recording, path);
@@ -34,25 +33,26 @@ void write_mcap(const io::Recording& recording, const std::string& log, const st
 
 int run(const Options& o) {
   bool intact = true;
-  std::map<std::string, std::string> taken;
+  std::size_t failed = 0;
   const auto logs = io::find_logs(o.logs);
-  for (const std::string& log : logs) {
-    const std::string name = fs::path(log).stem().string();
-    const auto [other, is_new] = taken.emplace(name, log);
-    if (!is_new && other->second != log)
-      throw std::runtime_error(other->second + " and " + log + ": would both become " + name +
-                               "; export them into different folders");
+  const auto names = io::result_names(logs);
+  for (std::size_t i = 0; i < logs.size(); ++i) {
+    try {
+      const io::Recording recording = io::read_recording(logs[i]);
+      std::fprintf(stderr, "%s", recording.remarks(logs[i]).c_str());
+      intact = intact && recording.intact();
+      const std::string path = (fs::path(o.out_folder) / names[i]).string();
+      if (o.format == "mcap")
+        write_mcap(recording, logs[i], path + ".mcap");
+      else
+        write_csv(recording, logs[i], path);
+    } catch (const std::runtime_error& e) {
+      ++failed;
+      std::fprintf(stderr, "%s\n", e.what());
+    }
   }
-  for (const std::string& log : logs) {
-    const io::Recording recording = io::read_recording(log);
-    std::fprintf(stderr, "%s", recording.remarks(log).c_str());
-    intact = intact && recording.intact();
-    const std::string path = (fs::path(o.out_folder) / fs::path(log).stem()).string();
-    if (o.format == "mcap")
-      write_mcap(recording, log, path + ".mcap");
-    else
-      write_csv(recording, log, path);
-  }
+  if (failed > 0 && logs.size() > 1) std::fprintf(stderr, "%zu of %zu logs were not exported\n", failed, logs.size());
+  if (failed > 0) return tools::kFailed;
   return intact ? tools::kOk : tools::kDamagedInput;
 }
 

@@ -11,8 +11,9 @@ struct Options {
   std::vector<std::string> logs;
 };
 
-// Writes OUT/LOG/*.csv or OUT/LOG.mcap, says on stdout what is in each, on stderr what is odd. Returns the exit status.
-// Throws std::runtime_error naming the first log that cannot be used; what is written of those before it is whole.
+// Writes OUT/LOG/*.csv or OUT/LOG.mcap, LOG by io::result_names. Prints on stdout what is in each, on stderr what is
+// odd. A log that cannot be used is reported on stderr and leaves nothing; the others are written, and the exit status
+// is 1. Throws std::runtime_error if a path does not exist.
 int run(const Options& options);
 
 }  // namespace bevel::exporting

@@ -3,11 +3,12 @@
 #include <algorithm>
 #include <cstdio>
 #include <filesystem>
-#include <map>
+#include <set>
 #include <stdexcept>
 
 #include "io/csv_export.hpp"
 #include "io/csv_import.hpp"
+#include "io/find_logs.hpp"
 #include "io/mcap_export.hpp"
 #include "tools/common/exit_status.hpp"
 
@@ -35,20 +36,15 @@ std::vector<std::string> csv_files(const std::vector<std::string>& paths) {
   return files;
 }
 
-// OUT/NAME.lcm for each, NAME that of the recording. One must not replace another's.
+// OUT/NAME.lcm for each recording; no two are equal.
 std::vector<std::string> log_paths(const std::vector<std::string>& recordings, const std::string& out_folder) {
-  std::map<std::string, std::string> taken;
+  std::set<fs::path> known;
+  for (const std::string& recording : recordings)
+    if (!known.insert(fs::weakly_canonical(recording)).second)
+      throw std::runtime_error(recording + ": given twice; give each recording once");
   std::vector<std::string> logs;
-  for (const std::string& recording : recordings) {
-    fs::path path = fs::path(recording).lexically_normal();
-    if (!path.has_filename()) path = path.parent_path();  // "csv/rec01/"
-    const std::string name = fs::is_directory(path) ? path.filename().string() : path.stem().string();
-    const auto [other, is_new] = taken.emplace(name, recording);
-    if (!is_new)
-      throw std::runtime_error(other->second + " and " + recording + ": would both become " + name +
-                               ".lcm; import them into different folders");
+  for (const std::string& name : io::result_names(recordings))
     logs.push_back((fs::path(out_folder) / (name + ".lcm")).string());
-  }
   return logs;
 }
 
@@ -61,20 +57,39 @@ io::Recording read_export(const std::string& path, bool& intact) {
   return std::move(mcap.recording);
 }
 
+// Calls `one(i)` for each recording. What it throws is printed, and the other recordings are imported all the same.
+// `one` returns whether its input was intact.
+template <class One>
+int for_each_recording(std::size_t count, One&& one) {
+  std::size_t failed = 0;
+  bool intact = true;
+  for (std::size_t i = 0; i < count; ++i) {
+    try {
+      intact = one(i) && intact;
+    } catch (const std::runtime_error& e) {
+      ++failed;
+      std::fprintf(stderr, "%s\n", e.what());
+    }
+  }
+  if (failed > 0 && count > 1) std::fprintf(stderr, "%zu of %zu recordings were not imported\n", failed, count);
+  if (failed > 0) return tools::kFailed;
+  return intact ? tools::kOk : tools::kDamagedInput;
+}
+
 int import_exports(const Options& o) {
   const auto logs = log_paths(o.inputs, o.out_folder);
-  bool intact = true;
-  for (std::size_t i = 0; i < logs.size(); ++i) {
+  return for_each_recording(logs.size(), [&](std::size_t i) {
     if (fs::exists(logs[i]))
       throw std::runtime_error(logs[i] + ": is there already, and may be the log that was exported, which holds more " +
                                "than the export; give another folder with --out");
+    bool intact = true;
     const io::Recording recording = read_export(o.inputs[i], intact);
     io::write_log(recording, logs[i]);
     std::printf("%s: %zu TIP_MEASUREMENT, %zu TIP_HEADING, %zu ACTUATOR_STATE, %zu MOTION_COMMAND, %zu NEEDLE_STATE\n",
                 logs[i].c_str(), recording.tips.size(), recording.headings.size(), recording.actuators.size(),
                 recording.commands.size(), recording.estimates.size());
-  }
-  return intact ? tools::kOk : tools::kDamagedInput;
+    return intact;
+  });
 }
 
 }  // namespace
@@ -99,15 +114,13 @@ int run(const Options& o) {
                              std::to_string(files.size()) + " files of the tip and " + std::to_string(base.size()) +
                              " of the base; allowed: " + (map.base_time ? "as many of each" : "none of the base"));
   const auto logs = log_paths(files, o.out_folder);
-  int status = tools::kOk;
-  for (std::size_t i = 0; i < files.size(); ++i) {
+  return for_each_recording(files.size(), [&](std::size_t i) {
     const io::ImportedRecording recording = io::import_csv(files[i], map, base.empty() ? "" : base[i]);
     io::write_log(recording, logs[i]);
     std::fprintf(stderr, "%s", recording.remarks(files[i]).c_str());
-    if (!recording.left_out.empty()) status = tools::kDamagedInput;
     std::printf("%s\n%s", logs[i].c_str(), io::summary(recording).c_str());
-  }
-  return status;
+    return recording.left_out.empty();
+  });
 }
 
 }  // namespace bevel::importing

@@ -13,8 +13,10 @@ struct Options {
 // A usage error, or "".
 std::string usage_fault(const Options& options);
 
-// Writes a log a recording, says on stdout what is in each, on stderr what is odd. Returns the exit status. Throws
-// std::runtime_error naming file, line and column of the first recording that cannot be used; logs before it are whole.
+// Writes one log for each recording, prints on stdout what is in it and on stderr what is odd. A recording that cannot
+// be used is reported with file, line and column on stderr and leaves no log; the others are written, and the exit
+// status is
+// 1. Throws std::runtime_error if no recording can be begun: the column map, the list of files.
 int run(const Options& options);
 
 }  // namespace bevel::importing

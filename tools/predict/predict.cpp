@@ -12,6 +12,7 @@
 
 #include "io/model_file.hpp"
 #include "io/recording.hpp"
+#include "io/second_insertion.hpp"
 #include "model/effects/prediction_spread.hpp"
 #include "tools/common/exit_status.hpp"
 
@@ -129,6 +130,7 @@ int run(const std::string& model_path, const std::string& log_path, std::ostream
   const io::Recording recording = io::read_recording(log_path);
   err << recording.remarks(log_path);
   io::require_usable(log_path, recording);
+  io::require_one_insertion(log_path, recording.actuators);
   const model::AugmentedNeedle needle(model.needle, io::active_effects(model, log_path));
   const bool uncertain = model.variation.has_value() || !model.discrepancies.empty();
   std::vector<Prediction> predictions;

@@ -3,7 +3,6 @@
 #include <algorithm>
 #include <atomic>
 #include <exception>
-#include <filesystem>
 #include <mutex>
 #include <ostream>
 #include <stdexcept>
@@ -19,8 +18,6 @@
 #include "tools/replay/report.hpp"
 
 namespace bevel::replay {
-
-namespace fs = std::filesystem;
 
 Setup load_setup(const BatchOptions& options) {
   Setup setup;
@@ -52,13 +49,7 @@ Setup load_setup(const BatchOptions& options) {
 std::vector<Replay> replay_logs(const std::vector<std::string>& logs,
                                 const std::vector<estimator::EstimatorConfig>& configs, const ReplayOptions& options) {
   std::vector<Replay> replays(logs.size());
-  // Logs of one name in several folders are told apart by the folder.
-  const auto name_of = [&logs](const fs::path& log) {
-    const auto same = std::count_if(logs.begin(), logs.end(),
-                                    [&log](const std::string& other) { return fs::path(other).stem() == log.stem(); });
-    const std::string stem = log.stem().string();
-    return same == 1 ? stem : log.parent_path().filename().string() + "_" + stem;
-  };
+  const auto names = io::result_names(logs);
   std::atomic<std::size_t> next{0};
   std::exception_ptr failure;
   std::mutex failure_mutex;
@@ -68,7 +59,7 @@ std::vector<Replay> replay_logs(const std::vector<std::string>& logs,
         const io::FileBytes file(logs[i]);
         estimator::EstimatorConfig own = configs.at(i);
         own.effects = io::active_effects(options.effects, options.discrepancies, logs[i]);
-        replays[i] = replay_log(file.bytes(), name_of(logs[i]), own, options);
+        replays[i] = replay_log(file.bytes(), names[i], own, options);
         if (!file.change().empty()) replays[i].remarks += replays[i].name + ": damaged: " + file.change() + "\n";
         if (!(options.ahead_mm > 0)) continue;
         replays[i].next = predict(replays[i], 1e-6);

@@ -12,6 +12,9 @@
 namespace bevel::replay {
 namespace {
 
+// As of a channel that may be left out of a log (io/recording.hpp).
+constexpr double kLargestShareTooOld = 0.2;
+
 double square(double x) { return x * x; }
 
 // Of this thread: what the work costs, whatever else the machine does.
@@ -209,6 +212,12 @@ Replay replay_log(std::span<const std::uint8_t> log, const std::string& name, co
   result.damage = recording.damage;
   result.refused_messages = recording.rejected();
   result.counters = estimator.counters();
+  for (const auto* c : {&result.counters.positions, &result.counters.headings})
+    if (static_cast<double>(c->too_old) > kLargestShareTooOld * static_cast<double>(c->offered))
+      result.remarks += name + ": " + std::to_string(c->too_old) + " of " + std::to_string(c->offered) +
+                        (c == &result.counters.positions ? " positions" : " headings") +
+                        " were not used: they stand in the log after their time has left the estimator's history. " +
+                        "Is the log in the order of time?\n";
   if (result.states.empty())
     throw std::runtime_error(name + ": no state estimated from its " + std::to_string(recording.actuators.size()) +
                              " ACTUATOR_STATE messages; at least one is needed");
