@@ -151,6 +151,7 @@ Replay replay_log(std::span<const std::uint8_t> log, const std::string& name, co
   const io::Recording recording = io::read_recording(log);
   io::require_usable(name, recording);
   result.remarks = recording.remarks(name);
+  result.order_note = recording.order_note(name);
   for (const io::Arrival& arrival : recording.arrivals) {
     if (arrival.channel == io::Arrival::Channel::tip)
       estimator.add(with_noise(recording.tips[arrival.index], options.noise_by_axis));
