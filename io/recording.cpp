@@ -184,9 +184,6 @@ std::string Recording::describe_faults() const {
   std::string text;
   if (!file_change.empty()) text += file_change + "\n";
   if (!damage.intact()) text += "log: " + damage.describe() + "\n";
-  if (out_of_order > 0)
-    text += "log: " + std::to_string(out_of_order) + " of " + std::to_string(events) +
-            " events stand behind later ones, as in a log that is sorted by channel; they were sorted by time\n";
   for (const auto& [channel, counts] : rejects) {
     for (std::size_t fault = 0; fault < counts.size(); ++fault) {
       if (counts[fault] == 0) continue;
@@ -210,6 +207,12 @@ std::string Recording::remarks(const std::string& name) const {
   std::string text, line;
   while (std::getline(faults, line)) text += name + ": damaged: " + line + "\n";
   return text;
+}
+
+std::string Recording::order_note(const std::string& name) const {
+  if (out_of_order == 0) return "";
+  return name + ": " + std::to_string(out_of_order) + " of " + std::to_string(events) +
+         " events stand behind later ones, as in a log that is sorted by channel; they were sorted by time\n";
 }
 
 std::string Recording::refusal() const {

@@ -51,11 +51,13 @@ struct Recording {
   std::int64_t rejected() const;
   bool intact() const {
     return damage.intact() && rejected() == 0 && tip_oddities.empty() && heading_oddities.empty() &&
-           actuator_oddities.empty() && coverage.faults.empty() && file_change.empty() && out_of_order == 0;
+           actuator_oddities.empty() && coverage.faults.empty() && file_change.empty();
   }
   std::string describe_faults() const;  // one line per kind of fault; "" if intact
   // The same for stderr: each line opens with the log's name.
   std::string remarks(const std::string& name) const;
+  // A line on events that were sorted, "" if there are none. Nothing is lost by it: the recording counts as intact.
+  std::string order_note(const std::string& name) const;
   // Why nothing can be made of it, "" if something can: no event, no usable message, a motion that no rig makes and
   // that lasts, no measurement within the time of the axes, or more than a fifth of a channel left out.
   std::string refusal() const;

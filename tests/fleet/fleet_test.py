@@ -319,6 +319,8 @@ class Whole(AsAWhole):
 class Slurm(AsAWhole):
     def test_slurm_gets_a_job_a_case_and_what_else_it_was_asked_for(self):
         """Against slurm_stand_in.py: what Snakemake's executor asks of Slurm, not what a real one makes of it."""
+        self.folder = self.folder / "in_{run}"
+        self.out = self.folder / "out_{x}"
         self.case("A/1")
         tools = self.folder / "tools"
         tools.mkdir()

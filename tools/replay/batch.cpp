@@ -86,7 +86,7 @@ std::vector<Replay> replay_logs(const std::vector<std::string>& logs, const esti
 int tell_damage(const std::vector<Replay>& replays, std::ostream& err) {
   int status = tools::kOk;
   for (const Replay& replay : replays) {
-    err << replay.remarks;
+    err << replay.order_note << replay.remarks;
     if (!replay.remarks.empty()) status = tools::kDamagedInput;
   }
   return status;

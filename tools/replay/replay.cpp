@@ -175,6 +175,7 @@ Replay replay_log(std::span<const std::uint8_t> log, const std::string& name, co
   const io::Recording recording = io::read_recording(log);
   io::require_usable(name, recording);
   result.remarks = recording.remarks(name);
+  result.order_note = recording.order_note(name);
   result.config = config;
   result.config.axes = axes_of(recording, config.axes, options.rates_of_log);
   // An actuator state takes about 100 bytes of a log, a measurement 170.

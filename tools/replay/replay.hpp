@@ -80,10 +80,11 @@ struct Replay {
   estimator::Counters counters;
   std::int64_t refused_messages = 0;  // by the checked decode
   io::LogDamage damage;
-  std::string remarks;  // on damage of any kind, lines for stderr; "" if the log is intact
-  TruthFigures truth;   // count 0: the log has no NEEDLE_TRUTH
-  double log_s = 0;     // newest minus oldest actuator state
-  double run_s = 0;     // wall time of decoding and estimating
+  std::string remarks;     // on damage of any kind, lines for stderr; "" if the log is intact
+  std::string order_note;  // a line for stderr on events that were sorted by time; "" if there are none
+  TruthFigures truth;      // count 0: the log has no NEEDLE_TRUTH
+  double log_s = 0;        // newest minus oldest actuator state
+  double run_s = 0;        // wall time of decoding and estimating
   double processor_s = 0;
   estimator::EstimatorConfig config;
   Predicted next;   // one measurement ahead; both by replay_logs, if asked
