@@ -34,7 +34,7 @@ struct NeedleView {
   bool unsure = false;  // it doubts its newest readings: come to rest, and go on when they are believed again
   std::int32_t reset_count = 0;
   std::int32_t reset_cause = 0;  // bits of estimator/health.hpp: why the newest reset was declared
-  bool from_entry = true;  // the estimator has been there since it went in
+  bool from_entry = true;        // the estimator has been there since it went in
 };
 
 struct Target {

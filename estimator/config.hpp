@@ -90,7 +90,7 @@ struct HealthLimits {
   double rejects_forgotten_s = 1.0;
 };
 
-/// What bounds the motion of the axes between two actuator states. An interval longer than gap_s is a gap: the path
+/// Limits of the axes between two actuator states. An interval longer than gap_s is a gap: the path
 /// of the axes within it is unknown, and is not interpolated (NeedleFilter::pass_gap).
 struct AxisLimits {
   double gap_s = 0.08;                // longest interval in which motion is interpolated; 0: any

@@ -45,8 +45,8 @@ constexpr std::int32_t reset_bit(ResetCause cause) {
   return cause == ResetCause::none ? 0 : kResetByRejects << (static_cast<int>(cause) - 1);
 }
 
-/// Time for which the cause of a reset is in the health word, us: the controller acts on an estimate within its age limit
-/// of 80 ms.
+/// Time for which the cause of a reset is in the health word, us. The controller acts on an estimate within its age
+/// limit, 80 ms.
 inline constexpr std::int64_t kResetReported_us = 200'000;
 
 /// Bits with which an estimate must not be steered by: all but kUnsure and the causes of resets.
