@@ -17,8 +17,8 @@ struct SdoJob {
     write,
     read,               ///< a unit object (StatedUnits)
     expect,             ///< read; (value & mask) must be `value`
-    expect_eventually,  ///< the same or 0, asked again until transition_timeout_ns
-    decide_units,       ///< no transfer: scales_of() what was read; later jobs use the scales
+    expect_eventually,  ///< as expect; 0 passes too, another value is read again until transition_timeout_ns
+    decide_units,       ///< no transfer: calls scales_of() on the values read; later jobs use the scales
   };
   /// Which aborts are accepted.
   enum class Optional : std::uint8_t {
@@ -35,7 +35,7 @@ struct SdoJob {
   std::uint8_t size_bytes = 4;  ///< writes only
   std::uint32_t value = 0;
   std::uint32_t mask = 0xFFFFFFFF;
-  StopReason otherwise = StopReason::configuration_failed;  ///< reason if the value is another one
+  StopReason otherwise = StopReason::configuration_failed;  ///< stop reason if the value differs
   Optional optional = Optional::no;
   bool monitored = false;                   ///< read back after writing, and cyclically from then on
   std::optional<std::uint32_t> fallback{};  ///< written if the drive rejects `value`

@@ -44,7 +44,7 @@ void DriveNode::restart() {
   phase_ = Phase::absent;
   next_nmt_ns_ = INT64_MIN;
   sdo_.cancel();
-  monitoring_ = false;
+  monitoring_ = voltage_ordered_ = false;
   statusword_ = 0;
   error_code_ = 0;
   have_position_ = false;
@@ -252,14 +252,20 @@ StopReason DriveNode::read_limit(std::int64_t now_ns, Transmitter& out) {
 }
 
 void DriveNode::disable_voltage(std::int64_t now_ns, Transmitter& out) {
-  if (phase_ != Phase::operational) return;
-  const bool ordered = sdo_.object() == kControlword && sdo_.status() != cia301::SdoClient::Status::idle;
-  if (!ordered) {
+  using Status = cia301::SdoClient::Status;
+  if (phase_ != Phase::operational || voltage_ordered_) return;
+  sdo_.check_time(now_ns);
+  const bool is_ours = sdo_.object() == kControlword;
+  const Status status = sdo_.status();
+  if (is_ours && (status == Status::done || status == Status::aborted)) {
+    voltage_ordered_ = true;
+    return sdo_.cancel();
+  }
+  if (!is_ours || status == Status::idle || (status == Status::timed_out && !sdo_.frame_to_send())) {
     sdo_.cancel();
     monitoring_ = false;
     sdo_.download(kControlword, cia402::controlword::kDisableVoltage, 2);
   }
-  sdo_.check_time(now_ns);
   const auto frame = sdo_.frame_to_send();
   if (frame && out.send(*frame, now_ns)) sdo_.sent(now_ns);
 }

@@ -118,7 +118,8 @@ class DriveNode {
   std::size_t monitored_ = 0;  // job whose value is read back next
   bool monitoring_ = false;    // its transfer is under way
   std::int64_t next_monitor_ns_ = 0;
-  int unanswered_ = 0;  // cyclic read-backs in a row
+  bool voltage_ordered_ = false;  // off, by SDO, since the last restart
+  int unanswered_ = 0;            // cyclic read-backs in a row
   int retries_ = 0;
   std::int64_t job_since_ns_ = 0;
   bool seen_operational_ = false;

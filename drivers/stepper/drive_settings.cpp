@@ -10,8 +10,8 @@ namespace {
 
 // Between two cyclic read-backs, in periods. Four frames of at most 135 bits in 30 ms load a bus of 500 kbit/s by 4 %.
 constexpr std::int64_t kMonitorEvery_periods = 3;
-// Cyclic read-backs in a row that may be lost on a bad line. With one frame in ten lost one transfer in five fails,
-// hence one series in 3000; a drive that answers none has lost its SDO server.
+// The fifth time-out in a row is reported: a drive that answers none has lost its SDO server. With one frame in ten
+// lost a fifth of the transfers fail, and five in a row are one in 3000.
 constexpr int kUnanswered = 5;
 
 }  // namespace

@@ -86,6 +86,9 @@ class Decider {
     const auto configured = static_cast<std::uint32_t>(axis_.velocity_unit);
     if (stated != 0 && configured != 0 && stated != configured)
       return refuse(StopReason::unit_contradicts, {0x60A9, 0}, stated);
+    const bool is_by_factor = stated == 0 && stated_.factor[0];  // counts/s
+    if (is_by_factor && configured != 0 && axis_.velocity_unit != VelocityUnit::counts_per_s)
+      return refuse(StopReason::unit_contradicts, {0x6096, 1}, *stated_.factor[0]);
     if (!factor_is_one()) return refuse(StopReason::unit_unsupported, {0x6096, 1}, stated_.factor[0].value_or(0));
     const std::uint32_t velocity = stated != 0 ? stated : configured;
     if (velocity == 0 && !stated_.factor[0]) return refuse(StopReason::unit_unstated, {0x60A9, 0}, 0);
@@ -127,11 +130,12 @@ class Decider {
     if (needs_counts && axis_.counts_per_revolution == 0.0)
       return refuse(StopReason::unit_needs_revolution, object, code), false;
     const auto stated = stated_counts_per_revolution(stated_);
-    if (needs_counts && stated && std::abs(*stated - axis_.counts_per_revolution) > kSameScale * *stated)
-      return refuse(StopReason::unit_contradicts,
-                    stated_.feed[0] ? cia301::ObjectAddress{0x6092, 1} : cia301::ObjectAddress{0x608F, 1},
-                    stated_.feed[0] ? *stated_.feed[0] : *stated_.encoder[0]),
+    if (needs_counts && stated && std::abs(*stated - axis_.counts_per_revolution) > kSameScale * *stated) {
+      const bool by_feed = ratio(stated_.feed).has_value();
+      const auto& term = by_feed ? stated_.feed[0] : stated_.encoder[0];
+      return refuse(StopReason::unit_contradicts, {static_cast<std::uint16_t>(by_feed ? 0x6092 : 0x608F), 1}, *term),
              false;
+    }
     const auto unit_revolutions = revolutions_of(unit.numerator, axis_.counts_per_revolution);
     const auto position_revolutions = revolutions_of(position_.numerator, axis_.counts_per_revolution);
     if (!unit_revolutions || !position_revolutions) return refuse(StopReason::unit_unsupported, object, code), false;

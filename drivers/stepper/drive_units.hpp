@@ -29,7 +29,7 @@ struct UnitScales {
   double acceleration_per_count_s2 = 1.0;  ///< acceleration units in one count/s^2
 };
 
-/// Result of scales_of(): the scales, or which object makes them uncertain.
+/// Result of scales_of(): the scales, or the reason for refusal and the object that causes it.
 struct UnitDecision {
   UnitScales scales{};
   StopReason refusal = StopReason::none;

@@ -28,7 +28,7 @@ class RestWatch {
   enum class Verdict : std::uint8_t {
     inactive,       ///< begin() was not called
     slowing,        ///< within the expected travel, not stationary yet
-    at_rest,        ///< measured: stationary, and where it came to rest
+    at_rest,        ///< measured: stationary, and still where it came to rest
     does_not_stop,  ///< measured: beyond the expected travel, moving past the deadline, or moving again
   };
 
@@ -52,17 +52,27 @@ class RestWatch {
 
   void end() { verdict_ = Verdict::inactive; }
 
+  /// Moves the origin of the positions: what was at `position_unit` is 0 from now on.
+  void set_zero(double position_unit) {
+    from_.position_unit -= position_unit;
+    last_.position_unit -= position_unit;
+    rested_unit_ -= position_unit;
+  }
+
   /// Judges the newest measurement.
-  /// @param held false if the drive holds the axis no longer, so that it may be moved by hand once it has come to rest
-  Verdict check(std::int64_t now_ns, const AxisSample& sample, bool held) {
+  /// @param is_held false if the drive no longer holds the axis: it may be moved by hand once it has come to rest
+  Verdict check(std::int64_t now_ns, const AxisSample& sample, bool is_held) {
     if (verdict_ == Verdict::inactive || verdict_ == Verdict::does_not_stop) return verdict_;
     if (verdict_ == Verdict::at_rest) {
-      if (!held) rested_unit_ = sample.position_unit;
+      if (!is_held) rested_unit_ = sample.position_unit;
       if (std::abs(sample.position_unit - rested_unit_) > kLeast_unit + 2 * sample.resolution_unit)
         verdict_ = Verdict::does_not_stop;
       return verdict_;
     }
-    const bool fresh = sample.sampled_ns > last_.sampled_ns && sample.sampled_ns >= begun_ns_;
+    if (sample.sampled_ns - last_.sampled_ns < kLeastInterval_ns && sample.sampled_ns != last_.sampled_ns)
+      return verdict_;  // too close to the one before to show a rate
+    // An axis that has just started is still before the stop has had an effect.
+    const bool fresh = sample.sampled_ns > last_.sampled_ns && sample.sampled_ns >= begun_ns_ + reaction_ns_;
     if (fresh && is_stationary(sample)) {
       verdict_ = Verdict::at_rest;
       rested_unit_ = sample.position_unit;
@@ -83,7 +93,7 @@ class RestWatch {
   bool is_stationary(const AxisSample& sample) const {
     const double dt_s = static_cast<double>(sample.sampled_ns - last_.sampled_ns) * 1e-9;
     const double travelled = std::abs(sample.position_unit - last_.position_unit);
-    // A rate of before the stop states nothing; the position alone decides then.
+    // A rate that was received before the stop is not used; the position alone decides then.
     const bool rate_known = sample.rate_received_ns >= begun_ns_;
     return (!rate_known || std::abs(sample.rate_unit_s) <= kStationary_unit_s + sample.resolution_unit_s) &&
            travelled <= kStationary_unit_s * dt_s + 2 * sample.resolution_unit;
@@ -97,8 +107,9 @@ class RestWatch {
     return speed_unit_s_ * (std::min(t_s, keeps_s) + braking_s) - 0.5 * ramp_unit_s2_ * braking_s * braking_s;
   }
 
-  static constexpr double kLeast_unit = 0.05;         // mm or rad: play, steps, an encoder's noise
-  static constexpr double kStationary_unit_s = 0.05;  // mm/s or rad/s
+  static constexpr std::int64_t kLeastInterval_ns = 5'000'000;  // half the shortest usual period
+  static constexpr double kLeast_unit = 0.05;                   // mm or rad: play, steps, an encoder's noise
+  static constexpr double kStationary_unit_s = 0.05;            // mm/s or rad/s
 
   Verdict verdict_ = Verdict::inactive;
   AxisSample from_{}, last_{};

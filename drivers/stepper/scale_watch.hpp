@@ -11,9 +11,9 @@ namespace bevel::stepper {
 /// Estimates by least squares how far an axis travels for each mm or rad that it is commanded to travel.
 ///
 /// Over blocks of kBlock cycles the measured travel is regressed on the commanded travel; the lag between them is the
-/// one, up to the allowed lag, that leaves the smallest residual. A scale counts as wrong if it differs from 1 by more
-/// than kTolerated and by four standard errors. FollowWatch finds large errors at once, this one small ones that add
-/// up. Pure: does not allocate.
+/// one of kLags cycles that leaves the smallest residual. A scale counts as wrong if it differs from 1 by more than
+/// kTolerated and by four standard errors. FollowWatch finds large errors at once, this one small ones that add up.
+/// Pure: does not allocate.
 class ScaleWatch {
  public:
   void begin() { *this = {}; }
@@ -57,12 +57,12 @@ class ScaleWatch {
   }
 
  private:
-  static constexpr std::size_t kBlock = 20;  // cycles: longer than the lag, shorter than what a needle turns for
+  static constexpr std::size_t kBlock = 20;  // cycles: longer than the lag, shorter than a usual rotation
   static constexpr std::size_t kLags = 12;   // cycles
   static constexpr std::size_t kRoom = kBlock + kLags;
   static constexpr std::size_t kLeastBlocks = 20;  // for a standard error
   static constexpr double kLeastPath_unit = 1.0;   // mm or rad
-  static constexpr double kTolerated = 0.05;       // of slip, of a screw's pitch, of a drive's rates
+  static constexpr double kTolerated = 0.05;       // slip, error of a screw's pitch or of a drive's rates
 
   std::array<double, kRoom> commanded_{}, positions_{};
   std::size_t count_ = 0;

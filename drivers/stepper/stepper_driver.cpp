@@ -82,6 +82,7 @@ bool StepperDriver::rearm() {
 
 void StepperDriver::set_zero() {
   for (std::size_t axis = 0; axis < kAxes; ++axis) {
+    rests_.at(axis).set_zero(nodes_.at(axis).position_unit());
     nodes_.at(axis).set_zero();
     follows_.at(axis).begin(last_step_ns_, 0);
     scales_.at(axis).begin();

@@ -149,6 +149,7 @@ class StepperDriver {
   void shape(std::int64_t now_ns, const std::array<double, kAxes>& rates);
   void supervise_motion(std::int64_t now_ns);
   void watch_rest(std::size_t axis, std::int64_t now_ns, double ramp_unit_s2);
+  void begin_watch(std::size_t axis, std::int64_t now_ns, double fastest_unit_s, double ramp_unit_s2);
   void measure_rest(std::size_t axis, std::int64_t now_ns);
   void escalate(std::size_t axis, std::int64_t now_ns);
   void judge_rest(std::size_t axis, std::int64_t now_ns);
@@ -198,7 +199,7 @@ class StepperDriver {
   std::array<double, kAxes> stopped_from_unit_s_{};
   std::array<bool, kAxes> judged_{}, held_back_{};
   std::array<bool, kAxes> stop_confirmed_{};
-  std::int64_t next_nmt_stop_ns_ = 0;
+  std::array<std::int64_t, kAxes> next_nmt_stop_ns_{};
   Stop later_{};
   std::array<bool, kAxes> command_waits_{};  // for the echo of the one before
   std::array<bool, kAxes> at_limit_{};       // what the statuswords said last

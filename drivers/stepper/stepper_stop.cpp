@@ -68,7 +68,7 @@ void StepperDriver::latch(const Stop& stop, std::int64_t now_ns) {
     state_ = DriverState::stopped;
   }
   for (auto& shaper : shapers_) shaper.reset();
-  // That they miss our heartbeat is what we wanted.
+  // A drive's heartbeat fault is expected once ours is withheld.
   if (is_fault(stop.reason) && !withhold_heartbeat_) state_ = DriverState::fault;
 }
 
@@ -86,8 +86,11 @@ void StepperDriver::watch_rest(std::size_t axis, std::int64_t now_ns, double ram
   const AxisSample sample = nodes_.at(axis).sample();
   const double commanded =
       std::max(std::abs(shapers_.at(axis).rate_unit_s()), follows_.at(axis).fastest_commanded_unit_s());
-  const double fastest = std::max(std::abs(sample.travel_rate_unit_s), commanded);
-  rests_.at(axis).begin(now_ns, sample, fastest, ramp_unit_s2, reaction_ns(config_),
+  begin_watch(axis, now_ns, std::max(std::abs(sample.travel_rate_unit_s), commanded), ramp_unit_s2);
+}
+
+void StepperDriver::begin_watch(std::size_t axis, std::int64_t now_ns, double fastest_unit_s, double ramp_unit_s2) {
+  rests_.at(axis).begin(now_ns, nodes_.at(axis).sample(), fastest_unit_s, ramp_unit_s2, reaction_ns(config_),
                         2 * config_.period_ns + kSettling_ns);
 }
 
@@ -117,14 +120,14 @@ void StepperDriver::escalate(std::size_t axis, std::int64_t now_ns) {
     case StopOrder::quick_stop: {
       ++counters_.stops_escalated;
       orders_.at(axis) = StopOrder::disable_voltage;
-      const double rate = std::abs(nodes_.at(axis).sample().travel_rate_unit_s);
-      watch_rest(axis, now_ns, std::max(rate, kResting_unit_s) / kCoasting_s);
+      const double rate = std::max(std::abs(nodes_.at(axis).sample().travel_rate_unit_s), kResting_unit_s);
+      begin_watch(axis, now_ns, rate, rate / kCoasting_s);
       break;
     }
     case StopOrder::disable_voltage:
-      // The drive's positions end with this. What its power stage does is then for the operator to see.
+      // NMT stop ends the PDOs, so that motion can no longer be measured.
       orders_.at(axis) = StopOrder::nmt_stop;
-      next_nmt_stop_ns_ = now_ns;
+      next_nmt_stop_ns_.at(axis) = now_ns;
       if (!withhold_heartbeat_) ++counters_.heartbeats_withheld;
       withhold_heartbeat_ = true;
       break;
@@ -151,9 +154,9 @@ void StepperDriver::supervise_stop(std::int64_t now_ns) {
     measure_rest(axis, now_ns);
     judge_rest(axis, now_ns);
     if (orders_.at(axis) == StopOrder::disable_voltage && may_send()) nodes_.at(axis).disable_voltage(now_ns, out_);
-    const bool nmt_stop = orders_.at(axis) == StopOrder::nmt_stop && now_ns >= next_nmt_stop_ns_ && may_send();
+    const bool nmt_stop = orders_.at(axis) == StopOrder::nmt_stop && now_ns >= next_nmt_stop_ns_.at(axis) && may_send();
     if (nmt_stop && out_.send(cia301::nmt(cia301::NmtCommand::stop, config_.axes.at(axis).node_id), now_ns))
-      next_nmt_stop_ns_ = now_ns + kNmtStopPause_ns;
+      next_nmt_stop_ns_.at(axis) = now_ns + kNmtStopPause_ns;
   }
   const bool confirmed = std::ranges::all_of(stop_confirmed_, [](bool each) { return each; });
   if (confirmed || withhold_heartbeat_ || now_ns - stopped_ns_ <= config_.tpdo_timeout_ns) return;
@@ -186,7 +189,7 @@ void StepperDriver::ask_why(std::int64_t now_ns) {
 // Once an axis rests after a stop: is it where it should be, or was it held back?
 void StepperDriver::judge_rest(std::size_t axis, std::int64_t now_ns) {
   const DriveNode& node = nodes_.at(axis);
-  if (judged_.at(axis) || std::abs(node.rate_unit_s()) > kResting_unit_s) return;
+  if (judged_.at(axis) || rests_.at(axis).verdict() != RestWatch::Verdict::at_rest) return;
   judged_.at(axis) = true;
   FollowWatch& follow = follows_.at(axis);
   follow.follows(now_ns, 0, node.position_unit());

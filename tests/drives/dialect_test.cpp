@@ -56,6 +56,12 @@ TEST(VelocityUnits, ThatContradictTheConfigurationAreRefused) {
                  "velocity_unit");
 }
 
+TEST(VelocityUnits, AreCountsPerSecondByTheFactor) {
+  expect_refused(with_revolution(51200.0, VelocityUnit::rpm), {}, StopReason::unit_contradicts, {0x6096, 1},
+                 "velocity_unit");
+  EXPECT_TRUE(Bench(with_revolution(0.0, VelocityUnit::counts_per_s)).enable());
+}
+
 // The mean rate is right to 1 % where one unit is 0.43 mm/s, also below it, and so is the stop.
 TEST(VelocityUnits, InRpmAreConverted) {
   struct Case {

@@ -106,6 +106,59 @@ TEST_F(MeasuredStop, DeclaresAnAxisThatMovesAgain) {
   EXPECT_NEAR(bench.insertion.position_unit(), rested_mm, 1e-6);
 }
 
+TEST_F(MeasuredStop, EscalatesForBothAxes) {
+  move();
+  bench.insertion.set_power_stage_stuck(true);
+  bench.rotation.set_power_stage_stuck(true);
+  bench.driver->stop_now(StopReason::operator_stop, bench.now_ns);
+  bench.run_ms(400);
+  EXPECT_EQ(bench.insertion.nmt_state(), rig::NmtState::stopped);
+  EXPECT_EQ(bench.rotation.nmt_state(), rig::NmtState::stopped);
+}
+
+// A slow motion after rest: the second order does not wait for what a fast axis would be allowed.
+TEST_F(MeasuredStop, EscalatesSoonForASlowMotionAfterRest) {
+  move(20.0, 0.0);
+  bench.driver->stop_now(StopReason::operator_stop, bench.now_ns);
+  bench.run_ms(500);
+  const std::int64_t begun_ns = bench.now_ns;
+  bench.wire.set_tap([&](can::Frame& frame) {  // 1 mm/s, whatever it is ordered
+    const double crept_mm = 1e-9 * static_cast<double>(bench.now_ns - begun_ns);
+    if (frame.id == 0x281)
+      stepper::cia301::put_u32(frame, 0,
+                               stepper::cia301::get_u32(frame, 0) + static_cast<std::uint32_t>(2000.0 * crept_mm));
+    return true;
+  });
+  EXPECT_TRUE(bench.run_until([&] { return bench.report().order[0] == StopOrder::nmt_stop; }, 400))
+      << describe(bench.report());
+}
+
+TEST_F(MeasuredStop, StaysMeasuredWhenTheEntryIsSet) {
+  move();
+  bench.driver->stop_now(StopReason::operator_stop, bench.now_ns);
+  bench.run_ms(500);
+  bench.driver->set_zero();
+  bench.run_ms(500);
+  EXPECT_EQ(bench.report().rest[0], AxisRest::at_rest);
+  EXPECT_EQ(bench.report().counters.stops_escalated, 0U);
+}
+
+// The axis is still stationary when the stop is commanded, and moves a little before the stop has an effect.
+TEST_F(MeasuredStop, OfAnAxisThatHasJustStartedIsNoFault) {
+  for (int ms = 1; ms <= 40; ++ms) {
+    Bench each;
+    ASSERT_TRUE(each.enable());
+    each.move(20.0, 10.0);
+    each.run_ms(ms);
+    each.driver->stop_now(StopReason::operator_stop, each.now_ns);
+    each.run_ms(300);
+    EXPECT_EQ(each.report().counters.stops_escalated, 0U) << ms << " ms: " << describe(each.report());
+    EXPECT_EQ(each.report().rest[0], AxisRest::at_rest) << ms << " ms: " << describe(each.report());
+    EXPECT_EQ(each.insertion.state(), rig::PowerStateMachine::State::quick_stop_active)
+        << ms << " ms: held, not let go";
+  }
+}
+
 // An operator may move the axis by hand once the drive no longer holds it.
 TEST_F(MeasuredStop, AllowsAnAxisWithoutVoltageToBeMoved) {
   stepper::StepperConfig config;

@@ -80,7 +80,11 @@ class OddRecordings {
     m.orientation_wxyz[0] = std::cos(angle), m.orientation_wxyz[2] = std::sin(angle);
     m.curvature_per_mm = odd(1), m.lambda1_per_rad = odd(1e3), m.lambda2 = odd(1e3), m.test_ratio = odd(1e12);
     m.rank = whole(0, 3), m.health = whole(0, 1000), m.reset_count = whole(0, 1000);
-    for (std::size_t k = 0; k < 9; ++k) m.covariance[10 * k] = std::abs(odd(1e12));
+    constexpr double kSmallestVariance = 1e-150;  // of the checked decode, but for 0
+    for (std::size_t k = 0; k < 9; ++k) {
+      const double variance = std::abs(odd(1e12));
+      m.covariance[10 * k] = variance < kSmallestVariance ? 0.0 : variance;
+    }
     return m;
   }
 
