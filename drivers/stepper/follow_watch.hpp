@@ -64,10 +64,10 @@ class FollowWatch {
   // Integral of the commanded rate since begin().
   double commanded_unit() const { return told_; }
 
-  // The largest rate, without its sign, that was commanded within the allowed lag.
-  double fastest_commanded_unit_s() const {
+  // The largest rate, without its sign, that was commanded in the last cycles; at most within the allowed lag.
+  double fastest_commanded_unit_s(std::size_t cycles = kRoom) const {
     double fastest = 0;
-    for (std::size_t i = 1; i <= std::min(count_, window_); ++i)
+    for (std::size_t i = 1; i <= std::min({count_, window_, cycles}); ++i)
       fastest = std::max(fastest, rates_.at((count_ - i) % kRoom));
     return fastest;
   }

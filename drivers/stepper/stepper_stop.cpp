@@ -84,8 +84,9 @@ void StepperDriver::note_later(const Stop& stop) {
 // rate that the drive reports may have another unit, or be of another time.
 void StepperDriver::watch_rest(std::size_t axis, std::int64_t now_ns, double ramp_unit_s2) {
   const AxisSample sample = nodes_.at(axis).sample();
+  const auto cycles = static_cast<std::size_t>(reaction_ns(config_) / config_.period_ns);
   const double commanded =
-      std::max(std::abs(shapers_.at(axis).rate_unit_s()), follows_.at(axis).fastest_commanded_unit_s());
+      std::max(std::abs(shapers_.at(axis).rate_unit_s()), follows_.at(axis).fastest_commanded_unit_s(cycles));
   begin_watch(axis, now_ns, std::max(std::abs(sample.travel_rate_unit_s), commanded), ramp_unit_s2);
 }
 
