@@ -42,7 +42,7 @@ Eigen::VectorXd middle_nuisance_sd(const System& system) {
   Eigen::VectorXd out(static_cast<Index>(system.nuisance_groups().size()));
   for (Index g = 0; g < out.size(); ++g) {
     const auto& values = system.nuisance_groups()[static_cast<std::size_t>(g)].standard_deviations;
-    out[g] = values[values.size() / 2];
+    out[g] = values[(values.size() - 1) / 2];
   }
   return out;
 }

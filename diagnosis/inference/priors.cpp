@@ -27,6 +27,11 @@ Prior flat_prior(double lower, double upper) {
           .lower = lower,
           .upper = upper};
 }
+Prior flat_prior(double lower, double upper, double least, double most) {
+  Prior out = flat_prior(lower, upper);
+  out.outside = most - least;
+  return out;
+}
 Prior size_prior(double none, double scale, double lower, double upper) {
   return {.form = Prior::Form::size, .middle = none, .scale = scale, .lower = lower, .upper = upper};
 }
@@ -37,8 +42,12 @@ double log_density(const Prior& prior, double value, double known_to) {
       const double x = (value - prior.middle) / prior.scale;
       return -0.5 * x * x - std::log(prior.scale) - 0.5 * std::log(2 * std::numbers::pi);
     }
-    case Prior::Form::flat:
-      return -std::log(prior.upper - prior.lower);
+    case Prior::Form::flat: {
+      const double density = 1 / (prior.upper - prior.lower);
+      if (!(prior.outside > 0)) return std::log(density);
+      const bool inside = value >= prior.lower && value <= prior.upper;
+      return std::log((inside ? (1 - kElsewhere) * density : 0) + kElsewhere / prior.outside);
+    }
     case Prior::Form::size: {
       const double x = std::max(std::abs(value - prior.middle), known_to) / prior.scale;
       static const double kOrders = -std::log(kSmallest);

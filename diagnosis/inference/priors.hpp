@@ -8,19 +8,22 @@ namespace bevel::inference {
 struct Prior {
   enum class Form {
     normal,  // middle, scale
-    flat,    // over [lower, upper]
+    flat,    // over [lower, upper]; with `outside` one part in twenty over a wider range
     size,    // of an effect: half of it Student's t of 4 degrees of freedom about `middle`, of scale `scale`; half of
              // it of any order of magnitude, down to a thirtieth of that
   };
   Form form = Form::normal;
   double middle = 0, scale = 1;
   double lower = 0, upper = 0;  // flat: the range; size: bounds, of which `middle` may be one
+  double outside = 0;           // flat: width of the wider range that holds the rest; 0: there is none
   // size: what the effect's causes bring about: this far from the middle at least, and no larger value than that.
   // One in twenty is said to lie elsewhere.
   double least_distance = 0, largest = std::numeric_limits<double>::infinity();
 };
 Prior normal_prior(double mean, double standard_deviation);
 Prior flat_prior(double lower, double upper);
+/// Uniform density: 19 of 20 parts over [lower, upper], one part over [least, most], which holds it.
+Prior flat_prior(double lower, double upper, double least, double most);
 Prior size_prior(double none, double scale, double lower, double upper);
 
 // Natural logarithm of the density at a value that is known to `known_to` (a standard error): a density that varies

@@ -85,8 +85,14 @@ void remark_on_beliefs(const NeedleSystem& system, const NeedleEstimate& needle,
     if (sd > kAsWide * belief_sd(p)) held += (held.empty() ? "" : ", ") + std::string(name);
   };
   look("curvature_per_mm", needle.curvature_sd_per_mm, kCurvature);
-  look("lambda1_per_rad", needle.lambda1_sd_per_rad, kU);
-  look("lambda2", needle.lambda2_sd, kLambda2);
+  if (needle.slip_determined) {
+    look("lambda1_per_rad", needle.lambda1_sd_per_rad, kU);
+    look("lambda2", needle.lambda2_sd, kLambda2);
+  } else {
+    findings.remarks.push_back(
+        "lambda1_per_rad and lambda2 are not determined: the shaft does not turn in these recordings. They keep the "
+        "values of the model file, and k is estimated given these; insertions that turn would determine them");
+  }
   if (!held.empty())
     findings.remarks.push_back(
         held +

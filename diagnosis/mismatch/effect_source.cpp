@@ -71,7 +71,9 @@ constexpr const char* kShape = R"(,
                                          .lower = @lower@,
                                          .upper = @upper@,
                                          .none = kNoNone,
-                                         .starts = {@starts@}})";
+                                         .starts = {@starts@},
+                                         .likely_low = @likely_low@,
+                                         .likely_high = @likely_high@})";
 constexpr const char* kPhase = R"(,
                                         {.name = "phase_rad",
                                          .lower = 0,
@@ -207,7 +209,9 @@ std::string parameters_of(const ProposedForm& p, const std::string& unit) {
     out += filled(kShape, {{"shape", name_of_shape(p, unit)},
                            {"lower", number(is_place ? p.low : 0.5 * *least)},
                            {"upper", number(is_place ? p.low + p.range : 2 * *most)},
-                           {"starts", starts}});
+                           {"starts", starts},
+                           {"likely_low", number(is_place ? p.low : *least)},
+                           {"likely_high", number(is_place ? p.low + p.range : *most)}});
   }
   return swings ? out + kPhase : out;
 }

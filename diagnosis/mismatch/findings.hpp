@@ -157,6 +157,7 @@ struct VariationEstimate {
   double sd = 0;             // posterior mean
   double none = 0;           // probability that they do not differ
   double low = 0, high = 0;  // 95 %, of the values that were tried
+  bool at_end = false;       // the interval reaches the largest of them: a limit, not a measurement
 };
 
 // What one insertion has of its own, as a deviation from what all share: curvature as a share of the needle's, the
@@ -182,6 +183,9 @@ struct NextExperiment {
 struct NeedleEstimate {
   model::NeedleParameters value;
   double curvature_sd_per_mm = 0, lambda1_sd_per_rad = 0, lambda2_sd = 0;
+  /// False: the shaft turns too little to separate slip from curvature. Both lambda keep the values of the model file,
+  /// and their standard deviations are those of the prior density.
+  bool slip_determined = true;
 };
 
 // Insertions steered in simulated time with one model in the software: true tip to target where the needle came to

@@ -181,6 +181,12 @@ NeedleEstimate needle_estimate(const NeedleSystem& system, const Search& search,
       shared_covariance(*model.fit, model.blocks, model.curve, nuisance_weights_of(search, *model.fit));
   const Eigen::RowVector2d by(1, out.value.lambda2 / std::numbers::pi);  // lambda1 by (u, lambda2)
   out.curvature_sd_per_mm = std::sqrt(covariance(kCurvature, kCurvature));
+  out.slip_determined = system.determines_slip();
+  if (!out.slip_determined) {
+    out.lambda1_sd_per_rad = std::hypot(kUWidth_per_rad, by[1] * kLambda2Width);
+    out.lambda2_sd = kLambda2Width;
+    return out;
+  }
   out.lambda1_sd_per_rad = std::sqrt((by * covariance.block<2, 2>(kU, kU) * by.transpose()).value());
   out.lambda2_sd = std::sqrt(covariance(kLambda2, kLambda2));
   return out;
@@ -201,6 +207,7 @@ std::vector<VariationEstimate> variation_of(const Search& search, const inferenc
       if (below < 0.975) one.high = value;
       below += share[i];
     }
+    one.at_end = one.high >= groups[g].standard_deviations.back();
     out.push_back(std::move(one));
   }
   return out;

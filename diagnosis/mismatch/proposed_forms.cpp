@@ -1,3 +1,5 @@
+#include <algorithm>
+#include <cmath>
 #include <cstdio>
 
 #include "diagnosis/inference/forms.hpp"
@@ -37,6 +39,15 @@ std::string equation_of(const inference::FormFit& fit, const inference::Curve& c
   return "";
 }
 
+// Whether the amplitude, and the value at each knot, lie within what a model file may hold of the component.
+bool is_possible(const inference::FormFit& fit, const inference::Curve& curve, model::DiscrepancyComponent component) {
+  const double largest = info_of(component).largest;
+  if (!(std::abs(fit.amplitude) <= largest)) return false;
+  return std::ranges::all_of(curve.at, [&](double x) {
+    return std::abs(fit.amplitude * value_of(fit.form, curve, fit.shape, fit.phase_rad, x)) <= largest;
+  });
+}
+
 }  // namespace
 
 std::vector<ProposedForm> propose_forms(const NeedleSystem& system, const inference::Search& search,
@@ -51,9 +62,10 @@ std::vector<ProposedForm> propose_forms(const NeedleSystem& system, const infere
     const double all = log_bayes_factor(search.discrepancy().scan(marginal));
     std::size_t count = 0;
     for (const auto& fit : fit_forms(system, search.discrepancy(), marginal)) {
-      if (count++ == kProposals) break;
       const inference::Curve& curve = system.curves()[fit.curve];
       const model::DiscrepancyCurve model_curve = system.model_curve(fit.curve, {}, {});
+      if (!is_possible(fit, curve, model_curve.component)) continue;
+      if (count++ == kProposals) break;
       out.push_back({.component = model_curve.component,
                      .covariate = model_curve.covariate,
                      .form = fit.form,

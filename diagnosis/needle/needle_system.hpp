@@ -40,6 +40,10 @@ struct KnownPhysics {
   std::vector<model::ActiveEffect> elsewhere;                  // in a motion that was not recorded
 };
 
+/// Standard deviations of the prior densities of u and lambda2 about the model file: all of Table I and beyond.
+inline constexpr double kUWidth_per_rad = 0.5;
+inline constexpr double kLambda2Width = 0.3;
+
 class NeedleSystem final : public inference::System {
  public:
   // Throws std::invalid_argument where `known` is too much to add anything to. An effect that is known is no candidate.
@@ -68,6 +72,9 @@ class NeedleSystem final : public inference::System {
                     inference::Prediction& out, Eigen::MatrixXd* by_values) const override;
 
   model::NeedleParameters needle(const Eigen::VectorXd& shared) const;
+  /// Whether the shaft turns enough in some recording to separate slip from curvature. Otherwise lambda is held at the
+  /// value of the model file, and its change is no candidate.
+  bool determines_slip() const { return determines_slip_; }
   // Of these recordings' effects that no library holds: by how much a parameter of the needle changed; -1: none.
   int changed_parameter(std::size_t effect) const;
   // The library's effect behind one of effects().
@@ -125,7 +132,7 @@ class NeedleSystem final : public inference::System {
   std::vector<NeedleCurve> needle_curves_;
   std::vector<inference::Curve> curves_;
   std::vector<std::shared_ptr<const model::Effect>> curve_physics_;  // parts of the curves, in their order
-  bool two_groups_, headings_;
+  bool two_groups_, determines_slip_, headings_;
   std::vector<double> common_at_mm_;             // depths at which each channel has a common error; none: no groups
   std::vector<Eigen::MatrixXd> common_columns_;  // of each recording
 };

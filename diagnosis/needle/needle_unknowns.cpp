@@ -18,8 +18,10 @@ namespace {
 
 // The lab's own belief in its model file: half of k, and all of Table I and beyond for lambda.
 constexpr double kCurvatureShare = 0.5;
-constexpr double kUWidth_per_rad = 0.5;
-constexpr double kLambda2Width = 0.3;
+// A shaft that turns by less in every recording does not separate slip from curvature: both bend the path in one plane.
+// Lambda then keeps the value of the model file, to within kHeldWidth (1/rad and 1).
+constexpr double kSeparatesSlip_rad = 0.2;
+constexpr double kHeldWidth = 1e-3;
 constexpr double kCurvatureMax_per_mm = 0.05;
 constexpr double kSmallestU = 1e-9;      // (26) is strict
 constexpr double kExpectedShare = 0.75;  // scale of a size's prior, of the largest that is reported
@@ -53,44 +55,44 @@ const std::array<const model::Effect*, kBaseParameters>& needle_changes() {
   return all;
 }
 
-// What the field reports of repeated insertions: curvature 10 to 40 % in tissue, a few in gelatin; entry angles of
-// 0.2 to 0.7 degrees; registration of some tenths of a millimetre; a bevel set by hand to a few degrees. Where depths
-// are read by hand, so is where they begin: off by up to a millimetre, each time. And a hand that guides a needle leads
-// it away from its path as it goes, by some tenths of a millimetre in 100 mm (a gradient of 1e-4: 0.17 mm).
+// Candidate standard deviations between insertions. Curvature varies by 10 to 40 % in tissue and by a few per cent in
+// gelatin. Entry angles vary by 0.2 to 0.7 degrees on a stage, and by up to 0.1 rad by hand or where the frame is
+// fitted to each path. Registration varies by some tenths of a millimetre, and by millimetres between set-ups. A bevel
+// that is set by hand varies by a few degrees; unmarked shafts vary by 30 degrees. Depths that are read by hand begin
+// up to a millimetre off. A hand that guides a needle bends it by some tenths of a millimetre in 100 mm (a gradient of
+// 1e-4: 0.17 mm).
 std::vector<inference::NuisanceGroup> variation_groups(bool by_hand) {
-  std::vector<inference::NuisanceGroup> out{{"curvature", "relative", {0, 0.02, 0.05, 0.12, 0.3}},
-                                            {"entry_angle", "rad", {0, 0.003, 0.007, 0.015, 0.03}},
-                                            {"entry_point", "mm", {0, 0.05, 0.12, 0.3, 0.8}},
-                                            {"roll", "rad", {0, 0.015, 0.04, 0.1}}};
+  std::vector<inference::NuisanceGroup> out{{"curvature", "relative", {0, 0.02, 0.05, 0.12, 0.3, 0.6}},
+                                            {"entry_angle", "rad", {0, 0.003, 0.007, 0.018, 0.05, 0.15}},
+                                            {"entry_point", "mm", {0, 0.05, 0.12, 0.35, 1, 3}},
+                                            {"roll", "rad", {0, 0.015, 0.04, 0.1, 0.25, 0.5}}};
   if (by_hand) {
-    out.push_back({"entry_depth", "mm", {0, 0.1, 0.3, 1}});
+    out.push_back({"entry_depth", "mm", {0, 0.1, 0.3, 1, 3}});
     out.push_back({"bend_gradient", "1/mm per 100 mm", {0, 1e-5, 3e-5, 1e-4, 3e-4}});
   }
   return out;
 }
 
-double reach_of(const model::EffectParameter& p) {
-  if (p.reported > 0) return p.reported;
-  double reach = 0;
-  for (const double start : p.starts) reach = std::max(reach, 2 * std::abs(start - p.none));
-  return reach;
-}
-
-inference::Prior prior_of(const model::EffectParameter& p, const std::vector<double>& starts, double lower,
-                          double upper) {
-  if (p.periodic && std::isnan(p.none)) return inference::flat_prior(lower, upper);
-  if (std::isnan(p.none)) {
-    const double low = *std::min_element(starts.begin(), starts.end());
-    const double high = std::max(*std::max_element(starts.begin(), starts.end()), p.reported);
-    return inference::flat_prior(low < high ? low : 0.5 * low, low < high ? high : 2 * high);
+inference::Prior prior_of(std::string_view effect, const model::EffectParameter& p) {
+  const bool sized = !std::isnan(p.none);
+  if (sized ? !(p.reported > 0) : !p.periodic && !(p.likely_low < p.likely_high))
+    throw std::invalid_argument("effect " + std::string(effect) + ", parameter " + std::string(p.name) +
+                                (sized ? ": reported is " + std::to_string(p.reported) +
+                                             "; required: above 0, the largest size that is reported"
+                                       : ": likely_low to likely_high is empty; required: the range that is likely") +
+                                ". The prior density follows from it; set it in the effect's source file");
+  if (sized) {
+    auto prior = inference::size_prior(p.none, kExpectedShare * p.reported, p.lower, p.upper);
+    prior.least_distance = p.smallest_seen;
+    prior.largest = p.largest_seen;
+    return prior;
   }
-  auto prior = inference::size_prior(p.none, kExpectedShare * reach_of(p), lower, upper);
-  prior.least_distance = p.smallest_seen;
-  prior.largest = p.largest_seen;
-  return prior;
+  if (p.periodic) return inference::flat_prior(p.lower, p.upper);
+  return inference::flat_prior(p.likely_low, p.likely_high, p.lower, p.upper);
 }
 
-inference::Parameter parameter_of(const model::EffectParameter& p, const RecordedCase& recorded) {
+inference::Parameter parameter_of(std::string_view effect, const model::EffectParameter& p,
+                                  const RecordedCase& recorded) {
   double longest_s = 0;
   for (const auto& recording : recorded.recordings) longest_s = std::max(longest_s, recording.duration_s());
   inference::Parameter out{.name = std::string(p.name),
@@ -116,8 +118,7 @@ inference::Parameter parameter_of(const model::EffectParameter& p, const Recorde
     std::erase_if(out.starts, [&, deepest_mm = recorded.deepest_mm()](double start) {
       return start > deepest_mm && start > p.starts.front();
     });
-  out.prior =
-      out.scope == Scope::instant ? inference::flat_prior(0, longest_s) : prior_of(p, out.starts, out.lower, out.upper);
+  out.prior = out.scope == Scope::instant ? inference::flat_prior(0, longest_s) : prior_of(effect, p);
   return out;
 }
 
@@ -129,6 +130,15 @@ std::string label_of(const model::Effect& effect, std::uint32_t variant) {
     if ((variant & ~common) >> p & 1U && effect.parameters()[p].scope == model::Scope::rig)
       label += " (" + std::string(effect.parameters()[p].name.substr(0, effect.parameters()[p].name.rfind('_'))) + ")";
   return label;
+}
+
+double largest_turn_rad(const RecordedCase& recorded) {
+  double largest_rad = 0;
+  for (const auto& recording : recorded.recordings) {
+    const auto [least, most] = std::ranges::minmax(recording.motion.nodes, {}, &model::BaseMotion::rotation_rad);
+    largest_rad = std::max(largest_rad, most.rotation_rad - least.rotation_rad);
+  }
+  return largest_rad;
 }
 
 inference::Dataset data_of(const RecordedCase& recorded) {
@@ -154,6 +164,7 @@ NeedleSystem::NeedleSystem(RecordedCase recorded, const model::NeedleParameters&
       data_(data_of(recorded_)),
       groups_(variation_groups(by_hand())),
       two_groups_(recorded_.two_groups()),
+      determines_slip_(largest_turn_rad(recorded_) >= kSeparatesSlip_rad),
       headings_(recorded_.has_headings()) {
   const std::size_t most_known = by_hand() ? kMostKnownByHand : kMostKnown;
   if (known_.elsewhere.size() > most_known)
@@ -163,6 +174,8 @@ NeedleSystem::NeedleSystem(RecordedCase recorded, const model::NeedleParameters&
                                 (by_hand() ? " in recordings without a clock" : ""));
   const double u = std::max(model.lambda1_per_rad - model.lambda2 * model.lambda2 / (2 * std::numbers::pi), kSmallestU);
   const double width_k = kCurvatureShare * std::max(std::abs(model.curvature_per_mm), 1e-4);
+  const double u_width = determines_slip_ ? kUWidth_per_rad : kHeldWidth;
+  const double lambda2_width = determines_slip_ ? kLambda2Width : kHeldWidth;
   base_ = {{.name = "curvature_per_mm",
             .lower = -kCurvatureMax_per_mm,
             .upper = kCurvatureMax_per_mm,
@@ -174,13 +187,13 @@ NeedleSystem::NeedleSystem(RecordedCase recorded, const model::NeedleParameters&
             .upper = 5,
             .none = 0,
             .starts = {},
-            .prior = inference::normal_prior(u, kUWidth_per_rad)},
+            .prior = inference::normal_prior(u, u_width)},
            {.name = "lambda2",
             .lower = -2,
             .upper = 0.9,
             .none = 0,
             .starts = {},
-            .prior = inference::normal_prior(model.lambda2, kLambda2Width)}};
+            .prior = inference::normal_prior(model.lambda2, lambda2_width)}};
   nuisances_ = {{"curvature_relative", 0}, {"tilt_x_rad", 1}, {"tilt_y_rad", 1},
                 {"roll_rad", 3},           {"entry_x_mm", 2}, {"entry_y_mm", 2}};
   if (by_hand())
@@ -211,7 +224,7 @@ void NeedleSystem::add_effects_of_library() {
       inference::Effect one{.name = std::string(effect.name()), .label = label_of(effect, variant), .parameters = {}};
       for (std::size_t p = 0; p < effect.parameters().size(); ++p)
         if ((variant >> p & 1U) != 0) {
-          one.parameters.push_back(parameter_of(effect.parameters()[p], recorded_));
+          one.parameters.push_back(parameter_of(effect.name(), effect.parameters()[p], recorded_));
           one.parameters.back().jumps = one.parameters.back().scope == Scope::instant && effect.jumps(variant);
         }
       // Where only some parameters are fitted, a partner's place moves with them; none of those has one.
@@ -229,8 +242,11 @@ void NeedleSystem::add_effects_of_library() {
     const bool may_change = !two_groups_ || !effect->parameters().empty();
     if (!known && shown && may_change) add(*effect);
   }
-  if (two_groups_)
-    for (const model::Effect* change : needle_changes()) add(*change);
+  if (!two_groups_) return;
+  add(*needle_changes()[kCurvature]);
+  if (!determines_slip_) return;
+  add(*needle_changes()[kU]);
+  add(*needle_changes()[kLambda2]);
 }
 
 void NeedleSystem::add_common_errors() {

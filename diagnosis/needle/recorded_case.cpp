@@ -114,7 +114,7 @@ SeenAxes seen_axes(const Point& point) {
     return axes;
   }
   const SeenAxes principal = principal_axes(information, rank);
-  if (!point.heading) axes = coordinate_axes(principal);
+  axes = coordinate_axes(principal);
   return axes.empty() ? principal : axes;
 }
 

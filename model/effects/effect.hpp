@@ -40,7 +40,10 @@ struct EffectParameter {
   double none;            // where the effect vanishes; NaN: it does not vanish by this parameter (a layer's depth)
   // Where fits begin: one value if the likelihood has one valley, a grid if several (a depth, a frequency).
   std::vector<double> starts;
-  double reported = 0;  // how far from `none` the field's reports reach; 0: nothing is known
+  double reported = 0;  // largest distance from `none` that the literature reports; 0 where `none` is NaN
+  // Where `none` is NaN and the parameter is not periodic: the range that the literature and the length of needles make
+  // likely. The prior density is uniform over it, with one part in twenty uniform over [lower, upper].
+  double likely_low = 0, likely_high = 0;
   Scope scope = Scope::rig;
   bool periodic = false;   // an angle: the bounds are one period apart
   int half_turns = -1;     // periodic: the angle that has to turn by half of its own period when this one turns by one
@@ -65,6 +68,8 @@ std::vector<double> starts_every(double step, double first, double last);
 double value_if_unsaid(const EffectParameter& parameter);
 // Of all values that are the same (EffectParameter::modulo) the one that is meant.
 double meant(const EffectParameter& parameter, double value);
+// Insertion needles are up to 150 mm long (brachytherapy and biopsy needles, 100 to 150 mm).
+inline constexpr double kLongestNeedle_mm = 150;
 inline constexpr double kNoNone = std::numeric_limits<double>::quiet_NaN();
 
 // Against what the effect is to be looked at: where it shows.

@@ -17,6 +17,8 @@ class Layer final : public Effect {
                   .upper = 300,
                   .none = kNoNone,
                   .starts = starts_every(7.5, 7.5, 120),
+                  .likely_low = 0,
+                  .likely_high = kLongestNeedle_mm,
                   .begins = Begins::depth},
                  {.name = "curvature_ratio", .lower = 0, .upper = 4, .none = 1, .starts = {0.8}, .reported = 0.8}}}) {}
 

@@ -22,6 +22,8 @@ class Puncture final : public Effect {
                                 .upper = 300,
                                 .none = kNoNone,
                                 .starts = starts_every(0.25, 0.25, 120),
+                                .likely_low = 0,
+                                .likely_high = kLongestNeedle_mm,
                                 .begins = Begins::depth},
                                {.name = "indentation_mm",
                                 .lower = 0,

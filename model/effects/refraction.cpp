@@ -12,7 +12,13 @@ class Refraction final : public Effect {
                 .covariate = Covariate::depth_mm,
                 .parameters = {
                     {.name = "coefficient", .lower = -0.3, .upper = 0.3, .none = 0, .starts = {0.02}, .reported = 0.04},
-                    {.name = "centre_mm", .lower = -100, .upper = 300, .none = kNoNone, .starts = {0, 25, 50, 75}}}}) {}
+                    {.name = "centre_mm",
+                     .lower = -100,
+                     .upper = 300,
+                     .none = kNoNone,
+                     .starts = {0, 25, 50, 75},
+                     .likely_low = 0,
+                     .likely_high = kLongestNeedle_mm}}}) {}
 
   void camera(Parameters p, Dual3& position_mm) const override {
     const Dual y = position_mm[1];

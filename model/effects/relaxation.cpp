@@ -19,12 +19,15 @@ class Relaxation final : public Effect {
                      .upper = 120,
                      .none = kNoNone,
                      .starts = {0.8, 2.5, 8.0},
-                     .reported = 20},
+                     .likely_low = 0.8,
+                     .likely_high = 20},
                     {.name = "build_mm",
                      .lower = 1,
                      .upper = 15,
                      .none = kNoNone,
                      .starts = {kUsualBuild_mm},
+                     .likely_low = 1,
+                     .likely_high = 10,
                      .usual = kUsualBuild_mm}}}) {}
 
   void settle(Parameters p, const LegView& leg, EffectMemory& memory) const override {

@@ -20,6 +20,8 @@ class TissueMotion final : public Effect {
                      .upper = 2,
                      .none = kNoNone,
                      .starts = {0.12, 0.15, 0.18, 0.21, 0.24, 0.27, 0.30, 0.33, 0.36, 0.39, 0.42, 0.46, 0.5, 0.55, 0.6},
+                     .likely_low = 0.1,
+                     .likely_high = 0.6,
                      .frequency = true},
                     {.name = "direction_rad",
                      .lower = 0,

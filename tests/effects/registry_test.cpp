@@ -207,6 +207,13 @@ TEST_P(EveryEffect, SaysWhatAReportNeeds) {
     EXPECT_FALSE(p.starts.empty()) << p.name;
     for (const double start : p.starts) EXPECT_TRUE(start >= p.lower && start <= p.upper) << p.name << ' ' << start;
     EXPECT_TRUE(std::isnan(p.none) || (p.none >= p.lower && p.none <= p.upper)) << p.name;
+    if (p.scope == Scope::recording || p.periodic) continue;
+    // The prior density of a diagnosis: about `none` by `reported`, else over the likely range.
+    if (std::isnan(p.none)) {
+      EXPECT_TRUE(p.lower <= p.likely_low && p.likely_low < p.likely_high && p.likely_high <= p.upper) << p.name;
+    } else {
+      EXPECT_GT(p.reported, 0) << p.name;
+    }
   }
 }
 

@@ -18,6 +18,7 @@ double mass(const Prior& prior, double from, double to, double known_to) {
 TEST(Priors, HaveMassOne) {
   EXPECT_NEAR(mass(normal_prior(2, 0.5), -4, 8, 0), 1, 1e-6);
   EXPECT_NEAR(mass(flat_prior(-1, 3), -1, 3, 0), 1, 1e-6);
+  EXPECT_NEAR(mass(flat_prior(-1, 3, -20, 30), -20, 30, 0), 1, 1e-4);
   // Both sides, one side, and one that its causes bound from above. Student's tails reach far.
   EXPECT_NEAR(mass(size_prior(0, 1, -1000, 1000), -1000, 1000, 1e-4), 1, 0.01);
   EXPECT_NEAR(mass(size_prior(0, 1, 0, 1000), 0, 1000, 1e-4), 1, 0.01);

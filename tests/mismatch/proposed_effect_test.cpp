@@ -158,6 +158,7 @@ TEST_P(EveryProposal, SaysWhatADiagnosisNeeds) {
     }
     if (&p != all.data()) {
       EXPECT_TRUE(std::isnan(p.none)) << p.name;
+      EXPECT_TRUE(p.periodic || p.likely_low < p.likely_high) << p.name;
     }
   }
   EXPECT_EQ(all.back().periodic, proposal.form == Form::sinusoid);

@@ -117,7 +117,9 @@ void print_verdict(std::ostream& out, const Findings& f) {
   if (!f.two_groups)
     out << "  needle: k " << with_error(n.value.curvature_per_mm, n.curvature_sd_per_mm) << " 1/mm, lambda1 "
         << with_error(n.value.lambda1_per_rad, n.lambda1_sd_per_rad) << ", lambda2 "
-        << with_error(n.value.lambda2, n.lambda2_sd) << '\n';
+        << with_error(n.value.lambda2, n.lambda2_sd)
+        << (n.slip_determined ? "" : " (lambda is not determined: the shaft does not turn; as in the model file)")
+        << '\n';
   const HeldOut& h = f.held_out;
   const std::string refitted = f.two_groups ? "by what both share " : "needle refitted ";
   const std::string found = f.two_groups ? "with the change " : "with what was found ";

@@ -79,7 +79,7 @@ std::string variation_in_words(const diagnosis::VariationEstimate& v) {
   std::string name = v.name;
   std::replace(name.begin(), name.end(), '_', ' ');
   return name + " " + number(scale * v.sd, 2) + (relative ? " %" : " " + v.unit) + " (none: " + probability(v.none) +
-         ")";
+         (v.at_end ? "; at the end of the values tried" : "") + ")";
 }
 
 bool is_kind_of(std::string_view tried, std::string_view effect, std::string_view parameter) {

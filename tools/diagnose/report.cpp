@@ -233,9 +233,13 @@ void add_parameters(report::Page& page, const Findings& f) {
     rows.push_back({kNames[i], number(given[i], 4), fitted(f.base)[i]});
     if (!one_model) rows.back().push_back(fitted(f.needle)[i]);
   }
-  page.table(header, rows,
-             "Value ± standard error. A wrong k, lambda1 or lambda2 is no missing physics: they are refitted before "
-             "anything is named.");
+  page.table(
+      header, rows,
+      f.needle.slip_determined
+          ? "Value ± standard error. A wrong k, lambda1 or lambda2 is no missing physics: they are refitted "
+            "before anything is named."
+          : "Value ± standard error. The shaft does not turn in these recordings, so lambda1 and lambda2 are not "
+            "determined: they keep the values of the model file.");
 }
 
 void add_variation(report::Page& page, const Findings& f) {
@@ -248,7 +252,9 @@ void add_variation(report::Page& page, const Findings& f) {
     const std::string unit = relative ? " %" : " " + v.unit;
     std::string name = v.name;
     std::replace(name.begin(), name.end(), '_', ' ');
-    rows.push_back({name, number(scale * v.sd, 2) + unit, number(scale * v.low, 2) + " to " + number(scale * v.high, 2),
+    rows.push_back({name, number(scale * v.sd, 2) + unit,
+                    number(scale * v.low, 2) + " to " + number(scale * v.high, 2) +
+                        (v.at_end ? ", the end of the values tried" : ""),
                     probability(v.none)});
   }
   page.table({"between insertions", "standard deviation", "95 %", "probability of none"}, rows,

@@ -101,6 +101,7 @@ json as_json(const NeedleEstimate& n) {
   return {{"curvature_per_mm", {{"value", n.value.curvature_per_mm}, {"std_error", figure(n.curvature_sd_per_mm)}}},
           {"lambda1_per_rad", {{"value", n.value.lambda1_per_rad}, {"std_error", figure(n.lambda1_sd_per_rad)}}},
           {"lambda2", {{"value", n.value.lambda2}, {"std_error", figure(n.lambda2_sd)}}},
+          {"slip_determined", n.slip_determined},
           {"wheelbase_mm", n.value.wheelbase_mm}};
 }
 
@@ -186,6 +187,7 @@ json as_json(const std::vector<VariationEstimate>& variation) {
     all[v.name] = {{"unit", v.unit},
                    {"standard_deviation", figure(v.sd)},
                    {"range95", {figure(v.low), figure(v.high)}},
+                   {"at_end", v.at_end},
                    {"probability_of_none", figure(v.none)}};
   return all;
 }
