@@ -21,7 +21,7 @@ constexpr double kCurvatureShare = 0.5;
 // A shaft that turns by less in every recording does not separate slip from curvature: both bend the path in one plane.
 // Lambda then keeps the value of the model file, to within kHeldWidth (1/rad and 1).
 constexpr double kSeparatesSlip_rad = 0.2;
-constexpr double kHeldWidth = 1e-3;
+constexpr double kHeldWidth = 1e-4;
 constexpr double kCurvatureMax_per_mm = 0.05;
 constexpr double kSmallestU = 1e-9;      // (26) is strict
 constexpr double kExpectedShare = 0.75;  // scale of a size's prior, of the largest that is reported

@@ -2,6 +2,7 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 
 #include "diagnosis/mismatch/diagnose.hpp"
@@ -38,6 +39,34 @@ Findings findings_of(const std::vector<Own>& own, std::uint64_t seed) {
                          .sigma_mm = {0.1, 0.1, 0.13},
                          .ar1 = 0.6};
   return diagnose(record_case(rig, seed), rig.needle, {});
+}
+
+// Strongly bent needles whose shafts never turn, rolled by up to 40 degrees, with headings.
+TEST(Insertions, RolledByManyDegreesGiveTheCurvature) {
+  model::NeedleParameters needle = model::testing::bicycle();
+  needle.curvature_per_mm = 0.010;
+  const SimulatedRig rig{.needle = needle,
+                         .effects_in =
+                             [](int r) {
+                               constexpr std::array kRoll_rad{0.7, -0.7, 0.55, -0.6};
+                               return std::vector{active("bevel_offset", {kRoll_rad.at(static_cast<std::size_t>(r))})};
+                             },
+                         .recordings = 4,
+                         .frame_s = 0.1,
+                         .sigma_mm = {0.1, 0.1, 0.1},
+                         .heading_sd_rad = 0.003,
+                         .script =
+                             [](int) {
+                               return model::testing::Script{{14, 5, 0}};
+                             }};
+  model::NeedleParameters in_use = needle;
+  in_use.curvature_per_mm = 0.012;
+  const Findings found = diagnose(record_case(rig, 1), in_use, {});
+  EXPECT_EQ(found.verdict, Verdict::nothing_missing) << found.sentence;
+  EXPECT_NEAR(found.needle.value.curvature_per_mm, 0.010, 4 * found.needle.curvature_sd_per_mm);
+  EXPECT_FALSE(found.needle.slip_determined);
+  EXPECT_NEAR(found.needle.value.lambda2, in_use.lambda2, 1e-3);
+  for (const auto& v : found.variation) EXPECT_EQ(v.at_end, v.name == "roll") << v.name << ' ' << v.sd;
 }
 
 // Two rigs, so that a share has readings enough: 16 insertions.

@@ -168,6 +168,45 @@ TEST(NeedleSystem, LooksOnlyForWhatTheRecordingsCanShow) {
 }
 
 // With three effects, two curves and what differs between insertions there are as many as a needle carries.
+// Without rotation slip and curvature bend the path in one plane: lambda keeps the value of the model file.
+TEST(NeedleSystem, HoldsLambdaWhereTheShaftNeverTurns) {
+  SimulatedRig rig{.recordings = 4, .changed_from = 2};
+  const auto has = [](const NeedleSystem& system, const std::string& name) {
+    return std::ranges::any_of(system.effects(), [&](const auto& effect) { return effect.name == name; });
+  };
+  const NeedleSystem turns(record_case(rig, 1), rig.needle);
+  EXPECT_TRUE(turns.determines_slip());
+  EXPECT_TRUE(has(turns, "curvature_per_mm") && has(turns, "lambda1_per_rad") && has(turns, "lambda2"));
+  EXPECT_GT(1 / std::sqrt(precision_of(turns.base()[kLambda2].prior)), 0.1);
+
+  rig.script = [](int) { return model::testing::Script{{6, 10, 0}}; };
+  const NeedleSystem straight(record_case(rig, 1), rig.needle);
+  EXPECT_FALSE(straight.determines_slip());
+  EXPECT_TRUE(has(straight, "curvature_per_mm"));
+  EXPECT_FALSE(has(straight, "lambda1_per_rad") || has(straight, "lambda2"));
+  for (const BaseParameter p : {kU, kLambda2}) EXPECT_LT(1 / std::sqrt(precision_of(straight.base()[p].prior)), 2e-3);
+  EXPECT_GT(1 / std::sqrt(precision_of(straight.base()[kCurvature].prior)), 1e-3);
+}
+
+// The density of an effect's parameter follows from the effect alone, not from what was recorded.
+TEST(NeedleSystem, PriorsDoNotDependOnTheRecordings) {
+  SimulatedRig rig{.recordings = 2};
+  const NeedleSystem deep(record_case(rig, 1), rig.needle);
+  rig.script = [](int) { return model::testing::Script{{1, 10, 0.5}, {1, 5, -0.5}}; };
+  rig.frame_s = 0.1;
+  const NeedleSystem shallow(record_case(rig, 1), rig.needle);
+  ASSERT_EQ(deep.effects().size(), shallow.effects().size());
+  for (std::size_t e = 0; e < deep.effects().size(); ++e)
+    for (std::size_t p = 0; p < deep.effects()[e].parameters.size(); ++p) {
+      const auto& one = deep.effects()[e].parameters[p];
+      const auto& other = shallow.effects()[e].parameters[p];
+      if (one.scope == inference::Scope::instant) continue;  // uniform over the recording
+      for (const double value : {-0.3, 0.2, 1.0, 5.0, 40.0, 120.0})
+        EXPECT_EQ(log_density(one.prior, value, 1e-3), log_density(other.prior, value, 1e-3))
+            << deep.effects()[e].label << ' ' << one.name << ' ' << value;
+    }
+}
+
 TEST(NeedleSystem, HoldsAsManyKnownEffectsAsLeaveRoomForTheOthers) {
   const SimulatedRig rig;
   const auto known = [](std::size_t count) {

@@ -70,6 +70,36 @@ TEST(Channels, AHeadingIsReadByItsComponents) {
     EXPECT_EQ(recording.series[4].measured[i], raw[1].headings[i].heading.y());
 }
 
+// A heading that turns by 1 rad toward an oblique direction: its principal axes turn with it, its channels do not.
+TEST(Channels, HeadingsOfAStronglyBentNeedleKeepTheirChannels) {
+  constexpr double kBend_rad = 1.0, kSd_rad = 0.004;
+  auto raw = record({.recordings = 2, .heading_sd_rad = kSd_rad}, 1);
+  const Eigen::Vector3d toward(0.5, -std::sqrt(0.75), 0);
+  for (auto& recording : raw)
+    for (std::size_t i = 0; i < recording.headings.size(); ++i) {
+      const double bent_rad = kBend_rad * static_cast<double>(i) / static_cast<double>(recording.headings.size() - 1);
+      auto& heading = recording.headings[i];
+      heading.heading = std::cos(bent_rad) * Eigen::Vector3d::UnitZ() + std::sin(bent_rad) * toward;
+      heading.information_per_rad2 =
+          (Eigen::Matrix3d::Identity() - heading.heading * heading.heading.transpose()) / (kSd_rad * kSd_rad);
+    }
+  const auto recorded = make_case(raw);
+  ASSERT_THAT(names_of(recorded), ::testing::ElementsAre("tip.x", "tip.y", "tip.z", "heading.x", "heading.y"));
+  for (const std::size_t c : {3U, 4U}) {
+    const Channel& channel = recorded.channels[c];
+    const Series& series = recorded.recordings[0].series[c];
+    ASSERT_EQ(series.measured.size(), raw[0].headings.size());
+    // A turn by e across the heading h moves its component along an axis a by sd |a - (a.h) h|.
+    for (std::size_t i = 0; i < series.measured.size(); ++i) {
+      const Eigen::Vector3d& h = raw[0].headings[i].heading;
+      const double along = channel.axis.dot(h);
+      EXPECT_NEAR(series.measured[i], along, 1e-12);
+      EXPECT_NEAR(series.relative_sd[i] * channel.claimed_sd, kSd_rad * std::sqrt(1 - along * along),
+                  5e-3 * kSd_rad);  // while the correlation is small it is left out of the marginal
+    }
+  }
+}
+
 // One camera sees a heading turn in its picture alone: from along x, about x.
 TEST(Channels, AHeadingThatOneCameraSeesHasOneChannel) {
   auto raw = record({.recordings = 2, .heading_sd_rad = 0.004}, 1);

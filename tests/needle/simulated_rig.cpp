@@ -33,10 +33,10 @@ std::vector<RawRecording> record(const SimulatedRig& rig, std::uint64_t seed) {
   std::normal_distribution<double> normal;
   std::vector<RawRecording> all;
   for (int r = 0; r < rig.recordings; ++r) {
-    RawRecording raw{.name = "rec" + std::to_string(r + 1), .actuators = script_of(r).actuators(0.02), .tips = {}};
+    RawRecording raw{.name = "rec" + std::to_string(r + 1), .actuators = rig.script(r).actuators(0.02), .tips = {}};
     std::vector<std::int64_t> utimes;
     std::vector<double> time_s;
-    const int frames = static_cast<int>(std::ceil(script_of(r).duration_s() / rig.frame_s));
+    const int frames = static_cast<int>(std::ceil(rig.script(r).duration_s() / rig.frame_s));
     for (int i = 0; i < frames; ++i) {
       const double t = i * rig.frame_s;
       if (uniform(random) < rig.dropped_share) continue;

@@ -13,6 +13,9 @@ namespace bevel::diagnosis::testing {
 
 using model::testing::active;
 
+// 7 to 9 s, 60 to 75 mm: turns both ways at several depths, two speeds, a rest, steady turning, retraction.
+model::testing::Script script_of(int recording);
+
 struct SimulatedRig {
   model::NeedleParameters needle = model::testing::agar();
   std::vector<model::ActiveEffect> effects{};
@@ -28,10 +31,8 @@ struct SimulatedRig {
   double dropped_share = 0;
   double heading_sd_rad = 0;  // of the heading's two components across the needle; 0: none is measured
   int changed_from = -1;      // the first recording of the second group; -1: there is one group
+  std::function<model::testing::Script(int recording)> script = script_of;
 };
-
-// 7 to 9 s, 60 to 75 mm: turns both ways at several depths, two speeds, a rest, steady turning, retraction.
-model::testing::Script script_of(int recording);
 
 std::vector<RawRecording> record(const SimulatedRig& rig, std::uint64_t seed);
 RecordedCase record_case(const SimulatedRig& rig, std::uint64_t seed);
