@@ -24,7 +24,7 @@ struct ImportedRecording {
   int rows_without_base = 0;          // of the tip, before the base's first reading or after its last; left out
   std::vector<std::string> left_out;  // a line for each row that is implausible beside its neighbours
   std::string far_tips;               // a sentence on tips farther away than the base moved; "" if there are none
-  std::string motion_gap;             // a sentence on the first gap of the base (motion_gap.hpp); "" if there is none
+  std::string motion_gap;             // a sentence on the first gap of the base (motion_gap.hpp); "" without a gap
   std::vector<std::string> held;      // a sentence for each column whose value is held between updates
   std::optional<EntryFrame> frame;    // if the map asks for an estimated one
   std::optional<BaseLag> lag;         // of the base relative to the tip; reported, not applied

@@ -9,7 +9,7 @@
 
 namespace bevel::io {
 
-/// Where the needle entered, in the frame of the measurements.
+/// Pose of {A} in the frame of the measurements.
 struct EntryFrame {
   Eigen::Quaterniond to_A = Eigen::Quaterniond::Identity();  ///< rotates a vector of the measurements' frame into {A}
   Eigen::Vector3d origin_mm = Eigen::Vector3d::Zero();       ///< of {A}, in the measurements' frame, in mm

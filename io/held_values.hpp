@@ -23,7 +23,7 @@ struct HeldValues {
 /// A value counts as held if it changes at intervals that are multiples of one period, and this period is longer than
 /// the interval between rows. An axis that stands still, and an encoder whose resolution is coarse at a varying speed,
 /// change at irregular intervals and are not held values.
-/// Where the value stays the same for several periods, one row in each period is an update.
+/// A value that stays the same for several periods has one update in each of them.
 /// @param times_us  time of each row that has the value, increasing
 /// @param is_new  whether the row's value differs from that of the row before; the first element is ignored
 /// @return nothing if the value is not held, or if it changes too rarely to decide

@@ -52,7 +52,7 @@ def targets_of(command):
     if command.program == "cmake" and command.words[1:3] == ("--build", "build"):
         return set(command.words[4:]) if "--target" in command.words else None
     if command.program.startswith("tools/"):
-        # What a script builds with all its options given or left out.
+        # A script may build more with some options; each target counts.
         return {name for found in TARGETS.findall(read(command.program)) for name in found.split()}
     return set()  # tools/test and .ci/run build all, but a reader may leave them out
 
@@ -115,7 +115,7 @@ class Example(unittest.TestCase):
         self.assertGreaterEqual(len(self.commands), 3, self.commands)
 
     def figures(self):
-        """Of the result, by the first words of each row of the table in examples/README.md."""
+        """Returns the figures of the result, by the names of the rows in examples/README.md."""
         effect, fit, steered = self.effects[0], self.verdict["fit"], self.verdict["steered"]
         jump = effect["parameters"]["jump_mm"]
         return {
