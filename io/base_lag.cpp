@@ -6,6 +6,8 @@
 #include <cmath>
 #include <limits>
 
+#include "io/outlier_limit.hpp"
+
 namespace bevel::io {
 namespace {
 
@@ -21,9 +23,20 @@ struct Point {
   double path_mm = 0;
 };
 
+/// Removes the points whose residual is an outlier. Returns whether there were any.
+bool remove_outliers(std::vector<Point>& points, const Eigen::VectorXd& residual_mm, double sigma_mm) {
+  const double limit_mm = outlier_limit({residual_mm.begin(), residual_mm.end()}, sigma_mm);
+  std::vector<Point> kept;
+  for (std::size_t i = 0; i < points.size(); ++i)
+    if (std::abs(residual_mm[static_cast<Eigen::Index>(i)]) <= limit_mm) kept.push_back(points[i]);
+  if (kept.size() == points.size() || kept.size() < kFewestTips) return false;
+  points = std::move(kept);
+  return true;
+}
+
 /// Sets the path length of each point: along the curve x(z), y(z), two cubic polynomials. Noise sideways does not add
-/// to it.
-void measure_path(std::vector<Point>& points) {
+/// to it. Returns the distance (mm) of each point from the curve.
+Eigen::VectorXd measure_path(std::vector<Point>& points) {
   const auto [low, high] = std::ranges::minmax(points, {}, [](const Point& p) { return p.at_mm.z(); });
   const double from_mm = low.at_mm.z(), length_mm = std::max(high.at_mm.z() - from_mm, 1e-9);
   Eigen::MatrixXd powers(std::ssize(points), 4), sideways(std::ssize(points), 2);
@@ -51,6 +64,7 @@ void measure_path(std::vector<Point>& points) {
     const auto i = std::min(static_cast<std::size_t>(at), kPieces - 1);
     point.path_mm = length[i] + (at - static_cast<double>(i)) * (length[i + 1] - length[i]);
   }
+  return (sideways - powers * curve).rowwise().norm();
 }
 
 /// Sums of squares of path length and depth, so that a part can be left out by subtraction.
@@ -129,6 +143,15 @@ class Fit {
     return sum.residual2();
   }
 
+  /// Residual of each point.
+  Eigen::VectorXd residuals_mm(double lag_s) const {
+    Eigen::MatrixXd line(std::ssize(points_), 2);
+    Eigen::VectorXd path_mm(std::ssize(points_));
+    line << Eigen::VectorXd::Ones(line.rows()), depths(lag_s);
+    for (Eigen::Index i = 0; i < path_mm.size(); ++i) path_mm[i] = points_[static_cast<std::size_t>(i)].path_mm;
+    return path_mm - line * line.colPivHouseholderQr().solve(path_mm);
+  }
+
   /// Minimum between `low_s` and `high_s` by golden-section search.
   double minimum(double low_s, double high_s, std::size_t without) const {
     const double ratio = (std::sqrt(5.0) - 1) / 2;
@@ -153,6 +176,47 @@ class Fit {
   std::vector<Point> points_;
   double middle_mm_ = 0, half_mm_ = 1, mean_mm_ = 0;
 };
+
+/// @param sigma_mm  smallest standard deviation of the path length
+BaseLag lag_of(const Fit& fit, double range_s, double sigma_mm) {
+  // One pass over the range for all, and for all but each part.
+  const double step_s = range_s / kSteps;
+  std::array<double, kParts + 1> lowest, best_s{};
+  lowest.fill(std::numeric_limits<double>::infinity());
+  std::array<double, 2 * kSteps + 1> of_all;
+  for (int k = -kSteps; k <= kSteps; ++k) {
+    const auto parts = fit.at(k * step_s);
+    Sums all;
+    for (const Sums& part : parts) all += part;
+    of_all[static_cast<std::size_t>(k + kSteps)] = all.residual2();
+    for (std::size_t without = 0; without <= kParts; ++without) {
+      Sums sum = all;
+      if (without < kParts) sum -= parts[without];
+      const double residual2 = sum.residual2();
+      if (residual2 < lowest[without]) lowest[without] = residual2, best_s[without] = k * step_s;
+    }
+  }
+  BaseLag lag;
+  lag.determined = std::abs(best_s[kParts]) < range_s - 0.5 * step_s;
+  for (std::size_t without = 0; without <= kParts; ++without)
+    best_s[without] = fit.minimum(best_s[without] - step_s, best_s[without] + step_s, without);
+  lag.lag_s = best_s[kParts];
+  lag.rms_mm = std::sqrt(std::max(0.0, fit.residual2(lag.lag_s, kParts)) / static_cast<double>(fit.size()));
+  double mean_s = 0, squares = 0;
+  for (std::size_t i = 0; i < kParts; ++i) mean_s += best_s[i] / kParts;
+  for (std::size_t i = 0; i < kParts; ++i) squares += (best_s[i] - mean_s) * (best_s[i] - mean_s);
+  // Lags that fit as well, within two standard deviations. A rate that is constant but for its beginning and its end
+  // has a range of such lags.
+  const double as_good = lowest[kParts] * (1 + 4 / static_cast<double>(fit.size()));
+  const auto is_as_good = [&](double residual2) { return residual2 <= as_good; };
+  const auto first = std::ranges::find_if(of_all, is_as_good);
+  const auto last = std::find_if(of_all.rbegin(), of_all.rend(), is_as_good).base();  // one behind
+  const double width_s = step_s * static_cast<double>(last - first - 1);
+  lag.sd_s = std::max({std::sqrt(squares * (kParts - 1) / kParts), width_s / 4,
+                       fit.independent_sd_s(lag.lag_s, step_s, std::max(lag.rms_mm, sigma_mm))});
+  lag.determined = lag.determined && lag.sd_s < kLargestLagSd_s;
+  return lag;
+}
 
 }  // namespace
 
@@ -179,35 +243,13 @@ std::optional<BaseLag> estimate_base_lag(std::span<const model::ActuatorState> a
     for (std::size_t i = 0; i < points.size(); i += every) fewer.push_back(points[i]);
     points = std::move(fewer);
   }
-  measure_path(points);
-  const Fit fit(actuators, std::move(points));
-  // One pass over the range for all, and for all but each part.
-  const double step_s = range_s / kSteps;
-  std::array<double, kParts + 1> lowest, best_s{};
-  lowest.fill(std::numeric_limits<double>::infinity());
-  for (int k = -kSteps; k <= kSteps; ++k) {
-    const auto parts = fit.at(k * step_s);
-    Sums all;
-    for (const Sums& part : parts) all += part;
-    for (std::size_t without = 0; without <= kParts; ++without) {
-      Sums sum = all;
-      if (without < kParts) sum -= parts[without];
-      const double residual2 = sum.residual2();
-      if (residual2 < lowest[without]) lowest[without] = residual2, best_s[without] = k * step_s;
-    }
-  }
   BaseLag lag;
-  lag.determined = std::abs(best_s[kParts]) < range_s - 0.5 * step_s;
-  for (std::size_t without = 0; without <= kParts; ++without)
-    best_s[without] = fit.minimum(best_s[without] - step_s, best_s[without] + step_s, without);
-  lag.lag_s = best_s[kParts];
-  lag.rms_mm = std::sqrt(std::max(0.0, fit.residual2(lag.lag_s, kParts)) / static_cast<double>(fit.size()));
-  double mean_s = 0, squares = 0;
-  for (std::size_t i = 0; i < kParts; ++i) mean_s += best_s[i] / kParts;
-  for (std::size_t i = 0; i < kParts; ++i) squares += (best_s[i] - mean_s) * (best_s[i] - mean_s);
-  lag.sd_s = std::max(std::sqrt(squares * (kParts - 1) / kParts),
-                      fit.independent_sd_s(lag.lag_s, step_s, std::max(lag.rms_mm, sigma_mm)));
-  lag.determined = lag.determined && lag.sd_s < kLargestLagSd_s;
+  for (int pass = 0; pass < kOutlierPasses; ++pass) {
+    if (remove_outliers(points, measure_path(points), sigma_mm)) measure_path(points);
+    const Fit fit(actuators, points);
+    lag = lag_of(fit, range_s, sigma_mm);
+    if (!remove_outliers(points, fit.residuals_mm(lag.lag_s), sigma_mm)) break;
+  }
   return lag;
 }
 

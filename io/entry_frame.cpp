@@ -9,6 +9,8 @@
 #include <string>
 #include <vector>
 
+#include "io/outlier_limit.hpp"
+
 namespace bevel::io {
 namespace {
 
@@ -107,6 +109,27 @@ Eigen::Quaterniond start_of(const std::vector<Point>& points, Parameters& p) {
   return start;
 }
 
+/// Fits the arc by Levenberg-Marquardt, and returns the whitened residuals.
+Eigen::VectorXd fit_arc(const std::vector<Point>& points, const Eigen::Quaterniond& start, Parameters& p) {
+  Eigen::VectorXd residual = residuals(points, p, start);
+  double damping = 1e-3;
+  for (int i = 0; i < 60; ++i) {
+    const Eigen::MatrixXd j = jacobian(points, p, start);
+    Eigen::Matrix<double, 8, 8> normal = j.transpose() * j;
+    normal.diagonal() *= 1 + damping;
+    const Parameters trial = p - normal.ldlt().solve(j.transpose() * residual);
+    const Eigen::VectorXd after = residuals(points, trial, start);
+    if (!(after.squaredNorm() < residual.squaredNorm())) {
+      if ((damping *= 10) > 1e9) break;
+      continue;
+    }
+    const double gain = 1 - after.squaredNorm() / residual.squaredNorm();
+    p = trial, residual = after, damping = std::max(damping / 10, 1e-12);
+    if (gain < 1e-10) break;
+  }
+  return residual;
+}
+
 /// Factor of the variances of correlated residuals, (1 + r) / (1 - r) for a correlation r of successive ones.
 double correlation_factor(const Eigen::VectorXd& residual) {
   double products = 0, squares = 0;
@@ -122,7 +145,7 @@ double correlation_factor(const Eigen::VectorXd& residual) {
 
 EntryFrame fit_entry_frame(std::span<const model::ActuatorState> actuators,
                            std::span<const model::TipMeasurement> tips) {
-  const std::vector<Point> points = actuators.size() < 2 ? std::vector<Point>{} : points_of(actuators, tips);
+  std::vector<Point> points = actuators.size() < 2 ? std::vector<Point>{} : points_of(actuators, tips);
   double deepest_mm = 0;
   for (const Point& point : points) deepest_mm = std::max(deepest_mm, point.depth_mm);
   constexpr std::size_t kFewestTips = 6;  // 18 coordinates for 8 parameters
@@ -133,23 +156,18 @@ EntryFrame fit_entry_frame(std::span<const model::ActuatorState> actuators,
                              std::to_string(kFewestTips) + " and " + figure(kShortestArc_mm) +
                              " mm. Give the frame as [tip.transform] instead");
   Parameters p;
-  const Eigen::Quaterniond start = start_of(points, p);
-  Eigen::VectorXd residual = residuals(points, p, start);
-  // Levenberg-Marquardt
-  double damping = 1e-3;
-  for (int i = 0; i < 60; ++i) {
-    const Eigen::MatrixXd j = jacobian(points, p, start);
-    Eigen::Matrix<double, 8, 8> normal = j.transpose() * j;
-    normal.diagonal() *= 1 + damping;
-    const Parameters trial = p - normal.ldlt().solve(j.transpose() * residual);
-    const Eigen::VectorXd after = residuals(points, trial, start);
-    if (!(after.squaredNorm() < residual.squaredNorm())) {
-      if ((damping *= 10) > 1e9) break;
-      continue;
-    }
-    const double gain = 1 - after.squaredNorm() / residual.squaredNorm();
-    p = trial, residual = after, damping = std::max(damping / 10, 1e-12);
-    if (gain < 1e-10) break;
+  Eigen::Quaterniond start = start_of(points, p);
+  Eigen::VectorXd residual = fit_arc(points, start, p);
+  for (int pass = 1; pass < kOutlierPasses; ++pass) {
+    const double limit = outlier_limit({residual.begin(), residual.end()}, 1);
+    std::vector<Point> kept;
+    for (std::size_t i = 0; i < points.size(); ++i)
+      if (residual.segment<3>(3 * static_cast<Eigen::Index>(i)).cwiseAbs().maxCoeff() <= limit)
+        kept.push_back(points[i]);
+    if (kept.size() == points.size() || kept.size() < kFewestTips) break;
+    points = std::move(kept);
+    start = start_of(points, p);
+    residual = fit_arc(points, start, p);
   }
   const Eigen::MatrixXd j = jacobian(points, p, start);
   const auto freedom = static_cast<double>(residual.size() - 8);
