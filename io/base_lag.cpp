@@ -205,15 +205,23 @@ BaseLag lag_of(const Fit& fit, double range_s, double sigma_mm) {
   double mean_s = 0, squares = 0;
   for (std::size_t i = 0; i < kParts; ++i) mean_s += best_s[i] / kParts;
   for (std::size_t i = 0; i < kParts; ++i) squares += (best_s[i] - mean_s) * (best_s[i] - mean_s);
+  // Successive residuals are correlated where the tip does not follow a line: with a correlation r they count as a
+  // share of (1 - r) / (1 + r).
+  const Eigen::VectorXd residual_mm = fit.residuals_mm(lag.lag_s);
+  const auto pairs = residual_mm.size() - 1;
+  const double r = std::clamp(
+      residual_mm.head(pairs).dot(residual_mm.tail(pairs)) / std::max(residual_mm.squaredNorm(), 1e-12), 0.0, 0.99);
+  const double correlated = (1 + r) / (1 - r);
   // Lags that fit as well, within two standard deviations. A rate that is constant but for its beginning and its end
   // has a range of such lags.
-  const double as_good = lowest[kParts] * (1 + 4 / static_cast<double>(fit.size()));
+  const double as_good = lowest[kParts] * (1 + 4 * correlated / static_cast<double>(fit.size()));
   const auto is_as_good = [&](double residual2) { return residual2 <= as_good; };
   const auto first = std::ranges::find_if(of_all, is_as_good);
   const auto last = std::find_if(of_all.rbegin(), of_all.rend(), is_as_good).base();  // one behind
   const double width_s = step_s * static_cast<double>(last - first - 1);
-  lag.sd_s = std::max({std::sqrt(squares * (kParts - 1) / kParts), width_s / 4,
-                       fit.independent_sd_s(lag.lag_s, step_s, std::max(lag.rms_mm, sigma_mm))});
+  lag.sd_s =
+      std::max({std::sqrt(squares * (kParts - 1) / kParts), width_s / 4,
+                std::sqrt(correlated) * fit.independent_sd_s(lag.lag_s, step_s, std::max(lag.rms_mm, sigma_mm))});
   lag.determined = lag.determined && lag.sd_s < kLargestLagSd_s;
   return lag;
 }

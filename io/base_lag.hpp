@@ -18,8 +18,8 @@ inline constexpr double kLargestLag_s = 2;
 /// How late the base's measurements are.
 struct BaseLag {
   double lag_s = 0;  ///< positive: the base's time stamps are later than the tip's for the same motion
-  /// Standard error: the largest of that from leaving out each of ten parts in turn, that of independent residuals, and
-  /// a quarter of the range of lags that fit as well within two standard deviations.
+  /// Standard error: the largest of that from leaving out each of ten parts in turn, that of the residuals with their
+  /// autocorrelation, and a quarter of the range of lags that fit as well within two standard deviations.
   double sd_s = 0;
   double rms_mm = 0;         ///< root mean square of the residuals of the path length, in mm
   bool determined = false;   ///< the standard error is below kLargestLagSd_s and the optimum is inside the search range

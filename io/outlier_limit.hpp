@@ -8,8 +8,8 @@
 
 namespace bevel::io {
 
-/// Returns five robust standard deviations of residuals: 1.4826 times the median of their magnitudes is the standard
-/// deviation of a normal distribution, of which 6 in 10 million exceed five.
+/// Returns five robust standard deviations of residuals, 1.4826 times the median of their magnitudes each. A normal
+/// distribution exceeds this limit in 6 of 10 million values.
 /// @param residuals  not empty, with either sign
 /// @param least  smallest standard deviation: that of the measurements
 inline double outlier_limit(std::vector<double> residuals, double least) {

@@ -5,12 +5,15 @@
 #include <Eigen/Geometry>
 #include <algorithm>
 #include <cmath>
+#include <cstdio>
+#include <filesystem>
 #include <functional>
 #include <random>
 
 #include "io/csv_import.hpp"
 #include "io/held_values.hpp"
 #include "io/motion_gap.hpp"
+#include "io/recording.hpp"
 #include "tests/support/run_program.hpp"
 #include "tests/support/shared_recordings.hpp"
 #include "tests/support/temporary_folder.hpp"
@@ -394,6 +397,27 @@ TEST(RealTrackers, AnEntryDirectionIsThatOfTheAlignedRecordings) {
     EXPECT_LT(r.frame->rms_mm, 0.25) << name;
     EXPECT_FALSE(r.lag && r.lag->determined) << "1 mm/s all the way";
   }
+}
+
+// Simulated recordings whose camera is late in one case only.
+TEST(SimulatedRecordings, ALagIsReportedForTheLateCameraAlone) {
+  const std::filesystem::path practice = test::shared_recordings() / "recordings/practice";
+  BEVEL_SKIP_WITHOUT(practice);
+  int recordings = 0, late = 0;
+  for (const auto& entry : std::filesystem::recursive_directory_iterator(practice)) {
+    if (entry.path().extension() != ".lcm") continue;
+    Recording r = read_recording(entry.path().string());
+    std::ranges::stable_sort(r.actuators, {}, &model::ActuatorState::utime);
+    std::ranges::stable_sort(r.tips, {}, &model::TipMeasurement::utime);
+    const auto lag = estimate_base_lag(r.actuators, r.tips);
+    ++recordings;
+    if (!lag || !lag->significant()) continue;
+    EXPECT_EQ(entry.path().parent_path().filename(), "case05") << entry.path() << lag->lag_s << " +- " << lag->sd_s;
+    EXPECT_NEAR(lag->lag_s, -0.0853, 4 * lag->sd_s) << entry.path();
+    ++late;
+  }
+  std::printf("lag: %d recordings, %d significant\n", recordings, late);
+  EXPECT_GT(late, 0);
 }
 
 }  // namespace
