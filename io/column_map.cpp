@@ -1,5 +1,6 @@
 #include "io/column_map.hpp"
 
+#include <Eigen/Geometry>
 #include <algorithm>
 #include <numbers>
 
@@ -85,6 +86,45 @@ std::optional<QuaternionColumns> read_quaternion(Section section) {
   return q;
 }
 
+/// Reads [tip.transform]: a rotation matrix or a quaternion, and a translation.
+std::optional<TipTransform> read_transform(Section section) {
+  if (!section.present()) return std::nullopt;
+  constexpr double kOrthonormalWithin = 1e-3;  // matrices are written with three digits or more
+  TipTransform transform;
+  const bool has_matrix = section.has("rotation"), has_quaternion = section.has("quaternion");
+  std::array<double, 9> matrix{1, 0, 0, 0, 1, 0, 0, 0, 1};
+  std::array<double, 4> wxyz{1, 0, 0, 0};
+  std::array<double, 3> translation_mm{};
+  section.read("rotation", matrix, optional, in_range(-1 - kOrthonormalWithin, 1 + kOrthonormalWithin));
+  section.read("quaternion", wxyz, optional, in_range(-1 - kOrthonormalWithin, 1 + kOrthonormalWithin));
+  section.read("translation_mm", translation_mm, optional, in_range(-1e5, 1e5));
+  transform.translation_mm = Eigen::Map<const Eigen::Vector3d>(translation_mm.data());
+  if (has_matrix && has_quaternion)
+    section.fail("rotation", "is given in addition to quaternion; allowed: one of them");
+  if (!has_matrix && !has_quaternion && !section.has("translation_mm"))
+    section.fail("", "is empty; allowed: rotation (9 numbers) or quaternion (w, x, y, z), and translation_mm");
+  if (has_quaternion) {
+    const Eigen::Quaterniond q(wxyz[0], wxyz[1], wxyz[2], wxyz[3]);
+    if (!(std::abs(q.norm() - 1) <= kOrthonormalWithin)) {
+      section.fail("quaternion", "has the length " + format_number(q.norm()) + "; allowed: 1 within 0.001");
+      return transform;
+    }
+    transform.rotation = q.normalized().toRotationMatrix();
+  }
+  if (has_matrix) {
+    const Eigen::Matrix3d given = Eigen::Map<const Eigen::Matrix<double, 3, 3, Eigen::RowMajor>>(matrix.data());
+    const double error = (given * given.transpose() - Eigen::Matrix3d::Identity()).cwiseAbs().maxCoeff();
+    if (!(error <= 2 * kOrthonormalWithin))
+      section.fail("rotation", "is no rotation: its rows are off length 1 or right angles by " + format_number(error) +
+                                   "; allowed 0.002. Give 9 numbers, row by row, without a scale");
+    else if (given.determinant() < 0)
+      section.fail("rotation", "is a reflection (determinant -1); allowed: a rotation. One axis has the wrong sign");
+    else
+      transform.rotation = Eigen::Quaterniond(given).normalized().toRotationMatrix();
+  }
+  return transform;
+}
+
 void read_tip(ConfigFile& file, ColumnMap& map) {
   Section tip = file.section("tip", required);
   const auto axes = read_three(tip, "axes", required);
@@ -97,6 +137,13 @@ void read_tip(ConfigFile& file, ColumnMap& map) {
       tip.fail("sigma_mm", "is " + format_number(sigma_mm) + " for an axis; allowed are 0, or 1e-06 to 1e+06");
   map.heading = read_three(tip, "heading", optional);
   map.quaternion = read_quaternion(tip.section("quaternion", optional));
+  tip.read("frame", map.frame, optional,
+           Choices<TipFrame>{{"axes", TipFrame::axes}, {"from-straight-insertion", TipFrame::from_straight_insertion}});
+  map.transform = read_transform(tip.section("transform", optional));
+  if (map.transform && map.frame != TipFrame::axes)
+    tip.fail("frame", "is from-straight-insertion, and [tip.transform] is given; allowed: one of them");
+  if (map.needs_all_axes() && std::ranges::any_of(map.sigma_mm, [](double sigma_mm) { return !(sigma_mm > 0); }))
+    tip.fail("sigma_mm", "is 0 for an axis; with a transform or an estimated frame all three axes must be measured");
   if (!map.heading.empty() && map.quaternion) tip.fail("heading", "is given beside a quaternion; one of them");
   tip.read("heading_sd_rad", map.heading_sd_rad, map.has_heading() ? required : optional, in_range(1e-5, 1));
 }
@@ -107,6 +154,7 @@ void read_axes(ConfigFile& file, ColumnMap& map) {
   insertion.read("column", column, required);
   map.insertion = signed_column(column);
   insertion.read("unit", map.mm_per_insertion_unit, required, kLengths_mm);
+  insertion.read("offset_mm", map.insertion_offset_mm, optional, in_range(-1e5, 1e5));
   insertion.read("settled", map.settled, optional);
   insertion.read("stops", map.stops, optional);
   if (map.settled && map.stops) insertion.fail("settled", "is given beside stops; one of them");
@@ -139,10 +187,13 @@ ColumnMap load_column_map(const std::string& path) {
     time.fail("", "is given, but insertion.stops = true makes a log without a clock; leave one out");
   Section base = file.section("base", optional);
   if (base.present()) {
-    Section base_time = base.section("time", required);
-    map.base_time = read_time(base_time);
+    base.read("offset_s", map.base_offset_s, optional, in_range(-1e10, 1e10));
+    Section base_time = base.section("time", base.has("offset_s") ? optional : required);
+    if (base_time.present()) map.base_time = read_time(base_time);
+    if (base_time.present() && base.has("offset_s"))
+      base.fail("offset_s", "is given in addition to [base.time]; give it there");
     if (!map.has_clock())
-      base.fail("", "is given, but a stepwise insertion (settled, stops) has base and tip in one file");
+      base.fail("", "is given, but a stepwise insertion (settled, stops) has base and tip in the same rows");
   }
   Section rows = file.section("rows", optional);
   rows.read("nonzero", map.nonzero, optional);

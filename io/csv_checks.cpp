@@ -146,8 +146,7 @@ void require_inward(const PlacedReadings& readings, const std::vector<Base>& bas
 }  // namespace
 
 void leave_out_the_implausible(PlacedReadings& readings, const std::string& tip_path, const std::string& base_path,
-                               std::vector<std::string>& left_out) {
-  const bool one_file = tip_path == base_path;
+                               bool share_rows, std::vector<std::string>& left_out) {
   const std::size_t tips = readings.tips.size(), base = readings.base.size(), headings = readings.headings.size();
   const auto require_most = [&](std::size_t now, std::size_t before) {
     if (static_cast<double>(before - now) > kMostLeftOut * static_cast<double>(before))
@@ -159,12 +158,12 @@ void leave_out_the_implausible(PlacedReadings& readings, const std::string& tip_
     std::set<std::int64_t> of_base, of_tip;
     const auto axes = samples_of(readings.base);
     note(judge(axes), readings.base, base_path, of_base, left_out);
-    note(judge(samples_of(readings.tips), axes), readings.tips, tip_path, one_file ? of_base : of_tip, left_out);
-    note(judge(samples_of(readings.headings)), readings.headings, tip_path, one_file ? of_base : of_tip, left_out);
+    note(judge(samples_of(readings.tips), axes), readings.tips, tip_path, share_rows ? of_base : of_tip, left_out);
+    note(judge(samples_of(readings.headings)), readings.headings, tip_path, share_rows ? of_base : of_tip, left_out);
     if (of_base.empty() && of_tip.empty()) break;
     drop(readings.base, of_base);
-    drop(readings.tips, one_file ? of_base : of_tip);
-    drop(readings.headings, one_file ? of_base : of_tip);
+    drop(readings.tips, share_rows ? of_base : of_tip);
+    drop(readings.headings, share_rows ? of_base : of_tip);
   }
   require_most(readings.base.size(), base);
   require_most(readings.tips.size(), tips);

@@ -23,10 +23,10 @@ struct PlacedReadings {
 };
 
 // Takes out rows that are implausible beside their neighbours (io/plausibility.hpp), and says each in `left_out`:
-// "FILE:LINE: what; the row is left out". With one file for tip and base a row goes as a whole. Throws
+// "FILE:LINE: what; the row is left out". If tip and base share their rows, a row is left out as a whole. Throws
 // std::runtime_error for motion that lasts, and where more than a fifth would have to go.
 void leave_out_the_implausible(PlacedReadings& readings, const std::string& tip_path, const std::string& base_path,
-                               std::vector<std::string>& left_out);
+                               bool share_rows, std::vector<std::string>& left_out);
 
 // The tip is at the end of what was pushed in: it is never farther from where it began than the base moved, and while
 // the base moves its first 50 mm, the tip's z grows with it. Throws std::runtime_error where that is not so of more

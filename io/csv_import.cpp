@@ -6,10 +6,12 @@
 #include <stdexcept>
 
 #include "io/csv_checks.hpp"
+#include "io/csv_held.hpp"
 #include "io/csv_rows.hpp"
 #include "io/csv_table.hpp"
 #include "io/log_writer.hpp"
 #include "io/messages.hpp"
+#include "io/motion_gap.hpp"
 #include "io/recording_clock.hpp"
 #include "io/second_insertion.hpp"
 
@@ -67,6 +69,45 @@ void require_one_insertion(const PlacedReadings& readings, const std::string& ba
                              "inserted again by more than " +
                              format_number(kInserted_mm) +
                              " mm. Allowed: one insertion in each file. Cut the file at this row");
+}
+
+template <class Sample>
+std::vector<Sample> samples_of(const std::vector<Placed<Sample>>& placed) {
+  std::vector<Sample> out;
+  for (const auto& p : placed) out.push_back(p.sample);
+  return out;
+}
+
+// Estimates {A} and moves tips and headings into it.
+EntryFrame move_to_entry_frame(PlacedReadings& readings, const ColumnMap& map, const std::string& tip_path) {
+  EntryFrame frame;
+  try {
+    frame = fit_entry_frame(samples_of(readings.base), samples_of(readings.tips));
+  } catch (const std::runtime_error& e) {
+    throw std::runtime_error(tip_path + ": " + e.what());
+  }
+  for (auto& tip : readings.tips) tip.sample.position_mm = frame.to_A * (tip.sample.position_mm - frame.origin_mm);
+  const double information_per_rad2 = 1 / (map.heading_sd_rad * map.heading_sd_rad);
+  for (auto& heading : readings.headings) {
+    const model::TipHeading turned = heading_along(frame.to_A * heading.sample.heading, information_per_rad2);
+    heading.sample.heading = turned.heading;
+    heading.sample.information_per_rad2 = turned.information_per_rad2;
+  }
+  return frame;
+}
+
+// Gaps in the base's motion, and its lag relative to the tip.
+void examine_times(const PlacedReadings& readings, const ColumnMap& map, const std::string& base_path,
+                   ImportedRecording& out) {
+  const auto base = samples_of(readings.base);
+  if (const auto gap = find_motion_gap(base))
+    out.motion_gap = base_path + ":" + std::to_string(readings.base[gap->after].line) + ": " + gap->what() +
+                     ". bevel-diagnose refuses the log";
+  out.lag = estimate_base_lag(base, samples_of(readings.tips));
+  if (!out.lag) return;
+  const double offset_s = (map.base_time ? map.base_time->offset_s : map.base_offset_s) - out.lag->lag_s;
+  out.lag_setting = std::string(map.base_time ? "[base.time]" : "[base]") +
+                    " offset_s = " + format_number(std::round(offset_s * 100) / 100);
 }
 
 template <class Sample>
@@ -139,27 +180,33 @@ ImportedRecording import_csv(const std::string& csv_path, const ColumnMap& map, 
   const std::string& base_file = one_file ? csv_path : base_path;
   ImportedRecording out;
   CsvTable table(csv_path);
-  const CsvRows tip = read_rows(table, map, map.time, {.tip = true, .base = one_file});
+  CsvRows tip = read_rows(table, map, map.time, {.tip = true, .base = one_file});
   out.format = table.format();
   out.rows = tip.read;
   out.rows_without_data = tip.without_data;
   out.rows_unsettled = tip.unsettled;
   out.has_clock = map.has_clock();
-  PlacedReadings readings;
+  std::vector<CsvRow> base_rows;
   if (one_file) {
-    readings = placed(tip.rows, base_motion(tip.rows, !map.rotation.empty()));
+    base_rows = tip.rows;
+    for (CsvRow& row : base_rows) row.utime += std::llround(map.base_offset_s * 1e6);
   } else {
     CsvTable base_table(base_path);
-    const CsvRows base = read_rows(base_table, map, *map.base_time, {.tip = false, .base = true});
+    CsvRows base = read_rows(base_table, map, *map.base_time, {.tip = false, .base = true});
     out.base_rows = base.read;
-    readings = placed(tip.rows, base_motion(base.rows, !map.rotation.empty()));
+    base_rows = std::move(base.rows);
   }
+  const bool has_rotation = !map.rotation.empty();
+  if (out.has_clock) out.held = remove_held_values(tip.rows, base_rows, has_rotation);
+  PlacedReadings readings = placed(tip.rows, base_motion(base_rows, has_rotation));
   out.rows_without_base = leave_out_without_base(readings, csv_path, base_file);
-  leave_out_the_implausible(readings, csv_path, base_file, out.left_out);
+  leave_out_the_implausible(readings, csv_path, base_file, one_file && map.base_offset_s == 0, out.left_out);
   out.rows_implausible = static_cast<int>(out.left_out.size());
   out.rows_without_base += leave_out_without_base(readings, csv_path, base_file);
   require_one_insertion(readings, base_file);
+  if (map.frame == TipFrame::from_straight_insertion) out.frame = move_to_entry_frame(readings, map, csv_path);
   out.far_tips = require_tip_follows_base(readings, csv_path);
+  if (out.has_clock) examine_times(readings, map, base_file, out);
   finish(readings, map, csv_path, base_file, out);
   return out;
 }
@@ -170,6 +217,7 @@ std::string ImportedRecording::remarks(const std::string& name) const {
   if (left_out.size() > kRemarks)
     text += name + ": and " + std::to_string(left_out.size() - kRemarks) + " more such rows\n";
   if (!far_tips.empty()) text += far_tips + "\n";
+  if (!motion_gap.empty()) text += motion_gap + "\n";
   if (rows_without_base > 0)
     text += name + ": " + std::to_string(rows_without_base) +
             " of the tip's readings are from before the base's first or after its last; left out\n";

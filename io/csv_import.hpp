@@ -1,10 +1,13 @@
 // CSV recordings made elsewhere, by a column map (column_map.hpp), into the messages of the contract.
 #pragma once
 
+#include <optional>
 #include <string>
 #include <vector>
 
+#include "io/base_lag.hpp"
 #include "io/column_map.hpp"
+#include "io/entry_frame.hpp"
 #include "model/samples.hpp"
 
 namespace bevel::io {
@@ -21,10 +24,16 @@ struct ImportedRecording {
   int rows_without_base = 0;          // of the tip, before the base's first reading or after its last; left out
   std::vector<std::string> left_out;  // a line for each row that is implausible beside its neighbours
   std::string far_tips;               // a sentence on tips farther away than the base moved; "" if there are none
+  std::string motion_gap;             // a sentence on the first gap of the base (motion_gap.hpp); "" without a gap
+  std::vector<std::string> held;      // a sentence for each column whose value is held between updates
+  std::optional<EntryFrame> frame;    // if the map asks for an estimated one
+  std::optional<BaseLag> lag;         // of the base relative to the tip; reported, not applied
+  std::string lag_setting;            // line of the map that removes the lag: "[base.time] offset_s = -0.31"
   std::string format;                 // what the file was taken for: "',' between cells"
   bool has_clock = true;
   double time_shift_s = 0;  // added where the file's clock begins at 0 or below; a log's times are positive
 
+  bool intact() const { return left_out.empty() && motion_gap.empty(); }
   std::string remarks(const std::string& name) const;  // in lines for stderr; "" if there is nothing
 };
 

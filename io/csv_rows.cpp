@@ -16,18 +16,6 @@ namespace {
 constexpr double kLatest_us = 1e16;
 constexpr double kUnitWithin = 0.01;  // files round
 
-model::TipHeading heading_along(const Eigen::Vector3d& along, double information_per_rad2) {
-  model::TipHeading m;
-  m.heading = along.normalized();
-  const Eigen::Vector3d& h = m.heading;
-  m.information_per_rad2 = -h * h.transpose();
-  // 1 - h_x^2, which by rounding would be below 0 for a heading along an axis.
-  m.information_per_rad2.diagonal() << h.y() * h.y() + h.z() * h.z(), h.x() * h.x() + h.z() * h.z(),
-      h.x() * h.x() + h.y() * h.y();
-  m.information_per_rad2 *= information_per_rad2;
-  return m;
-}
-
 // The cells of one row, by the map.
 class RowReader {
  public:
@@ -54,7 +42,14 @@ class RowReader {
     return utime + std::llround(*nanoseconds * 1e-3);
   }
 
-  std::optional<double> insertion_mm() { return length_mm(map_.insertion, map_.mm_per_insertion_unit); }
+  std::optional<double> insertion_mm() {
+    auto value_mm = length_mm(map_.insertion, map_.mm_per_insertion_unit);
+    if (value_mm) *value_mm += map_.insertion_offset_mm;
+    if (value_mm && !(std::abs(*value_mm) <= kLargestLength_mm))
+      table_.fail(map_.insertion.name, "with offset_mm " + format_number(*value_mm) + " mm; allowed " +
+                                           format_number(kLargestLength_mm) + " mm either way");
+    return value_mm;
+  }
   std::optional<double> rotation_rad() {
     if (map_.rotation.empty()) return std::nullopt;
     return within(map_.rotation[0], kLargestAngle_rad, "rad", map_.rad_per_rotation_unit);
@@ -71,18 +66,22 @@ class RowReader {
       if (!value_mm) continue;
       m.information_per_mm2(axis, axis) = 1 / (sigma_mm * sigma_mm);
       m.position_mm[axis] = *value_mm - (*origin_mm_)[axis];
-      if (!(std::abs(m.position_mm[axis]) <= kLargestLength_mm))
-        table_.fail(map_.tip[i].name, format_number(m.position_mm[axis]) + " mm from the origin; allowed " +
-                                          format_number(kLargestLength_mm) + " mm either way");
     }
     if (m.information_per_mm2.isZero(0)) return std::nullopt;
+    if (map_.needs_all_axes() && (m.information_per_mm2.diagonal().array() == 0).any()) return std::nullopt;
+    if (map_.transform) m.position_mm = map_.transform->rotation * m.position_mm + map_.transform->translation_mm;
+    for (std::size_t i = 0; i < 3; ++i)
+      if (const double at_mm = m.position_mm[static_cast<Eigen::Index>(i)]; !(std::abs(at_mm) <= kLargestLength_mm))
+        table_.fail(map_.tip[i].name, format_number(at_mm) + " mm from the origin; allowed " +
+                                          format_number(kLargestLength_mm) + " mm either way");
     return m;
   }
 
   std::optional<model::TipHeading> heading() {
     const auto along = map_.quaternion ? of_quaternion(*map_.quaternion) : of_columns();
     if (!along) return std::nullopt;
-    return heading_along(*along, 1 / (map_.heading_sd_rad * map_.heading_sd_rad));
+    return heading_along(map_.transform ? map_.transform->rotation * *along : *along,
+                         1 / (map_.heading_sd_rad * map_.heading_sd_rad));
   }
 
  private:
@@ -220,6 +219,18 @@ double at(const Series& series, std::int64_t utime) {
 }
 
 }  // namespace
+
+model::TipHeading heading_along(const Eigen::Vector3d& along, double information_per_rad2) {
+  model::TipHeading m;
+  m.heading = along.normalized();
+  const Eigen::Vector3d& h = m.heading;
+  m.information_per_rad2 = -h * h.transpose();
+  // 1 - h_x^2, which by rounding would be below 0 for a heading along an axis.
+  m.information_per_rad2.diagonal() << h.y() * h.y() + h.z() * h.z(), h.x() * h.x() + h.z() * h.z(),
+      h.x() * h.x() + h.y() * h.y();
+  m.information_per_rad2 *= information_per_rad2;
+  return m;
+}
 
 CsvRows read_rows(CsvTable& table, const ColumnMap& map, const TimeColumn& time, CsvParts parts) {
   table.set_unseen(map.unseen);

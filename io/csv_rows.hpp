@@ -30,6 +30,10 @@ struct CsvRows {
   int unsettled = 0;         // of these, left out because the needle was on its way between two steps
 };
 
+/// Returns a heading along a vector, whose information is the same to all sides and zero along it.
+/// @param along  in {A}, any length above 0
+model::TipHeading heading_along(const Eigen::Vector3d& along, double information_per_rad2);
+
 struct CsvParts {
   bool tip = true, base = true;  // which columns to look for
 };

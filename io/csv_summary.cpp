@@ -94,6 +94,34 @@ std::string heading_line(const ImportedRecording& r) {
               r.headings.front().heading.x(), r.headings.front().heading.y(), r.headings.front().heading.z());
 }
 
+std::string frame_line(const ImportedRecording& r) {
+  if (!r.frame) return "";
+  const EntryFrame& f = *r.frame;
+  const Eigen::Vector3d z = f.to_A.conjugate() * Eigen::Vector3d::UnitZ();
+  return text(
+             "  frame    by an arc through %zu tips: z of {A} is (%.4f, %.4f, %.4f) of tip.axes, +- %.2g rad; origin "
+             "(%.4g, "
+             "%.4g, %.4g) mm, +- %.2g mm\n",
+             f.tips, z.x(), z.y(), z.z(), f.direction_sd_rad, f.origin_mm.x(), f.origin_mm.y(), f.origin_mm.z(),
+             f.origin_sd_mm) +
+         text(
+             "           radius %.4g mm, %.4g mm of path per mm of insertion, rms error %.2g mm per axis; the roll "
+             "about z is "
+             "that of tip.axes\n",
+             f.radius_mm, f.scale, f.rms_mm);
+}
+
+std::string lag_line(const ImportedRecording& r) {
+  if (!r.lag) return "";
+  const BaseLag& lag = *r.lag;
+  const std::string value = text("%.2f +- %.2f s", lag.lag_s, lag.sd_s);
+  if (!lag.determined)
+    return "  lag      of the base relative to the tip: not determined by this motion (" + value + ")\n";
+  if (!lag.significant()) return "  lag      of the base relative to the tip: " + value + ", consistent with none\n";
+  return "  lag      of the base relative to the tip: " + value +
+         "; not corrected. To correct it, put into the map: " + r.lag_setting + "\n";
+}
+
 }  // namespace
 
 std::string summary(const ImportedRecording& r) {
@@ -102,7 +130,9 @@ std::string summary(const ImportedRecording& r) {
   if (r.base_rows > 0) out += text("; %d of the base", r.base_rows);
   out += "; " + r.format + "\n  time     ";
   out += r.has_clock ? text("%.6g s", seconds(r.actuators)) : "no clock: the order of stops alone";
-  return out + "\n" + base_lines(r) + tip_line(r) + heading_line(r);
+  out += "\n" + base_lines(r);
+  for (const std::string& held : r.held) out += "  held     " + held + "\n";
+  return out + tip_line(r) + heading_line(r) + frame_line(r) + lag_line(r);
 }
 
 }  // namespace bevel::io

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "diagnosis/inference/outliers.hpp"
 #include "diagnosis/statistics/ljung_box.hpp"
 
 namespace bevel::diagnosis {
@@ -10,14 +11,32 @@ namespace bevel::diagnosis {
 using Eigen::Index;
 using Eigen::VectorXd;
 
+namespace {
+
+/// Noise that a smoothing curve leaves of the final model's residuals. A curve through the errors of the nominal model
+/// does not follow sudden motion (a tip that sticks and jumps) and takes it for noise.
+inference::Noise noise_around(const ChosenModel& model, const inference::Noise& start) {
+  const inference::Fit& fit = *model.fit;
+  const inference::Dataset& data = fit.likelihood->data();
+  inference::Errors errors;
+  for (std::size_t r = 0; r < data.recordings.size(); ++r) {
+    const VectorXd all = fit.likelihood->errors(fit.layout, r, fit.shared, fit.local[r], model.curve, fit.curve_values);
+    if (all.size() != data.recordings[r].rows()) return start;
+    errors.push_back(by_channel(data.recordings[r], all));
+  }
+  return inference::calibrate_noise(data, errors).noise;
+}
+
+}  // namespace
+
 Checks check_model(const inference::Search& search, const ChosenModel& model, const inference::Readings& outliers,
-                   const inference::Noise& measured) {
+                   const inference::Noise& start) {
   constexpr int kLags = 12;  // at most, and a third of the readings
   constexpr Index kFewest = 8;
   constexpr double kBandQuantile = 2.576, kChance = 0.01;
   Checks out;
   const inference::Fit& fit = *model.fit;
-  const inference::Likelihood by_measured(search.system(), outliers, measured);
+  const inference::Likelihood by_measured(search.system(), outliers, noise_around(model, start));
   const auto curve = search.discrepancy().columns(by_measured, fit);
   inference::Residuals residuals;
   double chi2 = 0, count = 0, smallest_p = 1;

@@ -155,7 +155,7 @@ TEST(Page, what_is_left_may_be_less_than_the_noise_or_only_correlated) {
     return report_html(findings, {});
   };
   EXPECT_THAT(left(1.2, 0.5), HasSubstr("What is left is more than the fitted noise; the verdict"));
-  EXPECT_THAT(left(0.83, 0.5), HasSubstr("What is left is less than the fitted noise (a curve"));
+  EXPECT_THAT(left(0.83, 0.5), HasSubstr("What is left is less than the fitted noise; the verdict"));
   EXPECT_THAT(left(1.2, 0.001), HasSubstr("What is left is more than the fitted noise, and correlated; the verdict"));
   EXPECT_THAT(left(1, 0.001), HasSubstr("What is left is correlated from reading to reading; the verdict"));
 }

@@ -107,6 +107,11 @@ TEST_F(ReadLogs, MotionUnknownForAWhile) {
   EXPECT_THAT(refusal({logs[0], gap}), AllOf(HasSubstr("gap.lcm: no ACTUATOR_STATE for 2"), HasSubstr("not known")));
 }
 
+TEST_F(ReadLogs, ABaseThatIsMeasuredEvery800MillisecondsHasNoGap) {
+  const auto slow = write("slow.lcm", {.script = 3, .state_period_s = 0.8});
+  EXPECT_EQ(read_case({logs[0], slow}).recorded.recordings.size(), 2U);
+}
+
 TEST_F(ReadLogs, EmptyAndForeignFiles) {
   EXPECT_THAT(refusal({logs[0], folder.write("empty.lcm", "")}), HasSubstr("empty.lcm"));
   EXPECT_THAT(refusal({logs[0], folder.write("text.lcm", std::string(5000, 'x'))}),

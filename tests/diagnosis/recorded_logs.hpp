@@ -26,6 +26,7 @@ struct LogContents {
   bool tips = true, states = true;
   double camera_ahead_s = 0;           // its clock against that of the axes
   double states_missing_from_s = 1e9;  // for two seconds
+  double state_period_s = 0;           // shortest interval between axis samples that are written
   Eigen::Vector3d information_per_mm2 = Eigen::Vector3d::Constant(1 / (0.15 * 0.15));
 };
 
@@ -34,9 +35,12 @@ inline void write_log(const std::filesystem::path& path, const LogContents& cont
   const auto script = script_of(contents.script);
   std::mt19937_64 random(static_cast<std::uint64_t>(contents.script) + 11);
   std::normal_distribution<double> normal(0, contents.sigma_mm);
+  double next_state_s = 0;
   for (const auto& a : script.actuators(0.02)) {
     const double time_s = static_cast<double>(a.seq) * 0.02;
-    const bool missing = time_s > contents.states_missing_from_s && time_s < contents.states_missing_from_s + 2;
+    const bool missing = (time_s > contents.states_missing_from_s && time_s < contents.states_missing_from_s + 2) ||
+                         time_s < next_state_s;
+    if (!missing) next_state_s = time_s + contents.state_period_s - 1e-6;
     if (contents.states && !missing) log.write_message(a.utime, io::channel::kActuatorState, io::to_message(a));
   }
   const model::Motion motion = script.recorded();

@@ -21,11 +21,9 @@ import commands
 ROOT = pathlib.Path(__file__).resolve().parents[2]
 BUILD = pathlib.Path(sys.argv.pop(1) if len(sys.argv) > 1 else "build").resolve()
 
-# What is run, in this order, in a folder in which the names of the documents mean something. All that examples/README.md
-# says is run by tests/examples.
+# Commands that are run, in this order, in a folder that has the files that they name. tests/examples runs the commands of
+# README.md and examples/README.md.
 RUN = [
-    ("README.md", "build/bin/bevel-diagnose --model model.toml --out verdict rec01.lcm rec02.lcm"),
-    ("README.md", "build/bin/bevel-diagnose --model model.toml --out changed --baseline monday/ --changed tuesday/"),
     ("docs/diagnosis.md", "build/bin/bevel-diagnose --model model.toml --out result rec01.lcm rec02.lcm"),
     ("docs/diagnosis.md",
      "build/bin/bevel-diagnose --model model.toml --out result --baseline monday/*.lcm --changed tuesday/*.lcm"),
@@ -52,7 +50,7 @@ ONLY_CHECKED = {
     "bevel-calibrate": "needs pictures", "bevel-targets": "takes minutes", "bevel-blindtrial": "takes minutes",
     "bevel-close-the-loop": "takes minutes", "bevel-identify": "recordings from elsewhere",
     "bevel-predict": "has tests of its own", "bevel-export": "has tests of its own", "bevel-import": "recordings from elsewhere",
-    "bevel-replay": "recordings from elsewhere, or run by tests/examples", "bevel-diagnose": "recordings from elsewhere",
+    "bevel-replay": "recordings from elsewhere, or run by tests/examples", "bevel-diagnose": "recordings from elsewhere, or run by tests/examples",
     "bevel-table1": "has tests of its own",
     "test_": "is run by name elsewhere in this suite", "study_": "takes minutes", "bench_": "measures",
     "tip_sheet": "makes a picture to be looked at", "path_study": "needs the recordings of others",

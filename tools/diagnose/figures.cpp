@@ -167,8 +167,7 @@ std::string what_is_left(const diagnosis::Checks& c) {
   if (c.clean) return "What is left is noise.";
   std::string left;
   if (c.chi2_per_dof > c.band[1]) left = "more than the fitted noise";
-  if (c.chi2_per_dof < c.band[0])
-    left = "less than the fitted noise (a curve with a knot a second takes jumps for noise)";
+  if (c.chi2_per_dof < c.band[0]) left = "less than the fitted noise";
   if (c.ljung_box_p <= 0.01) left += left.empty() ? "correlated from reading to reading" : ", and correlated";
   return "What is left is " + left + "; the verdict does not rest on this.";
 }

@@ -8,6 +8,7 @@
 
 #include "io/file_bytes.hpp"
 #include "io/find_logs.hpp"
+#include "io/motion_gap.hpp"
 #include "io/recording_clock.hpp"
 #include "io/second_insertion.hpp"
 #include "io/sha256.hpp"
@@ -18,10 +19,6 @@ namespace fs = std::filesystem;
 namespace {
 
 constexpr double kLargestLoss = 0.2;  // of a log's bytes, or of a channel's messages
-// Between two actuator samples further apart than this, a motion of more than that is not known well enough.
-constexpr double kGap_s = 0.5;
-constexpr double kUnseen_mm = 1.0;
-constexpr double kUnseen_rad = 0.2;
 
 std::string one_line(std::string text) {
   while (text.ends_with('\n')) text.pop_back();
@@ -42,20 +39,8 @@ std::int64_t refused_on(const io::Recording& recording, const std::string& chann
 }
 
 void check_motion_known(const std::string& name, std::vector<model::ActuatorState> states) {
-  std::stable_sort(states.begin(), states.end(), [](const auto& a, const auto& b) { return a.utime < b.utime; });
-  for (std::size_t i = 1; i < states.size(); ++i) {
-    const double gap_s = static_cast<double>(states[i].utime - states[i - 1].utime) * 1e-6;
-    const double moved_mm = std::abs(states[i].insertion_mm - states[i - 1].insertion_mm);
-    const double turned_rad = std::abs(states[i].rotation_rad - states[i - 1].rotation_rad);
-    if (gap_s > kGap_s && (moved_mm > kUnseen_mm || turned_rad > kUnseen_rad))
-      throw std::runtime_error(
-          name + ": no ACTUATOR_STATE for " + number(gap_s) + " s, " +
-          number(static_cast<double>(states[i - 1].utime - states.front().utime) * 1e-6) +
-          " s after its first, while the base moved by " + number(moved_mm) + " mm and " + number(turned_rad) +
-          " rad: how it moved is not known, and missing physics would be blamed for it. Allowed are gaps up to " +
-          number(kGap_s) + " s, or longer ones with less than " + number(kUnseen_mm) + " mm and " +
-          number(kUnseen_rad) + " rad of motion");
-  }
+  std::ranges::stable_sort(states, {}, &model::ActuatorState::utime);
+  if (const auto gap = io::find_motion_gap(states)) throw std::runtime_error(name + ": " + gap->what());
 }
 
 // The last `parts` parts of a path: "monday/insertion.lcm" for 2.

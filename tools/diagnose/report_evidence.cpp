@@ -237,12 +237,12 @@ void add_noise_and_checks(report::Page& page, const Findings& f) {
       "; " + percent(f.noise.outlier_share) + " of them are outliers.");
   page.table(head, rows);
   const auto& c = f.checks;
-  page.table(
-      {"check of the final model", "found", "passed if"},
-      {{"chi2 per reading, by the noise that a flexible curve leaves", measured(c.chi2_per_dof, 4), interval(c.band)},
-       {"correlation left in the residuals (Ljung-Box p)", c.ljung_box_p < 0.001 ? "< 0.001" : number(c.ljung_box_p, 2),
-        "above 0.01"}},
-      what_is_left(c));
+  page.table({"check of the final model", "found", "passed if"},
+             {{"chi2 per measurement, by the noise around a smoothing curve through the residuals",
+               measured(c.chi2_per_dof, 4), interval(c.band)},
+              {"correlation left in the residuals (Ljung-Box p)",
+               c.ljung_box_p < 0.001 ? "< 0.001" : number(c.ljung_box_p, 2), "above 0.01"}},
+             what_is_left(c));
   if (!f.remarks.empty()) page.subheading("Remarks").list(f.remarks);
 }
 

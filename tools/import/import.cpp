@@ -119,7 +119,7 @@ int run(const Options& o) {
     io::write_log(recording, logs[i]);
     std::fprintf(stderr, "%s", recording.remarks(files[i]).c_str());
     std::printf("%s\n%s", logs[i].c_str(), io::summary(recording).c_str());
-    return recording.left_out.empty();
+    return recording.intact();
   });
 }
 

@@ -7,6 +7,7 @@
 #include <stdexcept>
 #include <utility>
 
+#include "io/motion_gap.hpp"
 #include "io/recording.hpp"
 
 namespace bevel::replay {
@@ -121,27 +122,20 @@ void compare(Replay& result, const std::vector<needle_state_t>& truths, const es
   figures.roll_rmse_rad = std::sqrt(roll2 / n);
 }
 
-// Limits of the axes of a recording. A log with a long period has no gap in each period: a gap is longer than four
-// typical periods, which at 100 Hz is less than AxisLimits::gap_s.
+// Limits of the axes of a recording. A log with a long period has no gap in each period (io::longest_interval_s).
 estimator::AxisLimits axes_of(const io::Recording& recording, estimator::AxisLimits axes, bool rates_of_log) {
-  constexpr double kPeriods = 4;
-  std::vector<std::pair<std::int64_t, const model::ActuatorState*>> sorted;
-  for (const model::ActuatorState& a : recording.actuators) sorted.emplace_back(a.utime, &a);
-  std::ranges::stable_sort(sorted, {}, &decltype(sorted)::value_type::first);
-  std::vector<double> periods_s;
+  std::vector<model::ActuatorState> sorted = recording.actuators;
+  std::ranges::stable_sort(sorted, {}, &model::ActuatorState::utime);
   double fastest_mm_s = 0, fastest_rad_s = 0;
   for (std::size_t i = 1; i < sorted.size(); ++i) {
-    const model::ActuatorState &a = *sorted[i - 1].second, &b = *sorted[i].second;
+    const model::ActuatorState &a = sorted[i - 1], &b = sorted[i];
     const double period_s = static_cast<double>(b.utime - a.utime) * 1e-6;
     if (!(period_s > 0)) continue;
-    periods_s.push_back(period_s);
     fastest_mm_s = std::max(fastest_mm_s, std::abs(b.insertion_mm - a.insertion_mm) / period_s);
     fastest_rad_s = std::max(fastest_rad_s, std::abs(b.rotation_rad - a.rotation_rad) / period_s);
   }
-  if (periods_s.empty() || !(axes.gap_s > 0)) return axes;
-  const auto middle = periods_s.begin() + static_cast<std::ptrdiff_t>(periods_s.size() / 2);
-  std::ranges::nth_element(periods_s, middle);
-  axes.gap_s = std::max(axes.gap_s, kPeriods * *middle);
+  if (sorted.size() < 2 || !(axes.gap_s > 0)) return axes;
+  axes.gap_s = io::longest_interval_s(sorted, axes.gap_s);
   if (rates_of_log) axes.insertion_rate_mm_s = fastest_mm_s, axes.rotation_rate_rad_s = fastest_rad_s;
   return axes;
 }
