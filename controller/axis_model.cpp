@@ -104,30 +104,33 @@ double AxisModel::take_up_rad(double direction) const {
   return std::clamp(kLongTurn_rad - std::abs(tried.rotation_rad - tip_.rotation_rad), 0.0, kLongTurn_rad);
 }
 
-// Steps through the insertion to come. A place counts from the first step in which the tip does not jump, since a base
-// that is told to stop within a jump does not stop there. `left` is the middle of the insertion over which the tip
-// rests at the nearest place: what the base stops too early or too late does then not matter.
+// Steps through the insertion to come. A place counts if the tip jumps neither to it nor from it, since a base that is
+// commanded to stop within a jump stops behind it. The result is the middle of the insertion over which the tip rests
+// at the nearest place: a base that stops too early or too late by less than half of it leaves the tip there.
 double AxisModel::insertion_to_nearest_mm(double ahead_mm) const {
   if (!advances_by_jumps_ || !entered_ || !(ahead_mm > 0) || ahead_mm > kLongestJump_mm) return ahead_mm;
   Tip tried = tip_;
   model::BaseMotion at = base_;
   double nearest_mm = ahead_mm, from_mm = 0, until_mm = 0;
+  bool follows_jump = true;  // nothing is counted before the first step
   for (double inserted_mm = 0; inserted_mm < ahead_mm + kLongestJump_mm;) {
     const double step_mm = std::max(kFinestStep_mm, kStepShare * inserted_mm);
-    const double before_mm = tried.insertion_mm;
+    const double before_mm = tried.insertion_mm - tip_.insertion_mm;
     const model::BaseMotion from = at;
+    at.insertion_mm += step_mm;
+    move(tried, from, at, tip_depth_mm_ + before_mm);
+    const bool jumps = is_jump(tried.insertion_mm - tip_.insertion_mm - before_mm, step_mm);
+    if (!jumps && !follows_jump) {
+      const double off_mm = std::abs(ahead_mm - before_mm);
+      if (off_mm < nearest_mm - kSamePlace_mm)
+        nearest_mm = off_mm, from_mm = until_mm = inserted_mm;
+      else if (off_mm <= nearest_mm + kSamePlace_mm)
+        until_mm = inserted_mm;
+      else if (before_mm > ahead_mm)
+        break;
+    }
+    follows_jump = jumps;
     inserted_mm += step_mm;
-    at.insertion_mm = base_.insertion_mm + inserted_mm;
-    move(tried, from, at, tip_depth_mm_ + before_mm - tip_.insertion_mm);
-    const double advanced_mm = tried.insertion_mm - tip_.insertion_mm;
-    if (is_jump(tried.insertion_mm - before_mm, step_mm)) continue;
-    const double off_mm = std::abs(ahead_mm - advanced_mm);
-    if (off_mm < nearest_mm - kSamePlace_mm)
-      nearest_mm = off_mm, from_mm = until_mm = inserted_mm;
-    else if (off_mm <= nearest_mm + kSamePlace_mm)
-      until_mm = inserted_mm;
-    else if (advanced_mm > ahead_mm)
-      break;
   }
   return from_mm > 0 ? 0.5 * (from_mm + until_mm) : 0;
 }

@@ -25,9 +25,9 @@ struct Candidate {
 /// Entry tilt of real rigs, rad (standard deviation), for the candidate with tilted entries.
 inline constexpr double kTiltOfRealRigs_rad = 0.1;
 
-/// Fits all candidates with fit_determined(): the bicycle, the four extended models (the one of options.start first),
-/// and, if the entry's tilt is held at nominal by \p options, the best of these with tilts of its own for each
-/// insertion. In one plane of motion the two slips are the same model and give the same row.
+/// Fits all candidates with fit_determined(): the bicycle, the four extended models (the one of options.start first;
+/// without separate_slip() it alone), and, if \p options hold the entry's tilt at nominal, the bicycle and the best
+/// extended model with insertion-specific tilts.
 std::vector<Candidate> fit_candidates(const std::vector<Insertion>& insertions, const FitOptions& options);
 
 /// Selects the candidate with the lowest BIC, the first of those that are equal within the fits' tolerance.

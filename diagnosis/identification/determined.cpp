@@ -27,7 +27,7 @@ double widest_roll_rad(const std::vector<Insertion>& insertions) {
 }
 
 // The fitted parameter that the data determine least of those that they determine less than its prior does; null if
-// there is none. A parameter at a bound has no standard error to judge by.
+// that set is empty. A parameter at a bound has no standard error to judge by.
 const FittedParameter* least_determined(const FitResult& fit, const FitOptions& options, double& prior_sd) {
   const FittedParameter* least = nullptr;
   double largest = 1;
@@ -43,16 +43,19 @@ const FittedParameter* least_determined(const FitResult& fit, const FitOptions& 
 
 }  // namespace
 
+bool separate_slip(const std::vector<Insertion>& insertions) {
+  return widest_roll_rad(insertions) >= kSeparatingRoll_rad;
+}
+
 FitResult fit_determined(const std::vector<Insertion>& insertions, const FitOptions& options) {
   FitOptions now = options;
   std::vector<HeldParameter> held;
   char text[160];
-  const double roll_rad = widest_roll_rad(insertions);
-  if (!options.fit_slip_in_plane && roll_rad < kSeparatingRoll_rad)
+  if (!options.fit_slip_in_plane && !separate_slip(insertions))
     for (const Parameter lambda : {kLambda1, kLambda2}) {
       if (!options.fitted[lambda]) continue;
       std::snprintf(text, sizeof text, "the shaft rotates by %.2g rad while it inserts; %.2g rad are required",
-                    roll_rad, kSeparatingRoll_rad);
+                    widest_roll_rad(insertions), kSeparatingRoll_rad);
       hold(lambda, text, now, held);
     }
   while (true) {

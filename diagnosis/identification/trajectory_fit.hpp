@@ -113,12 +113,15 @@ FitResult fit_from_many_starts(const std::vector<Insertion>& insertions, const F
 /// Entries on real rigs are uncertain by 0.1 rad; a smaller rotation leaves one plane of motion.
 inline constexpr double kSeparatingRoll_rad = 0.1;
 
+/// Returns whether an insertion rotates the shaft by kSeparatingRoll_rad while it inserts.
+bool separate_slip(const std::vector<Insertion>& insertions);
+
 /// Fits as fit_from_many_starts() and holds the parameters that the recordings do not determine.
 ///
-/// The lambdas are held if no insertion rotates the shaft by kSeparatingRoll_rad while it inserts: in one plane any
-/// smooth deviation of the path passes for slip, however small the standard error is. Of lambda1, lambda2 and ell,
-/// those with a standard error by the data alone above the prior's (without prior: above the plausible range) are held
-/// as well, the least determined first, with a new fit after each. The curvature is always estimated.
+/// The lambdas are held unless separate_slip(): in one plane any
+/// smooth deviation of the path is confounded with slip, however small the standard error is. Of lambda1, lambda2 and
+/// ell, those with a standard error by the data alone above the prior's (without prior: above the plausible range) are
+/// held as well, the least determined first, with a new fit after each. The curvature is always estimated.
 ///
 /// @param options.fit_slip_in_plane fits the lambdas of insertions without rotation all the same
 /// @return the fit; FitResult::held lists what was held, at the prior's mean or else at the value of options.start

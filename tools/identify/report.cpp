@@ -225,8 +225,12 @@ std::string figures_json(const Identification& r) {
                                                      {"prior_share", p.prior_share},
                                                      {"at_bound", p.at_bound}};
   for (const auto& h : r.fit.held)
-    j["parameters"][kParameterNames[h.parameter]] = {
-        {"value", h.value}, {"determined", false}, {"held_at", h.by_prior ? "prior" : "model file"}, {"why", h.reason}};
+    j["parameters"][kParameterNames[h.parameter]] = {{"value", h.value},
+                                                     {"determined", false},
+                                                     {"std_error", nullptr},
+                                                     {"ci95", nullptr},
+                                                     {"held_at", h.by_prior ? "prior" : "model file"},
+                                                     {"why", h.reason}};
   for (Eigen::Index i = 0; i < r.fit.correlation.rows(); ++i)
     j["correlation"].push_back(std::vector<double>(r.fit.correlation.row(i).begin(), r.fit.correlation.row(i).end()));
   for (const auto& d : r.fit.directions)
@@ -290,7 +294,7 @@ void save_report(const Identification& r, const std::string& path) {
   page.heading("Models side by side")
       .table(kCandidateHeader, candidate_rows(r),
              std::string(kCandidateNote) +
-                 "; BIC differences above 10 are strong evidence; without rotation the two slips are the same model.");
+                 "; BIC differences above 10 are strong evidence.");
   page.heading("Paths");
   page.figure(path_figure(r, 1, "y"), "Lateral position in the bevel's plane: seen, and by the models.");
   bool sees_x = false;
