@@ -14,7 +14,7 @@ namespace bevel::steering {
 namespace {
 
 constexpr std::uint64_t kSeed = 20'261'129;
-constexpr int kTargets = 30;
+constexpr int kTargets = 24;
 // Paired standard errors by which a model may steer worse by chance: one of 740 comparisons, of 24 here.
 constexpr double kDeviations = 3;
 
