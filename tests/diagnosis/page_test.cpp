@@ -155,11 +155,13 @@ TEST(Page, advice_for_steering_follows_from_the_paired_misses) {
       HasSubstr("missed by 0.14 +- 0.050 mm more with the model that was found (mean of 8): do not adopt this model"));
   steered.paired.farther_mm = -0.14;
   EXPECT_THAT(page(), HasSubstr("mm less with the model that was found (mean of 8): adopt this model for steering."));
+  EXPECT_THAT(page(), HasSubstr("simulator, estimator and bevel-predict read it"));
   steered.found.arrived = 7;
   EXPECT_THAT(page(), HasSubstr("do not adopt this model"));
+  EXPECT_THAT(page(), HasSubstr("in place of the model in use for simulation and prediction, not for steering"));
   steered.as_it_stands.arrived = steered.found.arrived = 0;
   steered.paired.targets = 0;
-  EXPECT_THAT(page(), HasSubstr("do not adopt this model for steering: no target was reached with it"));
+  EXPECT_THAT(page(), HasSubstr("Do not adopt this model for steering: no target was reached with it"));
 }
 
 TEST(Page, what_is_left_may_be_less_than_the_noise_or_only_correlated) {

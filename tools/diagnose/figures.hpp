@@ -63,6 +63,8 @@ enum class Steering {
   fails  ///< neither model reaches a target
 };
 Steering steering_with(const diagnosis::SteeredToTargets& steered);
+/// Returns whether the model that was found is not to be adopted for steering.
+constexpr bool is_refused(Steering steering) { return steering == Steering::worse || steering == Steering::fails; }
 /// Returns the advice in verdict.json: "adopt", "either" or "do-not-adopt".
 std::string_view name_of(Steering steering);
 /// States the paired difference and whether the model that was found is to be adopted for steering.

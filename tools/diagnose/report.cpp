@@ -176,9 +176,16 @@ void add_what_to_do(report::Page& page, const Findings& f) {
           "present.");
       break;
     case Verdict::effects_found:
-      todo.emplace_back(
-          "Put model.toml in place of the model in use (simulator, estimator and bevel-predict read it), or mend the "
-          "rig and record again.");
+      if (f.steered && is_refused(steering_with(*f.steered)))
+        todo.emplace_back(
+            "Put model.toml in place of the model in use for simulation and prediction, not for steering; or repair "
+            "the "
+            "rig and record again.");
+      else
+        todo.emplace_back(
+            "Put model.toml in place of the model in use (simulator, estimator and bevel-predict read it), or repair "
+            "the "
+            "rig and record again.");
       if (f.steered) {
         std::string advice = steering_advice(*f.steered);
         advice.front() = static_cast<char>(std::toupper(static_cast<unsigned char>(advice.front())));

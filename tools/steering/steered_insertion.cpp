@@ -181,7 +181,7 @@ StopCause stop_cause(const Pilot& pilot, const estimator::NeedleEstimator& estim
   }
   if (reason == Reason::state_unhealthy) {
     const estimator::HealthFinding finding = estimator.finding(estimate, utime);
-    cause.reason += std::string(", ") + finding.quantity;
+    if (finding.flag != estimator::kHealthy) cause.reason += std::string(", ") + finding.quantity;
     cause.value = finding.value, cause.limit = finding.limit, cause.unit = finding.unit;
   }
   if (reason == Reason::state_reset) {
