@@ -293,8 +293,7 @@ void save_report(const Identification& r, const std::string& path) {
   page.subheading("Correlation of the estimates").table(header, correlation);
   page.heading("Models side by side")
       .table(kCandidateHeader, candidate_rows(r),
-             std::string(kCandidateNote) +
-                 "; BIC differences above 10 are strong evidence.");
+             std::string(kCandidateNote) + "; BIC differences above 10 are strong evidence.");
   page.heading("Paths");
   page.figure(path_figure(r, 1, "y"), "Lateral position in the bevel's plane: seen, and by the models.");
   bool sees_x = false;
