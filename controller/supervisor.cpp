@@ -300,7 +300,7 @@ model::MotionCommand Supervisor::step(std::int64_t now_utime, double elapsed_s) 
   Rates wanted;
   if (pauses_for_path_ || needle_state_->unsure) {
     // Nothing is inserted until there is a path, and readings are believed.
-  } else if (ahead_mm <= 0) {  // closest approach: what still turns comes to rest by the ramp
+  } else if (insertion_left_mm(ahead_mm) <= 0) {  // closest approach: what still turns comes to rest by the ramp
     hold(Reason::coming_to_rest);
     met_mm_ = rendezvous_.target_mm(), met_sd_mm_ = rendezvous_.target_sd_mm();
   } else {

@@ -152,6 +152,8 @@ class Supervisor {
   PathStart path_start() const;
   bool see_geometry();
   double to_go_mm() const;
+  /// Insertion of the base, mm, until the closest approach to a target that lies \p ahead_mm ahead of the tip.
+  double insertion_left_mm(double ahead_mm) const;
   bool by_arcs() const { return config_.law != Law::spin; }
   double predicted_miss_mm(const Eigen::Vector3d& target_mm) const;
   bool by_half_turns() const;

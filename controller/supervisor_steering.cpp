@@ -39,6 +39,11 @@ double Supervisor::to_go_mm() const {
   return drawn_back_mm() + tip.R.col(2).dot(rendezvous_.target_mm() - tip.p_mm);
 }
 
+double Supervisor::insertion_left_mm(double ahead_mm) const {
+  if (route_.is_needed() && !route_.aims_at_target()) return ahead_mm;
+  return axes_.insertion_to_nearest_mm(ahead_mm);
+}
+
 PathStart Supervisor::path_start() const {
   PathStart start{cutting_tip(), needle_now(), shaft_now()};
   start.margin_mm = kPathDeviations * std::sqrt(needle_state_->position_variance_mm2) +
@@ -112,7 +117,8 @@ Rates Supervisor::steer(std::int64_t now_utime) {
   // Come to rest at the target's closest approach: never faster than the ramp can stop within what is left.
   // At a way-point it does not, but nothing brakes where the target is nearer than that.
   if (route_.is_needed() && !route_.aims_at_target()) ahead_mm = std::max(ahead_mm, to_go_mm());
-  const double braking = std::sqrt(2 * 0.5 * config_.limits.insertion_acceleration_mm_s2 * ahead_mm);
+  const double left_mm = insertion_left_mm(ahead_mm);
+  const double braking = std::sqrt(2 * 0.5 * config_.limits.insertion_acceleration_mm_s2 * left_mm);
   const double in_time = rendezvous_.rate_limit_mm_s(now_utime, ahead_mm + drawn_back_mm());
   wanted.insertion_mm_s = std::min({wanted.insertion_mm_s, braking, in_time});
   return wanted;

@@ -54,4 +54,13 @@ constexpr std::int32_t lost(std::int32_t health) { return health & ~(static_cast
 
 std::string describe_health(std::int32_t health);
 
+/// The quantity behind one bit of the health word: its value and its limit.
+struct HealthFinding {
+  Health flag = kHealthy;     ///< kHealthy: no bit is set that forbids steering
+  const char* quantity = "";  ///< for a report: "measurements rejected in a row"
+  double value = 0;
+  double limit = 0;  ///< largest allowed; 0: the quantity has none
+  const char* unit = "";
+};
+
 }  // namespace bevel::estimator

@@ -396,17 +396,11 @@ Estimate NeedleEstimator::describe(const FilterState& state, std::int64_t utime,
   const double largest_variance = state.covariance.diagonal().head<3>().maxCoeff();
   if (!(largest_variance < limits.position_sd_mm * limits.position_sd_mm)) result.health |= kUncertain;
   if (!(largest_tilt_variance(state) < square(limits.heading_sd_rad))) result.health |= kHeadingUncertain;
-  // A source that is gone is rejected no more.
-  const auto rejects = [&](std::int32_t in_row, std::int64_t heard_utime) {
-    return older_than(heard_utime, limits.rejects_forgotten_s) ? 0 : in_row;
-  };
   const Gate& gate = filter_.config().gate;
-  std::int32_t of_one = rejects(state.heading_rejects_in_row, state.heading_utime);
-  for (std::size_t camera = 0; camera < state.camera_utime.size(); ++camera)
-    of_one = std::max(of_one, rejects(state.camera_rejects_in_row.at(camera), state.camera_utime.at(camera)));
-  if (std::max(rejects(state.rejects_in_row, state.reading_utime), of_one) >= gate.rejects_before_unhealthy)
+  const Rejects rejects = rejects_in_row(state, now_utime);
+  if (std::max(rejects.of_all, rejects.of_one) >= gate.rejects_before_unhealthy)
     result.health |= kRejecting;
-  else if (of_one >= gate.rejects_before_unsure)
+  else if (rejects.of_one >= gate.rejects_before_unsure)
     result.health |= kUnsure;
   if (state.outside_model) result.health |= kOutsideModel;
   constexpr std::int32_t kUntilKnown = kNoMeasurement | kUncertain | kHeadingUncertain;

@@ -40,6 +40,8 @@ struct Estimate {
   std::int32_t health = 0;  // see health.hpp
 };
 
+struct HealthFinding;
+
 class NeedleEstimator {
  public:
   // history: number of nodes kept; at 100 Hz of actuators and 2 x 30 Hz of cameras 64 nodes are 0.4 s, and 0.3 s if
@@ -60,6 +62,10 @@ class NeedleEstimator {
 
   // The newest estimate. `now_utime` is only for the age limits of health; pass the newest sample's time in a replay.
   Estimate estimate(std::int64_t now_utime) const;
+
+  /// Finds the first bit of \p estimate's health word that forbids steering, with its value and its limit.
+  /// @param now_utime as for the estimate
+  HealthFinding finding(const Estimate& estimate, std::int64_t now_utime) const;
 
   // The estimate where the axes stand at `axes.utime`, a guess of now by the rates they last reported: with the
   // readings that wait for the axes, and without any trace in the history. An instant not newer than the newest node
@@ -83,6 +89,11 @@ class NeedleEstimator {
   const NeedleFilter& filter() const { return filter_; }
 
  private:
+  /// Measurements rejected in a row: the most of one source, and of all sources together.
+  struct Rejects {
+    std::int32_t of_one = 0, of_all = 0;
+  };
+  Rejects rejects_in_row(const FilterState& state, std::int64_t now_utime) const;
   // Insertion after which the past is run again; what has come since is linear.
   static constexpr double kFirstRelinearisation_mm = 30;
   static constexpr double kRelinearisedEvery_mm = 15;

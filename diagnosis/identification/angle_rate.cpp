@@ -25,9 +25,7 @@ double rate(const Eigen::Vector4d& c, double t) { return c(1) + t * (2 * c(2) + 
 double second_rate(const Eigen::Vector4d& c, double t) { return 2 * c(2) + 6 * t * c(3); }
 
 std::vector<AngleSample> angle_samples(const Insertion& insertion) {
-  double turned_rad = 0;
-  for (const Leg& leg : insertion.legs)
-    if (leg.insertion_mm != 0) turned_rad += std::abs(leg.rotation_rad);
+  const double turned_rad = roll_range_rad(insertion);
   if (turned_rad > 0.02)
     throw std::invalid_argument(insertion.name + ": the shaft turns by " + std::to_string(turned_rad) +
                                 " rad; the angle-rate method is planar and allows 0.02 rad");

@@ -107,6 +107,9 @@ void fill_uncertainty(const Eigen::MatrixXd& data_information, const std::vector
     posterior(i, i) = 1e12;
   }
   const Eigen::MatrixXd scaled = inverse(posterior);
+  for (Eigen::Index i = 0; i < n; ++i)
+    if (priors[parameters[static_cast<std::size_t>(i)]] && free[static_cast<std::size_t>(i)]) posterior(i, i) -= 1;
+  const Eigen::VectorXd by_data = inverse(posterior).diagonal().cwiseSqrt().cwiseProduct(unit);
   result.covariance = unit.asDiagonal() * scaled * unit.asDiagonal();
   result.correlation.resize(n, n);
   result.parameters.clear();
@@ -116,7 +119,7 @@ void fill_uncertainty(const Eigen::MatrixXd& data_information, const std::vector
     const Parameter p = parameters[static_cast<std::size_t>(i)];
     const double value = value_of(result.needle, p);
     const double error = std::sqrt(result.covariance(i, i));
-    result.parameters.push_back({p, value, error, value - kNormal95 * error, value + kNormal95 * error,
+    result.parameters.push_back({p, value, error, by_data(i), value - kNormal95 * error, value + kNormal95 * error,
                                  priors[p] ? scaled(i, i) : 0, !free[static_cast<std::size_t>(i)]});
   }
 }

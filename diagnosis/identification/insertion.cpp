@@ -3,6 +3,7 @@
 #include <Eigen/Eigenvalues>
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <numbers>
 #include <optional>
 #include <stdexcept>
@@ -91,6 +92,19 @@ int whiten(const Eigen::Matrix3d& information_per_mm2, Eigen::Matrix3d& whitenin
     whitening.row(rank++) = std::sqrt(value) * eigen.eigenvectors().col(i).transpose();
   }
   return rank;
+}
+
+double roll_range_rad(const Insertion& insertion) {
+  double roll_rad = 0;
+  double least_rad = std::numeric_limits<double>::infinity(), most_rad = -least_rad;
+  for (const Leg& leg : insertion.legs) {
+    const double before_rad = roll_rad;
+    roll_rad += leg.rotation_rad;
+    if (leg.insertion_mm == 0) continue;
+    least_rad = std::min({least_rad, before_rad, roll_rad});
+    most_rad = std::max({most_rad, before_rad, roll_rad});
+  }
+  return std::max(most_rad - least_rad, 0.0);
 }
 
 Insertion make_insertion(std::string name, const std::vector<model::ActuatorState>& actuators,

@@ -43,6 +43,12 @@ struct Insertion {
 Insertion make_insertion(std::string name, const std::vector<model::ActuatorState>& actuators,
                          const std::vector<model::TipMeasurement>& measurements);
 
+/// Computes the range of the shaft's roll over the parts of an insertion that advance or retract the needle.
+///
+/// Rotation at rest counts if insertion follows it in the new direction; the roll before the first insertion does not.
+/// @return largest minus smallest roll, rad, at least 0
+double roll_range_rad(const Insertion& insertion);
+
 // Whitening of a measurement: rows sqrt(eigenvalue) * eigenvector^T for the eigenvalues above 1e-9 of the largest.
 // Returns the rank.
 int whiten(const Eigen::Matrix3d& information_per_mm2, Eigen::Matrix3d& whitening);

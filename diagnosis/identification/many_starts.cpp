@@ -17,6 +17,11 @@ FitResult fit_from_many_starts(const std::vector<Insertion>& insertions, const F
     }
   };
   attempt(options);
+  if (fits.empty() && options.fitted[kCurvature]) {  // a needle as curved as the start leaves the domain of (25)
+    FitOptions straight = options;
+    straight.start.curvature_per_mm = 0;
+    attempt(straight);
+  }
   if (options.fitted[kLambda1] && options.fitted[kLambda2])
     for (const auto& priors : {table_one_agar(), table_one_plastisol()}) {
       FitOptions from = options;
@@ -29,6 +34,7 @@ FitResult fit_from_many_starts(const std::vector<Insertion>& insertions, const F
     FitOptions bicycle = options;
     bicycle.start.lambda1_per_rad = bicycle.start.lambda2 = 0;
     bicycle.fitted[kLambda1] = bicycle.fitted[kLambda2] = bicycle.fitted[kWheelbase] = false;
+    bicycle.start.curvature_per_mm = 0;
     FitOptions from = options;
     from.start.curvature_per_mm = fit_trajectory(insertions, bicycle).needle.curvature_per_mm;
     from.start.lambda1_per_rad = 0.01;

@@ -49,6 +49,7 @@ struct FitOptions {
   double huber_threshold = 2.0;     // in standard deviations: 98 % efficient on Gaussian noise
   bool estimate_scale = true;       // else s = 1: the measurements' covariances are believed
   bool correct_correlation = true;  // widen the covariance where residuals correlate in time
+  bool fit_slip_in_plane = false;   ///< read by fit_determined() only
   int max_iterations = 60;
   double tolerance = 1e-8;  // relative, on cost and on step
   int threads = 1;
@@ -64,15 +65,25 @@ struct FittedParameter {
   Parameter parameter;
   double value;
   double std_error;
+  double data_std_error;  ///< by the data alone, without priors; at most 1e6 plausible ranges
   double low95, high95;
   double prior_share;  // of the estimate's weight that is the prior's, in [0, 1]
   bool at_bound;       // of the model's domain: its error is then not to be believed
 };
 
+/// A parameter that was to be fitted and that the recordings do not determine: it stays at its value beforehand.
+struct HeldParameter {
+  Parameter parameter;
+  double value;
+  bool by_prior;       ///< the value is the prior's mean; false: the model file's
+  std::string reason;  ///< clause for a report
+};
+
 struct FitResult {
   model::NeedleParameters needle;
   std::vector<FittedParameter> parameters;
-  Eigen::MatrixXd covariance;  // of the fitted needle parameters, in their order
+  std::vector<HeldParameter> held;  ///< by fit_determined(); the other fits hold nothing
+  Eigen::MatrixXd covariance;       // of the fitted needle parameters, in their order
   Eigen::MatrixXd correlation;
   std::vector<Direction> directions;  // best fixed first
   std::vector<Entry> entries;         // one per insertion
@@ -97,5 +108,24 @@ FitResult fit_trajectory(const std::vector<Insertion>& insertions, const FitOpti
 // The same from several starts (the options', Table I's two, the fitted bicycle), the best of them: with lambda the
 // likelihood can have more than one hill.
 FitResult fit_from_many_starts(const std::vector<Insertion>& insertions, const FitOptions& options);
+
+/// Least roll, rad, between two parts of an insertion that separates slip from other deviations of the path.
+/// Entries on real rigs are uncertain by 0.1 rad; a smaller rotation leaves one plane of motion.
+inline constexpr double kSeparatingRoll_rad = 0.1;
+
+/// Returns whether an insertion rotates the shaft by kSeparatingRoll_rad while it inserts.
+bool separate_slip(const std::vector<Insertion>& insertions);
+
+/// Fits as fit_from_many_starts() and holds the parameters that the recordings do not determine.
+///
+/// The lambdas are held unless separate_slip(): in one plane any
+/// smooth deviation of the path is confounded with slip, however small the standard error is. Of lambda1, lambda2 and
+/// ell, those with a standard error by the data alone above the prior's (without prior: above the plausible range) are
+/// held as well, the least determined first, with a new fit after each. The curvature is always estimated.
+///
+/// @param options.fit_slip_in_plane fits the lambdas of insertions without rotation all the same
+/// @return the fit; FitResult::held lists what was held, at the prior's mean or else at the value of options.start
+/// @throws std::invalid_argument as fit_trajectory()
+FitResult fit_determined(const std::vector<Insertion>& insertions, const FitOptions& options);
 
 }  // namespace bevel::diagnosis

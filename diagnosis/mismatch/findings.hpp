@@ -194,6 +194,22 @@ struct SteeredFigures {
   std::size_t arrived = 0;
   double median_mm = 0, worst_mm = 0;  // the upper of the middle two, of an even count
   std::string stopped_by{};            // the commonest reason of those that did not arrive; "": all did
+  /// The insertions that ended before the depth of their target, counted by reason.
+  struct Stopped {
+    std::string reason;  ///< of an unhealthy estimate with the quantity: "needle state unhealthy, age of ..."
+    std::size_t count = 0;
+    std::array<double, 2> value{};  ///< least and largest of the quantity
+    double limit = 0;               ///< largest allowed; 0: the reason has none
+    std::string unit;
+    std::array<double, 2> depth_mm{};  ///< least and largest z of the true tip
+  };
+  std::vector<Stopped> stopped{};  ///< the commonest first
+};
+/// Mean difference of the distances from tip to target, over the targets at which both models arrive.
+struct PairedMiss {
+  std::size_t targets = 0;
+  double farther_mm = 0;    ///< with the model that was found, less as it stands: negative if it steers nearer
+  double std_error_mm = 0;  ///< of the mean
 };
 // To the same targets on a rig that is the model that was found, with the recordings' noise.
 struct SteeredToTargets {
@@ -201,6 +217,7 @@ struct SteeredToTargets {
   std::uint64_t seed = 0;
   std::array<double, 2> depth_mm{};  // of the targets, along z: from, to
   SteeredFigures as_it_stands{}, found{};
+  PairedMiss paired{};
   std::vector<std::string> not_known_live{};  // effects that no software knows of an insertion beforehand
 };
 

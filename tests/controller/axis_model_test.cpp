@@ -89,5 +89,42 @@ TEST(AxisModel, UndoingTheDeadBandBringsTheTipThereSoonerAndNotTooFar) {
   EXPECT_LT(farthest_undone, kWanted_rad + 0.05);
 }
 
+TEST(AxisModel, ATipThatJumpsRestsNearestBeforeOrBeyondThePoint) {
+  constexpr double kJump_mm = 0.8;
+  AxisModel axes({active("stick_slip", {kJump_mm})});
+  EXPECT_TRUE(axes.advances_by_jumps());
+  axes.follow(axes_at(0, 0), 0);
+  const double base_mm = 50.3;  // the tip rests at 49.6, the next jump is due at 50.4
+  axes.follow(axes_at(base_mm, 0), 49.6);
+  EXPECT_EQ(axes.insertion_to_nearest_mm(0.3), 0) << "the next place is 0.5 mm beyond the point";
+  // Beyond half a jump the next place is nearer; the base then stops half a jump behind the instant of that jump.
+  EXPECT_NEAR(axes.insertion_to_nearest_mm(0.5), 50.4 + 0.5 * kJump_mm - base_mm, 0.05);
+  EXPECT_NEAR(axes.insertion_to_nearest_mm(1.3), 51.2 + 0.5 * kJump_mm - base_mm, 0.1);
+  EXPECT_EQ(axes.insertion_to_nearest_mm(60), 60) << "farther than any jump reaches";
+}
+
+TEST(AxisModel, AMembraneHoldsTheTipWhereItsOtherSideIsFartherFromThePoint) {
+  AxisModel axes({active("puncture", {40, 3})});
+  EXPECT_TRUE(axes.advances_by_jumps());
+  axes.follow(axes_at(0, 0), 0);
+  for (double base_mm = 0.5; base_mm <= 41; base_mm += 0.5)
+    axes.follow(axes_at(base_mm, 0), std::min(base_mm - 0.5, 40.0));  // the depth before the step
+  EXPECT_EQ(axes.insertion_to_nearest_mm(1), 0) << "through the membrane the tip is 2 mm beyond the point";
+  EXPECT_NEAR(axes.insertion_to_nearest_mm(2.5), 2.2, 0.3) << "0.5 mm beyond it, once the membrane is open";
+  EXPECT_NEAR(axes.insertion_to_nearest_mm(6), 5, 0.3) << "the base has to take up the millimetre that it is ahead by";
+}
+
+TEST(AxisModel, EffectsWithoutJumpsLeaveTheClosestApproachAsItIs) {
+  for (const auto& effects : {std::vector<model::ActiveEffect>{},
+                              {active("insertion_scale", {0.9})},
+                              {active("insertion_backlash", {1.0}), active("torsional_windup", {0.6})}}) {
+    AxisModel axes(effects);
+    EXPECT_FALSE(axes.advances_by_jumps());
+    axes.follow(axes_at(0, 0), 0);
+    axes.follow(axes_at(30, 0), 30);
+    EXPECT_EQ(axes.insertion_to_nearest_mm(0.3), 0.3);
+  }
+}
+
 }  // namespace
 }  // namespace bevel::controller

@@ -122,13 +122,18 @@ TEST(Page, says_what_a_target_is_missed_by) {
       .targets = 8,
       .seed = 5,
       .depth_mm = {81, 90},
-      .as_it_stands = {.arrived = 7, .median_mm = 1.86, .worst_mm = 4.4, .stopped_by = "needle state unhealthy"},
+      .as_it_stands =
+          {.arrived = 7,
+           .median_mm = 1.86,
+           .worst_mm = 4.4,
+           .stopped = {{"needle state unhealthy, measurements rejected in a row", 1, {6, 6}, 5, "", {31, 31}}}},
       .found = {.arrived = 8, .median_mm = 0.06, .worst_mm = 0.11}};
   const std::string html = report_html(f, {});
   EXPECT_THAT(html, HasSubstr("moves the tip by 1.7 mm"));
   EXPECT_THAT(html, HasSubstr("1.9 → 0.060 mm"));
   EXPECT_THAT(html, HasSubstr("7 of 8"));
-  EXPECT_THAT(html, HasSubstr("needle state unhealthy"));
+  EXPECT_THAT(html,
+              HasSubstr("1: needle state unhealthy, measurements rejected in a row: 6, limit 5, at a depth of 31 mm"));
   EXPECT_THAT(html, HasSubstr("81 to 90 mm deep"));
   f.steered.reset();
   f.not_steered = "the recordings have no clock";
@@ -136,16 +141,27 @@ TEST(Page, says_what_a_target_is_missed_by) {
 }
 
 // Figures that the diagnosis may leave empty.
-TEST(Page, does_not_send_anybody_to_steer_by_what_steers_worse) {
+TEST(Page, advice_for_steering_follows_from_the_paired_misses) {
   auto findings = made_up(Verdict::effects_found);
   const auto page = [&] { return report_html(findings, {}); };
-  findings.steered->as_it_stands = {.arrived = 8, .median_mm = 0.19, .worst_mm = 0.40};
-  findings.steered->found = {.arrived = 8, .median_mm = 0.20, .worst_mm = 0.79};  // within a tenth
-  EXPECT_THAT(page(), Not(HasSubstr("do not steer by it untried")));
-  findings.steered->found.median_mm = 0.33;
-  EXPECT_THAT(page(), HasSubstr("do not steer by it untried"));
-  findings.steered->found = {.arrived = 7, .median_mm = 0.05, .worst_mm = 0.05, .stopped_by = "workspace"};
-  EXPECT_THAT(page(), HasSubstr("do not steer by it untried"));
+  auto& steered = *findings.steered;
+  steered.as_it_stands = {.arrived = 8, .median_mm = 0.19, .worst_mm = 0.40};
+  steered.found = {.arrived = 8, .median_mm = 0.33, .worst_mm = 0.79};
+  steered.paired = {.targets = 8, .farther_mm = 0.14, .std_error_mm = 0.08};  // as chance may bring
+  EXPECT_THAT(page(), HasSubstr("adopt this model for steering or keep the model as it stands"));
+  steered.paired.std_error_mm = 0.05;
+  EXPECT_THAT(
+      page(),
+      HasSubstr("missed by 0.14 +- 0.050 mm more with the model that was found (mean of 8): do not adopt this model"));
+  steered.paired.farther_mm = -0.14;
+  EXPECT_THAT(page(), HasSubstr("mm less with the model that was found (mean of 8): adopt this model for steering."));
+  EXPECT_THAT(page(), HasSubstr("simulator, estimator and bevel-predict read it"));
+  steered.found.arrived = 7;
+  EXPECT_THAT(page(), HasSubstr("do not adopt this model"));
+  EXPECT_THAT(page(), HasSubstr("in place of the model in use for simulation and prediction, not for steering"));
+  steered.as_it_stands.arrived = steered.found.arrived = 0;
+  steered.paired.targets = 0;
+  EXPECT_THAT(page(), HasSubstr("Do not adopt this model for steering: no target was reached with it"));
 }
 
 TEST(Page, what_is_left_may_be_less_than_the_noise_or_only_correlated) {

@@ -6,6 +6,7 @@
 
 #include "tests/diagnosis/made_up_findings.hpp"
 #include "tests/needle/simulated_rig.hpp"
+#include "tools/diagnose/figures.hpp"
 #include "tools/diagnose/verdict_json.hpp"
 
 namespace bevel::diagnose {
@@ -60,6 +61,25 @@ TEST_F(Steered, TheSameModelTwiceIsTheSameWhateverTheThreads) {
   EXPECT_EQ(two.steered->as_it_stands.median_mm, two.steered->found.median_mm);
   EXPECT_EQ(two.steered->as_it_stands.worst_mm, two.steered->found.worst_mm);
   EXPECT_EQ(two.steered->found.worst_mm, one.steered->found.worst_mm);
+}
+
+TEST_F(Steered, AnInsertionThatStopsIsReportedWithQuantityValueLimitAndDepth) {
+  findings.effects[0] = {};
+  findings.effects[0].name = "insertion_scale";
+  findings.effects[0].moved_at_depth_mm = 5;
+  findings.effects[0].parameters = {{"ratio", 0.9}};
+  const Findings f = steered(4);
+  ASSERT_TRUE(f.steered) << f.not_steered;
+  const auto& s = f.steered->as_it_stands;
+  ASSERT_EQ(s.stopped.size(), 1U);
+  EXPECT_EQ(s.arrived + s.stopped[0].count, 4U);
+  EXPECT_EQ(s.stopped[0].reason, "needle state unhealthy, measurements rejected in a row");
+  EXPECT_EQ(s.stopped_by, s.stopped[0].reason);
+  EXPECT_GT(s.stopped[0].value[0], s.stopped[0].limit);
+  EXPECT_GT(s.stopped[0].depth_mm[0], 0);
+  EXPECT_THAT(steered_in_words(s, 4), HasSubstr("stopped by needle state unhealthy, measurements rejected in a row: "));
+  EXPECT_THAT(steered_in_words(s, 4), HasSubstr(", limit 5, at a depth of "));
+  EXPECT_EQ(steering_with(*f.steered), Steering::better);
 }
 
 TEST_F(Steered, ItIsSaidWhyNot) {

@@ -11,8 +11,10 @@
 #include "io/messages.hpp"
 #include "io/model_file.hpp"
 #include "tests/identification/simulated_insertion.hpp"
+#include "tests/support/shared_recordings.hpp"
 #include "tests/support/temporary_folder.hpp"
 #include "tools/identify/identify.hpp"
+#include "tools/import/import.hpp"
 
 namespace bevel::identify {
 namespace {
@@ -45,6 +47,7 @@ struct IdentifyTool : ::testing::Test {
     }
     options.model_path = (folder / "start.toml").string();
     options.out_folder = (folder / "out").string();
+    options.fit_slip_in_plane = true;  // the simulated recordings follow the model to the noise
   }
 };
 
@@ -57,9 +60,76 @@ TEST_F(IdentifyTool, WritesAModelThatOtherProgramsAcceptAndFiguresToMatch) {
   const auto& l1 = figures["parameters"]["lambda1_per_rad"];
   EXPECT_DOUBLE_EQ(l1["value"].get<double>(), needle.lambda1_per_rad);
   EXPECT_NEAR(needle.lambda1_per_rad, truth.lambda1_per_rad, 4 * l1["std_error"].get<double>());
-  EXPECT_EQ(figures["candidates"].size(), 5U);
+  EXPECT_EQ(figures["candidates"].size(), 7U);
   EXPECT_GT(fs::file_size(options.out_folder + "/report.html"), 20000U);  // with pictures
   EXPECT_NE(out.str().find("extended, isotropic, published"), std::string::npos);
+}
+
+// One selection: the row of the table, the text, figures.json and the model file are of the same candidate.
+TEST_F(IdentifyTool, WritesTheSelectedModelAndNoErrorOfAParameterThatIsNotDetermined) {
+  options.fit_slip_in_plane = false;
+  for (const bool bicycle : {false, true}) {
+    options.bicycle = bicycle;
+    std::ostringstream out;
+    ASSERT_EQ(run(options, out, std::cerr), 0) << out.str();
+    const auto needle = io::load_model_file(options.out_folder + "/model.toml").needle;
+    std::ifstream file(options.out_folder + "/figures.json");
+    const auto figures = nlohmann::json::parse(file);
+    int selected = 0;
+    for (const auto& c : figures["candidates"]) {
+      if (!c["selected"].get<bool>()) continue;
+      ++selected;
+      EXPECT_EQ(c["needle"]["curvature_per_mm"].get<double>(), needle.curvature_per_mm);
+      EXPECT_EQ(c["needle"]["lambda1_per_rad"].get<double>(), needle.lambda1_per_rad);
+      EXPECT_NE(out.str().find("selected and written: " + c["model"].get<std::string>() + "\n"), std::string::npos);
+      EXPECT_NE(out.str().find(c["model"].get<std::string>() + " *"), std::string::npos);
+      if (bicycle) {
+        EXPECT_EQ(c["model"], "bicycle");
+      }
+      for (const auto& other : figures["candidates"])
+        if (!bicycle && other["possible"].get<bool>()) {
+          EXPECT_LE(c["bic"].get<double>(), other["bic"].get<double>() + 1e-3);
+        }
+    }
+    EXPECT_EQ(selected, 1);
+    EXPECT_NE(out.str().find("lambda1_per_rad is NOT DETERMINED by these recordings: the shaft rotates by 0 rad"),
+              std::string::npos);
+    if (needle.lambda1_per_rad == 0) continue;
+    EXPECT_EQ(needle.lambda1_per_rad, 0.2) << "the value of the start";
+    EXPECT_EQ(figures["parameters"]["lambda1_per_rad"]["determined"], false);
+    EXPECT_TRUE(figures["parameters"]["lambda1_per_rad"]["std_error"].is_null());
+  }
+}
+
+// Three insertions of a bent-tip needle at 1 mm/s, measured by others: constant curvature of 0.0120 to 0.0125 /mm.
+TEST(IdentifyRealInsertions, CurvatureOfANeedleThatNeverRotates) {
+  const fs::path real = test::shared_recordings() / "real/ultrasteer";
+  BEVEL_SKIP_WITHOUT(real);
+  test::TemporaryFolder folder;
+  for (const std::string set : {"aligned", "csv"})
+    for (const std::string map : {"ultrasteer.toml", "ultrasteer_pos.toml"}) {
+      const std::string logs = (folder / (set + map)).string();
+      importing::Options import;
+      import.map_path = (real / map).string(), import.out_folder = logs;
+      for (int i = 1; i <= 3; ++i)
+        import.inputs.push_back((real / set / "1mm" / ("trial" + std::to_string(i) + ".csv")).string());
+      ::testing::internal::CaptureStdout();
+      const int status = importing::run(import);
+      ::testing::internal::GetCapturedStdout();
+      ASSERT_EQ(status, 0);
+      for (const auto& [lambda1, lambda2] : {std::pair{0.49, 0.22}, {0.144, 0.032}, {0.0, 0.0}}) {
+        model::NeedleParameters start;
+        start.curvature_per_mm = 0.012, start.wheelbase_mm = 20;
+        start.lambda1_per_rad = lambda1, start.lambda2 = lambda2;
+        Options options;
+        options.logs = {logs}, options.model_path = (folder / "start.toml").string();
+        io::save_model_file({start, {}}, options.model_path);
+        const Identification r = identify(options, std::cerr);
+        EXPECT_GT(r.chosen.curvature_per_mm, 0.9 * 0.012) << set << ' ' << map << ' ' << lambda1;
+        EXPECT_LT(r.chosen.curvature_per_mm, 1.1 * 0.013) << set << ' ' << map << ' ' << lambda1;
+        EXPECT_EQ(r.chosen, r.candidates[diagnosis::preferred(r.candidates)].fit.needle);
+      }
+    }
 }
 
 TEST_F(IdentifyTool, MethodsAndPriorsAreHeard) {

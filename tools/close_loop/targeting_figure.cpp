@@ -64,7 +64,7 @@ TargetingFigure summarised(const std::vector<steering::Insertion>& insertions, d
     turned_rad += one.turned_rad;
     if (one.at_depth) continue;
     ++figure.stopped;
-    ++reasons[one.reason == controller::Reason::none ? "not there in time" : controller::to_string(one.reason)];
+    ++reasons[one.stopped ? one.stopped->reason : controller::to_string(one.reason)];
   }
   int most = 0;
   for (const auto& [reason, count] : reasons)

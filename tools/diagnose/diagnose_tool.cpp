@@ -142,7 +142,7 @@ void print_verdict(std::ostream& out, const Findings& f) {
         << steered_in_words(f.steered->found, f.steered->targets)
         << (f.steered->not_known_live.empty() ? ""
                                               : "; neither knows beforehand of " + listed(f.steered->not_known_live))
-        << (steers_worse(*f.steered) ? "; what was found predicts better and steers worse" : "") << '\n';
+        << "; " << steering_advice(*f.steered) << '\n';
   if (!f.not_steered.empty()) out << "  not steered to a target in simulation: " << f.not_steered << '\n';
   out << "  insertions differ by (standard deviation):";
   for (const auto& v : f.variation) out << (&v == f.variation.data() ? " " : ", ") << variation_in_words(v);

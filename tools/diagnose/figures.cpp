@@ -137,17 +137,59 @@ std::string moved_in_words(double moved_at_depth_mm) {
                                           : "by how far it moves the tip is not known";
 }
 
-std::string steered_in_words(const diagnosis::SteeredFigures& s, std::size_t targets) {
-  const std::string miss =
-      s.arrived == 0 ? "" : "median " + measured(s.median_mm, 2) + " mm, worst " + measured(s.worst_mm, 2) + " mm, ";
-  return miss + std::to_string(s.arrived) + " of " + std::to_string(targets) + " arrived" +
-         (s.stopped_by.empty() ? "" : " (else: " + s.stopped_by + ")");
+std::string stopped_in_words(const diagnosis::SteeredFigures::Stopped& s) {
+  const auto range = [](const std::array<double, 2>& of, int digits) {
+    const std::string least = number(of[0], digits), most = number(of[1], digits);
+    return least == most ? least : least + " to " + most;
+  };
+  std::string text = s.reason;
+  if (s.limit > 0) text += ": " + range(s.value, 3) + ", limit " + number(s.limit, 3);
+  if (s.limit > 0 && !s.unit.empty()) text += " " + s.unit;
+  return text + ", at a depth of " + range(s.depth_mm, 2) + " mm";
 }
 
-bool steers_worse(const diagnosis::SteeredToTargets& s) {
-  constexpr double kFarther = 1.1;
-  if (s.found.arrived != s.as_it_stands.arrived) return s.found.arrived < s.as_it_stands.arrived;
-  return s.found.median_mm > kFarther * s.as_it_stands.median_mm;
+std::string steered_in_words(const diagnosis::SteeredFigures& s, std::size_t targets) {
+  std::string text =
+      s.arrived == 0 ? "" : "median " + measured(s.median_mm, 2) + " mm, worst " + measured(s.worst_mm, 2) + " mm, ";
+  text += std::to_string(s.arrived) + " of " + std::to_string(targets) + " arrived";
+  for (const auto& one : s.stopped)
+    text +=
+        (&one == s.stopped.data() ? " (" : "; ") + std::to_string(one.count) + " stopped by " + stopped_in_words(one);
+  return text + (s.stopped.empty() ? "" : ")");
+}
+
+Steering steering_with(const diagnosis::SteeredToTargets& s) {
+  constexpr double kDeviations = 2;  // one in forty by chance
+  if (s.found.arrived != s.as_it_stands.arrived)
+    return s.found.arrived < s.as_it_stands.arrived ? Steering::worse : Steering::better;
+  if (s.found.arrived == 0) return Steering::fails;
+  const diagnosis::PairedMiss& p = s.paired;
+  if (p.targets < 2 || !(std::abs(p.farther_mm) > kDeviations * p.std_error_mm)) return Steering::equal;
+  return p.farther_mm > 0 ? Steering::worse : Steering::better;
+}
+
+std::string_view name_of(Steering steering) {
+  return steering == Steering::better ? "adopt" : steering == Steering::equal ? "either" : "do-not-adopt";
+}
+
+std::string steering_advice(const diagnosis::SteeredToTargets& s) {
+  const diagnosis::PairedMiss& p = s.paired;
+  const std::string difference =
+      p.targets < 2 ? ""
+                    : std::string("the same targets are missed by ") + measured(std::abs(p.farther_mm), 2) + " +- " +
+                          measured(p.std_error_mm, 2) + " mm " + (p.farther_mm > 0 ? "more" : "less") +
+                          " with the model that was found (mean of " + std::to_string(p.targets) + "): ";
+  switch (steering_with(s)) {
+    case Steering::better:
+      return difference + "adopt this model for steering";
+    case Steering::equal:
+      return difference + "adopt this model for steering or keep the model as it stands, the difference is chance";
+    case Steering::worse:
+      return difference + "do not adopt this model for steering";
+    case Steering::fails:
+      break;
+  }
+  return "do not adopt this model for steering: no target was reached with it";
 }
 
 std::string span_mm(const diagnosis::SteeredToTargets& s) {

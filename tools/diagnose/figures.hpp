@@ -50,11 +50,25 @@ std::optional<MovedAtDepth> moved_at_depth(const diagnosis::Findings& findings);
 
 // "moves the tip by 1.8 mm", at the deepest readings.
 std::string moved_in_words(double moved_at_depth_mm);
-// "median 0.31 mm, worst 0.8 mm, 7 of 8 arrived (else: workspace)"
+/// Describes a reason that ended insertions: "needle state unhealthy, measurements rejected in a row: 6, limit 5, at a
+/// depth of 12 to 31 mm".
+std::string stopped_in_words(const diagnosis::SteeredFigures::Stopped& stopped);
+/// Describes the insertions with one model: "median 0.31 mm, worst 0.8 mm, 7 of 8 arrived (1 stopped by ...)".
 std::string steered_in_words(const diagnosis::SteeredFigures& figures, std::size_t targets);
-// The needle comes to rest farther from the targets by what was found than by the model file, by a tenth, or arrives
-// less often.
-bool steers_worse(const diagnosis::SteeredToTargets& steered);
+/// Steering with the model that was found, compared with the model file as it stands.
+enum class Steering {
+  better,  ///< more targets reached; or the paired misses are smaller by more than two standard errors
+  equal,   ///< no difference beyond chance
+  worse,
+  fails  ///< neither model reaches a target
+};
+Steering steering_with(const diagnosis::SteeredToTargets& steered);
+/// Returns whether the model that was found is not to be adopted for steering.
+constexpr bool is_refused(Steering steering) { return steering == Steering::worse || steering == Steering::fails; }
+/// Returns the advice in verdict.json: "adopt", "either" or "do-not-adopt".
+std::string_view name_of(Steering steering);
+/// States the paired difference and whether the model that was found is to be adopted for steering.
+std::string steering_advice(const diagnosis::SteeredToTargets& steered);
 std::string span_mm(const diagnosis::SteeredToTargets& steered);  // "74 to 82 mm", of the targets' depths
 
 // Of the checks of the final model, a sentence.

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <array>
+#include <cctype>
 #include <cmath>
 
 #include "diagnosis/mismatch/effect_source.hpp"
@@ -175,14 +176,21 @@ void add_what_to_do(report::Page& page, const Findings& f) {
           "present.");
       break;
     case Verdict::effects_found:
-      todo.emplace_back(
-          "Put model.toml in place of the model in use (simulator, estimator and bevel-predict read it), or mend the "
-          "rig and record again.");
-      if (f.steered && steers_worse(*f.steered))
+      if (f.steered && is_refused(steering_with(*f.steered)))
         todo.emplace_back(
-            std::string("It predicts better, but do not steer by it untried: in simulation the needle ") +
-            (f.steered->found.arrived < f.steered->as_it_stands.arrived ? "reaches more of" : "comes nearer to") +
-            " its targets when estimator and controller believe the model as it stands (\"At the target\").");
+            "Put model.toml in place of the model in use for simulation and prediction, not for steering; or repair "
+            "the "
+            "rig and record again.");
+      else
+        todo.emplace_back(
+            "Put model.toml in place of the model in use (simulator, estimator and bevel-predict read it), or repair "
+            "the "
+            "rig and record again.");
+      if (f.steered) {
+        std::string advice = steering_advice(*f.steered);
+        advice.front() = static_cast<char>(std::toupper(static_cast<unsigned char>(advice.front())));
+        todo.push_back("In simulation (\"At the target\"): " + advice + ".");
+      }
       if (has_rivals(f))
         todo.emplace_back(
             "Before you name the cause, record the next experiment below: these recordings cannot tell the named "

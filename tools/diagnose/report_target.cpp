@@ -25,9 +25,12 @@ void add_steered(report::Page& page, const Findings& f) {
   if (!f.steered) return;
   const SteeredToTargets& s = *f.steered;
   const auto row = [&](const char* believed, const SteeredFigures& figures) {
+    std::string stopped;
+    for (const auto& one : figures.stopped)
+      stopped += (stopped.empty() ? "" : "; ") + std::to_string(one.count) + ": " + stopped_in_words(one);
     return std::vector<std::string>{believed, measured(figures.median_mm, 2), measured(figures.worst_mm, 2),
                                     std::to_string(figures.arrived) + " of " + std::to_string(s.targets),
-                                    figures.stopped_by.empty() ? "-" : figures.stopped_by};
+                                    stopped.empty() ? "-" : stopped};
   };
   page.table({"estimator and controller believe", "median miss (mm)", "worst (mm)", "arrived", "stopped by"},
              {row("the model file as it stands", s.as_it_stands), row("the model that was found", s.found)},

@@ -72,17 +72,39 @@ std::vector<Eigen::Vector3d> draw_targets(int count, const std::array<double, 2>
 
 SteeredFigures figures_of(const std::vector<steering::Insertion>& insertions) {
   std::vector<double> miss_mm;
-  std::map<std::string, int> reasons;
+  std::map<std::string, SteeredFigures::Stopped> reasons;
   for (const auto& one : insertions) {
-    if (one.at_depth)
+    if (one.at_depth) {
       miss_mm.push_back(one.miss_mm);
-    else
-      ++reasons[one.reason == controller::Reason::none ? "not there in time" : controller::to_string(one.reason)];
+      continue;
+    }
+    const steering::StopCause& cause = *one.stopped;
+    SteeredFigures::Stopped& all = reasons[cause.reason];
+    if (all.count++ == 0)
+      all = {cause.reason, 1, {cause.value, cause.value}, cause.limit, cause.unit, {cause.depth_mm, cause.depth_mm}};
+    all.value = {std::min(all.value[0], cause.value), std::max(all.value[1], cause.value)};
+    all.depth_mm = {std::min(all.depth_mm[0], cause.depth_mm), std::max(all.depth_mm[1], cause.depth_mm)};
   }
   SteeredFigures out{.arrived = miss_mm.size()};
   out.median_mm = out.worst_mm = std::numeric_limits<double>::quiet_NaN();
   if (!miss_mm.empty()) out.median_mm = median(miss_mm), out.worst_mm = std::ranges::max(miss_mm);
-  if (!reasons.empty()) out.stopped_by = std::ranges::max_element(reasons, {}, [](auto& r) { return r.second; })->first;
+  for (auto& [reason, stopped] : reasons) out.stopped.push_back(std::move(stopped));
+  std::ranges::stable_sort(out.stopped, std::ranges::greater{}, &SteeredFigures::Stopped::count);
+  if (!out.stopped.empty()) out.stopped_by = out.stopped.front().reason;
+  return out;
+}
+
+PairedMiss compare(const std::vector<steering::Insertion>& as_it_stands,
+                   const std::vector<steering::Insertion>& found) {
+  std::vector<double> farther_mm;
+  for (std::size_t i = 0; i < found.size(); ++i)
+    if (as_it_stands[i].at_depth && found[i].at_depth) farther_mm.push_back(found[i].miss_mm - as_it_stands[i].miss_mm);
+  PairedMiss out{.targets = farther_mm.size()};
+  const auto n = static_cast<double>(farther_mm.size());
+  for (const double one : farther_mm) out.farther_mm += one / n;
+  double squares = 0;
+  for (const double one : farther_mm) squares += (one - out.farther_mm) * (one - out.farther_mm);
+  out.std_error_mm = n > 1 ? std::sqrt(squares / (n * (n - 1))) : std::numeric_limits<double>::quiet_NaN();
   return out;
 }
 
@@ -108,6 +130,7 @@ SteeredToTargets steer(const RecordedCase& recorded, const io::ModelFile& in_use
   });
   out.as_it_stands = figures_of(insertions[0]);
   out.found = figures_of(insertions[1]);
+  out.paired = compare(insertions[0], insertions[1]);
   for (const auto& entry : found.effects)
     if (!io::unknown_beforehand(entry).empty()) out.not_known_live.push_back(entry.name);
   return out;

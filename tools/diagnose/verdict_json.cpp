@@ -5,6 +5,7 @@
 
 #include "diagnosis/mismatch/effect_source.hpp"
 #include "model/effects/effect.hpp"
+#include "tools/diagnose/figures.hpp"
 
 namespace bevel::diagnose {
 
@@ -212,7 +213,16 @@ json experiment_json(const std::optional<NextExperiment>& next) {
 }
 
 json as_json(const SteeredFigures& s) {
+  json stopped = json::array();
+  for (const auto& one : s.stopped)
+    stopped.push_back({{"reason", one.reason},
+                       {"count", one.count},
+                       {"value", {figure(one.value[0]), figure(one.value[1])}},
+                       {"limit", one.limit > 0 ? figure(one.limit) : json()},
+                       {"unit", one.unit},
+                       {"depth_mm", {figure(one.depth_mm[0]), figure(one.depth_mm[1])}}});
   return {{"arrived", s.arrived},
+          {"stopped", stopped},
           {"median_mm", figure(s.median_mm)},
           {"worst_mm", figure(s.worst_mm)},
           {"stopped_by", s.stopped_by}};
@@ -226,6 +236,11 @@ json steered_json(const Findings& f) {
           {"depth_mm", {figure(f.steered->depth_mm[0]), figure(f.steered->depth_mm[1])}},
           {"as_it_stands", as_json(f.steered->as_it_stands)},
           {"found", as_json(f.steered->found)},
+          {"paired",
+           {{"targets", f.steered->paired.targets},
+            {"farther_mm", figure(f.steered->paired.farther_mm)},
+            {"std_error_mm", figure(f.steered->paired.std_error_mm)}}},
+          {"advice", name_of(steering_with(*f.steered))},
           {"not_known_live", f.steered->not_known_live}};
 }
 

@@ -16,7 +16,9 @@ int main(int argc, char** argv) {
       .choice("--method", o.method, "trajectory (default) or angle-rate, as printed in the paper",
               {"trajectory", "angle-rate"})
       .choice("--prior", o.prior, "on the lambdas", {"none", "table1-agar", "table1-plastisol"})
-      .flag("--bicycle", o.bicycle, "the plain bicycle: lambda held at zero")
+      .flag("--bicycle", o.bicycle, "select the bicycle, lambda 0, whatever its BIC")
+      .flag("--fit-slip-in-plane", o.fit_slip_in_plane,
+            "fit lambda although no shaft rotates, as the paper does; misfit of any kind then changes it")
       .flag("--wheelbase", o.fit_wheelbase, "fit the wheelbase as well")
       .flag("--square-loss", o.square_loss, "least squares instead of Huber's loss")
       .non_negative("--entry-tilt-rad", o.entry_tilt_rad, "standard deviation of each entry's tilt; 0: nominal")

@@ -30,7 +30,8 @@ FitOptions fit_options(const Options& options, const model::NeedleParameters& st
   fit.entry_sigma(kRoll) = options.entry_roll_rad;
   fit.entry_sigma(kOffsetX) = fit.entry_sigma(kOffsetY) = options.entry_offset_mm;
   fit.entry_sigma(kLateEntry) = options.late_entry_mm;
-  return options.bicycle ? bicycle_options(fit) : fit;
+  fit.fit_slip_in_plane = options.fit_slip_in_plane;
+  return fit;
 }
 
 Insertion read_insertion(const std::string& path, const std::string& name, std::ostream& err,
@@ -72,8 +73,11 @@ Identification identify(const Options& options, std::ostream& err) {
     result.insertions.push_back(read_insertion(logs[i], names[i], err, result.faults));
 
   const FitOptions fit = fit_options(options, model.needle);
-  result.fit = fit_from_many_starts(result.insertions, fit);
   result.candidates = fit_candidates(result.insertions, fit);
+  result.preferred = options.bicycle ? 0 : preferred(result.candidates);
+  if (!result.candidates[result.preferred].possible)
+    throw std::runtime_error("bicycle: " + result.candidates[result.preferred].why);
+  result.fit = result.candidates[result.preferred].fit;
   result.chosen = result.fit.needle;
   try {
     result.angle_rate = fit_angle_rate(result.insertions, model.needle);

@@ -15,7 +15,8 @@ struct Options {
   std::string out_folder;
   std::string method = "trajectory";  // or "angle-rate"
   std::string prior = "none";         // or "table1-agar", "table1-plastisol"
-  bool bicycle = false;               // lambda held at zero
+  bool bicycle = false;               // the bicycle is selected whatever its BIC
+  bool fit_slip_in_plane = false;     // lambda is fitted although no shaft rotates
   bool fit_wheelbase = false;
   bool square_loss = false;
   double entry_tilt_rad = 0;  // standard deviations of each insertion's entry; 0 = nominal
@@ -30,8 +31,9 @@ struct Identification {
   std::string method, prior;
   std::vector<diagnosis::Insertion> insertions;
   std::vector<std::string> faults;  // of the logs
-  diagnosis::FitResult fit;         // trajectory; for angle-rate: of the same data, to compare with
   std::vector<diagnosis::Candidate> candidates;
+  std::size_t preferred = 0;  // of the candidates: the one selection that table, text and model file share
+  diagnosis::FitResult fit;   // of the preferred candidate; for angle-rate: of the same data, to compare with
   diagnosis::AngleRateResult angle_rate;
   std::string angle_rate_refusal;  // why there is none
   model::NeedleParameters chosen;  // what goes into model.toml

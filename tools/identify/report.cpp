@@ -28,8 +28,26 @@ std::string describe(const Direction& direction, const std::vector<FittedParamet
   return text;
 }
 
+std::string value_beforehand(const HeldParameter& held, int digits = 4) {
+  return number(held.value, digits) + (held.by_prior ? " (mean of the prior)" : " (model file)");
+}
+
 std::vector<std::string> statements(const Identification& r) {
   std::vector<std::string> all;
+  const Candidate& preferred = r.candidates[r.preferred];
+  all.push_back(r.method == "trajectory"
+                    ? "selected and written: " + preferred.model
+                    : "written: the result of --method " + r.method + "; selected by BIC: " + preferred.model);
+  for (const auto& c : r.candidates)
+    if (c.possible && c.extended && &c != &preferred && !c.fit.held.empty() && r.fit.held.empty()) {
+      for (const auto& h : c.fit.held)
+        all.push_back(std::string(kParameterNames[h.parameter]) + " is NOT DETERMINED by these recordings: " +
+                      h.reason + "; the extended models hold it at " + value_beforehand(h));
+      break;
+    }
+  for (const auto& h : r.fit.held)
+    all.push_back(std::string(kParameterNames[h.parameter]) + " is NOT DETERMINED by these recordings: " + h.reason +
+                  "; it stays at " + value_beforehand(h));
   for (const auto& d : r.fit.directions)
     if (d.sigma > 1)
       all.push_back("NOT FIXED by these recordings: " + describe(d, r.fit.parameters) + " (the data's own error is " +
@@ -65,15 +83,16 @@ std::vector<std::vector<std::string>> parameter_rows(const FitResult& fit) {
     rows.push_back({kParameterNames[p.parameter], number(p.value), p.at_bound ? "-" : number(p.std_error, 2),
                     p.at_bound ? "-" : number(p.low95) + " to " + number(p.high95), number(100 * p.prior_share, 2),
                     p.at_bound ? "at its bound" : ""});
+  for (const auto& h : fit.held)
+    rows.push_back({kParameterNames[h.parameter], number(h.value), "-", "-", "-", "not determined, held"});
   return rows;
 }
 const std::vector<std::string> kParameterHeader = {"parameter", "value",           "std. error",
                                                    "95 %",      "prior's share %", "note"};
 
-std::vector<std::vector<std::string>> candidate_rows(const std::vector<Candidate>& candidates) {
-  double best = 1e300;
-  for (const auto& c : candidates)
-    if (c.possible) best = std::min(best, c.bic);
+std::vector<std::vector<std::string>> candidate_rows(const Identification& r) {
+  const auto& candidates = r.candidates;
+  const double best = candidates[preferred(candidates)].bic;
   std::vector<std::vector<std::string>> rows;
   for (const auto& c : candidates) {
     if (!c.possible) {
@@ -81,14 +100,15 @@ std::vector<std::vector<std::string>> candidate_rows(const std::vector<Candidate
       continue;
     }
     const auto& n = c.fit.needle;
-    rows.push_back({c.model, number(n.curvature_per_mm), number(n.lambda1_per_rad, 3), number(n.lambda2, 3),
-                    number(c.at_insertion.rms_mm, 3), number(c.at_insertion.largest_mm, 3),
-                    number(c.at_depth.largest_mm, 3), number(c.bic - best, 3)});
+    rows.push_back({c.model + (&c == &candidates[r.preferred] ? " *" : ""), number(n.curvature_per_mm),
+                    number(n.lambda1_per_rad, 3), number(n.lambda2, 3), number(c.at_insertion.rms_mm, 3),
+                    number(c.at_insertion.largest_mm, 3), number(c.at_depth.largest_mm, 3), number(c.bic - best, 3)});
   }
   return rows;
 }
 const std::vector<std::string> kCandidateHeader = {"model",  "k 1/mm",     "lambda1",           "lambda2",
                                                    "RMS mm", "largest mm", "largest, at depth", "BIC above best"};
+const char* const kCandidateNote = "* selected";
 
 void print(std::ostream& out, const std::vector<std::string>& header,
            const std::vector<std::vector<std::string>>& rows) {
@@ -182,8 +202,8 @@ void print_table(std::ostream& out, const Identification& r) {
       << number(r.before.largest_mm, 3) << " -> " << number(r.after.largest_mm, 3) << " mm\n";
   for (const auto& s : statements(r)) out << "- " << s << '\n';
   out << '\n';
-  print(out, kCandidateHeader, candidate_rows(r.candidates));
-  out << '\n';
+  print(out, kCandidateHeader, candidate_rows(r));
+  out << kCandidateNote << "\n\n";
   if (r.angle_rate_refusal.empty())
     out << "angle-rate (Section IV, k and ell as given): lambda1 " << number(r.angle_rate.needle.lambda1_per_rad)
         << ", lambda2 " << number(r.angle_rate.needle.lambda2)
@@ -199,10 +219,18 @@ std::string figures_json(const Identification& r) {
   j["needle"] = as_json(r.chosen);
   for (const auto& p : r.fit.parameters)
     j["parameters"][kParameterNames[p.parameter]] = {{"value", p.value},
-                                                     {"std_error", p.std_error},
-                                                     {"ci95", {p.low95, p.high95}},
+                                                     {"determined", !p.at_bound},
+                                                     {"std_error", p.at_bound ? json() : json(p.std_error)},
+                                                     {"ci95", p.at_bound ? json() : json({p.low95, p.high95})},
                                                      {"prior_share", p.prior_share},
                                                      {"at_bound", p.at_bound}};
+  for (const auto& h : r.fit.held)
+    j["parameters"][kParameterNames[h.parameter]] = {{"value", h.value},
+                                                     {"determined", false},
+                                                     {"std_error", nullptr},
+                                                     {"ci95", nullptr},
+                                                     {"held_at", h.by_prior ? "prior" : "model file"},
+                                                     {"why", h.reason}};
   for (Eigen::Index i = 0; i < r.fit.correlation.rows(); ++i)
     j["correlation"].push_back(std::vector<double>(r.fit.correlation.row(i).begin(), r.fit.correlation.row(i).end()));
   for (const auto& d : r.fit.directions)
@@ -213,7 +241,7 @@ std::string figures_json(const Identification& r) {
   j["errors"] = {{"before", as_json(r.before)}, {"after", as_json(r.after)}};
   j["converged"] = r.fit.converged;
   for (const auto& c : r.candidates) {
-    json one = {{"model", c.model}, {"possible", c.possible}};
+    json one = {{"model", c.model}, {"possible", c.possible}, {"selected", &c == &r.candidates[r.preferred]}};
     if (c.possible) {
       one["needle"] = as_json(c.fit.needle);
       one["at_insertion"] = as_json(c.at_insertion);
@@ -239,12 +267,14 @@ std::string figures_json(const Identification& r) {
 void save_report(const Identification& r, const std::string& path) {
   report::Page page("Identification of the needle");
   const bool open = r.fit.unfixed_directions() > 0;
+  const bool held = !r.fit.held.empty();
   bool bound = false;
   for (const auto& p : r.fit.parameters) bound |= p.at_bound;
-  page.verdict(open || bound ? report::Tone::warning : report::Tone::good,
+  page.verdict(open || bound || held ? report::Tone::warning : report::Tone::good,
                bound  ? "A parameter ran to the bound of the model's domain"
                : open ? "The recordings leave a direction open"
-                      : "Every fitted parameter is fixed by the recordings",
+               : held ? "The recordings do not determine every parameter"
+                      : "The recordings determine every fitted parameter",
                "RMS error " + number(r.after.rms_mm, 3) + " mm, largest " + number(r.after.largest_mm, 3) +
                    " mm over " + std::to_string(r.insertions.size()) + " insertions; method " + r.method + ", prior " +
                    r.prior + ".");
@@ -262,9 +292,8 @@ void save_report(const Identification& r, const std::string& path) {
   }
   page.subheading("Correlation of the estimates").table(header, correlation);
   page.heading("Models side by side")
-      .table(kCandidateHeader, candidate_rows(r.candidates),
-             "BIC differences above 10 are strong evidence; without rotation the two "
-             "slips are the same model.");
+      .table(kCandidateHeader, candidate_rows(r),
+             std::string(kCandidateNote) + "; BIC differences above 10 are strong evidence.");
   page.heading("Paths");
   page.figure(path_figure(r, 1, "y"), "Lateral position in the bevel's plane: seen, and by the models.");
   bool sees_x = false;

@@ -157,6 +157,7 @@ class Pilot {
     return moves() ? Reason::none : !holds() ? Reason::state_unhealthy : Reason::held;
   }
   controller::Miss reported() const { return supervisor_.status().miss; }
+  const controller::Status& status() const { return supervisor_.status(); }
   bool has_report() const { return !yardstick_; }
 
  private:
@@ -165,6 +166,30 @@ class Pilot {
   std::optional<Yardstick> yardstick_;
   Eigen::Vector3d told_mm_ = Eigen::Vector3d::Zero();
 };
+
+StopCause stop_cause(const Pilot& pilot, const estimator::NeedleEstimator& estimator,
+                     const estimator::Estimate& estimate, std::int64_t utime, double depth_mm) {
+  using controller::Reason;
+  const Reason reason = pilot.reason();
+  StopCause cause;
+  cause.reason = reason == Reason::none ? "the time limit" : to_string(reason);
+  cause.depth_mm = depth_mm;
+  if (pilot.has_report() && reason != Reason::none) {
+    const controller::Status& status = pilot.status();
+    cause.value = status.value, cause.unit = status.unit;
+    if (status.allowed.place[0] != '\0') cause.limit = status.allowed.most;
+  }
+  if (reason == Reason::state_unhealthy) {
+    const estimator::HealthFinding finding = estimator.finding(estimate, utime);
+    if (finding.flag != estimator::kHealthy) cause.reason += std::string(", ") + finding.quantity;
+    cause.value = finding.value, cause.limit = finding.limit, cause.unit = finding.unit;
+  }
+  if (reason == Reason::state_reset) {
+    cause.reason += ", " + estimator::describe_health(estimator::reset_bit(estimate.state.reset_cause));
+    cause.value = 0, cause.unit.clear();
+  }
+  return cause;
+}
 
 }  // namespace
 
@@ -195,6 +220,8 @@ Insertion steer(const SteeredRig& rig, const Believed& believed, const Eigen::Ve
   enum class Leg { before, back, last } leg = believed.before ? Leg::before : Leg::last;
   WayIn way;
   std::vector<double> way_point_miss_mm(believed.way_points_mm.size(), std::numeric_limits<double>::infinity());
+  estimator::Estimate estimate;
+  std::int64_t estimated_utime = 0;
   const auto target_now = [&] { return rig.target_mm ? rig.target_mm(result.duration_s) : target_mm; };
   for (std::int64_t us = 0; us < kTimeLimit_us; us += kTick_us) {
     const std::int64_t utime = kStart_utime + us;
@@ -229,7 +256,8 @@ Insertion steer(const SteeredRig& rig, const Believed& believed, const Eigen::Ve
     cameras.deliver(estimator, entry, utime);
     if (result.turned_frame_said_mm == 0 && entry.is_turned()) result.turned_frame_said_mm = axes.insertion_mm;
     if (us % control_us != 0 || us < kSettle_us) continue;
-    controller::NeedleView view = view_of(estimator.estimate(utime));
+    estimate = estimator.estimate(utime), estimated_utime = utime;
+    controller::NeedleView view = view_of(estimate);
     if (leg == Leg::back)
       result.drawn_back_error_mm = std::max(result.drawn_back_error_mm, (view.pose.p_mm - plant->tip().p_mm).norm());
     if (told_the_tip) view.pose = plant->tip();
@@ -263,6 +291,7 @@ Insertion steer(const SteeredRig& rig, const Believed& believed, const Eigen::Ve
   result.inserted_mm = axes.insertion_mm;
   result.at_depth = leg == Leg::last && pilot.holds();
   result.reason = pilot.reason();
+  if (!result.at_depth) result.stopped = stop_cause(pilot, estimator, estimate, estimated_utime, plant->tip().p_mm.z());
   if (pilot.has_report()) result.reported = pilot.reported();
   if (!way_point_miss_mm.empty()) result.way_point_miss_mm = std::ranges::max(way_point_miss_mm);
   result.miss_mm = (plant->tip().p_mm - met_mm.value_or(target_now())).norm();

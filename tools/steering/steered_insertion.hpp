@@ -8,6 +8,7 @@
 #include <limits>
 #include <memory>
 #include <optional>
+#include <string>
 #include <vector>
 
 #include "controller/supervisor.hpp"
@@ -58,12 +59,23 @@ struct Believed {
   std::optional<YardstickLaw> yardstick{};
 };
 
+/// Cause of an insertion that ended before the depth of its target.
+struct StopCause {
+  /// The controller's reason; of an unhealthy estimate also the quantity, of a reset its cause.
+  std::string reason;
+  double value = 0;  ///< of the quantity behind the reason
+  double limit = 0;  ///< largest allowed; 0: the reason has none
+  std::string unit;
+  double depth_mm = 0;  ///< z of the true tip
+};
+
 struct Insertion {
   double miss_mm = 0;     // true tip to target where it came to rest
   bool at_depth = false;  ///< it came to the closest approach to the target and stopped there, near it or not
   /// The outcome that the controller reports at depth; of a law it is compared with, by the same rule.
   controller::Miss reported;
   controller::Reason reason = controller::Reason::none;  ///< of the controller's state at the end
+  std::optional<StopCause> stopped{};                    ///< none of an insertion at depth
   double turned_frame_said_mm = 0;                       // of insertion; 0: it was not
   double estimate_error_mm = 0;                          // estimate to true tip, at the end
   double pose_nees = 0;   // at the end, of six degrees of freedom: one each if the estimate's covariance is right

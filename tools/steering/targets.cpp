@@ -71,7 +71,7 @@ Figures figures_of(const std::vector<Insertion>& all) {
                                    one.reason == Reason::way_point_unreachable))
         ++f.refused;
       else
-        ++f.stopped[one.reason == controller::Reason::none ? "not there in time" : to_string(one.reason)];
+        ++f.stopped[one.stopped ? one.stopped->reason : to_string(one.reason)];
       continue;
     }
     ++f.at_depth;
