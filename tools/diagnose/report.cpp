@@ -59,6 +59,7 @@ report::Tone tone_of(Verdict verdict) {
     case Verdict::effects_found:
       return report::Tone::plain;
     case Verdict::unknown_effect:
+    case Verdict::inconclusive:
       return report::Tone::warning;
   }
   return report::Tone::plain;
@@ -85,7 +86,7 @@ bool has_rivals(const Findings& f) {
 std::vector<report::Fact> figures_of_verdict(const Findings& f) {
   std::vector<report::Fact> facts;
   const HeldOut& h = f.held_out;
-  const bool one_model = f.verdict == Verdict::nothing_missing;
+  const bool one_model = !adopts_a_model(f.verdict);
   const auto add_error = [&](const char* label, const FitFigures& figures, const std::string& note) {
     facts.push_back({label, measured(figures.rmse_mm) + " mm", note});
   };
@@ -149,6 +150,8 @@ void add_verdict(report::Page& page, const Findings& f) {
                     measured(f.held_out.before.chi2_per_dof) +
                     " (1: as far off as the model says it may be). Nothing above the sizes listed under \"What these "
                     "recordings could have shown\".";
+  else if (f.verdict == Verdict::inconclusive)
+    consequences += "model.toml holds the nominal model, refitted. No physics was added to it.";
   else
     consequences += held_out_sentence(f);
   page.verdict(tone_of(f.verdict), headline_of(f.verdict, f.two_groups) + ". " + f.sentence, consequences,
@@ -161,7 +164,9 @@ void add_what_to_do(report::Page& page, const Findings& f) {
     if (!effect.meaning.empty()) todo.push_back(effect.name + " means: " + effect.meaning + ".");
   if (f.two_groups) {
     todo.emplace_back(
-        f.verdict == Verdict::nothing_missing
+        f.verdict == Verdict::inconclusive ? "Do not act on a change yet: record the next experiment below with both "
+                                             "groups, and run bevel-diagnose again."
+        : f.verdict == Verdict::nothing_missing
             ? "Read the table of detectable sizes before you rule a change out: a smaller one may well be there."
             : "model.toml is the model in use with what changed; the rest of it is as it was.");
     page.heading("What to do").list(todo);
@@ -187,6 +192,11 @@ void add_what_to_do(report::Page& page, const Findings& f) {
         todo.emplace_back(
             "Before you name the cause, record the next experiment below: these recordings cannot tell the named "
             "effect from its rivals, though either model predicts equally well.");
+      break;
+    case Verdict::inconclusive:
+      todo.emplace_back(
+          "Do not change the model yet. Record the next experiment below, and run bevel-diagnose again with the new "
+          "recordings added.");
       break;
     case Verdict::unknown_effect:
       todo.emplace_back(
@@ -225,7 +235,7 @@ void add_parameters(report::Page& page, const Findings& f) {
   const std::array<double, 4> given{f.model_file.curvature_per_mm, f.model_file.lambda1_per_rad, f.model_file.lambda2,
                                     f.model_file.wheelbase_mm};
   constexpr const char* kNames[] = {"k (1/mm)", "lambda1 (1/rad)", "lambda2", "wheelbase (mm), not fitted"};
-  const bool one_model = f.verdict == Verdict::nothing_missing;
+  const bool one_model = !adopts_a_model(f.verdict);
   std::vector<std::string> header{"needle", "model file", one_model ? "refitted" : "refitted alone"};
   if (!one_model) header.emplace_back(f.discrepancies.empty() ? "with what was found" : "beside the discrepancy");
   std::vector<std::vector<std::string>> rows;
@@ -331,7 +341,7 @@ void add_residuals(report::Page& page, const Findings& f) {
     order.emplace_back(-sum, c);
   }
   std::sort(order.begin(), order.end());
-  const bool one_model = f.verdict == Verdict::nothing_missing;
+  const bool one_model = !adopts_a_model(f.verdict);
   const std::string reading = one_model
                                   ? " The line should lie at zero in every panel, within what its band lets it waver."
                                   : " Where the orange line leaves zero and the blue one does not, what was found "
