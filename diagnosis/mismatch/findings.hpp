@@ -55,14 +55,14 @@ struct FoundEffect {
   double moved_at_depth_mm = 0;
 };
 
-// Where the model in use (its needle refitted) goes wrong most.
+/// When the missing physics begins to act in a recording.
 struct Location {
   std::string log;
-  std::string channel;
-  double from_s = 0, to_s = 0;
+  std::string channel;          // in which it lowers chi2 most
+  double from_s = 0, to_s = 0;  // 95 % interval of the onset
   std::string covariate;
-  std::array<double, 2> range{};
-  double share = 0;  // of the whole mismatch, in chi2
+  std::array<double, 2> range{};  // of the covariate, during the onset
+  double share = 0;               // of the whole mismatch, in chi2
 };
 
 // Of scalar readings; errors in mm of positions alone, headings count in chi2 and density. chi2 counts what was not

@@ -148,8 +148,8 @@ void print_verdict(std::ostream& out, const Findings& f) {
   for (const auto& v : f.variation) out << (&v == f.variation.data() ? " " : ", ") << variation_in_words(v);
   out << '\n';
   for (std::size_t i = 0; i < f.where.size() && i < 3; ++i)
-    out << "  " << (i == 0 ? "worst: " : "       ") << f.where[i].log << " " << f.where[i].channel << ", "
-        << number(f.where[i].from_s) << " to " << number(f.where[i].to_s) << " s\n";
+    out << "  " << (i == 0 ? "begins to act: " : "               ") << f.where[i].log << " " << f.where[i].channel
+        << ", " << number(f.where[i].from_s) << " to " << number(f.where[i].to_s) << " s\n";
   out << "  next experiment: "
       << (!is_experiment_needed(f) ? "none needed"
           : f.next_experiment      ? f.next_experiment->script + "; it separates " + f.next_experiment->separates[0] +

@@ -274,10 +274,11 @@ void add_variation(report::Page& page, const Findings& f) {
 
 void add_location(report::Page& page, const Findings& f) {
   if (f.where.empty()) return;
-  page.heading("Where it goes wrong");
+  page.heading("Where the missing physics begins to act");
   page.paragraph(
-      "The spans in which the model in use, its needle refitted, misses most. Look there first: what did the base do, "
-      "and what came before it?");
+      "The time at which the missing physics begins to act, as a 95 % interval: from the innovations of the nominal "
+      "model, which predicts the later measurements from the tip's position and direction at each time. Look there "
+      "first: what did the actuators do, and what came before it?");
   std::vector<std::vector<std::string>> rows;
   for (const auto& w : f.where)
     rows.push_back({w.log, w.channel, time_span(f, w), w.covariate.empty() ? "-" : span_of(w), percent(w.share)});
@@ -285,8 +286,8 @@ void add_location(report::Page& page, const Findings& f) {
   const auto panels = located_panels(f, 2);
   if (!panels.empty())
     page.figures(panels, static_cast<int>(panels.size() / 3),
-                 "The worst spans, shaded, in their recordings: what was measured less what was predicted, and below "
-                 "it what the base did at that time.");
+                 "The onsets, shaded, in their recordings: what was measured less what was predicted, and below "
+                 "it the motion of the actuators.");
 }
 
 void add_unknown_part(report::Page& page, const Findings& f) {

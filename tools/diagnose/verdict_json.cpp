@@ -28,7 +28,8 @@ json as_json(const std::vector<FoundParameter>& parameters) {
     all[p.name] = {{"value", figure(p.value)},
                    {"std_error", figure(p.std_error)},
                    {"ci95", {figure(p.ci95[0]), figure(p.ci95[1])}},
-                   {"at_bound", p.at_bound}};
+                   {"at_bound", p.at_bound},
+                   {"none", figure(p.none)}};
   return all;
 }
 
