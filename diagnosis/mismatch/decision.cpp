@@ -114,7 +114,7 @@ Choice choose(const Search& search, const Posterior& posterior, const std::set<s
   };
   const bool unknown = posterior.discrepancy > 0.5 * something;
   if (const auto* best = likeliest(unknown)) return {best, unknown};
-  if (!unknown && posterior.discrepancy > 0)
+  if (!unknown && refused.empty() && posterior.discrepancy > 0)
     if (const auto* best = likeliest(true)) return {best, true};
   return nothing;  // or a discrepancy that no mode shows
 }

@@ -47,7 +47,10 @@ FoundParameter shared_parameter(const NeedleSystem& system, const inference::Unk
   out.value += turned;
   for (double& end : out.ci95) end += turned;
   const auto& held = model.fit->held;
-  out.at_bound = std::find(held.begin(), held.end(), at) != held.end();
+  const double fitted = model.fit->shared[at];
+  const bool at_end =
+      !parameter.periodic && fitted != parameter.none && (fitted <= parameter.lower || fitted >= parameter.upper);
+  out.at_bound = at_end || std::find(held.begin(), held.end(), at) != held.end();
   return out;
 }
 
@@ -174,10 +177,30 @@ std::string fault_of_name(const NeedleSystem& system, const Search& search, cons
   return factor && !(*factor > 0) ? "its log Bayes factor is not positive" : "";
 }
 
+namespace {
+
+// Of each effect, the log Bayes factor if its estimate is exactly "no effect": the density of the size prior there
+// against the standard error of the size. A fit that comes to less is in a local minimum, as "no effect" is a special
+// case of every effect.
+std::vector<double> least_log_factors(const Search& search) {
+  std::vector<double> out(search.system().effects().size(), 0);
+  for (const auto& size : search.proposals().reach(search.base_marginal()).sizes) {
+    const inference::Parameter& p = search.system().effects()[size.effect].parameters[size.parameter];
+    const double sd = size.one_deviation;
+    if (!std::isfinite(sd)) continue;
+    out[size.effect] +=
+        std::min(0.0, log_density(p.prior, p.none, sd) + std::log(sd) + 0.5 * std::log(2 * std::numbers::pi));
+  }
+  return out;
+}
+
+}  // namespace
+
 std::vector<TriedEffect> tried_beside(const Search& search, const ModelSet& set, bool with_discrepancy) {
   std::vector<TriedEffect> out;
   const auto& effects = search.system().effects();
   const auto& from = search.visited().at(set);
+  const auto least = least_log_factors(search);
   const auto is_known = [](const inference::Visited& one, bool with) {
     return with ? one.at->discrepancy_known : !one.at->given_up;
   };
@@ -193,6 +216,9 @@ std::vector<TriedEffect> tried_beside(const Search& search, const ModelSet& set,
         one.log_bayes_factor = at->second.log_with_curve - from.log_with_curve - odds;
       else if (is_known(from, false) && is_known(at->second, false))
         one.log_bayes_factor = at->second.log_without_curve - from.log_without_curve - odds;
+      // The tolerance of a prediction by the linear model against a fit: the noise is estimated again.
+      if (one.log_bayes_factor && *one.log_bayes_factor < least[e] - search.rules().optimism)
+        one.log_bayes_factor.reset();
       const Fit& fit =
           one.with_discrepancy && at->second.at->fit_with_curve ? *at->second.at->fit_with_curve : at->second.at->fit;
       const auto member = std::find(larger.begin(), larger.end(), e) - larger.begin();

@@ -128,7 +128,7 @@ void add_insertions(Findings& findings) {
 }
 
 void add_ranking(Findings& findings) {
-  double factor = findings.!adopts_a_model(verdict) ? 1.2 : 2112.7;
+  double factor = !adopts_a_model(findings.verdict) ? 1.2 : 2112.7;
   for (const model::Effect* effect : model::all_effects()) {
     TriedEffect tried;
     tried.name = effect->name();

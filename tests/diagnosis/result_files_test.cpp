@@ -103,8 +103,10 @@ TEST_F(Results, TheVerdictSaysWhatWasFound) {
 
 // A verdict of 99 % needs none; one that does not decide may know of none.
 TEST_F(Results, TheNextExperimentIsNoneNeededWhereThereIsNoDoubt) {
-  const auto next = [](const Findings& f) { return nlohmann::json::parse(verdict_json(f))["next_experiment"]; };
-  Findings f = made_up(Verdict::effects_found);
+  const auto next = [](const diagnosis::Findings& f) {
+    return nlohmann::json::parse(verdict_json(f))["next_experiment"];
+  };
+  diagnosis::Findings f = made_up(Verdict::effects_found);
   f.probability = 0.98;
   EXPECT_TRUE(next(f).is_object());
   f.probability = 0.99;
@@ -118,14 +120,14 @@ TEST_F(Results, AnInconclusiveVerdictNamesNothingAndSaysWhy) {
   EXPECT_EQ(j["verdict"], "inconclusive");
   EXPECT_TRUE(j["effects"].empty());
   EXPECT_THAT(j["reasons"][0].get<std::string>(), ::testing::HasSubstr("not fitted"));
-  Findings changed = made_up(Verdict::inconclusive);
+  diagnosis::Findings changed = made_up(Verdict::inconclusive);
   changed.two_groups = true;
   EXPECT_EQ(nlohmann::json::parse(verdict_json(changed))["verdict"], "inconclusive");
 }
 
 // What was not computed is absent: no number stands for it.
 TEST_F(Results, ALogBayesFactorThatWasNotComputedIsNull) {
-  Findings f = made_up(Verdict::effects_found);
+  diagnosis::Findings f = made_up(Verdict::effects_found);
   f.tried.front().log_bayes_factor.reset();
   EXPECT_TRUE(nlohmann::json::parse(verdict_json(f))["tried"][0]["log_bayes_factor"].is_null());
   EXPECT_THAT(report_html(f, {}), ::testing::HasSubstr("not computed"));

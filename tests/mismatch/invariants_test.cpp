@@ -6,6 +6,7 @@
 
 #include <cmath>
 #include <limits>
+#include <ostream>
 
 #include "diagnosis/mismatch/diagnose.hpp"
 #include "tests/needle/simulated_rig.hpp"
@@ -133,6 +134,8 @@ struct Case {
   SimulatedRig rig;
 };
 
+void PrintTo(const Case& one, std::ostream* out) { *out << one.name; }
+
 class Verdicts : public ::testing::TestWithParam<Case> {};
 
 TEST_P(Verdicts, KeepTheInvariants) {
@@ -153,7 +156,7 @@ std::vector<Case> cases() {
 }
 
 INSTANTIATE_TEST_SUITE_P(Simulated, Verdicts, ::testing::ValuesIn(cases()),
-                         [](const auto& info) { return std::string(info.param.name); });
+                         [](const auto& one) { return std::string(one.param.name); });
 
 }  // namespace
 }  // namespace bevel::diagnosis::testing

@@ -198,7 +198,7 @@ constexpr double kFeasible = 20;    // recordings of one motion
 
 void add_next_experiment(report::Page& page, const Findings& f) {
   page.heading("The next experiment");
-  if (!f.next_experiment) {
+  if (!is_experiment_needed(f) || !f.next_experiment) {
     page.paragraph(is_experiment_needed(f)
                        ? "No motion that was simulated separates the explanations that these recordings leave open."
                        : "None needed: the verdict has a probability of " + probability(f.probability) + ".");
