@@ -152,8 +152,9 @@ std::vector<Search::Job> Search::larger_sets(const ModelSet& set, const Beside& 
     const bool nothing_new = again && !is_new(here, one);
     Predicted& predicted = promised_[larger];
     predicted.log_posterior = std::max(predicted.log_posterior, promised);
-    predicted.log_bayes_factor =
-        std::max(predicted.log_bayes_factor, here.log_promised(one.log_bayes_factor) - here.log_reference);
+    double& factor =
+        here.about.scales.curves.empty() ? predicted.log_bayes_factor : predicted.log_bayes_factor_with_curve;
+    factor = std::max(factor, here.log_promised(one.log_bayes_factor) - here.log_reference);
     if (nothing_new) continue;
     const double doubtful = this->doubtful(one.log_bayes_factor);
     if (promised + doubtful < near) continue;

@@ -74,8 +74,10 @@ class Search {
   /// What the linear model predicts of a candidate model that has one effect more than a fitted one.
   struct Predicted {
     double log_posterior = -std::numeric_limits<double>::infinity();
-    /// Natural log Bayes factor of the joining effect against the fitted model, with the same discrepancy terms.
+    /// Natural log Bayes factor of the joining effect against the fitted model, both without a discrepancy.
     double log_bayes_factor = -std::numeric_limits<double>::infinity();
+    /// Natural log Bayes factor of the joining effect, both models with a discrepancy.
+    double log_bayes_factor_with_curve = -std::numeric_limits<double>::infinity();
   };
   /// Predictions of the linear model, for candidate models that were fitted since and for others.
   const std::map<ModelSet, Predicted>& promised() const { return promised_; }

@@ -73,7 +73,7 @@ struct Choice {
   bool unknown;
 };
 
-// The likeliest model that stands for what is named, among those without a refused effect.
+// Chooses the likeliest model with the named effects, among those without a refused effect.
 Choice choose(const Search& search, const Posterior& posterior, const std::set<std::string>& refused) {
   const double something = 1 - posterior.nothing;
   const Choice nothing{&search.visited().at({}), false};

@@ -2,9 +2,11 @@
 
 #include <algorithm>
 #include <cmath>
+#include <functional>
 #include <limits>
 #include <numbers>
 #include <set>
+#include <utility>
 
 #include "diagnosis/inference/instant_posterior.hpp"
 #include "diagnosis/inference/nuisances.hpp"
@@ -179,7 +181,7 @@ std::string fault_of_name(const NeedleSystem& system, const Search& search, cons
 
 namespace {
 
-// Of each effect, the log Bayes factor if its estimate is exactly "no effect": the density of the size prior there
+// Computes, for each effect, the log Bayes factor if its estimate is exactly "no effect": the density of the size prior there
 // against the standard error of the size. A fit that comes to less is in a local minimum, as "no effect" is a special
 // case of every effect.
 std::vector<double> least_log_factors(const Search& search) {
@@ -227,14 +229,19 @@ std::vector<TriedEffect> tried_beside(const Search& search, const ModelSet& set,
           one.parameters.emplace_back(effects[e].parameters[p].name, fit.shared[i]);
       one.likelier = at->second.log_posterior() > from.log_posterior();
     } else if (const auto promised = search.promised().find(larger); promised != search.promised().end()) {
-      if (std::isfinite(promised->second.log_bayes_factor)) one.log_bayes_factor = promised->second.log_bayes_factor;
+      const auto& predicted = promised->second;
+      one.with_discrepancy = with_discrepancy && std::isfinite(predicted.log_bayes_factor_with_curve);
+      const double factor = one.with_discrepancy ? predicted.log_bayes_factor_with_curve : predicted.log_bayes_factor;
+      if (std::isfinite(factor)) one.log_bayes_factor = factor;
     } else {
       continue;
     }
     out.push_back(std::move(one));
   }
-  std::stable_sort(out.begin(), out.end(),  // null after all numbers
-                   [](const auto& a, const auto& b) { return a.log_bayes_factor > b.log_bayes_factor; });
+  // Those that are compared like the model that was chosen come first; null comes after all numbers.
+  std::ranges::stable_sort(out, std::greater{}, [](const TriedEffect& one) {
+    return std::pair(one.with_discrepancy, one.log_bayes_factor);
+  });
   return out;
 }
 

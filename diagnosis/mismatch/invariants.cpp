@@ -64,7 +64,7 @@ void check_predictions(const HeldOut& held_out, std::vector<std::string>& out) {
   const double std_error = std::sqrt(square / (count - 1) / count);
   if (mean < -std_error)
     out.push_back(
-        "with what was found, left-out recordings are predicted worse than by the refitted nominal model: "
+        "the adopted model predicts left-out recordings worse than the refitted nominal model: "
         "log density per measurement " +
         text(mean) + " (standard error " + text(std_error) + ")");
 }

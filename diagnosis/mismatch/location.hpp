@@ -1,5 +1,5 @@
 #pragma once
-// Where the missing physics acts: in which recordings, from when on, and over which range of the covariate that the
+// Locates the missing physics: in which recordings, from when on, and over which range of the covariate that the
 // effect depends on.
 #include "diagnosis/mismatch/decision.hpp"
 

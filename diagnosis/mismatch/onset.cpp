@@ -39,7 +39,7 @@ std::vector<std::vector<Row>> rows_of(const NeedleSystem& system, std::size_t r)
   return out;
 }
 
-// What the physics adds to the rows of one channel if it begins at a time: its effect, less the continuation of the
+// Computes what the physics adds to the rows of one channel if it begins at t0: its effect, less the continuation of the
 // position and direction that it had reached there.
 void begin_at(double t0_s, const std::vector<Row>& rows, bool heading, Eigen::Ref<VectorXd> effect) {
   Index at = -1;

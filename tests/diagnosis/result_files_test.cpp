@@ -101,7 +101,7 @@ TEST_F(Results, TheVerdictSaysWhatWasFound) {
   EXPECT_TRUE(j["detectable"]["layer"]["curvature_ratio"].is_null());  // infinite
 }
 
-// A verdict of 99 % needs none; one that does not decide may know of none.
+// A verdict of 99 % requires no experiment; for an inconclusive one, no motion may separate the explanations.
 TEST_F(Results, TheNextExperimentIsNoneNeededWhereThereIsNoDoubt) {
   const auto next = [](const diagnosis::Findings& f) {
     return nlohmann::json::parse(verdict_json(f))["next_experiment"];
@@ -125,7 +125,7 @@ TEST_F(Results, AnInconclusiveVerdictNamesNothingAndSaysWhy) {
   EXPECT_EQ(nlohmann::json::parse(verdict_json(changed))["verdict"], "inconclusive");
 }
 
-// What was not computed is absent: no number stands for it.
+// A log Bayes factor that was not computed is null.
 TEST_F(Results, ALogBayesFactorThatWasNotComputedIsNull) {
   diagnosis::Findings f = made_up(Verdict::effects_found);
   f.tried.front().log_bayes_factor.reset();

@@ -242,8 +242,11 @@ TEST(PendulumTest, ProbabilitiesAddUpAndHeldOutIsBetterWithWhatWasFound) {
 TEST(PendulumTest, FitsWhatWasLeftForWantOfSteps) {
   const Pendulum system({}, 4, 5);
   const auto searched = [&](long further_steps) {
-    auto search = std::make_unique<Search>(
-        system, SearchRules{.most_steps = 0, .log_prior_odds_effect = 1, .further_steps = further_steps});
+    auto search = std::make_unique<Search>(system, SearchRules{.most_steps = 0,
+                                                               .log_prior_odds_effect = 0.5,
+                                                               .most_not_fitted = 0.01,
+                                                               .further_steps = further_steps,
+                                                               .at_once = 1});
     search->run(Readings(4), white());
     return search;
   };
@@ -256,8 +259,8 @@ TEST(PendulumTest, FitsWhatWasLeftForWantOfSteps) {
   EXPECT_NEAR(sum, 1, 1e-9) << "of the fitted models";
 }
 
-// Measurements that ask for a size beyond the bound at which the effect vanishes: no start can be evaluated, and no
-// number stands for its log Bayes factor.
+// Measurements that ask for a size beyond the bound at which the effect vanishes: no start can be evaluated, and its
+// log Bayes factor is minus infinity.
 TEST(PendulumTest, WhatCannotBeEvaluatedHasNoPrediction) {
   constexpr double kNever = -std::numeric_limits<double>::infinity();
   bool found = false;

@@ -109,7 +109,7 @@ TEST_F(Decide, NamesThatNoVisitedSetHoldsTogetherAreNotClaimed) {
   EXPECT_TRUE(inference::contains(set_of(decision), Pendulum::kDryFriction));
 }
 
-// Half of the mass is in models that were not fitted: the evidence does not decide, whatever the fitted ones say.
+// Half of the mass is in models that were not fitted: the evidence does not decide, whatever the fitted ones are.
 TEST_F(Decide, NothingWhereTooMuchWasNotFitted) {
   Posterior posterior;
   posterior.not_visited = 0.5;
@@ -138,7 +138,7 @@ TEST_F(Decide, NoNameBelowAHalf) {
   EXPECT_NE(decision.reasons[0].find("32 %"), std::string::npos) << decision.reasons[0];
 }
 
-// A name whose size may be none is not given; what is left of the explanation is.
+// An effect whose size may be none is not named; the rest of the explanation is.
 TEST_F(Decide, NoNameWithoutASizeOrEvidence) {
   const ModelSet both{Pendulum::kDryFriction, Pendulum::kSensorScale};
   ASSERT_TRUE(search.visited().contains(both));

@@ -82,7 +82,7 @@ TEST(Violations, TooMuchProbabilityInModelsThatWereNotFittedIsOne) {
 TEST(Violations, AnAdoptedModelThatPredictsWorseIsOne) {
   Findings f = sound();
   f.held_out.recordings = {held_out(-0.2, -0.9), held_out(-0.3, -1), held_out(-0.2, -0.8)};
-  EXPECT_THAT(violations(f), UnorderedElementsAre(HasSubstr("predicted worse")));
+  EXPECT_THAT(violations(f), UnorderedElementsAre(HasSubstr("predicts left-out recordings worse")));
   // Not beyond the standard error between recordings.
   f.held_out.recordings = {held_out(-0.2, -0.9), held_out(-1, -0.2), held_out(-0.2, -0.4)};
   EXPECT_THAT(violations(f), IsEmpty());

@@ -35,8 +35,6 @@ double shown(const std::optional<double>& gain) { return gain ? std::max(*gain, 
 }  // namespace
 
 std::string ranking_picture(const Findings& findings, std::vector<TriedEffect> tried) {
-  std::stable_sort(tried.begin(), tried.end(),
-                   [](const auto& a, const auto& b) { return a.log_bayes_factor > b.log_bayes_factor; });
   if (tried.empty()) return "";
   constexpr double kRow = 22;
   double most = 100;

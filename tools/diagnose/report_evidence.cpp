@@ -97,8 +97,8 @@ void add_evidence(report::Page& page, const Findings& f) {
       sizes += (sizes.empty() ? "" : ", ") + in_words(name) + " " + number(value);
     rows.push_back({t.name, log_factor(t.log_bayes_factor),
                     !t.log_bayes_factor ? "not computed"
-                    : !t.fitted         ? "linear estimate"
-                                        : (t.with_discrepancy ? "fitted, with a discrepancy" : "fitted"),
+                    : !t.fitted ? (t.with_discrepancy ? "linear estimate, with a discrepancy" : "linear estimate")
+                                : (t.with_discrepancy ? "fitted, with a discrepancy" : "fitted"),
                     sizes});
   }
   page.folded("the figures", [&](report::Page& inside) {
