@@ -158,5 +158,21 @@ std::vector<Case> cases() {
 INSTANTIATE_TEST_SUITE_P(Simulated, Verdicts, ::testing::ValuesIn(cases()),
                          [](const auto& one) { return std::string(one.param.name); });
 
+// The error of the path goes on growing to the end of the recording; the physics begins at the layer.
+TEST(Onset, IsWhereTheNeedleReachesALayer) {
+  const SimulatedRig rig{.effects = {active("layer", {30, 2})}, .recordings = 3};
+  const Findings found = diagnose(record_case(rig, 3), rig.needle, {});
+  ASSERT_EQ(found.effects.size(), 1U) << found.sentence;
+  EXPECT_EQ(found.effects[0].name, "layer");
+  ASSERT_FALSE(found.where.empty());
+  for (const Location& where : found.where) {
+    EXPECT_EQ(where.covariate, "depth_mm");
+    EXPECT_NEAR(where.range[0], 30, 2) << where.log;
+    EXPECT_LT(where.range[1], 50) << where.log;
+    EXPECT_GT(where.to_s, where.from_s);
+    EXPECT_LT(where.to_s - where.from_s, 3) << where.log;
+  }
+}
+
 }  // namespace
 }  // namespace bevel::diagnosis::testing
