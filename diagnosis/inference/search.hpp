@@ -71,7 +71,7 @@ class Search {
   const Likelihood& likelihood() const { return *likelihood_; }  // by whose noise the curves were prepared
   // The base alone, by the noise that promises were made with.
   Marginal base_marginal() const;
-  /// What the linear model predicts of a candidate model that has one effect more than a fitted one.
+  /// Prediction of the linear model for a candidate model that has one effect more than a fitted one.
   struct Predicted {
     double log_posterior = -std::numeric_limits<double>::infinity();
     /// Natural log Bayes factor of the joining effect against the fitted model, both without a discrepancy.

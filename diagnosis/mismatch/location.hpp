@@ -6,7 +6,7 @@
 namespace bevel::diagnosis {
 
 /// Locates the missing physics: for each recording, when it begins to act (onset.hpp), the channel in which it lowers
-/// chi2 most, and the range of the covariate during the onset. An effect with a depth or an event time of its own
+/// chi2 most, and the range of the covariate during the onset. An effect that has a depth or an event time
 /// begins no earlier than there. Recordings in which the onset is not determined are left out.
 /// @param before the nominal model, refitted with the noise of `after`
 /// @param at_most number of recordings, those with the largest fall of chi2 first

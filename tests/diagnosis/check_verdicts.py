@@ -14,7 +14,7 @@ import subprocess
 import sys
 import tempfile
 
-LEAST_LOG_BAYES_FACTOR = -7  # per size: what the size prior costs at most
+LEAST_LOG_BAYES_FACTOR = -8  # per size: what its prior costs if the standard error is a thousandth of its scale
 STRAIGHT = """[needle]
 curvature_per_mm = 0.001
 wheelbase_mm = 20

@@ -73,7 +73,7 @@ TEST(Page, nothing_missing_points_to_what_would_have_been_seen) {
   expect_sound(html);
   EXPECT_THAT(html, HasSubstr("no size in reach"));
   EXPECT_THAT(html, HasSubstr("Nothing above the sizes listed"));
-  EXPECT_THAT(html, Not(HasSubstr("Where the missing physics begins to act</h2>")));
+  EXPECT_THAT(html, Not(HasSubstr("Onset of the missing physics</h2>")));
 }
 
 TEST(Page, unknown_effect_shows_curves_and_no_name) {

@@ -107,9 +107,9 @@ TEST(Violations, AnInconclusiveVerdictNamesNothingAndStatesWhy) {
   EXPECT_THAT(violations(f), IsEmpty());
 }
 
-// Whole diagnoses. The size prior of an effect with one size costs at most about 7 in log evidence: the prior's width
-// over the standard error, which is not below a thousandth of it in so few recordings; with two sizes twice as much.
-constexpr double kLeastOfOneSize = -7;
+// Whole diagnoses. The prior of a size costs at most log(0.47 sd / scale) in log evidence (half Student's t of 4 degrees
+// of freedom), which is -7.7 for a standard error of a thousandth of the prior's scale; with two sizes twice as much.
+constexpr double kLeastOfOneSize = -8;
 
 void expect_sound(const Findings& found) {
   EXPECT_THAT(violations(found), IsEmpty()) << found.sentence;

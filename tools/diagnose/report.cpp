@@ -274,7 +274,7 @@ void add_variation(report::Page& page, const Findings& f) {
 
 void add_location(report::Page& page, const Findings& f) {
   if (f.where.empty()) return;
-  page.heading("Where the missing physics begins to act");
+  page.heading("Onset of the missing physics");
   page.paragraph(
       "The time at which the missing physics begins to act, as a 95 % interval: from the innovations of the nominal "
       "model, which predicts the later measurements from the tip's position and direction at each time. Look there "
