@@ -227,6 +227,7 @@ OpenedTruth parse_truth(std::string_view text) {
 }
 
 TrialScore score_verdict(const OpenedTruth& truth, const Verdict& verdict) {
+  if (verdict.kind == "inconclusive") return score_abstention(truth, "inconclusive");
   TrialScore score = begin(truth);
   score.named = verdict.named();
   const bool imitated = score.named.size() == 1 && holds(truth.rivals, score.named[0]);

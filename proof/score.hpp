@@ -74,7 +74,7 @@ struct TrialScore {
   std::vector<std::string> named;
   std::vector<std::string> rivals;
   bool abstained = false;
-  std::string abstention;  // why there is no verdict
+  std::string abstention;  // why there is no verdict; "inconclusive": the verdict decides nothing
   bool strict = false;   // named is what was expected, and beside it nothing but what is concealed too faintly for that
   bool lenient = false;  // so it is, with names out of ambiguous_with, or of a rival
   double probability_of_truth = 0;  // of all that is right to say

@@ -146,13 +146,16 @@ Verdict parse_verdict(std::string_view text_of_file) {
   const std::map<std::string, std::string> of_groups{
       {"unchanged", "nothing-missing"}, {"changed", "effects-found"}, {"changed-unknown", "unknown-effect"}};
   if (const auto same = of_groups.find(verdict.kind); same != of_groups.end()) verdict.kind = same->second;
-  if (verdict.kind != "nothing-missing" && verdict.kind != "effects-found" && verdict.kind != "unknown-effect")
+  if (verdict.kind != "nothing-missing" && verdict.kind != "effects-found" && verdict.kind != "unknown-effect" &&
+      verdict.kind != "inconclusive")
     fail("the verdict is \"" + verdict.kind +
-         "\", allowed are nothing-missing, effects-found, unknown-effect; of two groups unchanged, changed, "
-         "changed-unknown");
+         "\", allowed are nothing-missing, effects-found, unknown-effect, inconclusive; for two groups unchanged, "
+         "changed, "
+         "changed-unknown, inconclusive");
   for (const char* key : {"effects", "changes"})
     for (const json& effect : list(j, key)) verdict.effects.push_back(read_effect(effect));
   if (verdict.kind == "nothing-missing" && !verdict.effects.empty()) fail("nothing-missing, yet effects are named");
+  if (verdict.kind == "inconclusive" && !verdict.effects.empty()) fail("inconclusive, yet effects are named");
   if (verdict.kind == "effects-found" && verdict.effects.empty()) fail("effects-found, yet none is named");
   for (const json& location : list(j, "where")) verdict.where.push_back(read_location(location));
   if (j.contains("needle")) verdict.needle = read_needle(j.at("needle"));

@@ -337,6 +337,7 @@ void add_discrepancy(const Likelihood& likelihood, const Discrepancy& discrepanc
   const double give_up_below = start.promised_with_several ? kNever : start.hopeless_below;
   out.with_discrepancy = true;
   out.curves = scan_beside(likelihood, discrepancy, out.fit);
+  out.discrepancy_known = out.curves.empty();
   if (out.curves.empty()) return;
   out.log_bayes_factor_curve = log_factor_of_unlikely(out.curves);
   // Where none stands out, a fit that comes to less was given up, or is in another local minimum.
@@ -377,7 +378,9 @@ void add_discrepancy(const Likelihood& likelihood, const Discrepancy& discrepanc
         std::ranges::count(refined, one.prior.curve, &CurvePrior::curve) == 0)
       try_one(one);
   }
+  const bool is_at_mode = best.log_evidence() > least && !(best.log_evidence() < give_up_below);
   if (best.log_evidence() > least) begin_with(likelihood, discrepancy, rules, std::move(best), start, out);
+  out.discrepancy_known = is_at_mode || !stands_out;
 }
 
 void add_large_curves(const Likelihood& likelihood, const Discrepancy& discrepancy, const CurveRules& rules,

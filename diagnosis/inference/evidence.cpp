@@ -106,6 +106,7 @@ Evaluated evaluate(const Likelihood& likelihood, const Layout& layout, const Vec
   out.log_evidence = plain.over.log_mean;
   out.nuisance_weights = plain.over.weights;
   out.valid = out.fit.valid && std::isfinite(out.log_evidence);
+  out.given_up = out.log_evidence < give_up_below;
   return out;
 }
 

@@ -22,6 +22,10 @@ struct Evaluated {
   Eigen::VectorXd nuisance_weights;   // posterior over the grid of standard deviations
   Eigen::VectorXd nuisance_weights_with_curve;
   bool with_discrepancy = false;  // whether that was asked
+  // The search stopped before the mode was reached, because the evidence stayed too low: log_evidence is a lower bound.
+  bool given_up = false;
+  // The evidence with a discrepancy was computed: at its mode, or by the linear model where no curve stands out.
+  bool discrepancy_known = false;
   bool valid = false;
 };
 

@@ -80,15 +80,18 @@ std::vector<Search::Beside> Search::look_beside(const Fit& fit, double log_here,
   const Marginal marginal(*by, *from, *curve, likelihood_.get());
   // What is promised is relative to this set by the reference's noise.
   const auto log_promised = [log_here, moved](double log_change) { return log_here + moved->log_gain(log_change); };
-  std::vector<Beside> out{
-      {.about = *from, .proposals = proposals_->beside(marginal, rules_.starts), .log_promised = log_promised}};
+  std::vector<Beside> out{{.about = *from,
+                           .proposals = proposals_->beside(marginal, rules_.starts),
+                           .log_promised = log_promised,
+                           .log_reference = log_here}};
   if (with_others_moved)
     proposals_->look_with_others_moved(*likelihood_, *from, marginal, rules_.starts, out.front().proposals);
-  const auto beside_less = [this, by, curve, log_promised](const WithLessSpread& less) {
+  const auto beside_less = [this, by, curve, log_promised, log_here](const WithLessSpread& less) {
     return Beside{
         .about = less.fit,
         .proposals = proposals_->beside(Marginal(*by, less.fit, *curve, likelihood_.get()), rules_.starts),
-        .log_promised = [=, change = less.log_change](double log_factor) { return log_promised(change + log_factor); }};
+        .log_promised = [=, change = less.log_change](double log_factor) { return log_promised(change + log_factor); },
+        .log_reference = log_here};
   };
   for (const WithLessSpread& less : with_less_spread(*by, *from, *curve)) {
     out.push_back(beside_less(less));
@@ -109,14 +112,15 @@ std::vector<Search::Beside> Search::look_in_curves_places(const Fit& with_curve,
                           (count == 1 ? curve_rules_.log_prior_odds : curve_rules_.log_prior_odds_more);
     out.push_back({.about = std::move(about),
                    .proposals = proposals_->beside(marginal, rules_.starts),
-                   .log_promised = [=](double log_factor) { return log_here - leaves + log_factor; }});
+                   .log_promised = [=](double log_factor) { return log_here - leaves + log_factor; },
+                   .log_reference = log_here - leaves});
   }
   return out;
 }
 
 double Search::most_promised(const ModelSet& set) const {
   const auto known = promised_.find(set);
-  return known == promised_.end() ? -std::numeric_limits<double>::infinity() : known->second;
+  return known == promised_.end() ? -std::numeric_limits<double>::infinity() : known->second.log_posterior;
 }
 
 double Search::log_promised(const Beside& beside, const Proposal& one) const {
@@ -146,7 +150,11 @@ std::vector<Search::Job> Search::larger_sets(const ModelSet& set, const Beside& 
     const ModelSet larger = with(set, one.effect);
     const double promised = log_promised(here, one);
     const bool nothing_new = again && !is_new(here, one);
-    promised_[larger] = std::max(most_promised(larger), promised);
+    Predicted& predicted = promised_[larger];
+    predicted.log_posterior = std::max(predicted.log_posterior, promised);
+    double& factor =
+        here.about.scales.curves.empty() ? predicted.log_bayes_factor : predicted.log_bayes_factor_with_curve;
+    factor = std::max(factor, here.log_promised(one.log_bayes_factor) - here.log_reference);
     if (nothing_new) continue;
     const double doubtful = this->doubtful(one.log_bayes_factor);
     if (promised + doubtful < near) continue;
@@ -275,7 +283,8 @@ void Search::append_swaps(const Swapped& from, double log_here, std::vector<Job>
     const ModelSet swapped = with(from.about.layout.set(), one.effect);
     const auto visited = visited_.find(swapped);
     if (visited != visited_.end() && visited->second.log_posterior() > near) continue;
-    if (one.starts.empty() || swapped_.contains({swapped, beside_curve})) continue;
+    if (one.starts.empty() || !std::isfinite(one.log_bayes_factor) || swapped_.contains({swapped, beside_curve}))
+      continue;
     double difference = one.log_bayes_factor - from.leaves.log_bayes_factor;
     double doubt = doubtful(from.leaves.log_bayes_factor);
     // Where the rest has many local minima the linear model about none of the two says nothing of either.

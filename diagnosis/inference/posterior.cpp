@@ -83,9 +83,8 @@ Posterior posterior_of(const Search& search, double visible_sigmas) {
   Posterior out;
   std::vector<double> logs;
   for (const auto& [set, one] : search.visited()) logs.push_back(one.log_posterior());
-  logs.push_back(search.log_not_visited());
   const double all = log_sum(logs);
-  out.not_visited = std::exp(logs.back() - all);
+  out.not_visited = search.share_not_visited();
   const auto& effects = search.system().effects();
   for (const auto& [set, one] : search.visited()) {
     SetShare share{set, std::exp(one.log_posterior() - all), std::exp(one.log_with_curve - all), 0};

@@ -16,9 +16,11 @@ struct SetShare {
   double unknown = 0;           // part of that: with one as visible as was asked for
 };
 
+/// Probabilities given that one of the fitted candidate models is true.
 struct Posterior {
-  std::vector<SetShare> sets;               // the likeliest first
-  double not_visited = 0;                   // the share of sets that were not fitted, by the linear model's estimate
+  std::vector<SetShare> sets;  // the likeliest first
+  /// Estimated share that the candidate models which were not fitted would have (Search::share_not_visited()).
+  double not_visited = 0;
   std::map<std::string, double> inclusion;  // of each effect by name: the sum over the sets that hold it
   double discrepancy = 0;                   // probability of one as visible as was asked for
   double nothing = 0;                       // of neither an effect nor such a discrepancy

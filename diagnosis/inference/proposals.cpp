@@ -3,6 +3,7 @@
 #include <Eigen/Cholesky>
 #include <algorithm>
 #include <cmath>
+#include <limits>
 
 #include "diagnosis/inference/local_minima.hpp"
 #include "diagnosis/inference/log_sum.hpp"
@@ -19,7 +20,8 @@ namespace {
 
 constexpr double kFarthest = 4.0;  // sizes promised reach to so many times their start
 constexpr double kSmall = 0.1;     // of a start
-constexpr double kNever = -1e3;
+// Log Bayes factor of a start at which the effect cannot be evaluated: zero probability.
+constexpr double kNever = -std::numeric_limits<double>::infinity();
 
 // Every combination of starts of the shared parameters; with one shape only, a small size too: what an effect does to
 // the readings is not in proportion to its size beside another that comes in jumps.

@@ -18,7 +18,7 @@ struct StartPoint {
 
 struct Proposal {
   std::size_t effect = 0;
-  double log_bayes_factor = 0;     // averaged over the starts
+  double log_bayes_factor = 0;     // averaged over the starts; minus infinity: no start can be evaluated
   std::vector<StartPoint> starts;  // the likeliest first
 };
 

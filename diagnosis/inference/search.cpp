@@ -70,10 +70,25 @@ const Visited& Search::best() const {
 }
 
 double Search::log_not_visited() const {
+  const double least = best_log() - rules_.window;
   std::vector<double> logs;
-  for (const auto& [set, log] : promised_)
-    if (!is_visited(set)) logs.push_back(log);
-  return log_sum(logs);
+  double attained = 1, fitted = 1;
+  for (const auto& [set, predicted] : promised_) {
+    const auto at = visited_.find(set);
+    if (at == visited_.end()) {
+      logs.push_back(predicted.log_posterior);
+    } else if (predicted.log_posterior > least) {
+      attained += std::min(1.0, std::exp(at->second.log_posterior() - predicted.log_posterior));
+      fitted += 1;
+    }
+  }
+  return log_sum(logs) + std::log(attained / fitted);
+}
+
+double Search::share_not_visited() const {
+  std::vector<double> logs{log_not_visited()};
+  for (const auto& [set, one] : visited_) logs.push_back(one.log_posterior());
+  return std::exp(logs.front() - log_sum(logs));
 }
 
 Visited Search::weighed(const ModelSet& set, double log_prior, const std::shared_ptr<const Evaluated>& at) const {
@@ -154,8 +169,13 @@ void Search::evaluate_all(std::vector<Job> jobs) {
     const auto is_near = [&](const Job& job) {
       return is_out_of_steps() ? job.promised - job.doubtful >= best : job.promised >= best - rules_.window;
     };
-    std::erase_if(
-        jobs, [&](const Job& job) { return std::isfinite(job.promised) && (over || !(job.foremost || is_near(job))); });
+    std::erase_if(jobs, [&](const Job& job) {
+      if (!std::isfinite(job.promised) || (!over && (job.foremost || is_near(job)))) return false;
+      const auto known = left_.find(job.set);
+      if (!over && (known == left_.end() || known->second.promised < job.promised))
+        left_.insert_or_assign(job.set, job);
+      return true;
+    });
     const std::size_t count = std::min(jobs.size(), rules_.at_once);
     evaluate_with_curve(std::span(jobs).first(count), asked);
     jobs.erase(jobs.begin(), jobs.begin() + static_cast<std::ptrdiff_t>(count));
@@ -222,6 +242,7 @@ void Search::run(const Readings& outliers, const Noise& noise, const Progress& p
   }
   last_round_ = true;
   look_at_what_is_left();
+  fit_what_was_left();
 }
 
 std::shared_ptr<const Likelihood> Search::with_heavy_tails(const Fit& fit) const {
@@ -277,6 +298,7 @@ void Search::look_in_rounds(std::shared_ptr<const Likelihood> reference, Start& 
     keep({}, std::make_shared<const Evaluated>(base));
     expanded_.clear();
     promised_.clear();
+    left_.clear();
     refitted_.clear();
     swapped_.clear();
     look_around();
@@ -357,6 +379,23 @@ void Search::look_at_what_is_left() {
     expand(set);
     // All that comes near is looked at once more by such a noise: now that the likeliest has been looked around.
     if (!tails_known_ && expanded_.contains(best().set) && look_for_heavy_tails()) break;
+  }
+}
+
+void Search::fit_what_was_left() {
+  const long until = likelihood_->steps() + rules_.further_steps;
+  Modes asked;
+  while (share_not_visited() > rules_.most_not_fitted && likelihood_->steps() < until) {
+    std::vector<Job> jobs;
+    for (const auto& [set, job] : left_)
+      if (!is_visited(set)) jobs.push_back(job);
+    std::ranges::stable_sort(jobs, std::greater{}, [](const Job& job) { return job.promised - job.doubtful; });
+    if (jobs.empty()) break;
+    if (progress_) progress_(describe(system_, jobs.front().set) + ", which was left for want of steps");
+    for (const Job& job : jobs) left_.erase(job.set);
+    const std::size_t count = std::min(jobs.size(), rules_.at_once);
+    evaluate_with_curve(std::span(jobs).first(count), asked);
+    for (Job& job : std::span(jobs).subspan(count)) left_.emplace(job.set, std::move(job));
   }
 }
 

@@ -27,7 +27,11 @@ struct SearchRules {
   long most_steps = 2000;               // of all fits (Likelihood::steps); then only what may be the likeliest
   double log_prior_odds_effect = -5.0;  // of one effect being in the model, against not; its kinds share it
   std::size_t most_curves = 2;          // of a discrepancy
-  std::size_t at_once = 4;              // fits of which the next are chosen by what these come to
+  // Models that were predicted to be likely and not fitted for want of steps: fitted after the search, the likeliest
+  // first, until they hold no more than this share of the posterior or these further steps are spent.
+  double most_not_fitted = 0.1;
+  long further_steps = 1000;
+  std::size_t at_once = 4;  // fits of which the next are chosen by what these come to
   std::size_t rounds = 6;
   int threads = 2;
 };
@@ -67,10 +71,23 @@ class Search {
   const Likelihood& likelihood() const { return *likelihood_; }  // by whose noise the curves were prepared
   // The base alone, by the noise that promises were made with.
   Marginal base_marginal() const;
-  // Log posteriors of sets that the linear model promised, fitted since or not.
-  const std::map<ModelSet, double>& promised() const { return promised_; }
-  // Log of the share of sets that were judged by the linear model alone, by its estimate.
+  /// Prediction of the linear model for a candidate model that has one effect more than a fitted one.
+  struct Predicted {
+    double log_posterior = -std::numeric_limits<double>::infinity();
+    /// Natural log Bayes factor of the joining effect against the fitted model, both without a discrepancy.
+    double log_bayes_factor = -std::numeric_limits<double>::infinity();
+    /// Natural log Bayes factor of the joining effect, both models with a discrepancy.
+    double log_bayes_factor_with_curve = -std::numeric_limits<double>::infinity();
+  };
+  /// Predictions of the linear model, for candidate models that were fitted since and for others.
+  const std::map<ModelSet, Predicted>& promised() const { return promised_; }
+  /// Estimates the log of the posterior mass (prior times evidence) of the candidate models that were not fitted.
+  /// Each counts with its predicted mass times the share of such a prediction that fits attain: the mean of
+  /// min(1, fitted / predicted) over the fitted models that were predicted within the window of the likeliest, and of
+  /// one more that attains it in full, so that few fits correct little.
   double log_not_visited() const;
+  /// Share of the posterior mass that log_not_visited() is of all, in [0, 1].
+  double share_not_visited() const;
   double log_prior(const ModelSet& set) const;
   double log_prior_odds(std::size_t effect) const;  // of this kind of the effect, against not
   // Of a discrepancy: what nobody has named is as likely to be missing as what somebody has, all names together; one
@@ -101,6 +118,7 @@ class Search {
     std::vector<Proposal> proposals;
     // Of a log Bayes factor: the larger set's log posterior, but for the prior odds of what joins.
     std::function<double(double)> log_promised;
+    double log_reference = 0;  // log posterior of the model that the effects join
     // Beside less spread: what promises no more than it did elsewhere is not begun from here, nor anything before that
     // has been looked at about its mode.
     std::function<Beside()> at_its_mode{};
@@ -168,6 +186,7 @@ class Search {
   bool is_out_of_steps() const { return likelihood_->steps() >= rules_.most_steps; }
   void look_around();
   void look_at_what_is_left();  // in the window, the likeliest first
+  void fit_what_was_left();     // SearchRules::most_not_fitted
 
   const System& system_;
   SearchRules rules_;
@@ -179,7 +198,8 @@ class Search {
   std::set<ModelSet> expanded_, refitted_;       // once a round each
   std::set<std::pair<ModelSet, bool>> swapped_;  // beside a curve and without one, the same
   Progress progress_;
-  std::map<ModelSet, double> promised_;               // log posterior of sets that were not fitted
+  std::map<ModelSet, Predicted> promised_;
+  std::map<ModelSet, Job> left_;                      // not fitted for want of steps, where the most was predicted
   std::shared_ptr<const Likelihood> heavy_;           // by noise with heavy tails; null: normal, as far as is known
   std::shared_ptr<const Evaluated> asked_for_tails_;  // the likeliest set, when that was asked
   bool tails_known_ = false;                          // not asked any more

@@ -10,6 +10,7 @@
 #include "diagnosis/mismatch/checks.hpp"
 #include "diagnosis/mismatch/found_effects.hpp"
 #include "diagnosis/mismatch/held_out.hpp"
+#include "diagnosis/mismatch/invariants.hpp"
 #include "diagnosis/mismatch/location.hpp"
 #include "diagnosis/mismatch/reach.hpp"
 #include "diagnosis/mismatch/sentence.hpp"
@@ -140,25 +141,28 @@ void list_explanations(const inference::Search& search, const inference::Posteri
   findings.not_visited = posterior.not_visited;
 }
 
-// The decision against what comes nearest to it.
+// The motion that separates the chosen model from the likeliest other explanation; of an inconclusive verdict, the two
+// likeliest explanations. Null where none is needed, or there is no other.
 std::optional<NextExperiment> next_experiment(const inference::Search& search, const inference::Posterior& posterior,
                                               const Decision& decision, const ChosenModel& base,
                                               const Experiments& experiments) {
-  const auto& chosen = decision.model.fit->layout.set();
+  if (decision.verdict != Verdict::inconclusive && decision.probability >= kNoDoubt) return std::nullopt;
+  const auto model = [&](const inference::Fit& fit) { return imagined(fit, model_of(search, fit)); };
+  const auto chosen =
+      decision.verdict == Verdict::inconclusive ? posterior.sets.front().set : decision.model.fit->layout.set();
+  const inference::Fit& chosen_fit =
+      decision.verdict == Verdict::inconclusive ? search.visited().at(chosen).likelier_fit() : *decision.model.fit;
   if (decision.verdict == Verdict::unknown_effect) {
     // Against the likeliest explanation without a discrepancy, or the needle alone.
     for (const auto& share : posterior.sets)
-      if (!share.set.empty() && share.set != chosen) {
-        const auto& fit = search.visited().at(share.set).at->fit;
-        return experiments.best(imagined(*decision.model.fit, decision.model), imagined(fit, model_of(search, fit)));
-      }
-    return experiments.best(imagined(*decision.model.fit, decision.model), imagined(*base.fit, base));
+      if (!share.set.empty() && share.set != chosen)
+        return experiments.best(model(chosen_fit), model(search.visited().at(share.set).at->fit));
+    return experiments.best(model(chosen_fit), imagined(*base.fit, base));
   }
   for (const auto& share : posterior.sets) {
     if (share.set == chosen) continue;
-    const auto& fit = search.visited().at(share.set).at->fit;
-    const Imagined rival = imagined(fit, model_of(search, fit));
-    const Imagined found = imagined(*decision.model.fit, decision.model);
+    const Imagined rival = model(search.visited().at(share.set).at->fit);
+    const Imagined found = model(chosen_fit);
     // Where nothing was found, the rival would have to be true to be seen.
     return chosen.empty() ? experiments.best(rival, found) : experiments.best(found, rival);
   }
@@ -173,6 +177,8 @@ std::string_view name_of(Verdict verdict, bool two_groups) {
       return two_groups ? "unchanged" : "nothing-missing";
     case Verdict::effects_found:
       return two_groups ? "changed" : "effects-found";
+    case Verdict::inconclusive:
+      return "inconclusive";
     case Verdict::unknown_effect:
       break;
   }
@@ -207,40 +213,53 @@ Findings diagnose(const RecordedCase& recorded, const model::NeedleParameters& m
     if (options.progress) options.progress("comparing sets of effects: beside " + set);
   });
   const inference::Posterior posterior = posterior_of(search, consequence_sigmas(rules));
-  const Decision decision = decide(search, posterior);
-  findings.verdict = decision.verdict;
   list_explanations(search, posterior, findings);
 
-  stages.begin("intervals and rivals");
+  stages.begin("intervals and confounders");
   const inference::Unknowns unknowns(search);
-  findings.noise = decision.model.fit->likelihood->noise();
-  findings.noise.outlier_share = calibration.noise.outlier_share;
-  const inference::Fit base_fit = refitted_base(search, *decision.model.fit);
-  const ChosenModel base = model_of(search, base_fit);
-  findings.effects = found_effects(system, search, posterior, unknowns, decision.model);
-  findings.discrepancies = discrepancies_of(system, search, decision.model);
-  if (!findings.discrepancies.empty())
-    findings.discrepancy_sigmas = visible_sigmas_of_curve(search, *decision.model.fit);
-  findings.proposals = propose_forms(system, search, decision.model);
+  Decision decision = decide(search, posterior, [&](const ChosenModel& chosen, std::size_t member) {
+    return fault_of_name(system, search, unknowns, chosen, member);
+  });
+  std::optional<inference::Fit> base_fit;
+  const auto describe_decision = [&] {
+    findings.verdict = decision.verdict;
+    findings.probability = decision.probability;
+    findings.reasons = decision.reasons;
+    findings.noise = decision.model.fit->likelihood->noise();
+    findings.noise.outlier_share = calibration.noise.outlier_share;
+    base_fit = refitted_base(search, *decision.model.fit);
+    findings.effects = found_effects(system, search, posterior, unknowns, decision.model);
+    findings.discrepancies = discrepancies_of(system, search, decision.model);
+    findings.discrepancy_sigmas =
+        findings.discrepancies.empty() ? 0 : visible_sigmas_of_curve(search, *decision.model.fit);
+    findings.proposals = propose_forms(system, search, decision.model);
+    findings.insertions = insertions_of(system, search, decision.model);
+    findings.needle = needle_estimate(system, search, decision.model);
+  };
+  describe_decision();
   findings.variation = variation_of(search, unknowns);
-  findings.insertions = insertions_of(system, search, decision.model);
-  findings.needle = needle_estimate(system, search, decision.model);
   const inference::Fit& alone = search.visited().at({}).at->fit;
   findings.base = needle_estimate(system, search, model_of(search, alone));
-  findings.tried = tried_beside(search, {});
-  if (!decision.model.fit->layout.set().empty())
-    findings.beside = tried_beside(search, decision.model.fit->layout.set());
-  findings.checks = check_model(search, decision.model, calibration.outliers, calibration.noise);
 
   stages.begin("predicting each recording from the others");
   findings.held_out = hold_out(system, search, *decision.model.fit);
+  if (auto broken = violations(findings); !broken.empty()) {
+    decision = inconclusive(search, std::move(broken));
+    describe_decision();
+  }
+  const ChosenModel base = model_of(search, *base_fit);
+  const bool with_discrepancy = !decision.model.fit->scales.curves.empty();
+  findings.tried = tried_beside(search, {}, with_discrepancy);
+  if (!decision.model.fit->layout.set().empty())
+    findings.beside = tried_beside(search, decision.model.fit->layout.set(), with_discrepancy);
+  findings.checks = check_model(search, decision.model, calibration.outliers, calibration.noise);
 
   stages.begin("what these recordings could have shown");
   const Experiments experiments(system, findings.noise);
   find_reach(system, search, base, experiments, findings);
   findings.next_experiment = next_experiment(search, posterior, decision, base, experiments);
 
-  if (findings.verdict != Verdict::nothing_missing) findings.where = locate(system, base, decision.model, 3);
+  if (adopts_a_model(findings.verdict)) findings.where = locate(system, base, decision.model, 3);
   findings.traces = make_traces(system, calibration.outliers, base, decision.model, model);
   remark_on_short_recordings(recorded, findings);
   remark_on_clock(system, findings);

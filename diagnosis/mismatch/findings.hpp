@@ -2,6 +2,7 @@
 // What the mismatch tool found, as plain data: verdict.json, report.html and model.toml are made from this alone.
 #include <array>
 #include <cstdint>
+#include <limits>
 #include <optional>
 #include <string>
 #include <vector>
@@ -14,10 +15,14 @@
 
 namespace bevel::diagnosis {
 
-enum class Verdict { nothing_missing, effects_found, unknown_effect };
-// "nothing-missing", "effects-found", "unknown-effect"; of two groups of recordings "unchanged", "changed",
-// "changed-unknown".
+enum class Verdict { nothing_missing, effects_found, unknown_effect, inconclusive };
+/// Returns "nothing-missing", "effects-found" or "unknown-effect"; for two groups of recordings "unchanged", "changed"
+/// or "changed-unknown"; for both "inconclusive".
 std::string_view name_of(Verdict verdict, bool two_groups = false);
+/// Returns whether a model other than the nominal one is adopted.
+inline bool adopts_a_model(Verdict verdict) {
+  return verdict == Verdict::effects_found || verdict == Verdict::unknown_effect;
+}
 
 struct FoundParameter {
   std::string name;
@@ -25,6 +30,7 @@ struct FoundParameter {
   double std_error = 0;  // about it: over all explanations that hold the effect, with and without a discrepancy
   std::array<double, 2> ci95{};
   bool at_bound = false;
+  double none = std::numeric_limits<double>::quiet_NaN();  // value at which the effect vanishes; NaN: at no value
 };
 
 // Instants and phases: one entry per recording that has the effect.
@@ -37,24 +43,26 @@ struct FoundEffect {
   std::string name;
   std::string meaning;                        // one clause
   double probability = 0;                     // of being in the model
+  double joint_probability = 0;               // of it or one of `ambiguous_with` being in the model
   std::vector<std::string> ambiguous_with{};  // at odds of less than 20 to 1 in its place
   std::vector<FoundParameter> parameters{};
   std::vector<FoundInRecording> recordings{};
-  double log_bayes_factor = 0;  // natural: beside the others, against its absence
-  double visible_sigmas = 0;    // root of the fall of chi2 that it brings beside the others
+  // Natural: of the model with it against the model without it, both with a discrepancy or both without one.
+  double log_bayes_factor = 0;
+  double visible_sigmas = 0;  // root of the fall of chi2 that it brings beside the others
   // By how much it moves the tip where the cameras see it: the model without it against the model that was found, at
   // the deepest reading of each recording, root mean square over recordings. NaN: without it the tip cannot follow.
   double moved_at_depth_mm = 0;
 };
 
-// Where the model in use (its needle refitted) goes wrong most.
+/// When the missing physics begins to act in a recording.
 struct Location {
   std::string log;
-  std::string channel;
-  double from_s = 0, to_s = 0;
+  std::string channel;          // in which it lowers chi2 most
+  double from_s = 0, to_s = 0;  // 95 % interval of the onset
   std::string covariate;
-  std::array<double, 2> range{};
-  double share = 0;  // of the whole mismatch, in chi2
+  std::array<double, 2> range{};  // of the covariate, during the onset
+  double share = 0;               // of the whole mismatch, in chi2
 };
 
 // Of scalar readings; errors in mm of positions alone, headings count in chi2 and density. chi2 counts what was not
@@ -110,10 +118,12 @@ struct Explanation {
 // One line of the ranking: an effect tried alone, or beside what was found.
 struct TriedEffect {
   std::string name;
-  std::string beside;           // "" = alone
-  double log_bayes_factor = 0;  // natural, against its absence
-  bool fitted = false;          // else estimated from the linear model
-  bool likelier = false;        // its prior odds included
+  std::string beside;  // "" = alone
+  // Natural, against its absence, both with a discrepancy or both without one; null: not computed.
+  std::optional<double> log_bayes_factor{};
+  bool with_discrepancy = false;  // both
+  bool fitted = false;            // else estimated from the linear model
+  bool likelier = false;          // its prior odds included
   std::vector<std::pair<std::string, double>> parameters{};
 };
 
@@ -250,6 +260,9 @@ struct Findings {
   bool two_groups = false;  // what is said is of what the second has and the first has not
   double stop_s = 0;     // logs without a clock: by how much "times" of neighbouring stops are apart; 0: they have one
   std::string sentence;  // what was found, in one
+  double probability = 0;  // of the verdict, given that one of the fitted models is true; inconclusive: 0
+  // Why likely effects are not named, one sentence each; inconclusive: why nothing is concluded.
+  std::vector<std::string> reasons{};
   std::vector<FoundEffect> effects;
   std::vector<Explanation> explanations;  // the likeliest first
   double nothing_probability = 0;         // of no effect, and no discrepancy of any consequence
@@ -268,11 +281,11 @@ struct Findings {
   std::vector<TriedEffect> tried;   // alone, best first
   std::vector<TriedEffect> beside;  // beside what was found, best first
   std::vector<DetectableSize> detectable;
-  std::vector<Discrepancy> discrepancies;  // unknown-effect only
-  std::vector<ProposedForm> proposals;     // of each discrepancy in turn, the likeliest first
-  std::optional<NextExperiment> next_experiment;
-  std::optional<SteeredToTargets> steered;  // by whoever has a controller: diagnose() leaves it empty
-  std::string not_steered;                  // why, in a clause, where something found might matter to steering
+  std::vector<Discrepancy> discrepancies;         // unknown-effect only
+  std::vector<ProposedForm> proposals;            // of each discrepancy in turn, the likeliest first
+  std::optional<NextExperiment> next_experiment;  // null: none is needed, or none of the known motions decides
+  std::optional<SteeredToTargets> steered;        // by whoever has a controller: diagnose() leaves it empty
+  std::string not_steered;                        // why, in a clause, where something found might matter to steering
   std::vector<std::string> confusion_names;
   Eigen::MatrixXd confusion;  // |cosine| between visible parts
   Checks checks;
@@ -281,5 +294,11 @@ struct Findings {
   std::size_t readings = 0, outliers = 0;  // messages
   std::vector<StageTime> times;
 };
+
+/// From this probability of a verdict on, no experiment is needed to separate it from other explanations.
+inline constexpr double kNoDoubt = 0.99;
+inline bool is_experiment_needed(const Findings& findings) {
+  return findings.verdict == Verdict::inconclusive || findings.probability < kNoDoubt;
+}
 
 }  // namespace bevel::diagnosis

@@ -2,8 +2,11 @@
 
 #include <algorithm>
 #include <cmath>
+#include <functional>
+#include <limits>
 #include <numbers>
 #include <set>
+#include <utility>
 
 #include "diagnosis/inference/instant_posterior.hpp"
 #include "diagnosis/inference/nuisances.hpp"
@@ -20,7 +23,6 @@ using inference::Search;
 
 namespace {
 
-constexpr double kRivalOdds = 20;
 constexpr double k95 = 1.96;
 
 FoundParameter shared_parameter(const NeedleSystem& system, const inference::Unknowns& unknowns,
@@ -28,7 +30,7 @@ FoundParameter shared_parameter(const NeedleSystem& system, const inference::Unk
   const auto& layout = model.fit->layout;
   const int at = layout.find_shared(member, p);
   const inference::Parameter& parameter = *layout.shared()[static_cast<std::size_t>(at)].parameter;
-  FoundParameter out{.name = parameter.name, .value = model.fit->shared[at]};
+  FoundParameter out{.name = parameter.name, .value = model.fit->shared[at], .none = parameter.none};
   const auto mixture = unknowns.of(static_cast<int>(layout.set()[member]), p);
   const double off = mixture.mean() - out.value;
   out.std_error = std::sqrt(mixture.sd() * mixture.sd() + off * off);
@@ -47,7 +49,10 @@ FoundParameter shared_parameter(const NeedleSystem& system, const inference::Unk
   out.value += turned;
   for (double& end : out.ci95) end += turned;
   const auto& held = model.fit->held;
-  out.at_bound = std::find(held.begin(), held.end(), at) != held.end();
+  const double fitted = model.fit->shared[at];
+  const bool at_end =
+      !parameter.periodic && fitted != parameter.none && (fitted <= parameter.lower || fitted >= parameter.upper);
+  out.at_bound = at_end || std::find(held.begin(), held.end(), at) != held.end();
   return out;
 }
 
@@ -78,20 +83,37 @@ bool local_parameter(const ChosenModel& model, std::size_t r, int at, const Vect
   return true;
 }
 
-// Names that explain as much in its place, at odds of less than kRivalOdds to 1.
-std::vector<std::string> rivals_of(const Search& search, const ModelSet& set, std::size_t effect,
-                                   double log_posterior) {
-  std::set<std::string> names;
-  const auto& effects = search.system().effects();
-  const ModelSet rest = inference::without(set, effect);
-  for (const auto& [other, one] : search.visited()) {
-    if (other.size() != set.size() || one.log_posterior() < log_posterior - std::log(kRivalOdds)) continue;
-    std::vector<std::size_t> added;
-    std::set_difference(other.begin(), other.end(), rest.begin(), rest.end(), std::back_inserter(added));
-    if (added.size() == 1 && effects[added[0]].name != effects[effect].name) names.insert(effects[added[0]].name);
+// A candidate model at its mode: evaluated again where the search gave it up before, and with a discrepancy if asked.
+// `like` is a larger model's fit, from which an evaluation begins.
+inference::Visited at_mode(const Search& search, const ModelSet& set, const Fit& like, bool with_discrepancy) {
+  const auto known = search.visited().find(set);
+  std::shared_ptr<const inference::Evaluated> at = known == search.visited().end() ? nullptr : known->second.at;
+  const Fit from = carried_to(inference::Layout(search.system(), set), like);
+  if (!at || at->given_up)
+    at = std::make_shared<const inference::Evaluated>(
+        evaluate(search.likelihood(), from.layout, from.shared, from.local, from.scales.nuisance_sd));
+  if (at->valid && with_discrepancy && !at->discrepancy_known) {
+    auto more = std::make_shared<inference::Evaluated>(*at);
+    add_discrepancy(search.likelihood(), search.discrepancy(), search.curve_rules(), *more);
+    at = std::move(more);
   }
-  return {names.begin(), names.end()};
+  return search.weighed(set, search.log_prior(set), at);
 }
+
+// Null: the model without the member cannot follow the recordings.
+std::optional<double> log_bayes_factor_of(const Search& search, const ChosenModel& model, std::size_t member) {
+  const Fit& fit = *model.fit;
+  const ModelSet& set = fit.layout.set();
+  const bool with_discrepancy = !fit.scales.curves.empty();
+  const auto& here = search.visited().at(set);
+  const auto rest = at_mode(search, inference::without(set, set[member]), fit, with_discrepancy);
+  if (!rest.at->valid) return std::nullopt;
+  const double odds = search.log_prior_odds(set[member]);
+  return with_discrepancy ? here.log_with_curve - rest.log_with_curve - odds
+                          : here.log_without_curve - rest.log_without_curve - odds;
+}
+
+bool excludes_none(const FoundParameter& p) { return p.ci95[0] > p.none || p.ci95[1] < p.none; }
 
 // Borrows `discrepancy`.
 ModelledTip tip_of(const ChosenModel& model, std::span<const inference::CurveValues> discrepancy) {
@@ -114,7 +136,8 @@ std::vector<FoundEffect> found_effects(const NeedleSystem& system, const Search&
     FoundEffect found{.name = effect.name,
                       .meaning = std::string(system.physics(set[m]).meaning()),
                       .probability = std::min(1.0, posterior.inclusion.at(effect.name)),
-                      .ambiguous_with = rivals_of(search, set, set[m], search.visited().at(set).log_posterior())};
+                      .joint_probability = joint_probability(search, posterior, set, set[m]),
+                      .ambiguous_with = confounders_of(search, posterior, set, set[m])};
     for (std::size_t p = 0; p < effect.parameters.size(); ++p)
       if (effect.parameters[p].scope == inference::Scope::shared)
         found.parameters.push_back(shared_parameter(system, unknowns, model, m, p));
@@ -135,19 +158,54 @@ std::vector<FoundEffect> found_effects(const NeedleSystem& system, const Search&
     const Fit less = inference::fit(*fit.likelihood, smaller, smaller.shared_from(fit.layout, fit.shared), local,
                                     fit.scales, model.curve);
     found.visible_sigmas = std::sqrt(std::max(0.0, less.cost - fit.cost));
-    if (const auto at = search.visited().find(rest); at != search.visited().end())
-      found.log_bayes_factor =
-          search.visited().at(set).log_posterior() - at->second.log_posterior() - search.log_prior_odds(set[m]);
+    found.log_bayes_factor = log_bayes_factor_of(search, model, m).value_or(std::numeric_limits<double>::infinity());
     found.moved_at_depth_mm = moved_by_member_mm(system, tip, m);
     out.push_back(std::move(found));
   }
   return out;
 }
 
-std::vector<TriedEffect> tried_beside(const Search& search, const ModelSet& set) {
+std::string fault_of_name(const NeedleSystem& system, const Search& search, const inference::Unknowns& unknowns,
+                          const ChosenModel& model, std::size_t member) {
+  const auto& parameters = system.effects()[model.fit->layout.set()[member]].parameters;
+  bool has_size = false, shown = false;
+  for (std::size_t p = 0; p < parameters.size(); ++p) {
+    if (parameters[p].scope != inference::Scope::shared || std::isnan(parameters[p].none)) continue;
+    has_size = true;
+    shown = shown || excludes_none(shared_parameter(system, unknowns, model, member, p));
+  }
+  if (has_size && !shown) return "the 95 % interval of its size includes no effect";
+  const auto factor = log_bayes_factor_of(search, model, member);
+  return factor && !(*factor > 0) ? "its log Bayes factor is not positive" : "";
+}
+
+namespace {
+
+// Computes, for each effect, the log Bayes factor if its estimate is exactly "no effect": the density of the size prior there
+// against the standard error of the size. A fit that comes to less is in a local minimum, as "no effect" is a special
+// case of every effect.
+std::vector<double> least_log_factors(const Search& search) {
+  std::vector<double> out(search.system().effects().size(), 0);
+  for (const auto& size : search.proposals().reach(search.base_marginal()).sizes) {
+    const inference::Parameter& p = search.system().effects()[size.effect].parameters[size.parameter];
+    const double sd = size.one_deviation;
+    if (!std::isfinite(sd)) continue;
+    out[size.effect] +=
+        std::min(0.0, log_density(p.prior, p.none, sd) + std::log(sd) + 0.5 * std::log(2 * std::numbers::pi));
+  }
+  return out;
+}
+
+}  // namespace
+
+std::vector<TriedEffect> tried_beside(const Search& search, const ModelSet& set, bool with_discrepancy) {
   std::vector<TriedEffect> out;
   const auto& effects = search.system().effects();
-  const double from = search.visited().at(set).log_posterior();
+  const auto& from = search.visited().at(set);
+  const auto least = least_log_factors(search);
+  const auto is_known = [](const inference::Visited& one, bool with) {
+    return with ? one.at->discrepancy_known : !one.at->given_up;
+  };
   for (std::size_t e = 0; e < effects.size(); ++e) {
     const ModelSet larger = inference::with(set, e);
     if (inference::contains(set, e) || !search.system().allows(larger)) continue;
@@ -155,22 +213,35 @@ std::vector<TriedEffect> tried_beside(const Search& search, const ModelSet& set)
     TriedEffect one{.name = effects[e].label, .beside = set.empty() ? "" : describe(search.system(), set)};
     if (const auto at = search.visited().find(larger); at != search.visited().end()) {
       one.fitted = true;
-      one.log_bayes_factor = at->second.log_posterior() - from - odds;
-      const Fit& fit = at->second.at->fit;
+      one.with_discrepancy = with_discrepancy && is_known(from, true) && is_known(at->second, true);
+      if (one.with_discrepancy)
+        one.log_bayes_factor = at->second.log_with_curve - from.log_with_curve - odds;
+      else if (is_known(from, false) && is_known(at->second, false))
+        one.log_bayes_factor = at->second.log_without_curve - from.log_without_curve - odds;
+      // The tolerance of a prediction by the linear model against a fit: the noise is estimated again.
+      if (one.log_bayes_factor && *one.log_bayes_factor < least[e] - search.rules().optimism)
+        one.log_bayes_factor.reset();
+      const Fit& fit =
+          one.with_discrepancy && at->second.at->fit_with_curve ? *at->second.at->fit_with_curve : at->second.at->fit;
       const auto member = std::find(larger.begin(), larger.end(), e) - larger.begin();
       for (std::size_t p = 0; p < effects[e].parameters.size(); ++p)
         if (const int i = fit.layout.find_shared(static_cast<std::size_t>(member), p); i >= 0)
           one.parameters.emplace_back(effects[e].parameters[p].name, fit.shared[i]);
+      one.likelier = at->second.log_posterior() > from.log_posterior();
     } else if (const auto promised = search.promised().find(larger); promised != search.promised().end()) {
-      one.log_bayes_factor = promised->second - from - odds;
+      const auto& predicted = promised->second;
+      one.with_discrepancy = with_discrepancy && std::isfinite(predicted.log_bayes_factor_with_curve);
+      const double factor = one.with_discrepancy ? predicted.log_bayes_factor_with_curve : predicted.log_bayes_factor;
+      if (std::isfinite(factor)) one.log_bayes_factor = factor;
     } else {
       continue;
     }
-    one.likelier = one.fitted && one.log_bayes_factor + odds > 0;
     out.push_back(std::move(one));
   }
-  std::stable_sort(out.begin(), out.end(),
-                   [](const auto& a, const auto& b) { return a.log_bayes_factor > b.log_bayes_factor; });
+  // Those that are compared like the model that was chosen come first; null comes after all numbers.
+  std::ranges::stable_sort(out, std::greater{}, [](const TriedEffect& one) {
+    return std::pair(one.with_discrepancy, one.log_bayes_factor);
+  });
   return out;
 }
 

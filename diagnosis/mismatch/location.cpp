@@ -4,6 +4,8 @@
 #include <cmath>
 #include <limits>
 
+#include "diagnosis/mismatch/onset.hpp"
+
 namespace bevel::diagnosis {
 
 using Eigen::Index;
@@ -11,8 +13,6 @@ using Eigen::VectorXd;
 using inference::Fit;
 
 namespace {
-
-constexpr double kSpanShare = 0.8;  // of a series' fall of chi2 that a located span holds
 
 // White residuals of one recording by channel, in the order of its series.
 std::vector<VectorXd> white_of(const ChosenModel& model, std::size_t r) {
@@ -22,21 +22,6 @@ std::vector<VectorXd> white_of(const ChosenModel& model, std::size_t r) {
                                 fit.curve_values))
     return {};
   return by_channel(fit.likelihood->data().recordings[r], residuals.white);
-}
-
-// Shortest run of readings that holds the share of the positive fall.
-std::pair<std::size_t, std::size_t> shortest_span(const Eigen::VectorXd& fall) {
-  const double wanted = kSpanShare * fall.sum();
-  const auto n = static_cast<std::size_t>(fall.size());
-  std::pair<std::size_t, std::size_t> best{0, n - 1};
-  double sum = 0;
-  for (std::size_t from = 0, to = 0; to < n; ++to) {
-    sum += fall[static_cast<Eigen::Index>(to)];
-    while (from < to && sum - fall[static_cast<Eigen::Index>(from)] >= wanted)
-      sum -= fall[static_cast<Eigen::Index>(from++)];
-    if (sum >= wanted && to - from < best.second - best.first) best = {from, to};
-  }
-  return best;
 }
 
 struct Begin {
@@ -98,32 +83,28 @@ std::vector<Location> locate(const NeedleSystem& system, const ChosenModel& befo
       total += std::max(sum, 0.0);
       if (!(sum > most)) continue;
       most = sum;
-      const Series& series = after.fit->likelihood->data().recordings[r].series[c];
-      const auto [from, to] = shortest_span(fall);
       best.log = recording.name;
       best.channel = system.recorded().channels[c].name;
-      best.from_s = series.time_s[from];
-      best.to_s = series.time_s[to];
-      best.covariate = model::name_of(covariate);
       best.share = sum;
-      double low = std::numeric_limits<double>::infinity(), high = -low;
-      for (std::size_t i = from; i <= to; ++i) {
-        const double x = covariates[recording.motion.at[series.message[i]]][covariate];
-        low = std::min(low, x), high = std::max(high, x);
-      }
-      best.range = low <= high ? std::array{low, high} : std::array{0.0, 0.0};  // no reading says where the tip is
-      if (begin.at_s > 0) best.from_s = begin.at_s;
-      if (begin.depth_mm >= 0) {
-        best.range = {begin.depth_mm, std::max(begin.depth_mm, covariates.back()[model::Covariate::depth_mm])};
-        for (const auto& at : covariates)
-          if (at[model::Covariate::depth_mm] >= begin.depth_mm) {
-            best.from_s = at[model::Covariate::time_s];
-            break;
-          }
-      }
-      best.to_s = std::max(best.to_s, best.from_s);
     }
-    if (most > 0) all.push_back(best);
+    const auto onset = most > 0 ? onset_of(system, after, r) : std::nullopt;
+    if (!onset) continue;
+    best.covariate = model::name_of(covariate);
+    best.from_s = onset->from_s;
+    if (begin.at_s > 0) best.from_s = begin.at_s;
+    if (begin.depth_mm >= 0)
+      for (const auto& at : covariates)
+        if (at[model::Covariate::depth_mm] >= begin.depth_mm) {
+          best.from_s = at[model::Covariate::time_s];
+          break;
+        }
+    best.to_s = std::max(onset->to_s, best.from_s);
+    double low = std::numeric_limits<double>::infinity(), high = -low;
+    for (const auto& at : covariates)
+      if (at[model::Covariate::time_s] >= best.from_s && at[model::Covariate::time_s] <= best.to_s)
+        low = std::min(low, at[covariate]), high = std::max(high, at[covariate]);
+    best.range = low <= high ? std::array{low, high} : std::array{0.0, 0.0};  // no measurement gives the tip's place
+    all.push_back(best);
   }
   std::stable_sort(all.begin(), all.end(), [](const auto& a, const auto& b) { return a.share > b.share; });
   if (all.size() > at_most) all.resize(at_most);

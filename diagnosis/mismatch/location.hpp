@@ -1,12 +1,15 @@
 #pragma once
-// Where the model in use goes wrong: in which recordings, when, and over which range of the covariate that the effect
-// acts on.
+// Locates the missing physics: in which recordings, from when on, and over which range of the covariate that the
+// effect depends on.
 #include "diagnosis/mismatch/decision.hpp"
 
 namespace bevel::diagnosis {
 
-// The spans with most of the fall of chi2 from `before` to `after` (fits by one noise), at most one per recording,
-// largest first. Effects with a depth or an instant of their own begin there; `covariate` names what the range is of.
+/// Locates the missing physics: for each recording, when it begins to act (onset.hpp), the channel in which it lowers
+/// chi2 most, and the range of the covariate during the onset. An effect that has a depth or an event time
+/// begins no earlier than there. Recordings in which the onset is not determined are left out.
+/// @param before the nominal model, refitted with the noise of `after`
+/// @param at_most number of recordings, those with the largest fall of chi2 first
 std::vector<Location> locate(const NeedleSystem& system, const ChosenModel& before, const ChosenModel& after,
                              std::size_t at_most);
 

@@ -21,12 +21,25 @@ std::string off_with(const Findings& findings) {
   return text + (findings.effects.empty() ? "." : ", beside " + listed(findings.effects) + ".");
 }
 
+// The reasons and the motion that would decide.
+std::string inconclusive_because(const Findings& findings) {
+  std::string text = "The recordings do not decide";
+  for (const std::string& reason : findings.reasons)
+    text += (&reason == findings.reasons.data() ? ": " : "; ") + reason;
+  const auto& next = findings.next_experiment;
+  return text +
+         (next ? ". The next experiment would decide between " + next->separates[0] + " and " + next->separates[1] + "."
+               : ". More recordings, with turns and at two speeds, would decide.");
+}
+
 std::string sentence_on_change(const Findings& findings) {
   switch (findings.verdict) {
     case Verdict::nothing_missing:
       return "Nothing changed between the two groups that these recordings could show.";
     case Verdict::effects_found:
       return "What changed: " + listed(findings.effects) + ".";
+    case Verdict::inconclusive:
+      return inconclusive_because(findings);
     case Verdict::unknown_effect:
       break;
   }
@@ -42,6 +55,8 @@ std::string sentence_of(const Findings& findings) {
       return "Nothing is missing from the model that these recordings could show.";
     case Verdict::effects_found:
       return "The model leaves out " + listed(findings.effects) + ".";
+    case Verdict::inconclusive:
+      return inconclusive_because(findings);
     case Verdict::unknown_effect:
       break;
   }

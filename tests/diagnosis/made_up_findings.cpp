@@ -54,7 +54,7 @@ Trace trace_of(int recording, const model::NeedleParameters& needle, const std::
 }
 
 std::vector<model::ActiveEffect> truth_of(Verdict verdict) {
-  if (verdict == Verdict::nothing_missing) return {};
+  if (!adopts_a_model(verdict)) return {};
   if (verdict == Verdict::effects_found)
     return {active("torsional_windup", {0.82}), active("lost_steps", {1.39, 0, 3.3})};
   return {active("torsional_windup", {0.82}), active("lateral_bias", {0.0009, -0.0006})};
@@ -128,7 +128,7 @@ void add_insertions(Findings& findings) {
 }
 
 void add_ranking(Findings& findings) {
-  double factor = findings.verdict == Verdict::nothing_missing ? 1.2 : 2112.7;
+  double factor = !adopts_a_model(findings.verdict) ? 1.2 : 2112.7;
   for (const model::Effect* effect : model::all_effects()) {
     TriedEffect tried;
     tried.name = effect->name();
@@ -194,7 +194,7 @@ Findings made_up(Verdict verdict) {
   for (int i = 0; i < 8; ++i) {
     f.traces.push_back(trace_of(i, needle, truth, explained, random));
     f.readings += f.traces.back().time_s.size();
-    const double before = verdict == Verdict::nothing_missing ? 0.2 : 0.7 + 0.21 * i;
+    const double before = !adopts_a_model(verdict) ? 0.2 : 0.7 + 0.21 * i;
     const double after = explained ? 0.2 + 0.01 * i : before * 0.8;
     f.held_out.recordings.push_back({f.traces.back().log, figures(before, 3 * before, before * before / 0.04),
                                      figures(after, 3 * after, after * after / 0.04), predicted(before, 0.6),
@@ -233,13 +233,19 @@ Findings made_up(Verdict verdict) {
   f.next_experiment = {"insert 10 mm at 10 mm/s\nthen 6 times: turn +2 rad, -2 rad; insert 10 mm",
                        {"torsional_windup", "rotation_backlash"},
                        38.4};
-  if (verdict == Verdict::nothing_missing) {
+  if (!adopts_a_model(verdict)) {
     f.sentence = "These recordings show no missing physics.";
+    f.probability = 0.995;
     f.effects.clear();
     f.steered.reset();
     f.where.clear();
     f.next_experiment.reset();
     f.held_out.before = f.held_out.after = figures(0.249, 0.88, 1.008);
+  }
+  if (verdict == Verdict::inconclusive) {
+    f.sentence = "The recordings do not decide: 32 % of the probability is in candidate models that were not fitted.";
+    f.probability = 0;
+    f.reasons = {"32 % of the probability is in candidate models that were not fitted"};
   }
   if (verdict == Verdict::unknown_effect) {
     f.sentence = "Something is missing that no listed effect explains: the curvature depends on time.";

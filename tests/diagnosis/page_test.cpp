@@ -73,7 +73,7 @@ TEST(Page, nothing_missing_points_to_what_would_have_been_seen) {
   expect_sound(html);
   EXPECT_THAT(html, HasSubstr("no size in reach"));
   EXPECT_THAT(html, HasSubstr("Nothing above the sizes listed"));
-  EXPECT_THAT(html, Not(HasSubstr("Where it goes wrong</h2>")));
+  EXPECT_THAT(html, Not(HasSubstr("Onset of the missing physics</h2>")));
 }
 
 TEST(Page, unknown_effect_shows_curves_and_no_name) {
@@ -204,6 +204,21 @@ TEST(Page, next_experiment_says_how_many_recordings_it_takes) {
   EXPECT_THAT(page(3), HasSubstr("25 settles it), so it takes 4 of them."));
   EXPECT_THAT(page(0.36), HasSubstr("so none of these motions tells them apart in earnest."));
   EXPECT_THAT(page(0), HasSubstr("so none of these motions tells them apart in earnest."));
+}
+
+TEST(Page, next_experiment_is_none_needed_where_there_is_no_doubt) {
+  auto findings = made_up(Verdict::effects_found);
+  findings.probability = 0.995;
+  EXPECT_THAT(report_html(findings, {}), HasSubstr("None needed: the verdict has a probability of"));
+  findings.verdict = Verdict::inconclusive;
+  findings.next_experiment.reset();
+  EXPECT_THAT(report_html(findings, {}), HasSubstr("No motion that was simulated separates"));
+}
+
+TEST(Page, an_inconclusive_verdict_says_why_and_adopts_nothing) {
+  const std::string html = report_html(made_up(Verdict::inconclusive), {});
+  EXPECT_THAT(html, HasSubstr("Inconclusive. The recordings do not decide"));
+  EXPECT_THAT(html, HasSubstr("Do not change the model yet"));
 }
 
 TEST(Page, holds_when_findings_are_bare) {

@@ -16,6 +16,7 @@
 #include "tests/diagnosis/made_up_findings.hpp"
 #include "tests/support/temporary_folder.hpp"
 #include "tools/diagnose/diagnose_tool.hpp"
+#include "tools/diagnose/report.hpp"
 #include "tools/diagnose/verdict_json.hpp"
 
 namespace bevel::diagnose {
@@ -98,7 +99,38 @@ TEST_F(Results, TheVerdictSaysWhatWasFound) {
   EXPECT_DOUBLE_EQ(j["insertions"]["rec02.lcm"]["tilt_x_rad"]["value"], 0.003 * std::sin(3));
   EXPECT_DOUBLE_EQ(j["insertions"]["rec02.lcm"]["tilt_x_rad"]["std_error"], 0.4 * 0.003);
   EXPECT_TRUE(j["detectable"]["layer"]["curvature_ratio"].is_null());  // infinite
-  EXPECT_TRUE(nlohmann::json::parse(verdict_json(made_up(Verdict::nothing_missing)))["next_experiment"].is_null());
+}
+
+// A verdict of 99 % requires no experiment; for an inconclusive one, no motion may separate the explanations.
+TEST_F(Results, TheNextExperimentIsNoneNeededWhereThereIsNoDoubt) {
+  const auto next = [](const diagnosis::Findings& f) {
+    return nlohmann::json::parse(verdict_json(f))["next_experiment"];
+  };
+  diagnosis::Findings f = made_up(Verdict::effects_found);
+  f.probability = 0.98;
+  EXPECT_TRUE(next(f).is_object());
+  f.probability = 0.99;
+  EXPECT_EQ(next(f), "none needed");
+  EXPECT_EQ(next(made_up(Verdict::nothing_missing)), "none needed");
+  EXPECT_TRUE(next(made_up(Verdict::inconclusive)).is_null());
+}
+
+TEST_F(Results, AnInconclusiveVerdictNamesNothingAndSaysWhy) {
+  const auto j = nlohmann::json::parse(verdict_json(made_up(Verdict::inconclusive)));
+  EXPECT_EQ(j["verdict"], "inconclusive");
+  EXPECT_TRUE(j["effects"].empty());
+  EXPECT_THAT(j["reasons"][0].get<std::string>(), ::testing::HasSubstr("not fitted"));
+  diagnosis::Findings changed = made_up(Verdict::inconclusive);
+  changed.two_groups = true;
+  EXPECT_EQ(nlohmann::json::parse(verdict_json(changed))["verdict"], "inconclusive");
+}
+
+// A log Bayes factor that was not computed is null.
+TEST_F(Results, ALogBayesFactorThatWasNotComputedIsNull) {
+  diagnosis::Findings f = made_up(Verdict::effects_found);
+  f.tried.front().log_bayes_factor.reset();
+  EXPECT_TRUE(nlohmann::json::parse(verdict_json(f))["tried"][0]["log_bayes_factor"].is_null());
+  EXPECT_THAT(report_html(f, {}), ::testing::HasSubstr("not computed"));
 }
 
 TEST_F(Results, TheModelReadsBackWithItsUnknownsOfSingleRecordings) {

@@ -6,6 +6,8 @@
 #include <Eigen/LU>
 #include <algorithm>
 #include <cmath>
+#include <limits>
+#include <memory>
 #include <random>
 
 #include "diagnosis/inference/posterior.hpp"
@@ -213,7 +215,7 @@ TEST(PendulumTest, ProbabilitiesAddUpAndHeldOutIsBetterWithWhatWasFound) {
   Search search(system, {});
   search.run(Readings(6), white());
   const Posterior posterior = posterior_of(search, 5);
-  double sum = posterior.not_visited;
+  double sum = 0;
   for (const auto& one : posterior.sets) {
     sum += one.probability;
     EXPECT_LE(one.with_discrepancy, one.probability + 1e-12);
@@ -233,6 +235,47 @@ TEST(PendulumTest, ProbabilitiesAddUpAndHeldOutIsBetterWithWhatWasFound) {
   const auto blocks = linearise(*base.likelihood, base, {});
   for (std::size_t r = 0; r < 6; ++r)
     EXPECT_GT(found[r].log_density, leave_out(base, blocks, {}, r)->log_density) << "recording " << r;
+}
+
+// The steps are spent before anything is fitted: what was predicted to be likely is fitted after all, as far as it
+// holds more of the probability than may be in models that were not.
+TEST(PendulumTest, FitsWhatWasLeftForWantOfSteps) {
+  const Pendulum system({}, 4, 5);
+  const auto searched = [&](long further_steps) {
+    auto search = std::make_unique<Search>(system, SearchRules{.most_steps = 0,
+                                                               .log_prior_odds_effect = 0.5,
+                                                               .most_not_fitted = 0.01,
+                                                               .further_steps = further_steps,
+                                                               .at_once = 1});
+    search->run(Readings(4), white());
+    return search;
+  };
+  const auto none = searched(0), more = searched(5000);
+  EXPECT_GT(none->share_not_visited(), none->rules().most_not_fitted);
+  EXPECT_LE(more->share_not_visited(), more->rules().most_not_fitted);
+  EXPECT_GT(more->visited().size(), none->visited().size());
+  double sum = 0;
+  for (const SetShare& one : posterior_of(*none, 3).sets) sum += one.probability;
+  EXPECT_NEAR(sum, 1, 1e-9) << "of the fitted models";
+}
+
+// Measurements that ask for a size beyond the bound at which the effect vanishes: no start can be evaluated, and its
+// log Bayes factor is minus infinity.
+TEST(PendulumTest, WhatCannotBeEvaluatedHasNoPrediction) {
+  constexpr double kNever = -std::numeric_limits<double>::infinity();
+  bool found = false;
+  for (std::uint64_t seed = 1; seed <= 6 && !found; ++seed) {
+    const Pendulum system({}, 4, seed);
+    Search search(system, {});
+    search.run(Readings(4), white());
+    const auto beside = search.proposals().beside(search.base_marginal(), 1);
+    for (const Proposal& one : beside) {
+      if (one.effect != Pendulum::kDryFriction) continue;
+      found = found || one.log_bayes_factor == kNever;
+      EXPECT_TRUE(one.log_bayes_factor == kNever || one.log_bayes_factor > -100) << one.log_bayes_factor;
+    }
+  }
+  EXPECT_TRUE(found);
 }
 
 }  // namespace

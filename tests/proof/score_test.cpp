@@ -52,6 +52,18 @@ TEST(Score, ExactSetsOnly) {
   EXPECT_FALSE(score(two, "unknown-effect", {effect("layer"), effect("torsional_windup")}).strict);
 }
 
+// A verdict that decides nothing is neither right nor an alarm.
+TEST(Score, InconclusiveIsAnAbstention) {
+  for (const OpenedTruth& truth : {truth_of({}), truth_of({windup()})}) {
+    const TrialScore one = score(truth, "inconclusive", {});
+    EXPECT_TRUE(one.abstained);
+    EXPECT_EQ(one.abstention, "inconclusive");
+    EXPECT_FALSE(one.strict);
+    EXPECT_FALSE(one.lenient);
+  }
+  EXPECT_THROW(score(truth_of({}), "inconclusive", {effect("layer")}), std::runtime_error);
+}
+
 TEST(Score, NeedleCountsWhereAllThatWasConcealedIsNamed) {
   const auto with_needle = [](OpenedTruth truth) {
     truth.needle = {{"curvature_per_mm", 0.005}, {"lambda1_per_rad", 0.3}, {"lambda2", 0.1}};

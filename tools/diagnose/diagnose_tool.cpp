@@ -78,7 +78,7 @@ Found find(const Options& options, std::ostream& err) {
   how.progress = [&](const std::string& text) { progress.say(text); };
   Findings findings = diagnosis::diagnose(input.recorded, model.needle, how);
   const double diagnosed_s = progress.seconds();
-  if (options.targets > 0 && !findings.two_groups && findings.verdict != Verdict::nothing_missing)
+  if (options.targets > 0 && !findings.two_groups && adopts_a_model(findings.verdict))
     progress.say("steering to targets");
   steer_to_targets(input.recorded, model, model_of(findings, model), {options.targets, options.threads}, findings);
   if (findings.steered) findings.times.push_back({"steering to targets", progress.seconds() - diagnosed_s});
@@ -95,6 +95,8 @@ Found find(const Options& options, std::ostream& err) {
 
 void print_verdict(std::ostream& out, const Findings& f) {
   out << headline_of(f.verdict, f.two_groups) << ": " << f.sentence << "\n\n";
+  if (adopts_a_model(f.verdict))
+    for (const std::string& reason : f.reasons) out << "  " << reason << '\n';
   for (const auto& effect : f.effects) {
     out << "  " << effect.name << "  probability " << probability(effect.probability)
         << (effect.ambiguous_with.empty() ? "" : ", or " + listed(effect.ambiguous_with, ", ")) << "; "
@@ -129,7 +131,7 @@ void print_verdict(std::ostream& out, const Findings& f) {
       << refitted << measured(h.before.rmse_mm) << ", " << found << measured(h.after.rmse_mm) << ", noise alone "
       << measured(h.noise_floor.rmse_mm) << " mm; chi2 per reading, " << refitted << measured(h.before.chi2_per_dof)
       << ", " << found << measured(h.after.chi2_per_dof) << '\n';
-  if (const auto moved = moved_at_depth(f); moved && !f.two_groups && f.verdict != Verdict::nothing_missing)
+  if (const auto moved = moved_at_depth(f); moved && !f.two_groups && adopts_a_model(f.verdict))
     out << "  what was found moves the tip at the deepest readings by " << measured(moved->from_refitted_mm, 2)
         << " mm (rms over recordings) beside the needle refitted, by " << measured(moved->from_file_mm, 2)
         << " mm from where the model file as it stands has it\n";
@@ -148,8 +150,14 @@ void print_verdict(std::ostream& out, const Findings& f) {
   for (const auto& v : f.variation) out << (&v == f.variation.data() ? " " : ", ") << variation_in_words(v);
   out << '\n';
   for (std::size_t i = 0; i < f.where.size() && i < 3; ++i)
-    out << "  " << (i == 0 ? "worst: " : "       ") << f.where[i].log << " " << f.where[i].channel << ", "
-        << number(f.where[i].from_s) << " to " << number(f.where[i].to_s) << " s\n";
+    out << "  " << (i == 0 ? "begins to act: " : "               ") << f.where[i].log << " " << f.where[i].channel
+        << ", " << number(f.where[i].from_s) << " to " << number(f.where[i].to_s) << " s\n";
+  out << "  next experiment: "
+      << (!is_experiment_needed(f) ? "none needed"
+          : f.next_experiment      ? f.next_experiment->script + "; it separates " + f.next_experiment->separates[0] +
+                                    " from " + f.next_experiment->separates[1]
+                              : "no motion that was simulated separates the explanations")
+      << '\n';
   if (const auto unseen = not_to_be_seen(f); !unseen.empty())
     out << "  not to be seen in these recordings at its usual size: " << listed(unseen, ", ")
         << "; the page says which motions would show it\n";

@@ -30,13 +30,11 @@ bool was_found(const Findings& findings, const std::string& name) {
 const double kMark = -inference::SearchRules{}.log_prior_odds_effect;
 
 // Below one the logarithm says nothing: a bar that short is none.
-double shown(double gain) { return std::isfinite(gain) ? std::max(gain, 1.0) : 1.0; }
+double shown(const std::optional<double>& gain) { return gain ? std::max(*gain, 1.0) : 1.0; }
 
 }  // namespace
 
 std::string ranking_picture(const Findings& findings, std::vector<TriedEffect> tried) {
-  std::stable_sort(tried.begin(), tried.end(),
-                   [](const auto& a, const auto& b) { return a.log_bayes_factor > b.log_bayes_factor; });
   if (tried.empty()) return "";
   constexpr double kRow = 22;
   double most = 100;
@@ -118,7 +116,7 @@ void draw_pairs(Drawing& drawing, const Box& box, const HeldOut& held_out, doubl
 
 std::string held_out_picture(const Findings& findings) {
   const HeldOut& held_out = findings.held_out;
-  const bool one_model = findings.verdict == Verdict::nothing_missing;  // before is after
+  const bool one_model = !adopts_a_model(findings.verdict);  // before is after
   if (held_out.recordings.empty()) return "";
   const double height = 24 * static_cast<double>(held_out.recordings.size());
   double names = 60;

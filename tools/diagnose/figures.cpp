@@ -61,10 +61,9 @@ std::string percent(double share) {
 
 std::string probability(double p) { return p > 0.999 ? "> 99.9 %" : p < 0.001 ? "< 0.1 %" : percent(p); }
 
-std::string log_factor(double log_bayes_factor) {
-  if (!std::isfinite(log_bayes_factor)) return "-";
-  if (log_bayes_factor < -99) return "< -99";
-  return fixed(log_bayes_factor, std::abs(log_bayes_factor) < 100 ? 1 : 0);
+std::string log_factor(const std::optional<double>& log_bayes_factor) {
+  if (!log_bayes_factor || !std::isfinite(*log_bayes_factor)) return "-";
+  return fixed(*log_bayes_factor, std::abs(*log_bayes_factor) < 100 ? 1 : 0);
 }
 
 std::string listed(const std::vector<std::string>& names, const std::string& last) {
@@ -222,6 +221,8 @@ std::string headline_of(diagnosis::Verdict verdict, bool two_groups) {
       return two_groups ? "Changed" : "Effects found";
     case diagnosis::Verdict::unknown_effect:
       return two_groups ? "Changed, in a way on no list" : "Unknown effect";
+    case diagnosis::Verdict::inconclusive:
+      return "Inconclusive";
   }
   return "";
 }

@@ -19,8 +19,8 @@ std::string with_error(double value, double std_error);
 // Both ends rounded alike: "0.76 to 0.89".
 std::string interval(const std::array<double, 2>& ends);
 std::string percent(double share);
-std::string probability(double p);                // never 100 %, never 0 %
-std::string log_factor(double log_bayes_factor);  // a tenth is as fine as it means anything
+std::string probability(double p);                                      // never 100 %, never 0 %
+std::string log_factor(const std::optional<double>& log_bayes_factor);  // a tenth is as fine as it means anything
 std::string listed(const std::vector<std::string>& names, const std::string& last = " and ");
 // "curvature 5 % (none: 2 %)"
 std::string variation_in_words(const diagnosis::VariationEstimate& variation);

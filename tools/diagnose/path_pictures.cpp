@@ -57,7 +57,7 @@ struct Model {
 
 std::vector<Model> models_of(const Findings& findings) {
   std::vector<Model> models{{"model file as given", &Trace::model_file_mm, Colour::purple, true}};
-  if (findings.verdict == Verdict::nothing_missing) {  // before is after
+  if (!adopts_a_model(findings.verdict)) {  // before is after
     models.push_back({"needle refitted", &Trace::after_mm, kAfter, false});
   } else {
     models.push_back({"before", &Trace::before_mm, kBefore, true});

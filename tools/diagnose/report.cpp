@@ -60,6 +60,7 @@ report::Tone tone_of(Verdict verdict) {
     case Verdict::effects_found:
       return report::Tone::plain;
     case Verdict::unknown_effect:
+    case Verdict::inconclusive:
       return report::Tone::warning;
   }
   return report::Tone::plain;
@@ -86,7 +87,7 @@ bool has_rivals(const Findings& f) {
 std::vector<report::Fact> figures_of_verdict(const Findings& f) {
   std::vector<report::Fact> facts;
   const HeldOut& h = f.held_out;
-  const bool one_model = f.verdict == Verdict::nothing_missing;
+  const bool one_model = !adopts_a_model(f.verdict);
   const auto add_error = [&](const char* label, const FitFigures& figures, const std::string& note) {
     facts.push_back({label, measured(figures.rmse_mm) + " mm", note});
   };
@@ -150,6 +151,8 @@ void add_verdict(report::Page& page, const Findings& f) {
                     measured(f.held_out.before.chi2_per_dof) +
                     " (1: as far off as the model says it may be). Nothing above the sizes listed under \"What these "
                     "recordings could have shown\".";
+  else if (f.verdict == Verdict::inconclusive)
+    consequences += "model.toml holds the nominal model, refitted. No physics was added to it.";
   else
     consequences += held_out_sentence(f);
   page.verdict(tone_of(f.verdict), headline_of(f.verdict, f.two_groups) + ". " + f.sentence, consequences,
@@ -162,7 +165,9 @@ void add_what_to_do(report::Page& page, const Findings& f) {
     if (!effect.meaning.empty()) todo.push_back(effect.name + " means: " + effect.meaning + ".");
   if (f.two_groups) {
     todo.emplace_back(
-        f.verdict == Verdict::nothing_missing
+        f.verdict == Verdict::inconclusive ? "Do not act on a change yet: record the next experiment below with both "
+                                             "groups, and run bevel-diagnose again."
+        : f.verdict == Verdict::nothing_missing
             ? "Read the table of detectable sizes before you rule a change out: a smaller one may well be there."
             : "model.toml is the model in use with what changed; the rest of it is as it was.");
     page.heading("What to do").list(todo);
@@ -195,6 +200,11 @@ void add_what_to_do(report::Page& page, const Findings& f) {
         todo.emplace_back(
             "Before you name the cause, record the next experiment below: these recordings cannot tell the named "
             "effect from its rivals, though either model predicts equally well.");
+      break;
+    case Verdict::inconclusive:
+      todo.emplace_back(
+          "Do not change the model yet. Record the next experiment below, and run bevel-diagnose again with the new "
+          "recordings added.");
       break;
     case Verdict::unknown_effect:
       todo.emplace_back(
@@ -233,7 +243,7 @@ void add_parameters(report::Page& page, const Findings& f) {
   const std::array<double, 4> given{f.model_file.curvature_per_mm, f.model_file.lambda1_per_rad, f.model_file.lambda2,
                                     f.model_file.wheelbase_mm};
   constexpr const char* kNames[] = {"k (1/mm)", "lambda1 (1/rad)", "lambda2", "wheelbase (mm), not fitted"};
-  const bool one_model = f.verdict == Verdict::nothing_missing;
+  const bool one_model = !adopts_a_model(f.verdict);
   std::vector<std::string> header{"needle", "model file", one_model ? "refitted" : "refitted alone"};
   if (!one_model) header.emplace_back(f.discrepancies.empty() ? "with what was found" : "beside the discrepancy");
   std::vector<std::vector<std::string>> rows;
@@ -278,10 +288,11 @@ void add_variation(report::Page& page, const Findings& f) {
 
 void add_location(report::Page& page, const Findings& f) {
   if (f.where.empty()) return;
-  page.heading("Where it goes wrong");
+  page.heading("Onset of the missing physics");
   page.paragraph(
-      "The spans in which the model in use, its needle refitted, misses most. Look there first: what did the base do, "
-      "and what came before it?");
+      "The time at which the missing physics begins to act, as a 95 % interval: from the innovations of the nominal "
+      "model, which predicts the later measurements from the tip's position and direction at each time. Look there "
+      "first: what did the actuators do, and what came before it?");
   std::vector<std::vector<std::string>> rows;
   for (const auto& w : f.where)
     rows.push_back({w.log, w.channel, time_span(f, w), w.covariate.empty() ? "-" : span_of(w), percent(w.share)});
@@ -289,8 +300,8 @@ void add_location(report::Page& page, const Findings& f) {
   const auto panels = located_panels(f, 2);
   if (!panels.empty())
     page.figures(panels, static_cast<int>(panels.size() / 3),
-                 "The worst spans, shaded, in their recordings: what was measured less what was predicted, and below "
-                 "it what the base did at that time.");
+                 "The onsets, shaded, in their recordings: what was measured less what was predicted, and below "
+                 "it the motion of the actuators.");
 }
 
 void add_unknown_part(report::Page& page, const Findings& f) {
@@ -345,7 +356,7 @@ void add_residuals(report::Page& page, const Findings& f) {
     order.emplace_back(-sum, c);
   }
   std::sort(order.begin(), order.end());
-  const bool one_model = f.verdict == Verdict::nothing_missing;
+  const bool one_model = !adopts_a_model(f.verdict);
   const std::string reading = one_model
                                   ? " The line should lie at zero in every panel, within what its band lets it waver."
                                   : " Where the orange line leaves zero and the blue one does not, what was found "

@@ -64,7 +64,9 @@ void add_evidence(report::Page& page, const Findings& f) {
   }
   page.table({"effects in the model", "probability", "of it with a discrepancy"}, shares,
              "Neither an effect nor a discrepancy of any consequence: " + probability(f.nothing_probability) +
-                 ". Sets that were not fitted, by the linear model's estimate: " + percent(f.not_visited) + ".");
+                 ". Probabilities hold given that one of the fitted models is true. The models that were not fitted "
+                 "would have an estimated share of " +
+                 percent(f.not_visited) + ".");
   page.heading("Every effect that was tried");
   page.paragraph(
       "Each effect added to the needle alone. The bar is the natural logarithm of its Bayes factor: how much likelier "
@@ -73,6 +75,8 @@ void add_evidence(report::Page& page, const Findings& f) {
       "than not, its prior odds included.");
   const char* const caption =
       f.verdict == Verdict::nothing_missing ? "Effects alone, best first. None passes its mark."
+      : f.verdict == Verdict::inconclusive
+          ? "Effects alone, the largest log Bayes factor first. The recordings do not decide between them."
       : f.verdict == Verdict::effects_found
           ? "Effects alone, best first. Several may pass because they look alike; sets of effects are compared as a "
             "whole, above."
@@ -91,7 +95,11 @@ void add_evidence(report::Page& page, const Findings& f) {
     std::string sizes;
     for (const auto& [name, value] : t.parameters)
       sizes += (sizes.empty() ? "" : ", ") + in_words(name) + " " + number(value);
-    rows.push_back({t.name, log_factor(t.log_bayes_factor), t.fitted ? "fitted" : "linear estimate", sizes});
+    rows.push_back({t.name, log_factor(t.log_bayes_factor),
+                    !t.log_bayes_factor ? "not computed"
+                    : !t.fitted ? (t.with_discrepancy ? "linear estimate, with a discrepancy" : "linear estimate")
+                                : (t.with_discrepancy ? "fitted, with a discrepancy" : "fitted"),
+                    sizes});
   }
   page.folded("the figures", [&](report::Page& inside) {
     inside.table({"effect, alone", "log Bayes factor", "by", "size"}, rows);
@@ -104,7 +112,7 @@ namespace {
 void add_two_ways(report::Page& page, const Findings& f) {
   const HeldOut& h = f.held_out;
   std::vector<std::pair<std::string, const InsertionPredicted*>> models;
-  if (f.verdict == Verdict::nothing_missing) {
+  if (!adopts_a_model(f.verdict)) {
     models = {{"needle refitted", &h.predicted_before}};
   } else {
     models = {{"before", &h.predicted_before}, {"after", &h.predicted_after}};
@@ -147,7 +155,7 @@ void add_held_out(report::Page& page, const Findings& f) {
       "fitted, and the one put aside is predicted as a new insertion. An effect of the wrong name fits what it has "
       "seen and gets the rest wrong.");
   page.picture(held_out_picture(f),
-               f.verdict == Verdict::nothing_missing
+               !adopts_a_model(f.verdict)
                    ? "Each recording predicted from the others. On the right they should lie near the line, "
                      "none far off."
                    : "Each recording predicted from the others, before and after. Blue should lie left of orange, and "
@@ -190,9 +198,10 @@ constexpr double kFeasible = 20;    // recordings of one motion
 
 void add_next_experiment(report::Page& page, const Findings& f) {
   page.heading("The next experiment");
-  if (!f.next_experiment) {
-    page.paragraph(
-        "None is needed to tell rivals apart: no two explanations are left that these recordings leave open.");
+  if (!is_experiment_needed(f) || !f.next_experiment) {
+    page.paragraph(is_experiment_needed(f)
+                       ? "No motion that was simulated separates the explanations that these recordings leave open."
+                       : "None needed: the verdict has a probability of " + probability(f.probability) + ".");
     return;
   }
   const auto& next = *f.next_experiment;

@@ -119,7 +119,7 @@ bool has_any(const std::vector<double>& values) {
 }
 
 const char* name_of_after(const Findings& findings) {
-  return findings.verdict == Verdict::nothing_missing ? "needle refitted" : "after";
+  return !adopts_a_model(findings.verdict) ? "needle refitted" : "after";
 }
 
 // Logs without a clock are drawn by the number of the stop.
@@ -141,7 +141,7 @@ Figure over_time(const Findings& findings, const Trace& trace, std::size_t chann
   figure.height_px = 110;
   figure.references.push_back({report::Reference::Axis::horizontal, 0, ""});
   const std::vector<double> time = shown_times(findings, trace, use);
-  if (findings.verdict != Verdict::nothing_missing) figure.points("before", time, at(r.before, use), kBefore);
+  if (adopts_a_model(findings.verdict)) figure.points("before", time, at(r.before, use), kBefore);
   figure.points(name_of_after(findings), time, at(r.after, use), kAfter);
   for (const auto& where : findings.where)
     if (where.log == trace.log && where.channel == findings.channels[channel])
@@ -209,7 +209,7 @@ std::vector<Figure> residual_panels(const Findings& findings, std::size_t channe
   }
   std::vector<Figure> panels;
   if (!has_any(before)) return panels;
-  const bool one_model = findings.verdict == Verdict::nothing_missing;  // before is after
+  const bool one_model = !adopts_a_model(findings.verdict);  // before is after
   const std::vector<std::size_t> shown = shown_of(before, after, kMostReadings);
   const auto y_range = residual_range(before, after);
   for (const Against& against : kAgainst) {

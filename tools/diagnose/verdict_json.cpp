@@ -29,13 +29,15 @@ json as_json(const std::vector<FoundParameter>& parameters) {
     all[p.name] = {{"value", figure(p.value)},
                    {"std_error", figure(p.std_error)},
                    {"ci95", {figure(p.ci95[0]), figure(p.ci95[1])}},
-                   {"at_bound", p.at_bound}};
+                   {"at_bound", p.at_bound},
+                   {"none", figure(p.none)}};
   return all;
 }
 
 json as_json(const FoundEffect& effect) {
   json one = {{"name", effect.name},
               {"probability", figure(effect.probability)},
+              {"joint_probability", figure(effect.joint_probability)},
               {"ambiguous_with", effect.ambiguous_with},
               {"parameters", as_json(effect.parameters)}};
   for (const auto& r : effect.recordings) one["recordings"][r.log] = as_json(r.parameters);
@@ -113,7 +115,8 @@ json as_json(const std::vector<TriedEffect>& tried) {
     for (const auto& [name, value] : t.parameters) parameters[name] = figure(value);
     all.push_back({{"name", t.name},
                    {"beside", t.beside},
-                   {"log_bayes_factor", figure(t.log_bayes_factor)},
+                   {"log_bayes_factor", t.log_bayes_factor ? figure(*t.log_bayes_factor) : json(nullptr)},
+                   {"with_discrepancy", t.with_discrepancy},
                    {"fitted", t.fitted},
                    {"likelier", t.likelier},
                    {"parameters", parameters}});
@@ -205,11 +208,13 @@ json as_json(const std::vector<InsertionValues>& insertions) {
   return all;
 }
 
-json experiment_json(const std::optional<NextExperiment>& next) {
-  if (!next) return nullptr;
-  return {{"script", next->script},
-          {"separates", {next->separates[0], next->separates[1]}},
-          {"expected_gain", figure(next->expected_gain)}};
+json experiment_json(const Findings& f) {
+  if (!is_experiment_needed(f)) return "none needed";
+  if (!f.next_experiment) return nullptr;
+  const NextExperiment& next = *f.next_experiment;
+  return {{"script", next.script},
+          {"separates", {next.separates[0], next.separates[1]}},
+          {"expected_gain", figure(next.expected_gain)}};
 }
 
 json as_json(const SteeredFigures& s) {
@@ -261,7 +266,11 @@ json checks_json(const Checks& c) {
 }  // namespace
 
 std::string verdict_json(const Findings& f, const Provenance& made_of) {
-  json j = {{"verdict", name_of(f.verdict, f.two_groups)}, {"sentence", f.sentence}, {"effects", json::array()}};
+  json j = {{"verdict", name_of(f.verdict, f.two_groups)},
+            {"sentence", f.sentence},
+            {"probability", figure(f.probability)},
+            {"reasons", f.reasons},
+            {"effects", json::array()}};
   if (f.two_groups) j["changes"] = json::array();
   for (const auto& effect : f.effects) j[f.two_groups ? "changes" : "effects"].push_back(as_json(effect));
   j["where"] = json::array();
@@ -280,7 +289,7 @@ std::string verdict_json(const Findings& f, const Provenance& made_of) {
                                                  {"length_mm", figure(scatter.length_mm)}};
   j["fit"] = as_json(f.held_out, f);
   j["detectable"] = detectable_json(f.detectable);
-  j["next_experiment"] = experiment_json(f.next_experiment);
+  j["next_experiment"] = experiment_json(f);
   if (!f.two_groups)  // else it is held by the common errors, not measured
     j["needle"] = {{"before", as_json(f.base)}, {"after", as_json(f.needle)}};
   j["steered"] = steered_json(f);
