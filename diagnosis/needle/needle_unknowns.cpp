@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <limits>
 #include <numbers>
 
 #include "diagnosis/needle/needle_system.hpp"
@@ -18,9 +19,10 @@ namespace {
 
 // The lab's own belief in its model file: half of k, and all of Table I and beyond for lambda.
 constexpr double kCurvatureShare = 0.5;
-// A shaft that turns by less in every recording does not separate slip from curvature: both bend the path in one plane.
-// Lambda then keeps the value of the model file, to within kHeldWidth (1/rad and 1).
-constexpr double kSeparatesSlip_rad = 0.2;
+// A shaft that rotates by less while it inserts, in every recording, does not separate slip from curvature: both bend
+// the path in one plane. The entry angle of real rigs is uncertain by as much. Lambda then keeps the value of the model
+// file, to within kHeldWidth (1/rad and 1).
+constexpr double kSeparatesSlip_rad = 0.1;
 constexpr double kHeldWidth = 1e-4;
 constexpr double kCurvatureMax_per_mm = 0.05;
 constexpr double kSmallestU = 1e-9;      // (26) is strict
@@ -132,11 +134,18 @@ std::string label_of(const model::Effect& effect, std::uint32_t variant) {
   return label;
 }
 
+// Largest range of the shaft's rotation while it inserts, over the recordings, in rad.
 double largest_turn_rad(const RecordedCase& recorded) {
   double largest_rad = 0;
   for (const auto& recording : recorded.recordings) {
-    const auto [least, most] = std::ranges::minmax(recording.motion.nodes, {}, &model::BaseMotion::rotation_rad);
-    largest_rad = std::max(largest_rad, most.rotation_rad - least.rotation_rad);
+    const auto& nodes = recording.motion.nodes;
+    double least_rad = std::numeric_limits<double>::infinity(), most_rad = -least_rad;
+    for (std::size_t i = 1; i < nodes.size(); ++i) {
+      if (nodes[i].insertion_mm == nodes[i - 1].insertion_mm) continue;
+      least_rad = std::min({least_rad, nodes[i - 1].rotation_rad, nodes[i].rotation_rad});
+      most_rad = std::max({most_rad, nodes[i - 1].rotation_rad, nodes[i].rotation_rad});
+    }
+    largest_rad = std::max(largest_rad, most_rad - least_rad);
   }
   return largest_rad;
 }
