@@ -4,6 +4,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
 #include <limits>
 #include <ostream>
@@ -136,9 +137,9 @@ struct Case {
 
 void PrintTo(const Case& one, std::ostream* out) { *out << one.name; }
 
-class Verdicts : public ::testing::TestWithParam<Case> {};
+class EveryVerdict : public ::testing::TestWithParam<Case> {};
 
-TEST_P(Verdicts, KeepTheInvariants) {
+TEST_P(EveryVerdict, KeepsTheInvariants) {
   model::NeedleParameters model = GetParam().rig.needle;
   model.curvature_per_mm *= 1.08;
   expect_sound(diagnose(record_case(GetParam().rig, 7), model, {}));
@@ -155,8 +156,38 @@ std::vector<Case> cases() {
           {"Unlisted", sinking}};
 }
 
-INSTANTIATE_TEST_SUITE_P(Simulated, Verdicts, ::testing::ValuesIn(cases()),
+INSTANTIATE_TEST_SUITE_P(Simulated, EveryVerdict, ::testing::ValuesIn(cases()),
                          [](const auto& one) { return std::string(one.param.name); });
+
+// The same recordings in another order, with other names, on another clock, and in a frame that is rotated about z: the
+// shaft's angle is counted from the rotated frame, too.
+TEST(Verdicts, DoNotDependOnTheFormOfTheRecordings) {
+  constexpr double kTurn_rad = 0.6;
+  const SimulatedRig rig{.effects = {active("torsional_windup", {0.7})}, .recordings = 3};
+  auto raw = record(rig, 7);
+  const Findings plain = diagnose(make_case(raw), rig.needle, {});
+  std::ranges::reverse(raw);
+  const Eigen::Matrix3d turn = Eigen::AngleAxisd(kTurn_rad, Eigen::Vector3d::UnitZ()).toRotationMatrix();
+  for (std::size_t r = 0; r < raw.size(); ++r) {
+    raw[r].name = "another_" + std::to_string(r);
+    for (auto& state : raw[r].actuators) state.utime += 86'400'000'000, state.rotation_rad += kTurn_rad;
+    for (auto& tip : raw[r].tips) {
+      tip.utime += 86'400'000'000;
+      tip.position_mm = turn * tip.position_mm;
+      tip.information_per_mm2 = turn * tip.information_per_mm2 * turn.transpose();
+    }
+  }
+  const Findings other = diagnose(make_case(raw), rig.needle, {});
+  EXPECT_EQ(other.verdict, plain.verdict);
+  ASSERT_EQ(other.effects.size(), plain.effects.size());
+  for (std::size_t e = 0; e < plain.effects.size(); ++e) {
+    EXPECT_EQ(other.effects[e].name, plain.effects[e].name);
+    const FoundParameter &a = plain.effects[e].parameters[0], &b = other.effects[e].parameters[0];
+    EXPECT_NEAR(b.value, a.value, a.std_error) << a.name;
+  }
+  EXPECT_NEAR(other.needle.value.curvature_per_mm, plain.needle.value.curvature_per_mm,
+              plain.needle.curvature_sd_per_mm);
+}
 
 // The error of the path goes on growing to the end of the recording; the physics begins at the layer.
 TEST(Onset, IsWhereTheNeedleReachesALayer) {
