@@ -7,6 +7,7 @@
 #include "diagnosis/inference/calibrate.hpp"
 #include "diagnosis/inference/log_sum.hpp"
 #include "diagnosis/mismatch/decision.hpp"
+#include "diagnosis/mismatch/found_effects.hpp"
 #include "io/find_logs.hpp"
 #include "io/model_file.hpp"
 #include "proof/trial_files.hpp"
@@ -204,7 +205,11 @@ json compare(const fs::path& folder, const json& campaign, const json& score, in
   Search search(needle, {.threads = threads});
   search.run(calibration.outliers, calibration.noise);
   const auto posterior = inference::posterior_of(search, diagnosis::consequence_sigmas(search.rules()));
-  const auto decision = diagnosis::decide(search, posterior);
+  const inference::Unknowns unknowns(search);
+  const auto decision =
+      diagnosis::decide(search, posterior, [&](const diagnosis::ChosenModel& chosen, std::size_t member) {
+        return diagnosis::fault_of_name(needle, search, unknowns, chosen, member);
+      });
   Answer said;
   for (const std::size_t e : decision.model.fit->layout.set()) said.push_back(needle.effects()[e].name);
   if (decision.verdict == diagnosis::Verdict::unknown_effect) said.emplace_back("unknown");

@@ -108,8 +108,9 @@ TEST(Violations, AnInconclusiveVerdictNamesNothingAndStatesWhy) {
   EXPECT_THAT(violations(f), IsEmpty());
 }
 
-// Whole diagnoses. The prior of a size costs at most log(0.47 sd / scale) in log evidence (half Student's t of 4 degrees
-// of freedom), which is -7.7 for a standard error of a thousandth of the prior's scale; with two sizes twice as much.
+// Whole diagnoses. The prior of a size costs at most log(0.47 sd / scale) in log evidence (half Student's t of 4
+// degrees of freedom), which is -7.7 for a standard error of a thousandth of the prior's scale; with two sizes twice as
+// much.
 constexpr double kLeastOfOneSize = -8;
 
 void expect_sound(const Findings& found) {
@@ -159,8 +160,8 @@ std::vector<Case> cases() {
 INSTANTIATE_TEST_SUITE_P(Simulated, EveryVerdict, ::testing::ValuesIn(cases()),
                          [](const auto& one) { return std::string(one.param.name); });
 
-// The same recordings in another order, with other names, on another clock, and in a frame that is rotated about z: the
-// shaft's angle is counted from the rotated frame, too.
+// Order, names and clock of the recordings change, and the frame is rotated about z. The shaft's angle is counted from
+// the rotated frame, too.
 TEST(Verdicts, DoNotDependOnTheFormOfTheRecordings) {
   constexpr double kTurn_rad = 0.6;
   const SimulatedRig rig{.effects = {active("torsional_windup", {0.7})}, .recordings = 3};

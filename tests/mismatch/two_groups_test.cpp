@@ -72,8 +72,8 @@ TEST(TwoGroups, AShiftIsNotTakenForInsertionsThatDiffer) {
   EXPECT_EQ(found.effects[0].name, "entry_point");
 }
 
-// What the recordings say nothing of is said to be held by the model file.
-TEST(Beliefs, ANeedleThatNeverTurnsSaysNothingOfItsSlip) {
+// Lambda keeps the value of the model file, and a remark states it.
+TEST(Beliefs, WithoutRotationLambdaIsReportedAsNotDetermined) {
   auto raw = record({.recordings = 4}, kSeed);
   for (auto& one : raw) {
     model::testing::Script straight{{8, 2.5, 0}};
@@ -88,7 +88,9 @@ TEST(Beliefs, ANeedleThatNeverTurnsSaysNothingOfItsSlip) {
   }
   const Findings found = diagnose(make_case(std::move(raw)), model::testing::agar(), {});
   EXPECT_THAT(found.remarks,
-              ::testing::Contains(::testing::AllOf(HasSubstr("held by the model file"), HasSubstr("lambda1_per_rad"))));
+              ::testing::Contains(::testing::AllOf(HasSubstr("not determined"), HasSubstr("lambda1_per_rad"))));
+  EXPECT_FALSE(found.needle.slip_determined);
+  EXPECT_NEAR(found.needle.value.lambda2, model::testing::agar().lambda2, 1e-3);
 }
 
 // A sensor askew leaves the path alone: only its headings show it.
