@@ -81,6 +81,10 @@ Choice choose(const Search& search, const Posterior& posterior, const std::set<s
   std::set<std::string> names;
   for (const auto& [name, probability] : posterior.inclusion)
     if (probability > 0.5 * something && !refused.contains(name)) names.insert(name);
+  // A model that is far less likely than another one stands for nothing, whatever it names.
+  double likeliest_part = 0;
+  for (const auto& share : posterior.sets)
+    likeliest_part = std::max({likeliest_part, part_of(share, false), part_of(share, true)});
   // Of the sets that hold these names, or as many of them as any: those with another effect if that there is one is
   // likelier than not, else that without, and of these the likeliest. With a discrepancy that counts, or without one.
   const auto likeliest = [&](bool with_discrepancy) {
@@ -98,7 +102,8 @@ Choice choose(const Search& search, const Posterior& posterior, const std::set<s
       if (std::ranges::any_of(own, [&](const auto& name) { return refused.contains(name); })) continue;
       const auto held = static_cast<std::size_t>(
           std::count_if(names.begin(), names.end(), [&](const auto& name) { return own.contains(name); }));
-      all.push_back({&one, held, own.size() > held, part_of(share, with_discrepancy)});
+      const double part = part_of(share, with_discrepancy);
+      if (part * kConfounderOdds >= likeliest_part) all.push_back({&one, held, own.size() > held, part});
     }
     std::size_t most = 0;
     for (const Candidate& one : all) most = std::max(most, one.held);

@@ -124,6 +124,22 @@ TEST_F(Decide, NothingWhereTooMuchWasNotFitted) {
   EXPECT_EQ(decide_by(posterior).verdict, Verdict::effects_found);
 }
 
+// The likeliest effect may not be named. One that is far less likely lists it as a confounder, and is not named either.
+TEST_F(Decide, NoModelThatIsFarLessLikelyThanARefusedOne) {
+  Posterior posterior;
+  posterior.inclusion = {{"dry_friction", 1.0}, {"sensor_scale", 1e-9}};
+  posterior.sets = {{{Pendulum::kDryFriction}, 1.0, 0.0}, {{Pendulum::kSensorScale}, 1e-9, 0.0}};
+  const auto refuse = [](const ChosenModel& model, std::size_t member) {
+    return std::string(model.fit->layout.set()[member] == Pendulum::kDryFriction ? "its interval includes none" : "");
+  };
+  const Decision decision = diagnosis::decide(search, posterior, refuse);
+  EXPECT_EQ(decision.verdict, Verdict::inconclusive);
+  EXPECT_TRUE(set_of(decision).empty());
+  // One that is nearly as likely is.
+  posterior.sets = {{{Pendulum::kDryFriction}, 0.6, 0.0}, {{Pendulum::kSensorScale}, 0.4, 0.0}};
+  EXPECT_EQ(set_of(diagnosis::decide(search, posterior, refuse)), ModelSet{Pendulum::kSensorScale});
+}
+
 // Something is missing with 0.6; no name reaches a half, not even with what is as likely in its place.
 TEST_F(Decide, NoNameBelowAHalf) {
   Posterior posterior;
