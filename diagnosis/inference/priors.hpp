@@ -15,7 +15,7 @@ struct Prior {
   Form form = Form::normal;
   double middle = 0, scale = 1;
   double lower = 0, upper = 0;  // flat: the range; size: bounds, of which `middle` may be one
-  double outside = 0;           // flat: width of the wider range that holds the rest; 0: there is none
+  double outside = 0;           // flat: width of the wider range, which holds the rest; 0: the density is zero outside
   // size: what the effect's causes bring about: this far from the middle at least, and no larger value than that.
   // One in twenty is said to lie elsewhere.
   double least_distance = 0, largest = std::numeric_limits<double>::infinity();

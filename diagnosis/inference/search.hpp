@@ -31,7 +31,7 @@ struct SearchRules {
   // first, until they hold no more than this share of the posterior or these further steps are spent.
   double most_not_fitted = 0.1;
   long further_steps = 1000;
-  std::size_t at_once = 4;  // fits of which the next are chosen by what these come to
+  std::size_t at_once = 4;  // fits that run before the next ones are chosen
   std::size_t rounds = 6;
   int threads = 2;
 };

@@ -81,7 +81,7 @@ Choice choose(const Search& search, const Posterior& posterior, const std::set<s
   std::set<std::string> names;
   for (const auto& [name, probability] : posterior.inclusion)
     if (probability > 0.5 * something && !refused.contains(name)) names.insert(name);
-  // A model that is far less likely than another one stands for nothing, whatever it names.
+  // A model that is far less likely than another one is not reported.
   double likeliest_part = 0;
   for (const auto& share : posterior.sets)
     likeliest_part = std::max({likeliest_part, part_of(share, false), part_of(share, true)});

@@ -49,7 +49,7 @@ struct FoundEffect {
   std::vector<FoundInRecording> recordings{};
   // Natural: of the model with it against the model without it, both with a discrepancy or both without one.
   double log_bayes_factor = 0;
-  double visible_sigmas = 0;  // root of the fall of chi2 that it brings beside the others
+  double visible_sigmas = 0;  // root of the fall of chi2 that it brings, given the others
   // By how much it moves the tip where the cameras see it: the model without it against the model that was found, at
   // the deepest reading of each recording, root mean square over recordings. NaN: without it the tip cannot follow.
   double moved_at_depth_mm = 0;

@@ -41,8 +41,8 @@ struct EffectParameter {
   // Where fits begin: one value if the likelihood has one valley, a grid if several (a depth, a frequency).
   std::vector<double> starts;
   double reported = 0;  // largest distance from `none` that the literature reports; 0 where `none` is NaN
-  // Where `none` is NaN and the parameter is not periodic: the range that the literature and the length of needles make
-  // likely. The prior density is uniform over it, with one part in twenty uniform over [lower, upper].
+  // Likely range by the literature and the length of needles, for a parameter without `none` that is not periodic. The
+  // prior density is uniform over it, with one part in twenty uniform over [lower, upper].
   double likely_low = 0, likely_high = 0;
   Scope scope = Scope::rig;
   bool periodic = false;   // an angle: the bounds are one period apart

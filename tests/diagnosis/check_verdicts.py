@@ -50,7 +50,7 @@ def violations(verdict):
     for one in verdict["tried"] + verdict["tried_beside"]:
         factor, sizes = one["log_bayes_factor"], max(1, len(one["parameters"]))
         if one["fitted"] and factor is not None and factor < LEAST_LOG_BAYES_FACTOR * sizes:
-            out.append(f"{one['name']} beside {one['beside'] or 'nothing'} has a log Bayes factor of {factor:.1f}")
+            out.append(f"{one['name']} in addition to {one['beside'] or 'nothing'} has a log Bayes factor of {factor:.1f}")
     if not inconclusive and verdict["probability"] >= 0.99 and verdict["next_experiment"] != "none needed":
         out.append("a next experiment at a probability of 99 %")
     gains = [r["predicted"]["after"]["new_insertion"]["log_density"] -

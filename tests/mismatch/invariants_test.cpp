@@ -160,7 +160,7 @@ std::vector<Case> cases() {
 INSTANTIATE_TEST_SUITE_P(Simulated, EveryVerdict, ::testing::ValuesIn(cases()),
                          [](const auto& one) { return std::string(one.param.name); });
 
-// The same recordings in another form.
+// Equivalent forms of the same recordings.
 struct Form {
   const char* name;
   bool reversed = false;  // and with other names
