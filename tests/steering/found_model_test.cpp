@@ -142,6 +142,17 @@ TEST(FoundModel, BringsATipThatJumpsToTheRestNearestToTheTarget) {
   }
 }
 
+// Closed form for a circle of curvature k: 1/k - sqrt(1/k^2 - d^2) to the side at the depth d, and 1/k where it turns
+// back.
+TEST(ModelRig, ANeedleThatTurnsBackIsFarthestAsideThere) {
+  model::NeedleParameters bicycle;
+  bicycle.curvature_per_mm = 0.0159, bicycle.wheelbase_mm = 20, bicycle.lambda1_per_rad = 0, bicycle.lambda2 = 0;
+  const double radius_mm = 1 / bicycle.curvature_per_mm;
+  constexpr double kStep_mm = 1;
+  EXPECT_NEAR(farthest_aside_mm(bicycle, 40), radius_mm - std::sqrt(radius_mm * radius_mm - 40 * 40), kStep_mm);
+  EXPECT_NEAR(farthest_aside_mm(bicycle, 98), radius_mm, kStep_mm);
+}
+
 TEST(SteeredInsertion, AnInsertionThatAnUnhealthyEstimateEndsHasQuantityValueLimitAndDepth) {
   const io::ModelFile rig_model{needle(), {{"insertion_scale", {{"ratio", 0.92}}}}};
   for (const Insertion& one : steer_all(rig_model, {needle(), {}})) {

@@ -41,7 +41,8 @@ Cameras cameras_of(const diagnosis::RecordedCase& recorded, const inference::Noi
 
 double farthest_aside_mm(const model::NeedleParameters& needle, double depth_mm) {
   model::Pose tip;
-  while (tip.p_mm.z() < depth_mm &&
+  // A needle that never reaches the depth turns back: a circle of the bicycle goes on for ever.
+  while (tip.p_mm.z() < depth_mm && tip.R(2, 2) > 0 &&
          model::advance(tip, {1, 0, {needle.curvature_per_mm, 0}}, model::slip_parameters(needle))) {
   }
   return tip.p_mm.head<2>().norm();

@@ -22,7 +22,8 @@ std::vector<model::ActiveEffect> for_one_insertion(const io::ModelFile& model, d
 // Cameras that see the tip as those of the recordings, with this noise.
 Cameras cameras_of(const diagnosis::RecordedCase& recorded, const inference::Noise& noise);
 
-// How far to the side the needle bends that is never turned, on its way down to this depth.
+/// Computes the lateral distance of the tip, mm, where a needle that never rotates reaches a depth (mm along z of {A}),
+/// or where it turns back before it.
 double farthest_aside_mm(const model::NeedleParameters& needle, double depth_mm);
 
 inline constexpr double kDeepestTarget_mm = 110;      // the controller's workspace with room
