@@ -14,6 +14,9 @@
 
 namespace bevel::inference {
 
+/// Largest share of the posterior mass that may be in candidate models which were not fitted.
+inline constexpr double kMostNotFitted = 0.1;
+
 struct SearchRules {
   std::size_t largest = 3;
   double window = 3.5;         // in log posterior: sets below are not looked at further (odds of 33)
@@ -29,7 +32,7 @@ struct SearchRules {
   std::size_t most_curves = 2;          // of a discrepancy
   // Models that were predicted to be likely and not fitted for want of steps: fitted after the search, the likeliest
   // first, until they hold no more than this share of the posterior or these further steps are spent.
-  double most_not_fitted = 0.1;
+  double most_not_fitted = kMostNotFitted;
   long further_steps = 1000;
   std::size_t at_once = 4;  // fits that run before the next ones are chosen
   std::size_t rounds = 6;

@@ -145,10 +145,10 @@ Decision inconclusive(const Search& search, std::vector<std::string> reasons) {
 }
 
 Decision decide(const Search& search, const Posterior& posterior, const FaultOfName& fault_of) {
-  if (posterior.not_visited > kMostNotFitted)
+  if (posterior.not_visited > inference::kMostNotFitted)
     return inconclusive(search, {percent(posterior.not_visited) +
                                  " of the probability is in candidate models that were not fitted; at most " +
-                                 percent(kMostNotFitted) + " may be"});
+                                 percent(inference::kMostNotFitted) + " may be"});
   std::vector<std::string> reasons;
   std::set<std::string> refused;
   for (;;) {

@@ -32,8 +32,6 @@ struct ChosenModel {
 
 /// Least probability of a named effect, alone or jointly with the confounders that are listed with it.
 inline constexpr double kLeastProbability = 0.5;
-/// Largest share of the posterior mass that may be in candidate models which were not fitted.
-inline constexpr double kMostNotFitted = 0.1;
 /// An effect is a confounder of another one if the model with it in the other one's place is not less likely than this.
 inline constexpr double kConfounderOdds = 20;
 

@@ -142,11 +142,10 @@ void list_explanations(const inference::Search& search, const inference::Posteri
 }
 
 // The motion that separates the chosen model from the likeliest other explanation; of an inconclusive verdict, the two
-// likeliest explanations. Null where none is needed, or there is no other.
+// likeliest explanations. Null where there is no other.
 std::optional<NextExperiment> next_experiment(const inference::Search& search, const inference::Posterior& posterior,
                                               const Decision& decision, const ChosenModel& base,
                                               const Experiments& experiments) {
-  if (decision.verdict != Verdict::inconclusive && decision.probability >= kNoDoubt) return std::nullopt;
   const auto model = [&](const inference::Fit& fit) { return imagined(fit, model_of(search, fit)); };
   const auto chosen =
       decision.verdict == Verdict::inconclusive ? posterior.sets.front().set : decision.model.fit->layout.set();
@@ -257,7 +256,8 @@ Findings diagnose(const RecordedCase& recorded, const model::NeedleParameters& m
   stages.begin("what these recordings could have shown");
   const Experiments experiments(system, findings.noise);
   find_reach(system, search, base, experiments, findings);
-  findings.next_experiment = next_experiment(search, posterior, decision, base, experiments);
+  if (is_experiment_needed(findings))
+    findings.next_experiment = next_experiment(search, posterior, decision, base, experiments);
 
   if (adopts_a_model(findings.verdict)) findings.where = locate(system, base, decision.model, 3);
   findings.traces = make_traces(system, calibration.outliers, base, decision.model, model);

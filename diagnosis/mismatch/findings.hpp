@@ -32,6 +32,8 @@ struct FoundParameter {
   bool at_bound = false;
   double none = std::numeric_limits<double>::quiet_NaN();  // value at which the effect vanishes; NaN: at no value
 };
+/// Returns whether the 95 % interval of a size excludes "no effect"; false for a parameter at which no effect vanishes.
+inline bool excludes_none(const FoundParameter& p) { return p.ci95[0] > p.none || p.ci95[1] < p.none; }
 
 // Instants and phases: one entry per recording that has the effect.
 struct FoundInRecording {

@@ -113,8 +113,6 @@ std::optional<double> log_bayes_factor_of(const Search& search, const ChosenMode
                           : here.log_without_curve - rest.log_without_curve - odds;
 }
 
-bool excludes_none(const FoundParameter& p) { return p.ci95[0] > p.none || p.ci95[1] < p.none; }
-
 // Borrows `discrepancy`.
 ModelledTip tip_of(const ChosenModel& model, std::span<const inference::CurveValues> discrepancy) {
   const Fit& fit = *model.fit;
@@ -181,9 +179,9 @@ std::string fault_of_name(const NeedleSystem& system, const Search& search, cons
 
 namespace {
 
-// Computes, for each effect, the log Bayes factor if its estimate is exactly "no effect": the density of the size prior there
-// against the standard error of the size. A fit that comes to less is in a local minimum, as "no effect" is a special
-// case of every effect.
+// Computes, for each effect, the log Bayes factor if its estimate is exactly "no effect": the density of the size prior
+// there against the standard error of the size. A fit that comes to less is in a local minimum, as "no effect" is a
+// special case of every effect.
 std::vector<double> least_log_factors(const Search& search) {
   std::vector<double> out(search.system().effects().size(), 0);
   for (const auto& size : search.proposals().reach(search.base_marginal()).sizes) {

@@ -17,8 +17,6 @@ std::string text(double value) {
   return out;
 }
 
-bool excludes_none(const FoundParameter& p) { return p.ci95[0] > p.none || p.ci95[1] < p.none; }
-
 void check_name(const FoundEffect& effect, std::vector<std::string>& out) {
   const double probability = effect.ambiguous_with.empty() ? effect.probability : effect.joint_probability;
   if (!(probability >= kLeastProbability))
@@ -92,7 +90,7 @@ std::vector<std::string> violations(const Findings& findings) {
     out.emplace_back("effects were found, and none is named");
   if (findings.verdict == Verdict::nothing_missing && !(findings.effects.empty() && findings.discrepancies.empty()))
     out.emplace_back("nothing is missing, and something is named");
-  if (findings.not_visited > kMostNotFitted)
+  if (findings.not_visited > inference::kMostNotFitted)
     out.push_back(text(100 * findings.not_visited) +
                   " % of the probability is in candidate models that were not fitted");
   if (adopts_a_model(findings.verdict)) check_predictions(findings.held_out, out);

@@ -8,9 +8,8 @@
 namespace bevel::diagnosis {
 
 /// Checks the invariants of a verdict that its findings can show:
-///   1. a named effect has a probability of at least 0.5, alone or jointly with the confounders listed with it; the 95
-///   %
-///      interval of one of its sizes excludes "no effect"; its log Bayes factor is positive;
+///   1. a named effect has a probability of at least 0.5, alone or jointly with the confounders listed with it; the
+///      interval (95 %) of one of its sizes excludes "no effect"; its log Bayes factor is positive;
 ///   2. at most 10 % of the probability is in candidate models that were not fitted;
 ///   3. a log Bayes factor that is reported is a number that was computed;
 ///   4. the adopted model predicts left-out recordings no worse than the refitted nominal model: the mean difference in

@@ -39,8 +39,8 @@ std::vector<std::vector<Row>> rows_of(const NeedleSystem& system, std::size_t r)
   return out;
 }
 
-// Computes what the physics adds to the rows of one channel if it begins at t0: its effect, less the continuation of the
-// position and direction that it had reached there.
+// Computes what the physics adds to the rows of one channel if it begins at t0: its effect, less the continuation of
+// the position and direction that it had reached there.
 void begin_at(double t0_s, const std::vector<Row>& rows, bool heading, Eigen::Ref<VectorXd> effect) {
   Index at = -1;
   for (std::size_t i = 0; i < rows.size() && rows[i].time_s <= t0_s; ++i) at = static_cast<Index>(i);

@@ -59,7 +59,8 @@ TEST_F(ReadLogs, AFolderInPlaceOfALog) {
   EXPECT_EQ(read.recorded.recordings[2].name, "rec03.lcm");
   EXPECT_THAT(refusal({logs[0], folder.path().string()}), HasSubstr("rec01.lcm: given twice"));
   fs::create_directories(folder / "empty");
-  EXPECT_THAT(refusal({logs[0], (folder / "empty").string()}), HasSubstr("empty: holds no log; expected are files named *.lcm"));
+  EXPECT_THAT(refusal({logs[0], (folder / "empty").string()}),
+              HasSubstr("empty: holds no log; expected are files named *.lcm"));
 }
 
 TEST_F(ReadLogs, TheSameLogTwice) {
