@@ -1,7 +1,7 @@
-# LCM, and bindings out of one function. Two sources: the PyPI wheel (default; headers, liblcm, lcm-gen, lcm.jar, Python)
-# under .deps/lcm, or Debian's liblcm-dev + liblcm-bin + liblcm-java. Gives target bevel_lcm.
+# Finds LCM and defines bevel_lcm_bindings(). Two sources of LCM: the PyPI wheel under .deps/lcm (default; headers, liblcm,
+# lcm-gen, lcm.jar, Python), or Debian's liblcm-dev, liblcm-bin and liblcm-java. Defines the target bevel_lcm.
 option(BEVEL_SYSTEM_LCM "Use the system's liblcm even where .deps/lcm exists" OFF)
-set(lcm_wheel ${CMAKE_SOURCE_DIR}/.deps/lcm)
+set(lcm_wheel ${PROJECT_SOURCE_DIR}/.deps/lcm)
 if(EXISTS ${lcm_wheel}/lib/lcm/cmake/lcmConfig.cmake AND NOT BEVEL_SYSTEM_LCM)
   set(BEVEL_LCM_ROOT ${lcm_wheel})
   find_library(LCM_LIBRARY lcm PATHS ${lcm_wheel}/lib NO_DEFAULT_PATH REQUIRED)
@@ -27,7 +27,7 @@ endif()
 # bevel_lcm_bindings(TARGET FILES...): C++ headers (target TARGET), a jar (TARGET_jar, build/lcmtypes/TARGET.jar) and
 # a Python package (build/lcmtypes/python). A target that uses the types links TARGET.
 function(bevel_lcm_bindings target)
-  set(out ${CMAKE_BINARY_DIR}/lcmtypes)
+  set(out ${PROJECT_BINARY_DIR}/lcmtypes)
   set(headers "")
   set(java "")
   foreach(file ${ARGN})
@@ -44,9 +44,16 @@ function(bevel_lcm_bindings target)
     COMMENT "lcm-gen: C++, Java and Python types" VERBATIM)
   add_custom_target(${target}_generated DEPENDS ${headers} ${java})
   add_library(${target} INTERFACE)
+  add_library(bevel::lcmtypes ALIAS ${target})
   add_dependencies(${target} ${target}_generated)
-  target_include_directories(${target} SYSTEM INTERFACE ${out}/cpp)
-  target_link_libraries(${target} INTERFACE bevel_lcm)
+  target_include_directories(${target} SYSTEM INTERFACE "$<BUILD_INTERFACE:${out}/cpp>"
+    "$<INSTALL_INTERFACE:${CMAKE_INSTALL_INCLUDEDIR}>")
+  # The installed package finds LCM on the user's machine (bevelConfig.cmake).
+  target_link_libraries(${target} INTERFACE "$<BUILD_INTERFACE:bevel_lcm>" "$<INSTALL_INTERFACE:bevel::lcm>")
+  set_target_properties(${target} PROPERTIES EXPORT_NAME lcmtypes)
+  install(TARGETS ${target} EXPORT bevel-io-targets)
+  install(FILES ${headers} DESTINATION ${CMAKE_INSTALL_INCLUDEDIR}/bevel COMPONENT dev)
+  install(FILES ${sources} DESTINATION ${CMAKE_INSTALL_DATADIR}/bevel/lcmtypes COMPONENT dev)
 
   find_program(JAVAC javac)
   find_program(JAR jar)

@@ -4,7 +4,7 @@
 #include <map>
 #include <string>
 
-#include "model/beam/beam_plant.hpp"
+#include <bevel/model/beam/beam_plant.hpp>
 #include "proof/needle_path.hpp"
 #include "proof/visibility.hpp"
 

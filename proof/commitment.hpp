@@ -3,7 +3,7 @@
 #include <string>
 #include <string_view>
 
-#include "io/sha256.hpp"
+#include <bevel/io/sha256.hpp>
 
 namespace bevel::proof {
 

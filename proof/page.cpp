@@ -6,11 +6,11 @@
 #include <cstdio>
 #include <numbers>
 
+#include <bevel/report/numbers.hpp>
+#include <bevel/report/page.hpp>
 #include "proof/page_figures.hpp"
 #include "proof/trial.hpp"
 #include "proof/trial_files.hpp"
-#include "report/numbers.hpp"
-#include "report/page.hpp"
 
 namespace bevel::proof {
 namespace {

@@ -3,9 +3,9 @@
 #include <algorithm>
 #include <set>
 
+#include <bevel/report/drawing.hpp>
+#include <bevel/report/numbers.hpp>
 #include "proof/tally.hpp"
-#include "report/drawing.hpp"
-#include "report/numbers.hpp"
 
 namespace bevel::proof {
 

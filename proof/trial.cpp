@@ -8,7 +8,7 @@
 #include <numeric>
 #include <set>
 
-#include "model/needle.hpp"
+#include <bevel/model/needle.hpp>
 #include "proof/beam_path.hpp"
 #include "proof/distribution.hpp"
 

@@ -5,7 +5,7 @@
 #include <optional>
 #include <string>
 
-#include "model/beam/beam_plant.hpp"
+#include <bevel/model/beam/beam_plant.hpp>
 #include "proof/visibility.hpp"
 
 namespace bevel::proof {

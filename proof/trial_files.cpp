@@ -11,10 +11,10 @@
 #include <nlohmann/json.hpp>
 #include <stdexcept>
 
-#include "io/log_writer.hpp"
-#include "io/messages.hpp"
-#include "io/result_file.hpp"
-#include "model/samples.hpp"
+#include <bevel/io/log_writer.hpp>
+#include <bevel/io/messages.hpp>
+#include <bevel/io/result_file.hpp>
+#include <bevel/model/samples.hpp>
 #include "proof/commitment.hpp"
 
 namespace bevel::proof {

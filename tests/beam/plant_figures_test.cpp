@@ -7,7 +7,7 @@
 #include <cstdio>
 #include <vector>
 
-#include "model/beam/beam_plant.hpp"
+#include <bevel/model/beam/beam_plant.hpp>
 #include "tests/support/count_allocations.hpp"
 
 namespace bevel::model {

@@ -1,5 +1,5 @@
 // The beam plant's behaviour: signs, symmetry, closed form of the moving needle, memory, relaxation, wind-up, errors.
-#include "model/beam/beam_plant.hpp"
+#include <bevel/model/beam/beam_plant.hpp>
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>

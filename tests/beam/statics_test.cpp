@@ -5,10 +5,10 @@
 #include <cmath>
 #include <random>
 
-#include "model/beam/band_ldlt.hpp"
-#include "model/beam/cut_path.hpp"
-#include "model/beam/hermite_beam.hpp"
-#include "model/beam/windup.hpp"
+#include <bevel/model/beam/band_ldlt.hpp>
+#include <bevel/model/beam/cut_path.hpp>
+#include <bevel/model/beam/hermite_beam.hpp>
+#include <bevel/model/beam/windup.hpp>
 
 namespace bevel::model {
 namespace {

@@ -6,11 +6,11 @@
 #include <random>
 #include <stdexcept>
 
-#include "drivers/camera/calibrated_view.hpp"
-#include "drivers/camera/calibration/calibration_file.hpp"
-#include "drivers/camera/pipeline.hpp"
-#include "drivers/camera/planar_view.hpp"
-#include "estimator/needle_filter.hpp"
+#include <bevel/drivers/camera/calibrated_view.hpp>
+#include <bevel/drivers/camera/calibration/calibration_file.hpp>
+#include <bevel/drivers/camera/pipeline.hpp>
+#include <bevel/drivers/camera/planar_view.hpp>
+#include <bevel/estimator/needle_filter.hpp>
 #include "tests/calibration/true_optics.hpp"
 
 namespace bevel::camera {

@@ -8,7 +8,7 @@
 #include <opencv2/core/persistence.hpp>
 #include <random>
 
-#include "drivers/camera/calibration/calibration_file.hpp"
+#include <bevel/drivers/camera/calibration/calibration_file.hpp>
 #include "tests/calibration/true_optics.hpp"
 
 namespace bevel::camera {

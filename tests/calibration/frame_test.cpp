@@ -5,8 +5,8 @@
 #include <cstdio>
 #include <functional>
 
-#include "drivers/camera/calibrated_view.hpp"
-#include "drivers/camera/calibration/frame_fit.hpp"
+#include <bevel/drivers/camera/calibrated_view.hpp>
+#include <bevel/drivers/camera/calibration/frame_fit.hpp>
 #include "tests/calibration/true_optics.hpp"
 
 namespace bevel::camera {

@@ -5,7 +5,7 @@
 #include <chrono>
 #include <iostream>
 
-#include "drivers/camera/calibrated_view.hpp"
+#include <bevel/drivers/camera/calibrated_view.hpp>
 #include "tests/calibration/true_optics.hpp"
 #include "tests/loop/simulated_loop.hpp"
 

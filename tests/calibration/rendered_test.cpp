@@ -6,9 +6,9 @@
 #include <deque>
 #include <random>
 
-#include "drivers/camera/calibrated_view.hpp"
-#include "drivers/camera/pipeline.hpp"
-#include "rig/camera/needle_renderer.hpp"
+#include <bevel/drivers/camera/calibrated_view.hpp>
+#include <bevel/drivers/camera/pipeline.hpp>
+#include <bevel/rig/camera/needle_renderer.hpp>
 #include "tests/calibration/true_optics.hpp"
 #include "tests/camera/scenes.hpp"
 

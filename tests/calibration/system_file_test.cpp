@@ -2,9 +2,9 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-#include "drivers/camera/calibration/calibration_file.hpp"
-#include "io/config.hpp"
-#include "nodes/system_config.hpp"
+#include <bevel/drivers/camera/calibration/calibration_file.hpp>
+#include <bevel/io/config.hpp>
+#include <bevel/nodes/system_config.hpp>
 #include "tests/calibration/true_optics.hpp"
 #include "tests/support/temporary_folder.hpp"
 

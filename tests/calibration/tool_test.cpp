@@ -9,10 +9,10 @@
 #include <opencv2/imgcodecs.hpp>
 #include <sstream>
 
-#include "drivers/camera/calibrated_view.hpp"
-#include "drivers/camera/decode.hpp"
-#include "io/log_writer.hpp"
-#include "io/messages.hpp"
+#include <bevel/drivers/camera/calibrated_view.hpp>
+#include <bevel/drivers/camera/decode.hpp>
+#include <bevel/io/log_writer.hpp>
+#include <bevel/io/messages.hpp>
 #include "tests/calibration/true_optics.hpp"
 #include "tests/camera/exif.hpp"
 #include "tests/support/temporary_folder.hpp"

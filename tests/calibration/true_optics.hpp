@@ -7,7 +7,7 @@
 #include <random>
 #include <vector>
 
-#include "drivers/camera/calibration/calibrate.hpp"
+#include <bevel/drivers/camera/calibration/calibrate.hpp>
 
 namespace bevel::test {
 

@@ -1,7 +1,7 @@
 // Cost of one frame: `bench_camera --benchmark_min_time=1`. One thread, as in the camera process.
 #include <benchmark/benchmark.h>
 
-#include "drivers/camera/tip_tracker.hpp"
+#include <bevel/drivers/camera/tip_tracker.hpp>
 #include "tests/camera/scenes.hpp"
 
 namespace {

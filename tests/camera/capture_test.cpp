@@ -9,9 +9,9 @@
 #include <opencv2/imgcodecs.hpp>
 #include <set>
 
-#include "drivers/camera/frame_sources.hpp"
-#include "drivers/camera/pipeline.hpp"
-#include "drivers/camera/planar_view.hpp"
+#include <bevel/drivers/camera/frame_sources.hpp>
+#include <bevel/drivers/camera/pipeline.hpp>
+#include <bevel/drivers/camera/planar_view.hpp>
 
 namespace bevel::camera {
 namespace {

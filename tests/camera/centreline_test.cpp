@@ -1,5 +1,5 @@
 // What the needle is compared with on its sides, on made pictures.
-#include "drivers/camera/centreline.hpp"
+#include <bevel/drivers/camera/centreline.hpp>
 
 #include <gtest/gtest.h>
 

@@ -1,6 +1,6 @@
 // Decoding of images: rows and columns of the sensor whatever the orientation tag, one brightness scale per bit depth,
 // and no decoder in the source tree but this one.
-#include "drivers/camera/decode.hpp"
+#include <bevel/drivers/camera/decode.hpp>
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -10,7 +10,7 @@
 #include <opencv2/imgproc.hpp>
 #include <opencv2/videoio.hpp>
 
-#include "drivers/camera/frame_sources.hpp"
+#include <bevel/drivers/camera/frame_sources.hpp>
 #include "tests/camera/exif.hpp"
 #include "tests/support/temporary_folder.hpp"
 
@@ -214,13 +214,13 @@ TEST(Decode, IsTheOnlyDecoderInTheSourceTree) {
     for (const auto& entry : fs::recursive_directory_iterator(root / part)) {
       const fs::path& file = entry.path();
       if (file.extension() != ".cpp" && file.extension() != ".hpp") continue;
-      if (file == root / "drivers/camera/decode.cpp" || file.filename() == "decode_test.cpp") continue;
+      if (file == root / "drivers/src/camera/decode.cpp" || file.filename() == "decode_test.cpp") continue;
       ++files;
       const std::string text = test::text_of(file.string());
       for (const char* call : {"cv::imread(", "cv::imdecode(", "cv::imreadmulti("})
         EXPECT_EQ(text.find(call), std::string::npos)
             << file << " calls " << call
-            << ") and so rotates images by their EXIF orientation; use drivers/camera/decode.hpp";
+            << ") and so rotates images by their EXIF orientation; use bevel/drivers/camera/decode.hpp";
     }
   EXPECT_GT(files, 300);
 }

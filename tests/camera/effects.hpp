@@ -6,7 +6,7 @@
 #include <cmath>
 #include <vector>
 
-#include "drivers/camera/tip_tracker.hpp"
+#include <bevel/drivers/camera/tip_tracker.hpp>
 #include "tests/camera/scenes.hpp"
 
 namespace bevel::test {

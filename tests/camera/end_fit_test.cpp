@@ -1,13 +1,13 @@
 // The model of a bevelled end: its moments against the silhouette counted point by point, and the fit against profiles
 // made of the model.
-#include "drivers/camera/end_fit.hpp"
+#include <bevel/drivers/camera/end_fit.hpp>
 
 #include <gtest/gtest.h>
 
 #include <cmath>
 #include <random>
 
-#include "drivers/camera/bevel_shape.hpp"
+#include <bevel/drivers/camera/bevel_shape.hpp>
 
 namespace bevel::camera {
 namespace {

@@ -5,7 +5,7 @@
 #include <cstdio>
 #include <functional>
 
-#include "drivers/camera/tip_tracker.hpp"
+#include <bevel/drivers/camera/tip_tracker.hpp>
 #include "tests/camera/scenes.hpp"
 
 namespace bevel::camera {

@@ -1,5 +1,5 @@
 // A line thinner than the lens's blur, located across: against made profiles of known place.
-#include "drivers/camera/line_location.hpp"
+#include <bevel/drivers/camera/line_location.hpp>
 
 #include <gtest/gtest.h>
 

@@ -6,7 +6,7 @@
 #include <cmath>
 #include <stdexcept>
 
-#include "model/slip.hpp"
+#include <bevel/model/slip.hpp>
 
 namespace bevel::test {
 namespace {

@@ -1,4 +1,4 @@
-#include "drivers/camera/pipeline.hpp"
+#include <bevel/drivers/camera/pipeline.hpp>
 
 #include <gtest/gtest.h>
 

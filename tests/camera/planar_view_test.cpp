@@ -2,7 +2,7 @@
 
 #include <stdexcept>
 
-#include "drivers/camera/planar_view.hpp"
+#include <bevel/drivers/camera/planar_view.hpp>
 
 namespace bevel::camera {
 namespace {

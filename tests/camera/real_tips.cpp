@@ -9,8 +9,8 @@
 #include <sstream>
 #include <stdexcept>
 
-#include "drivers/camera/decode.hpp"
-#include "drivers/camera/frame_source.hpp"
+#include <bevel/drivers/camera/decode.hpp>
+#include <bevel/drivers/camera/frame_source.hpp>
 
 namespace bevel::test {
 

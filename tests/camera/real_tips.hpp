@@ -5,8 +5,8 @@
 #include <string>
 #include <vector>
 
-#include "drivers/camera/frame.hpp"
-#include "drivers/camera/tip_tracker.hpp"
+#include <bevel/drivers/camera/frame.hpp>
+#include <bevel/drivers/camera/tip_tracker.hpp>
 #include "tests/camera/path_fit.hpp"
 
 namespace bevel::test {

@@ -1,6 +1,6 @@
 // Frames kept while they are tracked: played back they give the same readings to the last bit, and a slow or broken
 // disk costs frames, never the tracker.
-#include "drivers/camera/frame_recorder.hpp"
+#include <bevel/drivers/camera/frame_recorder.hpp>
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -8,7 +8,7 @@
 #include <cstdio>
 #include <opencv2/imgcodecs.hpp>
 
-#include "drivers/camera/pipeline.hpp"
+#include <bevel/drivers/camera/pipeline.hpp>
 #include "tests/camera/scenes.hpp"
 #include "tests/support/run_program.hpp"
 #include "tests/support/temporary_folder.hpp"

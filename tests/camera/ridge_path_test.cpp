@@ -1,5 +1,5 @@
 // Which path is a needle's, and where it ends, on responses drawn by hand.
-#include "drivers/camera/ridge_path.hpp"
+#include <bevel/drivers/camera/ridge_path.hpp>
 
 #include <gtest/gtest.h>
 

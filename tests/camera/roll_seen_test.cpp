@@ -8,7 +8,7 @@
 #include <tuple>
 #include <vector>
 
-#include "rig/camera/needle_renderer.hpp"
+#include <bevel/rig/camera/needle_renderer.hpp>
 
 namespace bevel::camera {
 namespace {

@@ -6,9 +6,9 @@
 #include <random>
 #include <vector>
 
-#include "drivers/camera/planar_view.hpp"
-#include "drivers/camera/tracker_config.hpp"
-#include "rig/camera/needle_renderer.hpp"
+#include <bevel/drivers/camera/planar_view.hpp>
+#include <bevel/drivers/camera/tracker_config.hpp>
+#include <bevel/rig/camera/needle_renderer.hpp>
 
 namespace bevel::test {
 

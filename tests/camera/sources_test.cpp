@@ -10,9 +10,9 @@
 #include <opencv2/imgcodecs.hpp>
 #include <thread>
 
-#include "drivers/camera/frame_source.hpp"
-#include "drivers/camera/frame_stream.hpp"
-#include "rig/camera/frame_server.hpp"
+#include <bevel/drivers/camera/frame_source.hpp>
+#include <bevel/drivers/camera/frame_stream.hpp>
+#include <bevel/rig/camera/frame_server.hpp>
 #include "tests/support/stale_socket.hpp"
 #include "tests/support/temporary_folder.hpp"
 

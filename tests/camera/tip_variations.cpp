@@ -9,7 +9,7 @@
 #include <random>
 #include <string>
 
-#include "drivers/camera/decode.hpp"
+#include <bevel/drivers/camera/decode.hpp>
 #include "tests/camera/real_tips.hpp"
 
 namespace {

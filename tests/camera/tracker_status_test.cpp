@@ -4,7 +4,7 @@
 #include <opencv2/imgproc.hpp>
 #include <stdexcept>
 
-#include "drivers/camera/tip_tracker.hpp"
+#include <bevel/drivers/camera/tip_tracker.hpp>
 #include "tests/camera/scenes.hpp"
 
 namespace bevel::camera {

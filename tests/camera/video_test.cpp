@@ -8,7 +8,7 @@
 #include <opencv2/imgproc.hpp>
 #include <opencv2/videoio.hpp>
 
-#include "drivers/camera/pipeline.hpp"
+#include <bevel/drivers/camera/pipeline.hpp>
 #include "tests/camera/scenes.hpp"
 #include "tests/support/temporary_folder.hpp"
 

@@ -4,12 +4,12 @@
 #include <cmath>
 #include <limits>
 
-#include "diagnosis/inference/calibrate.hpp"
-#include "diagnosis/inference/log_sum.hpp"
-#include "diagnosis/mismatch/decision.hpp"
-#include "diagnosis/mismatch/found_effects.hpp"
-#include "io/find_logs.hpp"
-#include "io/model_file.hpp"
+#include <bevel/diagnosis/inference/calibrate.hpp>
+#include <bevel/diagnosis/inference/log_sum.hpp>
+#include <bevel/diagnosis/mismatch/decision.hpp>
+#include <bevel/diagnosis/mismatch/found_effects.hpp>
+#include <bevel/io/find_logs.hpp>
+#include <bevel/io/model_file.hpp>
 #include "proof/trial_files.hpp"
 #include "tools/diagnose/read_case.hpp"
 

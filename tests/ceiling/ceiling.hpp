@@ -4,7 +4,7 @@
 #include <filesystem>
 #include <nlohmann/json.hpp>
 
-#include "diagnosis/inference/search.hpp"
+#include <bevel/diagnosis/inference/search.hpp>
 #include "tests/ceiling/generator_prior.hpp"
 
 namespace bevel::ceiling {

@@ -2,7 +2,7 @@
 // What the generator draws an effect's sizes from, as a density (docs/proof/distribution.md): half of them as the field
 // reports them, uniform over a range; half scaled by a factor, of at most 1.5, so that a number of standard deviations
 // that is log-uniform can be seen.
-#include "diagnosis/inference/likelihood.hpp"
+#include <bevel/diagnosis/inference/likelihood.hpp>
 #include "tests/ceiling/generator_system.hpp"
 
 namespace bevel::ceiling {

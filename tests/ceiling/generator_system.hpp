@@ -1,13 +1,13 @@
 #pragma once
-// The blind trial's generator as a client of the engine (diagnosis/inference/system.hpp): its own integrator, its own
-// forms of the effects, those on no list too, under the same priors of needle, variation and noise as the needle's.
+// The blind trial's generator as a client of the engine (bevel/diagnosis/inference/system.hpp): its own integrator, its
+// own forms of the effects, those on no list too, under the same priors of needle, variation and noise as the needle's.
 // What the tool is measured against, so it belongs to neither room: proof/ and diagnosis/ meet here alone.
 //
 // Of one trial it has what the logs do not say: the share of the physical forms (HiddenPhysics::departure) and the
 // axes' motion at 1 kHz. The drives' periodic errors are unknown to it, as to the tool, unless they are given.
 #include <mutex>
 
-#include "diagnosis/needle/needle_system.hpp"
+#include <bevel/diagnosis/needle/needle_system.hpp>
 #include "proof/trial.hpp"
 
 namespace bevel::ceiling {

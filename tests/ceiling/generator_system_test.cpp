@@ -5,7 +5,7 @@
 
 #include <numbers>
 
-#include "diagnosis/inference/layout.hpp"
+#include <bevel/diagnosis/inference/layout.hpp>
 #include "tests/ceiling/trial_case.hpp"
 
 namespace bevel::ceiling {

@@ -1,8 +1,8 @@
 // Where nothing is concealed, the generator and the library are one model in two forms: the same evidence.
 #include <gmock/gmock.h>
 
-#include "diagnosis/inference/calibrate.hpp"
-#include "diagnosis/inference/evidence.hpp"
+#include <bevel/diagnosis/inference/calibrate.hpp>
+#include <bevel/diagnosis/inference/evidence.hpp>
 #include "tests/ceiling/generator_system.hpp"
 #include "tests/ceiling/trial_case.hpp"
 

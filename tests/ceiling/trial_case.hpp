@@ -4,8 +4,8 @@
 
 #include <filesystem>
 
-#include "diagnosis/needle/needle_system.hpp"
-#include "io/find_logs.hpp"
+#include <bevel/diagnosis/needle/needle_system.hpp>
+#include <bevel/io/find_logs.hpp>
 #include "proof/beam_path.hpp"
 #include "proof/trial_files.hpp"
 #include "tools/diagnose/read_case.hpp"

@@ -1,8 +1,8 @@
 // bevel-check against simulated drives in simulated time: a good rig, and each thing broken in turn.
 #include <gmock/gmock.h>
 
-#include "drivers/can/memory_bus.hpp"
-#include "rig/drives/simulated_drive.hpp"
+#include <bevel/drivers/can/memory_bus.hpp>
+#include <bevel/rig/drives/simulated_drive.hpp>
 #include "tools/check/bus_probe.hpp"
 #include "tools/check/judgement.hpp"
 

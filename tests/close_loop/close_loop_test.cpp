@@ -100,12 +100,14 @@ TEST_F(CloseTheLoop, InsertionScaleFoundMakesAllThreeBetterAndTheFilesSaySo) {
   EXPECT_EQ(json["controller"]["live"]["augmented"]["insertions"], 192);
   const std::string page = text_of(folder / "out/close-the-loop.html");
   std::size_t pictures = 0;
-  for (std::size_t at = page.find("data-figure="); at != std::string::npos; at = page.find("data-figure=", at + 1)) ++pictures;
+  for (std::size_t at = page.find("data-figure="); at != std::string::npos; at = page.find("data-figure=", at + 1))
+    ++pictures;
   EXPECT_EQ(pictures, 3U);
   for (const char* name : {"verdict.json", "report.html", "model.toml"}) EXPECT_TRUE(fs::exists(folder / "out" / name));
 }
 
-// The rig of the tool is the one the effects' tests know: its open loop is model/effects/open_loop, late camera too.
+// The rig of the tool is the one the effects' tests know: its open loop is bevel/model/effects/open_loop.hpp, late
+// camera too.
 TEST(SimulatedRecording, IsThePredictionOfTheModelFile) {
   io::ModelFile model{model::testing::agar(),
                       {{"rotation_backlash", {{"width_rad", 0.4}}, {}}, {"camera_scale", {{"ratio", 1.03}}, {}}}};

@@ -8,10 +8,10 @@
 #include <string>
 #include <vector>
 
-#include "io/log_writer.hpp"
-#include "io/messages.hpp"
-#include "io/model_file.hpp"
-#include "rig/plant/plant.hpp"
+#include <bevel/io/log_writer.hpp>
+#include <bevel/io/messages.hpp>
+#include <bevel/io/model_file.hpp>
+#include <bevel/rig/plant/plant.hpp>
 #include "tests/effects/script.hpp"
 
 namespace bevel::close_loop::testing {

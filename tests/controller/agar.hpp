@@ -1,7 +1,7 @@
 // The needle in agar, Table I.
 #pragma once
 
-#include "model/needle.hpp"
+#include <bevel/model/needle.hpp>
 
 namespace bevel::controller {
 

@@ -1,4 +1,4 @@
-#include "controller/arc_law.hpp"
+#include <bevel/controller/arc_law.hpp>
 
 #include <gtest/gtest.h>
 
@@ -7,7 +7,7 @@
 #include <numbers>
 #include <random>
 
-#include "controller/steering_law.hpp"
+#include <bevel/controller/steering_law.hpp>
 
 namespace bevel::controller {
 namespace {

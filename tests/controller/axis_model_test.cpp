@@ -1,5 +1,5 @@
 // The dead band between base and tip, against its closed form; and what it is worth on the way to a roll.
-#include "controller/axis_model.hpp"
+#include <bevel/controller/axis_model.hpp>
 
 #include <gtest/gtest.h>
 

@@ -1,7 +1,7 @@
 // One step of each law, at 100 mm to go: what a control period has to have room for.
 #include <benchmark/benchmark.h>
 
-#include "controller/arc_law.hpp"
+#include <bevel/controller/arc_law.hpp>
 
 namespace bevel::controller {
 namespace {

@@ -1,4 +1,4 @@
-#include "controller/command_watch.hpp"
+#include <bevel/controller/command_watch.hpp>
 
 #include <gtest/gtest.h>
 

@@ -1,6 +1,6 @@
 // Paths round obstacles, judged by computations of their own: distances by sampling, paths integrated in small steps,
 // and a search by brute force where the planner says that there is none.
-#include "controller/path_plan.hpp"
+#include <bevel/controller/path_plan.hpp>
 
 #include <gtest/gtest.h>
 
@@ -9,8 +9,8 @@
 #include <numbers>
 #include <random>
 
-#include "controller/arc_law.hpp"
-#include "controller/route.hpp"
+#include <bevel/controller/arc_law.hpp>
+#include <bevel/controller/route.hpp>
 #include "tests/support/count_allocations.hpp"
 
 namespace bevel::controller {

@@ -1,4 +1,4 @@
-#include "controller/steering_law.hpp"
+#include <bevel/controller/steering_law.hpp>
 
 #include <gtest/gtest.h>
 
@@ -9,7 +9,7 @@
 #include <random>
 #include <vector>
 
-#include "controller/arc_law.hpp"
+#include <bevel/controller/arc_law.hpp>
 #include "tests/controller/agar.hpp"
 
 namespace bevel::controller {

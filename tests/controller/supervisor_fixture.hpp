@@ -7,7 +7,7 @@
 #include <cstdint>
 #include <optional>
 
-#include "controller/supervisor.hpp"
+#include <bevel/controller/supervisor.hpp>
 #include "tests/controller/agar.hpp"
 
 namespace bevel::controller {

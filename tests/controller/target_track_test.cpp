@@ -1,4 +1,4 @@
-#include "controller/target_track.hpp"
+#include <bevel/controller/target_track.hpp>
 
 #include <gtest/gtest.h>
 
@@ -7,7 +7,7 @@
 #include <numbers>
 #include <random>
 
-#include "controller/rendezvous.hpp"
+#include <bevel/controller/rendezvous.hpp>
 
 namespace bevel::controller {
 namespace {

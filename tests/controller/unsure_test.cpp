@@ -3,7 +3,7 @@
 
 #include <cmath>
 
-#include "controller/supervisor.hpp"
+#include <bevel/controller/supervisor.hpp>
 
 namespace bevel::controller {
 namespace {

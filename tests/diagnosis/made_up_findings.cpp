@@ -4,7 +4,7 @@
 #include <limits>
 #include <random>
 
-#include "diagnosis/needle/recorded_case.hpp"
+#include <bevel/diagnosis/needle/recorded_case.hpp>
 #include "tests/diagnosis/recorded_logs.hpp"
 
 namespace bevel::diagnosis::testing {

@@ -2,7 +2,7 @@
 // ones: the needle with and without an effect along a rich motion.
 #pragma once
 
-#include "diagnosis/mismatch/findings.hpp"
+#include <bevel/diagnosis/mismatch/findings.hpp>
 
 namespace bevel::diagnosis::testing {
 

@@ -13,8 +13,8 @@
 #include <nlohmann/json.hpp>
 #include <thread>
 
-#include "io/model_file.hpp"
-#include "model/effects/discrepancy.hpp"
+#include <bevel/io/model_file.hpp>
+#include <bevel/model/effects/discrepancy.hpp>
 #include "tests/diagnosis/recorded_logs.hpp"
 #include "tests/support/temporary_folder.hpp"
 

@@ -7,8 +7,8 @@
 #include <string>
 #include <vector>
 
-#include "io/log_writer.hpp"
-#include "io/messages.hpp"
+#include <bevel/io/log_writer.hpp>
+#include <bevel/io/messages.hpp>
 #include "tests/effects/script.hpp"
 
 namespace bevel::diagnosis::testing {

@@ -2,10 +2,10 @@
 // counted.
 #include <gtest/gtest.h>
 
-#include "drivers/can/local_bus.hpp"
-#include "drivers/can/open_bus.hpp"
-#include "drivers/stepper/stepper_driver.hpp"
-#include "rig/drives/simulated_drive.hpp"
+#include <bevel/drivers/can/local_bus.hpp>
+#include <bevel/drivers/can/open_bus.hpp>
+#include <bevel/drivers/stepper/stepper_driver.hpp>
+#include <bevel/rig/drives/simulated_drive.hpp>
 #include "tests/support/count_allocations.hpp"
 #include "tests/support/temporary_folder.hpp"
 

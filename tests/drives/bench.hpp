@@ -7,9 +7,9 @@
 #include <optional>
 #include <ostream>
 
-#include "drivers/can/memory_bus.hpp"
-#include "drivers/stepper/stepper_driver.hpp"
-#include "rig/drives/simulated_drive.hpp"
+#include <bevel/drivers/can/memory_bus.hpp>
+#include <bevel/drivers/stepper/stepper_driver.hpp>
+#include <bevel/rig/drives/simulated_drive.hpp>
 
 namespace bevel::stepper {
 inline std::ostream& operator<<(std::ostream& out, DriverState state) { return out << to_string(state); }

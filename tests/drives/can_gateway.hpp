@@ -15,7 +15,7 @@
 #include <optional>
 #include <string>
 
-#include "drivers/can/bus.hpp"
+#include <bevel/drivers/can/bus.hpp>
 
 namespace bevel::test {
 

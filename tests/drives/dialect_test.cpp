@@ -1,7 +1,7 @@
 // Drives as makers ship them, by the simulated drive's dialects: right, or refused before the power stage is enabled.
 #include <gmock/gmock.h>
 
-#include "drivers/stepper/drive_units.hpp"
+#include <bevel/drivers/stepper/drive_units.hpp>
 #include "tests/drives/bench.hpp"
 
 namespace bevel::test {

@@ -7,8 +7,8 @@
 #include <memory>
 #include <string>
 
-#include "drivers/can/open_bus.hpp"
-#include "drivers/stepper/stepper_driver.hpp"
+#include <bevel/drivers/can/open_bus.hpp>
+#include <bevel/drivers/stepper/stepper_driver.hpp>
 
 namespace bevel::test {
 

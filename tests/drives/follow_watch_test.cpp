@@ -1,4 +1,4 @@
-#include "drivers/stepper/follow_watch.hpp"
+#include <bevel/drivers/stepper/follow_watch.hpp>
 
 #include <gtest/gtest.h>
 
@@ -8,7 +8,7 @@
 #include <optional>
 #include <random>
 
-#include "drivers/stepper/scale_watch.hpp"
+#include <bevel/drivers/stepper/scale_watch.hpp>
 
 namespace bevel::stepper {
 namespace {

@@ -12,8 +12,8 @@
 #include <string>
 #include <vector>
 
-#include "drivers/can/local_bus.hpp"
-#include "drivers/can/open_bus.hpp"
+#include <bevel/drivers/can/local_bus.hpp>
+#include <bevel/drivers/can/open_bus.hpp>
 #include "tests/support/temporary_folder.hpp"
 
 namespace bevel::can {

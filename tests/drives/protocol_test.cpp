@@ -2,8 +2,8 @@
 // rules.
 #include <gmock/gmock.h>
 
-#include "drivers/stepper/cia301.hpp"
-#include "drivers/stepper/cia402.hpp"
+#include <bevel/drivers/stepper/cia301.hpp>
+#include <bevel/drivers/stepper/cia402.hpp>
 #include "tests/drives/bench.hpp"
 #include "tests/drives/raw_drive.hpp"
 

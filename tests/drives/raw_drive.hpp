@@ -8,9 +8,9 @@
 #include <string>
 #include <vector>
 
-#include "drivers/can/memory_bus.hpp"
-#include "drivers/stepper/cia301.hpp"
-#include "rig/drives/simulated_drive.hpp"
+#include <bevel/drivers/can/memory_bus.hpp>
+#include <bevel/drivers/stepper/cia301.hpp>
+#include <bevel/rig/drives/simulated_drive.hpp>
 
 namespace bevel::test {
 

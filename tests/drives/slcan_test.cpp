@@ -16,8 +16,8 @@
 #include <string>
 #include <thread>
 
-#include "drivers/can/memory_bus.hpp"
-#include "rig/drives/simulated_drive.hpp"
+#include <bevel/drivers/can/memory_bus.hpp>
+#include <bevel/rig/drives/simulated_drive.hpp>
 #include "tests/drives/driven_by_can.hpp"
 
 namespace bevel::test {

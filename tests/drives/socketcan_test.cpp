@@ -15,7 +15,7 @@
 #include <string>
 #include <thread>
 
-#include "rig/drives/simulated_drive.hpp"
+#include <bevel/rig/drives/simulated_drive.hpp>
 #include "tests/drives/driven_by_can.hpp"
 
 namespace bevel::test {

@@ -8,7 +8,7 @@
 #include <deque>
 #include <random>
 
-#include "drivers/can/bus.hpp"
+#include <bevel/drivers/can/bus.hpp>
 
 namespace bevel::test {
 

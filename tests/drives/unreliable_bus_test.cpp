@@ -10,9 +10,9 @@
 #include <optional>
 #include <vector>
 
-#include "drivers/can/local_bus.hpp"
-#include "drivers/can/memory_bus.hpp"
-#include "drivers/can/open_bus.hpp"
+#include <bevel/drivers/can/local_bus.hpp>
+#include <bevel/drivers/can/memory_bus.hpp>
+#include <bevel/drivers/can/open_bus.hpp>
 #include "tests/drives/bench.hpp"
 #include "tests/drives/unreliable_bus.hpp"
 #include "tests/support/temporary_folder.hpp"

@@ -1,5 +1,5 @@
 // What a reading was taken at, against motions made by hand.
-#include "model/effects/covariates.hpp"
+#include <bevel/model/effects/covariates.hpp>
 
 #include <gtest/gtest.h>
 

@@ -1,6 +1,6 @@
 // Discrepancies against motions that are made by hand, against differences, and what they and the variation between
 // insertions make uncertain against draws.
-#include "model/effects/discrepancy.hpp"
+#include <bevel/model/effects/discrepancy.hpp>
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -9,7 +9,7 @@
 #include <numbers>
 #include <random>
 
-#include "model/effects/prediction_spread.hpp"
+#include <bevel/model/effects/prediction_spread.hpp>
 #include "tests/effects/script.hpp"
 
 namespace bevel::model::testing {

@@ -1,5 +1,5 @@
 // Elementary functions of dual numbers, their slopes against central differences.
-#include "model/effects/dual.hpp"
+#include <bevel/model/effects/dual.hpp>
 
 #include <gtest/gtest.h>
 

@@ -3,7 +3,7 @@
 
 #include <cmath>
 
-#include "io/model_file.hpp"
+#include <bevel/io/model_file.hpp>
 #include "tests/effects/script.hpp"
 
 namespace bevel::model::testing {

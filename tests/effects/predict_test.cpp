@@ -8,9 +8,9 @@
 #include <filesystem>
 #include <sstream>
 
-#include "io/log_writer.hpp"
-#include "io/messages.hpp"
-#include "io/model_file.hpp"
+#include <bevel/io/log_writer.hpp>
+#include <bevel/io/messages.hpp>
+#include <bevel/io/model_file.hpp>
 #include "tests/effects/script.hpp"
 #include "tests/support/temporary_folder.hpp"
 #include "tools/predict/predict.hpp"

@@ -5,9 +5,9 @@
 #include <filesystem>
 #include <thread>
 
-#include "drivers/camera/frame_source.hpp"
-#include "drivers/can/memory_bus.hpp"
-#include "nodes/rig_node.hpp"
+#include <bevel/drivers/camera/frame_source.hpp>
+#include <bevel/drivers/can/memory_bus.hpp>
+#include <bevel/nodes/rig_node.hpp>
 #include "tests/effects/script.hpp"
 #include "tests/support/temporary_folder.hpp"
 

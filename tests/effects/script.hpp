@@ -5,7 +5,7 @@
 #include <string>
 #include <vector>
 
-#include "model/effects/open_loop.hpp"
+#include <bevel/model/effects/open_loop.hpp>
 
 namespace bevel::model::testing {
 

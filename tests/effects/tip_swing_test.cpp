@@ -4,7 +4,7 @@
 #include <memory>
 #include <numbers>
 
-#include "model/beam/beam_plant.hpp"
+#include <bevel/model/beam/beam_plant.hpp>
 #include "tests/effects/brute_force.hpp"
 
 namespace bevel::model::testing {

@@ -1,7 +1,7 @@
 // No allocation in a step, late measurements, resets and relinearisation included: operator new is counted.
 #include <gtest/gtest.h>
 
-#include "estimator/needle_estimator.hpp"
+#include <bevel/estimator/needle_estimator.hpp>
 #include "tests/estimator/play.hpp"
 #include "tests/support/count_allocations.hpp"
 

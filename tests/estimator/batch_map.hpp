@@ -1,7 +1,7 @@
 #pragma once
 // The batch maximum a posteriori of an insertion without process noise: the best that any filter can do on the data.
 // Unknown: the start, 6 of a body-frame error exp(delta) at the entry pose and 3 of the parameters; Ceres.
-#include "estimator/needle_filter.hpp"
+#include <bevel/estimator/needle_filter.hpp>
 #include "tests/estimator/insertion.hpp"
 
 namespace bevel::estimator::testing {

@@ -1,7 +1,7 @@
 // Cost of predict + update, of the whole estimator per message, and of a plain dense product-sum of the same flops.
 #include <benchmark/benchmark.h>
 
-#include "estimator/needle_estimator.hpp"
+#include <bevel/estimator/needle_estimator.hpp>
 #include "tests/estimator/insertion.hpp"
 
 namespace bevel::estimator {

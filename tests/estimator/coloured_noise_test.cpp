@@ -5,7 +5,7 @@
 #include <boost/math/distributions/chi_squared.hpp>
 #include <iostream>
 
-#include "estimator/error_state.hpp"
+#include <bevel/estimator/error_state.hpp>
 #include "tests/estimator/coloured.hpp"
 #include "tests/estimator/play.hpp"
 

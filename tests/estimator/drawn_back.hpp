@@ -4,7 +4,7 @@
 #include <random>
 #include <vector>
 
-#include "rig/plant/plant.hpp"
+#include <bevel/rig/plant/plant.hpp>
 #include "tests/estimator/insertion.hpp"
 
 namespace bevel::estimator::testing {

@@ -5,9 +5,9 @@
 #include <cmath>
 #include <iostream>
 
-#include "estimator/needle_estimator.hpp"
-#include "estimator/propagate.hpp"
-#include "model/effects/open_loop.hpp"
+#include <bevel/estimator/needle_estimator.hpp>
+#include <bevel/estimator/propagate.hpp>
+#include <bevel/model/effects/open_loop.hpp>
 #include "tests/estimator/insertion.hpp"
 #include "tools/replay/statistics.hpp"
 

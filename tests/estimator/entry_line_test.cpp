@@ -1,4 +1,4 @@
-#include "estimator/entry_line.hpp"
+#include <bevel/estimator/entry_line.hpp>
 
 #include <gtest/gtest.h>
 

@@ -9,7 +9,7 @@
 #include <numbers>
 #include <string>
 
-#include "estimator/health.hpp"
+#include <bevel/estimator/health.hpp>
 #include "tests/estimator/play.hpp"
 
 namespace bevel::estimator {

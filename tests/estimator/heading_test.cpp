@@ -6,7 +6,7 @@
 #include <algorithm>
 #include <numbers>
 
-#include "estimator/health.hpp"
+#include <bevel/estimator/health.hpp>
 #include "tests/estimator/play.hpp"
 
 namespace bevel::estimator {

@@ -1,4 +1,4 @@
-#include "estimator/innovation_watch.hpp"
+#include <bevel/estimator/innovation_watch.hpp>
 
 #include <gtest/gtest.h>
 

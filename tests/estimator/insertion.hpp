@@ -5,10 +5,10 @@
 #include <random>
 #include <vector>
 
-#include "estimator/config.hpp"
-#include "model/motion_direction.hpp"
-#include "model/samples.hpp"
-#include "model/slip.hpp"
+#include <bevel/estimator/config.hpp>
+#include <bevel/model/motion_direction.hpp>
+#include <bevel/model/samples.hpp>
+#include <bevel/model/slip.hpp>
 
 namespace bevel::estimator::testing {
 

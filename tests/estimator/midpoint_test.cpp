@@ -6,7 +6,7 @@
 #include <iostream>
 #include <random>
 
-#include "model/kinematics.hpp"
+#include <bevel/model/kinematics.hpp>
 #include "tests/estimator/play.hpp"
 
 namespace bevel::model {

@@ -1,4 +1,4 @@
-#include "estimator/needle_estimator.hpp"
+#include <bevel/estimator/needle_estimator.hpp>
 
 #include <gtest/gtest.h>
 
@@ -8,7 +8,7 @@
 #include <iostream>
 #include <numbers>
 
-#include "estimator/health.hpp"
+#include <bevel/estimator/health.hpp>
 #include "tests/estimator/batch_map.hpp"
 #include "tests/estimator/play.hpp"
 

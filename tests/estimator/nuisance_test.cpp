@@ -6,7 +6,7 @@
 #include <boost/math/distributions/chi_squared.hpp>
 #include <iostream>
 
-#include "rig/plant/plant.hpp"
+#include <bevel/rig/plant/plant.hpp>
 #include "tests/estimator/play.hpp"
 
 namespace bevel::estimator {

@@ -4,7 +4,7 @@
 
 #include <random>
 
-#include "estimator/past.hpp"
+#include <bevel/estimator/past.hpp>
 
 namespace bevel::estimator {
 namespace {

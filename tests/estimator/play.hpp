@@ -5,8 +5,8 @@
 #include <random>
 #include <vector>
 
-#include "estimator/error_state.hpp"
-#include "estimator/needle_estimator.hpp"
+#include <bevel/estimator/error_state.hpp>
+#include <bevel/estimator/needle_estimator.hpp>
 #include "tests/estimator/insertion.hpp"
 
 namespace bevel::estimator::testing {

@@ -3,9 +3,9 @@
 // TIP_HEADING hold then, with all that neighbouring frames' errors have in common.
 #include <numbers>
 
-#include "drivers/camera/tip_tracker.hpp"
-#include "rig/camera/needle_renderer.hpp"
-#include "rig/plant/plant.hpp"
+#include <bevel/drivers/camera/tip_tracker.hpp>
+#include <bevel/rig/camera/needle_renderer.hpp>
+#include <bevel/rig/plant/plant.hpp>
 #include "tests/estimator/insertion.hpp"
 
 namespace bevel::estimator::testing {

@@ -1,8 +1,8 @@
 // States of the estimate that a source of measurements has brought about, once that source is gone.
 #include <gtest/gtest.h>
 
-#include "estimator/health.hpp"
-#include "estimator/innovation_watch.hpp"
+#include <bevel/estimator/health.hpp>
+#include <bevel/estimator/innovation_watch.hpp>
 #include "tests/estimator/play.hpp"
 
 namespace bevel::estimator {

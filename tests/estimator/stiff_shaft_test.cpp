@@ -5,10 +5,10 @@
 #include <iostream>
 #include <random>
 
-#include "estimator/error_state.hpp"
-#include "estimator/needle_estimator.hpp"
-#include "model/shaft_end.hpp"
-#include "rig/plant/plant.hpp"
+#include <bevel/estimator/error_state.hpp>
+#include <bevel/estimator/needle_estimator.hpp>
+#include <bevel/model/shaft_end.hpp>
+#include <bevel/rig/plant/plant.hpp>
 
 namespace bevel::estimator {
 namespace {

@@ -10,7 +10,7 @@
 #include <numbers>
 #include <string>
 
-#include "estimator/needle_estimator.hpp"
+#include <bevel/estimator/needle_estimator.hpp>
 #include "tests/estimator/coloured.hpp"
 #include "tests/estimator/play.hpp"
 #include "tests/estimator/rendered_insertion.hpp"

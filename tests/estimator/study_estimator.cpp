@@ -4,8 +4,8 @@
 #include <iomanip>
 #include <iostream>
 
-#include "estimator/needle_estimator.hpp"
-#include "model/beam/beam_plant.hpp"
+#include <bevel/estimator/needle_estimator.hpp>
+#include <bevel/model/beam/beam_plant.hpp>
 #include "tests/estimator/batch_map.hpp"
 #include "tests/estimator/insertion.hpp"
 #include "tests/estimator/ukf.hpp"

@@ -9,7 +9,7 @@
 #include <cstdio>
 #include <cstdlib>
 
-#include "estimator/needle_estimator.hpp"
+#include <bevel/estimator/needle_estimator.hpp>
 #include "tests/estimator/play.hpp"
 #include "tests/estimator/rendered_insertion.hpp"
 

@@ -9,12 +9,12 @@
 #include <fstream>
 #include <iostream>
 
-#include "io/log_reader.hpp"
-#include "io/log_writer.hpp"
-#include "nodes/estimator_node.hpp"
-#include "nodes/needle_pose.hpp"
-#include "nodes/runtime.hpp"
-#include "nodes/system_config.hpp"
+#include <bevel/io/log_reader.hpp>
+#include <bevel/io/log_writer.hpp>
+#include <bevel/nodes/estimator_node.hpp>
+#include <bevel/nodes/needle_pose.hpp>
+#include <bevel/nodes/runtime.hpp>
+#include <bevel/nodes/system_config.hpp>
 #include "tests/estimator/insertion.hpp"
 #include "tools/replay/batch.hpp"
 

@@ -2,9 +2,9 @@
 // An unscented Kalman filter of the same state, model and measurements as the needle filter: a second way to the same
 // posterior, to compare with. In order, at full cost, for tests only.
 // Source: Julier and Uhlmann 2004, Proc. IEEE 92(3); sigma points on the group as in Brossard et al. 2020, IROS.
-#include "estimator/config.hpp"
-#include "estimator/needle_filter.hpp"
-#include "model/samples.hpp"
+#include <bevel/estimator/config.hpp>
+#include <bevel/estimator/needle_filter.hpp>
+#include <bevel/model/samples.hpp>
 
 namespace bevel::estimator::testing {
 

@@ -5,8 +5,8 @@
 #include <boost/math/distributions/chi_squared.hpp>
 #include <iostream>
 
-#include "model/effects/discrepancy.hpp"
-#include "model/effects/open_loop.hpp"
+#include <bevel/model/effects/discrepancy.hpp>
+#include <bevel/model/effects/open_loop.hpp>
 #include "tests/estimator/play.hpp"
 
 namespace bevel::estimator {

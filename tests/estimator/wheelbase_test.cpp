@@ -88,8 +88,7 @@ TEST(Wheelbase, AnInsertionWithoutRotationDoesNotShowIt) {
   plan.rotation_rate_rad_s = 0;
   const EstimatorConfig config = config_with(5);
   const FilterState state = end_of(config, testing::insert(config.prior.needle, {}, plan, rng));
-  std::cout << "sd of ell after 100 mm without rotation: " << std::sqrt(state.tenth_variance)
-            << " mm, prior 5 mm\n";
+  std::cout << "sd of ell after 100 mm without rotation: " << std::sqrt(state.tenth_variance) << " mm, prior 5 mm\n";
   EXPECT_GT(std::sqrt(state.tenth_variance), 0.8 * 5);
   EXPECT_LT(std::sqrt(state.tenth_variance), 1.05 * 5);
 }

@@ -3,8 +3,8 @@
 #include <algorithm>
 #include <cmath>
 
-#include "estimator/health.hpp"
-#include "model/lie.hpp"
+#include <bevel/estimator/health.hpp>
+#include <bevel/model/lie.hpp>
 
 namespace bevel::test {
 namespace {

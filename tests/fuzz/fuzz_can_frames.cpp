@@ -9,9 +9,9 @@
 #include <memory>
 #include <optional>
 
-#include "drivers/can/memory_bus.hpp"
-#include "drivers/stepper/stepper_driver.hpp"
-#include "rig/drives/simulated_drive.hpp"
+#include <bevel/drivers/can/memory_bus.hpp>
+#include <bevel/drivers/stepper/stepper_driver.hpp>
+#include <bevel/rig/drives/simulated_drive.hpp>
 #include "tests/fuzz/fuzz_support.hpp"
 
 namespace bevel::fuzz {

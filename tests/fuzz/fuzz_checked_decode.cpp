@@ -3,7 +3,7 @@
 #include <utility>
 #include <vector>
 
-#include "io/checked_decode.hpp"
+#include <bevel/io/checked_decode.hpp>
 #include "tests/fuzz/fuzz_support.hpp"
 
 namespace bevel::fuzz {
@@ -54,8 +54,10 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
   using namespace bevel;
   const int types = fuzz::is_accepted<tip_measurement_t>(data, size) + fuzz::is_accepted<tip_heading_t>(data, size) +
                     fuzz::is_accepted<actuator_state_t>(data, size) + fuzz::is_accepted<motion_command_t>(data, size) +
-                    fuzz::is_accepted<needle_state_t>(data, size) + fuzz::is_accepted<needle_shaft_t>(data, size) + fuzz::is_accepted<steering_target_t>(data, size) +
-                    fuzz::is_accepted<operator_heartbeat_t>(data, size) + fuzz::is_accepted<process_status_t>(data, size);
+                    fuzz::is_accepted<needle_state_t>(data, size) + fuzz::is_accepted<needle_shaft_t>(data, size) +
+                    fuzz::is_accepted<steering_target_t>(data, size) +
+                    fuzz::is_accepted<operator_heartbeat_t>(data, size) +
+                    fuzz::is_accepted<process_status_t>(data, size);
   BEVEL_MUST(types <= 1);
   return 0;
 }

@@ -4,9 +4,9 @@
 // Input: [column map "\n---\n"] table. Without the separator the fixed map is used.
 #include <cmath>
 
-#include "io/checked_decode.hpp"
-#include "io/csv_import.hpp"
-#include "io/messages.hpp"
+#include <bevel/io/checked_decode.hpp>
+#include <bevel/io/csv_import.hpp>
+#include <bevel/io/messages.hpp>
 #include "tests/fuzz/fuzz_support.hpp"
 
 namespace bevel::fuzz {

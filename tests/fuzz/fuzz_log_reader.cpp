@@ -3,14 +3,14 @@
 #include <map>
 #include <vector>
 
-#include "io/messages.hpp"
-#include "io/recording.hpp"
+#include <bevel/io/messages.hpp>
+#include <bevel/io/recording.hpp>
 #include "tests/fuzz/fuzz_support.hpp"
 
 namespace bevel::fuzz {
 namespace {
 
-constexpr std::size_t kHeaderSize = 28;  // io/log_reader.hpp
+constexpr std::size_t kHeaderSize = 28;  // bevel/io/log_reader.hpp
 constexpr std::size_t kLongestChannel = 63;
 
 using Bytes = std::span<const std::uint8_t>;

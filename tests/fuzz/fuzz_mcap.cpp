@@ -1,11 +1,11 @@
 // Arbitrary bytes as an MCAP file. What is read lies in the file, damage has words, and the same bytes give the same;
 // as a recording it is refused with a sentence, or every message passes its checks and survives being written and read.
-#include "io/checked_decode.hpp"
-#include "io/json_message.hpp"
-#include "io/log_order.hpp"
-#include "io/mcap_export.hpp"
-#include "io/mcap_reader.hpp"
-#include "io/messages.hpp"
+#include <bevel/io/checked_decode.hpp>
+#include <bevel/io/json_message.hpp>
+#include <bevel/io/log_order.hpp>
+#include <bevel/io/mcap_export.hpp>
+#include <bevel/io/mcap_reader.hpp>
+#include <bevel/io/messages.hpp>
 #include "tests/fuzz/fuzz_support.hpp"
 
 namespace bevel::fuzz {

@@ -7,9 +7,9 @@
 #include <optional>
 #include <utility>
 
-#include "drivers/can/memory_bus.hpp"
-#include "drivers/stepper/cia301.hpp"
-#include "rig/drives/simulated_drive.hpp"
+#include <bevel/drivers/can/memory_bus.hpp>
+#include <bevel/drivers/stepper/cia301.hpp>
+#include <bevel/rig/drives/simulated_drive.hpp>
 #include "tests/fuzz/fuzz_support.hpp"
 
 namespace bevel::fuzz {

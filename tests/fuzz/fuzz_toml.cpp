@@ -3,10 +3,10 @@
 #include <cmath>
 #include <limits>
 
-#include "io/csv_import.hpp"
-#include "io/live_effects.hpp"
-#include "io/model_file.hpp"
-#include "nodes/system_config.hpp"
+#include <bevel/io/csv_import.hpp>
+#include <bevel/io/live_effects.hpp>
+#include <bevel/io/model_file.hpp>
+#include <bevel/nodes/system_config.hpp>
 #include "tests/fuzz/fuzz_support.hpp"
 
 namespace bevel::fuzz {

@@ -134,10 +134,10 @@ TEST_F(Line, InAFileAreFew) {
   std::istringstream text(said());
   std::vector<std::string> lines;
   for (std::string one; std::getline(text, one);) lines.push_back(one);
-  EXPECT_THAT(lines, ElementsAre("long work: 29 of 100, 10 s so far, about 25 s left",
-                                 "long work: 58 of 100, 20 s so far, about 15 s left",
-                                 "long work: 87 of 100, 30 s so far, about 5 s left",
-                                 "long work: 100 of 100, 35 s so far"));
+  EXPECT_THAT(lines,
+              ElementsAre("long work: 29 of 100, 10 s so far, about 25 s left",
+                          "long work: 58 of 100, 20 s so far, about 15 s left",
+                          "long work: 87 of 100, 30 s so far, about 5 s left", "long work: 100 of 100, 35 s so far"));
 }
 
 TEST_F(Line, IsSilentWhereItIsTold) {

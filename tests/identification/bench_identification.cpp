@@ -6,7 +6,7 @@
 #include <fstream>
 #include <iostream>
 
-#include "diagnosis/identification/trajectory_fit.hpp"
+#include <bevel/diagnosis/identification/trajectory_fit.hpp>
 #include "tests/identification/simulated_insertion.hpp"
 
 namespace {

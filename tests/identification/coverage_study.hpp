@@ -4,7 +4,7 @@
 #include <cmath>
 #include <vector>
 
-#include "diagnosis/identification/trajectory_fit.hpp"
+#include <bevel/diagnosis/identification/trajectory_fit.hpp>
 #include "proof/intervals.hpp"
 #include "tests/identification/simulated_insertion.hpp"
 

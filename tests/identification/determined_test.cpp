@@ -5,7 +5,7 @@
 #include <cmath>
 #include <numbers>
 
-#include "diagnosis/identification/candidates.hpp"
+#include <bevel/diagnosis/identification/candidates.hpp>
 #include "tests/identification/simulated_insertion.hpp"
 
 namespace bevel::diagnosis {

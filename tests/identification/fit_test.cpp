@@ -4,9 +4,9 @@
 #include <cmath>
 #include <numbers>
 
-#include "diagnosis/identification/angle_rate.hpp"
-#include "diagnosis/identification/candidates.hpp"
-#include "diagnosis/identification/fit_statistics.hpp"
+#include <bevel/diagnosis/identification/angle_rate.hpp>
+#include <bevel/diagnosis/identification/candidates.hpp>
+#include <bevel/diagnosis/identification/fit_statistics.hpp>
 #include "tests/identification/simulated_insertion.hpp"
 
 namespace bevel::diagnosis {

@@ -7,9 +7,9 @@
 #include <nlohmann/json.hpp>
 #include <sstream>
 
-#include "io/log_writer.hpp"
-#include "io/messages.hpp"
-#include "io/model_file.hpp"
+#include <bevel/io/log_writer.hpp>
+#include <bevel/io/messages.hpp>
+#include <bevel/io/model_file.hpp>
 #include "tests/identification/simulated_insertion.hpp"
 #include "tests/support/shared_recordings.hpp"
 #include "tests/support/temporary_folder.hpp"

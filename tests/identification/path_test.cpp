@@ -1,5 +1,5 @@
 // The path and its Jacobian, and the making of insertions from axis and camera samples.
-#include "diagnosis/identification/path.hpp"
+#include <bevel/diagnosis/identification/path.hpp>
 
 #include <gtest/gtest.h>
 

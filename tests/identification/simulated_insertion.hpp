@@ -6,8 +6,8 @@
 #include <stdexcept>
 #include <vector>
 
-#include "diagnosis/identification/insertion.hpp"
-#include "model/kinematics.hpp"
+#include <bevel/diagnosis/identification/insertion.hpp>
+#include <bevel/model/kinematics.hpp>
 
 namespace bevel::diagnosis {
 

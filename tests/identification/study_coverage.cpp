@@ -4,7 +4,7 @@
 #include <cstdio>
 #include <cstdlib>
 
-#include "report/page.hpp"
+#include <bevel/report/page.hpp>
 #include "tests/identification/coverage_study.hpp"
 
 int main(int argc, char** argv) {

@@ -12,7 +12,7 @@
 #include <string>
 #include <vector>
 
-#include "diagnosis/identification/candidates.hpp"
+#include <bevel/diagnosis/identification/candidates.hpp>
 #include "tests/support/shared_recordings.hpp"
 
 namespace {

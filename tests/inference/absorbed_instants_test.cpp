@@ -4,8 +4,8 @@
 
 #include <random>
 
-#include "diagnosis/inference/absorbed_instants.hpp"
-#include "diagnosis/inference/local_minima.hpp"
+#include <bevel/diagnosis/inference/absorbed_instants.hpp>
+#include <bevel/diagnosis/inference/local_minima.hpp>
 #include "tests/inference/held_system.hpp"
 
 namespace bevel::inference {

@@ -7,7 +7,7 @@
 #include <numbers>
 #include <random>
 
-#include "diagnosis/inference/arrow.hpp"
+#include <bevel/diagnosis/inference/arrow.hpp>
 
 namespace bevel::inference {
 namespace {

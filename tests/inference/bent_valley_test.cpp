@@ -4,7 +4,7 @@
 #include <Eigen/LU>
 #include <cmath>
 
-#include "diagnosis/inference/likelihood.hpp"
+#include <bevel/diagnosis/inference/likelihood.hpp>
 #include "tests/inference/held_system.hpp"
 
 namespace bevel::inference {

@@ -1,5 +1,5 @@
 // A discrepancy that is too large for the linear model about none.
-#include "diagnosis/inference/curved_fit.hpp"
+#include <bevel/diagnosis/inference/curved_fit.hpp>
 
 #include <gtest/gtest.h>
 
@@ -7,8 +7,8 @@
 #include <Eigen/LU>
 #include <random>
 
-#include "diagnosis/inference/evidence.hpp"
-#include "diagnosis/inference/nuisance_grid.hpp"
+#include <bevel/diagnosis/inference/evidence.hpp>
+#include <bevel/diagnosis/inference/nuisance_grid.hpp>
 #include "tests/inference/held_system.hpp"
 
 namespace bevel::inference {

@@ -3,7 +3,7 @@
 
 #include <limits>
 
-#include "diagnosis/inference/local_minima.hpp"
+#include <bevel/diagnosis/inference/local_minima.hpp>
 #include "tests/inference/linear_system.hpp"
 
 namespace bevel::inference {

@@ -1,7 +1,7 @@
 // What a set promises of a larger one depends on the noise by which it is asked: its own, or that of a reference.
 #include <gtest/gtest.h>
 
-#include "diagnosis/inference/evidence.hpp"
+#include <bevel/diagnosis/inference/evidence.hpp>
 #include "tests/inference/linear_system.hpp"
 
 namespace bevel::inference {

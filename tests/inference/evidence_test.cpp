@@ -3,11 +3,11 @@
 
 #include <Eigen/QR>
 
-#include "diagnosis/inference/error_spread.hpp"
-#include "diagnosis/inference/evidence.hpp"
-#include "diagnosis/inference/log_sum.hpp"
-#include "diagnosis/inference/posterior.hpp"
-#include "diagnosis/inference/proposals.hpp"
+#include <bevel/diagnosis/inference/error_spread.hpp>
+#include <bevel/diagnosis/inference/evidence.hpp>
+#include <bevel/diagnosis/inference/log_sum.hpp>
+#include <bevel/diagnosis/inference/posterior.hpp>
+#include <bevel/diagnosis/inference/proposals.hpp>
 #include "tests/inference/linear_system.hpp"
 
 namespace bevel::inference {

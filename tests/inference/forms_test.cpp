@@ -1,9 +1,9 @@
 // Equations for a discrepancy, against dense normal densities of a linear system.
-#include "diagnosis/inference/forms.hpp"
+#include <bevel/diagnosis/inference/forms.hpp>
 
 #include <gtest/gtest.h>
 
-#include "diagnosis/inference/log_sum.hpp"
+#include <bevel/diagnosis/inference/log_sum.hpp>
 #include "tests/inference/linear_system.hpp"
 
 namespace bevel::inference {

@@ -6,8 +6,8 @@
 #include <boost/math/distributions/students_t.hpp>
 #include <random>
 
-#include "diagnosis/inference/evidence.hpp"
-#include "diagnosis/inference/log_sum.hpp"
+#include <bevel/diagnosis/inference/evidence.hpp>
+#include <bevel/diagnosis/inference/log_sum.hpp>
 #include "tests/inference/linear_system.hpp"
 
 namespace bevel::inference {

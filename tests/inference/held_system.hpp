@@ -4,7 +4,7 @@
 #include <random>
 #include <span>
 
-#include "diagnosis/inference/system.hpp"
+#include <bevel/diagnosis/inference/system.hpp>
 
 namespace bevel::inference::testing {
 

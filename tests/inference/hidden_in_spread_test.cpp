@@ -5,8 +5,8 @@
 #include <limits>
 #include <random>
 
-#include "diagnosis/inference/search.hpp"
-#include "diagnosis/inference/settle.hpp"
+#include <bevel/diagnosis/inference/search.hpp>
+#include <bevel/diagnosis/inference/settle.hpp>
 #include "tests/inference/held_system.hpp"
 
 namespace bevel::inference {

@@ -6,9 +6,9 @@
 #include <numbers>
 #include <random>
 
-#include "diagnosis/inference/evidence.hpp"
-#include "diagnosis/inference/local_minima.hpp"
-#include "diagnosis/inference/log_sum.hpp"
+#include <bevel/diagnosis/inference/evidence.hpp>
+#include <bevel/diagnosis/inference/local_minima.hpp>
+#include <bevel/diagnosis/inference/log_sum.hpp>
 #include "tests/inference/held_system.hpp"
 
 namespace bevel::inference {

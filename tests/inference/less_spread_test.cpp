@@ -7,7 +7,7 @@
 #include <limits>
 #include <random>
 
-#include "diagnosis/inference/evidence.hpp"
+#include <bevel/diagnosis/inference/evidence.hpp>
 #include "tests/inference/held_system.hpp"
 
 namespace bevel::inference {

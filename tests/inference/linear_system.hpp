@@ -5,7 +5,7 @@
 #include <cmath>
 #include <random>
 
-#include "diagnosis/inference/noise.hpp"
+#include <bevel/diagnosis/inference/noise.hpp>
 #include "tests/inference/held_system.hpp"
 
 namespace bevel::inference::testing {

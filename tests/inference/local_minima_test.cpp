@@ -1,5 +1,5 @@
 // Instants, whose likelihood has one minimum a reading wide.
-#include "diagnosis/inference/local_minima.hpp"
+#include <bevel/diagnosis/inference/local_minima.hpp>
 
 #include <gtest/gtest.h>
 

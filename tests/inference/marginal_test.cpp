@@ -1,12 +1,12 @@
 // What stands beside a set, by the linear model about its fit, against dense least squares and a normal density.
-#include "diagnosis/inference/marginal.hpp"
+#include <bevel/diagnosis/inference/marginal.hpp>
 
 #include <gtest/gtest.h>
 
 #include <Eigen/QR>
 
-#include "diagnosis/inference/error_spread.hpp"
-#include "diagnosis/inference/evidence.hpp"
+#include <bevel/diagnosis/inference/error_spread.hpp>
+#include <bevel/diagnosis/inference/evidence.hpp>
 #include "tests/inference/linear_system.hpp"
 
 namespace bevel::inference {

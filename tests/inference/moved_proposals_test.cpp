@@ -4,7 +4,7 @@
 #include <cmath>
 #include <random>
 
-#include "diagnosis/inference/proposals.hpp"
+#include <bevel/diagnosis/inference/proposals.hpp>
 #include "tests/inference/held_system.hpp"
 
 namespace bevel::inference::testing {

@@ -3,7 +3,7 @@
 
 #include <random>
 
-#include "diagnosis/inference/outliers.hpp"
+#include <bevel/diagnosis/inference/outliers.hpp>
 
 namespace bevel::inference {
 namespace {

@@ -1,5 +1,5 @@
 // Combinations of standard deviations: that those with a share are found from any of them, and few others asked for.
-#include "diagnosis/inference/nuisance_grid.hpp"
+#include <bevel/diagnosis/inference/nuisance_grid.hpp>
 
 #include <gtest/gtest.h>
 

@@ -1,5 +1,5 @@
 // What each recording has of its own, integrated out: against the density of the readings in full.
-#include "diagnosis/inference/own_volume.hpp"
+#include <bevel/diagnosis/inference/own_volume.hpp>
 
 #include <gtest/gtest.h>
 
@@ -10,8 +10,8 @@
 #include <limits>
 #include <random>
 
-#include "diagnosis/inference/evidence.hpp"
-#include "diagnosis/inference/nuisances.hpp"
+#include <bevel/diagnosis/inference/evidence.hpp>
+#include <bevel/diagnosis/inference/nuisances.hpp>
 #include "tests/inference/held_system.hpp"
 
 namespace bevel::inference {

@@ -9,7 +9,7 @@
 #include <thread>
 #include <vector>
 
-#include "diagnosis/parallel.hpp"
+#include <bevel/diagnosis/parallel.hpp>
 
 namespace bevel::diagnosis {
 namespace {

@@ -1,7 +1,7 @@
 // What comes out does not depend on how many threads it took.
 #include <gtest/gtest.h>
 
-#include "diagnosis/inference/posterior.hpp"
+#include <bevel/diagnosis/inference/posterior.hpp>
 #include "tests/inference/pendulum.hpp"
 
 namespace bevel::inference {

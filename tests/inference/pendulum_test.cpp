@@ -10,7 +10,7 @@
 #include <memory>
 #include <random>
 
-#include "diagnosis/inference/posterior.hpp"
+#include <bevel/diagnosis/inference/posterior.hpp>
 #include "tests/inference/pendulum.hpp"
 
 namespace bevel::inference {

@@ -1,5 +1,5 @@
 // What was predicted last is not computed again, and is the same to the last bit.
-#include "diagnosis/inference/prediction_memo.hpp"
+#include <bevel/diagnosis/inference/prediction_memo.hpp>
 
 #include <gtest/gtest.h>
 
@@ -7,7 +7,7 @@
 #include <atomic>
 #include <cmath>
 
-#include "diagnosis/parallel.hpp"
+#include <bevel/diagnosis/parallel.hpp>
 #include "tests/inference/held_system.hpp"
 
 namespace bevel::inference {

@@ -1,5 +1,5 @@
 // The noise by which recordings are predicted: simulated recordings that differ, one channel white and one that drifts.
-#include "diagnosis/inference/prediction_noise.hpp"
+#include <bevel/diagnosis/inference/prediction_noise.hpp>
 
 #include <gtest/gtest.h>
 

@@ -1,13 +1,13 @@
 // Predictions of one recording, new and continued, and its nuisances, against dense normal densities of all readings.
-#include "diagnosis/inference/predictive.hpp"
+#include <bevel/diagnosis/inference/predictive.hpp>
 
 #include <gtest/gtest.h>
 
 #include <numeric>
 
-#include "diagnosis/inference/log_sum.hpp"
-#include "diagnosis/inference/nuisances.hpp"
-#include "diagnosis/inference/recording_rows.hpp"
+#include <bevel/diagnosis/inference/log_sum.hpp>
+#include <bevel/diagnosis/inference/nuisances.hpp>
+#include <bevel/diagnosis/inference/recording_rows.hpp>
 #include "tests/inference/linear_system.hpp"
 
 namespace bevel::inference {

@@ -2,7 +2,7 @@
 
 #include <cmath>
 
-#include "diagnosis/inference/priors.hpp"
+#include <bevel/diagnosis/inference/priors.hpp>
 
 namespace bevel::inference {
 namespace {

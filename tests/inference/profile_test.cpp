@@ -1,12 +1,12 @@
 // The likelihood along one unknown, and from one effect to another, against closed forms.
-#include "diagnosis/inference/profile.hpp"
+#include <bevel/diagnosis/inference/profile.hpp>
 
 #include <gtest/gtest.h>
 
 #include <boost/math/distributions/normal.hpp>
 
-#include "diagnosis/inference/local_minima.hpp"
-#include "diagnosis/inference/search.hpp"
+#include <bevel/diagnosis/inference/local_minima.hpp>
+#include <bevel/diagnosis/inference/search.hpp>
 #include "tests/inference/linear_system.hpp"
 
 namespace bevel::inference {

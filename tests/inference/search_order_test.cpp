@@ -4,7 +4,7 @@
 #include <limits>
 #include <vector>
 
-#include "diagnosis/inference/search.hpp"
+#include <bevel/diagnosis/inference/search.hpp>
 
 namespace bevel::inference {
 namespace {

@@ -1,5 +1,5 @@
 // Which spread is fitted next: the most promising, none twice, and nearer where the linear model was wrong.
-#include "diagnosis/inference/spread_search.hpp"
+#include <bevel/diagnosis/inference/spread_search.hpp>
 
 #include <gtest/gtest.h>
 

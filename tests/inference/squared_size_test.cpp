@@ -1,5 +1,5 @@
 // Sums of squares of normals with means, against exact distributions and draws.
-#include "diagnosis/inference/squared_size.hpp"
+#include <bevel/diagnosis/inference/squared_size.hpp>
 
 #include <gtest/gtest.h>
 

@@ -17,11 +17,11 @@
 #include <tuple>
 #include <vector>
 
-#include "io/csv_export.hpp"
-#include "io/json_message.hpp"
-#include "io/mcap_container.hpp"
-#include "io/mcap_export.hpp"
-#include "io/messages.hpp"
+#include <bevel/io/csv_export.hpp>
+#include <bevel/io/json_message.hpp>
+#include <bevel/io/mcap_container.hpp>
+#include <bevel/io/mcap_export.hpp>
+#include <bevel/io/messages.hpp>
 
 namespace {
 

@@ -1,6 +1,6 @@
 // CAMERA_PICTURE: made of a frame, through LCM's encoding and the checked decode, and against every way in which bytes
 // can be wrong.
-#include "io/camera_picture.hpp"
+#include <bevel/io/camera_picture.hpp>
 
 #include <gtest/gtest.h>
 
@@ -8,8 +8,8 @@
 #include <limits>
 #include <random>
 
-#include "drivers/camera/decode.hpp"
-#include "nodes/camera_pictures.hpp"
+#include <bevel/drivers/camera/decode.hpp>
+#include <bevel/nodes/camera_pictures.hpp>
 
 namespace bevel::io {
 namespace {

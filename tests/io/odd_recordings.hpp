@@ -3,7 +3,7 @@
 #include <cmath>
 #include <random>
 
-#include "io/recording.hpp"
+#include <bevel/io/recording.hpp>
 
 namespace bevel::test {
 

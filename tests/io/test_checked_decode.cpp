@@ -7,8 +7,8 @@
 #include <limits>
 #include <random>
 
-#include "io/checked_decode.hpp"
-#include "io/messages.hpp"
+#include <bevel/io/checked_decode.hpp>
+#include <bevel/io/messages.hpp>
 
 namespace bevel::io {
 namespace {

@@ -2,7 +2,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-#include "io/config.hpp"
+#include <bevel/io/config.hpp>
 
 namespace bevel::io {
 namespace {

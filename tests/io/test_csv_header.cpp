@@ -7,8 +7,8 @@
 #include <utility>
 #include <vector>
 
-#include "io/csv_import.hpp"
-#include "io/csv_table.hpp"
+#include <bevel/io/csv_import.hpp>
+#include <bevel/io/csv_table.hpp>
 #include "tests/support/run_program.hpp"
 #include "tests/support/temporary_folder.hpp"
 

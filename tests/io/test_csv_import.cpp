@@ -4,9 +4,9 @@
 #include <filesystem>
 #include <functional>
 
-#include "io/csv_export.hpp"
-#include "io/csv_import.hpp"
-#include "io/recording_clock.hpp"
+#include <bevel/io/csv_export.hpp>
+#include <bevel/io/csv_import.hpp>
+#include <bevel/io/recording_clock.hpp>
 #include "tests/support/run_program.hpp"
 #include "tests/support/shared_recordings.hpp"
 #include "tests/support/temporary_folder.hpp"

@@ -4,7 +4,7 @@
 
 #include <filesystem>
 
-#include "io/csv_export.hpp"
+#include <bevel/io/csv_export.hpp>
 #include "tests/io/odd_recordings.hpp"
 #include "tests/support/run_program.hpp"
 #include "tests/support/temporary_folder.hpp"

@@ -5,8 +5,8 @@
 #include <cmath>
 #include <functional>
 
-#include "io/csv_export.hpp"
-#include "io/csv_import.hpp"
+#include <bevel/io/csv_export.hpp>
+#include <bevel/io/csv_import.hpp>
 #include "tests/support/run_program.hpp"
 #include "tests/support/temporary_folder.hpp"
 

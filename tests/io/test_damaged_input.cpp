@@ -7,9 +7,9 @@
 #include <filesystem>
 #include <functional>
 
-#include "io/log_writer.hpp"
-#include "io/messages.hpp"
-#include "io/recording.hpp"
+#include <bevel/io/log_writer.hpp>
+#include <bevel/io/messages.hpp>
+#include <bevel/io/recording.hpp>
 #include "tests/support/run_program.hpp"
 
 namespace bevel {

@@ -10,11 +10,11 @@
 #include <numeric>
 #include <thread>
 
-#include "io/config.hpp"
-#include "io/csv_import.hpp"
-#include "io/file_bytes.hpp"
-#include "io/model_file.hpp"
-#include "io/recording.hpp"
+#include <bevel/io/config.hpp>
+#include <bevel/io/csv_import.hpp>
+#include <bevel/io/file_bytes.hpp>
+#include <bevel/io/model_file.hpp>
+#include <bevel/io/recording.hpp>
 #include "tests/support/temporary_folder.hpp"
 
 namespace bevel::io {

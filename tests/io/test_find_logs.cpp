@@ -5,7 +5,7 @@
 #include <filesystem>
 #include <set>
 
-#include "io/find_logs.hpp"
+#include <bevel/io/find_logs.hpp>
 #include "tests/support/temporary_folder.hpp"
 
 namespace bevel::io {

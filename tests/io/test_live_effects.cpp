@@ -1,7 +1,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-#include "io/live_effects.hpp"
+#include <bevel/io/live_effects.hpp>
 
 namespace bevel::io {
 namespace {

@@ -10,10 +10,10 @@
 #include <set>
 #include <span>
 
-#include "io/log_reader.hpp"
-#include "io/log_writer.hpp"
-#include "io/messages.hpp"
-#include "io/recording.hpp"
+#include <bevel/io/log_reader.hpp>
+#include <bevel/io/log_writer.hpp>
+#include <bevel/io/messages.hpp>
+#include <bevel/io/recording.hpp>
 #include "tests/support/temporary_folder.hpp"
 
 namespace bevel::io {

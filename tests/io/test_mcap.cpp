@@ -8,12 +8,12 @@
 #include <set>
 #include <tuple>
 
-#include "io/csv_export.hpp"
-#include "io/json_message.hpp"
-#include "io/mcap_container.hpp"
-#include "io/mcap_export.hpp"
-#include "io/mcap_reader.hpp"
-#include "io/mcap_writer.hpp"
+#include <bevel/io/csv_export.hpp>
+#include <bevel/io/json_message.hpp>
+#include <bevel/io/mcap_container.hpp>
+#include <bevel/io/mcap_export.hpp>
+#include <bevel/io/mcap_reader.hpp>
+#include <bevel/io/mcap_writer.hpp>
 #include "tests/io/odd_recordings.hpp"
 #include "tests/support/run_program.hpp"
 

@@ -2,7 +2,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-#include "io/model_file.hpp"
+#include <bevel/io/model_file.hpp>
 #include "tests/support/temporary_folder.hpp"
 
 namespace bevel::io {

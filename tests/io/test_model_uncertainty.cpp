@@ -5,7 +5,7 @@
 
 #include <numbers>
 
-#include "io/model_file.hpp"
+#include <bevel/io/model_file.hpp>
 
 namespace bevel::io {
 namespace {

@@ -4,8 +4,8 @@
 
 #include <filesystem>
 
-#include "io/recording.hpp"
-#include "io/second_insertion.hpp"
+#include <bevel/io/recording.hpp>
+#include <bevel/io/second_insertion.hpp>
 #include "tests/support/shared_recordings.hpp"
 
 namespace bevel::io {

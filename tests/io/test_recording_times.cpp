@@ -2,9 +2,9 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-#include "io/csv_export.hpp"
-#include "io/find_logs.hpp"
-#include "io/recording.hpp"
+#include <bevel/io/csv_export.hpp>
+#include <bevel/io/find_logs.hpp>
+#include <bevel/io/recording.hpp>
 #include "tests/support/temporary_folder.hpp"
 
 namespace bevel::io {

@@ -13,10 +13,10 @@
 #include <stdexcept>
 #include <string>
 
-#include "io/csv_export.hpp"
-#include "io/model_file.hpp"
-#include "io/result_file.hpp"
-#include "report/page.hpp"
+#include <bevel/io/csv_export.hpp>
+#include <bevel/io/model_file.hpp>
+#include <bevel/io/result_file.hpp>
+#include <bevel/report/page.hpp>
 #include "tests/support/temporary_folder.hpp"
 
 namespace bevel::io {

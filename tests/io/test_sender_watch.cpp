@@ -5,9 +5,9 @@
 #include <limits>
 #include <random>
 
-#include "io/motion_bounds.hpp"
-#include "io/sender_watch.hpp"
-#include "model/age.hpp"
+#include <bevel/io/motion_bounds.hpp>
+#include <bevel/io/sender_watch.hpp>
+#include <bevel/model/age.hpp>
 
 namespace bevel::io {
 namespace {

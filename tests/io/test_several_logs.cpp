@@ -5,9 +5,9 @@
 #include <algorithm>
 #include <filesystem>
 
-#include "io/log_reader.hpp"
-#include "io/log_writer.hpp"
-#include "io/messages.hpp"
+#include <bevel/io/log_reader.hpp>
+#include <bevel/io/log_writer.hpp>
+#include <bevel/io/messages.hpp>
 #include "tests/support/run_program.hpp"
 
 namespace bevel {

@@ -10,10 +10,10 @@
 #include <functional>
 #include <random>
 
-#include "io/csv_import.hpp"
-#include "io/held_values.hpp"
-#include "io/motion_gap.hpp"
-#include "io/recording.hpp"
+#include <bevel/io/csv_import.hpp>
+#include <bevel/io/held_values.hpp>
+#include <bevel/io/motion_gap.hpp>
+#include <bevel/io/recording.hpp>
 #include "tests/support/run_program.hpp"
 #include "tests/support/shared_recordings.hpp"
 #include "tests/support/temporary_folder.hpp"

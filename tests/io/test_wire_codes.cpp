@@ -5,7 +5,7 @@
 #include <string>
 #include <utility>
 
-#include "io/checked_decode.hpp"
+#include <bevel/io/checked_decode.hpp>
 
 namespace bevel::io {
 namespace {

@@ -5,8 +5,8 @@
 
 #include <cstdio>
 
-#include "diagnosis/latency/latency_fit.hpp"
-#include "model/effects/open_loop.hpp"
+#include <bevel/diagnosis/latency/latency_fit.hpp>
+#include <bevel/model/effects/open_loop.hpp>
 #include "tests/latency/stop_and_go.hpp"
 
 namespace bevel::diagnosis {

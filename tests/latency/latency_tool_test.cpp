@@ -4,10 +4,10 @@
 
 #include <sstream>
 
-#include "io/config.hpp"
-#include "io/log_writer.hpp"
-#include "io/messages.hpp"
-#include "io/recording_clock.hpp"
+#include <bevel/io/config.hpp>
+#include <bevel/io/log_writer.hpp>
+#include <bevel/io/messages.hpp>
+#include <bevel/io/recording_clock.hpp>
 #include "tests/latency/stop_and_go.hpp"
 #include "tests/support/temporary_folder.hpp"
 #include "tools/calibrate/calibrate_tool.hpp"

@@ -5,8 +5,8 @@
 #include <random>
 #include <vector>
 
-#include "model/samples.hpp"
-#include "rig/plant/plant.hpp"
+#include <bevel/model/samples.hpp>
+#include <bevel/rig/plant/plant.hpp>
 
 namespace bevel::test {
 

@@ -2,7 +2,7 @@
 // estimator or clears a stop.
 #include <limits>
 
-#include "estimator/health.hpp"
+#include <bevel/estimator/health.hpp>
 #include "tests/loop/loop_fixture.hpp"
 
 namespace bevel {

@@ -8,10 +8,10 @@
 #include <string>
 #include <vector>
 
-#include "drivers/can/open_bus.hpp"
-#include "drivers/stepper/cia301.hpp"
-#include "drivers/stepper/stepper_config.hpp"
-#include "nodes/runtime.hpp"
+#include <bevel/drivers/can/open_bus.hpp>
+#include <bevel/drivers/stepper/cia301.hpp>
+#include <bevel/drivers/stepper/stepper_config.hpp>
+#include <bevel/nodes/runtime.hpp>
 
 namespace bevel::test {
 

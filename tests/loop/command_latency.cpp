@@ -34,11 +34,11 @@
 #include <string>
 #include <vector>
 
-#include "drivers/can/open_bus.hpp"
-#include "drivers/stepper/cia301.hpp"
-#include "io/process_state.hpp"
-#include "nodes/runtime.hpp"
-#include "nodes/system_config.hpp"
+#include <bevel/drivers/can/open_bus.hpp>
+#include <bevel/drivers/stepper/cia301.hpp>
+#include <bevel/io/process_state.hpp>
+#include <bevel/nodes/runtime.hpp>
+#include <bevel/nodes/system_config.hpp>
 
 namespace bevel::test {
 namespace {

@@ -2,11 +2,11 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-#include "controller/axis_model.hpp"
-#include "nodes/controller_node.hpp"
-#include "nodes/needle_pose.hpp"
-#include "nodes/runtime.hpp"
-#include "nodes/system_config.hpp"
+#include <bevel/controller/axis_model.hpp>
+#include <bevel/nodes/controller_node.hpp>
+#include <bevel/nodes/needle_pose.hpp>
+#include <bevel/nodes/runtime.hpp>
+#include <bevel/nodes/system_config.hpp>
 #include "tests/support/temporary_folder.hpp"
 
 namespace bevel::nodes {

@@ -1,9 +1,9 @@
 // What the fault injector makes of a camera that gives positions and headings: both fail as one.
 #include <gtest/gtest.h>
 
-#include "estimator/health.hpp"
-#include "io/checked_decode.hpp"
-#include "model/motion_direction.hpp"
+#include <bevel/estimator/health.hpp>
+#include <bevel/io/checked_decode.hpp>
+#include <bevel/model/motion_direction.hpp>
 #include "tests/loop/simulated_loop.hpp"
 
 namespace bevel {

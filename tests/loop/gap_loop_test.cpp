@@ -2,8 +2,8 @@
 // afterwards, and when the needle may be steered again.
 #include <boost/math/distributions/chi_squared.hpp>
 
-#include "estimator/health.hpp"
-#include "model/lie.hpp"
+#include <bevel/estimator/health.hpp>
+#include <bevel/model/lie.hpp>
 #include "tests/loop/loop_fixture.hpp"
 
 namespace bevel {

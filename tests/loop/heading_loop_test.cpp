@@ -3,8 +3,8 @@
 
 #include <iostream>
 
-#include "estimator/health.hpp"
-#include "io/config.hpp"
+#include <bevel/estimator/health.hpp>
+#include <bevel/io/config.hpp>
 #include "tests/loop/simulated_loop.hpp"
 #include "tests/support/temporary_folder.hpp"
 

@@ -1,9 +1,9 @@
 // Real processes, killed or stopped in flight, and how long until both axes rest, read from the drives' own frames on
 // the bus. Usage: kill_study BIN_DIR CONFIG OUT_DIR BUS TRIALS SEED [PROGRAM SIGNAL], inside a network namespace of its
-// own (tests/loop/processes_test.sh): PROGRAM (such as bevel-demo) and SIGNAL (KILL or STOP) of every trial, drawn where
-// they are not given. Exit status 0 when every trial came to rest within 200 ms and stayed there. A stopped operator
-// program (bevel-demo) is noticed after controller.operator_timeout_s; the 200 ms count from there, the printed times
-// from the signal.
+// own (tests/loop/processes_test.sh): PROGRAM (such as bevel-demo) and SIGNAL (KILL or STOP) of every trial, drawn
+// where they are not given. Exit status 0 when every trial came to rest within 200 ms and stayed there. A stopped
+// operator program (bevel-demo) is noticed after controller.operator_timeout_s; the 200 ms count from there, the
+// printed times from the signal.
 #include <fcntl.h>
 #include <signal.h>
 #include <spawn.h>
@@ -23,8 +23,8 @@
 #include <thread>
 #include <vector>
 
-#include "nodes/runtime.hpp"
-#include "nodes/system_config.hpp"
+#include <bevel/nodes/runtime.hpp>
+#include <bevel/nodes/system_config.hpp>
 #include "tests/loop/bus_listener.hpp"
 
 extern char** environ;

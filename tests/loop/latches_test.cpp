@@ -2,8 +2,8 @@
 // (docs/running.md#latched-states-and-what-clears-them).
 #include <gmock/gmock.h>
 
-#include "estimator/health.hpp"
-#include "nodes/runtime.hpp"
+#include <bevel/estimator/health.hpp>
+#include <bevel/nodes/runtime.hpp>
 #include "tests/loop/loop_fixture.hpp"
 
 namespace bevel {

@@ -5,7 +5,7 @@
 #include <cstdlib>
 #include <string>
 
-#include "nodes/open_lcm.hpp"
+#include <bevel/nodes/open_lcm.hpp>
 
 namespace bevel::nodes {
 namespace {

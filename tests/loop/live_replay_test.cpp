@@ -6,12 +6,12 @@
 #include <random>
 #include <sstream>
 
-#include "io/file_bytes.hpp"
-#include "io/log_reader.hpp"
-#include "io/log_writer.hpp"
-#include "nodes/estimator_node.hpp"
-#include "nodes/needle_pose.hpp"
-#include "nodes/runtime.hpp"
+#include <bevel/io/file_bytes.hpp>
+#include <bevel/io/log_reader.hpp>
+#include <bevel/io/log_writer.hpp>
+#include <bevel/nodes/estimator_node.hpp>
+#include <bevel/nodes/needle_pose.hpp>
+#include <bevel/nodes/runtime.hpp>
 #include "tests/estimator/insertion.hpp"
 #include "tests/support/temporary_folder.hpp"
 #include "tools/replay/batch.hpp"

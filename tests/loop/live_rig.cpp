@@ -7,8 +7,8 @@
 #include <stdexcept>
 #include <thread>
 
-#include "estimator/health.hpp"
-#include "nodes/needle_pose.hpp"
+#include <bevel/estimator/health.hpp>
+#include <bevel/nodes/needle_pose.hpp>
 
 namespace bevel::test {
 namespace {

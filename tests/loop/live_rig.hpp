@@ -12,9 +12,9 @@
 #include <string>
 #include <vector>
 
-#include "nodes/operator_heartbeat.hpp"
-#include "nodes/operator_words.hpp"
-#include "nodes/system_config.hpp"
+#include <bevel/nodes/operator_heartbeat.hpp>
+#include <bevel/nodes/operator_words.hpp>
+#include <bevel/nodes/system_config.hpp>
 #include "tests/loop/bus_listener.hpp"
 #include "tools/demo_loop/process_group.hpp"
 

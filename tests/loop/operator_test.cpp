@@ -1,7 +1,7 @@
 // Requests of the operator program over LCM, and its heartbeat.
 #include <gmock/gmock.h>
 
-#include "nodes/runtime.hpp"
+#include <bevel/nodes/runtime.hpp>
 #include "tests/loop/loop_fixture.hpp"
 
 namespace bevel {

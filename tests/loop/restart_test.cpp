@@ -1,7 +1,7 @@
 // Processes that are started again while the needle is in the tissue.
 #include <Eigen/Geometry>
 
-#include "estimator/health.hpp"
+#include <bevel/estimator/health.hpp>
 #include "tests/loop/loop_fixture.hpp"
 
 namespace bevel {

@@ -5,8 +5,8 @@
 
 #include <ostream>
 
-#include "io/config.hpp"
-#include "nodes/system_config.hpp"
+#include <bevel/io/config.hpp>
+#include <bevel/nodes/system_config.hpp>
 #include "tests/support/temporary_folder.hpp"
 
 namespace bevel::nodes {

@@ -2,8 +2,8 @@
 
 #include <cstdlib>
 
-#include "drivers/can/open_bus.hpp"
-#include "nodes/runtime.hpp"
+#include <bevel/drivers/can/open_bus.hpp>
+#include <bevel/nodes/runtime.hpp>
 
 namespace bevel::test {
 

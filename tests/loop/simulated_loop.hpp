@@ -14,12 +14,12 @@
 #include <random>
 #include <string>
 
-#include "drivers/can/memory_bus.hpp"
-#include "nodes/controller_node.hpp"
-#include "nodes/estimator_node.hpp"
-#include "nodes/operator_heartbeat.hpp"
-#include "nodes/rig_node.hpp"
-#include "nodes/stepper_node.hpp"
+#include <bevel/drivers/can/memory_bus.hpp>
+#include <bevel/nodes/controller_node.hpp>
+#include <bevel/nodes/estimator_node.hpp>
+#include <bevel/nodes/operator_heartbeat.hpp>
+#include <bevel/nodes/rig_node.hpp>
+#include <bevel/nodes/stepper_node.hpp>
 
 namespace bevel::test {
 

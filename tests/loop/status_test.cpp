@@ -4,8 +4,8 @@
 #include <thread>
 #include <vector>
 
-#include "nodes/runtime.hpp"
-#include "nodes/status_reporter.hpp"
+#include <bevel/nodes/runtime.hpp>
+#include <bevel/nodes/status_reporter.hpp>
 
 namespace bevel::nodes {
 namespace {

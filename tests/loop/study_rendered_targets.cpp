@@ -21,9 +21,9 @@
 #include <utility>
 #include <vector>
 
-#include "diagnosis/parallel.hpp"
-#include "nodes/camera_node.hpp"
-#include "rig/camera/needle_renderer.hpp"
+#include <bevel/diagnosis/parallel.hpp>
+#include <bevel/nodes/camera_node.hpp>
+#include <bevel/rig/camera/needle_renderer.hpp>
 #include "tests/loop/simulated_loop.hpp"
 #include "tools/steering/scenarios.hpp"
 

@@ -2,7 +2,7 @@
 // Run into, at rest, latched with its reason, armed again by word and backed off.
 #include <gmock/gmock.h>
 
-#include "io/config.hpp"
+#include <bevel/io/config.hpp>
 #include "tests/loop/loop_fixture.hpp"
 #include "tests/support/temporary_folder.hpp"
 

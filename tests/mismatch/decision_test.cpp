@@ -1,5 +1,5 @@
 // The verdict from a posterior, with posteriors made up on the sets that a search of the pendulum visited.
-#include "diagnosis/mismatch/decision.hpp"
+#include <bevel/diagnosis/mismatch/decision.hpp>
 
 #include <gtest/gtest.h>
 

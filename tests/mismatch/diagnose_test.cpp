@@ -6,9 +6,9 @@
 #include <numbers>
 #include <set>
 
-#include "diagnosis/mismatch/diagnose.hpp"
-#include "diagnosis/mismatch/effect_source.hpp"
-#include "model/effects/discrepancy.hpp"
+#include <bevel/diagnosis/mismatch/diagnose.hpp>
+#include <bevel/diagnosis/mismatch/effect_source.hpp>
+#include <bevel/model/effects/discrepancy.hpp>
 #include "tests/needle/simulated_rig.hpp"
 
 namespace bevel::diagnosis::testing {

@@ -5,7 +5,7 @@
 #include <numbers>
 #include <set>
 
-#include "diagnosis/mismatch/experiments.hpp"
+#include <bevel/diagnosis/mismatch/experiments.hpp>
 #include "tests/needle/simulated_rig.hpp"
 
 namespace bevel::diagnosis::testing {

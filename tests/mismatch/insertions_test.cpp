@@ -5,7 +5,7 @@
 #include <array>
 #include <cmath>
 
-#include "diagnosis/mismatch/diagnose.hpp"
+#include <bevel/diagnosis/mismatch/diagnose.hpp>
 #include "tests/needle/simulated_rig.hpp"
 
 namespace bevel::diagnosis::testing {

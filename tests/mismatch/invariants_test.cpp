@@ -1,5 +1,5 @@
 // The invariants of a verdict, on findings that were made up and on whole diagnoses of simulated rigs.
-#include "diagnosis/mismatch/invariants.hpp"
+#include <bevel/diagnosis/mismatch/invariants.hpp>
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -9,7 +9,7 @@
 #include <limits>
 #include <ostream>
 
-#include "diagnosis/mismatch/diagnose.hpp"
+#include <bevel/diagnosis/mismatch/diagnose.hpp>
 #include "tests/needle/simulated_rig.hpp"
 
 namespace bevel::diagnosis::testing {

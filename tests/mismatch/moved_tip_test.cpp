@@ -1,5 +1,5 @@
 // By how much one part of a model moves the tip, against closed forms.
-#include "diagnosis/mismatch/moved_tip.hpp"
+#include <bevel/diagnosis/mismatch/moved_tip.hpp>
 
 #include <gtest/gtest.h>
 

@@ -3,9 +3,9 @@
 
 #include <filesystem>
 
-#include "diagnosis/mismatch/diagnose.hpp"
-#include "io/find_logs.hpp"
-#include "io/model_file.hpp"
+#include <bevel/diagnosis/mismatch/diagnose.hpp>
+#include <bevel/io/find_logs.hpp>
+#include <bevel/io/model_file.hpp>
 #include "tests/support/shared_recordings.hpp"
 #include "tools/diagnose/read_case.hpp"
 

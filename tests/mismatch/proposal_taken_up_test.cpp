@@ -3,7 +3,7 @@
 
 #include <cmath>
 
-#include "diagnosis/mismatch/diagnose.hpp"
+#include <bevel/diagnosis/mismatch/diagnose.hpp>
 #include "tests/needle/simulated_rig.hpp"
 
 namespace bevel::diagnosis::testing {

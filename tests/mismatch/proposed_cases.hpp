@@ -2,7 +2,7 @@
 // Proposals of every form in every kind of component, over covariates of every kind between them.
 #include <numbers>
 
-#include "diagnosis/mismatch/effect_source.hpp"
+#include <bevel/diagnosis/mismatch/effect_source.hpp>
 
 namespace bevel::diagnosis::testing {
 

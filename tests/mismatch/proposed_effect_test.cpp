@@ -5,8 +5,8 @@
 
 #include <cmath>
 
-#include "io/model_file.hpp"
-#include "model/effects/discrepancy.hpp"
+#include <bevel/io/model_file.hpp>
+#include <bevel/model/effects/discrepancy.hpp>
 #include "tests/effects/script.hpp"
 #include "tests/mismatch/proposed_cases.hpp"
 

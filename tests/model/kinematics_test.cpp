@@ -1,4 +1,4 @@
-#include "model/motion_direction.hpp"
+#include <bevel/model/motion_direction.hpp>
 
 #include <gtest/gtest.h>
 

@@ -1,4 +1,4 @@
-#include "model/lie.hpp"
+#include <bevel/model/lie.hpp>
 
 #include <gtest/gtest.h>
 

@@ -9,7 +9,7 @@
 #include <iostream>
 #include <vector>
 
-#include "model/kinematics.hpp"
+#include <bevel/model/kinematics.hpp>
 
 namespace bevel::model {
 namespace {

@@ -1,4 +1,4 @@
-#include "model/shaft_end.hpp"
+#include <bevel/model/shaft_end.hpp>
 
 #include <gtest/gtest.h>
 

@@ -1,4 +1,4 @@
-#include "model/slip.hpp"
+#include <bevel/model/slip.hpp>
 
 #include <gtest/gtest.h>
 

@@ -1,12 +1,12 @@
 // Curves over what the base does: which there are, what they weigh, what they do to readings.
-#include "diagnosis/needle/curves.hpp"
+#include <bevel/diagnosis/needle/curves.hpp>
 
 #include <gmock/gmock.h>
 
 #include <numbers>
 
-#include "diagnosis/inference/layout.hpp"
-#include "diagnosis/needle/needle_system.hpp"
+#include <bevel/diagnosis/inference/layout.hpp>
+#include <bevel/diagnosis/needle/needle_system.hpp>
 #include "tests/needle/simulated_rig.hpp"
 
 namespace bevel::diagnosis::testing {

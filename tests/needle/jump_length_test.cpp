@@ -2,8 +2,8 @@
 // leads away.
 #include <gtest/gtest.h>
 
-#include "diagnosis/inference/local_minima.hpp"
-#include "diagnosis/needle/needle_system.hpp"
+#include <bevel/diagnosis/inference/local_minima.hpp>
+#include <bevel/diagnosis/needle/needle_system.hpp>
 #include "tests/needle/simulated_rig.hpp"
 
 namespace bevel::diagnosis::testing {

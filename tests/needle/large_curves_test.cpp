@@ -1,9 +1,9 @@
 // A discrepancy of the needle's that is no small thing: what it does to the readings, and whether it is found.
 #include <gtest/gtest.h>
 
-#include "diagnosis/inference/curved_fit.hpp"
-#include "diagnosis/needle/needle_system.hpp"
-#include "model/effects/discrepancy.hpp"
+#include <bevel/diagnosis/inference/curved_fit.hpp>
+#include <bevel/diagnosis/needle/needle_system.hpp>
+#include <bevel/model/effects/discrepancy.hpp>
 #include "tests/needle/simulated_rig.hpp"
 
 namespace bevel::diagnosis::testing {

@@ -1,5 +1,5 @@
 // The needle behind the engine's interface, against differences and against the model itself.
-#include "diagnosis/needle/needle_system.hpp"
+#include <bevel/diagnosis/needle/needle_system.hpp>
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -7,8 +7,8 @@
 #include <map>
 #include <numbers>
 
-#include "diagnosis/inference/search.hpp"
-#include "diagnosis/needle/curves.hpp"
+#include <bevel/diagnosis/inference/search.hpp>
+#include <bevel/diagnosis/needle/curves.hpp>
 #include "tests/needle/simulated_rig.hpp"
 
 namespace bevel::diagnosis {

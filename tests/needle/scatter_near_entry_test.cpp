@@ -1,6 +1,6 @@
 // How much more readings scatter near the entry: against made-up readings of which it is known, and against restricted
 // likelihoods by dense matrices.
-#include "diagnosis/needle/scatter_near_entry.hpp"
+#include <bevel/diagnosis/needle/scatter_near_entry.hpp>
 
 #include <gtest/gtest.h>
 
@@ -9,7 +9,7 @@
 #include <algorithm>
 #include <random>
 
-#include "model/effects/discrepancy.hpp"
+#include <bevel/model/effects/discrepancy.hpp>
 
 namespace bevel::diagnosis {
 namespace {

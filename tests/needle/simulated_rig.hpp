@@ -6,7 +6,7 @@
 #include <functional>
 #include <random>
 
-#include "diagnosis/needle/recorded_case.hpp"
+#include <bevel/diagnosis/needle/recorded_case.hpp>
 #include "tests/effects/script.hpp"
 
 namespace bevel::diagnosis::testing {

@@ -27,7 +27,7 @@ SOURCE = os.environ.get("BEVEL_SOURCE", ".")
 INTERFACE = os.environ.get("BEVEL_CAN", "")
 # A CAN interface may be that of a guest whose time goes by unevenly (tools/in-vm): there times are bounded, not judged.
 PATIENCE = 10 if INTERFACE else 1
-EDS = os.path.join(SOURCE, "rig/drives/bevel_drive.eds")
+EDS = os.path.join(SOURCE, "rig/src/drives/bevel_drive.eds")
 FOLDER = tempfile.TemporaryDirectory(prefix="bevel-peers-")
 PATH = os.path.join(FOLDER.name, "can.sock")
 ADDRESS = INTERFACE or f"unix:{PATH}"  # as system files and bevel-stepper --can have it

@@ -1,4 +1,4 @@
-"""The rig's local bus for python-can: frames over a Unix socket, as drivers/can/local_wire.hpp has them.
+"""The rig's local bus for python-can: frames over a Unix socket, as drivers/include/bevel/drivers/can/local_wire.hpp has them.
 
     bus = LocalBus("/tmp/bus")                          # a participant
     network = canopen.Network(); network.bus = bus      # or hand it to python-canopen

@@ -1,7 +1,7 @@
 """The extended bicycle model with the effects that may be left out, in their plain form: one compiled loop.
 
 The path is integrated on the samples of ACTUATOR_STATE (half the turn, the advance by its mid-point, half the turn) and
-read off at the camera's stamps. No code is shared with model/effects.
+read off at the camera's stamps. No code is shared with model/src/effects.
 """
 import math
 

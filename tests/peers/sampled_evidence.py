@@ -1,4 +1,4 @@
-"""The evidence by Laplace's method, of diagnosis/inference, against sampled evidence on small cases.
+"""The evidence by Laplace's method, of diagnosis/src/inference, against sampled evidence on small cases.
 
     PYTHONPATH=.deps/python tests/peers/sampled_evidence.py build/bin/sampled_evidence_cases
 

@@ -8,9 +8,9 @@
 #include <iostream>
 #include <nlohmann/json.hpp>
 
-#include "diagnosis/inference/evidence.hpp"
-#include "diagnosis/inference/proposals.hpp"
-#include "diagnosis/needle/needle_system.hpp"
+#include <bevel/diagnosis/inference/evidence.hpp>
+#include <bevel/diagnosis/inference/proposals.hpp>
+#include <bevel/diagnosis/needle/needle_system.hpp>
 #include "tests/inference/pendulum.hpp"
 #include "tests/needle/simulated_rig.hpp"
 

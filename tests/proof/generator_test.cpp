@@ -4,7 +4,7 @@
 #include <cmath>
 #include <numbers>
 
-#include "model/kinematics.hpp"
+#include <bevel/model/kinematics.hpp>
 #include "proof/needle_path.hpp"
 
 namespace bevel::proof {

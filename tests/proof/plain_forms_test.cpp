@@ -6,7 +6,7 @@
 #include <cmath>
 #include <functional>
 
-#include "model/effects/open_loop.hpp"
+#include <bevel/model/effects/open_loop.hpp>
 #include "proof/needle_path.hpp"
 
 namespace bevel::proof {

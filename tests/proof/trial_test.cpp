@@ -6,8 +6,8 @@
 #include <map>
 #include <nlohmann/json.hpp>
 
-#include "io/model_file.hpp"
-#include "io/recording.hpp"
+#include <bevel/io/model_file.hpp>
+#include <bevel/io/recording.hpp>
 #include "proof/score.hpp"
 #include "proof/trial_files.hpp"
 #include "tests/support/temporary_folder.hpp"

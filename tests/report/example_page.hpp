@@ -1,7 +1,7 @@
 // A page with one figure of each kind, whose values are known: what a browser shows of it is compared with them.
 #pragma once
 
-#include "report/page.hpp"
+#include <bevel/report/page.hpp>
 
 namespace bevel::report::testing {
 

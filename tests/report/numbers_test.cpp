@@ -1,5 +1,5 @@
 // Statistics without a value: of nothing, of one, of what does not vary.
-#include "report/numbers.hpp"
+#include <bevel/report/numbers.hpp>
 
 #include <gtest/gtest.h>
 

@@ -10,11 +10,11 @@
 #include <nlohmann/json.hpp>
 #include <regex>
 
-#include "report/assets.hpp"
-#include "report/figure_svg.hpp"
-#include "report/html_text.hpp"
-#include "report/label_place.hpp"
-#include "report/page.hpp"
+#include <bevel/report/assets.hpp>
+#include <bevel/report/figure_svg.hpp>
+#include <bevel/report/html_text.hpp>
+#include <bevel/report/label_place.hpp>
+#include <bevel/report/page.hpp>
 #include "tests/report/example_page.hpp"
 
 namespace bevel::report {

@@ -5,8 +5,8 @@
 #include <cmath>
 #include <random>
 
-#include "report/figure.hpp"
-#include "report/thinned.hpp"
+#include <bevel/report/figure.hpp>
+#include <bevel/report/thinned.hpp>
 
 namespace bevel::report {
 namespace {

@@ -1,4 +1,4 @@
-#include "diagnosis/statistics/ljung_box.hpp"
+#include <bevel/diagnosis/statistics/ljung_box.hpp>
 
 #include <gtest/gtest.h>
 

@@ -6,8 +6,8 @@
 #include <numbers>
 #include <random>
 
-#include "controller/reason.hpp"
-#include "diagnosis/parallel.hpp"
+#include <bevel/controller/reason.hpp>
+#include <bevel/diagnosis/parallel.hpp>
 #include "tools/steering/model_rig.hpp"
 
 namespace bevel::steering {

@@ -8,7 +8,7 @@
 #include <numbers>
 #include <random>
 
-#include "model/kinematics.hpp"
+#include <bevel/model/kinematics.hpp>
 
 namespace bevel::steering {
 namespace {

@@ -11,8 +11,8 @@
 #include <utility>
 #include <vector>
 
-#include "view/http_request.hpp"
-#include "view/page_server.hpp"
+#include <bevel/view/http_request.hpp>
+#include <bevel/view/page_server.hpp>
 
 namespace bevel::view {
 namespace {

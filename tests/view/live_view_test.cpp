@@ -1,4 +1,4 @@
-#include "view/live_view.hpp"
+#include <bevel/view/live_view.hpp>
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>

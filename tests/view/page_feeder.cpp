@@ -10,9 +10,9 @@
 #include <opencv2/imgcodecs.hpp>
 #include <thread>
 
-#include "io/process_state.hpp"
-#include "view/live_view.hpp"
-#include "view/page_server.hpp"
+#include <bevel/io/process_state.hpp>
+#include <bevel/view/live_view.hpp>
+#include <bevel/view/page_server.hpp>
 
 int main() {
   using namespace bevel;

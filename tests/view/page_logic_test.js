@@ -1,6 +1,6 @@
 'use strict';
 // Runs the script of the live page on a stand-in for the browser and checks what it writes: captions and axis labels.
-// Usage: node page_logic_test.js view/page/view.js
+// Usage: node page_logic_test.js view/src/page/view.js
 const assert = require('assert'), fs = require('fs'), vm = require('vm');
 
 const charts = [];

@@ -1,4 +1,4 @@
-#include "view/page_server.hpp"
+#include <bevel/view/page_server.hpp>
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -10,7 +10,7 @@
 #include <string>
 #include <thread>
 
-#include "view/page.hpp"
+#include <bevel/view/page.hpp>
 
 namespace bevel::view {
 namespace {

@@ -7,9 +7,9 @@
 #include <ostream>
 #include <sstream>
 
-#include "io/recording.hpp"
-#include "io/result_file.hpp"
-#include "report/numbers.hpp"
+#include <bevel/io/recording.hpp>
+#include <bevel/io/result_file.hpp>
+#include <bevel/report/numbers.hpp>
 #include "tools/common/exit_status.hpp"
 
 namespace bevel::calibrate {

@@ -6,7 +6,7 @@
 #include <string>
 #include <vector>
 
-#include "drivers/camera/calibration/frame_fit.hpp"
+#include <bevel/drivers/camera/calibration/frame_fit.hpp>
 
 namespace bevel::calibrate {
 

@@ -2,11 +2,11 @@
 #include <ostream>
 #include <stdexcept>
 
-#include "diagnosis/latency/latency_fit.hpp"
-#include "io/model_file.hpp"
-#include "io/recording.hpp"
-#include "io/recording_clock.hpp"
-#include "report/numbers.hpp"
+#include <bevel/diagnosis/latency/latency_fit.hpp>
+#include <bevel/io/model_file.hpp>
+#include <bevel/io/recording.hpp>
+#include <bevel/io/recording_clock.hpp>
+#include <bevel/report/numbers.hpp>
 #include "tools/calibrate/calibrate_tool.hpp"
 #include "tools/common/exit_status.hpp"
 

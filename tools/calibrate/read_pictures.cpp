@@ -5,8 +5,8 @@
 #include <set>
 #include <stdexcept>
 
-#include "drivers/camera/decode.hpp"
-#include "drivers/camera/frame_source.hpp"
+#include <bevel/drivers/camera/decode.hpp>
+#include <bevel/drivers/camera/frame_source.hpp>
 #include "tools/calibrate/calibrate_tool.hpp"
 
 namespace bevel::calibrate {

@@ -5,9 +5,9 @@
 #include <nlohmann/json.hpp>
 #include <sstream>
 
-#include "io/result_file.hpp"
-#include "report/numbers.hpp"
-#include "report/page.hpp"
+#include <bevel/io/result_file.hpp>
+#include <bevel/report/numbers.hpp>
+#include <bevel/report/page.hpp>
 #include "tools/calibrate/calibrate_tool.hpp"
 
 namespace bevel::calibrate {

@@ -1,7 +1,7 @@
 // bevel-check: proves the link before motion, and says what to type to mend what is not right.
 #include <cstdio>
 
-#include "nodes/runtime.hpp"
+#include <bevel/nodes/runtime.hpp>
 #include "tools/check/link_probe.hpp"
 #include "tools/common/command_line.hpp"
 #include "tools/common/exit_status.hpp"

@@ -2,7 +2,7 @@
 
 #include <algorithm>
 
-#include "drivers/can/drain.hpp"
+#include <bevel/drivers/can/drain.hpp>
 
 namespace bevel::tools::check {
 namespace {

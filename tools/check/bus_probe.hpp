@@ -11,10 +11,10 @@
 #include <string>
 #include <vector>
 
-#include "drivers/can/bus.hpp"
-#include "drivers/stepper/cia301.hpp"
-#include "drivers/stepper/drive_units.hpp"
-#include "drivers/stepper/stepper_config.hpp"
+#include <bevel/drivers/can/bus.hpp>
+#include <bevel/drivers/stepper/cia301.hpp>
+#include <bevel/drivers/stepper/drive_units.hpp>
+#include <bevel/drivers/stepper/stepper_config.hpp>
 
 namespace bevel::tools::check {
 

@@ -9,9 +9,9 @@
 #include <thread>
 #include <utility>
 
-#include "drivers/can/open_bus.hpp"
-#include "nodes/open_lcm.hpp"
-#include "nodes/runtime.hpp"
+#include <bevel/drivers/can/open_bus.hpp>
+#include <bevel/nodes/open_lcm.hpp>
+#include <bevel/nodes/runtime.hpp>
 
 namespace bevel::tools::check {
 namespace {

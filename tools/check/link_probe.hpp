@@ -6,8 +6,8 @@
 #include <map>
 #include <string>
 
-#include "nodes/lcm_port.hpp"
-#include "nodes/system_config.hpp"
+#include <bevel/nodes/lcm_port.hpp>
+#include <bevel/nodes/system_config.hpp>
 #include "tools/check/judgement.hpp"
 
 namespace bevel::tools::check {

@@ -3,7 +3,7 @@
 #include <ostream>
 #include <utility>
 
-#include "io/estimator_config.hpp"
+#include <bevel/io/estimator_config.hpp>
 #include "tools/close_loop/report.hpp"
 #include "tools/common/exit_status.hpp"
 #include "tools/diagnose/diagnose_tool.hpp"

@@ -1,6 +1,6 @@
 #include <cstdio>
 
-#include "io/live_effects.hpp"
+#include <bevel/io/live_effects.hpp>
 #include "tools/close_loop/report.hpp"
 #include "tools/diagnose/figures.hpp"
 

@@ -5,9 +5,9 @@
 #include <string>
 #include <vector>
 
-#include "diagnosis/mismatch/findings.hpp"
-#include "estimator/config.hpp"
-#include "io/model_file.hpp"
+#include <bevel/diagnosis/mismatch/findings.hpp>
+#include <bevel/estimator/config.hpp>
+#include <bevel/io/model_file.hpp>
 #include "tools/replay/statistics.hpp"
 
 namespace bevel::close_loop {

@@ -5,9 +5,9 @@
 #include <string>
 #include <vector>
 
-#include "diagnosis/mismatch/findings.hpp"
-#include "diagnosis/needle/recorded_case.hpp"
-#include "io/model_file.hpp"
+#include <bevel/diagnosis/mismatch/findings.hpp>
+#include <bevel/diagnosis/needle/recorded_case.hpp>
+#include <bevel/io/model_file.hpp>
 
 namespace bevel::close_loop {
 

@@ -6,7 +6,7 @@
 #include <nlohmann/json.hpp>
 #include <numeric>
 
-#include "report/page.hpp"
+#include <bevel/report/page.hpp>
 #include "tools/diagnose/figures.hpp"
 
 namespace bevel::close_loop {

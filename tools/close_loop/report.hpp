@@ -4,7 +4,7 @@
 #include <string>
 #include <vector>
 
-#include "report/figure.hpp"
+#include <bevel/report/figure.hpp>
 #include "tools/close_loop/close_loop.hpp"
 
 namespace bevel::close_loop {

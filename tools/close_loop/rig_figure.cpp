@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
-#include "rig/plant/plant.hpp"
+#include <bevel/rig/plant/plant.hpp>
 
 namespace bevel::close_loop {
 namespace {

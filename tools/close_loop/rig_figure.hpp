@@ -4,9 +4,9 @@
 #include <string>
 #include <vector>
 
-#include "diagnosis/inference/noise.hpp"
-#include "diagnosis/needle/recorded_case.hpp"
-#include "io/model_file.hpp"
+#include <bevel/diagnosis/inference/noise.hpp>
+#include <bevel/diagnosis/needle/recorded_case.hpp>
+#include <bevel/io/model_file.hpp>
 
 namespace bevel::close_loop {
 

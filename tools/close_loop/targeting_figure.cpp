@@ -8,8 +8,8 @@
 #include <random>
 #include <stdexcept>
 
-#include "controller/arc_law.hpp"
-#include "diagnosis/parallel.hpp"
+#include <bevel/controller/arc_law.hpp>
+#include <bevel/diagnosis/parallel.hpp>
 #include "tools/steering/model_rig.hpp"
 
 namespace bevel::close_loop {

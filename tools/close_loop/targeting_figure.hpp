@@ -4,7 +4,7 @@
 #include <string>
 #include <vector>
 
-#include "diagnosis/needle/recorded_case.hpp"
+#include <bevel/diagnosis/needle/recorded_case.hpp>
 #include "tools/close_loop/models.hpp"
 #include "tools/common/progress_line.hpp"
 #include "tools/steering/steered_insertion.hpp"

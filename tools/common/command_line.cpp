@@ -9,7 +9,7 @@
 #include <iostream>
 #include <new>
 
-#include "io/config.hpp"
+#include <bevel/io/config.hpp>
 #include "tools/common/exit_status.hpp"
 #include "tools/common/limits.hpp"
 

@@ -15,9 +15,7 @@ constexpr double kTerminalEvery_s = 0.1;  // quicker than an eye reads
 constexpr double kLineEvery_s = 10;       // of a file that keeps them all
 constexpr const char* kErased = "\r\033[K";
 
-double steady_s() {
-  return std::chrono::duration<double>(std::chrono::steady_clock::now().time_since_epoch()).count();
-}
+double steady_s() { return std::chrono::duration<double>(std::chrono::steady_clock::now().time_since_epoch()).count(); }
 
 // Of what nobody knows to the second.
 std::string roughly(double seconds) {

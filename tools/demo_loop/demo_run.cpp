@@ -7,10 +7,10 @@
 #include <stdexcept>
 #include <thread>
 
-#include "nodes/claim_name.hpp"
-#include "nodes/fault_injector.hpp"
-#include "nodes/open_lcm.hpp"
-#include "nodes/system_config.hpp"
+#include <bevel/nodes/claim_name.hpp>
+#include <bevel/nodes/fault_injector.hpp>
+#include <bevel/nodes/open_lcm.hpp>
+#include <bevel/nodes/system_config.hpp>
 #include "tools/demo_loop/loop_figures.hpp"
 #include "tools/demo_loop/process_group.hpp"
 #include "tools/demo_loop/steering_session.hpp"

@@ -7,9 +7,9 @@
 #include <numbers>
 #include <stdexcept>
 
-#include "io/file_bytes.hpp"
-#include "io/log_reader.hpp"
-#include "io/messages.hpp"
+#include <bevel/io/file_bytes.hpp>
+#include <bevel/io/log_reader.hpp>
+#include <bevel/io/messages.hpp>
 #include "tools/demo_loop/steering_session.hpp"
 
 namespace bevel::tools {

@@ -5,7 +5,7 @@
 #include <string>
 #include <vector>
 
-#include "io/recording.hpp"
+#include <bevel/io/recording.hpp>
 
 namespace bevel::tools {
 

@@ -1,8 +1,8 @@
 #include <cmath>
 
-#include "nodes/needle_pose.hpp"
-#include "report/numbers.hpp"
-#include "report/page.hpp"
+#include <bevel/nodes/needle_pose.hpp>
+#include <bevel/report/numbers.hpp>
+#include <bevel/report/page.hpp>
 #include "tools/demo_loop/loop_figures.hpp"
 #include "tools/demo_loop/steering_session.hpp"
 

@@ -3,8 +3,8 @@
 #include <cstdio>
 #include <stdexcept>
 
-#include "controller/supervisor.hpp"
-#include "estimator/health.hpp"
+#include <bevel/controller/supervisor.hpp>
+#include <bevel/estimator/health.hpp>
 
 namespace bevel::tools {
 namespace {

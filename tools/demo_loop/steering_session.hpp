@@ -7,10 +7,10 @@
 #include <optional>
 #include <string>
 
-#include "io/log_writer.hpp"
-#include "nodes/operator_heartbeat.hpp"
-#include "nodes/operator_words.hpp"
-#include "nodes/runtime.hpp"
+#include <bevel/io/log_writer.hpp>
+#include <bevel/nodes/operator_heartbeat.hpp>
+#include <bevel/nodes/operator_words.hpp>
+#include <bevel/nodes/runtime.hpp>
 
 namespace bevel::tools {
 

@@ -7,11 +7,11 @@
 #include <ostream>
 #include <stdexcept>
 
-#include "diagnosis/mismatch/diagnose.hpp"
-#include "diagnosis/mismatch/effect_source.hpp"
-#include "io/find_logs.hpp"
-#include "io/model_file.hpp"
-#include "io/sha256.hpp"
+#include <bevel/diagnosis/mismatch/diagnose.hpp>
+#include <bevel/diagnosis/mismatch/effect_source.hpp>
+#include <bevel/io/find_logs.hpp>
+#include <bevel/io/model_file.hpp>
+#include <bevel/io/sha256.hpp>
 #include "tools/common/exit_status.hpp"
 #include "tools/diagnose/figures.hpp"
 #include "tools/diagnose/progress.hpp"

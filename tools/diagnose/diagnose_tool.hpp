@@ -6,8 +6,8 @@
 #include <string>
 #include <vector>
 
-#include "diagnosis/mismatch/findings.hpp"
-#include "io/model_file.hpp"
+#include <bevel/diagnosis/mismatch/findings.hpp>
+#include <bevel/io/model_file.hpp>
 #include "tools/diagnose/provenance.hpp"
 #include "tools/diagnose/result_files.hpp"
 

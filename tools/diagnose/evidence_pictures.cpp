@@ -1,8 +1,8 @@
 #include <algorithm>
 #include <cmath>
 
-#include "diagnosis/inference/search.hpp"
-#include "model/effects/effect.hpp"
+#include <bevel/diagnosis/inference/search.hpp>
+#include <bevel/model/effects/effect.hpp>
 #include "tools/diagnose/figures.hpp"
 #include "tools/diagnose/pictures.hpp"
 

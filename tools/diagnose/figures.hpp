@@ -7,8 +7,8 @@
 #include <string_view>
 #include <vector>
 
-#include "diagnosis/mismatch/findings.hpp"
-#include "report/numbers.hpp"
+#include <bevel/diagnosis/mismatch/findings.hpp>
+#include <bevel/report/numbers.hpp>
 
 namespace bevel::diagnose {
 

@@ -3,7 +3,7 @@
 #include <limits>
 #include <numeric>
 
-#include "report/thinned.hpp"
+#include <bevel/report/thinned.hpp>
 #include "tools/diagnose/figures.hpp"
 #include "tools/diagnose/pictures.hpp"
 

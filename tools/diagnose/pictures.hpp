@@ -5,9 +5,9 @@
 #include <string>
 #include <vector>
 
-#include "diagnosis/mismatch/findings.hpp"
-#include "report/drawing.hpp"
-#include "report/figure.hpp"
+#include <bevel/diagnosis/mismatch/findings.hpp>
+#include <bevel/report/drawing.hpp>
+#include <bevel/report/figure.hpp>
 
 namespace bevel::diagnose {
 

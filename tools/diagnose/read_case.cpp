@@ -6,12 +6,12 @@
 #include <map>
 #include <stdexcept>
 
-#include "io/file_bytes.hpp"
-#include "io/find_logs.hpp"
-#include "io/motion_gap.hpp"
-#include "io/recording_clock.hpp"
-#include "io/second_insertion.hpp"
-#include "io/sha256.hpp"
+#include <bevel/io/file_bytes.hpp>
+#include <bevel/io/find_logs.hpp>
+#include <bevel/io/motion_gap.hpp>
+#include <bevel/io/recording_clock.hpp>
+#include <bevel/io/second_insertion.hpp>
+#include <bevel/io/sha256.hpp>
 #include "tools/diagnose/figures.hpp"
 
 namespace bevel::diagnose {

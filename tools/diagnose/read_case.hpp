@@ -4,8 +4,8 @@
 #include <string>
 #include <vector>
 
-#include "diagnosis/needle/recorded_case.hpp"
-#include "io/recording.hpp"
+#include <bevel/diagnosis/needle/recorded_case.hpp>
+#include <bevel/io/recording.hpp>
 #include "tools/diagnose/provenance.hpp"
 
 namespace bevel::diagnose {

@@ -5,7 +5,7 @@
 #include <cctype>
 #include <cmath>
 
-#include "diagnosis/mismatch/effect_source.hpp"
+#include <bevel/diagnosis/mismatch/effect_source.hpp>
 #include "tools/diagnose/figures.hpp"
 #include "tools/diagnose/pictures.hpp"
 #include "tools/diagnose/verdict_json.hpp"

@@ -3,8 +3,8 @@
 
 #include <string>
 
-#include "diagnosis/mismatch/findings.hpp"
-#include "report/page.hpp"
+#include <bevel/diagnosis/mismatch/findings.hpp>
+#include <bevel/report/page.hpp>
 #include "tools/diagnose/provenance.hpp"
 
 namespace bevel::diagnose {

@@ -1,7 +1,7 @@
 #include <algorithm>
 #include <cmath>
 
-#include "model/effects/effect.hpp"
+#include <bevel/model/effects/effect.hpp>
 #include "tools/diagnose/figures.hpp"
 #include "tools/diagnose/pictures.hpp"
 #include "tools/diagnose/report.hpp"

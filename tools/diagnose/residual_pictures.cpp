@@ -2,7 +2,7 @@
 #include <cmath>
 #include <limits>
 
-#include "report/thinned.hpp"
+#include <bevel/report/thinned.hpp>
 #include "tools/diagnose/figures.hpp"
 #include "tools/diagnose/pictures.hpp"
 

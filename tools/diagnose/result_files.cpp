@@ -10,7 +10,7 @@
 #include <stdexcept>
 #include <system_error>
 
-#include "io/result_file.hpp"
+#include <bevel/io/result_file.hpp>
 
 namespace bevel::diagnose {
 namespace fs = std::filesystem;

@@ -8,10 +8,10 @@
 #include <random>
 #include <stdexcept>
 
-#include "controller/arc_law.hpp"
-#include "diagnosis/parallel.hpp"
-#include "diagnosis/statistics/median.hpp"
-#include "io/live_effects.hpp"
+#include <bevel/controller/arc_law.hpp>
+#include <bevel/diagnosis/parallel.hpp>
+#include <bevel/diagnosis/statistics/median.hpp>
+#include <bevel/io/live_effects.hpp>
 #include "tools/diagnose/figures.hpp"
 #include "tools/steering/model_rig.hpp"
 

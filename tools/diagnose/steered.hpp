@@ -2,9 +2,9 @@
 // leaves.
 #pragma once
 
-#include "diagnosis/mismatch/findings.hpp"
-#include "diagnosis/needle/recorded_case.hpp"
-#include "io/model_file.hpp"
+#include <bevel/diagnosis/mismatch/findings.hpp>
+#include <bevel/diagnosis/needle/recorded_case.hpp>
+#include <bevel/io/model_file.hpp>
 
 namespace bevel::diagnose {
 

@@ -3,8 +3,8 @@
 #include <cmath>
 #include <nlohmann/json.hpp>
 
-#include "diagnosis/mismatch/effect_source.hpp"
-#include "model/effects/effect.hpp"
+#include <bevel/diagnosis/mismatch/effect_source.hpp>
+#include <bevel/model/effects/effect.hpp>
 #include "tools/diagnose/figures.hpp"
 
 namespace bevel::diagnose {

@@ -3,8 +3,8 @@
 
 #include <string>
 
-#include "diagnosis/mismatch/findings.hpp"
-#include "io/model_file.hpp"
+#include <bevel/diagnosis/mismatch/findings.hpp>
+#include <bevel/io/model_file.hpp>
 #include "tools/diagnose/provenance.hpp"
 
 namespace bevel::diagnose {

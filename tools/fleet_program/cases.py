@@ -14,7 +14,7 @@ COLUMNS = ("case", "rig", "date", "model", "logs")
 LOG_HEADER = struct.Struct(">IQQ")  # of an LCM log's event: sync word, number, time in us
 LOG_SYNC = 0xEDA1DA01
 SEPARATORS = (",", ";", "\t", "|")
-# As io/find_logs.hpp: lcm-logger's names, also of rotated and split logs.
+# As io/include/bevel/io/find_logs.hpp: lcm-logger's names, also of rotated and split logs.
 LOG_NAME = re.compile(r"(.*\.lcm(\.\d+)?|lcmlog-[^.]*(\.\d+)?)")
 MAYBE_LOG_NAME = re.compile(r"[^.]+|.*\.\d+")  # a log if it begins as one
 

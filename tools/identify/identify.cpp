@@ -5,11 +5,11 @@
 #include <ostream>
 #include <stdexcept>
 
-#include "io/find_logs.hpp"
-#include "io/model_file.hpp"
-#include "io/recording.hpp"
-#include "io/result_file.hpp"
-#include "io/second_insertion.hpp"
+#include <bevel/io/find_logs.hpp>
+#include <bevel/io/model_file.hpp>
+#include <bevel/io/recording.hpp>
+#include <bevel/io/result_file.hpp>
+#include <bevel/io/second_insertion.hpp>
 #include "tools/common/exit_status.hpp"
 
 namespace bevel::identify {

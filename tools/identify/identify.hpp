@@ -4,8 +4,8 @@
 #include <string>
 #include <vector>
 
-#include "diagnosis/identification/angle_rate.hpp"
-#include "diagnosis/identification/candidates.hpp"
+#include <bevel/diagnosis/identification/angle_rate.hpp>
+#include <bevel/diagnosis/identification/candidates.hpp>
 
 namespace bevel::identify {
 

@@ -3,8 +3,8 @@
 #include <nlohmann/json.hpp>
 #include <ostream>
 
-#include "report/numbers.hpp"
-#include "report/page.hpp"
+#include <bevel/report/numbers.hpp>
+#include <bevel/report/page.hpp>
 #include "tools/identify/identify.hpp"
 
 namespace bevel::identify {

@@ -4,9 +4,9 @@
 #include <filesystem>
 #include <stdexcept>
 
-#include "io/csv_export.hpp"
-#include "io/find_logs.hpp"
-#include "io/mcap_export.hpp"
+#include <bevel/io/csv_export.hpp>
+#include <bevel/io/find_logs.hpp>
+#include <bevel/io/mcap_export.hpp>
 #include "tools/common/exit_status.hpp"
 
 namespace bevel::exporting {

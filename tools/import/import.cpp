@@ -6,10 +6,10 @@
 #include <set>
 #include <stdexcept>
 
-#include "io/csv_export.hpp"
-#include "io/csv_import.hpp"
-#include "io/find_logs.hpp"
-#include "io/mcap_export.hpp"
+#include <bevel/io/csv_export.hpp>
+#include <bevel/io/csv_import.hpp>
+#include <bevel/io/find_logs.hpp>
+#include <bevel/io/mcap_export.hpp>
 #include "tools/common/exit_status.hpp"
 
 namespace bevel::importing {

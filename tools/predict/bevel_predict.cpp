@@ -2,7 +2,7 @@
 #include <iostream>
 #include <stdexcept>
 
-#include "io/find_logs.hpp"
+#include <bevel/io/find_logs.hpp>
 #include "tools/common/command_line.hpp"
 #include "tools/predict/predict.hpp"
 

@@ -10,10 +10,10 @@
 #include <ostream>
 #include <stdexcept>
 
-#include "io/model_file.hpp"
-#include "io/recording.hpp"
-#include "io/second_insertion.hpp"
-#include "model/effects/prediction_spread.hpp"
+#include <bevel/io/model_file.hpp>
+#include <bevel/io/recording.hpp>
+#include <bevel/io/second_insertion.hpp>
+#include <bevel/model/effects/prediction_spread.hpp>
 #include "tools/common/exit_status.hpp"
 
 namespace bevel::predict {

@@ -7,8 +7,8 @@
 #include <string>
 #include <vector>
 
-#include "io/model_file.hpp"
-#include "model/effects/open_loop.hpp"
+#include <bevel/io/model_file.hpp>
+#include <bevel/model/effects/open_loop.hpp>
 
 namespace bevel::predict {
 

@@ -1,5 +1,5 @@
 // bevel-camera: frames in (the rig, a folder, a video file, a V4L2 device), TIP_MEASUREMENT out.
-#include "nodes/camera_node.hpp"
+#include <bevel/nodes/camera_node.hpp>
 #include "tools/processes/process_main.hpp"
 
 int main(int argc, char** argv) {

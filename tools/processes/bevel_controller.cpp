@@ -1,5 +1,5 @@
 // bevel-controller: NEEDLE_STATE, ACTUATOR_STATE and STEERING_TARGET in, MOTION_COMMAND out.
-#include "nodes/controller_node.hpp"
+#include <bevel/nodes/controller_node.hpp>
 #include "tools/processes/process_main.hpp"
 
 int main(int argc, char** argv) {

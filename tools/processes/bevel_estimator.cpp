@@ -1,6 +1,6 @@
 // bevel-estimator: TIP_MEASUREMENT, TIP_HEADING and ACTUATOR_STATE in, NEEDLE_STATE out.
-#include "nodes/controller_node.hpp"
-#include "nodes/estimator_node.hpp"
+#include <bevel/nodes/controller_node.hpp>
+#include <bevel/nodes/estimator_node.hpp>
 #include "tools/processes/process_main.hpp"
 
 int main(int argc, char** argv) {

@@ -2,9 +2,9 @@
 #include <cstdio>
 #include <thread>
 
-#include "drivers/can/local_bus.hpp"
-#include "drivers/can/open_bus.hpp"
-#include "nodes/rig_node.hpp"
+#include <bevel/drivers/can/local_bus.hpp>
+#include <bevel/drivers/can/open_bus.hpp>
+#include <bevel/nodes/rig_node.hpp>
 #include "tools/processes/process_main.hpp"
 
 int main(int argc, char** argv) {

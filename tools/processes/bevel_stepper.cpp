@@ -1,8 +1,8 @@
 // bevel-stepper: MOTION_COMMAND in, two CiA 402 drives over CAN (or the rig's local bus), ACTUATOR_STATE out.
 #include <cstdio>
 
-#include "drivers/can/open_bus.hpp"
-#include "nodes/stepper_node.hpp"
+#include <bevel/drivers/can/open_bus.hpp>
+#include <bevel/nodes/stepper_node.hpp>
 #include "tools/processes/process_main.hpp"
 
 int main(int argc, char** argv) {

@@ -6,8 +6,8 @@
 #include <memory>
 #include <stdexcept>
 
-#include "nodes/claim_name.hpp"
-#include "nodes/open_lcm.hpp"
+#include <bevel/nodes/claim_name.hpp>
+#include <bevel/nodes/open_lcm.hpp>
 
 namespace bevel::tools {
 

@@ -3,10 +3,10 @@
 #include <lcm/lcm-cpp.hpp>
 #include <optional>
 
-#include "nodes/fault_injector.hpp"
-#include "nodes/lcm_port.hpp"
-#include "nodes/runtime.hpp"
-#include "nodes/system_config.hpp"
+#include <bevel/nodes/fault_injector.hpp>
+#include <bevel/nodes/lcm_port.hpp>
+#include <bevel/nodes/runtime.hpp>
+#include <bevel/nodes/system_config.hpp>
 #include "tools/common/command_line.hpp"
 
 namespace bevel::tools {

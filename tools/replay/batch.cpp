@@ -8,11 +8,11 @@
 #include <stdexcept>
 #include <thread>
 
-#include "io/estimator_config.hpp"
-#include "io/file_bytes.hpp"
-#include "io/find_logs.hpp"
-#include "io/model_file.hpp"
-#include "nodes/system_config.hpp"
+#include <bevel/io/estimator_config.hpp>
+#include <bevel/io/file_bytes.hpp>
+#include <bevel/io/find_logs.hpp>
+#include <bevel/io/model_file.hpp>
+#include <bevel/nodes/system_config.hpp>
 #include "tools/common/exit_status.hpp"
 #include "tools/replay/held_out.hpp"
 #include "tools/replay/report.hpp"

@@ -6,7 +6,7 @@
 #include <ostream>
 #include <stdexcept>
 
-#include "io/find_logs.hpp"
+#include <bevel/io/find_logs.hpp>
 #include "tools/replay/batch.hpp"
 
 namespace bevel::replay {

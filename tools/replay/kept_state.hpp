@@ -4,7 +4,7 @@
 // a replay's time.
 #include <array>
 
-#include "estimator/needle_filter.hpp"
+#include <bevel/estimator/needle_filter.hpp>
 
 namespace bevel::replay {
 

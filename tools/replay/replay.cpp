@@ -7,13 +7,13 @@
 #include <stdexcept>
 #include <utility>
 
-#include "io/motion_gap.hpp"
-#include "io/recording.hpp"
+#include <bevel/io/motion_gap.hpp>
+#include <bevel/io/recording.hpp>
 
 namespace bevel::replay {
 namespace {
 
-// As of a channel that may be left out of a log (io/recording.hpp).
+// As of a channel that may be left out of a log (bevel/io/recording.hpp).
 constexpr double kLargestShareTooOld = 0.2;
 
 double square(double x) { return x * x; }

@@ -6,9 +6,9 @@
 #include <string>
 #include <vector>
 
-#include "estimator/needle_estimator.hpp"
-#include "io/log_reader.hpp"
-#include "io/model_file.hpp"
+#include <bevel/estimator/needle_estimator.hpp>
+#include <bevel/io/log_reader.hpp>
+#include <bevel/io/model_file.hpp>
 #include "tools/replay/kept_state.hpp"
 #include "tools/replay/statistics.hpp"
 

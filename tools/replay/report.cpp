@@ -10,9 +10,9 @@
 #include <stdexcept>
 #include <utility>
 
-#include "estimator/health.hpp"
-#include "io/result_file.hpp"
-#include "report/page.hpp"
+#include <bevel/estimator/health.hpp>
+#include <bevel/io/result_file.hpp>
+#include <bevel/report/page.hpp>
 
 namespace bevel::replay {
 namespace {

@@ -3,7 +3,7 @@
 #include <cstdint>
 #include <vector>
 
-#include "diagnosis/statistics/ljung_box.hpp"
+#include <bevel/diagnosis/statistics/ljung_box.hpp>
 
 namespace bevel::replay {
 

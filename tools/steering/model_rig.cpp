@@ -3,7 +3,7 @@
 #include <cmath>
 #include <random>
 
-#include "io/live_effects.hpp"
+#include <bevel/io/live_effects.hpp>
 
 namespace bevel::steering {
 

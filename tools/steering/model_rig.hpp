@@ -4,15 +4,15 @@
 #include <cstdint>
 #include <vector>
 
-#include "diagnosis/inference/noise.hpp"
-#include "diagnosis/needle/recorded_case.hpp"
-#include "io/model_file.hpp"
+#include <bevel/diagnosis/inference/noise.hpp>
+#include <bevel/diagnosis/needle/recorded_case.hpp>
+#include <bevel/io/model_file.hpp>
 #include "tools/steering/steered_insertion.hpp"
 
 namespace bevel::steering {
 
 // The estimator and the controller by their defaults, of the model what bevel-estimator and bevel-controller take of
-// it: effects that are known before an insertion, and no others (io/live_effects.hpp).
+// it: effects that are known before an insertion, and no others (bevel/io/live_effects.hpp).
 Believed believed_of(const io::ModelFile& model);
 
 // The model's effects as another insertion of this duration might have them: their angles of single recordings

@@ -9,9 +9,9 @@
 #include <utility>
 #include <vector>
 
-#include "estimator/entry_line.hpp"
-#include "estimator/health.hpp"
-#include "estimator/needle_estimator.hpp"
+#include <bevel/estimator/entry_line.hpp>
+#include <bevel/estimator/health.hpp>
+#include <bevel/estimator/needle_estimator.hpp>
 
 namespace bevel::steering {
 namespace {

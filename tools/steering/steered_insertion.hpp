@@ -11,9 +11,9 @@
 #include <string>
 #include <vector>
 
-#include "controller/supervisor.hpp"
-#include "estimator/config.hpp"
-#include "rig/plant/plant.hpp"
+#include <bevel/controller/supervisor.hpp>
+#include <bevel/estimator/config.hpp>
+#include <bevel/rig/plant/plant.hpp>
 #include "tools/steering/yardstick.hpp"
 
 namespace bevel::steering {

@@ -14,8 +14,8 @@
 #include <stdexcept>
 #include <utility>
 
-#include "diagnosis/parallel.hpp"
-#include "io/result_file.hpp"
+#include <bevel/diagnosis/parallel.hpp>
+#include <bevel/io/result_file.hpp>
 #include "tools/common/progress_line.hpp"
 #include "tools/steering/scenarios.hpp"
 

@@ -16,7 +16,7 @@
 #include <Eigen/Core>
 #include <optional>
 
-#include "controller/supervisor.hpp"
+#include <bevel/controller/supervisor.hpp>
 
 namespace bevel::steering {
 

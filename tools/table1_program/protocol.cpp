@@ -5,8 +5,8 @@
 #include <cstdio>
 #include <random>
 
-#include "diagnosis/identification/candidates.hpp"
-#include "rig/plant/plant.hpp"
+#include <bevel/diagnosis/identification/candidates.hpp>
+#include <bevel/rig/plant/plant.hpp>
 
 namespace bevel::table1 {
 

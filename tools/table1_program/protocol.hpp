@@ -3,10 +3,10 @@
 #include <string>
 #include <vector>
 
-#include "diagnosis/identification/angle_rate.hpp"
-#include "diagnosis/identification/figures.hpp"
-#include "diagnosis/identification/trajectory_fit.hpp"
-#include "model/beam/beam_plant.hpp"
+#include <bevel/diagnosis/identification/angle_rate.hpp>
+#include <bevel/diagnosis/identification/figures.hpp>
+#include <bevel/diagnosis/identification/trajectory_fit.hpp>
+#include <bevel/model/beam/beam_plant.hpp>
 
 namespace bevel::table1 {
 

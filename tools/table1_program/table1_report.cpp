@@ -5,7 +5,7 @@
 #include <cstdio>
 #include <ostream>
 
-#include "report/page.hpp"
+#include <bevel/report/page.hpp>
 
 namespace bevel::table1 {
 

@@ -11,11 +11,11 @@
 #include <sstream>
 #include <stdexcept>
 
-#include "nodes/open_lcm.hpp"
-#include "nodes/runtime.hpp"
+#include <bevel/nodes/open_lcm.hpp>
+#include <bevel/nodes/runtime.hpp>
+#include <bevel/view/view_node.hpp>
 #include "tools/common/command_line.hpp"
 #include "tools/common/limits.hpp"
-#include "view/view_node.hpp"
 
 namespace {
 

@@ -1,0 +1,213 @@
+#pragma once
+// Which sets of effects are likely: an Occam window (Madigan and Raftery 1994, JASA 89) over all sets of up to
+// `largest`, searched from a queue by adding, dropping and swapping, with refits where the linear model comes near.
+#include <functional>
+#include <limits>
+#include <map>
+#include <memory>
+#include <optional>
+#include <set>
+#include <span>
+
+#include <bevel/diagnosis/inference/evidence.hpp>
+#include <bevel/diagnosis/inference/proposals.hpp>
+
+namespace bevel::inference {
+
+/// Largest share of the posterior mass that may be in candidate models which were not fitted.
+inline constexpr double kMostNotFitted = 0.1;
+
+struct SearchRules {
+  std::size_t largest = 3;
+  double window = 3.5;         // in log posterior: sets below are not looked at further (odds of 33)
+  double curve_window = 15.0;  // without a discrepancy: sets further below are not looked at with one
+  double optimism = 2.0;       // by which a refit may exceed what the linear model promised
+  double doubt = 12.0;         // below by that after a first fit: noise and variation are not fitted
+  double linear_error = 0.15;  // of what the linear model promises, as a share of it
+  std::size_t starts = 2;      // of an effect, that are fitted
+  std::size_t foremost = 2;    // proposals that are looked at in a member's place
+  std::size_t pairs = 8;
+  long most_steps = 2000;               // of all fits (Likelihood::steps); then only what may be the likeliest
+  double log_prior_odds_effect = -5.0;  // of one effect being in the model, against not; its kinds share it
+  std::size_t most_curves = 2;          // of a discrepancy
+  // Models that were predicted to be likely and not fitted for want of steps: fitted after the search, the likeliest
+  // first, until they hold no more than this share of the posterior or these further steps are spent.
+  double most_not_fitted = kMostNotFitted;
+  long further_steps = 1000;
+  std::size_t at_once = 4;  // fits that run before the next ones are chosen
+  std::size_t rounds = 6;
+  int threads = 2;
+};
+
+// One set, with its share in the posterior (not normalised).
+struct Visited {
+  ModelSet set;
+  std::shared_ptr<const Evaluated> at;
+  double log_without_curve = 0, log_with_curve = 0;  // log of prior x evidence
+  double log_posterior() const;
+  bool is_likelier_with_curve() const;
+  const Fit& likelier_fit() const;
+};
+
+// The set to be looked around next, null where none is left: the likeliest; what it is without one member; what is in
+// its window, or, as a curve takes the place of several effects at once and is far above the sets on the way to these,
+// in that of the likeliest without a curve.
+const ModelSet* next_to_expand(const std::map<ModelSet, Visited>& visited, const std::set<ModelSet>& expanded,
+                               double window);
+
+class Search {
+ public:
+  Search(const System& system, const SearchRules& rules);
+
+  // Told what is looked around next, and how many fits are done of how many; may throw to stop.
+  using Progress = std::function<void(const std::string&)>;
+  // From readings without those outliers, and a noise to begin with. What the linear model promises depends on the
+  // noise, and on what else the tip does: it is asked again about the likeliest set, until that is the same. Throws
+  // std::domain_error where the model without effects cannot follow the recordings.
+  void run(const Readings& outliers, const Noise& noise, const Progress& progress = {});
+  const std::map<ModelSet, Visited>& visited() const { return visited_; }
+  const Visited& best() const;
+  const System& system() const { return system_; }
+  const Discrepancy& discrepancy() const { return *discrepancy_; }
+  const Proposals& proposals() const { return *proposals_; }
+  const SearchRules& rules() const { return rules_; }
+  const Likelihood& likelihood() const { return *likelihood_; }  // by whose noise the curves were prepared
+  // The base alone, by the noise that promises were made with.
+  Marginal base_marginal() const;
+  /// Prediction of the linear model for a candidate model that has one effect more than a fitted one.
+  struct Predicted {
+    double log_posterior = -std::numeric_limits<double>::infinity();
+    /// Natural log Bayes factor of the joining effect against the fitted model, both without a discrepancy.
+    double log_bayes_factor = -std::numeric_limits<double>::infinity();
+    /// Natural log Bayes factor of the joining effect, both models with a discrepancy.
+    double log_bayes_factor_with_curve = -std::numeric_limits<double>::infinity();
+  };
+  /// Predictions of the linear model, for candidate models that were fitted since and for others.
+  const std::map<ModelSet, Predicted>& promised() const { return promised_; }
+  /// Estimates the log of the posterior mass (prior times evidence) of the candidate models that were not fitted.
+  /// Each counts with its predicted mass times the share of such a prediction that fits attain: the mean of
+  /// min(1, fitted / predicted) over the fitted models that were predicted within the window of the likeliest, and of
+  /// one more that attains it in full, so that few fits correct little.
+  double log_not_visited() const;
+  /// Share of the posterior mass that log_not_visited() is of all, in [0, 1].
+  double share_not_visited() const;
+  double log_prior(const ModelSet& set) const;
+  double log_prior_odds(std::size_t effect) const;  // of this kind of the effect, against not
+  // Of a discrepancy: what nobody has named is as likely to be missing as what somebody has, all names together; one
+  // more curve is as likely as one more effect.
+  const CurveRules& curve_rules() const { return curve_rules_; }
+  // A set that was evaluated, with its share in the posterior. It may be of another system: its prior comes with it.
+  Visited weighed(const ModelSet& set, double log_prior, const std::shared_ptr<const Evaluated>& at) const;
+
+ private:
+  struct Job {
+    ModelSet set;
+    Layout layout;
+    Eigen::VectorXd shared;
+    std::vector<Eigen::VectorXd> local;
+    Eigen::VectorXd nuisance_sd;
+    bool beside_curve = false;
+    bool beside_several = false;  // with the first alone there is little of what is promised
+    bool foremost = false;        // fitted though it does not come near: a smaller set that was not yet
+    // Log posterior that it may have by the linear model, and by how much of that the model may be wrong; what nothing
+    // was promised of is fitted in any case.
+    double promised = std::numeric_limits<double>::infinity();
+    double doubtful = 0;
+    std::shared_ptr<const Fit> large_curve{};  // with curves too large for the linear model: the same begins there
+  };
+  // What further effects bring beside one fit of a set, by the linear model.
+  struct Beside {
+    Fit about;
+    std::vector<Proposal> proposals;
+    // Of a log Bayes factor: the larger set's log posterior, but for the prior odds of what joins.
+    std::function<double(double)> log_promised;
+    double log_reference = 0;  // log posterior of the model that the effects join
+    // Beside less spread: what promises no more than it did elsewhere is not begun from here, nor anything before that
+    // has been looked at about its mode.
+    std::function<Beside()> at_its_mode{};
+  };
+  void expand(const ModelSet& set);
+  std::vector<Beside> look_beside(const Fit& fit, double log_here, bool with_others_moved) const;
+  std::vector<Beside> look_in_curves_places(const Fit& with_curve, double log_here) const;
+  std::vector<Job> larger_sets(const ModelSet& set, const Beside& beside);
+  double most_promised(const ModelSet& set) const;
+  double log_promised(const Beside& beside, const Proposal& one) const;
+  double doubtful(double log_promised) const;  // by which a fit may exceed what the linear model says of it
+  std::vector<Job> sets_without_a_member(const Fit& fit, double log_here);
+  std::optional<Job> smaller_set(const Fit& about, std::size_t member, double log_here, double log_cost) const;
+  // A fit whose member at `place` leaves, and what is proposed beside the rest, that member too.
+  struct Swapped {
+    const Likelihood& own;
+    const CurveColumns& curve;
+    const Fit& fit;
+    const Fit& about;
+    std::size_t place;
+    const std::vector<Proposal>& proposals;
+    const Proposal& leaves;
+  };
+  void append_swaps(const Swapped& from, double log_here, std::vector<Job>& out);
+  void keep(const ModelSet& set, const std::shared_ptr<const Evaluated>& at);
+  void drop_repeated(std::vector<Job>& jobs) const;
+  // Without a curve, all kept that are valid; what comes to a lower log posterior is left as it is.
+  std::vector<std::shared_ptr<Evaluated>> evaluate_without_curve(std::span<const Job> jobs, double give_up_below);
+  void evaluate_all(std::vector<Job> jobs);
+  // Modes that were asked for a curve: of a set, with its log evidence.
+  using Modes = std::vector<std::pair<ModelSet, double>>;
+  void evaluate_with_curve(std::span<const Job> jobs, Modes& asked);
+  static Job job_at(const Fit& fit);
+  // A job that is begun from a fit with a curve asks for one, too, and begins with a large one from there.
+  void ask_for_curve_of(const Fit& fit, Job& job) const;
+  void ask_for_curve_of(const Fit& fit, std::shared_ptr<const Likelihood> by, Job& job) const;
+  Job job_from(const Fit& fit, std::size_t effect, const StartPoint& start) const;
+  Job job_from_alike(const Fit& fit, std::size_t effect, StartPoint start) const;
+  bool has_instants(std::size_t effect) const;
+  // Null: its noise is normal.
+  std::shared_ptr<const Likelihood> with_heavy_tails(const Fit& fit) const;
+  // Whether the likeliest set's noise has, which alone can say: what jumps is no noise, once it has a name.
+  bool look_for_heavy_tails();
+  double best_log() const;
+  const Fit& likeliest_fit() const { return best().likelier_fit(); }
+  bool is_visited(const ModelSet& set) const { return visited_.contains(set); }
+
+  // The base alone, from where it is fitted.
+  struct Start {
+    Eigen::VectorXd shared;
+    std::vector<Eigen::VectorXd> local;
+    Eigen::VectorXd nuisance_sd;
+  };
+  void look_in_rounds(std::shared_ptr<const Likelihood> reference, Start& start, std::vector<Job> known);
+  // Of a set that is visited: so far below the likeliest that no curve is sought beside it any more.
+  bool is_hopeless(const ModelSet& set) const;
+  double hopeless_below() const;
+  double hopeless_with_curve(const ModelSet& set) const;  // log evidence
+  // Each alone and without a curve, before any is sought.
+  void look_at_foremost_effects();
+  // Whether nothing stays hopeless with all that is promised of a curve.
+  bool is_nothing_hopeless_with_a_curve() const;
+  // Promises that were made by this noise are not worth much by that of what was found since; the last goes on.
+  bool is_round_over() const;
+  bool is_out_of_steps() const { return likelihood_->steps() >= rules_.most_steps; }
+  void look_around();
+  void look_at_what_is_left();  // in the window, the likeliest first
+  void fit_what_was_left();     // SearchRules::most_not_fitted
+
+  const System& system_;
+  SearchRules rules_;
+  CurveRules curve_rules_;
+  std::shared_ptr<const Likelihood> likelihood_;  // for what is linear; each set is judged by its own noise
+  std::unique_ptr<const Discrepancy> discrepancy_;
+  std::unique_ptr<const Proposals> proposals_;
+  std::map<ModelSet, Visited> visited_;
+  std::set<ModelSet> expanded_, refitted_;       // once a round each
+  std::set<std::pair<ModelSet, bool>> swapped_;  // beside a curve and without one, the same
+  Progress progress_;
+  std::map<ModelSet, Predicted> promised_;
+  std::map<ModelSet, Job> left_;                      // not fitted for want of steps, where the most was predicted
+  std::shared_ptr<const Likelihood> heavy_;           // by noise with heavy tails; null: normal, as far as is known
+  std::shared_ptr<const Evaluated> asked_for_tails_;  // the likeliest set, when that was asked
+  bool tails_known_ = false;                          // not asked any more
+  bool last_round_ = false;
+  bool nothing_is_hopeless_ = false;  // whatever the noise: beside it no curve is sought any more
+};
+
+}  // namespace bevel::inference

@@ -1,0 +1,24 @@
+#pragma once
+// Invariants of a verdict: what must hold of every diagnosis, whatever the recordings.
+#include <string>
+#include <vector>
+
+#include <bevel/diagnosis/mismatch/findings.hpp>
+
+namespace bevel::diagnosis {
+
+/// Checks the invariants of a verdict that its findings can show:
+///   1. a named effect has a probability of at least 0.5, alone or jointly with the confounders listed with it; the
+///      interval (95 %) of one of its sizes excludes "no effect"; its log Bayes factor is positive;
+///   2. at most 10 % of the probability is in candidate models that were not fitted;
+///   3. a log Bayes factor that is reported is a number that was computed;
+///   4. the adopted model predicts left-out recordings no worse than the refitted nominal model: the mean difference in
+///      log density between recordings is not below zero by more than its standard error;
+///   5. a proposed equation has finite values;
+///   6. a parameter at a bound of its range is marked.
+/// 1, 2 and 4 are not asked of an inconclusive verdict: it adopts nothing. Instead it names nothing and states a
+/// reason.
+/// @return one sentence for each violation; empty if all invariants hold
+std::vector<std::string> violations(const Findings& findings);
+
+}  // namespace bevel::diagnosis

@@ -1,0 +1,44 @@
+#pragma once
+/// \file
+/// Time lag of the base's sensor relative to the tip's, estimated from an insertion.
+
+#include <optional>
+#include <span>
+#include <string>
+#include <vector>
+
+#include <bevel/model/samples.hpp>
+
+namespace bevel::io {
+
+/// Largest lag (s) that is searched, in both directions. Median and averaging filters of trackers delay by up to a
+/// second.
+inline constexpr double kLargestLag_s = 2;
+
+/// How late the base's measurements are.
+struct BaseLag {
+  double lag_s = 0;  ///< positive: the base's time stamps are later than the tip's for the same motion
+  /// Standard error: the largest of that from leaving out each of ten parts in turn, that of the residuals with their
+  /// autocorrelation, and a quarter of the range of lags that fit as well within two standard deviations.
+  double sd_s = 0;
+  double rms_mm = 0;         ///< root mean square of the residuals of the path length, in mm
+  bool determined = false;   ///< the standard error is below kLargestLagSd_s and the optimum is inside the search range
+  bool significant() const;  ///< determined, and more than three standard errors from zero
+};
+
+/// Standard error (s) from which on the motion does not determine the lag. At 10 mm/s it is a depth of 1 mm.
+inline constexpr double kLargestLagSd_s = 0.1;
+
+/// Estimates the lag of the base relative to the tip.
+///
+/// The tip's z at time t is a cubic polynomial of the depth that the base reports at t + lag. The polynomial covers
+/// entry tilt, curvature, scale and zero of the depth; the lag minimises the sum of squared residuals. At a constant
+/// rate of insertion a lag is the same as another zero of the depth, and is not determined. A tip that follows the base
+/// late for a mechanical reason (friction, a compliant shaft) looks like a lag.
+/// @param actuators  positions of the axes, in order of time
+/// @param tips  positions in {A}, in order of time
+/// @return nothing for less than 4 s or 40 measurements, or if z was not measured
+std::optional<BaseLag> estimate_base_lag(std::span<const model::ActuatorState> actuators,
+                                         std::span<const model::TipMeasurement> tips);
+
+}  // namespace bevel::io

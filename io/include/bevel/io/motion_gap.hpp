@@ -1,0 +1,44 @@
+#pragma once
+/// \file
+/// Intervals between two axis samples in which the motion of the axes is not known.
+
+#include <cstddef>
+#include <optional>
+#include <span>
+#include <string>
+
+#include <bevel/model/samples.hpp>
+
+namespace bevel::io {
+
+/// An interval counts as a gap from this many typical intervals on. Sensors that report every 0.8 s have no gap in each
+/// interval; three lost reports in a row are one.
+inline constexpr double kGapPeriods = 4;
+/// Shortest gap (s), for programs that fit the tip to the motion of the axes. A shorter interval of an axis that
+/// accelerates by 10 mm/s^2 is interpolated with an error of at most 0.3 mm (acceleration times interval squared / 8).
+inline constexpr double kShortestGap_s = 0.5;
+/// Motion within a gap below which it does no harm: the path between both ends is known that closely.
+inline constexpr double kMovedInGap_mm = 1.0, kTurnedInGap_rad = 0.2;
+
+/// Returns the longest interval (s) that is no gap: \p shortest_s, or kGapPeriods times the median interval if that is
+/// longer.
+/// @param actuators in order of time
+double longest_interval_s(std::span<const model::ActuatorState> actuators, double shortest_s = kShortestGap_s);
+
+/// A gap in which the axes moved.
+struct MotionGap {
+  std::size_t after = 0;     ///< index of the sample at the end of the gap
+  double gap_s = 0;          ///< length of the gap, in s
+  double since_first_s = 0;  ///< from the first sample to the beginning of the gap, in s
+  double moved_mm = 0;       ///< insertion between both ends, in mm
+  double turned_rad = 0;     ///< rotation between both ends, in rad
+  double allowed_s = 0;      ///< longest_interval_s
+  std::string what() const;  ///< one sentence with the figures and the allowed values
+};
+
+/// Finds the first gap in which the axes moved by more than kMovedInGap_mm or kTurnedInGap_rad. Import and diagnosis
+/// use the same rule.
+/// @param actuators in order of time
+std::optional<MotionGap> find_motion_gap(std::span<const model::ActuatorState> actuators);
+
+}  // namespace bevel::io
