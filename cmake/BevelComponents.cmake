@@ -7,7 +7,7 @@ set(BEVEL_NEEDS_diagnosis model)
 set(BEVEL_NEEDS_drivers "")
 set(BEVEL_NEEDS_camera drivers)
 set(BEVEL_NEEDS_io model estimator controller)
-set(BEVEL_NEEDS_sim model drivers)
+set(BEVEL_NEEDS_sim model estimator controller drivers)
 set(BEVEL_NEEDS_nodes model estimator controller drivers camera io sim)
 
 set(BEVEL_COMPONENTS all CACHE STRING "Components to build, separated by semicolons: all, or some of ${BEVEL_ALL_COMPONENTS}")

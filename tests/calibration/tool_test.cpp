@@ -9,6 +9,7 @@
 #include <opencv2/imgcodecs.hpp>
 #include <sstream>
 
+#include <bevel/analysis/calibrate/calibrate_tool.hpp>
 #include <bevel/drivers/camera/calibrated_view.hpp>
 #include <bevel/drivers/camera/decode.hpp>
 #include <bevel/io/log_writer.hpp>
@@ -16,9 +17,8 @@
 #include "tests/calibration/true_optics.hpp"
 #include "tests/camera/exif.hpp"
 #include "tests/support/temporary_folder.hpp"
-#include "tools/calibrate/calibrate_tool.hpp"
 
-namespace bevel::calibrate {
+namespace bevel::analysis {
 namespace {
 
 namespace fs = std::filesystem;
@@ -31,7 +31,7 @@ const camera::BoardSpec kBoard{BoardKind::charuco, 8, 6, 9.0, 6.75};
 const cv::Vec3d kEntry_W = test::kBox_mm + cv::Vec3d(0, -30, 0);
 const cv::Matx33d kR_WA = test::turned(0.03, -0.02, 0.02) * cv::Matx33d(0, 1, 0, 0, 0, 1, 1, 0, 0);  // x ahead, z down
 
-// Pictures of two cameras: 10 places in air, 8 immersed, a fiducial in the needle's plane; made once, they take
+// BoardPictures of two cameras: 10 places in air, 8 immersed, a fiducial in the needle's plane; made once, they take
 // seconds.
 class Tool : public testing::Test {
  protected:
@@ -59,8 +59,8 @@ class Tool : public testing::Test {
     delete cameras_;
   }
   static std::string path(const std::string& name) { return (fs::path(folder_->path()) / name).string(); }
-  static Options options() {
-    Options o;
+  static CalibrateOptions options() {
+    CalibrateOptions o;
     o.board = kBoard;
     o.air = {path("air0"), path("air1")};
     o.immersed = {path("wet0"), path("wet1")};
@@ -98,7 +98,7 @@ test::TemporaryFolder* Tool::folder_ = nullptr;
 std::vector<test::TrueCamera>* Tool::cameras_ = nullptr;
 
 TEST_F(Tool, PicturesAndAFiducialGiveCamerasThatFindTheTip) {
-  Options o = options();
+  CalibrateOptions o = options();
   o.fiducial = {path("fiducial0.png"), path("fiducial1.png")};
   o.fiducial_immersed = true;
   o.fiducial_y = "-y";
@@ -156,7 +156,7 @@ TEST_F(Tool, TheLogOfAStraightInsertionGivesTheFrame) {
     }
     log.close();
   }
-  Options o;
+  CalibrateOptions o;
   o.calibration = path("out/cameras.yaml");
   o.insertion = path("insertion.lcm");
   o.out_folder = path("framed");
@@ -171,7 +171,7 @@ TEST_F(Tool, TheLogOfAStraightInsertionGivesTheFrame) {
 
 // Water in the pictures, gel in the file: the walls stay where they were found.
 TEST_F(Tool, TheGelsIndexTakesTheWaters) {
-  Options o = options();
+  CalibrateOptions o = options();
   ASSERT_EQ(run(o, out_, err_), 0);
   const camera::Calibration water = camera::load_calibration(path("out/cameras.yaml"));
   o.gel_index = 1.345;
@@ -187,7 +187,7 @@ TEST_F(Tool, TheGelsIndexTakesTheWaters) {
 }
 
 TEST_F(Tool, AnUnreadablePictureIsToldByTheStatus) {
-  Options o = options();
+  CalibrateOptions o = options();
   o.air = {path("air0")};
   o.immersed.clear();
   std::ofstream(fs::path(path("air0")) / "broken.png") << "no picture";
@@ -198,7 +198,7 @@ TEST_F(Tool, AnUnreadablePictureIsToldByTheStatus) {
 
 // Phones and some cameras tag their images with an orientation; the lens of the sensor does not turn with it.
 TEST_F(Tool, OrientationTagsInThePicturesChangeNothing) {
-  Options o = options();
+  CalibrateOptions o = options();
   o.immersed.clear();
   std::vector<double> lenses[2];
   for (const int orientation : {0, 6}) {
@@ -229,7 +229,7 @@ TEST_F(Tool, OrientationTagsInThePicturesChangeNothing) {
 
 // A 12-bit sensor fills the low 12 of the 16 bits of a PNG.
 TEST_F(Tool, TwelveBitPicturesAreScaled) {
-  Options o = options();
+  CalibrateOptions o = options();
   o.immersed.clear();
   const std::string folder = path("deep");
   fs::create_directories(folder);
@@ -265,7 +265,7 @@ TEST(CalibrationVerdict, GoodImpliesThatTheLensIsDetermined) {
       }
       try {
         const camera::Calibrated got = camera::calibrate(board, test::input_of({truth}, shots));
-        const Verdict verdict = verdict_of(got);
+        const CalibrationVerdict verdict = verdict_of(got);
         const double off = std::abs(got.calibration.cameras[0].model.lens.parameters[camera::kFx] / truth.fx - 1);
         std::printf("tilt %.2f, seed %u: %s, fx off by %.2f %%, lens to %.2f %%, orientations: %d\n", tilt, seed,
                     verdict.title.c_str(), 100 * off, 100 * lens_error(got, 0), got.tilts[0]);
@@ -292,7 +292,7 @@ TEST(CalibrationVerdict, GoodImpliesThatTheLensIsDetermined) {
 
 // One view 16 times, as an issue reported it.
 TEST_F(Tool, OnePictureSixteenTimesIsRefused) {
-  Options o = options();
+  CalibrateOptions o = options();
   o.immersed.clear();
   o.air = {path("same")};
   o.out_folder = path("out-same");
@@ -315,7 +315,7 @@ TEST_F(Tool, ALegacyBoardIsRecognisedAndReported) {
   const camera::Board board(kBoard);
   std::vector<test::BoardPlace> places;
   const auto shots = test::shots_of({(*cameras_)[0]}, board, 10, 0, 0, kSeed, &places);
-  Options o = options();
+  CalibrateOptions o = options();
   o.immersed.clear();
   o.air = {path("legacy")};
   o.out_folder = path("out-legacy");
@@ -342,7 +342,7 @@ TEST_F(Tool, ALegacyBoardIsRecognisedAndReported) {
 }
 
 // What was said before the refusal.
-std::string expect_refused(const Options& o, const std::vector<std::string>& words) {
+std::string expect_refused(const CalibrateOptions& o, const std::vector<std::string>& words) {
   std::ostringstream out, err;
   try {
     run(o, out, err);
@@ -359,7 +359,7 @@ TEST_F(Tool, WhatIsWrongIsNamed) {
   cv::imwrite(mixed + "/a.png", cv::Mat(480, 640, CV_8UC1, cv::Scalar(1)));
   cv::imwrite(mixed + "/b.png", cv::Mat(240, 320, CV_8UC1, cv::Scalar(1)));
   cv::imwrite(few + "/a.png", cv::Mat(480, 640, CV_8UC1, cv::Scalar(1)));
-  Options o = options();
+  CalibrateOptions o = options();
   o.immersed.clear();
   o.air = {mixed};
   expect_refused(o, {"b.png' is 320 x 240 px, allowed: 640 x 480 px"});
@@ -394,14 +394,14 @@ TEST_F(Tool, WhatIsWrongIsNamed) {
   o = options();
   o.print_board = path("board.jpg");
   expect_refused(o, {"'.jpg', allowed: .svg, .png"});
-  o = Options{};
+  o = CalibrateOptions{};
   o.calibration = path("nowhere.yaml");
   o.insertion = path("insertion.lcm");
   expect_refused(o, {"nowhere.yaml: not a file"});
 }
 
 TEST_F(Tool, ABoardToPrintIsFoundInItsOwnPicture) {
-  Options o = options();
+  CalibrateOptions o = options();
   o.print_board = path("board.png");
   EXPECT_EQ(run(o, out_, err_), 0);
   EXPECT_EQ(camera::Board(kBoard).find(camera::read_gray(o.print_board).gray).ids.size(), 35U);
@@ -411,4 +411,4 @@ TEST_F(Tool, ABoardToPrintIsFoundInItsOwnPicture) {
 }
 
 }  // namespace
-}  // namespace bevel::calibrate
+}  // namespace bevel::analysis

@@ -4,6 +4,7 @@
 #include <cmath>
 #include <limits>
 
+#include <bevel/analysis/diagnose/read_case.hpp>
 #include <bevel/diagnosis/inference/calibrate.hpp>
 #include <bevel/diagnosis/inference/log_sum.hpp>
 #include <bevel/diagnosis/mismatch/decision.hpp>
@@ -11,7 +12,6 @@
 #include <bevel/io/find_logs.hpp>
 #include <bevel/io/model_file.hpp>
 #include "proof/trial_files.hpp"
-#include "tools/diagnose/read_case.hpp"
 
 namespace bevel::ceiling {
 
@@ -199,7 +199,7 @@ json compare(const fs::path& folder, const json& campaign, const json& score, in
   const proof::Trial trial = open_trial(folder, campaign, number);
   const proof::TrialFolders folders(folder, number);
   const auto model = io::load_model_file((folders.given / "model.toml").string());
-  const diagnosis::NeedleSystem needle(diagnose::read_case(io::find_logs({folders.given.string()})).recorded,
+  const diagnosis::NeedleSystem needle(analysis::read_case(io::find_logs({folders.given.string()})).recorded,
                                        model.needle);
   const auto calibration = inference::calibrate(needle);
   Search search(needle, {.threads = threads});

@@ -4,11 +4,11 @@
 
 #include <filesystem>
 
+#include <bevel/analysis/diagnose/read_case.hpp>
 #include <bevel/diagnosis/needle/needle_system.hpp>
 #include <bevel/io/find_logs.hpp>
 #include "proof/beam_path.hpp"
 #include "proof/trial_files.hpp"
-#include "tools/diagnose/read_case.hpp"
 
 namespace bevel::ceiling::testing {
 
@@ -45,7 +45,7 @@ struct NoiseFree {
     proof::write_trial(folder, trial);
     const auto given = proof::TrialFolders(folder, trial.truth.trial).given.string();
     const proof::BaseNeedle& n = trial.truth.believed;
-    auto read = diagnose::read_case(io::find_logs({given}));
+    auto read = analysis::read_case(io::find_logs({given}));
     std::filesystem::remove_all(folder);
     return {std::move(read.recorded),
             {.curvature_per_mm = n.curvature_per_mm,

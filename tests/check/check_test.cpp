@@ -2,11 +2,11 @@
 #include <gmock/gmock.h>
 
 #include <bevel/drivers/can/memory_bus.hpp>
+#include <bevel/drivers/commissioning/bus_probe.hpp>
+#include <bevel/drivers/commissioning/judgement.hpp>
 #include <bevel/rig/drives/simulated_drive.hpp>
-#include "tools/check/bus_probe.hpp"
-#include "tools/check/judgement.hpp"
 
-namespace bevel::tools::check {
+namespace bevel::drivers {
 namespace {
 
 using stepper::kMs;
@@ -202,4 +202,4 @@ TEST(Judge, Cameras) {
 }
 
 }  // namespace
-}  // namespace bevel::tools::check
+}  // namespace bevel::drivers

@@ -1,5 +1,5 @@
 // A concealed effect, found, put back into rig, estimator and controller: each gets better by it.
-#include "tools/close_loop/close_loop.hpp"
+#include <bevel/analysis/close_loop/close_loop.hpp>
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -8,11 +8,11 @@
 #include <nlohmann/json.hpp>
 #include <sstream>
 
+#include <bevel/analysis/close_loop/report.hpp>
 #include "tests/close_loop/made_case.hpp"
 #include "tests/support/temporary_folder.hpp"
-#include "tools/close_loop/report.hpp"
 
-namespace bevel::close_loop {
+namespace bevel::analysis {
 namespace {
 
 namespace fs = std::filesystem;
@@ -22,8 +22,8 @@ using ::testing::HasSubstr;
 struct CloseTheLoop : ::testing::Test {
   test::TemporaryFolder folder;
 
-  Options options(const std::string& name) const {
-    Options o;
+  CloseLoopOptions options(const std::string& name) const {
+    CloseLoopOptions o;
     o.folder = (folder / name).string();
     o.out_folder = (folder / "out").string();
     o.estimator_path = std::string(BEVEL_SOURCE_DIR) + "/tools/replay/strict.toml";
@@ -31,7 +31,7 @@ struct CloseTheLoop : ::testing::Test {
     o.targeting.seeds = 3;
     return o;
   }
-  static std::string refusal(const Options& o) {
+  static std::string refusal(const CloseLoopOptions& o) {
     try {
       close_the_loop(o, std::cerr);
     } catch (const std::exception& e) {
@@ -64,14 +64,14 @@ void expect_all_three_better(const ClosedLoop& loop, const std::string& effect) 
 TEST_F(CloseTheLoop, WindUpFoundMakesRigEstimatorAndControllerBetter) {
   const io::ModelFile truth{model::testing::agar(), {{"torsional_windup", {{"lag_at_100mm_rad", 0.8}}, {}}}};
   testing::make_case(folder / "windup", truth);
-  Options o = options("windup");
+  CloseLoopOptions o = options("windup");
   o.targeting.seeds = 6;
   expect_all_three_better(close_the_loop(o, std::cerr), "torsional_windup");
 }
 
 TEST_F(CloseTheLoop, ALogCutOffIsSaidAndStatusThree) {
   testing::make_case(folder / "torn", {model::testing::agar(), {}});
-  Options o = options("torn");
+  CloseLoopOptions o = options("torn");
   o.targeting.seeds = 1;
   const fs::path torn = folder / "torn/rec01.lcm";
   fs::resize_file(torn, fs::file_size(torn) - 40);  // a recorder that was killed
@@ -83,7 +83,7 @@ TEST_F(CloseTheLoop, ALogCutOffIsSaidAndStatusThree) {
 TEST_F(CloseTheLoop, InsertionScaleFoundMakesAllThreeBetterAndTheFilesSaySo) {
   const io::ModelFile truth{model::testing::agar(), {{"insertion_scale", {{"ratio", 0.93}}, {}}}};
   testing::make_case(folder / "scale", truth);
-  Options o = options("scale");
+  CloseLoopOptions o = options("scale");
   o.targeting.seeds = 16;  // a forgiving filter gains 7 um by the model: seen in 192 insertions, not in 36
   std::ostringstream err;
   const ClosedLoop loop = close_the_loop(o, err);
@@ -131,11 +131,11 @@ TEST_F(CloseTheLoop, BadInputIsOneSentence) {
   EXPECT_THAT(refusal(options("empty")), HasSubstr("empty: holds no recording (rec*.lcm)"));
   testing::record(folder / "empty/rec01.lcm", 0, plain);
   EXPECT_THAT(refusal(options("empty")), HasSubstr("at least two"));
-  Options o = options("empty");
+  CloseLoopOptions o = options("empty");
   o.estimator_path = (folder / "no.toml").string();
   EXPECT_THAT(refusal(o), HasSubstr("no.toml"));
   EXPECT_FALSE(fs::exists(folder / "out"));
 }
 
 }  // namespace
-}  // namespace bevel::close_loop
+}  // namespace bevel::analysis

@@ -14,7 +14,7 @@
 #include <bevel/rig/plant/plant.hpp>
 #include "tests/effects/script.hpp"
 
-namespace bevel::close_loop::testing {
+namespace bevel::analysis::testing {
 
 constexpr double kSigma_mm = 0.1;
 constexpr std::uint64_t kSeed = 17;
@@ -61,4 +61,4 @@ inline void make_case(const std::filesystem::path& folder, const io::ModelFile& 
   for (int r = 0; r < 4; ++r) record(folder / ("rec0" + std::to_string(r + 1) + ".lcm"), r, truth);
 }
 
-}  // namespace bevel::close_loop::testing
+}  // namespace bevel::analysis::testing

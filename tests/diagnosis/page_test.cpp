@@ -8,11 +8,11 @@
 #include <fstream>
 #include <regex>
 
+#include <bevel/analysis/diagnose/figures.hpp>
+#include <bevel/analysis/diagnose/report.hpp>
 #include "tests/diagnosis/made_up_findings.hpp"
-#include "tools/diagnose/figures.hpp"
-#include "tools/diagnose/report.hpp"
 
-namespace bevel::diagnose {
+namespace bevel::analysis {
 namespace {
 
 using diagnosis::Verdict;
@@ -231,4 +231,4 @@ TEST(Page, holds_when_findings_are_bare) {
 }
 
 }  // namespace
-}  // namespace bevel::diagnose
+}  // namespace bevel::analysis

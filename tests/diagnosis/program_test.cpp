@@ -18,7 +18,7 @@
 #include "tests/diagnosis/recorded_logs.hpp"
 #include "tests/support/temporary_folder.hpp"
 
-namespace bevel::diagnose {
+namespace bevel::analysis {
 namespace {
 
 namespace fs = std::filesystem;
@@ -259,4 +259,4 @@ TEST_F(Program, UsageErrorsAreStatusTwo) {
 }
 
 }  // namespace
-}  // namespace bevel::diagnose
+}  // namespace bevel::analysis

@@ -4,11 +4,11 @@
 
 #include <filesystem>
 
+#include <bevel/analysis/diagnose/read_case.hpp>
 #include "tests/diagnosis/recorded_logs.hpp"
 #include "tests/support/temporary_folder.hpp"
-#include "tools/diagnose/read_case.hpp"
 
-namespace bevel::diagnose {
+namespace bevel::analysis {
 namespace {
 
 namespace fs = std::filesystem;
@@ -135,4 +135,4 @@ TEST_F(ReadLogs, ALittleDamageIsARemarkMuchIsARefusal) {
 }
 
 }  // namespace
-}  // namespace bevel::diagnose
+}  // namespace bevel::analysis

@@ -13,13 +13,13 @@
 #include <nlohmann/json.hpp>
 #include <sstream>
 
+#include <bevel/analysis/diagnose/diagnose_tool.hpp>
+#include <bevel/analysis/diagnose/report.hpp>
+#include <bevel/analysis/diagnose/verdict_json.hpp>
 #include "tests/diagnosis/made_up_findings.hpp"
 #include "tests/support/temporary_folder.hpp"
-#include "tools/diagnose/diagnose_tool.hpp"
-#include "tools/diagnose/report.hpp"
-#include "tools/diagnose/verdict_json.hpp"
 
-namespace bevel::diagnose {
+namespace bevel::analysis {
 namespace {
 
 namespace fs = std::filesystem;
@@ -256,4 +256,4 @@ TEST_F(Results, AFolderThatCannotHoldThemIsSaidBeforehandAndNothingMade) {
 }
 
 }  // namespace
-}  // namespace bevel::diagnose
+}  // namespace bevel::analysis

@@ -1,15 +1,15 @@
 // Steered to targets with one model in the software and with another; and when that is not done.
-#include "tools/diagnose/steered.hpp"
+#include <bevel/analysis/diagnose/steered.hpp>
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <bevel/analysis/diagnose/figures.hpp>
+#include <bevel/analysis/diagnose/verdict_json.hpp>
 #include "tests/diagnosis/made_up_findings.hpp"
 #include "tests/needle/simulated_rig.hpp"
-#include "tools/diagnose/figures.hpp"
-#include "tools/diagnose/verdict_json.hpp"
 
-namespace bevel::diagnose {
+namespace bevel::analysis {
 namespace {
 
 using diagnosis::Findings;
@@ -117,4 +117,4 @@ TEST_F(Steered, NothingIsSaidWhereThereIsNothingToSay) {
 }
 
 }  // namespace
-}  // namespace bevel::diagnose
+}  // namespace bevel::analysis

@@ -8,12 +8,12 @@
 #include <filesystem>
 #include <sstream>
 
+#include <bevel/analysis/predict/predict.hpp>
 #include <bevel/io/log_writer.hpp>
 #include <bevel/io/messages.hpp>
 #include <bevel/io/model_file.hpp>
 #include "tests/effects/script.hpp"
 #include "tests/support/temporary_folder.hpp"
-#include "tools/predict/predict.hpp"
 
 namespace bevel::model::testing {
 namespace {
@@ -227,14 +227,14 @@ TEST_F(Predict, PrintsALineForEachMeasurementInTheOrderOfTheLog) {
   for (std::size_t i = 0; i < tips.size(); ++i)
     tips[i].utime = actuators.front().utime + std::array{2'000'000, -500'000, 60'000'000, 1'000'000}.at(i);
   const AugmentedNeedle needle(agar());
-  const auto lines = predict::predict(needle, actuators, tips);
+  const auto lines = analysis::predict(needle, actuators, tips);
   ASSERT_EQ(lines.size(), 4U);
   for (std::size_t i = 0; i < 4; ++i) EXPECT_EQ(lines[i].utime, tips[i].utime);
   EXPECT_EQ(lines[1].position_mm, Eigen::Vector3d::Zero());  // before the motion
   EXPECT_LT(lines[3].position_mm.z(), lines[0].position_mm.z());
   auto shuffled = actuators;
   std::reverse(shuffled.begin(), shuffled.end());
-  const auto again = predict::predict(needle, shuffled, tips);
+  const auto again = analysis::predict(needle, shuffled, tips);
   for (std::size_t i = 0; i < 4; ++i) EXPECT_EQ(again[i].position_mm, lines[i].position_mm);
 }
 

@@ -5,11 +5,11 @@
 #include <cmath>
 #include <iostream>
 
+#include <bevel/analysis/replay/statistics.hpp>
 #include <bevel/estimator/needle_estimator.hpp>
 #include <bevel/estimator/propagate.hpp>
 #include <bevel/model/effects/open_loop.hpp>
 #include "tests/estimator/insertion.hpp"
-#include "tools/replay/statistics.hpp"
 
 namespace bevel::estimator {
 namespace {
@@ -64,12 +64,12 @@ testing::Insertion simulate(const EstimatorConfig& truth, std::mt19937_64& rng) 
   return data;
 }
 
-replay::ChiSquareMean innovations(const EstimatorConfig& config, const testing::Insertion& data) {
+analysis::ChiSquareMean innovations(const EstimatorConfig& config, const testing::Insertion& data) {
   NeedleEstimator estimator(config);
-  replay::ChiSquareMean nis;
+  analysis::ChiSquareMean nis;
   estimator.observe(
       [](void* context, const NeedleEstimator::Applied& a) {
-        static_cast<replay::ChiSquareMean*>(context)->add(a.update.mahalanobis2, a.update.rank);
+        static_cast<analysis::ChiSquareMean*>(context)->add(a.update.mahalanobis2, a.update.rank);
       },
       &nis);
   std::size_t next = 0;

@@ -1,5 +1,5 @@
 // Parameters learned on other insertions: what one log's filter has learned starts another's.
-#include "tools/replay/held_out.hpp"
+#include <bevel/analysis/replay/held_out.hpp>
 
 #include <gtest/gtest.h>
 
@@ -7,7 +7,7 @@
 
 #include "tests/estimator/insertion.hpp"
 
-namespace bevel::replay {
+namespace bevel::analysis {
 namespace {
 
 constexpr unsigned kSeed = 23;
@@ -85,4 +85,4 @@ TEST(HeldOut, WhatIsHeldFixedStays) {
 }
 
 }  // namespace
-}  // namespace bevel::replay
+}  // namespace bevel::analysis

@@ -3,9 +3,9 @@
 #include <cmath>
 #include <random>
 
-#include "tools/replay/statistics.hpp"
+#include <bevel/analysis/replay/statistics.hpp>
 
-namespace bevel::replay {
+namespace bevel::analysis {
 namespace {
 
 // A curved path with first-order noise, one reading in a hundred an outlier, one in twenty lost.
@@ -57,4 +57,4 @@ TEST(ReplayStatistics, TooFewReadingsGiveNoNoise) {
 }
 
 }  // namespace
-}  // namespace bevel::replay
+}  // namespace bevel::analysis

@@ -9,6 +9,7 @@
 #include <fstream>
 #include <iostream>
 
+#include <bevel/analysis/replay/batch.hpp>
 #include <bevel/io/log_reader.hpp>
 #include <bevel/io/log_writer.hpp>
 #include <bevel/nodes/estimator_node.hpp>
@@ -16,7 +17,6 @@
 #include <bevel/nodes/runtime.hpp>
 #include <bevel/nodes/system_config.hpp>
 #include "tests/estimator/insertion.hpp"
-#include "tools/replay/batch.hpp"
 
 namespace bevel {
 namespace {
@@ -70,9 +70,9 @@ TEST_F(SystemFile, TheEstimatorTakesDiscrepanciesAndVariationLiveAndInAReplay) {
   EXPECT_EQ(config.live_effects.active.size(), 2U);
   EXPECT_TRUE(config.live_effects.left_out.empty());
   for (const bool by_system : {true, false}) {
-    replay::BatchOptions options;
+    analysis::BatchOptions options;
     (by_system ? options.system_path : options.model_path) = system_path;
-    const replay::Setup setup = replay::load_setup(options);
+    const analysis::ReplaySetup setup = analysis::load_setup(options);
     EXPECT_EQ(setup.discrepancies, config.discrepancies);
     EXPECT_EQ(setup.config.prior.variation, config.estimator.prior.variation);
   }
@@ -166,11 +166,11 @@ TEST_F(SystemFile, AReplayIsWithTheDiscrepancyAndTheVariation) {
   const std::string log = (folder / "log.lcm").string();
   write_log(log, data);
   const auto last_of = [&](const std::string& text) {
-    replay::BatchOptions options;
+    analysis::BatchOptions options;
     options.model_path = write(text, "model.toml");
-    const replay::Setup setup = replay::load_setup(options);
+    const analysis::ReplaySetup setup = analysis::load_setup(options);
     const auto one =
-        replay::replay_logs({log}, setup.config, {.effects = setup.effects, .discrepancies = setup.discrepancies});
+        analysis::replay_logs({log}, setup.config, {.effects = setup.effects, .discrepancies = setup.discrepancies});
     return one.front().states.back().state.unpacked();
   };
   const auto plain = last_of(kNeedle), uncertain = last_of(std::string(kNeedle) + kUncertain);
@@ -208,11 +208,11 @@ TEST_F(SystemFile, TheLiveNodeAppliesItsEffectsAsAReplayWithTheSameFileDoes) {
       });
   const std::string log = (folder / "live.lcm").string();
   write_log(log, data);
-  replay::BatchOptions options;
+  analysis::BatchOptions options;
   options.system_path = system_path;
-  const replay::Setup setup = replay::load_setup(options);
-  const auto replayed = replay::replay_logs({log}, setup.config, {.effects = setup.effects}).front();
-  const auto without = replay::replay_logs({log}, setup.config).front();
+  const analysis::ReplaySetup setup = analysis::load_setup(options);
+  const auto replayed = analysis::replay_logs({log}, setup.config, {.effects = setup.effects}).front();
+  const auto without = analysis::replay_logs({log}, setup.config).front();
   ASSERT_EQ(live.size(), replayed.states.size());
   ASSERT_GT(live.size(), 900U);
   for (std::size_t i = 0; i < live.size(); ++i)
@@ -226,7 +226,7 @@ TEST_F(SystemFile, ErrorsAgainstTheTruthAreThoseThatWerePutIn) {
   const auto data = insertion(rng, config.prior);
   const std::string log = (folder / "truth.lcm").string();
   write_log(log, data);
-  const auto blind = replay::replay_logs({log}, config).front();
+  const auto blind = analysis::replay_logs({log}, config).front();
   EXPECT_EQ(blind.truth.count, 0);
   // A truth off the estimate by as much in its own frame, sampled at every fifth actuator state.
   model::Vector6d error;
@@ -242,7 +242,7 @@ TEST_F(SystemFile, ErrorsAgainstTheTruthAreThoseThatWerePutIn) {
   // Before the first actuator state there is no estimate: such a truth is left out.
   truths.insert(truths.begin(), truth_message(blind.states.front().utime - 1000, {}));
   write_log(log, data, truths);
-  const auto seen = replay::replay_logs({log}, config).front();
+  const auto seen = analysis::replay_logs({log}, config).front();
   EXPECT_EQ(seen.truth.count, static_cast<std::int64_t>(truths.size()) - 1);
   EXPECT_NEAR(seen.truth.position_rmse_mm, 0.5, 2e-3);  // exp of a twist turns its displacement by half of 0.03
   EXPECT_NEAR(seen.truth.last_position_error_mm, 0.5, 2e-3);
@@ -255,7 +255,7 @@ TEST_F(SystemFile, AgainstTheTruthOfFortyInsertionsTheFilterIsConsistent) {
   std::mt19937_64 rng(kSeed);
   estimator::EstimatorConfig config;
   config.process = {0, 0, 0, 0, 0, 0, 0};  // as the truth: the default's walk alone would bring NEES to a half
-  replay::ChiSquareMean nees;
+  analysis::ChiSquareMean nees;
   double squares_mm2 = 0;
   constexpr int kRuns = 40;
   for (int run = 0; run < kRuns; ++run) {
@@ -263,7 +263,7 @@ TEST_F(SystemFile, AgainstTheTruthOfFortyInsertionsTheFilterIsConsistent) {
     // At the end alone: one independent figure of six degrees each.
     const std::string log = (folder / "truth.lcm").string();
     write_log(log, data, {truth_message(data.actuators.back().utime, data.poses.back())});
-    const auto replay = replay::replay_logs({log}, config).front();
+    const auto replay = analysis::replay_logs({log}, config).front();
     ASSERT_EQ(replay.truth.count, 1);
     nees.add(replay.truth.pose_nees.sum, 6);
     squares_mm2 += replay.truth.position_rmse_mm * replay.truth.position_rmse_mm / kRuns;

@@ -9,8 +9,8 @@
 #include <regex>
 #include <sstream>
 
+#include <bevel/cli/command_line.hpp>
 #include "tests/support/temporary_folder.hpp"
-#include "tools/common/command_line.hpp"
 
 namespace bevel {
 namespace {
@@ -169,7 +169,7 @@ TEST(CommandLine, ValuesThatBeginWithADashAreValues) {
   std::vector<double> target{0, 0, 0};
   std::vector<std::string> rest;
   std::string name;
-  tools::CommandLine command_line("test", "Tests.");
+  cli::CommandLine command_line("test", "Tests.");
   command_line.numbers("-t,--target", target, "", 3).option("-n,--name", name, "").arguments("REST", rest, "", false);
   std::vector<std::string> words{"test", "--target", "-4,.5,-95", "-nme", "--", "--not-an-option"};
   std::vector<char*> argv;

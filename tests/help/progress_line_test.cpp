@@ -1,5 +1,5 @@
 // What someone who waits is told: the estimate, its words, and how often.
-#include "tools/common/progress_line.hpp"
+#include <bevel/cli/progress_line.hpp>
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -11,7 +11,7 @@
 #include <sstream>
 #include <tuple>
 
-namespace bevel::tools {
+namespace bevel::cli {
 namespace {
 
 using ::testing::ElementsAre;
@@ -150,4 +150,4 @@ TEST_F(Line, IsSilentWhereItIsTold) {
 }
 
 }  // namespace
-}  // namespace bevel::tools
+}  // namespace bevel::cli

@@ -9,10 +9,10 @@
 #include <string>
 #include <vector>
 
-#include "tools/common/command_line.hpp"
-#include "tools/common/exit_status.hpp"
+#include <bevel/cli/command_line.hpp>
+#include <bevel/cli/exit_status.hpp>
 
-namespace bevel::tools {
+namespace bevel::cli {
 namespace {
 
 // Exit status of a program with its standard output in that file.
@@ -63,4 +63,4 @@ TEST(StandardOutput, KeepsAStatusThatReportsMore) {
 }
 
 }  // namespace
-}  // namespace bevel::tools
+}  // namespace bevel::cli

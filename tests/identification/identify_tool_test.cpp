@@ -7,16 +7,16 @@
 #include <nlohmann/json.hpp>
 #include <sstream>
 
+#include <bevel/analysis/convert/import.hpp>
+#include <bevel/analysis/identify/identify.hpp>
 #include <bevel/io/log_writer.hpp>
 #include <bevel/io/messages.hpp>
 #include <bevel/io/model_file.hpp>
 #include "tests/identification/simulated_insertion.hpp"
 #include "tests/support/shared_recordings.hpp"
 #include "tests/support/temporary_folder.hpp"
-#include "tools/identify/identify.hpp"
-#include "tools/import/import.hpp"
 
-namespace bevel::identify {
+namespace bevel::analysis {
 namespace {
 
 namespace fs = std::filesystem;
@@ -24,7 +24,7 @@ namespace fs = std::filesystem;
 struct IdentifyTool : ::testing::Test {
   test::TemporaryFolder folder;
   model::NeedleParameters truth;
-  Options options;
+  IdentifyOptions options;
 
   void SetUp() override {
     truth.lambda1_per_rad = 0.49;
@@ -109,19 +109,19 @@ TEST(IdentifyRealInsertions, CurvatureOfANeedleThatNeverRotates) {
   for (const std::string set : {"aligned", "csv"})
     for (const std::string map : {"ultrasteer.toml", "ultrasteer_pos.toml"}) {
       const std::string logs = (folder / (set + map)).string();
-      importing::Options import;
+      analysis::ImportOptions import;
       import.map_path = (real / map).string(), import.out_folder = logs;
       for (int i = 1; i <= 3; ++i)
         import.inputs.push_back((real / set / "1mm" / ("trial" + std::to_string(i) + ".csv")).string());
       ::testing::internal::CaptureStdout();
-      const int status = importing::run(import);
+      const int status = analysis::run(import);
       ::testing::internal::GetCapturedStdout();
       ASSERT_EQ(status, 0);
       for (const auto& [lambda1, lambda2] : {std::pair{0.49, 0.22}, {0.144, 0.032}, {0.0, 0.0}}) {
         model::NeedleParameters start;
         start.curvature_per_mm = 0.012, start.wheelbase_mm = 20;
         start.lambda1_per_rad = lambda1, start.lambda2 = lambda2;
-        Options options;
+        IdentifyOptions options;
         options.logs = {logs}, options.model_path = (folder / "start.toml").string();
         io::save_model_file({start, {}}, options.model_path);
         const Identification r = identify(options, std::cerr);
@@ -172,4 +172,4 @@ TEST_F(IdentifyTool, AModelThatSaysWhatIsUncertainIsRefused) {
 }
 
 }  // namespace
-}  // namespace bevel::identify
+}  // namespace bevel::analysis

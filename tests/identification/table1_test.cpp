@@ -4,9 +4,9 @@
 #include <cmath>
 #include <iostream>
 
-#include "tools/table1_program/protocol.hpp"
+#include <bevel/analysis/table1/protocol.hpp>
 
-namespace bevel::table1 {
+namespace bevel::analysis {
 namespace {
 
 model::NeedleParameters agar() {
@@ -59,4 +59,4 @@ TEST(Table1, TheSignOfThePrintedModelFollowsFromItsTable) {
 }
 
 }  // namespace
-}  // namespace bevel::table1
+}  // namespace bevel::analysis

@@ -4,15 +4,15 @@
 
 #include <sstream>
 
+#include <bevel/analysis/calibrate/calibrate_tool.hpp>
 #include <bevel/io/config.hpp>
 #include <bevel/io/log_writer.hpp>
 #include <bevel/io/messages.hpp>
 #include <bevel/io/recording_clock.hpp>
 #include "tests/latency/stop_and_go.hpp"
 #include "tests/support/temporary_folder.hpp"
-#include "tools/calibrate/calibrate_tool.hpp"
 
-namespace bevel::calibrate {
+namespace bevel::analysis {
 namespace {
 
 using ::testing::HasSubstr;
@@ -23,8 +23,8 @@ constexpr const char* kModel =
 class LatencyTool : public testing::Test {
  protected:
   // Cameras as they follow each other in `runs`; the axes of the first.
-  Options log_of(const std::vector<test::StopAndGo>& runs, const std::string& config = "") {
-    Options o;
+  CalibrateOptions log_of(const std::vector<test::StopAndGo>& runs, const std::string& config = "") {
+    CalibrateOptions o;
     o.latency = (folder_ / "stop-and-go.lcm").string();
     o.model = folder_.write("model.toml", kModel);
     io::LogWriter log(o.latency);
@@ -81,7 +81,7 @@ TEST_F(LatencyTool, AddsToWhatWasTakenOffAlready) {
 }
 
 TEST_F(LatencyTool, LeavesTheModelsOwnLatencyAside) {
-  Options o = log_of({{.latency_s = 0.1}});
+  CalibrateOptions o = log_of({{.latency_s = 0.1}});
   o.model =
       folder_.write("late.toml", std::string(kModel) + "[[effect]]\nname = \"camera_latency\"\nlatency_s = 0.1\n");
   EXPECT_EQ(run(o, out_, err_), 0);
@@ -96,9 +96,9 @@ TEST_F(LatencyTool, SaysWhatToRecordAndFails) {
 }
 
 TEST_F(LatencyTool, RefusesLogsWithoutAClock) {
-  const Options o = log_of({{}}, io::kNoClockConfig);
+  const CalibrateOptions o = log_of({{}}, io::kNoClockConfig);
   EXPECT_THROW(run(o, out_, err_), std::runtime_error);
 }
 
 }  // namespace
-}  // namespace bevel::calibrate
+}  // namespace bevel::analysis

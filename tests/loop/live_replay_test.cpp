@@ -6,6 +6,8 @@
 #include <random>
 #include <sstream>
 
+#include <bevel/analysis/replay/batch.hpp>
+#include <bevel/analysis/replay/report.hpp>
 #include <bevel/io/file_bytes.hpp>
 #include <bevel/io/log_reader.hpp>
 #include <bevel/io/log_writer.hpp>
@@ -14,8 +16,6 @@
 #include <bevel/nodes/runtime.hpp>
 #include "tests/estimator/insertion.hpp"
 #include "tests/support/temporary_folder.hpp"
-#include "tools/replay/batch.hpp"
-#include "tools/replay/report.hpp"
 
 namespace bevel {
 namespace {
@@ -88,7 +88,7 @@ void expect_live_is_replay(double heading_sd_rad) {
     log.close();
   }
   const io::FileBytes file(path);
-  const auto replay = replay::replay_log(file.bytes(), "live", config);
+  const auto replay = analysis::replay_log(file.bytes(), "live", config);
 
   ASSERT_EQ(live.size(), replay.states.size());
   ASSERT_GT(live.size(), 900U);
@@ -138,8 +138,8 @@ TEST(LiveReplay, AReplaySaysWhatHeadingsBring) {
     log.close();
     return io::FileBytes(path);
   };
-  const auto with = replay::replay_log(write((folder / "with.lcm").string(), true).bytes(), "with", config);
-  const auto without = replay::replay_log(write((folder / "without.lcm").string(), false).bytes(), "without", config);
+  const auto with = analysis::replay_log(write((folder / "with.lcm").string(), true).bytes(), "with", config);
+  const auto without = analysis::replay_log(write((folder / "without.lcm").string(), false).bytes(), "without", config);
   ASSERT_TRUE(with.without_headings);
   EXPECT_FALSE(without.without_headings);
   // Left out they are as if they had never been, to the last bit.
@@ -151,21 +151,21 @@ TEST(LiveReplay, AReplaySaysWhatHeadingsBring) {
     EXPECT_LT(with.states.back().state.unpacked().covariance(i, i), never.covariance(i, i)) << i;
   EXPECT_LT(with.truth.tilt_rmse_rad, without.truth.tilt_rmse_rad);
 
-  const auto figures = replay::innovation_figures(with);
+  const auto figures = analysis::innovation_figures(with);
   EXPECT_EQ(figures.headings, static_cast<std::int64_t>(data.headings.size()));
   EXPECT_TRUE(figures.heading_nis.in_band()) << figures.heading_nis.mean();
   std::ostringstream said, said_without;
-  replay::print(said, with, 20);
-  replay::print(said_without, without, 20);
+  analysis::print(said, with, 20);
+  analysis::print(said_without, without, 20);
   std::cout << "seed " << kSeed << "\n" << said.str();
   for (const char* words : {"headings     303: 0 not usable", "heading NIS  0.9", "with them    k 0.00",
                             "without      k 0.00", "without headings RMSE", "; pose NEES/6 "})
     EXPECT_THAT(said.str(), HasSubstr(words));
   EXPECT_THAT(said_without.str(), Not(HasSubstr("heading")));
-  const auto told = replay::replay_logs({(folder / "with.lcm").string()}, config, {.use_headings = false}).front();
+  const auto told = analysis::replay_logs({(folder / "with.lcm").string()}, config, {.use_headings = false}).front();
   EXPECT_EQ(told.states.back().state.unpacked().covariance, never.covariance);
   EXPECT_EQ(told.counters.headings.offered, 0);
-  replay::write_files(with, (folder / "out").string(), 20);
+  analysis::write_files(with, (folder / "out").string(), 20);
   EXPECT_THAT(test::text_of(folder / "out/with.html"), HasSubstr("with them    k 0.00"));
   EXPECT_THAT(test::text_of(folder / "out/with.headings.csv"), HasSubstr("innovation_a_rad"));
 }

@@ -14,9 +14,9 @@
 
 #include <bevel/nodes/operator_heartbeat.hpp>
 #include <bevel/nodes/operator_words.hpp>
+#include <bevel/nodes/process_group.hpp>
 #include <bevel/nodes/system_config.hpp>
 #include "tests/loop/bus_listener.hpp"
-#include "tools/demo_loop/process_group.hpp"
 
 namespace bevel::test {
 
@@ -87,7 +87,7 @@ class LiveRig {
   lcm::LCM lcm_;
   nodes::LcmPort port_;
   nodes::OperatorHeartbeat heartbeat_;
-  tools::ProcessGroup processes_;
+  nodes::ProcessGroup processes_;
   std::unique_ptr<BusListener> listener_;
   std::map<std::string, process_status_t> said_;
   std::array<std::int64_t, kSources.size()> heard_ns_{};

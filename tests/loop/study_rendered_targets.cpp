@@ -24,8 +24,8 @@
 #include <bevel/diagnosis/parallel.hpp>
 #include <bevel/nodes/camera_node.hpp>
 #include <bevel/rig/camera/needle_renderer.hpp>
+#include <bevel/rig/steering/scenarios.hpp>
 #include "tests/loop/simulated_loop.hpp"
-#include "tools/steering/scenarios.hpp"
 
 namespace bevel {
 namespace {
@@ -96,7 +96,7 @@ class RenderedCameras {
 };
 
 // The demo's file, its needle and what is believed of it in the trial's place.
-nodes::SystemConfig system_of(const steering::Trial& trial) {
+nodes::SystemConfig system_of(const rig::Trial& trial) {
   nodes::SystemConfig config = nodes::load_system_config(std::string(BEVEL_SOURCE_DIR "/config/") +
                                                          (trial.needle.beam ? "beam" : "demo") + ".toml");
   config.estimator.prior = trial.believed.estimator.prior;
@@ -116,8 +116,8 @@ struct Outcome {
   std::string why_not;
 };
 
-Outcome one(const steering::Scenario& scenario, std::uint64_t seed) {
-  const steering::Trial trial = scenario.draw(seed);
+Outcome one(const rig::Scenario& scenario, std::uint64_t seed) {
+  const rig::Trial trial = scenario.draw(seed);
   const nodes::SystemConfig config = system_of(trial);
   test::SimulatedLoop loop(seed, config);
   RenderedCameras cameras(config, seed);
@@ -178,12 +178,12 @@ int print(const std::string& name, std::vector<Outcome> all) {
 }
 
 // Those of these names; none, and what is said of it, where one cannot be taken over.
-std::vector<steering::Scenario> taken_over(const std::vector<std::string>& names) {
-  std::vector<steering::Scenario> taken;
-  const auto& all = steering::scenarios();
+std::vector<rig::Scenario> taken_over(const std::vector<std::string>& names) {
+  std::vector<rig::Scenario> taken;
+  const auto& all = rig::scenarios();
   for (const std::string& name : names) {
-    const auto scenario = std::ranges::find(all, name, &steering::Scenario::name);
-    if (scenario != all.end() && steering::is_of_needle_alone(*scenario)) {
+    const auto scenario = std::ranges::find(all, name, &rig::Scenario::name);
+    if (scenario != all.end() && rig::is_of_needle_alone(*scenario)) {
       taken.push_back(*scenario);
       continue;
     }
@@ -191,15 +191,15 @@ std::vector<steering::Scenario> taken_over(const std::vector<std::string>& names
               << (scenario == all.end() ? "is none" : "has more to it than a needle, which would be left out")
               << "; allowed: ";
     const char* separator = "";
-    for (const steering::Scenario& one : all)
-      if (steering::is_of_needle_alone(one)) std::cerr << std::exchange(separator, ", ") << one.name;
+    for (const rig::Scenario& one : all)
+      if (rig::is_of_needle_alone(one)) std::cerr << std::exchange(separator, ", ") << one.name;
     std::cerr << "\n";
     return {};
   }
   return taken;
 }
 
-int run(int targets, const std::vector<steering::Scenario>& scenarios) {
+int run(int targets, const std::vector<rig::Scenario>& scenarios) {
   cv::setNumThreads(1);
   std::printf(
       "seed %llu; mm, of those that arrived\n\n| scenario | targets | median | mean +- sd | 95 %% | worst | "
@@ -209,7 +209,7 @@ int run(int targets, const std::vector<steering::Scenario>& scenarios) {
   const std::clock_t from = std::clock();
   std::vector<Outcome> everything;
   int missing = 0;
-  for (const steering::Scenario& scenario : scenarios) {
+  for (const rig::Scenario& scenario : scenarios) {
     std::vector<Outcome> outcomes(static_cast<std::size_t>(targets));
     parallel_for(outcomes.size(), 2, [&](std::size_t i) { outcomes[i] = one(scenario, 1'000'003 * kSeed + i); });
     missing += print(scenario.name, outcomes);

@@ -3,11 +3,11 @@
 
 #include <filesystem>
 
+#include <bevel/analysis/diagnose/read_case.hpp>
 #include <bevel/diagnosis/mismatch/diagnose.hpp>
 #include <bevel/io/find_logs.hpp>
 #include <bevel/io/model_file.hpp>
 #include "tests/support/shared_recordings.hpp"
-#include "tools/diagnose/read_case.hpp"
 
 namespace bevel::diagnosis {
 namespace {
@@ -17,7 +17,7 @@ namespace fs = std::filesystem;
 fs::path practice() { return test::shared_recordings() / "recordings" / "practice"; }
 
 Findings findings_of(const fs::path& folder) {
-  return diagnose(diagnose::read_case(io::find_logs({folder.string()})).recorded,
+  return diagnose(analysis::read_case(io::find_logs({folder.string()})).recorded,
                   io::load_model_file((folder / "model.toml").string()).needle, {});
 }
 

@@ -7,10 +7,10 @@
 #include <nlohmann/json.hpp>
 #include <sstream>
 
+#include <bevel/analysis/replay/report.hpp>
 #include "tests/support/temporary_folder.hpp"
-#include "tools/replay/report.hpp"
 
-namespace bevel::replay {
+namespace bevel::analysis {
 namespace {
 
 constexpr std::int64_t kStart_utime = 1'700'000'000'000'000;
@@ -69,4 +69,4 @@ TEST(ReplayPage, shows_what_each_camera_measured) {
 }
 
 }  // namespace
-}  // namespace bevel::replay
+}  // namespace bevel::analysis

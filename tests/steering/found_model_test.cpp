@@ -6,11 +6,11 @@
 #include <numbers>
 #include <random>
 
+#include <bevel/analysis/steering/model_rig.hpp>
 #include <bevel/controller/reason.hpp>
 #include <bevel/diagnosis/parallel.hpp>
-#include "tools/steering/model_rig.hpp"
 
-namespace bevel::steering {
+namespace bevel::rig {
 namespace {
 
 constexpr std::uint64_t kSeed = 20'261'129;
@@ -167,4 +167,4 @@ TEST(SteeredInsertion, AnInsertionThatAnUnhealthyEstimateEndsHasQuantityValueLim
 }
 
 }  // namespace
-}  // namespace bevel::steering
+}  // namespace bevel::rig

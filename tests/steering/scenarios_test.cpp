@@ -1,10 +1,10 @@
 // Which scenarios another loop can take over: by name, so that one that has something new to it is looked at.
-#include "tools/steering/scenarios.hpp"
+#include <bevel/rig/steering/scenarios.hpp>
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-namespace bevel::steering {
+namespace bevel::rig {
 namespace {
 
 TEST(Scenarios, ThoseOfANeedleAloneHaveNoOtherCamerasTargetsOrEffects) {
@@ -20,4 +20,4 @@ TEST(Scenarios, ThoseOfANeedleAloneHaveNoOtherCamerasTargetsOrEffects) {
 }
 
 }  // namespace
-}  // namespace bevel::steering
+}  // namespace bevel::rig

@@ -2,11 +2,11 @@
 // Exit status: 0 finished, 1 failed, 2 usage, 130 interrupted (the same command goes on).
 #include <iostream>
 
+#include <bevel/cli/command_line.hpp>
+#include <bevel/cli/progress_line.hpp>
 #include "proof/campaign.hpp"
 #include "proof/seed.hpp"
 #include "proof/trial.hpp"
-#include "tools/common/command_line.hpp"
-#include "tools/common/progress_line.hpp"
 
 int main(int argc, char** argv) {
   bevel::proof::CampaignOptions o;
@@ -14,7 +14,7 @@ int main(int argc, char** argv) {
   std::string diagnose;
   std::string seed_file;
   bool describe = false;
-  bevel::tools::CommandLine command_line(
+  bevel::cli::CommandLine command_line(
       "bevel-blindtrial",
       "A blind trial of a mismatch tool: physics concealed and sealed, verdicts hashed, then scored.");
   command_line.example("bevel-blindtrial --trials 3 --out trials --diagnose build/bin/bevel-diagnose")
@@ -49,7 +49,7 @@ int main(int argc, char** argv) {
     o.out = out;
     o.diagnose = diagnose;
     o.seed = bevel::proof::seed_of(seed_file, o.out);
-    bevel::tools::ProgressLine line(bevel::tools::ProgressLine::as_stderr_is());
+    bevel::cli::ProgressLine line(bevel::cli::ProgressLine::as_stderr_is());
     o.watch = {.begin = [&](const auto& what, auto pieces, auto jobs) { line.begin(what, pieces, jobs); },
                .one_done = [&] { line.one_done(); },
                .make_room = [&] { line.make_room(); },

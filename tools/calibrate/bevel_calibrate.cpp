@@ -1,12 +1,12 @@
 // bevel-calibrate: cameras from pictures of a board, how late they are from an insertion.
 #include <iostream>
 
-#include "tools/calibrate/calibrate_tool.hpp"
-#include "tools/common/command_line.hpp"
+#include <bevel/analysis/calibrate/calibrate_tool.hpp>
+#include <bevel/cli/command_line.hpp>
 
 int main(int argc, char** argv) {
-  bevel::calibrate::Options o;
-  bevel::tools::CommandLine command_line(
+  bevel::analysis::CalibrateOptions o;
+  bevel::cli::CommandLine command_line(
       "bevel-calibrate",
       "Lenses, poses and walls of one or two cameras from pictures of a board: a YAML and a page. Or how late their\n"
       "stamps are, from the log of an insertion that stops and goes.");
@@ -51,5 +51,5 @@ int main(int argc, char** argv) {
         return "";
       });
   command_line.example("bevel-calibrate --columns 8 --rows 6 --square-mm 9 --air air0/ air1/ --out calibration");
-  return command_line.run(argc, argv, [&] { return bevel::calibrate::run(o, std::cout, std::cerr); });
+  return command_line.run(argc, argv, [&] { return bevel::analysis::run(o, std::cout, std::cerr); });
 }

@@ -1,14 +1,14 @@
 // bevel-check: proves the link before motion, and says what to type to mend what is not right.
 #include <cstdio>
 
+#include <bevel/cli/command_line.hpp>
+#include <bevel/cli/exit_status.hpp>
+#include <bevel/nodes/link_probe.hpp>
 #include <bevel/nodes/runtime.hpp>
-#include "tools/check/link_probe.hpp"
-#include "tools/common/command_line.hpp"
-#include "tools/common/exit_status.hpp"
 
 int main(int argc, char** argv) {
   using namespace bevel;
-  tools::CommandLine command_line(
+  cli::CommandLine command_line(
       "bevel-check",
       "Proves the link before motion: multicast, CAN, the drives' identities and heartbeats, timers, "
       "cameras.\nMoves nothing, and sends nothing to drives that another program commands. Status 1 if something is "
@@ -22,10 +22,10 @@ int main(int argc, char** argv) {
   return command_line.run(argc, argv, [&] {
     nodes::catch_signals();
     const nodes::SystemConfig config = nodes::load_system_config(config_path);
-    const auto findings = tools::check::check_all(config, lcm_url.empty() ? config.lcm_url : lcm_url,
-                                                  can.empty() ? config.can : can, config_path);
-    std::fputs(tools::check::to_text(findings).c_str(), stdout);
+    const auto findings = drivers::check_all(config, lcm_url.empty() ? config.lcm_url : lcm_url,
+                                             can.empty() ? config.can : can, config_path);
+    std::fputs(drivers::to_text(findings).c_str(), stdout);
     if (nodes::stop_requested()) throw std::runtime_error("interrupted: what is above is not all");
-    return tools::check::any_failed(findings) ? tools::kFailed : tools::kOk;
+    return drivers::any_failed(findings) ? cli::kFailed : cli::kOk;
   });
 }

@@ -4,16 +4,16 @@
 #include <iostream>
 #include <thread>
 
-#include "tools/close_loop/close_loop.hpp"
-#include "tools/common/command_line.hpp"
-#include "tools/common/shipped_file.hpp"
-#include "tools/diagnose/result_files.hpp"
+#include <bevel/analysis/close_loop/close_loop.hpp>
+#include <bevel/analysis/diagnose/result_files.hpp>
+#include <bevel/cli/command_line.hpp>
+#include <bevel/cli/shipped_file.hpp>
 
 int main(int argc, char** argv) {
-  bevel::close_loop::Options o;
+  bevel::analysis::CloseLoopOptions o;
   std::vector<std::string> folders;
   o.threads = std::clamp(static_cast<int>(std::thread::hardware_concurrency()), 1, 64);
-  bevel::tools::CommandLine command_line(
+  bevel::cli::CommandLine command_line(
       "bevel-close-the-loop",
       "Diagnoses a case, and shows what rig, estimator and controller make of the model before and after.");
   command_line.arguments("CASE", folders, "folder with model.toml and rec*.lcm")
@@ -26,12 +26,12 @@ int main(int argc, char** argv) {
       .option("--threads", o.threads, "at work at once; the results do not depend on it", 1, 64)
       .flag("-q,--quiet", o.quiet, "no progress on stderr")
       .check([&] { return folders.size() == 1 ? "" : "one CASE at a time"; });
-  bevel::diagnose::end_on_signals("bevel-close-the-loop");
+  bevel::analysis::end_on_signals("bevel-close-the-loop");
   return command_line.run(argc, argv, [&] {
     o.folder = folders.front();
-    if (o.estimator_path.empty()) o.estimator_path = bevel::tools::shipped_file("tools/replay/strict.toml");
+    if (o.estimator_path.empty()) o.estimator_path = bevel::cli::shipped_file("tools/replay/strict.toml");
     if (o.out_folder.empty())
       o.out_folder = "out/close-the-loop/" + std::filesystem::weakly_canonical(o.folder).filename().string();
-    return bevel::close_loop::run(o, std::cout, std::cerr);
+    return bevel::analysis::run(o, std::cout, std::cerr);
   });
 }

@@ -3,15 +3,15 @@
 // or something failed; 2 usage; 130 interrupted.
 #include <filesystem>
 
-#include "tools/common/command_line.hpp"
-#include "tools/common/shipped_file.hpp"
+#include <bevel/cli/command_line.hpp>
+#include <bevel/cli/shipped_file.hpp>
 #include "tools/demo_loop/demo_run.hpp"
 
 int main(int argc, char** argv) {
   using namespace bevel;
   tools::DemoOptions options;
-  tools::CommandLine command_line(
-      "bevel-demo", "Steers a simulated needle with all five processes and a rendered camera in the loop.");
+  cli::CommandLine command_line("bevel-demo",
+                                "Steers a simulated needle with all five processes and a rendered camera in the loop.");
   std::string plant = "kinematic", config;
   command_line.exit_status("130 interrupted")
       .example("bevel-demo --target 4,-10,95 --out somewhere")
@@ -31,7 +31,7 @@ int main(int argc, char** argv) {
   return command_line.run(argc, argv, [&] {
     options.programs = std::filesystem::read_symlink("/proc/self/exe").parent_path().string();
     options.config_path =
-        !config.empty() ? config : tools::shipped_file(plant == "beam" ? "config/beam.toml" : "config/demo.toml");
+        !config.empty() ? config : cli::shipped_file(plant == "beam" ? "config/beam.toml" : "config/demo.toml");
     return tools::run_demo(options);
   });
 }

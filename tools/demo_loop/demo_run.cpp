@@ -10,9 +10,9 @@
 #include <bevel/nodes/claim_name.hpp>
 #include <bevel/nodes/fault_injector.hpp>
 #include <bevel/nodes/open_lcm.hpp>
+#include <bevel/nodes/process_group.hpp>
 #include <bevel/nodes/system_config.hpp>
 #include "tools/demo_loop/loop_figures.hpp"
-#include "tools/demo_loop/process_group.hpp"
 #include "tools/demo_loop/steering_session.hpp"
 
 namespace bevel::tools {

@@ -3,19 +3,19 @@
 #include <iostream>
 #include <thread>
 
-#include "tools/common/command_line.hpp"
-#include "tools/diagnose/diagnose_tool.hpp"
-#include "tools/diagnose/result_files.hpp"
+#include <bevel/analysis/diagnose/diagnose_tool.hpp>
+#include <bevel/analysis/diagnose/result_files.hpp>
+#include <bevel/cli/command_line.hpp>
 
 int main(int argc, char** argv) {
-  bevel::diagnose::Options o;
+  bevel::analysis::DiagnoseOptions o;
   o.threads = std::clamp(static_cast<int>(std::thread::hardware_concurrency()), 1, 64);
-  bevel::tools::CommandLine command_line(
+  bevel::cli::CommandLine command_line(
       "bevel-diagnose", "Where the model in use goes wrong, what physics it leaves out, and the model with it.");
   command_line.arguments("LOG", o.logs, "logs of one rig, or folders of them: at least two logs", false)
       .paths("--baseline", o.baseline, "with --changed, in place of LOG: logs, or folders of them, as it was")
       .paths("--changed", o.changed, "the same, as it is now: what changed?")
-      .check([&] { return bevel::diagnose::usage_fault(o); })
+      .check([&] { return bevel::analysis::usage_fault(o); })
       .reads_recordings()
       .example("bevel-diagnose --model model.toml --out verdict recordings/")
       .option("-m,--model", o.model_path, "the model in use (TOML)", true)
@@ -23,6 +23,6 @@ int main(int argc, char** argv) {
       .option("--threads", o.threads, "at work at once; the verdict does not depend on it", 1, 64)
       .option("--targets", o.targets, "steered to in simulated time, before and after; 0: none", 0, 1000)
       .flag("-q,--quiet", o.quiet, "no progress on stderr");
-  bevel::diagnose::end_on_signals("bevel-diagnose");
-  return command_line.run(argc, argv, [&] { return bevel::diagnose::run(o, std::cout, std::cerr); });
+  bevel::analysis::end_on_signals("bevel-diagnose");
+  return command_line.run(argc, argv, [&] { return bevel::analysis::run(o, std::cout, std::cerr); });
 }

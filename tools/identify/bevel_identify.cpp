@@ -1,13 +1,13 @@
 // bevel-identify: the needle's parameters from recorded insertions.
 #include <iostream>
 
-#include "tools/common/command_line.hpp"
-#include "tools/identify/identify.hpp"
+#include <bevel/analysis/identify/identify.hpp>
+#include <bevel/cli/command_line.hpp>
 
 int main(int argc, char** argv) {
-  bevel::identify::Options o;
-  bevel::tools::CommandLine command_line("bevel-identify",
-                                         "The needle's parameters from recorded insertions, with their uncertainty.");
+  bevel::analysis::IdentifyOptions o;
+  bevel::cli::CommandLine command_line("bevel-identify",
+                                       "The needle's parameters from recorded insertions, with their uncertainty.");
   command_line.arguments("LOG", o.logs, "logs of one insertion each, or folders of them")
       .reads_recordings()
       .example("bevel-identify --model model.toml --out found rec01.lcm rec02.lcm")
@@ -26,5 +26,5 @@ int main(int argc, char** argv) {
       .non_negative("--entry-offset-mm", o.entry_offset_mm, "standard deviation of each entry's lateral place")
       .non_negative("--late-entry-mm", o.late_entry_mm,
                     "standard deviation of the insertion at which the tip met the tissue");
-  return command_line.run(argc, argv, [&] { return bevel::identify::run(o, std::cout, std::cerr); });
+  return command_line.run(argc, argv, [&] { return bevel::analysis::run(o, std::cout, std::cerr); });
 }

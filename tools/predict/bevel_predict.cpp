@@ -2,14 +2,14 @@
 #include <iostream>
 #include <stdexcept>
 
+#include <bevel/analysis/predict/predict.hpp>
+#include <bevel/cli/command_line.hpp>
 #include <bevel/io/find_logs.hpp>
-#include "tools/common/command_line.hpp"
-#include "tools/predict/predict.hpp"
 
 int main(int argc, char** argv) {
   std::string model_path;
   std::vector<std::string> logs;
-  bevel::tools::CommandLine command_line(
+  bevel::cli::CommandLine command_line(
       "bevel-predict",
       "Integrates the model with its effects and discrepancies from ACTUATOR_STATE alone.\nCSV on stdout, one line per "
       "TIP_MEASUREMENT, with standard deviations where the model file says what is uncertain, and residuals of "
@@ -23,6 +23,6 @@ int main(int argc, char** argv) {
     const auto found = bevel::io::find_logs(logs);
     if (found.size() > 1)
       throw std::runtime_error(logs.front() + ": holds " + std::to_string(found.size()) + " logs; one at a time");
-    return bevel::predict::run(model_path, found.front(), std::cout, std::cerr);
+    return bevel::analysis::run(model_path, found.front(), std::cout, std::cerr);
   });
 }

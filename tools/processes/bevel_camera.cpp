@@ -4,7 +4,7 @@
 
 int main(int argc, char** argv) {
   using namespace bevel;
-  tools::CommandLine command_line("bevel-camera", "Finds the needle tip in pictures and publishes where it is.");
+  cli::CommandLine command_line("bevel-camera", "Finds the needle tip in pictures and publishes where it is.");
   command_line.example("bevel-camera --config config/demo.toml");
   std::string source, record;
   bool print = false;
@@ -15,13 +15,13 @@ int main(int argc, char** argv) {
                       "send each camera's picture, made small, so often, for bevel-view; 0: never", 0.0,
                       nodes::kMostPictures_hz);
   command_line.flag("--print", print, "print each observation as CSV");
-  return tools::process_main(command_line, argc, argv, nodes::camera_process_name, [&](tools::ProcessContext& context) {
+  return cli::process_main(command_line, argc, argv, nodes::camera_process_name, [&](cli::ProcessContext& context) {
     nodes::SystemConfig& config = context.config;
     if (!source.empty()) config.source.path = source;
     if (config.source.kind == camera::SourceKind::folder || config.source.kind == camera::SourceKind::video)
       config.source.start_utime = nodes::now().utime;
     nodes::CameraNode node(context.lcm, config, pictures_hz);
-    tools::inject(context, node.port());
+    cli::inject(context, node.port());
     if (!record.empty()) node.record(record);
     if (print) {
       std::puts("utime,seq,camera,status,x_mm,y_mm,z_mm,u_px,v_px,reason");

@@ -9,16 +9,16 @@ int main(int argc, char** argv) {
   using namespace bevel;
   constexpr int kPriority = 50;  // of SCHED_FIFO
   constexpr double kLongestStop_s = 0.5;
-  tools::CommandLine command_line("bevel-stepper", "Drives the insertion and rotation axes over CANopen.");
+  cli::CommandLine command_line("bevel-stepper", "Drives the insertion and rotation axes over CANopen.");
   command_line.example("bevel-stepper --config config/demo.toml");
   std::string can;
   command_line.option("--can", can, "bus instead of the file's: can0, or unix:/path for the rig's local bus");
   const auto name = [](const nodes::SystemConfig&) { return "bevel-stepper"; };
-  return tools::process_main(command_line, argc, argv, name, kPriority, [&](tools::ProcessContext& context) {
+  return cli::process_main(command_line, argc, argv, name, kPriority, [&](cli::ProcessContext& context) {
     const stepper::StepperConfig& config = context.config.stepper;
     const auto bus = can::open_bus(can.empty() ? context.config.can : can, stepper::StepperDriver::listen_ids(config));
     nodes::StepperNode node(context.lcm, *bus, config);
-    tools::inject(context, node.port());
+    cli::inject(context, node.port());
     const auto loop = [&](bool to_rest) {
       return nodes::Loop{static_cast<double>(config.period_ns) * 1e-9,
                          [&](const nodes::Now& now) { node.tell_time(now); },

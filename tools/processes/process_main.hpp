@@ -3,11 +3,11 @@
 #include <lcm/lcm-cpp.hpp>
 #include <optional>
 
+#include <bevel/cli/command_line.hpp>
 #include <bevel/nodes/fault_injector.hpp>
 #include <bevel/nodes/lcm_port.hpp>
 #include <bevel/nodes/runtime.hpp>
 #include <bevel/nodes/system_config.hpp>
-#include "tools/common/command_line.hpp"
 
 namespace bevel::tools {
 

@@ -1,13 +1,13 @@
 // bevel-replay: logs through the estimator that runs live, deterministic and faster than real time.
 #include <iostream>
 
-#include "tools/common/command_line.hpp"
-#include "tools/replay/batch.hpp"
+#include <bevel/analysis/replay/batch.hpp>
+#include <bevel/cli/command_line.hpp>
 
 int main(int argc, char** argv) {
-  using namespace bevel::replay;
+  using namespace bevel::analysis;
   BatchOptions options;
-  bevel::tools::CommandLine command_line(
+  bevel::cli::CommandLine command_line(
       "bevel-replay", "Replays logs through the estimator: consistency, parameters, error against the truth.");
   command_line.arguments("LOG", options.paths, "logs, or folders of them; with --cases folders of cases")
       .reads_recordings()

@@ -3,14 +3,14 @@
 #include <iostream>
 #include <thread>
 
-#include "tools/common/command_line.hpp"
-#include "tools/steering/targets.hpp"
+#include <bevel/analysis/steering/targets.hpp>
+#include <bevel/cli/command_line.hpp>
 
 int main(int argc, char** argv) {
-  bevel::steering::TargetsOptions o;
+  bevel::analysis::TargetsOptions o;
   o.threads = static_cast<int>(std::max(1U, std::thread::hardware_concurrency()));
   int seed = 1;
-  bevel::tools::CommandLine command_line(
+  bevel::cli::CommandLine command_line(
       "bevel-targets",
       "Steers to random targets in simulated time and prints how far from them the needle comes to rest.");
   command_line.example("bevel-targets --targets 20 --json targets.json")
@@ -24,6 +24,6 @@ int main(int argc, char** argv) {
       .option("--json", o.json, "writes the figures to this file as well");
   return command_line.run(argc, argv, [&] {
     o.seed = static_cast<std::uint64_t>(seed);
-    return bevel::steering::run_targets(o, std::cout);
+    return bevel::analysis::run_targets(o, std::cout);
   });
 }

@@ -11,11 +11,11 @@
 #include <sstream>
 #include <stdexcept>
 
+#include <bevel/cli/command_line.hpp>
+#include <bevel/cli/limits.hpp>
 #include <bevel/nodes/open_lcm.hpp>
 #include <bevel/nodes/runtime.hpp>
 #include <bevel/view/view_node.hpp>
-#include "tools/common/command_line.hpp"
-#include "tools/common/limits.hpp"
 
 namespace {
 
@@ -49,7 +49,7 @@ int main(int argc, char** argv) {
   int port = 8402, parent = 0;
   std::string lcm_url, hosts;
   std::vector<std::string> command;
-  tools::CommandLine command_line("bevel-view", "Shows a running loop, or a log that is played back, on a live page.");
+  cli::CommandLine command_line("bevel-view", "Shows a running loop, or a log that is played back, on a live page.");
   command_line.option("--port", port, "on 127.0.0.1; 0 for one that is free", 0, 65535)
       .option("--lcm-url", lcm_url, "LCM provider; default: LCM_DEFAULT_URL")
       .option("--allow-host", hosts,
@@ -67,7 +67,7 @@ int main(int argc, char** argv) {
     if (parent != 0) nodes::end_with(parent);
     const auto opened = nodes::open_lcm(lcm_url);
     lcm::LCM& lcm = *opened;
-    tools::require_threads(view::PageServer::kThreads);
+    cli::require_threads(view::PageServer::kThreads);
     view::ViewNode node(lcm, socket, names_in(hosts));
     std::printf("watch at %s\n", node.address().c_str());
     std::fflush(stdout);
