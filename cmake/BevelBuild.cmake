@@ -67,7 +67,7 @@ endif()
 # For tools/, tests/ and proof/, whose headers are included by their path from the project's root.
 add_library(bevel_options INTERFACE)
 target_link_libraries(bevel_options INTERFACE bevel_flags)
-target_include_directories(bevel_options INTERFACE ${PROJECT_SOURCE_DIR})
+target_include_directories(bevel_options INTERFACE ${PROJECT_SOURCE_DIR} ${PROJECT_SOURCE_DIR}/core/include)
 
 # bevel_component(NAME SOURCES files... [COMPONENT name] [PUBLIC libs...] [PRIVATE libs...] [BUILD libs...]):
 # library bevel_NAME with the alias bevel::NAME, static or shared by BUILD_SHARED_LIBS, installed and exported with
@@ -84,6 +84,7 @@ function(bevel_component name)
   target_compile_features(bevel_${name} PUBLIC cxx_std_20)
   target_include_directories(bevel_${name}
     PUBLIC "$<BUILD_INTERFACE:${CMAKE_CURRENT_SOURCE_DIR}/include>" "$<INSTALL_INTERFACE:${CMAKE_INSTALL_INCLUDEDIR}>"
+      "$<BUILD_INTERFACE:${PROJECT_SOURCE_DIR}/core/include>"  # bevel/error.hpp
     PRIVATE ${CMAKE_CURRENT_SOURCE_DIR}/src)
   target_link_libraries(bevel_${name} PUBLIC ${arg_PUBLIC} PRIVATE ${arg_PRIVATE} $<BUILD_INTERFACE:bevel_flags>)
   foreach(library IN LISTS arg_BUILD)

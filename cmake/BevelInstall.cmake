@@ -1,5 +1,6 @@
 # Headers and package files of the components. Targets are installed where they are defined (bevel_component()).
 include(CMakePackageConfigHelpers)
+install(DIRECTORY core/include/ DESTINATION ${CMAKE_INSTALL_INCLUDEDIR} COMPONENT dev)  # exceptions, used by every component
 set(package_folder ${CMAKE_INSTALL_LIBDIR}/cmake/bevel)
 foreach(component IN LISTS BEVEL_ALL_COMPONENTS)
   if(NOT BEVEL_WITH_${component})

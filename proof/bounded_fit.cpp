@@ -2,7 +2,7 @@
 
 #include <Eigen/Cholesky>
 #include <algorithm>
-#include <stdexcept>
+#include <bevel/error.hpp>
 
 namespace bevel::proof {
 namespace {
@@ -45,7 +45,7 @@ BoundedFit fit_in_box(const BoundedProblem& problem, const VectorXd& start, int 
   constexpr int kPatience = 4;
   VectorXd x = start.cwiseMax(problem.lowest).cwiseMin(problem.highest);
   auto residual = problem.residual(x);
-  if (!residual) throw std::domain_error("the refit starts outside the model's domain");
+  if (!residual) throw DomainError("the refit starts outside the model's domain");
   bool converged = false;
   double damping = 1e-6;
   for (int iteration = 0; iteration < iterations && !converged; ++iteration) {

@@ -20,7 +20,7 @@ struct BoundedFit {
 };
 
 // Levenberg and Marquardt; what stands at a bound and wants beyond stays there. Gives up where the norm stays above
-// `hopeless` after a few iterations. Throws std::domain_error if the residual is not defined at `start`.
+// `hopeless` after a few iterations. Throws DomainError if the residual is not defined at `start`.
 BoundedFit fit_in_box(const BoundedProblem& problem, const Eigen::VectorXd& start, int iterations, double hopeless);
 
 }  // namespace bevel::proof

@@ -7,10 +7,10 @@
 #include <mutex>
 #include <nlohmann/json.hpp>
 #include <ostream>
-#include <stdexcept>
 #include <system_error>
 #include <thread>
 
+#include <bevel/error.hpp>
 #include "proof/commitment.hpp"
 #include "proof/page.hpp"
 #include "proof/tool_run.hpp"
@@ -84,25 +84,25 @@ void claim_folder(const CampaignOptions& options) {
   if (fs::exists(path)) {
     const json before = json::parse(read_text(path));
     if (before.at("seed") != options.seed)
-      throw std::runtime_error(options.out.string() + ": holds trials of seed " + before.at("seed").dump() + ", not " +
+      throw ConfigurationError(options.out.string() + ": holds trials of seed " + before.at("seed").dump() + ", not " +
                                std::to_string(options.seed) + "; take that seed or another folder");
     const double varied = before.value("varied", 0.0);  // campaigns before there was any
     if (varied != options.population.varied)
-      throw std::runtime_error(options.out.string() + ": holds trials of which a share of " + json(varied).dump() +
+      throw ConfigurationError(options.out.string() + ": holds trials of which a share of " + json(varied).dump() +
                                " is varied, not " + json(options.population.varied).dump() +
                                "; take that share or another folder");
     const int edition = before.value("edition", 1);  // campaigns before there were two
     if (edition != options.population.edition)
-      throw std::runtime_error(options.out.string() + ": holds trials of edition " + std::to_string(edition) +
+      throw ConfigurationError(options.out.string() + ": holds trials of edition " + std::to_string(edition) +
                                ", not " + std::to_string(options.population.edition) +
                                "; take that edition or another folder");
     if (before.value("nulls", false) != options.population.nulls)
-      throw std::runtime_error(
+      throw ConfigurationError(
           options.out.string() +
           (options.population.nulls ? ": holds trials with physics concealed" : ": holds nulls only") +
           "; take another folder");
     if (before.value("two_groups", false) != options.population.two_groups)
-      throw std::runtime_error(options.out.string() + ": holds trials of " +
+      throw ConfigurationError(options.out.string() + ": holds trials of " +
                                (options.population.two_groups ? "one group" : "two groups") +
                                " of recordings; take another folder");
     return;
@@ -130,7 +130,7 @@ std::string claim_tool(const CampaignOptions& options) {
   if (fs::exists(path)) {
     const std::string before = json::parse(read_text(path)).at("sha256");
     if (before != sha256)
-      throw std::runtime_error(options.out.string() + ": holds verdicts of another program (sha256 " +
+      throw ConfigurationError(options.out.string() + ": holds verdicts of another program (sha256 " +
                                before.substr(0, 12) + "..., now " + sha256.substr(0, 12) +
                                "...); take another --out, or remove tool.json and trials/*/run.json there");
   } else {
@@ -143,7 +143,7 @@ void check_inputs(const TrialFolders& folders) {
   const json commitment = json::parse(read_text(folders.commitment));
   for (const auto& [name, sha256] : commitment.at("sha256_of_inputs").items())
     if (io::sha256_of_file((folders.given / name).string()) != sha256)
-      throw std::runtime_error((folders.given / name).string() + ": changed since it was sealed");
+      throw ConfigurationError((folders.given / name).string() + ": changed since it was sealed");
 }
 
 // False if interrupted before the end: nothing is kept of it then.
@@ -210,10 +210,10 @@ TrialScore score_trial(const CampaignOptions& options, int number) {
     if (run.at("verdict_sha256").is_null()) return score_abstention(truth, "no verdict.json");
     const fs::path path = folders.tool_output / "verdict.json";
     if (io::sha256_of_file(path.string()) != run.at("verdict_sha256"))
-      throw std::runtime_error(path.string() + ": changed since the tool wrote it");
+      throw ConfigurationError(path.string() + ": changed since the tool wrote it");
     try {
       return score_verdict(truth, parse_verdict(read_text(path)));
-    } catch (const std::runtime_error& e) {
+    } catch (const Error& e) {
       return score_abstention(truth, e.what());
     }
   };
@@ -235,7 +235,7 @@ int run_campaign(const CampaignOptions& options, std::ostream& progress) {
   interrupted = 0;
   const SignalGuard guard;
   if (!options.generate_only && !fs::is_regular_file(options.diagnose))
-    throw std::runtime_error(options.diagnose.string() + ": there is no such program (the tool under test)");
+    throw ConfigurationError(options.diagnose.string() + ": there is no such program (the tool under test)");
   claim_folder(options);
   std::mutex mutex;
   const auto say = [&](const std::string& line) {

@@ -34,7 +34,7 @@ struct CampaignOptions {
   CampaignWatch watch;
 };
 
-// Exit status: 0 finished, 130 interrupted. Throws std::runtime_error with a message for the user.
+// Exit status: 0 finished, 130 interrupted. Throws ConfigurationError with a message for the user.
 int run_campaign(const CampaignOptions& options, std::ostream& progress);
 
 }  // namespace bevel::proof

@@ -3,14 +3,14 @@
 #include <openssl/rand.h>
 
 #include <array>
-#include <stdexcept>
+#include <bevel/error.hpp>
 
 namespace bevel::proof {
 
 std::string draw_salt() {
   std::array<unsigned char, 32> bytes{};
   if (RAND_bytes(bytes.data(), static_cast<int>(bytes.size())) != 1)
-    throw std::runtime_error("no random bytes from OpenSSL for a salt");
+    throw IoError("no random bytes from OpenSSL for a salt");
   return io::hex(bytes);
 }
 

@@ -1,8 +1,8 @@
 #include "proof/hidden_physics.hpp"
 
 #include <algorithm>
+#include <bevel/error.hpp>
 #include <numbers>
-#include <stdexcept>
 
 namespace bevel::proof {
 namespace {
@@ -141,7 +141,7 @@ const EffectKind& kind_of(const ConcealedEffect& effect) {
   for (int edition = kEditions; edition > 0; --edition)
     for (const EffectKind& kind : catalogue(edition))
       if (kind.name == wanted && kind.listed == effect.kind.empty()) return kind;
-  throw std::out_of_range("effect \"" + wanted + "\" is not in the catalogue of the trial");
+  throw DomainError("effect \"" + wanted + "\" is not in the catalogue of the trial");
 }
 
 ConcealedEffect draw_effect(const EffectKind& kind, Random& random, const std::vector<AxisMotion>& motions) {

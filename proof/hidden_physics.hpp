@@ -120,7 +120,7 @@ inline constexpr int kBeamIsListed = 3;  // from this edition on
 const std::vector<EffectKind>& catalogue(int edition = kEditions);
 // What else may change between two groups of recordings: the needle's own parameters.
 const std::vector<EffectKind>& needle_changes();
-const EffectKind& kind_of(const ConcealedEffect& effect);  // throws std::out_of_range for a name it does not hold
+const EffectKind& kind_of(const ConcealedEffect& effect);  // throws DomainError for a name it does not hold
 
 // Sizes as the field reports them; instants and phases for recordings of these durations.
 ConcealedEffect draw_effect(const EffectKind& kind, Random& random, const std::vector<AxisMotion>& motions);

@@ -2,9 +2,9 @@
 
 #include <Eigen/Geometry>
 #include <algorithm>
+#include <bevel/error.hpp>
 #include <cmath>
 #include <numbers>
-#include <stdexcept>
 
 namespace bevel::proof {
 namespace {
@@ -31,7 +31,7 @@ struct Rate {  // per mm of advance
 double slip_tangent(const BaseNeedle& needle, double lean_rad) {
   const double b = 1.0 - needle.lambda2;
   const double root = b * b + 4.0 * needle.lambda1_per_rad * lean_rad;
-  if (root < 0.0) throw std::domain_error("the tip leans too far for the slip law");
+  if (root < 0.0) throw DomainError("the tip leans too far for the slip law");
   return std::tan(2.0 * lean_rad / (b + std::sqrt(root)) - lean_rad);
 }
 

@@ -23,7 +23,7 @@ struct BaseNeedle {
 
 using TipPath = std::vector<Eigen::Vector3d>;  // every kStep_s
 
-// Throws std::domain_error naming the recording if the tip leaves the domain of the slip law.
+// Throws DomainError naming the recording if the tip leaves the domain of the slip law.
 TipPath travel(const BaseNeedle& needle, const AxisMotion& motion, const HiddenPhysics& physics,
                const DriveRipple& ripple, int recording);
 

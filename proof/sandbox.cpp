@@ -6,9 +6,9 @@
 #include <cstdio>
 #include <initializer_list>
 #include <memory>
-#include <stdexcept>
 #include <utility>
 
+#include <bevel/error.hpp>
 #include "proof/libraries.hpp"
 
 namespace bevel::proof {
@@ -29,7 +29,7 @@ class Options {
  public:
   void add(std::initializer_list<std::string> words) {
     for (const std::string& word : words) {
-      if (word.find('\0') != std::string::npos) throw std::runtime_error("a path has a zero byte");
+      if (word.find('\0') != std::string::npos) throw IoError("a path has a zero byte");
       text_ += word + '\0';
     }
   }
@@ -45,11 +45,11 @@ bool is_inside(const fs::path& path, const fs::path& folder) {
 }
 
 void require_apart(const fs::path& source, const fs::path& hidden) {
-  if (!fs::exists(source)) throw std::runtime_error(source.string() + ": does not exist");
+  if (!fs::exists(source)) throw IoError(source.string() + ": does not exist");
   const fs::path there = fs::canonical(source);
   if (is_inside(hidden, there) || is_inside(there, hidden))
-    throw std::runtime_error(hidden.string() + ": the sealed truths and " + there.string() +
-                             ", which the tool under test can read, are not apart; take another --out");
+    throw IoError(hidden.string() + ": the sealed truths and " + there.string() +
+                  ", which the tool under test can read, are not apart; take another --out");
 }
 
 /// Whether bubblewrap has --disable-userns, from version 0.8 on. Without it a tool can make a user namespace with
@@ -66,9 +66,9 @@ bool disables_user_namespaces() {
 
 std::string sandbox_options(const SandboxView& view, const fs::path& secret) {
   if (::access(kBubblewrap, X_OK) != 0)
-    throw std::runtime_error(std::string(kBubblewrap) +
-                             " is not there; install the package bubblewrap (tools/setup does), or give --unsealed, "
-                             "which the result reports");
+    throw IoError(std::string(kBubblewrap) +
+                  " is not there; install the package bubblewrap (tools/setup does), or give --unsealed, "
+                  "which the result reports");
   const fs::path hidden = fs::weakly_canonical(secret);
   Options options;
   options.add({"--unshare-user", "--unshare-pid", "--unshare-net", "--unshare-ipc", "--unshare-uts",

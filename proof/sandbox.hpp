@@ -24,7 +24,7 @@ inline constexpr const char* kBubblewrap = "/usr/bin/bwrap";
 /// Options for bubblewrap, each ended by a zero byte, as `--args FD` reads them: on a command line they would be
 /// visible inside, in /proc/1/cmdline.
 /// @param secret  folder whose files must not be visible
-/// @throws std::runtime_error if bubblewrap is not installed, if the program or a folder does not exist, or if one of
+/// @throws IoError if bubblewrap is not installed, if the program or a folder does not exist, or if one of
 ///   them contains \p secret or is in it
 std::string sandbox_options(const SandboxView& view, const fs::path& secret);
 

@@ -1,11 +1,11 @@
 #include "proof/score.hpp"
 
 #include <algorithm>
+#include <bevel/error.hpp>
 #include <cmath>
 #include <nlohmann/json.hpp>
 #include <numbers>
 #include <set>
-#include <stdexcept>
 
 namespace bevel::proof {
 
@@ -222,7 +222,7 @@ OpenedTruth parse_truth(std::string_view text) {
     for (const json& rival : j.at("rivals")) truth.rivals.push_back(rival.at("name"));
     return truth;
   } catch (const json::exception& e) {
-    throw std::runtime_error(std::string("a truth cannot be read: ") + e.what());
+    throw ParseError(std::string("a truth cannot be read: ") + e.what());
   }
 }
 

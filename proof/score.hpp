@@ -29,7 +29,7 @@ struct OpenedTruth {
   std::map<std::string, double> needle = {};  // its parameters
   std::vector<std::string> rivals;            // listed effects that these recordings cannot tell from the unlisted one
 };
-OpenedTruth parse_truth(std::string_view text);  // throws std::runtime_error
+OpenedTruth parse_truth(std::string_view text);  // throws ParseError
 
 enum class Visibility {
   null,       // nothing concealed

@@ -6,8 +6,8 @@
 #include <iterator>
 #include <nlohmann/json.hpp>
 #include <random>
-#include <stdexcept>
 
+#include <bevel/error.hpp>
 #include "proof/trial_files.hpp"
 
 namespace bevel::proof {
@@ -33,7 +33,7 @@ std::uint64_t seed_of(const std::string& file, const std::filesystem::path& camp
   std::uint64_t seed = 0;
   const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), seed);
   if (text.empty() || error != std::errc{} || end != text.data() + text.size() || seed > kLargestSeed)
-    throw std::runtime_error((file == "-" ? "standard input" : file) + ": holds '" + text.substr(0, 40) +
+    throw ConfigurationError((file == "-" ? "standard input" : file) + ": holds '" + text.substr(0, 40) +
                              "'; allowed: one whole number from 0 to " + std::to_string(kLargestSeed));
   return seed;
 }

@@ -10,7 +10,7 @@ namespace bevel::proof {
 /// Returns the seed of a campaign.
 /// @param file  file with a whole number from 0 to 2^63 - 1, "-" for standard input, or ""
 /// @param campaign  folder of the campaign: without \p file, the seed stored in it, or else a random one
-/// @throws std::runtime_error if the file cannot be read or does not hold one such number
+/// @throws ConfigurationError if the file cannot be read or does not hold one such number
 std::uint64_t seed_of(const std::string& file, const std::filesystem::path& campaign);
 
 }  // namespace bevel::proof

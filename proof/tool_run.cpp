@@ -9,12 +9,12 @@
 
 #include <algorithm>
 #include <array>
+#include <bevel/error.hpp>
 #include <cerrno>
 #include <chrono>
 #include <csignal>
 #include <cstdlib>
 #include <cstring>
-#include <stdexcept>
 #include <system_error>
 
 namespace bevel::proof {
@@ -26,7 +26,7 @@ class StagingFolder {
  public:
   StagingFolder() {
     std::string pattern = (fs::temp_directory_path() / "bevel-blindtrial-XXXXXX").string();
-    if (::mkdtemp(pattern.data()) == nullptr) throw std::runtime_error(pattern + ": cannot be made");
+    if (::mkdtemp(pattern.data()) == nullptr) throw IoError(pattern + ": cannot be made");
     path_ = pattern;
   }
   ~StagingFolder() {
@@ -80,7 +80,7 @@ void copy_files(const fs::path& from, const fs::path& to) {
     else if (fs::is_regular_file(status))
       fs::copy_file(entry->path(), target, fs::copy_options::overwrite_existing, failed);
     if (failed && failed != std::errc::permission_denied)
-      throw std::runtime_error(target.string() + ": cannot be written: " + failed.message());
+      throw IoError(target.string() + ": cannot be written: " + failed.message());
   }
 }
 
@@ -94,7 +94,7 @@ int file_with(const std::string& text) {
     if (size > 0) done += static_cast<std::size_t>(size);
   }
   if (file < 0 || done < text.size() || ::lseek(file, 0, SEEK_SET) != 0)
-    throw std::runtime_error(std::string("the options of the sandbox cannot be stored: ") + std::strerror(errno));
+    throw IoError(std::string("the options of the sandbox cannot be stored: ") + std::strerror(errno));
   return file;
 }
 
@@ -129,7 +129,7 @@ ToolEnd wait_for(pid_t child, double limit_s, const std::atomic<int>& stop) {
     const pid_t done = ::waitpid(child, &status, WNOHANG);
     end.seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
     if (done == child) break;
-    if (done < 0 && errno != EINTR) throw std::runtime_error(std::string("waitpid: ") + std::strerror(errno));
+    if (done < 0 && errno != EINTR) throw IoError(std::string("waitpid: ") + std::strerror(errno));
     if (!killed && (stop != 0 || end.seconds > limit_s)) {
       end.stopped = stop != 0;
       end.out_of_time = !end.stopped;
@@ -147,7 +147,7 @@ ToolEnd wait_for(pid_t child, double limit_s, const std::atomic<int>& stop) {
 
 ToolEnd run_tool(const ToolRun& run, const std::atomic<int>& stop) {
   if (::access(run.program.c_str(), X_OK) != 0)
-    throw std::runtime_error(run.program.string() + ": " + std::strerror(errno) + " (the tool under test)");
+    throw IoError(run.program.string() + ": " + std::strerror(errno) + " (the tool under test)");
   const StagingFolder staging;
   const fs::path given = staging.path() / "case", output = staging.path() / "out";
   std::vector<std::string> command = command_of(run);
@@ -164,7 +164,7 @@ ToolEnd run_tool(const ToolRun& run, const std::atomic<int>& stop) {
   const auto variables = pointers(environment);
   const std::string console = run.console.string();
   std::array<int, 2> pipe{};
-  if (::pipe2(pipe.data(), O_CLOEXEC) != 0) throw std::runtime_error(std::string("pipe: ") + std::strerror(errno));
+  if (::pipe2(pipe.data(), O_CLOEXEC) != 0) throw IoError(std::string("pipe: ") + std::strerror(errno));
 
   const pid_t child = ::fork();
   if (child == 0) {  // until exec only calls that are safe in the child of a program with threads
@@ -195,15 +195,15 @@ ToolEnd run_tool(const ToolRun& run, const std::atomic<int>& stop) {
   if (options >= 0) ::close(options);
   if (child < 0) {
     ::close(pipe[0]);
-    throw std::runtime_error(std::string("fork: ") + std::strerror(errno));
+    throw IoError(std::string("fork: ") + std::strerror(errno));
   }
   const ToolEnd end = wait_for(child, run.limit_s, stop);
   const std::string status = text_in(pipe[0]);
   ::close(pipe[0]);
   if (run.sealed && !end.stopped && !end.out_of_time && status.find("child-pid") == std::string::npos)
-    throw std::runtime_error("the tool cannot be sealed off (" + console +
-                             " has bubblewrap's message); where the kernel has no user namespaces, --unsealed runs it "
-                             "without, and the result reports that");
+    throw IoError("the tool cannot be sealed off (" + console +
+                  " has bubblewrap's message); where the kernel has no user namespaces, --unsealed runs it "
+                  "without, and the result reports that");
   if (run.sealed) copy_files(output, run.output);
   return end;
 }

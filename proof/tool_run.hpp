@@ -25,7 +25,7 @@ struct ToolEnd {
 };
 
 // Runs PROGRAM --model M.toml --out DIR LOG..., ends it with everything it started when time is over or `stop` becomes
-// non-zero. Throws std::runtime_error if it cannot be started or sealed, saying at which step.
+// non-zero. Throws IoError if it cannot be started or sealed, saying at which step.
 ToolEnd run_tool(const ToolRun& run, const std::atomic<int>& stop);
 
 }  // namespace bevel::proof

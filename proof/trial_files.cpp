@@ -9,8 +9,8 @@
 #include <fstream>
 #include <iterator>
 #include <nlohmann/json.hpp>
-#include <stdexcept>
 
+#include <bevel/error.hpp>
 #include <bevel/io/log_writer.hpp>
 #include <bevel/io/messages.hpp>
 #include <bevel/io/result_file.hpp>
@@ -155,7 +155,7 @@ void write_atomically(const fs::path& path, const std::string& text) {
 
 std::string read_text(const fs::path& path) {
   std::ifstream file(path, std::ios::binary);
-  if (!file) throw std::runtime_error(path.string() + ": cannot be read");
+  if (!file) throw IoError(path.string() + ": cannot be read");
   return {std::istreambuf_iterator<char>(file), {}};
 }
 
@@ -251,8 +251,7 @@ std::string open_truth(const TrialFolders& folders) {
   const json commitment = json::parse(read_text(folders.commitment));
   std::string truth = sealed.at("truth");
   if (commitment_to(sealed.at("salt").get<std::string>(), truth) != commitment.at("sha256_of_salt_and_truth"))
-    throw std::runtime_error(folders.truth.string() + ": not the truth that " + folders.commitment.string() +
-                             " commits to");
+    throw IoError(folders.truth.string() + ": not the truth that " + folders.commitment.string() + " commits to");
   return truth;
 }
 

@@ -20,8 +20,8 @@ struct TrialFolders {
   fs::path trial, given, commitment, truth, tool_output, run, score;
 };
 
-void write_atomically(const fs::path& path, const std::string& text);  // throws std::runtime_error naming the file
-std::string read_text(const fs::path& path);                           // throws std::runtime_error naming the file
+void write_atomically(const fs::path& path, const std::string& text);  // throws IoError naming the file
+std::string read_text(const fs::path& path);                           // throws IoError naming the file
 
 std::string truth_json(const Truth& truth);
 std::string model_file_text(const Truth& truth);
@@ -30,7 +30,7 @@ void write_trial(const fs::path& out, const Trial& trial);
 // Draws and writes the trial unless it is there already. True if it was written now.
 bool prepare_trial(const fs::path& out, std::uint64_t seed, int number, const Population& population);
 
-// Checks the seal: throws std::runtime_error if the truth is not the one committed to. Returns the truth's text.
+// Checks the seal: throws IoError if the truth is not the one committed to. Returns the truth's text.
 std::string open_truth(const TrialFolders& folders);
 
 }  // namespace bevel::proof

@@ -1,11 +1,11 @@
 #include "proof/verdict.hpp"
 
 #include <algorithm>
+#include <bevel/error.hpp>
 #include <cmath>
 #include <filesystem>
 #include <nlohmann/json.hpp>
 #include <set>
-#include <stdexcept>
 
 namespace bevel::proof {
 
@@ -13,7 +13,7 @@ using nlohmann::json;
 
 namespace {
 
-[[noreturn]] void fail(const std::string& what) { throw std::runtime_error("verdict.json: " + what); }
+[[noreturn]] void fail(const std::string& what) { throw ParseError("verdict.json: " + what); }
 
 std::optional<double> number(const json& object, const char* key) {
   if (!object.is_object() || !object.contains(key) || object.at(key).is_null()) return std::nullopt;

@@ -55,7 +55,7 @@ struct Verdict {
   std::vector<std::string> named() const;
 };
 
-// Throws std::runtime_error saying what is wrong: no JSON, an unknown verdict, an effect without a name, a verdict that
+// Throws ParseError saying what is wrong: no JSON, an unknown verdict, an effect without a name, a verdict that
 // contradicts itself (nothing missing, yet effects; effects found, yet none), a number that is none.
 Verdict parse_verdict(std::string_view text);
 

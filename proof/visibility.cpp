@@ -6,9 +6,9 @@
 #include <limits>
 #include <numbers>
 #include <optional>
-#include <stdexcept>
 #include <utility>
 
+#include <bevel/error.hpp>
 #include "proof/bounded_fit.hpp"
 
 namespace bevel::proof {
@@ -42,7 +42,7 @@ std::optional<Eigen::VectorXd> misfit(const Setting& setting, const Views& seen,
                                       const HiddenPhysics& known) {
   try {
     return whitened_difference(setting, seen, views_of(setting, needle, known));
-  } catch (const std::domain_error&) {
+  } catch (const DomainError&) {
     return std::nullopt;
   }
 }

@@ -6,11 +6,11 @@
 #include <unistd.h>
 
 #include <algorithm>
+#include <bevel/error.hpp>
 #include <cerrno>
 #include <condition_variable>
 #include <cstring>
 #include <mutex>
-#include <stdexcept>
 #include <string>
 #include <system_error>
 #include <thread>
@@ -55,17 +55,16 @@ void require_open_files() {
     free = free_files(kFreeFiles);
   }
   if (free >= kFreeFiles) return;
-  throw std::runtime_error("only " + std::to_string(free) + " more files can be opened, " + std::to_string(kFreeFiles) +
-                           " are required; the limit of open files is " + text_of(limit.rlim_cur) +
-                           ", raise it: ulimit -n 1024");
+  throw IoError("only " + std::to_string(free) + " more files can be opened, " + std::to_string(kFreeFiles) +
+                " are required; the limit of open files is " + text_of(limit.rlim_cur) + ", raise it: ulimit -n 1024");
 }
 
 void require_memory() {
   void* at = mmap(nullptr, kFreeBytes, PROT_READ | PROT_WRITE, MAP_PRIVATE | MAP_ANONYMOUS | MAP_NORESERVE, -1, 0);
   if (at == MAP_FAILED)
-    throw std::runtime_error("64 MiB of memory are required and refused (" + std::string(std::strerror(errno)) +
-                             "); the limit of address space is " + text_of(limit_of(RLIMIT_AS).rlim_cur) +
-                             " bytes, raise it: ulimit -v unlimited");
+    throw IoError("64 MiB of memory are required and refused (" + std::string(std::strerror(errno)) +
+                  "); the limit of address space is " + text_of(limit_of(RLIMIT_AS).rlim_cur) +
+                  " bytes, raise it: ulimit -v unlimited");
   munmap(at, kFreeBytes);
 }
 
@@ -94,9 +93,9 @@ void require_threads(int count) {
     changed.notify_all();
   }
   if (!refused.empty())
-    throw std::runtime_error("a thread is refused (" + refused + "), required: " + std::to_string(count) +
-                             "; the limit of processes is " + text_of(limit_of(RLIMIT_NPROC).rlim_cur) +
-                             ", raise it: ulimit -u 4096; and that of address space: ulimit -v unlimited");
+    throw IoError("a thread is refused (" + refused + "), required: " + std::to_string(count) +
+                  "; the limit of processes is " + text_of(limit_of(RLIMIT_NPROC).rlim_cur) +
+                  ", raise it: ulimit -u 4096; and that of address space: ulimit -v unlimited");
 }
 
 void require_limits() {

@@ -1,8 +1,8 @@
 #include <bevel/controller/axis_model.hpp>
 
 #include <algorithm>
+#include <bevel/error.hpp>
 #include <cmath>
-#include <stdexcept>
 #include <string>
 
 namespace bevel::controller {
@@ -26,8 +26,8 @@ bool is_jump(double tip_mm, double base_mm) { return tip_mm > kJumpRatio * base_
 
 AxisModel::AxisModel(std::vector<model::ActiveEffect> effects) : effects_(std::move(effects)) {
   if (effects_.size() > model::kMaxEffects)
-    throw std::invalid_argument("a model has " + std::to_string(effects_.size()) + " effects; at most " +
-                                std::to_string(model::kMaxEffects) + " are supported");
+    throw ArgumentError("a model has " + std::to_string(effects_.size()) + " effects; at most " +
+                        std::to_string(model::kMaxEffects) + " are supported");
   // A discrepancy is no dead band: what it adds to a rate, the feedback takes care of, and a turn that comes in short
   // by a share would be taken for slack.
   std::erase_if(effects_, [](const model::ActiveEffect& active) { return active.owned != nullptr; });

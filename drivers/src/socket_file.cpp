@@ -5,9 +5,9 @@
 #include <sys/stat.h>
 #include <unistd.h>
 
+#include <bevel/error.hpp>
 #include <cerrno>
 #include <cstring>
-#include <stdexcept>
 
 namespace bevel {
 namespace {
@@ -41,22 +41,22 @@ void remove_stale(const sockaddr_un& address, int type, const std::string& name)
   const char* path = static_cast<const char*>(address.sun_path);
   if (::lstat(path, &status) != 0) return;  // bind() reports what prevents it
   if (!S_ISSOCK(status.st_mode))
-    throw std::runtime_error(name + ": the path is " + kind_of(status.st_mode) +
-                             "; allowed: a path that does not exist yet, or a socket whose process has ended. Choose "
-                             "another path, or remove it");
+    throw IoError(name + ": the path is " + kind_of(status.st_mode) +
+                  "; allowed: a path that does not exist yet, or a socket whose process has ended. Choose "
+                  "another path, or remove it");
   switch (const int error = error_of_connection(address, type)) {
     case ECONNREFUSED:  // nobody listens: its process has ended
-      if (::unlink(path) != 0) throw std::runtime_error(name + ": cannot be removed: " + std::strerror(errno));
+      if (::unlink(path) != 0) throw IoError(name + ": cannot be removed: " + std::strerror(errno));
       return;
     case ENOENT:
       return;
     case 0:
     case EAGAIN:      // its queue of connections is full
     case EPROTOTYPE:  // a process listens with another type of socket
-      throw std::runtime_error(name + ": another process serves it already; end that process or choose another path");
+      throw IoError(name + ": another process serves it already; end that process or choose another path");
     default:
-      throw std::runtime_error(
-          name + ": is a socket, and whether a process serves it cannot be found out: " + std::strerror(error));
+      throw IoError(name +
+                    ": is a socket, and whether a process serves it cannot be found out: " + std::strerror(error));
   }
 }
 
@@ -67,7 +67,7 @@ SocketFile::SocketFile(int socket, const sockaddr_un& address, const std::string
   remove_stale(address, type_of(socket), name);
   struct stat status {};
   if (::bind(socket, generic(address), sizeof address) != 0 || ::lstat(path_.c_str(), &status) != 0)
-    throw std::runtime_error(name + ": cannot be served: " + std::strerror(errno));
+    throw IoError(name + ": cannot be served: " + std::strerror(errno));
   device_ = status.st_dev;
   inode_ = status.st_ino;
 }

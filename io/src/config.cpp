@@ -20,6 +20,7 @@
 #include <set>
 #include <sstream>
 
+#include <bevel/error.hpp>
 #include <bevel/io/file_bytes.hpp>
 #include "toml_limits.hpp"
 
@@ -103,7 +104,7 @@ std::string join(const std::vector<std::string>& words) {
 }  // namespace
 
 ConfigError::ConfigError(std::vector<std::string> messages)
-    : std::runtime_error([&messages] {
+    : ConfigurationError([&messages] {
         std::string all;
         for (const auto& message : messages) all += (all.empty() ? "" : "\n") + message;
         return all;
@@ -343,7 +344,7 @@ ConfigFile ConfigFile::load(const std::string& path) {
   std::string text;
   try {
     text = read_text_file(path);
-  } catch (const std::runtime_error& unreadable) {
+  } catch (const Error& unreadable) {
     throw ConfigError({unreadable.what()});
   }
   return parse(text, path);

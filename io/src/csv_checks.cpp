@@ -5,8 +5,8 @@
 #include <cmath>
 #include <cstdio>
 #include <set>
-#include <stdexcept>
 
+#include <bevel/error.hpp>
 #include <bevel/io/plausibility.hpp>
 
 namespace bevel::io {
@@ -41,7 +41,7 @@ void note(const Judgement& judgement, const std::vector<Placed<Sample>>& placed,
   for (const Oddity& oddity : judgement.oddities) {
     const auto row = std::ranges::find(placed, oddity.utime, [](const auto& p) { return p.sample.utime; });
     const std::string text = path + ":" + std::to_string(row->line) + ": " + oddity.what;
-    if (!oddity.left_out) throw std::runtime_error(text + "; it lasts, and is no recording of one insertion");
+    if (!oddity.left_out) throw ParseError(text + "; it lasts, and is no recording of one insertion");
     if (gone.insert(oddity.utime).second) left_out.push_back(text + "; the row is left out");
   }
 }
@@ -114,8 +114,8 @@ std::string far_tips(const PlacedReadings& readings, const std::vector<Base>& ba
   if (far == 0) return "";
   const std::string share = std::to_string(far) + " of " + std::to_string(readings.tips.size()) + " tips";
   if (static_cast<double>(far) > kMostLeftOut * static_cast<double>(readings.tips.size()))
-    throw std::runtime_error(where + "; in all " + share +
-                             " are too far. Are tip.unit, insertion.unit, the units of time and the columns right?");
+    throw ParseError(where + "; in all " + share +
+                     " are too far. Are tip.unit, insertion.unit, the units of time and the columns right?");
   return where + "; in all " + share + " are too far, and stay in the log";
 }
 
@@ -134,13 +134,13 @@ void require_inward(const PlacedReadings& readings, const std::vector<Base>& bas
   const auto [share, i] = shares[shares.size() / 2];
   if (share >= kFollowShare) return;
   const double in_mm = base[i].at_mm - base.front().at_mm;
-  throw std::runtime_error(path + ":" + std::to_string(readings.tips[i].line) + ": the tip's z changed by " +
-                           figure(share * in_mm) + " mm from line " + std::to_string(readings.tips.front().line) +
-                           " on, while the insertion changed by " + figure(in_mm) +
-                           " mm; allowed: " + figure(kFollowShare * in_mm) +
-                           " mm or more in that direction, since z of {A} leads into the tissue. Are the units, the "
-                           "signs and the order of " +
-                           "tip.axes right?");
+  throw ParseError(path + ":" + std::to_string(readings.tips[i].line) + ": the tip's z changed by " +
+                   figure(share * in_mm) + " mm from line " + std::to_string(readings.tips.front().line) +
+                   " on, while the insertion changed by " + figure(in_mm) +
+                   " mm; allowed: " + figure(kFollowShare * in_mm) +
+                   " mm or more in that direction, since z of {A} leads into the tissue. Are the units, the "
+                   "signs and the order of " +
+                   "tip.axes right?");
 }
 
 }  // namespace
@@ -150,8 +150,8 @@ void leave_out_the_implausible(PlacedReadings& readings, const std::string& tip_
   const std::size_t tips = readings.tips.size(), base = readings.base.size(), headings = readings.headings.size();
   const auto require_most = [&](std::size_t now, std::size_t before) {
     if (static_cast<double>(before - now) > kMostLeftOut * static_cast<double>(before))
-      throw std::runtime_error(left_out.front() + ", as are " + std::to_string(before - now - 1) + " others of " +
-                               std::to_string(before) + "; at most 20 % may be");
+      throw ParseError(left_out.front() + ", as are " + std::to_string(before - now - 1) + " others of " +
+                       std::to_string(before) + "; at most 20 % may be");
   };
   // Without its worst rows a neighbour may stand out that did not before.
   for (;;) {

@@ -24,12 +24,12 @@ struct PlacedReadings {
 
 // Takes out rows that are implausible beside their neighbours (bevel/io/plausibility.hpp), and says each in `left_out`:
 // "FILE:LINE: what; the row is left out". If tip and base share their rows, a row is left out as a whole. Throws
-// std::runtime_error for motion that lasts, and where more than a fifth would have to go.
+// Error for motion that lasts, and where more than a fifth would have to go.
 void leave_out_the_implausible(PlacedReadings& readings, const std::string& tip_path, const std::string& base_path,
                                bool share_rows, std::vector<std::string>& left_out);
 
 // The tip is at the end of what was pushed in: it is never farther from where it began than the base moved, and while
-// the base moves its first 50 mm, the tip's z grows with it. Throws std::runtime_error where that is not so of more
+// the base moves its first 50 mm, the tip's z grows with it. Throws ParseError where that is not so of more
 // than a fifth of the tips, with the two figures, what is allowed and the line; returns a sentence on fewer, "" for
 // none. Wrong units, signs and columns look like this.
 std::string require_tip_follows_base(const PlacedReadings& readings, const std::string& tip_path);

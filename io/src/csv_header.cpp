@@ -2,9 +2,9 @@
 
 #include <algorithm>
 #include <array>
+#include <bevel/error.hpp>
 #include <cctype>
 #include <charconv>
-#include <stdexcept>
 
 namespace bevel::io {
 namespace {
@@ -84,8 +84,8 @@ std::optional<char> separator_hint(const std::string& path, std::string_view lin
   const std::string value = text.substr(4);
   if (value.empty() || kSeparators.find(value[0]) == std::string_view::npos ||
       value.find_first_not_of(value[0]) != std::string::npos)
-    throw std::runtime_error(path + ":1: the separator in '" + text +
-                             "' is not known; allowed: sep= with a comma, semicolon, pipe or tab");
+    throw ParseError(path + ":1: the separator in '" + text +
+                     "' is not known; allowed: sep= with a comma, semicolon, pipe or tab");
   return value[0];
 }
 
@@ -192,9 +192,9 @@ CsvHeader find_header(const std::string& path, CsvLines& lines) {
           auto found = names_for(without_mark(line.text), *row, out.separator, surplus);
           if (!found) continue;
           if (out.line != 0)
-            throw std::runtime_error(path + ":" + std::to_string(line.number) + ": this comment and that of line " +
-                                     std::to_string(out.line) + " both have " + std::to_string(row->size()) +
-                                     " cells, as the first row; remove the # of the one that names the columns");
+            throw ParseError(path + ":" + std::to_string(line.number) + ": this comment and that of line " +
+                             std::to_string(out.line) + " both have " + std::to_string(row->size()) +
+                             " cells, as the first row; remove the # of the one that names the columns");
           out.names = std::move(*found);
           if (out.names.front().empty()) out.names.front() = trimmed_cell(line.text).front();  // "#,x,y"
           out.line = line.number;
@@ -207,7 +207,7 @@ CsvHeader find_header(const std::string& path, CsvLines& lines) {
       names.push_back({text, lines.number()});
     }
   }
-  if (names.empty()) throw std::runtime_error(path + (comments.empty() ? ": is empty" : ": has no line but comments"));
+  if (names.empty()) throw ParseError(path + (comments.empty() ? ": is empty" : ": has no line but comments"));
   // No line fits the rows: the first one is the header, and reading the rows reports what does not fit.
   const Line& first = names.front();
   out.separator = candidates.size() == 1 && row && candidates[0] != kBlanks ? candidates[0] : ',';
@@ -215,8 +215,8 @@ CsvHeader find_header(const std::string& path, CsvLines& lines) {
     out.separator = separator_of_names(first.text);
   auto cells = split_cells(first.text, out.separator);
   if (!cells)
-    throw std::runtime_error(path + ":" + std::to_string(first.number) +
-                             ": a quote (\") is opened and not closed in this line");
+    throw ParseError(path + ":" + std::to_string(first.number) +
+                     ": a quote (\") is opened and not closed in this line");
   out.names = std::move(*cells);
   out.is_numbers = is_mostly_numbers(out.names);
   out.line = first.number;

@@ -3,8 +3,8 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
-#include <stdexcept>
 
+#include <bevel/error.hpp>
 #include <bevel/io/csv_table.hpp>
 #include <bevel/io/log_writer.hpp>
 #include <bevel/io/messages.hpp>
@@ -44,18 +44,18 @@ std::string span_s(std::int64_t first_us, std::int64_t last_us) {
 // Where the base was is not known before its first reading nor after its last.
 int leave_out_without_base(PlacedReadings& readings, const std::string& tip_path, const std::string& base_path) {
   if (readings.base.empty())
-    throw std::runtime_error(base_path + ": no row tells where the base was (insertion, rotation) by this column map");
+    throw ParseError(base_path + ": no row tells where the base was (insertion, rotation) by this column map");
   if (readings.tips.empty() && readings.headings.empty())
-    throw std::runtime_error(tip_path + ": no row tells where the tip was by this column map");
+    throw ParseError(tip_path + ": no row tells where the tip was by this column map");
   const std::int64_t first = readings.base.front().sample.utime, last = readings.base.back().sample.utime;
   const auto outside = [&](const auto& p) { return p.sample.utime < first || p.sample.utime > last; };
   const auto& tips = readings.tips;
   const std::string tip_span = tips.empty() ? "" : span_s(tips.front().sample.utime, tips.back().sample.utime);
   const auto gone = std::erase_if(readings.tips, outside) + std::erase_if(readings.headings, outside);
   if (readings.tips.empty() && readings.headings.empty())
-    throw std::runtime_error(tip_path + ": the tip was read at " + tip_span + ", the base at " + span_s(first, last) +
-                             " (" + base_path + "): they have no time in common. Are the units and clocks the same? " +
-                             "offset_s in [time] or [base.time] is added to a clock");
+    throw ParseError(tip_path + ": the tip was read at " + tip_span + ", the base at " + span_s(first, last) + " (" +
+                     base_path + "): they have no time in common. Are the units and clocks the same? " +
+                     "offset_s in [time] or [base.time] is added to a clock");
   return static_cast<int>(gone);
 }
 
@@ -64,11 +64,11 @@ void require_one_insertion(const PlacedReadings& readings, const std::string& ba
   for (const auto& p : readings.base) base.push_back(p.sample);
   const auto second = second_insertion(base);
   if (second)
-    throw std::runtime_error(base_path + ":" + std::to_string(readings.base[*second].line) +
-                             ": a second insertion begins: here the needle is back at the entry point, and below it is "
-                             "inserted again by more than " +
-                             format_number(kInserted_mm) +
-                             " mm. Allowed: one insertion in each file. Cut the file at this row");
+    throw ParseError(base_path + ":" + std::to_string(readings.base[*second].line) +
+                     ": a second insertion begins: here the needle is back at the entry point, and below it is "
+                     "inserted again by more than " +
+                     format_number(kInserted_mm) +
+                     " mm. Allowed: one insertion in each file. Cut the file at this row");
 }
 
 template <class Sample>
@@ -83,8 +83,8 @@ EntryFrame move_to_entry_frame(PlacedReadings& readings, const ColumnMap& map, c
   EntryFrame frame;
   try {
     frame = fit_entry_frame(samples_of(readings.base), samples_of(readings.tips));
-  } catch (const std::runtime_error& e) {
-    throw std::runtime_error(tip_path + ": " + e.what());
+  } catch (const Error& e) {
+    throw ParseError(tip_path + ": " + e.what());
   }
   for (auto& tip : readings.tips) tip.sample.position_mm = frame.to_A * (tip.sample.position_mm - frame.origin_mm);
   const double information_per_rad2 = 1 / (map.heading_sd_rad * map.heading_sd_rad);
@@ -113,8 +113,8 @@ void examine_times(const PlacedReadings& readings, const ColumnMap& map, const s
 template <class Sample>
 void require_readable(const Placed<Sample>& placed, const std::string& path) {
   if (const auto error = check_fields(to_message(placed.sample)))
-    throw std::runtime_error(path + ":" + std::to_string(placed.line) +
-                             ": readers would refuse the message made of this row (" + describe(*error) + ")");
+    throw ParseError(path + ":" + std::to_string(placed.line) +
+                     ": readers would refuse the message made of this row (" + describe(*error) + ")");
 }
 
 // Moved to a time after 0, numbered, with rates; into `out`.
@@ -173,9 +173,9 @@ void write_messages(const ImportedRecording& recording, LogWriter& log) {
 
 ImportedRecording import_csv(const std::string& csv_path, const ColumnMap& map, const std::string& base_path) {
   if (base_path.empty() == map.base_time.has_value())
-    throw std::runtime_error(csv_path + (base_path.empty() ? ": the column map has [base], and no file for it is given"
-                                                           : ": a file for the base is given (" + base_path +
-                                                                 "), and the column map has no [base.time]"));
+    throw ParseError(csv_path + (base_path.empty() ? ": the column map has [base], and no file for it is given"
+                                                   : ": a file for the base is given (" + base_path +
+                                                         "), and the column map has no [base.time]"));
   const bool one_file = base_path.empty();
   const std::string& base_file = one_file ? csv_path : base_path;
   ImportedRecording out;

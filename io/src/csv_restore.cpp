@@ -4,8 +4,8 @@
 #include <filesystem>
 #include <limits>
 #include <map>
-#include <stdexcept>
 
+#include <bevel/error.hpp>
 #include <bevel/io/config.hpp>
 #include <bevel/io/csv_columns.hpp>
 #include <bevel/io/csv_export.hpp>
@@ -68,18 +68,18 @@ std::map<std::string, std::int64_t> read_sizes(const std::string& folder) {
 
 /// Checks that no file was cut, by a full disk or an interrupted copy for instance.
 /// @param sizes  found: rows of each table, bytes of config.toml
-/// @throws std::runtime_error with the file, both sizes and the remedy
+/// @throws ParseError with the file, both sizes and the remedy
 void require_all(const std::string& folder, const std::map<std::string, std::int64_t>& sizes) {
   for (const auto& [name, expected] : read_sizes(folder)) {
     const auto found = sizes.find(name);
     const std::int64_t count = found == sizes.end() ? 0 : found->second;
     const char* unit = name == exported::kConfig ? " bytes; " : " rows; ";
     if (count != expected)
-      throw std::runtime_error(folder + "/" + name + ": has " + std::to_string(count) + unit + exported::kRows +
-                               " lists " + std::to_string(expected) +
-                               ". The folder is incomplete: export or copy it again. If it was changed on purpose, "
-                               "remove " +
-                               exported::kRows);
+      throw ParseError(folder + "/" + name + ": has " + std::to_string(count) + unit + exported::kRows + " lists " +
+                       std::to_string(expected) +
+                       ". The folder is incomplete: export or copy it again. If it was changed on purpose, "
+                       "remove " +
+                       exported::kRows);
   }
 }
 
@@ -87,8 +87,8 @@ void require_all(const std::string& folder, const std::map<std::string, std::int
 void require_line_end(const std::string& path) {
   const std::string text = read_text_file(path);
   if (!text.empty() && text.back() != '\n' && text.back() != '\r')
-    throw std::runtime_error(path + ": its last line has no line end, so that the file may be cut; export or copy it " +
-                             "again, or add the line end if the file is complete");
+    throw ParseError(path + ": its last line has no line end, so that the file may be cut; export or copy it " +
+                     "again, or add the line end if the file is complete");
 }
 
 template <class Message, class Take>
@@ -101,7 +101,7 @@ void read_file(const std::string& folder, const char* name, std::map<std::string
     Message message{};
     visit_columns(message, FromRow(table));
     if (const auto error = check_fields(message))
-      throw std::runtime_error(table.place(table.line()) + "readers would refuse this row (" + describe(*error) + ")");
+      throw ParseError(table.place(table.line()) + "readers would refuse this row (" + describe(*error) + ")");
     take(message, table);
   }
 }
@@ -125,8 +125,8 @@ bool is_exported(const std::string& folder) {
 
 Recording import_exported(const std::string& folder) {
   if (!is_exported(folder))
-    throw std::runtime_error(folder + ": has none of the files of bevel-export, " + exported::kTips +
-                             " for instance; CSV files of one's own need a column map, --columns");
+    throw ParseError(folder + ": has none of the files of bevel-export, " + exported::kTips +
+                     " for instance; CSV files of one's own need a column map, --columns");
   Recording out;
   ArrivalsByNumber arrivals;
   std::map<std::string, std::int64_t> sizes;

@@ -4,8 +4,8 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
-#include <stdexcept>
 
+#include <bevel/error.hpp>
 #include <bevel/io/message_fields.hpp>
 #include "csv_stops.hpp"
 
@@ -194,7 +194,7 @@ class Clock {
       if (last_[i].line > 0 && row.utime <= last_[i].utime) {
         const std::string why = "but time does not grow; allowed: later than in line " + std::to_string(last_[i].line);
         if (!time.column.empty()) table.fail(time.column, why);
-        throw std::runtime_error(table.place(row.line) + why);
+        throw ParseError(table.place(row.line) + why);
       }
       last_[i] = {row.utime, row.line};
     }
@@ -268,7 +268,7 @@ CsvRows read_rows(CsvTable& table, const ColumnMap& map, const TimeColumn& time,
     clock.require_later(table, time, row);
     out.rows.push_back(std::move(row));
   }
-  if (out.rows.empty()) throw std::runtime_error(table.path() + ": no row with data by this column map");
+  if (out.rows.empty()) throw ParseError(table.path() + ": no row with data by this column map");
   if (map.stops) out.rows = stops_of(out.rows, map, out.unsettled);
   // Rows of the base may follow all rows of the tip: each grows, both together need not.
   std::ranges::stable_sort(out.rows, {}, &CsvRow::utime);

@@ -38,7 +38,7 @@ struct CsvParts {
   bool tip = true, base = true;  // which columns to look for
 };
 
-// Throws std::runtime_error naming the file, the line and the column that is missing, not a number, out of range, or
+// Throws ParseError naming the file, the line and the column that is missing, not a number, out of range, or
 // whose time does not grow.
 CsvRows read_rows(CsvTable& table, const ColumnMap& map, const TimeColumn& time, CsvParts parts);
 

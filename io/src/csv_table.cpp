@@ -3,8 +3,8 @@
 #include <algorithm>
 #include <charconv>
 #include <cmath>
-#include <stdexcept>
 
+#include <bevel/error.hpp>
 #include <bevel/io/config.hpp>
 #include <bevel/io/file_bytes.hpp>
 
@@ -19,7 +19,7 @@ constexpr std::size_t kTwice = std::string::npos;  // in place of a column's num
 
 CsvTable::CsvTable(const std::string& path) : path_(path), text_(read_text_file(path)), lines_("") {
   if (text_.starts_with("\xFF\xFE") || text_.starts_with("\xFE\xFF"))
-    throw std::runtime_error(path + ": is UTF-16; allowed: UTF-8, in a spreadsheet \"CSV UTF-8\"");
+    throw ParseError(path + ": is UTF-16; allowed: UTF-8, in a spreadsheet \"CSV UTF-8\"");
   lines_ = CsvLines(std::string_view(text_).substr(text_.starts_with(kByteOrderMark) ? kByteOrderMark.size() : 0));
   header_ = find_header(path, lines_);
   for (std::size_t i = 0; i < header_.names.size(); ++i)
@@ -32,12 +32,12 @@ bool CsvTable::next() {
   while (lines_.next(line)) {
     if (trimmed_cell(line).empty()) continue;
     auto cells = split_cells(line, header_.separator);
-    if (!cells) throw std::runtime_error(place(lines_.number()) + "a quote (\") is opened and not closed in this line");
+    if (!cells) throw ParseError(place(lines_.number()) + "a quote (\") is opened and not closed in this line");
     cells_ = std::move(*cells);
     if (cells_.size() != columns && is_comment(line)) continue;
     while (cells_.size() > columns && cells_.back().empty()) cells_.pop_back();
     if (cells_.size() != columns)
-      throw std::runtime_error(
+      throw ParseError(
           place(lines_.number()) + "has " + std::to_string(cells_.size()) + " cells, and the header (line " +
           std::to_string(header_.line) + ") names " + std::to_string(columns) +
           (columns == 1 ? "; if line " + std::to_string(header_.line) + " is a note, put a # before it"
@@ -55,15 +55,14 @@ const std::string& CsvTable::text(const std::string& column) const {
     for (std::size_t i = 0; i < std::min(header_.names.size(), kNamesShown); ++i)
       all += (i > 0 ? ", '" : "'") + header_.names[i] + "'";
     if (header_.names.size() > kNamesShown) all += ", ...";
-    throw std::runtime_error(path_ + ": no column '" + column + "'; the nearest is '" +
-                             nearest_name(column, header_.names) + "'; there are " + all +
-                             (header_.is_numbers
-                                  ? "; line " + std::to_string(header_.line) +
-                                        " holds numbers: put a line with the names of the columns before it"
-                                  : ""));
+    throw ParseError(path_ + ": no column '" + column + "'; the nearest is '" + nearest_name(column, header_.names) +
+                     "'; there are " + all +
+                     (header_.is_numbers ? "; line " + std::to_string(header_.line) +
+                                               " holds numbers: put a line with the names of the columns before it"
+                                         : ""));
   }
   if (found->second == kTwice)
-    throw std::runtime_error(path_ + ": column '" + column + "' is there twice; which one is meant?");
+    throw ParseError(path_ + ": column '" + column + "' is there twice; which one is meant?");
   return cells_[found->second];
 }
 
@@ -101,7 +100,7 @@ std::optional<std::int64_t> CsvTable::integer(const std::string& column) const {
 }
 
 void CsvTable::fail(const std::string& column, const std::string& why) const {
-  throw std::runtime_error(place(line()) + "column '" + column + "' is '" + text(column) + "', " + why);
+  throw ParseError(place(line()) + "column '" + column + "' is '" + text(column) + "', " + why);
 }
 
 std::string CsvTable::format() const {

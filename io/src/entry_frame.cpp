@@ -5,10 +5,10 @@
 #include <array>
 #include <cmath>
 #include <cstdio>
-#include <stdexcept>
 #include <string>
 #include <vector>
 
+#include <bevel/error.hpp>
 #include "outlier_limit.hpp"
 
 namespace bevel::io {
@@ -99,10 +99,9 @@ Eigen::Quaterniond start_of(const std::vector<Point>& points, Parameters& p) {
   const Eigen::Matrix3d fit = powers.colPivHouseholderQr().solve(positions);
   const Eigen::Vector3d along = fit.row(1).transpose();
   if (!(along.z() > 0))
-    throw std::runtime_error(
-        "the tip moves along (" + figure(along.x()) + ", " + figure(along.y()) + ", " + figure(along.z()) +
-        ") per mm of insertion by tip.axes, and the frame is from-straight-insertion. Allowed: a z "
-        "above 0. Change signs or order of tip.axes so that z leads into the tissue");
+    throw ParseError("the tip moves along (" + figure(along.x()) + ", " + figure(along.y()) + ", " + figure(along.z()) +
+                     ") per mm of insertion by tip.axes, and the frame is from-straight-insertion. Allowed: a z "
+                     "above 0. Change signs or order of tip.axes so that z leads into the tissue");
   const auto start = Eigen::Quaterniond::FromTwoVectors(Eigen::Vector3d::UnitZ(), along);
   const Eigen::Vector3d bend = start.conjugate() * fit.row(2).transpose();
   p << fit.row(0).transpose(), 0, 0, 2 * bend.head<2>() / along.squaredNorm(), along.norm();
@@ -150,11 +149,10 @@ EntryFrame fit_entry_frame(std::span<const model::ActuatorState> actuators,
   for (const Point& point : points) deepest_mm = std::max(deepest_mm, point.depth_mm);
   constexpr std::size_t kFewestTips = 6;  // 18 coordinates for 8 parameters
   if (points.size() < kFewestTips || deepest_mm < kShortestArc_mm)
-    throw std::runtime_error("frame is from-straight-insertion, and before the base turns by " +
-                             figure(kTurnedSinceEntry_rad) + " rad there are " + std::to_string(points.size()) +
-                             " tips to a depth of " + figure(deepest_mm) + " mm; needed are " +
-                             std::to_string(kFewestTips) + " and " + figure(kShortestArc_mm) +
-                             " mm. Give the frame as [tip.transform] instead");
+    throw ParseError("frame is from-straight-insertion, and before the base turns by " + figure(kTurnedSinceEntry_rad) +
+                     " rad there are " + std::to_string(points.size()) + " tips to a depth of " + figure(deepest_mm) +
+                     " mm; needed are " + std::to_string(kFewestTips) + " and " + figure(kShortestArc_mm) +
+                     " mm. Give the frame as [tip.transform] instead");
   Parameters p;
   Eigen::Quaterniond start = start_of(points, p);
   Eigen::VectorXd residual = fit_arc(points, start, p);
@@ -188,9 +186,9 @@ EntryFrame fit_entry_frame(std::span<const model::ActuatorState> actuators,
     squares_mm2 += std::pow(residual[i] * points[static_cast<std::size_t>(i / 3)].sigma_mm[i % 3], 2);
   frame.rms_mm = std::sqrt(squares_mm2 / static_cast<double>(residual.size()));
   if (!(frame.direction_sd_rad < kLargestDirectionSd_rad))
-    throw std::runtime_error("frame is from-straight-insertion, and the entry direction has a standard error of " +
-                             figure(frame.direction_sd_rad) + " rad; allowed " + figure(kLargestDirectionSd_rad) +
-                             " rad. Give the frame as [tip.transform] instead");
+    throw ParseError("frame is from-straight-insertion, and the entry direction has a standard error of " +
+                     figure(frame.direction_sd_rad) + " rad; allowed " + figure(kLargestDirectionSd_rad) +
+                     " rad. Give the frame as [tip.transform] instead");
   return frame;
 }
 

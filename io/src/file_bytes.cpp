@@ -4,15 +4,15 @@
 #include <sys/stat.h>
 #include <unistd.h>
 
+#include <bevel/error.hpp>
 #include <cerrno>
 #include <cstring>
-#include <stdexcept>
 
 namespace bevel::io {
 namespace {
 
 [[noreturn]] void fail(const std::string& path, const std::string& reason) {
-  throw std::runtime_error(path + ": cannot be read: " + reason);
+  throw IoError(path + ": cannot be read: " + reason);
 }
 
 const char* kind_of(mode_t mode) {
@@ -82,7 +82,7 @@ FileBytes::FileBytes(const std::string& path, std::uint64_t largest_bytes) {
 
 std::string read_text_file(const std::string& path) {
   const FileBytes file(path, kLargestText_bytes);
-  if (!file.change().empty()) throw std::runtime_error(path + ": " + file.change() + "; try again");
+  if (!file.change().empty()) throw IoError(path + ": " + file.change() + "; try again");
   return {file.bytes().begin(), file.bytes().end()};
 }
 

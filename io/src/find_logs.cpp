@@ -2,12 +2,12 @@
 
 #include <algorithm>
 #include <array>
+#include <bevel/error.hpp>
 #include <cctype>
 #include <filesystem>
 #include <fstream>
 #include <map>
 #include <set>
-#include <stdexcept>
 
 namespace bevel::io {
 
@@ -19,8 +19,8 @@ namespace {
 void require_name(const std::string& log) {
   const std::string stem = fs::path(log).stem().string();
   if (stem.find_first_not_of('.') == std::string::npos)
-    throw std::runtime_error(log + ": its name without the extension is '" + stem +
-                             "'; allowed: a name with a character that is no dot. Rename the file");
+    throw IoError(log + ": its name without the extension is '" + stem +
+                  "'; allowed: a name with a character that is no dot. Rename the file");
 }
 
 bool is_number(std::string_view text) {
@@ -94,13 +94,12 @@ std::vector<std::string> find_logs(const std::vector<std::string>& paths) {
   std::vector<std::string> logs;
   std::set<fs::path> known;
   const auto add = [&](const std::string& log) {
-    if (!known.insert(fs::weakly_canonical(log)).second)
-      throw std::runtime_error(log + ": given twice; give each log once");
+    if (!known.insert(fs::weakly_canonical(log)).second) throw IoError(log + ": given twice; give each log once");
     logs.push_back(log);
   };
   for (const std::string& path : paths) {
     if (!fs::is_directory(path)) {
-      if (!fs::exists(path)) throw std::runtime_error(path + ": no such log");
+      if (!fs::exists(path)) throw IoError(path + ": no such log");
       add(path);
       continue;
     }
@@ -108,8 +107,8 @@ std::vector<std::string> find_logs(const std::vector<std::string>& paths) {
     for (const auto& entry : fs::directory_iterator(path))
       if (is_log(entry)) inside.push_back(entry.path().string());
     if (inside.empty())
-      throw std::runtime_error(path + ": holds no log; expected are files named *.lcm, or as lcm-logger names them " +
-                               "(lcmlog-2026-03-02.00, *.lcm.00)");
+      throw IoError(path + ": holds no log; expected are files named *.lcm, or as lcm-logger names them " +
+                    "(lcmlog-2026-03-02.00, *.lcm.00)");
     std::ranges::sort(inside, is_before);
     std::ranges::for_each(inside, add);
   }

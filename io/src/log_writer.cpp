@@ -1,10 +1,10 @@
 #include <bevel/io/log_writer.hpp>
 
 #include <array>
+#include <bevel/error.hpp>
 #include <cerrno>
 #include <cstring>
 #include <filesystem>
-#include <stdexcept>
 
 namespace bevel::io {
 namespace {
@@ -19,12 +19,12 @@ void put_big_endian(std::uint8_t* at, Integer value) {
 }  // namespace
 
 LogWriter::LogWriter(const std::string& path) : path_(path), file_(std::fopen(path.c_str(), "wbe")) {
-  if (!file_) throw std::runtime_error(path + ": cannot be written: " + std::strerror(errno));
+  if (!file_) throw IoError(path + ": cannot be written: " + std::strerror(errno));
 }
 
 void LogWriter::write(std::int64_t timestamp_us, std::string_view channel, std::span<const std::uint8_t> data) {
   if (channel.empty() || channel.size() > 63) {
-    throw std::runtime_error("channel \"" + std::string(channel) + "\": 1 to 63 characters are allowed");
+    throw IoError("channel \"" + std::string(channel) + "\": 1 to 63 characters are allowed");
   }
   std::array<std::uint8_t, 28> header{};
   put_big_endian(header.data(), std::uint32_t{0xEDA1DA01});
@@ -34,7 +34,7 @@ void LogWriter::write(std::int64_t timestamp_us, std::string_view channel, std::
   put_big_endian(header.data() + 24, static_cast<std::int32_t>(data.size()));
   const auto put = [this](const void* bytes, std::size_t size) {
     if (size > 0 && std::fwrite(bytes, 1, size, file_.get()) != size) {
-      throw std::runtime_error(path_ + ": cannot be written: " + std::strerror(errno));
+      throw IoError(path_ + ": cannot be written: " + std::strerror(errno));
     }
   };
   put(header.data(), header.size());
@@ -49,8 +49,7 @@ void LogWriter::write_text(std::int64_t timestamp_us, std::string_view channel, 
 
 void LogWriter::close() {
   if (!file_) return;
-  if (std::fclose(file_.release()) != 0)
-    throw std::runtime_error(path_ + ": cannot be written: " + std::strerror(errno));
+  if (std::fclose(file_.release()) != 0) throw IoError(path_ + ": cannot be written: " + std::strerror(errno));
 }
 
 void write_whole_log(const std::string& path, const std::function<void(LogWriter&)>& fill) {

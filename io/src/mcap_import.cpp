@@ -5,8 +5,8 @@
 #include <nlohmann/json.hpp>
 #include <set>
 #include <sstream>
-#include <stdexcept>
 
+#include <bevel/error.hpp>
 #include <bevel/io/json_message.hpp>
 #include <bevel/io/log_order.hpp>
 #include <bevel/io/mcap_export.hpp>
@@ -195,8 +195,7 @@ struct Channels {
  private:
   static void require_json(const mcap::Message& one) {
     if (one.encoding != "json")
-      throw std::runtime_error(std::string(one.topic) + " is '" + std::string(one.encoding.substr(0, 16)) +
-                               "'; allowed: json");
+      throw ParseError(std::string(one.topic) + " is '" + std::string(one.encoding.substr(0, 16)) + "'; allowed: json");
   }
 };
 
@@ -224,16 +223,15 @@ ImportedMcap import_mcap(std::string_view file) {
                                                         out.recording.config = one.data;
                                                     }});
   for (const mcap::Damage::Place& place : damage.places)
-    if (place.fault == mcap::Fault::magic || place.fault == mcap::Fault::compression)
-      throw std::runtime_error(place.what);
+    if (place.fault == mcap::Fault::magic || place.fault == mcap::Fault::compression) throw ParseError(place.what);
   out.recording.bytes = static_cast<std::int64_t>(file.size());
   channels.give(out.recording);
   out.faults = damage.describe() + unusable.describe();
   out.notes = channels.notes();
   const Recording& r = out.recording;
   if (r.arrivals.empty() && r.commands.empty() && r.estimates.empty() && r.truths.empty())
-    throw std::runtime_error("no message that can be used, of " + std::to_string(r.events) + " on any channel" +
-                             (out.faults.empty() ? "" : "; " + out.faults.substr(0, out.faults.find('\n'))));
+    throw ParseError("no message that can be used, of " + std::to_string(r.events) + " on any channel" +
+                     (out.faults.empty() ? "" : "; " + out.faults.substr(0, out.faults.find('\n'))));
   return out;
 }
 
@@ -244,8 +242,8 @@ ImportedMcap import_mcap_file(const std::string& path) {
     ImportedMcap out = import_mcap({reinterpret_cast<const char*>(bytes.data()), bytes.size()});
     if (!file.change().empty()) out.faults += file.change() + "\n";
     return out;
-  } catch (const std::runtime_error& e) {
-    throw std::runtime_error(path + ": " + e.what());
+  } catch (const Error& e) {
+    throw ParseError(path + ": " + e.what());
   }
 }
 

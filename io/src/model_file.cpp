@@ -5,6 +5,7 @@
 #include <filesystem>
 #include <limits>
 
+#include <bevel/error.hpp>
 #include <bevel/io/result_file.hpp>
 #include "toml_text.hpp"
 
@@ -132,7 +133,7 @@ std::vector<model::ActiveEffect> active_effects(const std::vector<EffectEntry>& 
   std::vector<model::ActiveEffect> active;
   for (const auto& entry : effects) {
     model::ActiveEffect one{.effect = model::find_effect(entry.name), .parameters = {}};
-    if (one.effect == nullptr) throw std::invalid_argument("there is no effect \"" + entry.name + "\"");
+    if (one.effect == nullptr) throw ArgumentError("there is no effect \"" + entry.name + "\"");
     std::map<std::string, double> values;
     if (const auto own = find_recording(entry.recordings, recording); own != entry.recordings.end())
       values = own->second;
@@ -142,10 +143,9 @@ std::vector<model::ActiveEffect> active_effects(const std::vector<EffectEntry>& 
       const double otherwise = model::value_if_unsaid(parameter);
       one.parameters[i++] = given.empty() ? otherwise : given.mapped();
       if (given.empty() && std::isnan(otherwise))
-        throw std::invalid_argument(entry.name + "." + std::string(parameter.name) + " is missing and is required");
+        throw ArgumentError(entry.name + "." + std::string(parameter.name) + " is missing and is required");
     }
-    if (!values.empty())
-      throw std::invalid_argument(entry.name + " has no parameter \"" + values.begin()->first + "\"");
+    if (!values.empty()) throw ArgumentError(entry.name + " has no parameter \"" + values.begin()->first + "\"");
     active.push_back(one);
   }
   return active;

@@ -4,8 +4,8 @@
 #include <limits>
 #include <set>
 #include <sstream>
-#include <stdexcept>
 
+#include <bevel/error.hpp>
 #include <bevel/io/file_bytes.hpp>
 #include <bevel/io/messages.hpp>
 
@@ -260,7 +260,7 @@ Recording read_recording(const std::string& path) {
 
 void require_usable(const std::string& name, const Recording& recording) {
   const std::string refusal = recording.refusal();
-  if (!refusal.empty()) throw std::runtime_error(name + ": " + refusal);
+  if (!refusal.empty()) throw ParseError(name + ": " + refusal);
 }
 
 }  // namespace bevel::io

@@ -1,5 +1,6 @@
 #include <bevel/io/recording_clock.hpp>
 
+#include <bevel/error.hpp>
 #include <bevel/io/config.hpp>
 
 namespace bevel::io {

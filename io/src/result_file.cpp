@@ -4,10 +4,10 @@
 #include <sys/stat.h>
 #include <unistd.h>
 
+#include <bevel/error.hpp>
 #include <cerrno>
 #include <cstring>
 #include <filesystem>
-#include <stdexcept>
 #include <utility>
 
 namespace bevel::io {
@@ -16,7 +16,7 @@ namespace {
 namespace fs = std::filesystem;
 
 [[noreturn]] void fail(const std::string& path, const std::string& what, int error) {
-  throw std::runtime_error(path + ": " + what + ": " + std::strerror(error));
+  throw IoError(path + ": " + what + ": " + std::strerror(error));
 }
 
 /// Returns 0, or the error number.
@@ -50,7 +50,7 @@ mode_t mode_for(const std::string& path) {
 }
 
 /// A device or FIFO, /dev/stdout included: written to directly, since a rename would replace it.
-/// @throws std::runtime_error for a directory
+/// @throws IoError for a directory
 bool is_device(const std::string& path) {
   if (path.starts_with("/dev/") || path.starts_with("/proc/")) return true;
   struct stat status {};

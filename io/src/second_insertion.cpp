@@ -2,8 +2,8 @@
 
 #include <algorithm>
 #include <array>
+#include <bevel/error.hpp>
 #include <cstdio>
-#include <stdexcept>
 #include <vector>
 
 namespace bevel::io {
@@ -37,7 +37,7 @@ void require_one_insertion(const std::string& name, std::span<const model::Actua
       "ACTUATOR_STATE, and is inserted again by more than %g mm. Allowed: one insertion in each log. Cut it with "
       "lcm-logfilter -c '.*' and -e %.3f or -s %.3f, which count from the log's first message",
       at_s, kInserted_mm, at_s, at_s);
-  throw std::runtime_error(name + text.data());
+  throw ParseError(name + text.data());
 }
 
 }  // namespace bevel::io

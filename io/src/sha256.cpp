@@ -3,9 +3,9 @@
 #include <openssl/evp.h>
 
 #include <array>
+#include <bevel/error.hpp>
 #include <fstream>
 #include <iterator>
-#include <stdexcept>
 
 namespace bevel::io {
 
@@ -23,13 +23,13 @@ std::string sha256_hex(std::string_view bytes) {
   std::array<unsigned char, EVP_MAX_MD_SIZE> digest{};
   unsigned int size = 0;
   if (EVP_Digest(bytes.data(), bytes.size(), digest.data(), &size, EVP_sha256(), nullptr) != 1)
-    throw std::runtime_error("SHA-256 is not available from OpenSSL");
+    throw ParseError("SHA-256 is not available from OpenSSL");
   return hex(std::span(digest).first(size));
 }
 
 std::string sha256_of_file(const std::string& path) {
   std::ifstream file(path, std::ios::binary);
-  if (!file) throw std::runtime_error(path + ": cannot be read");
+  if (!file) throw ParseError(path + ": cannot be read");
   const std::string bytes{std::istreambuf_iterator<char>(file), {}};
   return sha256_hex(bytes);
 }

@@ -2,9 +2,9 @@
 
 #include <algorithm>
 #include <cmath>
-#include <stdexcept>
 
 #include <bevel/drivers/camera/calibrated_view.hpp>
+#include <bevel/error.hpp>
 #include <bevel/io/camera_picture.hpp>
 
 namespace bevel::nodes {
@@ -43,7 +43,7 @@ tip_heading_t to_heading(const camera::TipObservation& seen, std::int64_t seq) {
 
 CameraNode::CameraNode(lcm::LCM& lcm, const SystemConfig& config, double pictures_hz)
     : port_(lcm), status_(port_, camera_process_name(config), 0) {
-  if (config.cameras.empty()) throw std::invalid_argument("no [[camera]] in the configuration: at least one is needed");
+  if (config.cameras.empty()) throw ArgumentError("no [[camera]] in the configuration: at least one is needed");
   // Stamps of files are their own, and those of recorded frames are right already.
   const bool live =
       config.source.kind == camera::SourceKind::device || config.source.kind == camera::SourceKind::stream;

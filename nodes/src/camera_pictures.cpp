@@ -1,10 +1,10 @@
 #include <bevel/nodes/camera_pictures.hpp>
 
 #include <algorithm>
+#include <bevel/error.hpp>
 #include <cmath>
 #include <opencv2/imgcodecs.hpp>
 #include <opencv2/imgproc.hpp>
-#include <stdexcept>
 #include <string>
 
 namespace bevel::nodes {
@@ -46,8 +46,8 @@ camera_picture_t make_picture(const camera::Frame& frame, const camera::TipObser
 
 PictureClock::PictureClock(double rate_hz) {
   if (!(rate_hz > 0 && rate_hz <= kMostPictures_hz))
-    throw std::invalid_argument("pictures a second: " + std::to_string(rate_hz) + ", allowed: above 0, at most " +
-                                std::to_string(static_cast<int>(kMostPictures_hz)));
+    throw ArgumentError("pictures a second: " + std::to_string(rate_hz) + ", allowed: above 0, at most " +
+                        std::to_string(static_cast<int>(kMostPictures_hz)));
   period_ns_ = std::llround(1e9 / rate_hz);
 }
 

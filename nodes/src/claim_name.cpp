@@ -6,8 +6,8 @@
 #include <algorithm>
 #include <cerrno>
 #include <cstring>
-#include <stdexcept>
 
+#include <bevel/error.hpp>
 #include <bevel/nodes/lcm_port.hpp>
 #include <bevel/nodes/runtime.hpp>
 
@@ -19,7 +19,7 @@ constexpr double kListen_s = 0.6;  // longer than a process is silent on PROCESS
 void claim_on_this_machine(const std::string& lcm_url, const std::string& name) {
   // An abstract socket lives in the network namespace and goes with the process, even after kill -9.
   const int fd = socket(AF_UNIX, SOCK_STREAM | SOCK_CLOEXEC, 0);
-  if (fd < 0) throw std::runtime_error(std::string("cannot make a socket: ") + std::strerror(errno));
+  if (fd < 0) throw IoError(std::string("cannot make a socket: ") + std::strerror(errno));
   sockaddr_un address{};
   address.sun_family = AF_UNIX;
   std::string path = "bevel/" + name + (lcm_url.empty() ? "" : "/" + lcm_url);
@@ -27,7 +27,7 @@ void claim_on_this_machine(const std::string& lcm_url, const std::string& name) 
   std::memcpy(address.sun_path + 1, path.data(), path.size());
   const auto size = static_cast<socklen_t>(offsetof(sockaddr_un, sun_path) + 1 + path.size());
   if (bind(fd, reinterpret_cast<const sockaddr*>(&address), size) != 0)
-    throw std::runtime_error("another " + name + " is running here; two would fight over the needle");
+    throw IoError("another " + name + " is running here; two would fight over the needle");
   // Not closed: held for the life of the process.
 }
 
@@ -39,7 +39,7 @@ void claim_on_the_network(lcm::LCM& lcm, const std::string& name) {
                                      [&](const process_status_t& m) { heard = heard || m.process == name; });
     run_to_end(lcm, {0.02, {}, [&](const Now&, double) { return !heard && !stop_requested(); }}, kListen_s);
   }
-  if (heard) throw std::runtime_error("another " + name + " is heard on this network; two would fight over the needle");
+  if (heard) throw IoError("another " + name + " is heard on this network; two would fight over the needle");
 }
 
 void refuse_second_operator(lcm::LCM& lcm) {
@@ -51,7 +51,7 @@ void refuse_second_operator(lcm::LCM& lcm) {
     run_to_end(lcm, {0.02, {}, [&](const Now&, double) { return !heard && !stop_requested(); }}, kListen_s);
   }
   if (heard)
-    throw std::runtime_error(
+    throw IoError(
         "another operator program sends OPERATOR_HEARTBEAT on this network; end it first: one program operates the "
         "needle");
 }

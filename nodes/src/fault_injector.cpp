@@ -4,9 +4,9 @@
 #include <algorithm>
 #include <array>
 #include <charconv>
-#include <stdexcept>
 #include <utility>
 
+#include <bevel/error.hpp>
 #include <bevel/io/checked_decode.hpp>
 #include <bevel/io/messages.hpp>
 
@@ -53,7 +53,7 @@ void parse_name(const Table& table, const std::string& text, const char* what, E
     }
     allowed += (allowed.empty() ? "" : ", ") + std::string(name);
   }
-  throw std::invalid_argument("fault: no " + std::string(what) + " '" + text + "'; allowed: " + allowed);
+  throw ArgumentError("fault: no " + std::string(what) + " '" + text + "'; allowed: " + allowed);
 }
 
 // Something false that no check of a single message can see.
@@ -121,7 +121,7 @@ std::vector<std::string> channels_of(Component component) {
 Fault parse_fault(const std::string& text) {
   const std::size_t colon = text.find(':'), at = text.find('@');
   if (colon == std::string::npos || at == std::string::npos || at < colon || !text.ends_with('s'))
-    throw std::invalid_argument("fault: '" + text + "' is not COMPONENT:KIND@SECONDSs, as in camera:off@5s");
+    throw ArgumentError("fault: '" + text + "' is not COMPONENT:KIND@SECONDSs, as in camera:off@5s");
   Fault fault;
   parse_name(kComponentNames, text.substr(0, colon), "component", fault.component);
   parse_name(kKindNames, text.substr(colon + 1, at - colon - 1), "kind", fault.kind);
@@ -129,7 +129,7 @@ Fault parse_fault(const std::string& text) {
   const char* end = text.data() + text.size() - 1;
   const auto [stop, error] = std::from_chars(begin, end, fault.at_s);
   if (error != std::errc{} || stop != end || !(fault.at_s >= 0 && fault.at_s <= 3600))
-    throw std::invalid_argument("fault: time '" + std::string(begin, end) + "'; allowed: 0 to 3600 seconds");
+    throw ArgumentError("fault: time '" + std::string(begin, end) + "'; allowed: 0 to 3600 seconds");
   return fault;
 }
 
@@ -163,7 +163,7 @@ const FaultInjector::Due* FaultInjector::newest_of(std::size_t channel) const {
 void FaultInjector::pass(std::string_view name, const Bytes& bytes, std::int64_t now_ns, std::int64_t now_utime) {
   const auto channel = static_cast<std::size_t>(std::ranges::find(channels_, name) - channels_.begin());
   if (channel == channels_.size())
-    throw std::invalid_argument("fault injector: channel '" + std::string(name) + "'; allowed: of its component alone");
+    throw ArgumentError("fault injector: channel '" + std::string(name) + "'; allowed: of its component alone");
   if (now_ns < start_ns_) {
     past_.push_back({now_ns, channel, bytes});
     while (past_.front().at_ns < now_ns - kRemembered_ns) past_.pop_front();

@@ -5,11 +5,11 @@
 #include <chrono>
 #include <cstring>
 #include <ctime>
-#include <stdexcept>
 #include <thread>
 #include <utility>
 
 #include <bevel/drivers/can/open_bus.hpp>
+#include <bevel/error.hpp>
 #include <bevel/nodes/open_lcm.hpp>
 #include <bevel/nodes/runtime.hpp>
 
@@ -65,7 +65,7 @@ Findings check_bus(const stepper::StepperConfig& config, const std::string& addr
   std::unique_ptr<can::Bus> bus;
   try {
     bus = can::open_bus(address);
-  } catch (const std::runtime_error& e) {
+  } catch (const Error& e) {
     return {{"bus " + address, Verdict::failed, e.what(), "a CAN interface, or unix:/path of the rig's local bus",
              "sudo modprobe can_raw; ip link show type can; system.can of " + system_file}};
   }

@@ -1,10 +1,10 @@
 #include <bevel/nodes/open_lcm.hpp>
 
 #include <algorithm>
+#include <bevel/error.hpp>
 #include <cstdio>
 #include <cstdlib>
 #include <sstream>
-#include <stdexcept>
 
 namespace bevel::nodes {
 
@@ -42,10 +42,9 @@ void warn_of_lcm_url(const std::string& url) {
 std::unique_ptr<lcm::LCM> open_lcm(const std::string& url) {
   warn_of_lcm_url(url);
   auto lcm = std::make_unique<lcm::LCM>(url);
-  if (!lcm->good())
-    throw std::runtime_error("LCM does not start; is multicast routed, and the provider right? (docs/running.md)");
+  if (!lcm->good()) throw IoError("LCM does not start; is multicast routed, and the provider right? (docs/running.md)");
   if (lcm->getFileno() < 0)
-    throw std::runtime_error(
+    throw IoError(
         "LCM cannot receive, see its message above; check the multicast route (docs/running.md) and the limits of open "
         "files and processes (ulimit -n, ulimit -u)");
   return lcm;

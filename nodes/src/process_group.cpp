@@ -5,9 +5,9 @@
 #include <sys/wait.h>
 #include <unistd.h>
 
+#include <bevel/error.hpp>
 #include <csignal>
 #include <cstring>
-#include <stdexcept>
 
 extern char** environ;
 
@@ -37,7 +37,7 @@ void ProcessGroup::start(const std::string& name, const std::vector<std::string>
   const int error = posix_spawn(&pid, argv[0], &files, &attributes, argv.data(), environ);
   posix_spawnattr_destroy(&attributes);
   posix_spawn_file_actions_destroy(&files);
-  if (error != 0) throw std::runtime_error("cannot start " + command[0] + ": " + std::strerror(error));
+  if (error != 0) throw IoError("cannot start " + command[0] + ": " + std::strerror(error));
   children_.push_back({name, pid});
 }
 

@@ -4,9 +4,9 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
-#include <stdexcept>
 
 #include <bevel/drivers/camera/calibrated_view.hpp>
+#include <bevel/error.hpp>
 #include <bevel/model/lie.hpp>
 #include <bevel/nodes/needle_pose.hpp>
 
@@ -80,8 +80,8 @@ RigNode::RigNode(lcm::LCM& lcm, can::Bus& insertion_bus, can::Bus& rotation_bus,
 
 void RigNode::break_drive(const Fault& fault, std::int64_t start_ns, std::uint64_t seed) {
   if (fault.component != Component::insertion_drive && fault.component != Component::rotation_drive)
-    throw std::invalid_argument(std::string("fault: the rig has no ") + name_of(fault.component) +
-                                "; allowed: insertion_drive, rotation_drive");
+    throw ArgumentError(std::string("fault: the rig has no ") + name_of(fault.component) +
+                        "; allowed: insertion_drive, rotation_drive");
   const std::size_t axis = fault.component == Component::insertion_drive ? 0 : 1;
   const std::int64_t from_ns = start_ns + std::llround(fault.at_s * 1e9);
   if (fault.kind == FaultKind::stuck) {

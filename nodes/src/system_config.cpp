@@ -8,6 +8,7 @@
 
 #include <bevel/drivers/camera/calibrated_view.hpp>
 #include <bevel/drivers/camera/calibration/calibration_file.hpp>
+#include <bevel/error.hpp>
 #include <bevel/io/config.hpp>
 #include <bevel/io/estimator_config.hpp>
 

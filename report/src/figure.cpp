@@ -2,8 +2,8 @@
 
 #include <algorithm>
 #include <cmath>
-#include <stdexcept>
 
+#include <bevel/error.hpp>
 #include <bevel/report/thinned.hpp>
 
 namespace bevel::report {
@@ -89,15 +89,15 @@ void check(const Figure& figure) {
     const bool two_ends = s.kind == Series::Kind::band || s.kind == Series::Kind::bars;
     const std::string who =
         "figure \"" + figure.title + "\", series \"" + s.label + "\": " + std::to_string(s.x.size());
-    if (s.x.size() != s.y.size()) throw std::invalid_argument(who + " x for " + std::to_string(s.y.size()) + " y");
+    if (s.x.size() != s.y.size()) throw ArgumentError(who + " x for " + std::to_string(s.y.size()) + " y");
     if (s.y_high.size() != (two_ends ? s.x.size() : 0))
-      throw std::invalid_argument(who + " x for " + std::to_string(s.y_high.size()) + " upper ends");
+      throw ArgumentError(who + " x for " + std::to_string(s.y_high.size()) + " upper ends");
     if (!s.key.empty() && s.key.size() != s.x.size())
-      throw std::invalid_argument(who + " x for " + std::to_string(s.key.size()) + " keys");
+      throw ArgumentError(who + " x for " + std::to_string(s.key.size()) + " keys");
     for (std::size_t i = 0; i < s.x.size(); ++i)
       something = something || (std::isfinite(s.x[i]) && std::isfinite(s.y[i]));
   }
-  if (!something) throw std::invalid_argument("figure \"" + figure.title + "\": nothing finite to show");
+  if (!something) throw ArgumentError("figure \"" + figure.title + "\": nothing finite to show");
 }
 
 Figure thinned(Figure figure, std::size_t most) {
@@ -139,12 +139,12 @@ void check(const Space& space) {
   bool something = false;
   for (const SpacePath& p : space.paths) {
     if (!p.key.empty() && p.key.size() != p.points_mm.size())
-      throw std::invalid_argument("path \"" + p.label + "\": " + std::to_string(p.points_mm.size()) + " points for " +
-                                  std::to_string(p.key.size()) + " keys");
+      throw ArgumentError("path \"" + p.label + "\": " + std::to_string(p.points_mm.size()) + " points for " +
+                          std::to_string(p.key.size()) + " keys");
     for (const auto& at : p.points_mm)
       something = something || (std::isfinite(at[0]) && std::isfinite(at[1]) && std::isfinite(at[2]));
   }
-  if (!something) throw std::invalid_argument("paths in space: nothing finite to show");
+  if (!something) throw ArgumentError("paths in space: nothing finite to show");
 }
 
 Space thinned(Space space, std::size_t most) {

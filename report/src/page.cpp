@@ -3,8 +3,8 @@
 #include <algorithm>
 #include <cstdlib>
 #include <cstring>
-#include <stdexcept>
 
+#include <bevel/error.hpp>
 #include <bevel/io/result_file.hpp>
 #include <bevel/io/sha256.hpp>
 #include <bevel/report/assets.hpp>
@@ -118,8 +118,8 @@ Page& Page::table(const std::vector<std::string>& header, const std::vector<std:
   std::vector<bool> numeric(header.size(), !rows.empty());
   for (const auto& row : rows) {
     if (row.size() != header.size()) {
-      throw std::invalid_argument("table \"" + std::string(caption) + "\": a row of " + std::to_string(row.size()) +
-                                  " cells under a header of " + std::to_string(header.size()));
+      throw ArgumentError("table \"" + std::string(caption) + "\": a row of " + std::to_string(row.size()) +
+                          " cells under a header of " + std::to_string(header.size()));
     }
     for (std::size_t i = 0; i < row.size(); ++i) numeric[i] = numeric[i] && is_number(row[i]);
   }

@@ -5,6 +5,7 @@
 #include <gtest/gtest.h>
 
 #include <Eigen/Geometry>
+#include <bevel/error.hpp>
 #include <cmath>
 #include <limits>
 #include <numbers>
@@ -248,18 +249,18 @@ TEST(BeamPlant, BadInputIsNamedAndChangesNothing) {
     return config;
   };
   EXPECT_THAT([&] { BeamPlant(with(&BeamPlantConfig::relaxing_fraction, 1.0)); },
-              ThrowsMessage<std::invalid_argument>(HasSubstr("relaxing_fraction = 1, allowed: 0 to below 1")));
+              ThrowsMessage<bevel::ArgumentError>(HasSubstr("relaxing_fraction = 1, allowed: 0 to below 1")));
   EXPECT_THAT([&] { BeamPlant(with(&BeamPlantConfig::element_length_mm, 0.0)); },
-              ThrowsMessage<std::invalid_argument>(HasSubstr("element_length_mm")));
+              ThrowsMessage<bevel::ArgumentError>(HasSubstr("element_length_mm")));
   EXPECT_THAT([&] { BeamPlant(with(&BeamPlantConfig::bevel_force_N, -0.5)); },
-              ThrowsMessage<std::invalid_argument>(HasSubstr("bevel_force_N")));
+              ThrowsMessage<bevel::ArgumentError>(HasSubstr("bevel_force_N")));
   auto plant = inserted({}, 50.0);
   const Eigen::Vector3d before = plant.tip_position_mm();
-  EXPECT_THROW(plant.advance(std::numeric_limits<double>::quiet_NaN(), 0.0, 0.1), std::invalid_argument);
-  EXPECT_THROW(plant.advance(1.0, std::numeric_limits<double>::infinity(), 0.1), std::invalid_argument);
-  EXPECT_THROW(plant.advance(1.0, 0.0, -0.1), std::invalid_argument);
+  EXPECT_THROW(plant.advance(std::numeric_limits<double>::quiet_NaN(), 0.0, 0.1), bevel::ArgumentError);
+  EXPECT_THROW(plant.advance(1.0, std::numeric_limits<double>::infinity(), 0.1), bevel::ArgumentError);
+  EXPECT_THROW(plant.advance(1.0, 0.0, -0.1), bevel::ArgumentError);
   EXPECT_THAT([&] { plant.advance(151.0, 0.0, 0.1); },
-              ThrowsMessage<std::out_of_range>(HasSubstr("max_depth_mm = 200")));
+              ThrowsMessage<bevel::DomainError>(HasSubstr("max_depth_mm = 200")));
   EXPECT_EQ(plant.tip_position_mm(), before);
   EXPECT_EQ(plant.fed_mm(), 50.0);
 }

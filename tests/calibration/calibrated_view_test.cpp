@@ -4,12 +4,12 @@
 #include <Eigen/Eigenvalues>
 #include <cstdio>
 #include <random>
-#include <stdexcept>
 
 #include <bevel/drivers/camera/calibrated_view.hpp>
 #include <bevel/drivers/camera/calibration/calibration_file.hpp>
 #include <bevel/drivers/camera/pipeline.hpp>
 #include <bevel/drivers/camera/planar_view.hpp>
+#include <bevel/error.hpp>
 #include <bevel/estimator/needle_filter.hpp>
 #include "tests/calibration/true_optics.hpp"
 
@@ -207,7 +207,7 @@ TEST(CalibratedView, ACameraThatLooksAlongTheNeedleIsRefused) {
   try {
     const CalibratedView view(model);
     ADD_FAILURE() << "accepted";
-  } catch (const std::invalid_argument& error) {
+  } catch (const ArgumentError& error) {
     EXPECT_NE(std::string(error.what()).find("allowed: 20"), std::string::npos) << error.what();
   }
 }

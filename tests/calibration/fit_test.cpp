@@ -4,6 +4,7 @@
 #include <cstdio>
 #include <functional>
 
+#include <bevel/error.hpp>
 #include "tests/calibration/true_optics.hpp"
 
 namespace bevel::camera {
@@ -218,7 +219,7 @@ TEST(Fit, CopiesOfOneViewAreRefused) {
     try {
       const auto got = calibrate(board(), test::input_of({camera}, copies_of(camera, 16, noise_px, shake_mm)));
       ADD_FAILURE() << "accepted with fx " << got.calibration.cameras[0].model.lens.parameters[kFx];
-    } catch (const std::invalid_argument& error) {
+    } catch (const ArgumentError& error) {
       EXPECT_NE(std::string(error.what()).find("pictures in air with a board are 1, allowed: 6"), std::string::npos)
           << error.what();
       EXPECT_NE(std::string(error.what()).find("15 more repeat the view of another picture"), std::string::npos)

@@ -7,6 +7,7 @@
 
 #include <bevel/drivers/camera/calibrated_view.hpp>
 #include <bevel/drivers/camera/calibration/frame_fit.hpp>
+#include <bevel/error.hpp>
 #include "tests/calibration/true_optics.hpp"
 
 namespace bevel::camera {
@@ -169,7 +170,7 @@ TEST(Frame, AnInsertionThatSlipsOrIsSeenByOneEyeIsRefused) {
     try {
       set_frame_by_insertion(bad.tips(calibration), 0.0, calibration);
       ADD_FAILURE() << bad.message << ": was accepted";
-    } catch (const std::invalid_argument& error) {
+    } catch (const ArgumentError& error) {
       EXPECT_NE(std::string(error.what()).find(bad.message), std::string::npos) << error.what();
       EXPECT_NE(std::string(error.what()).find("allowed"), std::string::npos) << error.what();
       EXPECT_EQ(calibration.frame, FrameKind::none) << "and nothing was changed";
@@ -178,8 +179,8 @@ TEST(Frame, AnInsertionThatSlipsOrIsSeenByOneEyeIsRefused) {
 }
 
 TEST(Frame, AxesOfTheFiducialAreChecked) {
-  EXPECT_THROW(rotation_of_axes("+z", "-z"), std::invalid_argument);
-  EXPECT_THROW(rotation_of_axes("z", "+x"), std::invalid_argument);
+  EXPECT_THROW(rotation_of_axes("+z", "-z"), bevel::ArgumentError);
+  EXPECT_THROW(rotation_of_axes("z", "+x"), bevel::ArgumentError);
   const cv::Matx33d R = rotation_of_axes("+z", "+x");
   EXPECT_NEAR(cv::determinant(R), 1.0, 1e-12);
   EXPECT_EQ(R(2, 0), 1.0);

@@ -5,6 +5,7 @@
 #include <opencv2/aruco/charuco.hpp>
 #include <opencv2/imgproc.hpp>
 
+#include <bevel/error.hpp>
 #include "tests/calibration/true_optics.hpp"
 
 namespace bevel::camera {
@@ -203,7 +204,7 @@ TEST(PictureOfABoard, BadBoardsNameTheKey) {
     try {
       const Board board(spec);
       ADD_FAILURE() << key << " was accepted";
-    } catch (const std::invalid_argument& error) {
+    } catch (const ArgumentError& error) {
       EXPECT_NE(std::string(error.what()).find(key), std::string::npos) << error.what();
       EXPECT_NE(std::string(error.what()).find("allowed"), std::string::npos) << error.what();
     }

@@ -3,8 +3,8 @@
 #include <gtest/gtest.h>
 
 #include <opencv2/calib3d.hpp>
-#include <stdexcept>
 
+#include <bevel/error.hpp>
 #include "tests/calibration/true_optics.hpp"
 
 namespace bevel::camera {
@@ -132,7 +132,7 @@ TEST(Projection, BadModelsNameTheKey) {
     try {
       check(model);
       ADD_FAILURE() << bad.key << " was accepted";
-    } catch (const std::invalid_argument& error) {
+    } catch (const ArgumentError& error) {
       const std::string what = error.what();
       EXPECT_NE(what.find(bad.key), std::string::npos) << what;
       EXPECT_NE(what.find("allowed"), std::string::npos) << what;

@@ -3,6 +3,7 @@
 #include <gtest/gtest.h>
 
 #include <bevel/drivers/camera/calibration/calibration_file.hpp>
+#include <bevel/error.hpp>
 #include <bevel/io/config.hpp>
 #include <bevel/nodes/system_config.hpp>
 #include "tests/calibration/true_optics.hpp"

@@ -12,6 +12,7 @@
 #include <bevel/analysis/calibrate/calibrate_tool.hpp>
 #include <bevel/drivers/camera/calibrated_view.hpp>
 #include <bevel/drivers/camera/decode.hpp>
+#include <bevel/error.hpp>
 #include <bevel/io/log_writer.hpp>
 #include <bevel/io/messages.hpp>
 #include "tests/calibration/true_optics.hpp"
@@ -305,7 +306,7 @@ TEST_F(Tool, OnePictureSixteenTimesIsRefused) {
   try {
     run(o, out, err);
     ADD_FAILURE() << "accepted: " << out.str();
-  } catch (const std::invalid_argument& error) {
+  } catch (const ArgumentError& error) {
     EXPECT_THAT(error.what(), HasSubstr("15 more repeat the view of another picture"));
   }
 }
@@ -335,7 +336,7 @@ TEST_F(Tool, ALegacyBoardIsRecognisedAndReported) {
   try {
     run(o, out_, err_);
     ADD_FAILURE() << "accepted";
-  } catch (const std::invalid_argument& error) {
+  } catch (const ArgumentError& error) {
     EXPECT_THAT(error.what(), HasSubstr("zz.png' shows a board with the current ChArUco pattern"));
     EXPECT_THAT(error.what(), HasSubstr("allowed: one board in all pictures"));
   }

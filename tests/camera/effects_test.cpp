@@ -3,6 +3,7 @@
 
 #include <gtest/gtest.h>
 
+#include <bevel/error.hpp>
 #include <cstdio>
 #include <string>
 
@@ -72,8 +73,8 @@ TEST(OpticsTest, APictureIsMovedAsItsPointsAre) {
 }
 
 TEST(OpticsTest, RefusesALensThatFoldsThePicture) {
-  EXPECT_THROW(rig::Optics({-0.3, -0.3}, {}, {640, 480}, 5.0), std::invalid_argument);
-  EXPECT_THROW(rig::Optics({}, {.gel_depth_mm = -1.0}, {640, 480}, 5.0), std::invalid_argument);
+  EXPECT_THROW(rig::Optics({-0.3, -0.3}, {}, {640, 480}, 5.0), bevel::ArgumentError);
+  EXPECT_THROW(rig::Optics({}, {.gel_depth_mm = -1.0}, {640, 480}, 5.0), bevel::ArgumentError);
 }
 
 }  // namespace

@@ -3,6 +3,7 @@
 
 #include <gtest/gtest.h>
 
+#include <bevel/error.hpp>
 #include <cmath>
 #include <random>
 
@@ -55,7 +56,7 @@ TEST(PathFit, TheModelThatMadeThePathForetellsIt) {
 }
 
 TEST(PathFit, FewerTipsThanParametersAreRefused) {
-  EXPECT_THROW(fit_path({{10.0, 1.0, 0.1}}, PathModel::bicycle), std::invalid_argument);
+  EXPECT_THROW(fit_path({{10.0, 1.0, 0.1}}, PathModel::bicycle), bevel::ArgumentError);
 }
 
 }  // namespace

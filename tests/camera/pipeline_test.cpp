@@ -4,6 +4,7 @@
 
 #include <deque>
 
+#include <bevel/error.hpp>
 #include "tests/camera/scenes.hpp"
 
 namespace bevel::camera {
@@ -133,15 +134,15 @@ TEST(CameraPipeline, BadSetupsNameTheCamera) {
   const auto make = [](const std::vector<CameraSetup>& cameras) {
     CameraPipeline(std::make_unique<ScriptedSource>(std::deque<FrameResult>{}), cameras);
   };
-  EXPECT_THROW(make({}), std::invalid_argument);
-  EXPECT_THROW(make({setup(0, top_view()), setup(0, top_view())}), std::invalid_argument);
-  EXPECT_THROW(make({CameraSetup{}}), std::invalid_argument);
+  EXPECT_THROW(make({}), bevel::ArgumentError);
+  EXPECT_THROW(make({setup(0, top_view()), setup(0, top_view())}), bevel::ArgumentError);
+  EXPECT_THROW(make({CameraSetup{}}), bevel::ArgumentError);
   CameraSetup bad = setup(4, top_view());
   bad.tracker.min_length_mm = 0.0;
   try {
     make({bad});
     ADD_FAILURE() << "accepted";
-  } catch (const std::invalid_argument& error) {
+  } catch (const ArgumentError& error) {
     EXPECT_NE(std::string(error.what()).find("camera 4"), std::string::npos) << error.what();
     EXPECT_NE(std::string(error.what()).find("min_length_mm"), std::string::npos) << error.what();
   }

@@ -1,8 +1,7 @@
 #include <gtest/gtest.h>
 
-#include <stdexcept>
-
 #include <bevel/drivers/camera/planar_view.hpp>
+#include <bevel/error.hpp>
 
 namespace bevel::camera {
 namespace {
@@ -78,7 +77,7 @@ TEST(PlanarView, BadConfigurationsNameTheKey) {
     try {
       const PlanarView view(config);
       ADD_FAILURE() << bad.key << " was accepted";
-    } catch (const std::invalid_argument& error) {
+    } catch (const ArgumentError& error) {
       EXPECT_NE(std::string(error.what()).find(bad.key), std::string::npos) << error.what();
       EXPECT_NE(std::string(error.what()).find("allowed"), std::string::npos) << error.what();
     }

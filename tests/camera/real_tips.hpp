@@ -18,7 +18,7 @@ struct TipLabel {
   double across_sd_px = 1.0, along_sd_px = 2.0;  ///< the labeller's own opinion
 };
 
-/// Throws std::runtime_error naming the line that cannot be read.
+/// Throws IoError naming the line that cannot be read.
 std::vector<TipLabel> read_labels(const std::filesystem::path& csv);
 
 /// What is known of these pictures and of this needle: the scale its authors state, and that labels are what an eye

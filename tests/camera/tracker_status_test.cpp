@@ -2,9 +2,9 @@
 #include <gtest/gtest.h>
 
 #include <opencv2/imgproc.hpp>
-#include <stdexcept>
 
 #include <bevel/drivers/camera/tip_tracker.hpp>
+#include <bevel/error.hpp>
 #include "tests/camera/scenes.hpp"
 
 namespace bevel::camera {
@@ -152,12 +152,12 @@ TEST(TrackerConfigCheck, NamesTheKey) {
     try {
       const TipTracker tracker(config, 5.0);
       ADD_FAILURE() << bad.key << " was accepted";
-    } catch (const std::invalid_argument& error) {
+    } catch (const ArgumentError& error) {
       EXPECT_NE(std::string(error.what()).find(bad.key), std::string::npos) << error.what();
       EXPECT_NE(std::string(error.what()).find("allowed"), std::string::npos) << error.what();
     }
   }
-  EXPECT_THROW(TipTracker(TrackerConfig{}, 0.0), std::invalid_argument);
+  EXPECT_THROW(TipTracker(TrackerConfig{}, 0.0), bevel::ArgumentError);
 }
 
 }  // namespace

@@ -34,7 +34,7 @@ Judged judge(const inference::Search& search, const GeneratorSystem& system, con
 // The truth's claims; of effects that no size tells, none is visible.
 std::vector<Claim> claims_of(const GeneratorSystem& system, const proof::Truth& truth);
 
-// A trial of a campaign's folder, its recordings drawn again and its truth opened. Throws std::runtime_error where the
+// A trial of a campaign's folder, its recordings drawn again and its truth opened. Throws IoError where the
 // seal is broken or a file is missing.
 proof::Trial open_trial(const std::filesystem::path& folder, const nlohmann::json& campaign, int number);
 

@@ -6,6 +6,7 @@
 #include <numbers>
 #include <stdexcept>
 
+#include <bevel/error.hpp>
 #include "proof/beam_path.hpp"
 
 namespace bevel::ceiling {
@@ -237,11 +238,11 @@ bool GeneratorSystem::read(const proof::Setting& setting, const Plant& plant, st
     out.resize(axis_[r].rows());
     for (Index row = 0; row < out.size(); ++row)
       out[row] = axis_[r].row(row).dot(views[0].col(frame_[r][static_cast<std::size_t>(row)]));
-  } catch (const std::domain_error&) {
+  } catch (const DomainError&) {
     return false;
-  } catch (const std::invalid_argument&) {
+  } catch (const ArgumentError&) {
     return false;
-  } catch (const std::out_of_range&) {
+  } catch (const DomainError&) {
     return false;
   }
   return out.allFinite();

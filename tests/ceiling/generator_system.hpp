@@ -29,7 +29,7 @@ struct Slot {
 class GeneratorSystem final : public inference::System {
  public:
   // Readings, base, nuisances and curves are those of `needle`, made of this trial's logs; it must live as long.
-  // Throws std::invalid_argument where a reading has no frame of the trial.
+  // Throws ArgumentError where a reading has no frame of the trial.
   GeneratorSystem(const diagnosis::NeedleSystem& needle, const proof::Trial& trial,
                   const proof::DriveRipple& ripple = {});
 

@@ -3,6 +3,7 @@
 
 #include <limits>
 
+#include <bevel/error.hpp>
 #include "tests/drives/bench.hpp"
 
 namespace bevel::test {
@@ -247,7 +248,7 @@ TEST(Configuration, ProblemsNameKeyValueAndRange) {
                                             testing::HasSubstr("drive_heartbeat_timeout_ms = 1e-06")));
   can::MemoryNetwork wire;
   const auto bus = wire.attach();
-  EXPECT_THROW(stepper::StepperDriver(*bus, config), std::invalid_argument);
+  EXPECT_THROW(stepper::StepperDriver(*bus, config), bevel::ArgumentError);
   EXPECT_TRUE(stepper::problems_of(stepper::StepperConfig{}).empty());
 }
 

@@ -9,6 +9,7 @@
 #include <numbers>
 #include <random>
 
+#include <bevel/error.hpp>
 #include <bevel/model/effects/prediction_spread.hpp>
 #include "tests/effects/script.hpp"
 
@@ -321,7 +322,7 @@ TEST(Discrepancy, FaultsAreNamed) {
   EXPECT_EQ(find_fault(curve), "");
   curve.values = {std::numeric_limits<double>::quiet_NaN()};
   EXPECT_THAT(find_fault(curve), ::testing::HasSubstr("values: element 0 = nan is not allowed"));
-  EXPECT_THROW(make_discrepancy(curve), std::invalid_argument);
+  EXPECT_THROW(make_discrepancy(curve), bevel::ArgumentError);
   curve = {Component::x, Covariate::depth_mm, {}, {}, {}};
   EXPECT_THAT(find_fault(curve), ::testing::HasSubstr("knots has 0 elements"));
   const DiscrepancyCurve of_motion{Component::advance, Covariate::since_speed_change_s, {0.1}, {0}, {0}};

@@ -5,6 +5,7 @@
 #include <numbers>
 #include <set>
 
+#include <bevel/error.hpp>
 #include "tests/effects/script.hpp"
 
 namespace bevel::model::testing {
@@ -391,8 +392,8 @@ TEST(AugmentedNeedle, StaysWhereItIsOutsideTheDomain) {
 
 TEST(AugmentedNeedle, RefusesMoreThanItHasRoomFor) {
   const auto one = testing::active("camera_scale", {1.01});
-  EXPECT_THROW(AugmentedNeedle(agar(), std::vector<ActiveEffect>(kMaxEffects + 1, one)), std::invalid_argument);
-  EXPECT_THROW(AugmentedNeedle(agar(), {}, kMaxColumns + 1), std::invalid_argument);
+  EXPECT_THROW(AugmentedNeedle(agar(), std::vector<ActiveEffect>(kMaxEffects + 1, one)), bevel::ArgumentError);
+  EXPECT_THROW(AugmentedNeedle(agar(), {}, kMaxColumns + 1), bevel::ArgumentError);
 }
 
 }  // namespace

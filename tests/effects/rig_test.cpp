@@ -7,6 +7,7 @@
 
 #include <bevel/drivers/camera/frame_source.hpp>
 #include <bevel/drivers/can/memory_bus.hpp>
+#include <bevel/error.hpp>
 #include <bevel/nodes/rig_node.hpp>
 #include "tests/effects/script.hpp"
 #include "tests/support/temporary_folder.hpp"

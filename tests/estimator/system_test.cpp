@@ -10,6 +10,7 @@
 #include <iostream>
 
 #include <bevel/analysis/replay/batch.hpp>
+#include <bevel/error.hpp>
 #include <bevel/io/log_reader.hpp>
 #include <bevel/io/log_writer.hpp>
 #include <bevel/nodes/estimator_node.hpp>

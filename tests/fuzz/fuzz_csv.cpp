@@ -4,6 +4,7 @@
 // Input: [column map "\n---\n"] table. Without the separator the fixed map is used.
 #include <cmath>
 
+#include <bevel/error.hpp>
 #include <bevel/io/checked_decode.hpp>
 #include <bevel/io/csv_import.hpp>
 #include <bevel/io/messages.hpp>

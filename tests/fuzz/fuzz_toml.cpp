@@ -1,8 +1,9 @@
-// Arbitrary text as each of the TOML files. It is refused with a ConfigError that says where, or it is a configuration:
-// a model file then survives being written and read, to the last bit, and can be put to work.
+// Arbitrary text as each of the TOML files. It is refused with a ConfigError that says where, or it is a
+// configuration: a model file then survives being written and read, to the last bit, and can be put to work.
 #include <cmath>
 #include <limits>
 
+#include <bevel/error.hpp>
 #include <bevel/io/csv_import.hpp>
 #include <bevel/io/live_effects.hpp>
 #include <bevel/io/model_file.hpp>

@@ -7,6 +7,7 @@
 #include <bevel/diagnosis/identification/angle_rate.hpp>
 #include <bevel/diagnosis/identification/candidates.hpp>
 #include <bevel/diagnosis/identification/fit_statistics.hpp>
+#include <bevel/error.hpp>
 #include "tests/identification/simulated_insertion.hpp"
 
 namespace bevel::diagnosis {
@@ -191,16 +192,16 @@ TEST(TrajectoryFit, StopsAtTheBoundOfTheDomainAndSaysSo) {
 
 TEST(TrajectoryFit, RefusesWhatItCannotFit) {
   const auto data = trials(needle(0.144, 0.032), 1, {}, 16);
-  EXPECT_THROW(fit_trajectory({}, from_plastisol()), std::invalid_argument);
+  EXPECT_THROW(fit_trajectory({}, from_plastisol()), bevel::ArgumentError);
   auto options = from_plastisol();
   options.start.lambda1_per_rad = 0;  // (26)
-  EXPECT_THROW(fit_trajectory(data, options), std::invalid_argument);
+  EXPECT_THROW(fit_trajectory(data, options), bevel::ArgumentError);
   options = from_plastisol();
   options.fitted = {};
-  EXPECT_THROW(fit_trajectory(data, options), std::invalid_argument);
+  EXPECT_THROW(fit_trajectory(data, options), bevel::ArgumentError);
   options = from_plastisol();
   options.priors[kCurvature] = Prior{0.005, 0};
-  EXPECT_THROW(fit_trajectory(data, options), std::invalid_argument);
+  EXPECT_THROW(fit_trajectory(data, options), bevel::ArgumentError);
 }
 
 TEST(TrajectoryFit, BicycleIsTheExtendedModelWithoutLambda) {
@@ -238,7 +239,7 @@ TEST(AngleRate, RecoversLambdaFromCleanPathsAndLosesItInNoise) {
 TEST(AngleRate, RefusesATurningShaft) {
   SimulatedInsertion plan;
   plan.rotation_rad = 1;
-  EXPECT_THROW(fit_angle_rate(trials(needle(0.144, 0.032), 1, plan, 20), needle(0.144, 0.032)), std::invalid_argument);
+  EXPECT_THROW(fit_angle_rate(trials(needle(0.144, 0.032), 1, plan, 20), needle(0.144, 0.032)), bevel::ArgumentError);
 }
 
 TEST(FitStatistics, ScaleAndCorrelationOfKnownNoise) {

@@ -6,6 +6,7 @@
 #include <iostream>
 #include <numbers>
 
+#include <bevel/error.hpp>
 #include "tests/identification/simulated_insertion.hpp"
 
 namespace bevel::diagnosis {
@@ -93,8 +94,8 @@ TEST(Insertion, MeasurementsThatCannotBeUsedAreCounted) {
   EXPECT_EQ(insertion.observations.size(), r.tips.size() - 3);
   EXPECT_EQ(insertion.observations[0].rank, 2);  // the camera sees y and z
   for (auto& tip : r.tips) tip.status = 1;
-  EXPECT_THROW(make_insertion("r", r.actuators, r.tips), std::invalid_argument);
-  EXPECT_THROW(make_insertion("r", {r.actuators[0]}, r.tips), std::invalid_argument);
+  EXPECT_THROW(make_insertion("r", r.actuators, r.tips), bevel::ArgumentError);
+  EXPECT_THROW(make_insertion("r", {r.actuators[0]}, r.tips), bevel::ArgumentError);
 }
 
 // An axis that turned for days before the recording: only the rest of a turn is a motion of the needle.

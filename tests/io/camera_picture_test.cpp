@@ -9,6 +9,7 @@
 #include <random>
 
 #include <bevel/drivers/camera/decode.hpp>
+#include <bevel/error.hpp>
 #include <bevel/nodes/camera_pictures.hpp>
 
 namespace bevel::io {
@@ -160,7 +161,7 @@ TEST(PictureClock, keeps_to_its_rate_for_each_camera_by_itself) {
   EXPECT_EQ(first, 38);
   EXPECT_EQ(second, 19);
   for (const double wrong : {0.0, -1.0, 5.01, std::nan(""), std::numeric_limits<double>::infinity()})
-    EXPECT_THROW(nodes::PictureClock{wrong}, std::invalid_argument) << wrong;
+    EXPECT_THROW(nodes::PictureClock{wrong}, bevel::ArgumentError) << wrong;
 }
 
 }  // namespace

@@ -2,6 +2,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <bevel/error.hpp>
 #include <bevel/io/config.hpp>
 
 namespace bevel::io {

@@ -4,6 +4,7 @@
 #include <filesystem>
 #include <functional>
 
+#include <bevel/error.hpp>
 #include <bevel/io/csv_export.hpp>
 #include <bevel/io/csv_import.hpp>
 #include <bevel/io/recording_clock.hpp>

@@ -1,6 +1,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <bevel/error.hpp>
 #include <bevel/io/live_effects.hpp>
 
 namespace bevel::io {
@@ -29,7 +30,7 @@ TEST(LiveEffects, what_is_known_beforehand_is_all_there) {
   const LiveEffects live = live_effects({{"rotation_backlash", {{"width_rad", 0.4}}, {}}, {"slip_direction", {}, {}}});
   EXPECT_EQ(live.active.size(), 2U);
   EXPECT_THAT(live.left_out, IsEmpty());
-  EXPECT_THROW(live_effects({{"no_such_effect", {}, {}}}), std::invalid_argument);
+  EXPECT_THROW(live_effects({{"no_such_effect", {}, {}}}), bevel::ArgumentError);
 }
 
 }  // namespace

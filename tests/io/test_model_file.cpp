@@ -2,6 +2,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <bevel/error.hpp>
 #include <bevel/io/model_file.hpp>
 #include "tests/support/temporary_folder.hpp"
 
@@ -168,10 +169,10 @@ TEST(ModelFile, every_effect_of_the_registry_is_read_back_as_written) {
 }
 
 TEST(ModelFile, effects_made_in_code_are_checked_too) {
-  EXPECT_THROW(active_effects({EffectEntry{.name = "gravity"}}, ""), std::invalid_argument);
-  EXPECT_THROW(active_effects({EffectEntry{.name = "layer"}}, ""), std::invalid_argument);
+  EXPECT_THROW(active_effects({EffectEntry{.name = "gravity"}}, ""), bevel::ArgumentError);
+  EXPECT_THROW(active_effects({EffectEntry{.name = "layer"}}, ""), bevel::ArgumentError);
   EXPECT_THROW(active_effects({EffectEntry{.name = "drilling", .parameters = {{"size", 1.0}}}}, ""),
-               std::invalid_argument);
+               bevel::ArgumentError);
 }
 
 TEST(ModelFile, parameters_outside_the_models_domain_are_refused) {

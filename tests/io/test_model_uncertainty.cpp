@@ -5,6 +5,7 @@
 
 #include <numbers>
 
+#include <bevel/error.hpp>
 #include <bevel/io/model_file.hpp>
 
 namespace bevel::io {

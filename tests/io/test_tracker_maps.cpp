@@ -10,6 +10,7 @@
 #include <functional>
 #include <random>
 
+#include <bevel/error.hpp>
 #include <bevel/io/csv_import.hpp>
 #include <bevel/io/held_values.hpp>
 #include <bevel/io/motion_gap.hpp>

@@ -6,6 +6,7 @@
 #include <cstdio>
 
 #include <bevel/diagnosis/latency/latency_fit.hpp>
+#include <bevel/error.hpp>
 #include <bevel/model/effects/open_loop.hpp>
 #include "tests/latency/stop_and_go.hpp"
 
@@ -189,7 +190,7 @@ TEST(LatencyFit, RefusesWhatIsTooNoisyOrTooLittle) {
   seen = test::simulate({.latency_s = 3});
   EXPECT_NE(fit(seen).refusal, "");
   seen.axes.resize(1);
-  EXPECT_THROW(fit(seen), std::invalid_argument);
+  EXPECT_THROW(fit(seen), bevel::ArgumentError);
 }
 
 }  // namespace

@@ -3,6 +3,7 @@
 
 #include <cmath>
 
+#include <bevel/error.hpp>
 #include <bevel/io/config.hpp>
 #include "tests/loop/simulated_loop.hpp"
 #include "tests/support/temporary_folder.hpp"

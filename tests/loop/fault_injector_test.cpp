@@ -1,6 +1,7 @@
 // What the fault injector makes of a camera that gives positions and headings: both fail as one.
 #include <gtest/gtest.h>
 
+#include <bevel/error.hpp>
 #include <bevel/estimator/health.hpp>
 #include <bevel/io/checked_decode.hpp>
 #include <bevel/model/motion_direction.hpp>
@@ -125,7 +126,7 @@ TEST(FaultInjector, AChannelOfAnotherComponentIsRefused) {
   FaultInjector injector(Component::controller);
   EXPECT_FALSE(injector.concerns(io::channel::kTipHeading));
   EXPECT_TRUE(injector.concerns(io::channel::kMotionCommand));
-  EXPECT_THROW(injector.pass(io::channel::kTipHeading, {1, 2, 3}, 1, 1), std::invalid_argument);
+  EXPECT_THROW(injector.pass(io::channel::kTipHeading, {1, 2, 3}, 1, 1), bevel::ArgumentError);
 }
 
 // The loop with cameras that give the tangent of the shaft: without a fault it arrives, and headings that are turned

@@ -3,6 +3,7 @@
 
 #include <iostream>
 
+#include <bevel/error.hpp>
 #include <bevel/estimator/health.hpp>
 #include <bevel/io/config.hpp>
 #include "tests/loop/simulated_loop.hpp"

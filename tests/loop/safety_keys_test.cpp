@@ -5,6 +5,7 @@
 
 #include <ostream>
 
+#include <bevel/error.hpp>
 #include <bevel/io/config.hpp>
 #include <bevel/nodes/system_config.hpp>
 #include "tests/support/temporary_folder.hpp"

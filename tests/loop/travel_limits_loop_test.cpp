@@ -2,6 +2,7 @@
 // Run into, at rest, latched with its reason, armed again by word and backed off.
 #include <gmock/gmock.h>
 
+#include <bevel/error.hpp>
 #include <bevel/io/config.hpp>
 #include "tests/loop/loop_fixture.hpp"
 #include "tests/support/temporary_folder.hpp"

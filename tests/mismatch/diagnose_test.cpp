@@ -8,6 +8,7 @@
 
 #include <bevel/diagnosis/mismatch/diagnose.hpp>
 #include <bevel/diagnosis/mismatch/effect_source.hpp>
+#include <bevel/error.hpp>
 #include <bevel/model/effects/discrepancy.hpp>
 #include "tests/needle/simulated_rig.hpp"
 
@@ -322,7 +323,7 @@ TEST(Diagnose, AModelThatCannotFollowIsRefused) {
   try {
     diagnose(recorded, model, {});
     FAIL() << "taken";
-  } catch (const std::invalid_argument& e) {
+  } catch (const ArgumentError& e) {
     EXPECT_THAT(e.what(), HasSubstr("leaves the domain"));
   }
 }

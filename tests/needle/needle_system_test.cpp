@@ -9,6 +9,7 @@
 
 #include <bevel/diagnosis/inference/search.hpp>
 #include <bevel/diagnosis/needle/curves.hpp>
+#include <bevel/error.hpp>
 #include "tests/needle/simulated_rig.hpp"
 
 namespace bevel::diagnosis {
@@ -215,9 +216,9 @@ TEST(NeedleSystem, HoldsAsManyKnownEffectsAsLeaveRoomForTheOthers) {
     return out;
   };
   EXPECT_NO_THROW(NeedleSystem(record_case(rig, 1), rig.needle, known(2)));
-  EXPECT_THROW(NeedleSystem(record_case(rig, 1), rig.needle, known(3)), std::invalid_argument);
+  EXPECT_THROW(NeedleSystem(record_case(rig, 1), rig.needle, known(3)), bevel::ArgumentError);
   EXPECT_NO_THROW(NeedleSystem(without_clock(rig, 1), rig.needle, known(1)));
-  EXPECT_THROW(NeedleSystem(without_clock(rig, 1), rig.needle, known(2)), std::invalid_argument);
+  EXPECT_THROW(NeedleSystem(without_clock(rig, 1), rig.needle, known(2)), bevel::ArgumentError);
 }
 
 TEST(NeedleSystem, WithoutEffectsItIsTheModel) {

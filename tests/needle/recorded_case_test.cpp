@@ -4,6 +4,7 @@
 
 #include <numbers>
 
+#include <bevel/error.hpp>
 #include "tests/needle/simulated_rig.hpp"
 
 namespace bevel::diagnosis::testing {
@@ -28,7 +29,7 @@ Eigen::Matrix3d diagonal(double x, double y, double z) {
 std::string refusal(std::vector<RawRecording> raw) {
   try {
     make_case(std::move(raw));
-  } catch (const std::invalid_argument& e) {
+  } catch (const ArgumentError& e) {
     return e.what();
   }
   return "taken";

@@ -10,6 +10,7 @@
 #include <nlohmann/json.hpp>
 #include <regex>
 
+#include <bevel/error.hpp>
 #include <bevel/report/assets.hpp>
 #include <bevel/report/figure_svg.hpp>
 #include <bevel/report/html_text.hpp>
@@ -71,7 +72,7 @@ TEST(ReportPage, is_self_contained_and_escapes_its_text) {
   const std::regex fetched("(src|href)=[\"'](https?:)?//|url\\(http|@import");
   EXPECT_FALSE(std::regex_search(html, fetched));
   EXPECT_THAT(html, HasSubstr("default-src 'none'; style-src 'unsafe-inline'; script-src 'sha256-"));
-  EXPECT_THROW(page.table({"a", "b"}, {{"1"}}), std::invalid_argument);
+  EXPECT_THROW(page.table({"a", "b"}, {{"1"}}), bevel::ArgumentError);
   const auto path = std::filesystem::path(BEVEL_BINARY_DIR) / "test-report.html";
   page.save(path.string());
   EXPECT_EQ(std::filesystem::file_size(path), html.size());
@@ -195,14 +196,14 @@ TEST(ReportFigure, a_gap_breaks_a_line_and_a_band_and_a_lone_sample_is_a_bar) {
 }
 
 TEST(ReportFigure, nothing_to_show_and_unequal_lengths_are_refused) {
-  EXPECT_THROW(check(Figure{}), std::invalid_argument);
-  EXPECT_THROW(check(Figure{}.line("", {1, 2}, {1})), std::invalid_argument);
-  EXPECT_THROW(check(Figure{}.line("", {1}, {std::nan("")})), std::invalid_argument);
-  EXPECT_THROW(check(Figure{}.band("", {1, 2}, {1, 2}, {1})), std::invalid_argument);
+  EXPECT_THROW(check(Figure{}), bevel::ArgumentError);
+  EXPECT_THROW(check(Figure{}.line("", {1, 2}, {1})), bevel::ArgumentError);
+  EXPECT_THROW(check(Figure{}.line("", {1}, {std::nan("")})), bevel::ArgumentError);
+  EXPECT_THROW(check(Figure{}.band("", {1, 2}, {1, 2}, {1})), bevel::ArgumentError);
   Figure keyed = Figure{}.line("k", {1, 2}, {1, 2});
   keyed.series[0].key = {1};
-  EXPECT_THROW(Page("p").figure(keyed, ""), std::invalid_argument);
-  EXPECT_THROW(Page("p").space(Space{}, ""), std::invalid_argument);
+  EXPECT_THROW(Page("p").figure(keyed, ""), bevel::ArgumentError);
+  EXPECT_THROW(Page("p").space(Space{}, ""), bevel::ArgumentError);
 }
 
 TEST(ReportFigure, data_hold_the_values_once_and_no_digit_too_many) {

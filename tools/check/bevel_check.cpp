@@ -3,6 +3,7 @@
 
 #include <bevel/cli/command_line.hpp>
 #include <bevel/cli/exit_status.hpp>
+#include <bevel/error.hpp>
 #include <bevel/nodes/link_probe.hpp>
 #include <bevel/nodes/runtime.hpp>
 
@@ -25,7 +26,7 @@ int main(int argc, char** argv) {
     const auto findings = drivers::check_all(config, lcm_url.empty() ? config.lcm_url : lcm_url,
                                              can.empty() ? config.can : can, config_path);
     std::fputs(drivers::to_text(findings).c_str(), stdout);
-    if (nodes::stop_requested()) throw std::runtime_error("interrupted: what is above is not all");
+    if (nodes::stop_requested()) throw bevel::IoError("interrupted: what is above is not all");
     return drivers::any_failed(findings) ? cli::kFailed : cli::kOk;
   });
 }

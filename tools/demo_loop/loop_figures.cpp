@@ -5,8 +5,8 @@
 #include <cstdio>
 #include <map>
 #include <numbers>
-#include <stdexcept>
 
+#include <bevel/error.hpp>
 #include <bevel/io/file_bytes.hpp>
 #include <bevel/io/log_reader.hpp>
 #include <bevel/io/messages.hpp>
@@ -99,7 +99,7 @@ Percentiles percentiles(std::vector<double> values) {
 LoopFigures loop_figures(const std::string& log_path) {
   const io::Recording log = io::read_recording(log_path);
   const auto need = [&](bool there, const char* channel) {
-    if (!there) throw std::runtime_error(log_path + " holds no " + channel);
+    if (!there) throw IoError(log_path + " holds no " + channel);
   };
   need(!log.estimates.empty(), io::channel::kNeedleState);
   need(!log.truths.empty(), io::channel::kNeedleTruth);

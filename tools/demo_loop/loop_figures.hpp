@@ -37,7 +37,7 @@ struct LoopFigures {
   std::int64_t measurements = 0, measurements_unusable = 0, rejected_messages = 0;
 };
 
-// Throws std::runtime_error naming what the log lacks.
+// Throws IoError naming what the log lacks.
 LoopFigures loop_figures(const std::string& log_path);
 std::string to_text(const LoopFigures& figures);
 // A self-contained page: paths with target and uncertainty, errors over time, commands.

@@ -1,9 +1,9 @@
 #include "tools/demo_loop/steering_session.hpp"
 
 #include <cstdio>
-#include <stdexcept>
 
 #include <bevel/controller/supervisor.hpp>
+#include <bevel/error.hpp>
 #include <bevel/estimator/health.hpp>
 
 namespace bevel::tools {
@@ -76,7 +76,7 @@ void SteeringSession::say(nodes::Word word, const Eigen::Vector3d& position_mm) 
 void SteeringSession::stop() { say(nodes::Word::stop); }
 
 void SteeringSession::close_log() {
-  if (!log_failure_.empty()) throw std::runtime_error(log_failure_);
+  if (!log_failure_.empty()) throw IoError(log_failure_);
   log_.close();
 }
 

@@ -1,9 +1,9 @@
 // bevel-predict: where the model says the tip was, from the axes alone.
 #include <iostream>
-#include <stdexcept>
 
 #include <bevel/analysis/predict/predict.hpp>
 #include <bevel/cli/command_line.hpp>
+#include <bevel/error.hpp>
 #include <bevel/io/find_logs.hpp>
 
 int main(int argc, char** argv) {
@@ -22,7 +22,7 @@ int main(int argc, char** argv) {
   return command_line.run(argc, argv, [&] {
     const auto found = bevel::io::find_logs(logs);
     if (found.size() > 1)
-      throw std::runtime_error(logs.front() + ": holds " + std::to_string(found.size()) + " logs; one at a time");
+      throw bevel::IoError(logs.front() + ": holds " + std::to_string(found.size()) + " logs; one at a time");
     return bevel::analysis::run(model_path, found.front(), std::cout, std::cerr);
   });
 }

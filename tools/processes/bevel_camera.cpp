@@ -1,4 +1,5 @@
 // bevel-camera: frames in (the rig, a folder, a video file, a V4L2 device), TIP_MEASUREMENT out.
+#include <bevel/error.hpp>
 #include <bevel/nodes/camera_node.hpp>
 #include "tools/processes/process_main.hpp"
 
@@ -40,7 +41,7 @@ int main(int argc, char** argv) {
       const auto outcome = node.step(nodes::now(), 50);
       if (outcome == nodes::CameraNode::Outcome::failed) {
         end_recording();
-        throw std::runtime_error(node.failure());
+        throw bevel::IoError(node.failure());
       }
       if (outcome == nodes::CameraNode::Outcome::ended) break;
     }

@@ -9,10 +9,10 @@
 #include <cstring>
 #include <limits>
 #include <sstream>
-#include <stdexcept>
 
 #include <bevel/cli/command_line.hpp>
 #include <bevel/cli/limits.hpp>
+#include <bevel/error.hpp>
 #include <bevel/nodes/open_lcm.hpp>
 #include <bevel/nodes/runtime.hpp>
 #include <bevel/view/view_node.hpp>
@@ -39,7 +39,7 @@ int start_with_port(const std::vector<std::string>& command, int socket) {
   for (const std::string& word : command) words.push_back(const_cast<char*>(word.c_str()));
   words.push_back(nullptr);
   ::execvp(words[0], words.data());
-  throw std::runtime_error("cannot start " + command[0] + ": " + std::strerror(errno));
+  throw bevel::IoError("cannot start " + command[0] + ": " + std::strerror(errno));
 }
 
 }  // namespace

@@ -16,10 +16,10 @@
 #include <list>
 #include <mutex>
 #include <optional>
-#include <stdexcept>
 #include <thread>
 #include <utility>
 
+#include <bevel/error.hpp>
 #include <bevel/view/http_request.hpp>
 #include <bevel/view/page.hpp>
 
@@ -275,8 +275,8 @@ int PageServer::open_port(int port) {
     return socket;
   const std::string why = std::strerror(errno);
   if (socket >= 0) ::close(socket);
-  throw std::runtime_error("port " + std::to_string(port) + " of 127.0.0.1 cannot be opened: " + why +
-                           "; choose another, or 0 for one that is free");
+  throw IoError("port " + std::to_string(port) + " of 127.0.0.1 cannot be opened: " + why +
+                "; choose another, or 0 for one that is free");
 }
 
 PageServer::PageServer(int socket, std::function<std::string()> history, Picture picture,
@@ -288,12 +288,12 @@ PageServer::PageServer(int socket, std::function<std::string()> history, Picture
   socklen_t listens_size = sizeof listens;
   if (::getsockname(socket, reinterpret_cast<sockaddr*>(&address), &size) != 0 || address.sin_family != AF_INET ||
       ::getsockopt(socket, SOL_SOCKET, SO_ACCEPTCONN, &listens, &listens_size) != 0 || listens == 0)
-    throw std::runtime_error("file descriptor " + std::to_string(socket) + " is no port that is open");
+    throw IoError("file descriptor " + std::to_string(socket) + " is no port that is open");
   ::fcntl(socket, F_SETFD, FD_CLOEXEC);
   ::fcntl(socket, F_SETFL, O_NONBLOCK);
   impl_->port = ntohs(address.sin_port);
   impl_->wake = ::eventfd(0, EFD_CLOEXEC | EFD_NONBLOCK);
-  if (impl_->wake < 0) throw std::runtime_error(std::string("live page: no event descriptor: ") + std::strerror(errno));
+  if (impl_->wake < 0) throw IoError(std::string("live page: no event descriptor: ") + std::strerror(errno));
   impl_->thread = std::thread([this] { impl_->serve(); });
 }
 

@@ -8,6 +8,7 @@
 #include <sstream>
 
 #include <bevel/cli/exit_status.hpp>
+#include <bevel/error.hpp>
 #include <bevel/io/recording.hpp>
 #include <bevel/io/result_file.hpp>
 #include <bevel/report/numbers.hpp>
@@ -41,10 +42,10 @@ void print_board(const camera::Board& board, const std::string& path, std::ostre
   } else if (extension == ".png") {
     std::vector<unsigned char> picture;
     if (!cv::imencode(extension, board.drawing(140), picture))
-      throw std::runtime_error("--board '" + path + "': the picture cannot be encoded");
+      throw IoError("--board '" + path + "': the picture cannot be encoded");
     io::write_result_file(path, {reinterpret_cast<const char*>(picture.data()), picture.size()});
   } else {
-    throw std::invalid_argument("--board '" + path + "' ends in '" + extension + "', allowed: .svg, .png");
+    throw ArgumentError("--board '" + path + "' ends in '" + extension + "', allowed: .svg, .png");
   }
   out << path
       << (extension == ".svg" ? ": print it at 100 %, without fitting it to the page"
@@ -68,7 +69,7 @@ std::vector<std::string> tables_of(const camera::Calibration& calibration, const
 
 int fit_pictures(const camera::Board& board, const CalibrateOptions& o, std::ostream& out, std::ostream& err) {
   if (o.gel_index != 0 && !(o.gel_index >= 1))
-    throw std::invalid_argument("--gel-index is " + format_significant(o.gel_index) + ", allowed: 1 to 2.5, or 0");
+    throw ArgumentError("--gel-index is " + format_significant(o.gel_index) + ", allowed: 1 to 2.5, or 0");
   const BoardPictures pictures = read_pictures(board, o);
   const auto say_left_out = [&err](const std::vector<camera::LeftOut>& all) {
     for (const auto& left : all) err << "left out: " << left.name << ": " << left.why << '\n';

@@ -1,10 +1,10 @@
 #include <map>
 #include <ostream>
-#include <stdexcept>
 
 #include <bevel/analysis/calibrate/calibrate_tool.hpp>
 #include <bevel/cli/exit_status.hpp>
 #include <bevel/diagnosis/latency/latency_fit.hpp>
+#include <bevel/error.hpp>
 #include <bevel/io/model_file.hpp>
 #include <bevel/io/recording.hpp>
 #include <bevel/io/recording_clock.hpp>
@@ -46,7 +46,7 @@ int fit_latency(const CalibrateOptions& o, std::ostream& out, std::ostream& err)
   io::require_usable(o.latency, recording);
   err << recording.remarks(o.latency);
   if (!io::has_clock(recording))
-    throw std::runtime_error(o.latency + ": its times are an order and no clock; nothing is late in it");
+    throw IoError(o.latency + ": its times are an order and no clock; nothing is late in it");
   std::map<int, std::vector<model::TipMeasurement>> of_camera;
   for (const model::TipMeasurement& m : recording.tips) of_camera[m.camera].push_back(m);
   const std::map<int, double> applied_s = latencies_in(recording.config);

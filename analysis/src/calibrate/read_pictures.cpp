@@ -3,11 +3,11 @@
 #include <filesystem>
 #include <map>
 #include <set>
-#include <stdexcept>
 
 #include <bevel/analysis/calibrate/calibrate_tool.hpp>
 #include <bevel/drivers/camera/decode.hpp>
 #include <bevel/drivers/camera/frame_source.hpp>
+#include <bevel/error.hpp>
 
 namespace bevel::analysis {
 namespace {
@@ -29,12 +29,11 @@ bool is_picture(const fs::path& file) {
 std::vector<fs::path> pictures_in(const std::string& folder) {
   std::error_code error;
   if (!fs::is_directory(folder, error))
-    throw std::invalid_argument("'" + folder + "' is not a folder; allowed: a folder of pictures");
+    throw ArgumentError("'" + folder + "' is not a folder; allowed: a folder of pictures");
   std::vector<fs::path> files;
   for (const auto& entry : fs::directory_iterator(folder))
     if (entry.is_regular_file() && is_picture(entry.path())) files.push_back(entry.path());
-  if (files.empty())
-    throw std::invalid_argument("'" + folder + "' has no picture; allowed: jpg, png, bmp, pgm, ppm, tif");
+  if (files.empty()) throw ArgumentError("'" + folder + "' has no picture; allowed: jpg, png, bmp, pgm, ppm, tif");
   std::ranges::sort(files, [](const fs::path& a, const fs::path& b) {
     return camera::natural_less(a.filename().string(), b.filename().string());
   });
@@ -51,8 +50,8 @@ void require_different_folders(const CalibrateOptions& options) {
       if (error) continue;  // pictures_in() reports it
       const auto [at, is_new] = options_by_folder.emplace(path, option);
       if (!is_new)
-        throw std::invalid_argument(std::string(option) + " '" + folder + "' is the same folder as one of " +
-                                    at->second + "; allowed: different folders for all cameras and media");
+        throw ArgumentError(std::string(option) + " '" + folder + "' is the same folder as one of " + at->second +
+                            "; allowed: different folders for all cameras and media");
     }
 }
 
@@ -75,9 +74,8 @@ class Reader {
     cv::Size& size = out_.input.sizes_px[camera];
     if (first_[camera].empty()) first_[camera] = file.string(), size = gray.size();
     if (gray.size() != size)
-      throw std::invalid_argument("'" + file.string() + "' is " + text_of(gray.size()) + ", allowed: " + text_of(size) +
-                                  " as '" + first_[camera] +
-                                  "', the first of this camera; a calibration holds for one size");
+      throw ArgumentError("'" + file.string() + "' is " + text_of(gray.size()) + ", allowed: " + text_of(size) +
+                          " as '" + first_[camera] + "', the first of this camera; a calibration holds for one size");
     camera::Sighting seen = board_.find(gray);
     if (seen.ids.empty()) {
       const std::string none = "no board of " + std::to_string(board_.spec().columns) + " x " +
@@ -95,9 +93,9 @@ class Reader {
     if (!board_.has_two_patterns() || seen.ids.size() < static_cast<size_t>(camera::kFewestCorners)) return;
     if (!out_.pattern) out_.pattern = seen.pattern, patterned_ = file.string();
     if (*out_.pattern != seen.pattern)
-      throw std::invalid_argument("'" + file.string() + "' shows a board with the " + name_of(seen.pattern) +
-                                  " ChArUco pattern, '" + patterned_ + "' one with the " + name_of(*out_.pattern) +
-                                  "; allowed: one board in all pictures");
+      throw ArgumentError("'" + file.string() + "' shows a board with the " + name_of(seen.pattern) +
+                          " ChArUco pattern, '" + patterned_ + "' one with the " + name_of(*out_.pattern) +
+                          "; allowed: one board in all pictures");
   }
 
   // One remark per folder: the images of a camera have the same format.
@@ -126,15 +124,15 @@ std::string name_of(camera::CharucoPattern pattern) {
 BoardPictures read_pictures(const camera::Board& board, const CalibrateOptions& options) {
   const size_t cameras = options.air.size();
   if (cameras > 2)
-    throw std::invalid_argument("--air has " + std::to_string(cameras) + " folders, allowed: 1 or 2, one per camera");
+    throw ArgumentError("--air has " + std::to_string(cameras) + " folders, allowed: 1 or 2, one per camera");
   for (const auto& [what, given] :
        {std::pair("--immersed", options.immersed.size()), {"--fiducial", options.fiducial.size()}})
     if (given != 0 && given != cameras)
-      throw std::invalid_argument(std::string(what) + " has " + std::to_string(given) + " values, allowed: " +
-                                  std::to_string(cameras) + ", one per folder of --air, or none");
+      throw ArgumentError(std::string(what) + " has " + std::to_string(given) +
+                          " values, allowed: " + std::to_string(cameras) + ", one per folder of --air, or none");
   if (options.numbers.size() < cameras)
-    throw std::invalid_argument("--numbers has " + std::to_string(options.numbers.size()) +
-                                " values, allowed: " + std::to_string(cameras) + " or more");
+    throw ArgumentError("--numbers has " + std::to_string(options.numbers.size()) +
+                        " values, allowed: " + std::to_string(cameras) + " or more");
   require_different_folders(options);
   BoardPictures out;
   out.input.options = options.fit;
@@ -154,7 +152,7 @@ BoardPictures read_pictures(const camera::Board& board, const CalibrateOptions& 
   out.fiducial = {"fiducial", options.fiducial_immersed, {}};
   for (size_t c = 0; c < options.fiducial.size(); ++c) {
     if (!fs::is_regular_file(options.fiducial[c]))
-      throw std::invalid_argument("--fiducial '" + options.fiducial[c] + "' is not a file; allowed: a picture");
+      throw ArgumentError("--fiducial '" + options.fiducial[c] + "' is not a file; allowed: a picture");
     out.fiducial.seen.push_back(reader.read(options.fiducial[c], c));
   }
   return out;

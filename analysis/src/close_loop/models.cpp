@@ -1,23 +1,23 @@
 #include <bevel/analysis/close_loop/models.hpp>
 
 #include <algorithm>
+#include <bevel/error.hpp>
 #include <filesystem>
-#include <stdexcept>
 
 namespace bevel::analysis {
 namespace fs = std::filesystem;
 
 CaseFiles find_case(const std::string& folder) {
   if (!fs::is_directory(folder))
-    throw std::runtime_error(folder + ": no such folder; a case is a folder with model.toml and rec*.lcm");
+    throw IoError(folder + ": no such folder; a case is a folder with model.toml and rec*.lcm");
   CaseFiles files;
   files.name = fs::weakly_canonical(folder).filename().string();
   files.model_path = (fs::path(folder) / "model.toml").string();
-  if (!fs::exists(files.model_path)) throw std::runtime_error(folder + ": holds no model.toml");
+  if (!fs::exists(files.model_path)) throw IoError(folder + ": holds no model.toml");
   for (const auto& entry : fs::directory_iterator(folder))
     if (entry.path().extension() == ".lcm" && entry.path().filename().string().starts_with("rec"))
       files.logs.push_back(entry.path().string());
-  if (files.logs.empty()) throw std::runtime_error(folder + ": holds no recording (rec*.lcm)");
+  if (files.logs.empty()) throw IoError(folder + ": holds no recording (rec*.lcm)");
   std::sort(files.logs.begin(), files.logs.end());
   return files;
 }

@@ -6,11 +6,11 @@
 #include <numbers>
 #include <numeric>
 #include <random>
-#include <stdexcept>
 
 #include <bevel/analysis/steering/model_rig.hpp>
 #include <bevel/controller/arc_law.hpp>
 #include <bevel/diagnosis/parallel.hpp>
+#include <bevel/error.hpp>
 
 namespace bevel::analysis {
 namespace {
@@ -89,8 +89,8 @@ std::vector<Eigen::Vector3d> choose_targets(const model::NeedleParameters& needl
     }
   }
   if (targets.empty())
-    throw std::runtime_error("no target within reach of the needle down to " + std::to_string(deepest_mm) +
-                             " mm: the recordings are too shallow to steer as far as they go");
+    throw DomainError("no target within reach of the needle down to " + std::to_string(deepest_mm) +
+                      " mm: the recordings are too shallow to steer as far as they go");
   return targets;
 }
 

@@ -2,9 +2,9 @@
 
 #include <cstdio>
 #include <filesystem>
-#include <stdexcept>
 
 #include <bevel/cli/exit_status.hpp>
+#include <bevel/error.hpp>
 #include <bevel/io/csv_export.hpp>
 #include <bevel/io/find_logs.hpp>
 #include <bevel/io/mcap_export.hpp>
@@ -16,14 +16,14 @@ namespace fs = std::filesystem;
 
 void write_csv(const io::Recording& recording, const std::string& log, const std::string& folder) {
   const auto files = io::export_csv(recording, folder);
-  if (files.empty()) throw std::runtime_error(log + ": " + recording.refusal());
+  if (files.empty()) throw IoError(log + ": " + recording.refusal());
   for (const auto& [file, rows] : files) std::printf("%s: %lld rows\n", file.c_str(), static_cast<long long>(rows));
 }
 
 void write_mcap(const io::Recording& recording, const std::string& log, const std::string& path) {
   const std::size_t messages =
       recording.arrivals.size() + recording.commands.size() + recording.estimates.size() + recording.truths.size();
-  if (messages == 0) throw std::runtime_error(log + ": " + recording.refusal());
+  if (messages == 0) throw IoError(log + ": " + recording.refusal());
   fs::create_directories(fs::path(path).parent_path());
   io::export_mcap(recording, path);
   std::printf("%s: %zu messages\n", path.c_str(), messages);
@@ -46,7 +46,7 @@ int run(const ExportOptions& o) {
         write_mcap(recording, logs[i], path + ".mcap");
       else
         write_csv(recording, logs[i], path);
-    } catch (const std::runtime_error& e) {
+    } catch (const Error& e) {
       ++failed;
       std::fprintf(stderr, "%s\n", e.what());
     }

@@ -4,9 +4,9 @@
 #include <cstdio>
 #include <filesystem>
 #include <set>
-#include <stdexcept>
 
 #include <bevel/cli/exit_status.hpp>
+#include <bevel/error.hpp>
 #include <bevel/io/csv_export.hpp>
 #include <bevel/io/csv_import.hpp>
 #include <bevel/io/find_logs.hpp>
@@ -21,7 +21,7 @@ namespace fs = std::filesystem;
 std::vector<std::string> csv_files(const std::vector<std::string>& paths) {
   std::vector<std::string> files;
   for (const std::string& path : paths) {
-    if (!fs::exists(path)) throw std::runtime_error(path + ": no such file or folder");
+    if (!fs::exists(path)) throw IoError(path + ": no such file or folder");
     if (!fs::is_directory(path)) {
       files.push_back(path);
       continue;
@@ -29,7 +29,7 @@ std::vector<std::string> csv_files(const std::vector<std::string>& paths) {
     std::vector<std::string> inside;
     for (const auto& entry : fs::directory_iterator(path))
       if (entry.path().extension() == ".csv") inside.push_back(entry.path().string());
-    if (inside.empty()) throw std::runtime_error(path + ": holds no file that ends in .csv");
+    if (inside.empty()) throw IoError(path + ": holds no file that ends in .csv");
     std::ranges::sort(inside);
     files.insert(files.end(), inside.begin(), inside.end());
   }
@@ -41,7 +41,7 @@ std::vector<std::string> log_paths(const std::vector<std::string>& recordings, c
   std::set<fs::path> known;
   for (const std::string& recording : recordings)
     if (!known.insert(fs::weakly_canonical(recording)).second)
-      throw std::runtime_error(recording + ": given twice; give each recording once");
+      throw IoError(recording + ": given twice; give each recording once");
   std::vector<std::string> logs;
   for (const std::string& name : io::result_names(recordings))
     logs.push_back((fs::path(out_folder) / (name + ".lcm")).string());
@@ -66,7 +66,7 @@ int for_each_recording(std::size_t count, One&& one) {
   for (std::size_t i = 0; i < count; ++i) {
     try {
       intact = one(i) && intact;
-    } catch (const std::runtime_error& e) {
+    } catch (const Error& e) {
       ++failed;
       std::fprintf(stderr, "%s\n", e.what());
     }
@@ -80,8 +80,8 @@ int import_exports(const ImportOptions& o) {
   const auto logs = log_paths(o.inputs, o.out_folder);
   return for_each_recording(logs.size(), [&](std::size_t i) {
     if (fs::exists(logs[i]))
-      throw std::runtime_error(logs[i] + ": is there already, and may be the log that was exported, which holds more " +
-                               "than the export; give another folder with --out");
+      throw IoError(logs[i] + ": is there already, and may be the log that was exported, which holds more " +
+                    "than the export; give another folder with --out");
     bool intact = true;
     const io::Recording recording = read_export(o.inputs[i], intact);
     io::write_log(recording, logs[i]);
@@ -110,9 +110,9 @@ int run(const ImportOptions& o) {
   const io::ColumnMap map = io::load_column_map(o.map_path);
   const auto files = csv_files(o.inputs), base = csv_files(o.base);
   if (map.base_time.has_value() != !base.empty() || (!base.empty() && base.size() != files.size()))
-    throw std::runtime_error(o.map_path + ": " + (map.base_time ? "has [base]" : "has no [base]") + "; given are " +
-                             std::to_string(files.size()) + " files of the tip and " + std::to_string(base.size()) +
-                             " of the base; allowed: " + (map.base_time ? "as many of each" : "none of the base"));
+    throw IoError(o.map_path + ": " + (map.base_time ? "has [base]" : "has no [base]") + "; given are " +
+                  std::to_string(files.size()) + " files of the tip and " + std::to_string(base.size()) +
+                  " of the base; allowed: " + (map.base_time ? "as many of each" : "none of the base"));
   const auto logs = log_paths(files, o.out_folder);
   return for_each_recording(files.size(), [&](std::size_t i) {
     const io::ImportedRecording recording = io::import_csv(files[i], map, base.empty() ? "" : base[i]);

@@ -4,9 +4,9 @@
 #include <cmath>
 #include <filesystem>
 #include <map>
-#include <stdexcept>
 
 #include <bevel/analysis/diagnose/figures.hpp>
+#include <bevel/error.hpp>
 #include <bevel/io/file_bytes.hpp>
 #include <bevel/io/find_logs.hpp>
 #include <bevel/io/motion_gap.hpp>
@@ -40,7 +40,7 @@ std::int64_t refused_on(const io::Recording& recording, const std::string& chann
 
 void check_motion_known(const std::string& name, std::vector<model::ActuatorState> states) {
   std::ranges::stable_sort(states, {}, &model::ActuatorState::utime);
-  if (const auto gap = io::find_motion_gap(states)) throw std::runtime_error(name + ": " + gap->what());
+  if (const auto gap = io::find_motion_gap(states)) throw ParseError(name + ": " + gap->what());
 }
 
 // The last `parts` parts of a path: "monday/insertion.lcm" for 2.
@@ -75,8 +75,8 @@ std::string judge_damage(const std::string& name, const io::Recording& recording
   if (lost > kLargestLoss * static_cast<double>(recording.bytes) ||
       lost_much(refused_on(recording, "TIP_MEASUREMENT"), recording.tips.size()) ||
       lost_much(refused_on(recording, "ACTUATOR_STATE"), recording.actuators.size()))
-    throw std::runtime_error(name + ": damaged beyond use (" + faults + "); at most " + percent(kLargestLoss) +
-                             " of a log, and of the messages of a channel, may be lost");
+    throw ParseError(name + ": damaged beyond use (" + faults + "); at most " + percent(kLargestLoss) +
+                     " of a log, and of the messages of a channel, may be lost");
   if (io::has_clock(recording)) check_motion_known(name, recording.actuators);
   if (recording.intact()) return "";
   return name + ": damaged (" + faults + "); what is left of it was used.";
@@ -103,8 +103,8 @@ class Reader {
     const auto bytes = files_.back().bytes();
     for (std::size_t k = 0; k + 1 < files_.size(); ++k)
       if (!bytes.empty() && std::ranges::equal(bytes, files_[k].bytes()))
-        throw std::runtime_error(log + ": the same recording as " + paths_[k] +
-                                 "; counted twice it would make everything look surer than it is");
+        throw ParseError(log + ": the same recording as " + paths_[k] +
+                         "; counted twice it would make everything look surer than it is");
     io::Recording recording = io::read_recording(bytes);
     recording.file_change = files_.back().change();
     result_.files.push_back({name, io::sha256_hex({reinterpret_cast<const char*>(bytes.data()), bytes.size()})});
@@ -139,10 +139,10 @@ ReadCase read_groups(const std::vector<std::string>& baseline, const std::vector
   for (const bool second : {false, true}) {
     const auto logs = io::find_logs(second ? changed : baseline);
     if (logs.size() < kFewest)
-      throw std::runtime_error(std::string(second ? "--changed" : "--baseline") + ": " + std::to_string(logs.size()) +
-                               " recording; at least " + std::to_string(kFewest) +
-                               " are needed to know how much insertions differ by themselves, and three or more are "
-                               "better");
+      throw ParseError(std::string(second ? "--changed" : "--baseline") + ": " + std::to_string(logs.size()) +
+                       " recording; at least " + std::to_string(kFewest) +
+                       " are needed to know how much insertions differ by themselves, and three or more are "
+                       "better");
     reader.add_all(logs, second ? "changed/" : "baseline/", second);
   }
   return reader.take();

@@ -7,9 +7,9 @@
 #include <cerrno>
 #include <csignal>
 #include <cstring>
-#include <stdexcept>
 #include <system_error>
 
+#include <bevel/error.hpp>
 #include <bevel/io/result_file.hpp>
 
 namespace bevel::analysis {
@@ -17,7 +17,7 @@ namespace fs = std::filesystem;
 namespace {
 
 [[noreturn]] void fail(const fs::path& path, const std::string& what) {
-  throw std::runtime_error(path.string() + ": " + what + ": " + std::strerror(errno));
+  throw IoError(path.string() + ": " + what + ": " + std::strerror(errno));
 }
 
 // What the handler says; made beforehand, a handler may not allocate.
@@ -71,7 +71,7 @@ void write_together(const fs::path& folder, const std::vector<ResultFile>& files
   const SignalsWait wait;
   std::error_code error;
   fs::create_directories(folder, error);
-  if (error) throw std::runtime_error(folder.string() + ": cannot be made: " + error.message());
+  if (error) throw IoError(folder.string() + ": cannot be made: " + error.message());
   std::vector<io::PendingFile> pending;
   pending.reserve(files.size());
   for (const auto& file : files) {

@@ -6,13 +6,13 @@
 #include <map>
 #include <numbers>
 #include <random>
-#include <stdexcept>
 
 #include <bevel/analysis/diagnose/figures.hpp>
 #include <bevel/analysis/steering/model_rig.hpp>
 #include <bevel/controller/arc_law.hpp>
 #include <bevel/diagnosis/parallel.hpp>
 #include <bevel/diagnosis/statistics/median.hpp>
+#include <bevel/error.hpp>
 #include <bevel/io/live_effects.hpp>
 
 namespace bevel::analysis {
@@ -152,7 +152,7 @@ void steer_to_targets(const RecordedCase& recorded, const io::ModelFile& in_use,
   }
   try {
     f.steered = steer(recorded, in_use, found, f.noise, depth_mm, targets_mm, options.threads);
-  } catch (const std::logic_error& e) {  // a model that estimator or controller refuses is no reason to lose the rest
+  } catch (const Error& e) {  // a model that estimator or controller refuses is no reason to lose the rest
     f.not_steered = e.what();
   }
 }

@@ -3,9 +3,9 @@
 #include <algorithm>
 #include <filesystem>
 #include <ostream>
-#include <stdexcept>
 
 #include <bevel/cli/exit_status.hpp>
+#include <bevel/error.hpp>
 #include <bevel/io/find_logs.hpp>
 #include <bevel/io/model_file.hpp>
 #include <bevel/io/recording.hpp>
@@ -53,14 +53,14 @@ Insertion read_insertion(const std::string& path, const std::string& name, std::
 Identification identify(const IdentifyOptions& options, std::ostream& err) {
   const io::ModelFile model = io::load_model_file(options.model_path);
   if (!model.effects.empty())
-    throw std::runtime_error(options.model_path + ": has [[effect]] \"" + model.effects.front().name +
+    throw ConfigurationError(options.model_path + ": has [[effect]] \"" + model.effects.front().name +
                              "\"; identification fits [needle] alone, bevel-diagnose fits effects");
   if (!model.discrepancies.empty())
-    throw std::runtime_error(options.model_path + ": has [[discrepancy]] in \"" +
+    throw ConfigurationError(options.model_path + ": has [[discrepancy]] in \"" +
                              std::string(model::info_of(model.discrepancies.front().component).name) +
                              "\"; identification fits [needle] alone, bevel-diagnose fits discrepancies");
   if (model.variation)
-    throw std::runtime_error(options.model_path +
+    throw ConfigurationError(options.model_path +
                              ": has [variation]; identification takes all insertions for the same needle, "
                              "bevel-diagnose fits how they differ");
   Identification result;
@@ -76,23 +76,23 @@ Identification identify(const IdentifyOptions& options, std::ostream& err) {
   result.candidates = fit_candidates(result.insertions, fit);
   result.preferred = options.bicycle ? 0 : preferred(result.candidates);
   if (!result.candidates[result.preferred].possible)
-    throw std::runtime_error("bicycle: " + result.candidates[result.preferred].why);
+    throw DomainError("bicycle: " + result.candidates[result.preferred].why);
   result.fit = result.candidates[result.preferred].fit;
   result.chosen = result.fit.needle;
   try {
     result.angle_rate = fit_angle_rate(result.insertions, model.needle);
-  } catch (const std::invalid_argument& e) {
+  } catch (const ArgumentError& e) {
     result.angle_rate_refusal = e.what();
   }
   if (options.method == "angle-rate") {
-    if (!result.angle_rate_refusal.empty()) throw std::runtime_error(result.angle_rate_refusal);
+    if (!result.angle_rate_refusal.empty()) throw DomainError(result.angle_rate_refusal);
     if (const auto violation = model::find_domain_violation(result.angle_rate.needle))
-      throw std::runtime_error("angle-rate fit leaves the model's domain: " + model::describe(*violation));
+      throw DomainError("angle-rate fit leaves the model's domain: " + model::describe(*violation));
     result.chosen = result.angle_rate.needle;
   }
   try {
     result.before = error_figures(result.insertions, model.needle, Compare::same_insertion);
-  } catch (const std::domain_error&) {  // the start need not be able to follow the data
+  } catch (const DomainError&) {  // the start need not be able to follow the data
   }
   const bool trajectory = options.method == "trajectory";
   result.after = error_figures(result.insertions, result.chosen, Compare::same_insertion,

@@ -8,9 +8,9 @@
 #include <numbers>
 #include <numeric>
 #include <ostream>
-#include <stdexcept>
 
 #include <bevel/cli/exit_status.hpp>
+#include <bevel/error.hpp>
 #include <bevel/io/model_file.hpp>
 #include <bevel/io/recording.hpp>
 #include <bevel/io/second_insertion.hpp>
@@ -29,7 +29,7 @@ namespace {
                 "the needle leaves the domain of the slip law (25) %.3f s after the first actuator sample, at "
                 "%.1f mm of insertion with its heading %.0f degrees off z",
                 state.base.time_s, state.base.insertion_mm, model::tilt_rad(state.pose) * 180 / std::numbers::pi);
-  throw std::domain_error(text.data());
+  throw DomainError(text.data());
 }
 
 // The log in order of time.
@@ -41,8 +41,8 @@ struct Ordered {
 
 template <class Measurement>
 Ordered in_order(std::span<const model::ActuatorState> actuators, std::span<const Measurement> tips) {
-  if (actuators.empty()) throw std::invalid_argument("no ACTUATOR_STATE: nothing tells how the base moved");
-  if (tips.empty()) throw std::invalid_argument("no TIP_MEASUREMENT: nothing tells for when to predict");
+  if (actuators.empty()) throw ArgumentError("no ACTUATOR_STATE: nothing tells how the base moved");
+  if (tips.empty()) throw ArgumentError("no TIP_MEASUREMENT: nothing tells for when to predict");
   const auto by_utime = [](const auto& a, const auto& b) { return a.utime < b.utime; };
   std::vector<model::ActuatorState> sorted(actuators.begin(), actuators.end());
   std::stable_sort(sorted.begin(), sorted.end(), by_utime);
@@ -141,7 +141,7 @@ int run(const std::string& model_path, const std::string& log_path, std::ostream
     headings = heading_residuals(needle, recording.actuators, recording.headings);
     if (uncertain) sd_mm = standard_deviations_mm(model, log_path, recording.actuators, recording.tips);
   } catch (const std::exception& e) {
-    throw std::runtime_error(log_path + ": " + e.what());
+    throw ParseError(log_path + ": " + e.what());
   }
   if (!headings.empty()) err << summary_of(headings);
   out << "utime,x_mm,y_mm,z_mm" << (uncertain ? ",x_sd_mm,y_sd_mm,z_sd_mm" : "")
@@ -159,7 +159,7 @@ int run(const std::string& model_path, const std::string& log_path, std::ostream
     if (!headings.empty()) out << cells_of(headings, p.utime);
     out << '\n';
   }
-  if (!(out << std::flush)) throw std::runtime_error("the output cannot be written");
+  if (!(out << std::flush)) throw ParseError("the output cannot be written");
   return recording.intact() ? cli::kOk : cli::kDamagedInput;
 }
 

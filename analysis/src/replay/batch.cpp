@@ -5,12 +5,12 @@
 #include <exception>
 #include <mutex>
 #include <ostream>
-#include <stdexcept>
 #include <thread>
 
 #include <bevel/analysis/replay/held_out.hpp>
 #include <bevel/analysis/replay/report.hpp>
 #include <bevel/cli/exit_status.hpp>
+#include <bevel/error.hpp>
 #include <bevel/io/estimator_config.hpp>
 #include <bevel/io/file_bytes.hpp>
 #include <bevel/io/find_logs.hpp>
@@ -96,7 +96,7 @@ int run(const BatchOptions& options, std::ostream& out, std::ostream& err) {
   const ReplaySetup setup = load_setup(options);
   const auto logs = io::find_logs(options.paths);
   if (options.held_out && logs.size() < 2)
-    throw std::runtime_error("there is one log; to learn on the others takes at least two");
+    throw ConfigurationError("there is one log; to learn on the others takes at least two");
   ReplayOptions replay_options;
   replay_options.effects = setup.effects;
   replay_options.discrepancies = setup.discrepancies;

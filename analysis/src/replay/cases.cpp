@@ -4,9 +4,9 @@
 #include <cstdio>
 #include <filesystem>
 #include <ostream>
-#include <stdexcept>
 
 #include <bevel/analysis/replay/batch.hpp>
+#include <bevel/error.hpp>
 #include <bevel/io/find_logs.hpp>
 
 namespace bevel::analysis {
@@ -65,11 +65,11 @@ CaseFigures figures_of(const std::string& folder, const BatchOptions& options, s
 int run_cases(const BatchOptions& options, std::ostream& out, std::ostream& err) {
   std::vector<std::string> folders;
   for (const std::string& path : options.paths) {
-    if (!fs::is_directory(path)) throw std::runtime_error(path + ": no such folder of cases");
+    if (!fs::is_directory(path)) throw IoError(path + ": no such folder of cases");
     for (const auto& entry : fs::directory_iterator(path))
       if (fs::exists(entry.path() / "model.toml")) folders.push_back(entry.path().string());
   }
-  if (folders.empty()) throw std::runtime_error(options.paths.front() + ": holds no case (a folder with model.toml)");
+  if (folders.empty()) throw IoError(options.paths.front() + ": holds no case (a folder with model.toml)");
   std::sort(folders.begin(), folders.end());
   out << "case      noise x y z (mm)    rho x y z          NIS as stated  NIS calibrated [95 % band]  not white  "
          "rejected   consistent\n";

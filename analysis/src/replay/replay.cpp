@@ -4,9 +4,9 @@
 #include <chrono>
 #include <cmath>
 #include <ctime>
-#include <stdexcept>
 #include <utility>
 
+#include <bevel/error.hpp>
 #include <bevel/io/motion_gap.hpp>
 #include <bevel/io/recording.hpp>
 
@@ -197,10 +197,9 @@ Replay replay_log(std::span<const std::uint8_t> log, const std::string& name, co
     row.test_ratio = estimate.newest_update.test_ratio;
     row.health = estimate.health;
     if (!is_finite(estimate))
-      throw std::runtime_error(
-          name + ": the estimate is not finite from " +
-          std::to_string(static_cast<double>(actuator.utime - result.states.front().utime) * 1e-6) +
-          " s on; check the measurements before that time, and the model file");
+      throw DomainError(name + ": the estimate is not finite from " +
+                        std::to_string(static_cast<double>(actuator.utime - result.states.front().utime) * 1e-6) +
+                        " s on; check the measurements before that time, and the model file");
   }
   result.processor_s = processor_s() - start_processor_s;
   result.run_s = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
@@ -214,8 +213,8 @@ Replay replay_log(std::span<const std::uint8_t> log, const std::string& name, co
                         " were not used: they stand in the log after their time has left the estimator's history. " +
                         "Is the log in the order of time?\n";
   if (result.states.empty())
-    throw std::runtime_error(name + ": no state estimated from its " + std::to_string(recording.actuators.size()) +
-                             " ACTUATOR_STATE messages; at least one is needed");
+    throw DomainError(name + ": no state estimated from its " + std::to_string(recording.actuators.size()) +
+                      " ACTUATOR_STATE messages; at least one is needed");
   result.log_s = static_cast<double>(result.states.back().utime - result.states.front().utime) * 1e-6;
   compare(result, recording.truths, estimator.filter());
   if (result.headings.empty()) return result;

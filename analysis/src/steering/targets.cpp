@@ -11,11 +11,11 @@
 #include <numbers>
 #include <optional>
 #include <ostream>
-#include <stdexcept>
 #include <utility>
 
 #include <bevel/cli/progress_line.hpp>
 #include <bevel/diagnosis/parallel.hpp>
+#include <bevel/error.hpp>
 #include <bevel/io/result_file.hpp>
 #include <bevel/rig/steering/scenarios.hpp>
 
@@ -184,7 +184,7 @@ std::vector<const Scenario*> wanted_scenarios(const std::string& name) {
     names += ", " + scenario.name;
     if (name.empty() ? scenario.in_table : name == "all" || name == scenario.name) wanted.push_back(&scenario);
   }
-  if (wanted.empty()) throw std::runtime_error("no scenario '" + name + "'; there are: " + names);
+  if (wanted.empty()) throw ConfigurationError("no scenario '" + name + "'; there are: " + names);
   return wanted;
 }
 
@@ -195,7 +195,7 @@ std::vector<LawTried> wanted_laws(const std::string& name) {
     names += (names.empty() ? "" : ", ") + std::string(law.name);
     if (name.empty() ? law.law != controller::Law::flip : name == law.name) wanted.push_back(law);
   }
-  if (wanted.empty()) throw std::runtime_error("no law '" + name + "'; there are: " + names);
+  if (wanted.empty()) throw ConfigurationError("no law '" + name + "'; there are: " + names);
   return wanted;
 }
 
@@ -235,7 +235,7 @@ Insertion one_insertion(const Row& row, const TargetsOptions& options, std::uint
 int run_targets(const TargetsOptions& options, std::ostream& out) {
   const std::vector<Row> rows = rows_of(options);
   if (rows.empty())
-    throw std::runtime_error("--law \"" + options.law + "\" is not tried in --scenario " + options.scenario);
+    throw ConfigurationError("--law \"" + options.law + "\" is not tried in --scenario " + options.scenario);
   if (!options.json.empty()) io::require_writable(options.json);  // before hours of work
   out << "seed " << options.seed
       << "; errors in mm, of the insertions that came to rest at the depth of their target\n\n"

@@ -6,6 +6,7 @@
 #include <random>
 
 #include <bevel/diagnosis/identification/candidates.hpp>
+#include <bevel/error.hpp>
 #include <bevel/rig/plant/plant.hpp>
 
 namespace bevel::analysis {
@@ -142,7 +143,7 @@ Tissue identify_tissue(const TissuePath& path, std::uint64_t seed) {
     const auto largest_mm = [&](const AngleRateResult& rate) {
       try {
         return error_figures({row.mean}, rate.needle, Compare::same_depth).largest_mm;
-      } catch (const std::domain_error&) {
+      } catch (const DomainError&) {
         return std::nan("");
       }
     };

@@ -3,8 +3,8 @@
 #include <ceres/ceres.h>
 
 #include <Eigen/Dense>
+#include <bevel/error.hpp>
 #include <cmath>
-#include <stdexcept>
 
 namespace bevel::diagnosis {
 namespace {
@@ -27,13 +27,13 @@ double second_rate(const Eigen::Vector4d& c, double t) { return 2 * c(2) + 6 * t
 std::vector<AngleSample> angle_samples(const Insertion& insertion) {
   const double turned_rad = roll_range_rad(insertion);
   if (turned_rad > 0.02)
-    throw std::invalid_argument(insertion.name + ": the shaft turns by " + std::to_string(turned_rad) +
-                                " rad; the angle-rate method is planar and allows 0.02 rad");
+    throw ArgumentError(insertion.name + ": the shaft turns by " + std::to_string(turned_rad) +
+                        " rad; the angle-rate method is planar and allows 0.02 rad");
   const auto& seen = insertion.observations;
   const auto n = static_cast<Eigen::Index>(seen.size());
   if (n < 8)
-    throw std::invalid_argument(insertion.name + ": " + std::to_string(n) +
-                                " measurements; the angle-rate method wants at least 8");
+    throw ArgumentError(insertion.name + ": " + std::to_string(n) +
+                        " measurements; the angle-rate method wants at least 8");
   Eigen::VectorXd t(n), y(n), z(n), s(n);
   for (Eigen::Index i = 0; i < n; ++i) {
     const auto& o = seen[static_cast<std::size_t>(i)];
@@ -44,8 +44,7 @@ std::vector<AngleSample> angle_samples(const Insertion& insertion) {
   }
   const double duration_s = t(n - 1);
   if (!(duration_s > 0) || !(s(n - 1) > s(0)))
-    throw std::invalid_argument(insertion.name +
-                                ": the needle does not advance; the angle-rate method wants an insertion");
+    throw ArgumentError(insertion.name + ": the needle does not advance; the angle-rate method wants an insertion");
   // Polynomials of t/T: the same curves as of t, better conditioned.
   t /= duration_s;
   const auto py = fit_cubic(t, y);
@@ -95,7 +94,7 @@ AngleRateResult fit_angle_rate(const std::vector<Insertion>& insertions, const m
       problem.AddResidualBlock(
           new ceres::AutoDiffCostFunction<AngleRate, 1, 1, 2>(new AngleRate{sample, start.wheelbase_mm, sign}), nullptr,
           &k, lambda.data());
-  if (problem.NumResiduals() == 0) throw std::invalid_argument("a fit wants at least one insertion");
+  if (problem.NumResiduals() == 0) throw ArgumentError("a fit wants at least one insertion");
   if (!fit_curvature) problem.SetParameterBlockConstant(&k);
   ceres::Solver::Options options;
   options.linear_solver_type = ceres::DENSE_QR;

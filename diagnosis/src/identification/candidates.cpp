@@ -1,8 +1,8 @@
 #include <bevel/diagnosis/identification/candidates.hpp>
 
 #include <algorithm>
+#include <bevel/error.hpp>
 #include <cmath>
-#include <stdexcept>
 
 namespace bevel::diagnosis {
 namespace {
@@ -18,7 +18,7 @@ Candidate fit_one(std::string name, bool extended, const std::vector<Insertion>&
     c.fit = fit_determined(insertions, options);
     c.at_insertion = error_figures(insertions, c.fit.needle, Compare::same_insertion, c.fit.entries);
     c.at_depth = error_figures(insertions, c.fit.needle, Compare::same_depth, c.fit.entries);
-  } catch (const std::logic_error& e) {  // invalid_argument of the fit, domain_error of the figures
+  } catch (const Error& e) {  // invalid_argument of the fit, domain_error of the figures
     c.possible = false;
     c.why = e.what();
     return c;
@@ -99,7 +99,7 @@ std::vector<Candidate> fit_candidates(const std::vector<Insertion>& insertions, 
 
 std::size_t preferred(const std::vector<Candidate>& all) {
   const std::size_t best = best_of(all, 0, all.size());
-  if (best == all.size()) throw std::invalid_argument(all.empty() ? "no candidate" : all.front().why);
+  if (best == all.size()) throw ArgumentError(all.empty() ? "no candidate" : all.front().why);
   return best;
 }
 

@@ -1,8 +1,8 @@
 #include <bevel/diagnosis/identification/figures.hpp>
 
+#include <bevel/error.hpp>
 #include <cmath>
 #include <limits>
-#include <stdexcept>
 
 namespace bevel::diagnosis {
 namespace {
@@ -41,7 +41,7 @@ std::vector<double> path_errors_mm(const Insertion& insertion, const model::Need
                                    const Entry& entry) {
   Path path;
   if (!integrate(insertion, needle, entry, false, path))
-    throw std::domain_error(insertion.name + ": with these parameters the tip leaves the domain of the slip law, (25)");
+    throw DomainError(insertion.name + ": with these parameters the tip leaves the domain of the slip law, (25)");
   std::vector<double> errors;
   for (std::size_t i = 0; i < insertion.observations.size(); ++i) {
     const Observation& o = insertion.observations[i];
@@ -93,14 +93,14 @@ ErrorFigures error_figures(const std::vector<Insertion>& insertions, const model
 }
 
 Insertion mean_of_trials(const std::vector<Insertion>& trials) {
-  if (trials.empty()) throw std::invalid_argument("the mean of no trials");
+  if (trials.empty()) throw ArgumentError("the mean of no trials");
   Insertion mean = trials.front();
   mean.name = "mean of " + std::to_string(trials.size()) + " trials";
   for (std::size_t k = 1; k < trials.size(); ++k) {
     if (trials[k].observations.size() != mean.observations.size())
-      throw std::invalid_argument(trials[k].name + " has " + std::to_string(trials[k].observations.size()) +
-                                  " measurements and " + trials[0].name + " has " +
-                                  std::to_string(mean.observations.size()) + ": their mean wants the same number");
+      throw ArgumentError(trials[k].name + " has " + std::to_string(trials[k].observations.size()) +
+                          " measurements and " + trials[0].name + " has " + std::to_string(mean.observations.size()) +
+                          ": their mean wants the same number");
     for (std::size_t i = 0; i < mean.observations.size(); ++i)
       mean.observations[i].position_mm += trials[k].observations[i].position_mm;
   }

@@ -2,11 +2,11 @@
 
 #include <Eigen/Eigenvalues>
 #include <algorithm>
+#include <bevel/error.hpp>
 #include <cmath>
 #include <limits>
 #include <numbers>
 #include <optional>
-#include <stdexcept>
 
 namespace bevel::diagnosis {
 namespace {
@@ -36,7 +36,7 @@ std::vector<Waypoint> merge(const std::vector<model::ActuatorState>& actuators,
     const auto& b = actuators[i];
     if (i > 0) {
       const auto& a = actuators[i - 1];
-      if (b.utime < a.utime) throw std::invalid_argument("actuator samples run backwards in time");
+      if (b.utime < a.utime) throw ArgumentError("actuator samples run backwards in time");
       for (; next < measurements.size() && measurements[next].utime < b.utime; ++next) {
         const double t =
             static_cast<double>(measurements[next].utime - a.utime) / static_cast<double>(b.utime - a.utime);
@@ -110,8 +110,8 @@ double roll_range_rad(const Insertion& insertion) {
 Insertion make_insertion(std::string name, const std::vector<model::ActuatorState>& actuators,
                          const std::vector<model::TipMeasurement>& measurements) {
   if (actuators.size() < 2)
-    throw std::invalid_argument(name + ": " + std::to_string(actuators.size()) +
-                                " actuator samples; an insertion has at least 2");
+    throw ArgumentError(name + ": " + std::to_string(actuators.size()) +
+                        " actuator samples; an insertion has at least 2");
   Insertion out;
   out.name = std::move(name);
   std::vector<Waypoint> way = merge(actuators, measurements, out.skipped);
@@ -160,9 +160,9 @@ Insertion make_insertion(std::string name, const std::vector<model::ActuatorStat
     first = last;
   }
   if (out.observations.empty())
-    throw std::invalid_argument(out.name + ": none of its " + std::to_string(measurements.size()) +
-                                " tip measurements is usable; wanted are status 0, an information matrix that is not "
-                                "zero, and a time within the actuators'");
+    throw ArgumentError(out.name + ": none of its " + std::to_string(measurements.size()) +
+                        " tip measurements is usable; wanted are status 0, an information matrix that is not "
+                        "zero, and a time within the actuators'");
   if (out.legs.empty()) out.legs.push_back({0, 0});
   return out;
 }

@@ -1,8 +1,8 @@
 #include <algorithm>
 #include <cmath>
-#include <stdexcept>
 
 #include <bevel/diagnosis/identification/trajectory_fit.hpp>
+#include <bevel/error.hpp>
 
 namespace bevel::diagnosis {
 
@@ -12,7 +12,7 @@ FitResult fit_from_many_starts(const std::vector<Insertion>& insertions, const F
   const auto attempt = [&](const FitOptions& from) {
     try {
       fits.push_back(fit_trajectory(insertions, from));
-    } catch (const std::invalid_argument& e) {
+    } catch (const ArgumentError& e) {
       refusal = e.what();
     }
   };
@@ -41,7 +41,7 @@ FitResult fit_from_many_starts(const std::vector<Insertion>& insertions, const F
     if (options.fitted[kLambda2]) from.start.lambda2 = 0;
     if (!model::find_domain_violation(from.start)) attempt(from);
   }
-  if (fits.empty()) throw std::invalid_argument(refusal);
+  if (fits.empty()) throw ArgumentError(refusal);
   // Correlated residuals count less against the priors; by how much is taken from the least correlated fit, for all.
   double rho = 1;
   for (const auto& fit : fits) rho = std::min(rho, std::max(fit.lag1_correlation, 0.0));

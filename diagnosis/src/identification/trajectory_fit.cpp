@@ -5,9 +5,9 @@
 #include <cmath>
 #include <limits>
 #include <numbers>
-#include <stdexcept>
 
 #include <bevel/diagnosis/identification/fit_statistics.hpp>
+#include <bevel/error.hpp>
 #include "identification/trajectory_problem.hpp"
 
 namespace bevel::diagnosis {
@@ -36,8 +36,7 @@ FitResult TrajectoryFit::run() {
   std::vector<Block> now;
   std::vector<Block> trial;
   if (!evaluate(x, now))
-    throw std::invalid_argument(
-        "from its start the model cannot follow the insertions: the tilt leaves the domain of (25)");
+    throw ArgumentError("from its start the model cannot follow the insertions: the tilt leaves the domain of (25)");
 
   double damping = 1e-6;
   bool converged = false;

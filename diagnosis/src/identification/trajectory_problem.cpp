@@ -5,10 +5,10 @@
 #include <cmath>
 #include <limits>
 #include <numbers>
-#include <stdexcept>
 #include <thread>
 
 #include <bevel/diagnosis/identification/fit_statistics.hpp>
+#include <bevel/error.hpp>
 
 namespace bevel::diagnosis {
 namespace {
@@ -21,24 +21,24 @@ using Eigen::VectorXd;
 
 TrajectoryFit::TrajectoryFit(const std::vector<Insertion>& insertions, const FitOptions& options)
     : insertions_(insertions), options_(options) {
-  if (insertions.empty()) throw std::invalid_argument("a fit wants at least one insertion");
+  if (insertions.empty()) throw ArgumentError("a fit wants at least one insertion");
   if (const auto violation = model::find_domain_violation(options.start))
-    throw std::invalid_argument("start of the fit: " + model::describe(*violation));
+    throw ArgumentError("start of the fit: " + model::describe(*violation));
   for (int p = 0; p < kNeedleParameters; ++p)
     if (options.fitted[static_cast<std::size_t>(p)]) parameters_.push_back(static_cast<Parameter>(p));
   for (int e = 0; e < kEntryParameters; ++e) {
-    if (!(options.entry_sigma(e) >= 0)) throw std::invalid_argument("entry_sigma must be 0 or above");
+    if (!(options.entry_sigma(e) >= 0)) throw ArgumentError("entry_sigma must be 0 or above");
     if (options.entry_sigma(e) > 0) entry_.push_back(static_cast<EntryParameter>(e));
   }
   globals_ = static_cast<Eigen::Index>(parameters_.size());
   locals_ = static_cast<Eigen::Index>(entry_.size());
   size_ = globals_ + locals_ * static_cast<Eigen::Index>(insertions.size());
-  if (size_ == 0) throw std::invalid_argument("nothing to fit: no parameter is free");
+  if (size_ == 0) throw ArgumentError("nothing to fit: no parameter is free");
   prior_mean_.setZero(size_);
   prior_weight_.setZero(size_);
   for (Eigen::Index i = 0; i < globals_; ++i)
     if (const auto& prior = options.priors[parameters_[static_cast<std::size_t>(i)]]) {
-      if (!(prior->sigma > 0)) throw std::invalid_argument("a prior's sigma must be above 0");
+      if (!(prior->sigma > 0)) throw ArgumentError("a prior's sigma must be above 0");
       prior_mean_(i) = prior->mean;
       prior_weight_(i) = 1 / (prior->sigma * prior->sigma);
     }

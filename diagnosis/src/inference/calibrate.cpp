@@ -2,9 +2,9 @@
 
 #include <algorithm>
 #include <cmath>
-#include <stdexcept>
 
 #include <bevel/diagnosis/inference/nuisance_grid.hpp>
+#include <bevel/error.hpp>
 
 namespace bevel::inference {
 
@@ -73,7 +73,7 @@ Calibration calibrate(const System& system) {
   claimed.frame_s = system.data().frame_s;
   claimed.sigma = system.data().claimed_sd;
   const Fit base = tempered_base(system, none, claimed);
-  if (!base.valid) throw std::domain_error("the model cannot follow the recordings");
+  if (!base.valid) throw DomainError("the model cannot follow the recordings");
   return calibrate_noise(system.data(),
                          errors_by_series(Likelihood(system, none, claimed), base.layout, base.shared, base.local));
 }

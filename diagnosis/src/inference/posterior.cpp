@@ -7,11 +7,11 @@
 #include <cmath>
 #include <numeric>
 #include <set>
-#include <stdexcept>
 
 #include <bevel/diagnosis/inference/local_minima.hpp>
 #include <bevel/diagnosis/inference/log_sum.hpp>
 #include <bevel/diagnosis/parallel.hpp>
+#include <bevel/error.hpp>
 
 namespace bevel::inference {
 
@@ -299,7 +299,7 @@ std::vector<LeftOutSelection> leave_out_selection(const Search& search) {
       if (auto part = leave_out(fit, blocks, curve, r)) models[m].parts.push_back(std::move(*part));
   });
   std::erase_if(models, [&](const Model& model) { return model.parts.size() < recordings; });
-  if (models.empty()) throw std::domain_error("no model can be fitted to these recordings without one of them");
+  if (models.empty()) throw DomainError("no model can be fitted to these recordings without one of them");
   std::vector<LeftOutSelection> out;
   for (std::size_t r = 0; r < recordings; ++r) {
     std::vector<double> with, without;

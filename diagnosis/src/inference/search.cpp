@@ -7,12 +7,12 @@
 #include <limits>
 #include <numeric>
 #include <set>
-#include <stdexcept>
 
 #include <bevel/diagnosis/inference/calibrate.hpp>
 #include <bevel/diagnosis/inference/error_spread.hpp>
 #include <bevel/diagnosis/inference/log_sum.hpp>
 #include <bevel/diagnosis/parallel.hpp>
+#include <bevel/error.hpp>
 
 namespace bevel::inference {
 namespace {
@@ -268,7 +268,7 @@ void Search::look_in_rounds(std::shared_ptr<const Likelihood> reference, Start& 
     last_round_ = round + 1 == rules_.rounds;
     likelihood_ = reference;
     Evaluated base = evaluate(*likelihood_, nothing, start.shared, start.local, start.nuisance_sd);
-    if (!base.valid) throw std::domain_error("the model cannot follow the recordings");
+    if (!base.valid) throw DomainError("the model cannot follow the recordings");
     discrepancy_ = std::make_unique<const Discrepancy>(*likelihood_, base.fit);
     proposals_ = nullptr;
     keep({}, std::make_shared<const Evaluated>(base));

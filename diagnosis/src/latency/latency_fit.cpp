@@ -7,9 +7,9 @@
 #include <cmath>
 #include <cstdio>
 #include <limits>
-#include <stdexcept>
 #include <vector>
 
+#include <bevel/error.hpp>
 #include <bevel/model/effects/open_loop.hpp>
 
 namespace bevel::diagnosis {
@@ -73,7 +73,7 @@ Path path_of(const model::AugmentedNeedle& needle, const std::vector<model::Actu
   }
   model::OpenLoop open_loop;
   if (!model::predict(needle, model::make_motion(axes, utimes), open_loop, true))
-    throw std::domain_error("the model's needle leaves the domain of the slip law (25) along this motion");
+    throw DomainError("the model's needle leaves the domain of the slip law (25) along this motion");
   path.position_mm = std::move(open_loop.position_mm);
   path.heading = std::move(open_loop.heading);
   path.start_utime = axes.front().utime;
@@ -279,7 +279,7 @@ LatencyFit fit_latency(const model::AugmentedNeedle& needle, std::span<const mod
                        std::span<const model::TipMeasurement> tips) {
   const std::vector<model::ActuatorState> axes = going_in(actuators);
   if (axes.size() < 2)
-    throw std::invalid_argument("fewer than two actuator samples before the first withdrawal: there is no motion");
+    throw ArgumentError("fewer than two actuator samples before the first withdrawal: there is no motion");
   const Path path = path_of(needle, axes);
   const std::vector<Reading> readings = readings_of(tips, path);
   LatencyFit fit;

@@ -4,12 +4,12 @@
 #include <chrono>
 #include <cmath>
 #include <limits>
-#include <stdexcept>
 
 #include <bevel/diagnosis/inference/calibrate.hpp>
 #include <bevel/diagnosis/mismatch/found_effects.hpp>
 #include <bevel/diagnosis/mismatch/invariants.hpp>
 #include <bevel/diagnosis/parallel.hpp>
+#include <bevel/error.hpp>
 #include "mismatch/checks.hpp"
 #include "mismatch/held_out.hpp"
 #include "mismatch/location.hpp"
@@ -48,8 +48,8 @@ class Stages {
 inference::Calibration calibrate(const NeedleSystem& system) {
   try {
     return inference::calibrate(system);
-  } catch (const std::domain_error&) {
-    throw std::invalid_argument(
+  } catch (const DomainError&) {
+    throw ArgumentError(
         "the model in use cannot follow these recordings: with it the tip leaves the domain of the slip law; check the "
         "model file's curvature_per_mm and lambda, and that insertion and rotation are logged in mm and rad");
   }

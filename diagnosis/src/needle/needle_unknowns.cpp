@@ -7,6 +7,7 @@
 #include <numbers>
 
 #include <bevel/diagnosis/needle/needle_system.hpp>
+#include <bevel/error.hpp>
 
 namespace bevel::diagnosis {
 
@@ -78,11 +79,11 @@ std::vector<inference::NuisanceGroup> variation_groups(bool by_hand) {
 inference::Prior prior_of(std::string_view effect, const model::EffectParameter& p) {
   const bool sized = !std::isnan(p.none);
   if (sized ? !(p.reported > 0) : !p.periodic && !(p.likely_low < p.likely_high))
-    throw std::invalid_argument("effect " + std::string(effect) + ", parameter " + std::string(p.name) +
-                                (sized ? ": reported is " + std::to_string(p.reported) +
-                                             "; required: above 0, the largest size that is reported"
-                                       : ": likely_low to likely_high is empty; required: the range that is likely") +
-                                ". The prior density follows from it; set it in the effect's source file");
+    throw ArgumentError("effect " + std::string(effect) + ", parameter " + std::string(p.name) +
+                        (sized ? ": reported is " + std::to_string(p.reported) +
+                                     "; required: above 0, the largest size that is reported"
+                               : ": likely_low to likely_high is empty; required: the range that is likely") +
+                        ". The prior density follows from it; set it in the effect's source file");
   if (sized) {
     auto prior = inference::size_prior(p.none, kExpectedShare * p.reported, p.lower, p.upper);
     prior.least_distance = p.smallest_seen;
@@ -177,10 +178,9 @@ NeedleSystem::NeedleSystem(RecordedCase recorded, const model::NeedleParameters&
       headings_(recorded_.has_headings()) {
   const std::size_t most_known = by_hand() ? kMostKnownByHand : kMostKnown;
   if (known_.elsewhere.size() > most_known)
-    throw std::invalid_argument("the model in use has " + std::to_string(known_.elsewhere.size()) +
-                                " effects and discrepancies; at most " + std::to_string(most_known) +
-                                " can be held while more is looked for" +
-                                (by_hand() ? " in recordings without a clock" : ""));
+    throw ArgumentError("the model in use has " + std::to_string(known_.elsewhere.size()) +
+                        " effects and discrepancies; at most " + std::to_string(most_known) +
+                        " can be held while more is looked for" + (by_hand() ? " in recordings without a clock" : ""));
   const double u = std::max(model.lambda1_per_rad - model.lambda2 * model.lambda2 / (2 * std::numbers::pi), kSmallestU);
   const double width_k = kCurvatureShare * std::max(std::abs(model.curvature_per_mm), 1e-4);
   const double u_width = determines_slip_ ? kUWidth_per_rad : kHeldWidth;

@@ -7,10 +7,10 @@
 #include <map>
 #include <numeric>
 #include <sstream>
-#include <stdexcept>
 
 #include <bevel/diagnosis/needle/scatter_near_entry.hpp>
 #include <bevel/diagnosis/statistics/median.hpp>
+#include <bevel/error.hpp>
 
 namespace bevel::diagnosis {
 namespace {
@@ -181,24 +181,23 @@ Recording make_recording(RawRecording& raw, std::vector<Channel>& channels) {
   recording.changed = raw.changed;
   std::ranges::stable_sort(raw.actuators, {}, &model::ActuatorState::utime);
   if (raw.actuators.size() < 2)
-    throw std::invalid_argument(raw.name + ": " + std::to_string(raw.actuators.size()) +
-                                " ACTUATOR_STATE messages; the motion of the base needs at least two");
+    throw ArgumentError(raw.name + ": " + std::to_string(raw.actuators.size()) +
+                        " ACTUATOR_STATE messages; the motion of the base needs at least two");
   const std::vector<Point> usable = usable_points(raw);
   recording.skipped = raw.tips.size() + raw.headings.size() - usable.size();
   if (std::ranges::all_of(usable, &Point::heading))
-    throw std::invalid_argument(raw.name + ": no usable TIP_MEASUREMENT (" + std::to_string(raw.tips.size()) +
-                                " in the log, of which none has status 0 and information along any axis)");
+    throw ArgumentError(raw.name + ": no usable TIP_MEASUREMENT (" + std::to_string(raw.tips.size()) +
+                        " in the log, of which none has status 0 and information along any axis)");
   const auto seconds = [&](std::int64_t utime) {
     return static_cast<double>(utime - raw.actuators.front().utime) * 1e-6;
   };
   const double end_s = seconds(raw.actuators.back().utime);
   const double middle_s = seconds(usable[usable.size() / 2].utime);
   if (middle_s < -kClocksApart_s || middle_s > end_s + kClocksApart_s)
-    throw std::invalid_argument(raw.name +
-                                ": the clocks of camera and axes are apart: half of the tip measurements lie " +
-                                std::to_string(std::abs(middle_s < 0 ? middle_s : middle_s - end_s)) +
-                                " s outside the actuators' time; at most " + std::to_string(kClocksApart_s) +
-                                " s is allowed. Set both clocks by the same source and record again");
+    throw ArgumentError(raw.name + ": the clocks of camera and axes are apart: half of the tip measurements lie " +
+                        std::to_string(std::abs(middle_s < 0 ? middle_s : middle_s - end_s)) +
+                        " s outside the actuators' time; at most " + std::to_string(kClocksApart_s) +
+                        " s is allowed. Set both clocks by the same source and record again");
 
   // A position and a heading of one time and one sensor are one message, right or wrong together.
   std::vector<std::int64_t> utimes;
@@ -237,9 +236,9 @@ void check_lengths(const RecordedCase& recorded) {
     std::size_t most = 0;
     for (const auto& recording : recorded.recordings) most = std::max(most, recording.series[c].time_s.size());
     if (most < kFewest)
-      throw std::invalid_argument("channel " + recorded.channels[c].name + " has " + std::to_string(most) +
-                                  " readings in its longest recording; at least " + std::to_string(kFewest) +
-                                  " are needed to measure its noise");
+      throw ArgumentError("channel " + recorded.channels[c].name + " has " + std::to_string(most) +
+                          " readings in its longest recording; at least " + std::to_string(kFewest) +
+                          " are needed to measure its noise");
   }
 }
 
@@ -254,19 +253,19 @@ void check_same_rig(const RecordedCase& recorded) {
       const std::string where = recording.name + " and " + first.name + ": recordings of different rigs: ";
       const std::string& channel = recorded.channels[c].name;
       if (recording.series[c].time_s.size() < 2)
-        throw std::invalid_argument(recording.name + ": no channel " + channel +
-                                    ", which another recording has: recordings of different rigs");
+        throw ArgumentError(recording.name + ": no channel " + channel +
+                            ", which another recording has: recordings of different rigs");
       const double a_s = period(recording.series[c]);
       const double b_s = period(first.series[c]);
       if (differ(a_s, b_s))
-        throw std::invalid_argument(where + "a reading of " + channel + " every " + std::to_string(a_s) +
-                                    " s and every " + std::to_string(b_s) + " s");
+        throw ArgumentError(where + "a reading of " + channel + " every " + std::to_string(a_s) + " s and every " +
+                            std::to_string(b_s) + " s");
       const double a_sd = median(recording.series[c].relative_sd);
       const double b_sd = median(first.series[c].relative_sd);
       const std::string unit = std::string(" ") + recorded.channels[c].unit();
       if (differ(a_sd, b_sd))
-        throw std::invalid_argument(where + "the standard deviation claimed for " + channel + " is " +
-                                    std::to_string(a_sd) + unit + " and " + std::to_string(b_sd) + unit);
+        throw ArgumentError(where + "the standard deviation claimed for " + channel + " is " + std::to_string(a_sd) +
+                            unit + " and " + std::to_string(b_sd) + unit);
     }
 }
 
@@ -291,9 +290,8 @@ std::size_t RecordedCase::measurements() const {
 
 RecordedCase make_case(std::vector<RawRecording> raw) {
   if (raw.size() < 2)
-    throw std::invalid_argument(
-        std::to_string(raw.size()) +
-        " recording given; at least two are needed: what is found in one has to predict another");
+    throw ArgumentError(std::to_string(raw.size()) +
+                        " recording given; at least two are needed: what is found in one has to predict another");
   RecordedCase recorded;
   recorded.has_clock = std::ranges::all_of(raw, &RawRecording::has_clock);
   for (auto& one : raw) {

@@ -2,9 +2,9 @@
 
 #include <algorithm>
 #include <limits>
-#include <stdexcept>
 #include <string>
 
+#include <bevel/error.hpp>
 #include "camera/calibration/number_text.hpp"
 
 namespace bevel::camera {
@@ -29,18 +29,16 @@ CalibratedView::CalibratedView(const CameraModel& model) : model_(model) {
   check(model_);
   const std::string camera = "camera " + std::to_string(model.number);
   const auto ahead = model_.ray(middle(model_.lens.picture_px));
-  if (!ahead)
-    throw std::invalid_argument(camera + ": distortion_coefficients leave no direction to the picture's middle");
+  if (!ahead) throw ArgumentError(camera + ": distortion_coefficients leave no direction to the picture's middle");
   const cv::Vec3d across(ahead->direction[0], ahead->direction[1], 0.0);
   if (!(cv::norm(across) >= kSineAlongNeedle))
-    throw std::invalid_argument(camera + ": its line of sight is " +
-                                number_text(std::asin(std::min(1.0, cv::norm(across))) * 180.0 / CV_PI) +
-                                " degrees from the z axis of {A}, allowed: 20 or more, or it looks along the needle");
+    throw ArgumentError(camera + ": its line of sight is " +
+                        number_text(std::asin(std::min(1.0, cv::norm(across))) * 180.0 / CV_PI) +
+                        " degrees from the z axis of {A}, allowed: 20 or more, or it looks along the needle");
   plane_normal_ = cv::normalize(across);
   const auto at = spot(middle(model_.lens.picture_px));
   if (!at)
-    throw std::invalid_argument(camera +
-                                ": the needle's plane lies behind it or before its wall; is the frame {A} right?");
+    throw ArgumentError(camera + ": the needle's plane lies behind it or before its wall; is the frame {A} right?");
   px_per_mm_ = 1.0 / std::sqrt(std::abs(cv::determinant(at->mm_per_px)));
 }
 

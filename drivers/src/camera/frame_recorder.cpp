@@ -6,6 +6,7 @@
 #include <opencv2/imgcodecs.hpp>
 
 #include <bevel/drivers/camera/frame_source.hpp>
+#include <bevel/error.hpp>
 
 namespace bevel::camera {
 namespace {
@@ -79,7 +80,7 @@ std::vector<RecordedFrame> read_frame_index(const fs::path& folder) {
 FrameRecorder::FrameRecorder(const fs::path& folder, size_t queue_frames)
     : folder_(folder), queue_frames_(queue_frames) {
   const auto fail = [&](const std::string& why) {
-    throw std::runtime_error("frames cannot be recorded into '" + folder.string() + "': " + why);
+    throw IoError("frames cannot be recorded into '" + folder.string() + "': " + why);
   };
   std::error_code error;
   fs::create_directories(folder, error);

@@ -1,8 +1,8 @@
 #include <bevel/drivers/camera/pipeline.hpp>
 
 #include <algorithm>
+#include <bevel/error.hpp>
 #include <cmath>
-#include <stdexcept>
 
 namespace bevel::camera {
 namespace {
@@ -16,18 +16,18 @@ std::string text_of(const cv::Size& size) {
 CameraPipeline::CameraPipeline(std::unique_ptr<FrameSource> source, const std::vector<CameraSetup>& cameras,
                                Clock clock)
     : source_(std::move(source)), clock_(std::move(clock)) {
-  if (!source_) throw std::invalid_argument("camera pipeline: no frame source");
-  if (cameras.empty()) throw std::invalid_argument("camera pipeline: no camera is set up, at least one is needed");
+  if (!source_) throw ArgumentError("camera pipeline: no frame source");
+  if (cameras.empty()) throw ArgumentError("camera pipeline: no camera is set up, at least one is needed");
   for (const CameraSetup& setup : cameras) {
     const std::string name = "camera " + std::to_string(setup.camera);
-    if (!setup.view) throw std::invalid_argument(name + ": no view");
-    if (eyes_.contains(setup.camera)) throw std::invalid_argument(name + ": set up twice");
+    if (!setup.view) throw ArgumentError(name + ": no view");
+    if (eyes_.contains(setup.camera)) throw ArgumentError(name + ": set up twice");
     try {
       Eye eye{setup.view, TipTracker(setup.tracker, setup.view->px_per_mm()), setup.latency_us, {}, {}};
       if (!setup.background.empty()) eye.tracker.set_background(setup.background);
       eyes_.emplace(setup.camera, std::move(eye));
-    } catch (const std::invalid_argument& error) {
-      throw std::invalid_argument(name + ": " + error.what());
+    } catch (const ArgumentError& error) {
+      throw ArgumentError(name + ": " + error.what());
     }
   }
 }

@@ -1,7 +1,7 @@
 #include <bevel/drivers/camera/planar_view.hpp>
 
+#include <bevel/error.hpp>
 #include <cmath>
-#include <stdexcept>
 #include <string>
 
 namespace bevel::camera {
@@ -10,7 +10,7 @@ namespace {
 size_t index(const SignedAxis& a) { return static_cast<size_t>(a.axis); }
 
 void require(bool good, const std::string& key, const std::string& value, const char* allowed) {
-  if (!good) throw std::invalid_argument("view " + key + " is " + value + ", allowed: " + allowed);
+  if (!good) throw ArgumentError("view " + key + " is " + value + ", allowed: " + allowed);
 }
 
 void check(const PlanarViewConfig& c) {

@@ -3,10 +3,10 @@
 #include <algorithm>
 #include <cmath>
 #include <cstring>
-#include <stdexcept>
 #include <string>
 
 #include <bevel/drivers/camera/needle_end.hpp>
+#include <bevel/error.hpp>
 
 namespace bevel::camera {
 namespace {
@@ -68,12 +68,11 @@ TipTracker::TipTracker(const TrackerConfig& config, double px_per_mm)
       scale_(ridge_scale(config.needle_diameter_mm * px_per_mm / shrink_)) {
   check(config_);
   if (!std::isfinite(px_per_mm) || px_per_mm <= 0.0)
-    throw std::invalid_argument("tracker px_per_mm is " + std::to_string(px_per_mm) + ", allowed: above 0");
+    throw ArgumentError("tracker px_per_mm is " + std::to_string(px_per_mm) + ", allowed: above 0");
 }
 
 void TipTracker::set_background(const cv::Mat& gray) {
-  if (gray.empty() || gray.type() != CV_8UC1)
-    throw std::invalid_argument("tracker background: not an 8-bit gray picture");
+  if (gray.empty() || gray.type() != CV_8UC1) throw ArgumentError("tracker background: not an 8-bit gray picture");
   background_ = gray.clone();
 }
 

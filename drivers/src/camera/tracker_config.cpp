@@ -1,7 +1,7 @@
 #include <bevel/drivers/camera/tracker_config.hpp>
 
+#include <bevel/error.hpp>
 #include <cmath>
-#include <stdexcept>
 #include <string>
 
 namespace bevel::camera {
@@ -43,11 +43,11 @@ void check(const TrackerConfig& c) {
   };
   for (const Range& r : ranges)
     if (!std::isfinite(r.value) || r.value < r.low || r.value > r.high)
-      throw std::invalid_argument(std::string("tracker ") + r.key + " is " + std::to_string(r.value) +
-                                  ", allowed: " + std::to_string(r.low) + " to " + std::to_string(r.high));
+      throw ArgumentError(std::string("tracker ") + r.key + " is " + std::to_string(r.value) +
+                          ", allowed: " + std::to_string(r.low) + " to " + std::to_string(r.high));
   if (c.fit_length_mm <= c.bevel_length_mm)
-    throw std::invalid_argument("tracker fit_length_mm is " + std::to_string(c.fit_length_mm) +
-                                ", allowed: more than bevel_length_mm, " + std::to_string(c.bevel_length_mm));
+    throw ArgumentError("tracker fit_length_mm is " + std::to_string(c.fit_length_mm) +
+                        ", allowed: more than bevel_length_mm, " + std::to_string(c.bevel_length_mm));
 }
 
 }  // namespace bevel::camera

@@ -5,10 +5,10 @@
 
 #include <algorithm>
 #include <cerrno>
-#include <stdexcept>
 #include <utility>
 
 #include <bevel/drivers/can/local_wire.hpp>
+#include <bevel/error.hpp>
 
 namespace bevel::can {
 namespace wire {
@@ -34,8 +34,8 @@ std::optional<Frame> decode(std::span<const std::uint8_t> packet) {
 sockaddr_un address_of(const std::string& path) {
   sockaddr_un address{};
   if (path.empty() || path.size() >= sizeof address.sun_path)
-    throw std::runtime_error("local bus '" + path + "': a path has 1 to " +
-                             std::to_string(sizeof address.sun_path - 1) + " characters");
+    throw DeviceError("local bus '" + path + "': a path has 1 to " + std::to_string(sizeof address.sun_path - 1) +
+                      " characters");
   address.sun_family = AF_UNIX;
   std::copy(path.begin(), path.end(), std::begin(address.sun_path));
   return address;

@@ -6,11 +6,11 @@
 #include <array>
 #include <cerrno>
 #include <cstring>
-#include <stdexcept>
 #include <utility>
 
 #include <bevel/drivers/can/local_bus.hpp>
 #include <bevel/drivers/can/local_wire.hpp>
+#include <bevel/error.hpp>
 
 namespace bevel::can {
 namespace {
@@ -19,8 +19,8 @@ constexpr int kBacklog = 16;
 constexpr int kRounds = 16;  // a bound, so that service() returns however much the clients talk
 constexpr int kStopLatency_ms = 20;
 
-std::runtime_error failure(const std::string& path, const std::string& what) {
-  return std::runtime_error("local bus '" + path + "': " + what + " (" + std::strerror(errno) + ")");
+IoError failure(const std::string& path, const std::string& what) {
+  return IoError("local bus '" + path + "': " + what + " (" + std::strerror(errno) + ")");
 }
 
 void watch(int epoll_fd, int fd) {

@@ -11,10 +11,10 @@
 #include <unistd.h>
 
 #include <algorithm>
+#include <bevel/error.hpp>
 #include <cerrno>
 #include <cstring>
 #include <optional>
-#include <stdexcept>
 #include <utility>
 
 namespace bevel::can {
@@ -51,11 +51,11 @@ void set_option(int fd, int level, int name, const T& value) {
 SocketCanBus::SocketCanBus(std::string interface, std::span<const std::uint32_t> listen)
     : interface_(std::move(interface)), listen_(listen.begin(), listen.end()) {
   if (interface_.empty() || interface_.size() >= IFNAMSIZ)
-    throw std::runtime_error("CAN interface '" + interface_ + "': a name has 1 to 15 characters");
+    throw DeviceError("CAN interface '" + interface_ + "': a name has 1 to 15 characters");
   const int probe = ::socket(PF_CAN, SOCK_RAW | SOCK_CLOEXEC, CAN_RAW);
   if (probe < 0)
-    throw std::runtime_error("CAN interface '" + interface_ + "': this kernel has no SocketCAN (" +
-                             std::strerror(errno) + ")");
+    throw DeviceError("CAN interface '" + interface_ + "': this kernel has no SocketCAN (" + std::strerror(errno) +
+                      ")");
   ::close(probe);
   open();
 }

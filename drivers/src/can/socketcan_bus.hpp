@@ -14,7 +14,7 @@ namespace bevel::can {
 class SocketCanBus final : public SocketBus {
  public:
   // interface: its name. listen: the identifiers to hear, own echoes included (exact kernel filters); empty: all.
-  // Throws std::runtime_error only for a name that cannot be one and where the kernel has no CAN: an interface that is
+  // Throws DeviceError only for a name that cannot be one and where the kernel has no CAN: an interface that is
   // missing or down is waited for.
   SocketCanBus(std::string interface, std::span<const std::uint32_t> listen);
 

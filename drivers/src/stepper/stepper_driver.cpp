@@ -1,10 +1,10 @@
 #include <bevel/drivers/stepper/stepper_driver.hpp>
 
 #include <algorithm>
-#include <stdexcept>
 #include <string>
 
 #include <bevel/drivers/can/drain.hpp>
+#include <bevel/error.hpp>
 
 namespace bevel::stepper {
 namespace {
@@ -16,7 +16,7 @@ constexpr std::uint64_t kFaultResetSteps =
 StepperConfig checked(const StepperConfig& config) {
   std::string text;
   for (const auto& problem : problems_of(config)) text += (text.empty() ? "stepper: " : "; ") + problem;
-  if (!text.empty()) throw std::invalid_argument(text);
+  if (!text.empty()) throw ArgumentError(text);
   return config;
 }
 

@@ -1,15 +1,15 @@
 #include <bevel/model/beam/band_ldlt.hpp>
 
 #include <algorithm>
-#include <stdexcept>
+#include <bevel/error.hpp>
 #include <string>
 
 namespace bevel::model {
 
 void BandLdlt::reset(std::size_t size, std::size_t kept) {
   if (size > rows_.size()) {
-    throw std::length_error("band matrix: size " + std::to_string(size) + ", allowed at most " +
-                            std::to_string(rows_.size()));
+    throw DomainError("band matrix: size " + std::to_string(size) + ", allowed at most " +
+                      std::to_string(rows_.size()));
   }
   size_ = size;
   kept_ = std::min(kept, size);
@@ -33,8 +33,8 @@ void BandLdlt::factor() {
       row[k] = scaled;
     }
     if (!(pivot > 0.0)) {
-      throw std::domain_error("band matrix: pivot " + std::to_string(i) + " is " + std::to_string(pivot) +
-                              ", must be positive");
+      throw DomainError("band matrix: pivot " + std::to_string(i) + " is " + std::to_string(pivot) +
+                        ", must be positive");
     }
     inverse_pivots_[i] = 1.0 / pivot;
   }

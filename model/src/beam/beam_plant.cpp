@@ -2,9 +2,9 @@
 
 #include <Eigen/Geometry>
 #include <algorithm>
+#include <bevel/error.hpp>
 #include <cmath>
 #include <sstream>
-#include <stdexcept>
 
 namespace bevel::model {
 namespace {
@@ -18,7 +18,7 @@ void require(bool allowed, const char* field, double value, const char* allowed_
   if (allowed) return;
   std::ostringstream message;
   message << "beam plant: " << field << " = " << value << ", allowed: " << allowed_text;
-  throw std::invalid_argument(message.str());
+  throw ArgumentError(message.str());
 }
 
 void require_positive(const char* field, double value) {
@@ -70,7 +70,7 @@ void BeamPlant::advance(double insertion_increment_mm, double rotation_increment
     std::ostringstream message;
     message << "beam plant: feed to " << fed_mm_ + insertion_increment_mm
             << " mm, allowed: up to max_depth_mm = " << config_.max_depth_mm;
-    throw std::out_of_range(message.str());
+    throw DomainError(message.str());
   }
   double steps = std::max(1.0, std::abs(insertion_increment_mm) / config_.max_step_mm);
   if (insertion_increment_mm != 0.0) {

@@ -1,8 +1,8 @@
 #include <bevel/model/beam/hermite_beam.hpp>
 
 #include <algorithm>
+#include <bevel/error.hpp>
 #include <cmath>
-#include <stdexcept>
 #include <string>
 
 namespace bevel::model {
@@ -10,7 +10,7 @@ namespace {
 
 std::size_t count_for(double span_mm, double length_mm) {
   if (!(length_mm > 0.0)) {
-    throw std::invalid_argument("beam: element_length_mm = " + std::to_string(length_mm) + ", allowed: > 0");
+    throw ArgumentError("beam: element_length_mm = " + std::to_string(length_mm) + ", allowed: > 0");
   }
   return static_cast<std::size_t>(std::ceil(span_mm / length_mm - 1e-9));
 }
@@ -61,8 +61,8 @@ HermiteBeam::HermiteBeam(double bending_stiffness_N_mm2, double element_length_m
 
 void HermiteBeam::set_tip(double tip_mm, double settled_mm) {
   if (!(tip_mm > nodes_mm_.front() && tip_mm <= nodes_mm_.back())) {
-    throw std::out_of_range("beam: tip at " + std::to_string(tip_mm) + " mm, allowed above " +
-                            std::to_string(nodes_mm_.front()) + " and up to " + std::to_string(nodes_mm_.back()));
+    throw DomainError("beam: tip at " + std::to_string(tip_mm) + " mm, allowed above " +
+                      std::to_string(nodes_mm_.front()) + " and up to " + std::to_string(nodes_mm_.back()));
   }
   tip_mm_ = tip_mm;
   // A sliver at the end would only spoil the conditioning, so the last whole element swallows it.

@@ -1,7 +1,7 @@
 #include <bevel/model/effects/augmented_needle.hpp>
 
 #include <algorithm>
-#include <stdexcept>
+#include <bevel/error.hpp>
 #include <string>
 
 namespace bevel::model {
@@ -50,11 +50,11 @@ AugmentedNeedle::AugmentedNeedle(const NeedleParameters& needle, std::vector<Act
                                  const NeedleColumns& needle_columns)
     : needle_(needle), effects_(std::move(effects)), columns_(columns), needle_columns_(needle_columns) {
   if (effects_.size() > kMaxEffects)
-    throw std::invalid_argument("a model has " + std::to_string(effects_.size()) + " effects; at most " +
-                                std::to_string(kMaxEffects) + " are supported");
+    throw ArgumentError("a model has " + std::to_string(effects_.size()) + " effects; at most " +
+                        std::to_string(kMaxEffects) + " are supported");
   if (columns < 0 || columns > kMaxColumns)
-    throw std::invalid_argument(std::to_string(columns) + " sensitivities asked; 0 to " + std::to_string(kMaxColumns) +
-                                " are supported");
+    throw ArgumentError(std::to_string(columns) + " sensitivities asked; 0 to " + std::to_string(kMaxColumns) +
+                        " are supported");
   std::stable_sort(effects_.begin(), effects_.end(), [](const ActiveEffect& a, const ActiveEffect& b) {
     return registry_index(a.effect) < registry_index(b.effect);
   });

@@ -1,11 +1,11 @@
 #include <bevel/model/effects/discrepancy.hpp>
 
 #include <algorithm>
+#include <bevel/error.hpp>
 #include <cmath>
 #include <cstdio>
 #include <limits>
 #include <numbers>
-#include <stdexcept>
 
 namespace bevel::model {
 namespace {
@@ -197,8 +197,7 @@ KnotWeights weights_at(std::span<const double> at, bool periodic, double place) 
 
 std::shared_ptr<const Effect> make_discrepancy(DiscrepancyCurve curve, std::size_t first) {
   if (const std::string fault = find_fault(curve); !fault.empty())
-    throw std::invalid_argument("a discrepancy in " + std::string(info_of(curve.component).name) +
-                                " has a fault: " + fault);
+    throw ArgumentError("a discrepancy in " + std::string(info_of(curve.component).name) + " has a fault: " + fault);
   return std::make_shared<Discrepancy>(std::move(curve), first);
 }
 

@@ -1,7 +1,7 @@
 #include <bevel/model/effects/open_loop.hpp>
 
 #include <algorithm>
-#include <stdexcept>
+#include <bevel/error.hpp>
 
 namespace bevel::model {
 namespace {
@@ -39,12 +39,12 @@ bool is_long(const BaseMotion& a, const BaseMotion& b) {
 }  // namespace
 
 Motion make_motion(std::span<const ActuatorState> actuators, std::span<const std::int64_t> reading_utimes) {
-  if (actuators.size() < 2) throw std::invalid_argument("fewer than two actuator samples: there is no motion");
+  if (actuators.size() < 2) throw ArgumentError("fewer than two actuator samples: there is no motion");
   const auto backwards = [](const auto& a, const auto& b) { return b.utime < a.utime; };
   if (std::adjacent_find(actuators.begin(), actuators.end(), backwards) != actuators.end())
-    throw std::invalid_argument("actuator samples run backwards in time");
+    throw ArgumentError("actuator samples run backwards in time");
   if (std::adjacent_find(reading_utimes.begin(), reading_utimes.end(), std::greater<>()) != reading_utimes.end())
-    throw std::invalid_argument("tip measurements run backwards in time");
+    throw ArgumentError("tip measurements run backwards in time");
 
   Motion motion;
   motion.start_utime = actuators.front().utime;

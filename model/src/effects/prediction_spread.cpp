@@ -1,6 +1,6 @@
 #include <bevel/model/effects/prediction_spread.hpp>
 
-#include <stdexcept>
+#include <bevel/error.hpp>
 
 namespace bevel::model {
 namespace {
@@ -8,7 +8,7 @@ namespace {
 // Adds J diag(sd^2) J^T of each reading.
 void add(const AugmentedNeedle& needle, const Motion& motion, const Eigen::VectorXd& sd, OpenLoop& path,
          std::vector<Eigen::Matrix3d>& sum) {
-  if (!predict(needle, motion, path)) throw std::domain_error("the needle leaves the domain of the slip law (25)");
+  if (!predict(needle, motion, path)) throw DomainError("the needle leaves the domain of the slip law (25)");
   for (std::size_t r = 0; r < sum.size(); ++r) {
     const Eigen::Matrix3Xd J = path.jacobian.middleRows<3>(static_cast<Eigen::Index>(3 * r)) * sd.asDiagonal();
     sum[r] += J * J.transpose();

@@ -10,9 +10,9 @@
 #include <algorithm>
 #include <cerrno>
 #include <cstring>
-#include <stdexcept>
 
 #include <bevel/drivers/camera/frame_stream.hpp>
+#include <bevel/error.hpp>
 
 namespace bevel::rig {
 namespace {
@@ -22,8 +22,8 @@ constexpr size_t kQueue = 3;  // frames a client may be behind
 sockaddr_un address_of(const std::string& path) {
   sockaddr_un address{};
   if (path.empty() || path.size() >= sizeof address.sun_path)
-    throw std::runtime_error("frame server path '" + path + "': allowed 1 to " +
-                             std::to_string(sizeof address.sun_path - 1) + " characters");
+    throw IoError("frame server path '" + path + "': allowed 1 to " + std::to_string(sizeof address.sun_path - 1) +
+                  " characters");
   address.sun_family = AF_UNIX;
   std::memcpy(static_cast<char*>(address.sun_path), path.c_str(), path.size() + 1);
   return address;
@@ -37,9 +37,9 @@ FrameServer::FrameServer(const std::string& socket_path) {
   listener_ = socket(AF_UNIX, SOCK_STREAM | SOCK_CLOEXEC | SOCK_NONBLOCK, 0);
   wake_ = eventfd(0, EFD_CLOEXEC | EFD_NONBLOCK);
   try {
-    if (listener_ < 0 || wake_ < 0) throw std::runtime_error(name + ": " + std::strerror(errno));
+    if (listener_ < 0 || wake_ < 0) throw IoError(name + ": " + std::strerror(errno));
     file_ = std::make_unique<SocketFile>(listener_, address, name);
-    if (listen(listener_, 8) != 0) throw std::runtime_error(name + ": " + std::strerror(errno));
+    if (listen(listener_, 8) != 0) throw IoError(name + ": " + std::strerror(errno));
   } catch (...) {
     if (listener_ >= 0) close(listener_);
     if (wake_ >= 0) close(wake_);
@@ -63,7 +63,7 @@ void FrameServer::wake() const {
 }
 
 void FrameServer::publish(const camera::Frame& frame) {
-  if (frame.gray.type() != CV_8UC1) throw std::invalid_argument("frame server: the picture is not 8-bit gray");
+  if (frame.gray.type() != CV_8UC1) throw ArgumentError("frame server: the picture is not 8-bit gray");
   camera::FrameHeader header;
   header.camera = frame.camera;
   header.width_px = static_cast<uint32_t>(frame.gray.cols);
@@ -71,7 +71,7 @@ void FrameServer::publish(const camera::Frame& frame) {
   header.payload_bytes = header.width_px * header.height_px;
   header.seq = frame.seq;
   header.capture_utime = frame.capture_utime;
-  if (const auto reason = camera::why_unusable(header)) throw std::invalid_argument("frame server: " + *reason);
+  if (const auto reason = camera::why_unusable(header)) throw ArgumentError("frame server: " + *reason);
   auto packet = std::make_shared<std::vector<unsigned char>>(sizeof header + header.payload_bytes);
   const camera::HeaderBytes head = camera::encode(header);
   std::memcpy(packet->data(), head.data(), head.size());

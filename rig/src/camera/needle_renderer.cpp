@@ -1,10 +1,10 @@
 #include <bevel/rig/camera/needle_renderer.hpp>
 
 #include <algorithm>
+#include <bevel/error.hpp>
 #include <cmath>
 #include <limits>
 #include <opencv2/imgproc.hpp>
-#include <stdexcept>
 #include <string>
 
 namespace bevel::rig {
@@ -14,7 +14,7 @@ constexpr int kSamples = 4;  // per pixel and axis
 
 void require(bool good, const char* key, double value, const char* allowed) {
   if (!good)
-    throw std::invalid_argument(std::string("scene ") + key + " is " + std::to_string(value) + ", allowed: " + allowed);
+    throw ArgumentError(std::string("scene ") + key + " is " + std::to_string(value) + ", allowed: " + allowed);
 }
 
 void check(const SceneConfig& s) {
@@ -229,7 +229,7 @@ NeedlePicture NeedleRenderer::render(const std::vector<camera::Vector3>& path_mm
     const cv::Point2d first = axis_px[2] - axis_px[1];
     const cv::Point2d last = axis_px.back() - axis_px[axis_px.size() - 2];
     if (cv::norm(first) <= 0.0 || cv::norm(last) <= 0.0)
-      throw std::invalid_argument("needle path: its first or last two points coincide in the picture");
+      throw ArgumentError("needle path: its first or last two points coincide in the picture");
     const double outside_px = 2.0 * (light.cols + light.rows);
     axis_px.front() = axis_px[1] - outside_px * (first / cv::norm(first));
     add_needle(light, axis_px, roll_rad);

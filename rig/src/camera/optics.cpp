@@ -1,9 +1,9 @@
 #include <bevel/rig/camera/optics.hpp>
 
 #include <algorithm>
+#include <bevel/error.hpp>
 #include <cmath>
 #include <opencv2/imgproc.hpp>
-#include <stdexcept>
 #include <string>
 
 namespace bevel::rig {
@@ -11,7 +11,7 @@ namespace {
 
 void require(bool good, const char* key, double value, const char* allowed) {
   if (!good)
-    throw std::invalid_argument(std::string("scene ") + key + " is " + std::to_string(value) + ", allowed: " + allowed);
+    throw ArgumentError(std::string("scene ") + key + " is " + std::to_string(value) + ", allowed: " + allowed);
 }
 
 }  // namespace

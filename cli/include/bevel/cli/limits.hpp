@@ -7,11 +7,11 @@ namespace bevel::cli {
 
 /// Checks that this process can open 48 more files, start a thread and map 64 MiB. Raises the soft limit of open files
 /// up to its hard limit where that is needed.
-/// @throws std::runtime_error naming the limit, its value and the remedy
+/// @throws IoError naming the limit, its value and the remedy
 void require_limits();
 
 /// Checks that this process can run \p count more threads at once.
-/// @throws std::runtime_error as above
+/// @throws IoError as above
 void require_threads(int count);
 
 }  // namespace bevel::cli

@@ -13,7 +13,7 @@ namespace bevel::controller {
 
 class AxisModel {
  public:
-  // Effects that do nothing between base and tip may be among them. Throws std::invalid_argument for more than
+  // Effects that do nothing between base and tip may be among them. Throws ArgumentError for more than
   // model::kMaxEffects.
   explicit AxisModel(std::vector<model::ActiveEffect> effects);
 

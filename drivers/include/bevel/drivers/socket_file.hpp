@@ -13,7 +13,7 @@ class SocketFile {
  public:
   /// Binds \p socket to \p address. A socket file there whose process has ended is removed first.
   /// @param name  start of each message: "local bus '/run/bevel.bus'"
-  /// @throws std::runtime_error if the path names a file that is no socket, if a process listens there, or if the
+  /// @throws IoError if the path names a file that is no socket, if a process listens there, or if the
   ///   socket cannot be bound
   SocketFile(int socket, const sockaddr_un& address, const std::string& name);
   /// Removes the file, unless another file has taken its place.

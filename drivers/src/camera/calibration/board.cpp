@@ -4,8 +4,8 @@
 #include <cmath>
 #include <opencv2/calib3d.hpp>
 #include <opencv2/imgproc.hpp>
-#include <stdexcept>
 
+#include <bevel/error.hpp>
 #include "camera/calibration/charuco.hpp"
 #include "camera/calibration/number_text.hpp"
 
@@ -50,8 +50,8 @@ void turn_as_printed(const cv::Mat& gray, int across, int down, std::vector<cv::
 void check(const BoardSpec& spec) {
   const auto within = [](const char* key, double value, double low, double high) {
     if (!(value >= low && value <= high))
-      throw std::invalid_argument(std::string("board ") + key + " is " + number_text(value) +
-                                  ", allowed: " + number_text(low) + " to " + number_text(high));
+      throw ArgumentError(std::string("board ") + key + " is " + number_text(value) + ", allowed: " + number_text(low) +
+                          " to " + number_text(high));
   };
   within("columns", spec.columns, 4, 60);
   within("rows", spec.rows, 4, 60);

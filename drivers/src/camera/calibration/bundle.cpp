@@ -3,8 +3,8 @@
 #include <ceres/ceres.h>
 #include <ceres/rotation.h>
 
+#include <bevel/error.hpp>
 #include <memory>
-#include <stdexcept>
 
 namespace bevel::camera {
 namespace {
@@ -161,7 +161,7 @@ void solve(ceres::Problem& problem) {
   options.logging_type = ceres::SILENT;
   ceres::Solver::Summary summary;
   ceres::Solve(options, &problem, &summary);
-  if (!summary.IsSolutionUsable()) throw std::runtime_error("the fit of the boards failed: " + summary.message);
+  if (!summary.IsSolutionUsable()) throw DomainError("the fit of the boards failed: " + summary.message);
 }
 
 }  // namespace
@@ -242,7 +242,7 @@ RigSd deviations(const Board& board, const std::vector<Shot>& shots, const FitOp
   ceres::Covariance covariance(how);
   const int spare = problem.residuals - problem.free_parameters();
   if (spare <= 0 || !covariance.Compute(wanted, &problem.ceres))
-    throw std::runtime_error(
+    throw DomainError(
         "the pictures leave something of the cameras undetermined; more of them are needed, with the board turned by "
         "20 to "
         "40 degrees to all sides and at several distances");

@@ -2,8 +2,8 @@
 
 #include <algorithm>
 #include <set>
-#include <stdexcept>
 
+#include <bevel/error.hpp>
 #include "camera/calibration/number_text.hpp"
 
 namespace bevel::camera {
@@ -17,19 +17,18 @@ constexpr double kFocalShare = 0.05;  // of the focal length, its standard devia
 
 void require_pictures(const Board& board, const CalibrationInput& in) {
   if (in.numbers.empty() || in.numbers.size() > 2 || in.sizes_px.size() != in.numbers.size())
-    throw std::invalid_argument("cameras are " + std::to_string(in.numbers.size()) + ", allowed: 1 or 2");
+    throw ArgumentError("cameras are " + std::to_string(in.numbers.size()) + ", allowed: 1 or 2");
   if (in.numbers.size() == 2 && in.numbers[0] == in.numbers[1])
-    throw std::invalid_argument("both cameras have the number " + std::to_string(in.numbers[0]) +
-                                ", allowed: two numbers");
+    throw ArgumentError("both cameras have the number " + std::to_string(in.numbers[0]) + ", allowed: two numbers");
   if (in.numbers.size() == 2 && !board.oriented())
-    throw std::invalid_argument(
+    throw ArgumentError(
         "the chessboard has " + std::to_string(board.spec().columns) + " x " + std::to_string(board.spec().rows) +
         " squares and looks the same upside down; allowed with two cameras: an even number one way and an "
         "odd one the other, or ChArUco");
   for (const Shot& shot : in.shots)
     if (shot.seen.size() != in.numbers.size())
-      throw std::invalid_argument("'" + shot.name + "' has " + std::to_string(shot.seen.size()) +
-                                  " sightings, allowed: " + std::to_string(in.numbers.size()));
+      throw ArgumentError("'" + shot.name + "' has " + std::to_string(shot.seen.size()) +
+                          " sightings, allowed: " + std::to_string(in.numbers.size()));
 }
 
 // After all that is left out: whether what is left is enough.
@@ -44,21 +43,21 @@ void require_enough(const CalibrationInput& in, const std::vector<Shot>& shots, 
   for (size_t c = 0; c < in.numbers.size(); ++c) {
     const int in_air = count([&](const Shot& s) { return !s.immersed && !s.seen[c].ids.empty(); });
     if (in_air < kFewestPictures)
-      throw std::invalid_argument("camera " + std::to_string(in.numbers[c]) + ": pictures in air with a board are " +
-                                  std::to_string(in_air) + ", allowed: " + std::to_string(kFewestPictures) +
-                                  " or more, better 15 to 30" + repeated(c, false));
+      throw ArgumentError("camera " + std::to_string(in.numbers[c]) + ": pictures in air with a board are " +
+                          std::to_string(in_air) + ", allowed: " + std::to_string(kFewestPictures) +
+                          " or more, better 15 to 30" + repeated(c, false));
     const int immersed = count([&](const Shot& s) { return s.immersed && !s.seen[c].ids.empty(); });
     const bool any = count([](const Shot& s) { return s.immersed; }) > 0;
     if (any && immersed < 3)
-      throw std::invalid_argument("camera " + std::to_string(in.numbers[c]) + ": immersed pictures with a board are " +
-                                  std::to_string(immersed) + ", allowed: none of any camera, or 3 or more, better 8" +
-                                  repeated(c, true));
+      throw ArgumentError("camera " + std::to_string(in.numbers[c]) + ": immersed pictures with a board are " +
+                          std::to_string(immersed) + ", allowed: none of any camera, or 3 or more, better 8" +
+                          repeated(c, true));
   }
   if (in.numbers.size() < 2) return;
   const int together = count([](const Shot& s) { return !s.seen[0].ids.empty() && !s.seen[1].ids.empty(); });
   if (together < 3)
-    throw std::invalid_argument("shots in which both cameras found the board are " + std::to_string(together) +
-                                ", allowed: 3 or more; pictures of one moment have one name in both folders");
+    throw ArgumentError("shots in which both cameras found the board are " + std::to_string(together) +
+                        ", allowed: 3 or more; pictures of one moment have one name in both folders");
 }
 
 double median(std::vector<double> values) {
@@ -157,9 +156,9 @@ void fill_figures(const CalibrationInput& in, const Board& board, Calibrated& ou
     camera.fit.rms_px = rms(of_camera);
     const double fx = camera.model.lens.parameters[kFx], sd = camera.fit.lens_sd[kFx];
     if (!(sd < kFocalShare * fx))
-      throw std::runtime_error("camera " + std::to_string(in.numbers[c]) + ": the standard deviation of fx is " +
-                               number_text(sd) + " px of " + number_text(fx) +
-                               ", allowed: 5 %; turn the board by 20 to 40 degrees to all sides");
+      throw DomainError("camera " + std::to_string(in.numbers[c]) + ": the standard deviation of fx is " +
+                        number_text(sd) + " px of " + number_text(fx) +
+                        ", allowed: 5 %; turn the board by 20 to 40 degrees to all sides");
     check(camera.model);
     out.calibration.cameras.push_back(camera);
   }

@@ -8,6 +8,7 @@
 #include <opencv2/core/persistence.hpp>
 #include <set>
 
+#include <bevel/error.hpp>
 #include "camera/calibration/number_text.hpp"
 
 namespace bevel::camera {
@@ -179,7 +180,7 @@ Calibration read_all(const cv::FileStorage& storage, const std::string& name) {
       root.refuse("cameras", "have the number " + std::to_string(number) + " twice, allowed: once each");
     try {
       check(out.cameras.back().model);
-    } catch (const std::invalid_argument& error) {
+    } catch (const ArgumentError& error) {
       throw CalibrationError(name + ": " + error.what());
     }
   }

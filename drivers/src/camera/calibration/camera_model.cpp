@@ -1,8 +1,8 @@
 #include <bevel/drivers/camera/calibration/camera_model.hpp>
 
-#include <stdexcept>
 #include <string>
 
+#include <bevel/error.hpp>
 #include "camera/calibration/number_text.hpp"
 
 namespace bevel::camera {
@@ -81,7 +81,7 @@ std::optional<Ray> CameraModel::ray(const cv::Point2d& at) const {
 void check(const CameraModel& model) {
   const std::string camera = "camera " + std::to_string(model.number) + " ";
   const auto require = [&](bool good, const std::string& key, double value, const std::string& allowed) {
-    if (!good) throw std::invalid_argument(camera + key + " is " + number_text(value) + ", allowed: " + allowed);
+    if (!good) throw ArgumentError(camera + key + " is " + number_text(value) + ", allowed: " + allowed);
   };
   // Written so that a NaN is refused.
   const auto within = [&](const std::string& key, double value, double low, double high) {

@@ -4,8 +4,8 @@
 #include <cmath>
 #include <limits>
 #include <opencv2/calib3d.hpp>
-#include <stdexcept>
 
+#include <bevel/error.hpp>
 #include "camera/calibration/number_text.hpp"
 
 namespace bevel::camera {
@@ -74,9 +74,9 @@ Charuco::Charuco(const BoardSpec& spec, CharucoPattern pattern)
   const Sighting all = find_corners(drawn, find_markers(drawn));
   const int corners = (spec.columns - 1) * (spec.rows - 1);
   if (static_cast<int>(all.ids.size()) != corners)
-    throw std::invalid_argument("board: the detector finds " + std::to_string(all.ids.size()) + " of " +
-                                std::to_string(corners) + " corners in a drawing, allowed: all; marker_mm is " +
-                                number_text(spec.marker_mm) + " of square_mm " + number_text(spec.square_mm));
+    throw ArgumentError("board: the detector finds " + std::to_string(all.ids.size()) + " of " +
+                        std::to_string(corners) + " corners in a drawing, allowed: all; marker_mm is " +
+                        number_text(spec.marker_mm) + " of square_mm " + number_text(spec.square_mm));
   cv::Point2d off;
   for (size_t i = 0; i < all.ids.size(); ++i) {
     // A corner lies between two pixels, half a pixel before the centre of the second.

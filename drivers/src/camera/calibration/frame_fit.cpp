@@ -1,8 +1,8 @@
 #include <bevel/drivers/camera/calibration/frame_fit.hpp>
 
 #include <algorithm>
-#include <stdexcept>
 
+#include <bevel/error.hpp>
 #include "camera/calibration/number_text.hpp"
 
 namespace bevel::camera {
@@ -15,8 +15,7 @@ constexpr double kLeastSeen = 1e-7;  // share of the best seen direction below w
 
 cv::Vec3d axis_named(const std::string& text, const char* of) {
   const bool good = text.size() == 2 && (text[0] == '+' || text[0] == '-') && text[1] >= 'x' && text[1] <= 'z';
-  if (!good)
-    throw std::invalid_argument(std::string(of) + " is '" + text + "', allowed: +x, -x, +y, -y, +z, -z of {A}");
+  if (!good) throw ArgumentError(std::string(of) + " is '" + text + "', allowed: +x, -x, +y, -y, +z, -z of {A}");
   cv::Vec3d axis;
   axis[text[1] - 'x'] = text[0] == '+' ? 1.0 : -1.0;
   return axis;
@@ -43,7 +42,7 @@ Line fit_line(const std::vector<InsertedTip>& tips) {
   cv::Matx66d vectors;
   cv::eigen(normal, values, vectors);
   if (!(values[5] > kLeastSeen * values[0]))
-    throw std::invalid_argument(
+    throw ArgumentError(
         "the insertion's line has no depth: seen by one camera only, or along one direction; allowed: readings of two "
         "cameras "
         "that look from different sides");
@@ -63,8 +62,8 @@ cv::Matx33d rotation_of_axes(const std::string& board_x_along, const std::string
   const cv::Vec3d x = axis_named(board_x_along, "the axis along the board's x"),
                   y = axis_named(board_y_along, "the axis along the board's y");
   if (x.dot(y) != 0.0)
-    throw std::invalid_argument("the board's x and y lie along " + board_x_along + " and " + board_y_along +
-                                ", allowed: two different axes of {A}");
+    throw ArgumentError("the board's x and y lie along " + board_x_along + " and " + board_y_along +
+                        ", allowed: two different axes of {A}");
   const cv::Vec3d z = x.cross(y);
   return {x[0], y[0], z[0], x[1], y[1], z[1], x[2], y[2], z[2]};
 }
@@ -73,10 +72,10 @@ FrameFigures set_frame_by_fiducial(const Board& board, const Shot& fiducial, con
                                    Calibration& calibration) {
   for (size_t c = 0; c < rig.lenses.size(); ++c)
     if (fiducial.immersed && !fiducial.seen[c].ids.empty() && !rig.walls[c])
-      throw std::invalid_argument("'" + fiducial.name + "' is immersed and camera " + std::to_string(c) +
-                                  " has no wall; allowed: immersed pictures of it too");
+      throw ArgumentError("'" + fiducial.name + "' is immersed and camera " + std::to_string(c) +
+                          " has no wall; allowed: immersed pictures of it too");
   if (!board.oriented())
-    throw std::invalid_argument(
+    throw ArgumentError(
         "the chessboard looks the same upside down; allowed as a fiducial: an even number of squares one "
         "way and an odd one the other, or ChArUco");
   Rig alone = rig;
@@ -100,12 +99,12 @@ FrameFigures set_frame_by_fiducial(const Board& board, const Shot& fiducial, con
 
 FrameFigures set_frame_by_insertion(const std::vector<InsertedTip>& tips, double roll_rad, Calibration& calibration) {
   if (static_cast<int>(tips.size()) < kFewestReadings)
-    throw std::invalid_argument("readings of the insertion are " + std::to_string(tips.size()) +
-                                ", allowed: " + std::to_string(kFewestReadings) + " or more");
+    throw ArgumentError("readings of the insertion are " + std::to_string(tips.size()) +
+                        ", allowed: " + std::to_string(kFewestReadings) + " or more");
   const auto [low, high] = std::ranges::minmax(tips, {}, &InsertedTip::insertion_mm);
   if (!(high.insertion_mm - low.insertion_mm >= kShortest_mm))
-    throw std::invalid_argument("the insertion is " + number_text(high.insertion_mm - low.insertion_mm) +
-                                " mm long, allowed: " + number_text(kShortest_mm) + " mm or more");
+    throw ArgumentError("the insertion is " + number_text(high.insertion_mm - low.insertion_mm) +
+                        " mm long, allowed: " + number_text(kShortest_mm) + " mm or more");
   const Line line = fit_line(tips);
   const cv::Vec3d o(line.o_and_d.val), d(&line.o_and_d.val[3]);
   FrameFigures figures;
@@ -113,7 +112,7 @@ FrameFigures set_frame_by_insertion(const std::vector<InsertedTip>& tips, double
   figures.scale = cv::norm(d);
   const cv::Vec3d z = d * (1.0 / figures.scale);
   if (!(std::abs(figures.scale - 1.0) <= kScaleWithin))
-    throw std::invalid_argument(
+    throw ArgumentError(
         "of each millimetre inserted " + number_text(figures.scale) +
         " mm are seen, allowed: 0.95 to 1.05; the needle slips in its drive, square_mm is not that of the "
         "print, or the wall is not where it was");
@@ -145,8 +144,8 @@ FrameFigures set_frame_by_insertion(const std::vector<InsertedTip>& tips, double
   const cv::Vec3d looks = calibration.cameras.front().model.R_CA.t() * cv::Vec3d(0, 0, 1);
   const cv::Vec3d beside = looks - looks.dot(z) * z;
   if (!(cv::norm(beside) > 0.3))
-    throw std::invalid_argument("camera " + std::to_string(calibration.cameras.front().model.number) +
-                                " looks along the needle; allowed: 20 degrees or more from it");
+    throw ArgumentError("camera " + std::to_string(calibration.cameras.front().model.number) +
+                        " looks along the needle; allowed: 20 degrees or more from it");
   const cv::Vec3d x0 = cv::normalize(beside), y0 = z.cross(x0);
   const cv::Vec3d x = std::cos(roll_rad) * x0 + std::sin(roll_rad) * y0, y = z.cross(x);
   move_frame({x[0], y[0], z[0], x[1], y[1], z[1], x[2], y[2], z[2]}, o, calibration);

@@ -1,9 +1,9 @@
 // First guesses for bundle.hpp: lenses by OpenCV's calibrateCamera, boards by its solvePnP, walls by trying distances.
 #include <limits>
 #include <opencv2/calib3d.hpp>
-#include <stdexcept>
 
 #include <bevel/drivers/camera/calibration/calibrate.hpp>
+#include <bevel/error.hpp>
 
 namespace bevel::camera {
 namespace {
@@ -36,7 +36,7 @@ Lens start_lens(const Board& board, const std::vector<Shot>& shots, size_t camer
     cv::calibrateCamera(points, seen, size_px, K, distortion, rotations, translations,
                         options.fit_k3 ? 0 : cv::CALIB_FIX_K3);
   } catch (const cv::Exception& error) {
-    throw std::runtime_error("no lens fits the pictures to begin with: " + error.err);
+    throw DomainError("no lens fits the pictures to begin with: " + error.err);
   }
   Lens lens;
   lens.picture_px = size_px;
@@ -97,15 +97,14 @@ Rig start_camera(const Board& board, const std::vector<Shot>& all, size_t camera
     held.fit_index = false;
     try {
       fit_rig(board, shots, held, 1.0, tried);
-    } catch (const std::runtime_error&) {
+    } catch (const DomainError&) {
       continue;  // this distance leads nowhere
     }
     const double px = rms(residuals_of(board, shots, tried));
     if (px < best_px) best = tried, best_px = px;
   }
   if (!std::isfinite(best_px))
-    throw std::runtime_error(
-        "no wall fits the immersed pictures: is the pane's thickness right, is the board behind it?");
+    throw DomainError("no wall fits the immersed pictures: is the pane's thickness right, is the board behind it?");
   return best;
 }
 
@@ -116,7 +115,7 @@ Pose apparent_pose(const Board& board, const Sighting& seen, const Lens& lens) {
   const cv::Vec<double, 5> distortion(p[kK1], p[kK2], p[kP1], p[kP2], p[kK3]);
   cv::Vec3d rotation, translation;
   if (!cv::solvePnP(on_board(board, seen), in_picture(seen), camera_matrix(lens), distortion, rotation, translation))
-    throw std::runtime_error("a board of " + std::to_string(seen.ids.size()) + " corners has no pose");
+    throw DomainError("a board of " + std::to_string(seen.ids.size()) + " corners has no pose");
   Pose pose;
   std::copy_n(rotation.val, 3, pose.parameters.begin());
   std::copy_n(translation.val, 3, &pose.parameters[3]);
@@ -132,7 +131,7 @@ Pose start_board(const Board& board, const Shot& shot, const Rig& rig) {
                          rig.walls[c]->parameters[kIndex]);
     return rig.from_first[c].inverse() * pose;
   }
-  throw std::invalid_argument("'" + shot.name + "': no camera found the board in it, allowed: one at least");
+  throw ArgumentError("'" + shot.name + "': no camera found the board in it, allowed: one at least");
 }
 
 Rig start_rig(const Board& board, const std::vector<Shot>& shots, const std::vector<cv::Size>& sizes_px,

@@ -18,16 +18,17 @@
 #include <limits>
 #include <map>
 #include <memory>
-#include <stdexcept>
 #include <string>
 #include <string_view>
 #include <utility>
 #include <vector>
 
+#include <bevel/error.hpp>
+
 namespace bevel::io {
 
 // what() is all messages, one a line; each begins with "file:line: " and the full dotted key.
-class ConfigError : public std::runtime_error {
+class ConfigError : public ConfigurationError {
  public:
   explicit ConfigError(std::vector<std::string> messages);
   const std::vector<std::string>& messages() const { return messages_; }

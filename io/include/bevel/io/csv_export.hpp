@@ -15,17 +15,17 @@ namespace bevel::io {
 
 // Makes `folder`, and replaces the files of an earlier export in it. All files are written to `folder`.unfinished
 // first, so that an export that fails changes nothing. Returns each file with its number of rows. Throws
-// std::runtime_error naming a file it cannot write.
+// Error naming a file it cannot write.
 std::vector<std::pair<std::string, std::int64_t>> export_csv(const Recording& recording, const std::string& folder);
 
 // Such a folder back. Not in it: steering targets and status, and when a message was received (it is taken to have been
-// at its own time, in the order of arrival). Throws std::runtime_error naming file, line and column for what is no
+// at its own time, in the order of arrival). Throws ParseError naming file, line and column for what is no
 // export, is incomplete or would be refused by readers.
 Recording import_exported(const std::string& folder);
 // Whether a folder is meant to be one: it has one of the files.
 bool is_exported(const std::string& folder);
 
-// Throws std::runtime_error, and leaves no file.
+// Throws ParseError, and leaves no file.
 void write_log(const Recording& recording, const std::string& log_path);
 
 }  // namespace bevel::io

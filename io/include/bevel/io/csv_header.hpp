@@ -50,7 +50,7 @@ struct CsvHeader {
 /// many cells. If there is no other line above the row than comments, the header is the one comment with as many cells,
 /// as numpy.savetxt writes it. A first line `sep=X` sets the separator, as in Excel. Without it the separator is the
 /// first of tab, semicolon, pipe, comma and blanks that splits the first row into numbers.
-/// @throws std::runtime_error naming the file and the line: no line, an unknown `sep=`, two comments with as many cells
+/// @throws ParseError naming the file and the line: no line, an unknown `sep=`, two comments with as many cells
 CsvHeader find_header(const std::string& path, CsvLines& lines);
 
 }  // namespace bevel::io

@@ -39,14 +39,14 @@ struct ImportedRecording {
 
 // What it returns reads back intact. `base_path`: the file that has the base's columns, if the map says that it is
 // another one; the tip keeps its own instants, and whoever reads the log takes the base's position between two of its
-// readings by linear interpolation. Throws std::runtime_error naming the file, the line and the column that is missing,
+// readings by linear interpolation. Throws ParseError naming the file, the line and the column that is missing,
 // not a number or out of range, and for motion that no rig or needle makes.
 ImportedRecording import_csv(const std::string& csv_path, const ColumnMap& map, const std::string& base_path = "");
 
 // Lines that let a person see a wrong unit, sign or column: duration, rates, extents, total turn, depth.
 std::string summary(const ImportedRecording& recording);
 
-// All on their channels, in time order; receipt time is the sample's own. Throws std::runtime_error, and leaves no
+// All on their channels, in time order; receipt time is the sample's own. Throws ParseError, and leaves no
 // file.
 void write_log(const ImportedRecording& recording, const std::string& log_path);
 

@@ -20,7 +20,7 @@ namespace bevel::io {
 
 class CsvTable {
  public:
-  // Reads the file whole, and its header. Throws std::runtime_error as all of these do.
+  // Reads the file whole, and its header. Throws ParseError as all of these do.
   explicit CsvTable(const std::string& path);
   CsvTable(const CsvTable&) = delete;  // lines_ refers to text_
   CsvTable& operator=(const CsvTable&) = delete;

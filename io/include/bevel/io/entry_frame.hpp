@@ -35,7 +35,7 @@ inline constexpr double kLargestDirectionSd_rad = 0.1;
 /// measurements' frame.
 /// @param actuators  positions of the axes, in order of time; the insertion of the first one is that of the origin
 /// @param tips  positions in any right-handed frame whose z leads into the tissue, within 90 degrees; in order of time
-/// @throws std::runtime_error if the measurements do not determine the direction, with the figures and the remedy
+/// @throws ParseError if the measurements do not determine the direction, with the figures and the remedy
 EntryFrame fit_entry_frame(std::span<const model::ActuatorState> actuators,
                            std::span<const model::TipMeasurement> tips);
 

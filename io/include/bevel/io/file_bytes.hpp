@@ -18,7 +18,7 @@ inline constexpr std::uint64_t kLargestLog_bytes = std::uint64_t{1} << 30U;
 // Text (TOML, CSV) is written by hand or a row at a time.
 inline constexpr std::uint64_t kLargestText_bytes = std::uint64_t{64} << 20U;
 
-// Throws std::runtime_error naming the file, what it is and what is allowed: for what is not there or not a regular
+// Throws IoError naming the file, what it is and what is allowed: for what is not there or not a regular
 // file (told before it is opened), and for more than `largest_bytes`.
 class FileBytes {
  public:

@@ -15,7 +15,7 @@ bool is_log_name(const std::string& file_name);
 /// In a folder a log is a file with a log's name (is_log_name), or a file whose name ends in a number or has no
 /// extension and whose content starts as a log does (`lcm-logger -i rec` writes `rec.00`). Files that are given are
 /// returned as they are. A file that is given twice, or that is in a folder that is given too, is returned once.
-/// @throws std::runtime_error naming a path that does not exist, a folder without a log, or a log that is given twice,
+/// @throws IoError naming a path that does not exist, a folder without a log, or a log that is given twice,
 /// also as a file of a folder, or a log whose name
 /// without the extension has only dots
 std::vector<std::string> find_logs(const std::vector<std::string>& paths);

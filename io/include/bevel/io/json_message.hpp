@@ -9,11 +9,11 @@
 #include <charconv>
 #include <cmath>
 #include <cstring>
-#include <stdexcept>
 #include <string>
 #include <string_view>
 #include <vector>
 
+#include <bevel/error.hpp>
 #include <bevel/io/csv_columns.hpp>
 
 namespace bevel::io {
@@ -95,7 +95,7 @@ class JsonWriter {
     at_ += text.size();
   }
   void digits(double value) {
-    if (!std::isfinite(value)) throw std::runtime_error("a number that is not finite, which JSON has not");
+    if (!std::isfinite(value)) throw ParseError("a number that is not finite, which JSON has not");
     at_ = std::to_chars(at_, at_ + kLongestNumber, value).ptr;
     // Whoever takes "-0" for a whole number loses its sign.
     if (value == 0 && std::signbit(value)) *at_++ = '.', *at_++ = '0';

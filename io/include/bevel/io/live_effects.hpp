@@ -17,7 +17,7 @@ struct LiveEffects {
   std::vector<std::string> left_out;  // for each of the others a sentence with its name and what is not known
 };
 // For whoever acts on a model while the needle moves: the estimator and the controller have the same effects. Throws
-// std::invalid_argument as active_effects() does.
+// ArgumentError as active_effects() does.
 // The discrepancies, which are all known beforehand, come behind the effects.
 LiveEffects live_effects(const std::vector<EffectEntry>& effects,
                          const std::vector<model::DiscrepancyCurve>& discrepancies = {});

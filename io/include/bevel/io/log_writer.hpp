@@ -15,7 +15,7 @@ namespace bevel::io {
 
 class LogWriter {
  public:
-  // Replaces an existing file. Throws std::runtime_error naming the file and the reason, as all of these do.
+  // Replaces an existing file. Throws IoError naming the file and the reason, as all of these do.
   explicit LogWriter(const std::string& path);
 
   void write(std::int64_t timestamp_us, std::string_view channel, std::span<const std::uint8_t> data);
@@ -40,7 +40,7 @@ class LogWriter {
 };
 
 // A log that is there whole or not at all: `fill` writes it under another name first. Throws what `fill` throws, and
-// std::runtime_error as above.
+// Error as above.
 void write_whole_log(const std::string& path, const std::function<void(LogWriter&)>& fill);
 
 }  // namespace bevel::io

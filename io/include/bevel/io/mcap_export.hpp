@@ -16,7 +16,7 @@ namespace bevel::io {
 // JSON of a message takes up to three times what the log has of it.
 inline constexpr std::uint64_t kLargestMcap_bytes = 3 * kLargestLog_bytes;
 
-// Throws std::runtime_error naming the file where it cannot be written; there is none then.
+// Throws ParseError naming the file where it cannot be written; there is none then.
 void export_mcap(const Recording& recording, const std::string& path);
 
 struct ImportedMcap {
@@ -29,7 +29,7 @@ struct ImportedMcap {
 };
 
 // Also files that tools/bevel-mcap made before there was this, and such files written anew by other tools. What is
-// damaged is left out and reported. Throws std::runtime_error for what is no MCAP, has no message of a recording in it,
+// damaged is left out and reported. Throws ParseError for what is no MCAP, has no message of a recording in it,
 // or has a chunk of another compression than zstd and lz4.
 ImportedMcap import_mcap(std::string_view file);
 // Throws also where the file cannot be read; each message begins with its name.

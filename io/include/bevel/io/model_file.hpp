@@ -66,7 +66,7 @@ model::NeedleParameters read_needle(Section needle);
 std::vector<EffectEntry> read_effects(Section parent);
 
 // The effects with all their parameters, the discrepancies behind them, as model::AugmentedNeedle
-// takes them, for one recording: the path or the name of its log, empty if there is none. Throws std::invalid_argument
+// takes them, for one recording: the path or the name of its log, empty if there is none. Throws ArgumentError
 // for an effect or a parameter that does not exist.
 std::vector<model::ActiveEffect> active_effects(const std::vector<EffectEntry>& effects,
                                                 std::string_view recording_name);
@@ -77,7 +77,7 @@ std::vector<model::ActiveEffect> active_effects(const ModelFile& model, std::str
 
 // Reads back as the same values, to the last bit.
 std::string to_toml(const ModelFile& model);
-// Throws std::runtime_error naming the file and the reason.
+// Throws ParseError naming the file and the reason.
 void save_model_file(const ModelFile& model, const std::string& path);
 
 }  // namespace bevel::io

@@ -64,9 +64,9 @@ struct Recording {
 };
 
 Recording read_recording(std::span<const std::uint8_t> log);
-// Throws std::runtime_error if the file cannot be read; damage inside it is reported in the result.
+// Throws ParseError if the file cannot be read; damage inside it is reported in the result.
 Recording read_recording(const std::string& path);
-// Throws std::runtime_error with the name and the refusal, if there is one.
+// Throws ParseError with the name and the refusal, if there is one.
 void require_usable(const std::string& name, const Recording& recording);
 
 }  // namespace bevel::io

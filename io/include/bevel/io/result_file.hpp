@@ -12,7 +12,7 @@ class PendingFile {
  public:
   /// Writes \p contents and synchronises them with the disk.
   /// @param path  destination; an existing symbolic link is followed
-  /// @throws std::runtime_error with \p path and the reason if the folder cannot be written or the disk is full
+  /// @throws IoError with \p path and the reason if the folder cannot be written or the disk is full
   PendingFile(const std::string& path, std::string_view contents);
   ~PendingFile();
   PendingFile(PendingFile&& other) noexcept;
@@ -21,7 +21,7 @@ class PendingFile {
   PendingFile& operator=(PendingFile&&) = delete;
 
   /// Gives the file its final name; a file of that name is replaced.
-  /// @throws std::runtime_error if the name belongs to a directory, for instance
+  /// @throws IoError if the name belongs to a directory, for instance
   void take_place();
 
  private:
@@ -29,11 +29,11 @@ class PendingFile {
 };
 
 /// Checks that a file can be made at \p path; one that is there keeps its contents.
-/// @throws std::runtime_error as PendingFile
+/// @throws IoError as PendingFile
 void require_writable(const std::string& path);
 
 /// Writes a file completely or not at all. A device or FIFO at \p path is written to directly.
-/// @throws std::runtime_error as PendingFile
+/// @throws IoError as PendingFile
 void write_result_file(const std::string& path, std::string_view contents);
 
 }  // namespace bevel::io

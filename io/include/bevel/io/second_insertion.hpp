@@ -25,7 +25,7 @@ std::optional<std::size_t> second_insertion(std::span<const model::ActuatorState
 
 /// Throws for a recording of more than one insertion, for programs that fit one entry pose for each recording.
 /// @param actuators in any order
-/// @throws std::runtime_error with \p name, the time of the second insertion and the remedy
+/// @throws ParseError with \p name, the time of the second insertion and the remedy
 void require_one_insertion(const std::string& name, std::span<const model::ActuatorState> actuators);
 
 }  // namespace bevel::io

@@ -8,6 +8,6 @@ namespace bevel::io {
 
 std::string hex(std::span<const unsigned char> bytes);
 std::string sha256_hex(std::string_view bytes);       // 64 hexadecimal digits
-std::string sha256_of_file(const std::string& path);  // throws std::runtime_error naming the file
+std::string sha256_of_file(const std::string& path);  // throws ParseError naming the file
 
 }  // namespace bevel::io

@@ -21,7 +21,7 @@ tip_heading_t to_heading(const camera::TipObservation& seen, std::int64_t seq);
 
 class CameraNode {
  public:
-  // Throws camera::SourceError or std::invalid_argument, naming what is wrong.
+  // Throws camera::SourceError or ArgumentError, naming what is wrong.
   // `pictures_hz`: how often a camera's picture goes out on CAMERA_PICTURE, at most kMostPictures_hz; 0: never.
   CameraNode(lcm::LCM& lcm, const SystemConfig& config, double pictures_hz = 0);
   enum class Outcome { frame, nothing, ended, failed };
@@ -29,7 +29,7 @@ class CameraNode {
   // Waits at most timeout_ms for a frame and publishes what it shows.
   Outcome step(const Now& now, int timeout_ms);
   LcmPort& port() { return port_; }
-  // Keeps the frames from here on (frame_recorder.hpp). Throws std::runtime_error.
+  // Keeps the frames from here on (frame_recorder.hpp). Throws IoError.
   void record(const std::string& folder);
   // Waits for the disk; then how many were kept and how many not. Empty if nothing is recorded.
   std::string end_recording();

@@ -34,7 +34,7 @@ camera_picture_t make_picture(const camera::Frame& frame, const camera::TipObser
 // When a camera's next picture is due.
 class PictureClock {
  public:
-  // Throws std::invalid_argument unless 0 < rate_hz <= kMostPictures_hz.
+  // Throws ArgumentError unless 0 < rate_hz <= kMostPictures_hz.
   explicit PictureClock(double rate_hz);
   bool due(std::int32_t camera, std::int64_t now_ns);  // true: take it; the next is due one period later
 

@@ -40,7 +40,7 @@ struct Fault {
   FaultKind kind = FaultKind::off;
   double at_s = 0;  // after the start of the process, or of the simulation
 };
-// "camera:off@5s". Throws std::invalid_argument saying what is allowed.
+// "camera:off@5s". Throws ArgumentError saying what is allowed.
 Fault parse_fault(const std::string& text);
 
 class FaultInjector {
@@ -54,7 +54,7 @@ class FaultInjector {
 
   bool concerns(std::string_view channel) const;
   // Takes a message that its component sends; what comes out of it is emitted by flush(), on the same channel. A
-  // channel that it does not concern throws std::invalid_argument.
+  // channel that it does not concern throws ArgumentError.
   void pass(std::string_view channel, const std::vector<std::uint8_t>& bytes, std::int64_t now_ns,
             std::int64_t now_utime);
   // Emits what is due.

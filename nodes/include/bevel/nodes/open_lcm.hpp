@@ -16,7 +16,7 @@ void warn_of_lcm_url(const std::string& url);
 /// Prints the warning of lcm_url_warning() and starts LCM, its receiver included: LCM itself starts the receiver with
 /// the first subscription, and crashes where that fails.
 /// @param url  LCM provider; empty: LCM_DEFAULT_URL
-/// @throws std::runtime_error with the remedy
+/// @throws IoError with the remedy
 std::unique_ptr<lcm::LCM> open_lcm(const std::string& url);
 
 }  // namespace bevel::nodes

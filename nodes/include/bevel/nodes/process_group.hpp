@@ -15,7 +15,7 @@ class ProcessGroup {
   ProcessGroup(const ProcessGroup&) = delete;
   ProcessGroup& operator=(const ProcessGroup&) = delete;
 
-  // Throws std::runtime_error if it cannot be started. Its output goes to `log_path`.
+  // Throws IoError if it cannot be started. Its output goes to `log_path`.
   void start(const std::string& name, const std::vector<std::string>& command, const std::string& log_path);
   // Name and how it ended of a process that is no longer there, if any: "bevel-rig: exit status 1".
   std::optional<std::string> first_death();

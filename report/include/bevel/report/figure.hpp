@@ -67,7 +67,7 @@ struct Figure {
                Colour colour = Colour::automatic);
 };
 
-// Throws std::invalid_argument, naming figure and series, if lengths differ or nothing finite is there to show.
+// Throws ArgumentError, naming figure and series, if lengths differ or nothing finite is there to show.
 void check(const Figure& figure);
 
 // As it is shown: series longer than a picture has room for are thinned (thinned.hpp).

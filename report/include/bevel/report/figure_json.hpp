@@ -22,7 +22,7 @@ class NumberLists {
 
 // One JSON object in one line, in which a list of numbers is its place in `lists`. Values are rounded to a
 // hundred-thousandth of what their axis shows; what is not finite is null; text that is not UTF-8 is mended. Not yet
-// fit for the inside of a <script>: escape_script. Throws std::invalid_argument where check() does.
+// fit for the inside of a <script>: escape_script. Throws ArgumentError where check() does.
 std::string figure_json(const Figure& figure, NumberLists& lists);
 std::string space_json(const Space& space, NumberLists& lists);
 

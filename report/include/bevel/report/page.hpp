@@ -34,10 +34,10 @@ class Page {
   Page& facts(const std::vector<Fact>& facts);  // side by side
   // What `fill` adds stands behind a line that unfolds it.
   Page& folded(std::string_view line, const std::function<void(Page&)>& fill);
-  // A column whose cells are all numbers is set flush right. Throws std::invalid_argument on a row of another length.
+  // A column whose cells are all numbers is set flush right. Throws ArgumentError on a row of another length.
   Page& table(const std::vector<std::string>& header, const std::vector<std::vector<std::string>>& rows,
               std::string_view caption = "");
-  // These throw std::invalid_argument where check() of figure.hpp does.
+  // These throw ArgumentError where check() of figure.hpp does.
   Page& figure(const Figure& figure, std::string_view caption);
   // Panels of one figure, so many beside each other (1 to 4) where the page is wide enough.
   Page& figures(const std::vector<Figure>& panels, int columns, std::string_view caption);
@@ -45,7 +45,7 @@ class Page {
   Page& picture(std::string_view svg, std::string_view caption);  // svg is trusted, not escaped: of report::Drawing
 
   std::string html() const;
-  void save(const std::string& path) const;  // throws std::runtime_error naming the file and the reason
+  void save(const std::string& path) const;  // throws IoError naming the file and the reason
 
  private:
   void add_live(const std::string& json, const std::string& svg);

@@ -22,7 +22,7 @@ class PageServer {
   static constexpr std::chrono::seconds kLongestWrite{10};   ///< without progress: the peer does not read
   static constexpr int kThreads = 1;                         ///< that serve all of them
 
-  // A port that is open before anything is served; 0 takes one that is free. Throws std::runtime_error naming the port
+  // A port that is open before anything is served; 0 takes one that is free. Throws IoError naming the port
   // and why it cannot be had.
   static int open_port(int port);
 

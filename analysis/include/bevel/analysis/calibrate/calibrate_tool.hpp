@@ -49,7 +49,7 @@ struct BoardPictures {
   std::optional<camera::CharucoPattern> pattern;  // of the board, if it has two and was found
   std::vector<std::string> remarks;               // on orientation tags and bit depths, once per folder
 };
-// Throws std::invalid_argument: a folder without pictures, pictures of different sizes or of boards with different
+// Throws ArgumentError: a folder without pictures, pictures of different sizes or of boards with different
 // patterns.
 BoardPictures read_pictures(const camera::Board& board, const CalibrateOptions& options);
 std::string name_of(camera::CharucoPattern pattern);

@@ -37,11 +37,11 @@ struct ClosedLoop {
   TargetingFigures targeting;
 };
 
-// Throws std::runtime_error, std::invalid_argument or io::ConfigError with one sentence for a case that cannot be used.
+// Throws IoError, ArgumentError or io::ConfigError with one sentence for a case that cannot be used.
 // Writes nothing, and says on `err` what of the input is damaged.
 ClosedLoop close_the_loop(const CloseLoopOptions& options, std::ostream& err);
 
-// The mismatch tool's three files, close-the-loop.json and close-the-loop.html, all or none. Throws std::runtime_error
+// The mismatch tool's three files, close-the-loop.json and close-the-loop.html, all or none. Throws IoError
 // naming the file and the reason.
 void write_results(const ClosedLoop& loop, const std::string& out_folder);
 

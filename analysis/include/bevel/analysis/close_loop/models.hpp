@@ -21,7 +21,7 @@ struct CaseFiles {
   std::string name, model_path;
   std::vector<std::string> logs;  // in the order of their names
 };
-// Throws std::runtime_error naming what is not there.
+// Throws IoError naming what is not there.
 CaseFiles find_case(const std::string& folder);
 
 // The readings that the mismatch tool took for outliers, taken out.

@@ -38,7 +38,7 @@ struct TargetingFigures {
 };
 inline constexpr double kForgiveness = 10;
 
-// Targets that the rig reaches, no deeper than it was recorded, all around. Throws std::runtime_error where the needle
+// Targets that the rig reaches, no deeper than it was recorded, all around. Throws IoError where the needle
 // bends too little for one.
 std::vector<Eigen::Vector3d> choose_targets(const model::NeedleParameters& needle, double deepest_mm);
 

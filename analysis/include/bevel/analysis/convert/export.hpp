@@ -13,7 +13,7 @@ struct ExportOptions {
 
 // Writes OUT/LOG/*.csv or OUT/LOG.mcap, LOG by io::result_names. Prints on stdout what is in each, on stderr what is
 // odd. A log that cannot be used is reported on stderr and leaves nothing; the others are written, and the exit status
-// is 1. Throws std::runtime_error if a path does not exist.
+// is 1. Throws IoError if a path does not exist.
 int run(const ExportOptions& options);
 
 }  // namespace bevel::analysis

@@ -16,7 +16,7 @@ std::string usage_fault(const ImportOptions& options);
 // Writes one log for each recording, prints on stdout what is in it and on stderr what is odd. A recording that cannot
 // be used is reported with file, line and column on stderr and leaves no log; the others are written, and the exit
 // status is
-// 1. Throws std::runtime_error if no recording can be begun: the column map, the list of files.
+// 1. Throws IoError if no recording can be begun: the column map, the list of files.
 int run(const ImportOptions& options);
 
 }  // namespace bevel::analysis

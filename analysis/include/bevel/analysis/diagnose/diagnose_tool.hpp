@@ -32,7 +32,7 @@ struct Found {
   bool input_damaged = false;  // so that it did not stand in the way; the findings' remarks say how
 };
 
-// Throws std::runtime_error or std::invalid_argument with one sentence for input that cannot be diagnosed. Writes
+// Throws IoError or ArgumentError with one sentence for input that cannot be diagnosed. Writes
 // nothing, and says on `err` what of the input is damaged.
 Found find(const DiagnoseOptions& options, std::ostream& err);
 

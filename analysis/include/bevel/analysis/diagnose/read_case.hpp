@@ -17,7 +17,7 @@ struct ReadCase {
 };
 
 // `paths`: logs, and folders that hold them. A recording is named by its log's file name, and where several have one,
-// by as many of the folders before it as tell them apart: "monday/insertion.lcm". Throws std::runtime_error for a log
+// by as many of the folders before it as tell them apart: "monday/insertion.lcm". Throws IoError for a log
 // that cannot be read or lost too much, for a log given twice, and with what diagnosis::make_case says of the rest.
 ReadCase read_case(const std::vector<std::string>& paths);
 

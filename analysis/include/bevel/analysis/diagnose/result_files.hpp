@@ -13,12 +13,12 @@ struct ResultFile {
   std::optional<std::string> text;  // nothing: these results have no such file, and an older one of that name goes
 };
 
-// Asked before the long work: throws std::runtime_error naming the folder if files could not be made in it (or it could
+// Asked before the long work: throws IoError naming the folder if files could not be made in it (or it could
 // not be made itself). Leaves nothing behind.
 void check_writable(const std::filesystem::path& folder);
 
 // Each is written whole under another name, then all take their places. The last one is taken away first and comes
-// last: where it is, the others belong to it, and none is left over from before. Throws std::runtime_error naming the
+// last: where it is, the others belong to it, and none is left over from before. Throws IoError naming the
 // file and the reason, with the folder as it was unless the disk fails in the act of renaming.
 void write_together(const std::filesystem::path& folder, const std::vector<ResultFile>& files);
 

@@ -18,7 +18,7 @@ struct Prediction {
 };
 
 // One per measurement, in their order, which need not be that of time; the order of the actuator samples is free too.
-// Throws std::invalid_argument for too few of either, std::domain_error where the needle leaves the slip law's domain.
+// Throws ArgumentError for too few of either, DomainError where the needle leaves the slip law's domain.
 std::vector<Prediction> predict(const model::AugmentedNeedle& needle, std::span<const model::ActuatorState> actuators,
                                 std::span<const model::TipMeasurement> tips);
 

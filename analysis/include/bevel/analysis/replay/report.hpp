@@ -15,7 +15,7 @@ void print_together(std::ostream& out, const std::vector<Replay>& replays, doubl
 void print_speed(std::ostream& out, const std::vector<Replay>& replays);
 
 // DIR/<name>.states.csv, DIR/<name>.innovations.csv, DIR/<name>.headings.csv where there are any, and one page
-// DIR/<name>.html. Throws std::runtime_error naming the file.
+// DIR/<name>.html. Throws IoError naming the file.
 void write_files(const Replay& replay, const std::string& folder, double ahead_mm);
 
 }  // namespace bevel::analysis

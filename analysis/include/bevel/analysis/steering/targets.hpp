@@ -18,7 +18,7 @@ struct TargetsOptions {
   std::string json;  // path; empty: none
 };
 
-// Prints a table, on stderr how far it is; returns the exit status. Throws std::runtime_error for a scenario that there
+// Prints a table, on stderr how far it is; returns the exit status. Throws IoError for a scenario that there
 // is not, naming those that there are, and where the file cannot be written.
 int run_targets(const TargetsOptions& options, std::ostream& out);
 

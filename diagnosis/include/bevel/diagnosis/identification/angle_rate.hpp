@@ -22,7 +22,7 @@ struct AngleRateResult {
   std::string message;     // of the solver
 };
 
-// `start` gives k, ell, front wheel and the lambdas to begin with. Throws std::invalid_argument where an insertion
+// `start` gives k, ell, front wheel and the lambdas to begin with. Throws ArgumentError where an insertion
 // turns the shaft by more than 0.02 rad, has fewer than 8 measurements, or does not advance.
 AngleRateResult fit_angle_rate(const std::vector<Insertion>& insertions, const model::NeedleParameters& start,
                                bool fit_curvature = false);

@@ -33,7 +33,7 @@ std::vector<Candidate> fit_candidates(const std::vector<Insertion>& insertions, 
 /// Selects the candidate with the lowest BIC, the first of those that are equal within the fits' tolerance.
 ///
 /// @return index into \p all
-/// @throws std::invalid_argument with the reason of the first candidate, if none can follow the insertions
+/// @throws ArgumentError with the reason of the first candidate, if none can follow the insertions
 std::size_t preferred(const std::vector<Candidate>& all);
 
 // The bicycle's options out of the extended model's: both lambdas 0 and not fitted.

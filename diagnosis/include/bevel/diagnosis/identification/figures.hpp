@@ -20,7 +20,7 @@ struct ErrorFigures {
 
 // Error of each observation, mm: the distance for same_insertion, the signed lateral (y) error for same_depth. Depth
 // has no answer where the needle turned back; the first crossing counts, NaN if the model never gets there. Throws
-// std::domain_error where the model leaves its domain.
+// DomainError where the model leaves its domain.
 std::vector<double> path_errors_mm(const Insertion& insertion, const model::NeedleParameters& needle, Compare compare,
                                    const Entry& entry = Entry::Zero());
 
@@ -29,7 +29,7 @@ ErrorFigures error_figures(const std::vector<Insertion>& insertions, const model
                            Compare compare, const std::vector<Entry>& entries = {});
 
 // Trials with the same commands, averaged measurement by measurement (Section IV compares with the mean of three).
-// Throws std::invalid_argument if they do not have the same number of measurements.
+// Throws ArgumentError if they do not have the same number of measurements.
 Insertion mean_of_trials(const std::vector<Insertion>& trials);
 
 }  // namespace bevel::diagnosis

@@ -38,7 +38,7 @@ struct Insertion {
 };
 
 // Both inputs in order of time; the actuators' positions are interpolated linearly between their samples. Insertion
-// below 0 is in air and moves nothing. Throws std::invalid_argument where fewer than two actuator samples or no usable
+// below 0 is in air and moves nothing. Throws ArgumentError where fewer than two actuator samples or no usable
 // measurement remain, or times run backwards.
 Insertion make_insertion(std::string name, const std::vector<model::ActuatorState>& actuators,
                          const std::vector<model::TipMeasurement>& measurements);

@@ -101,7 +101,7 @@ struct FitResult {
   [[nodiscard]] const FittedParameter* find(Parameter parameter) const;
 };
 
-// Throws std::invalid_argument for no insertion, a start outside the model's domain, a sigma that is not positive or a
+// Throws ArgumentError for no insertion, a start outside the model's domain, a sigma that is not positive or a
 // start from which the model cannot follow the insertions.
 FitResult fit_trajectory(const std::vector<Insertion>& insertions, const FitOptions& options);
 
@@ -125,7 +125,7 @@ bool separate_slip(const std::vector<Insertion>& insertions);
 ///
 /// @param options.fit_slip_in_plane fits the lambdas of insertions without rotation all the same
 /// @return the fit; FitResult::held lists what was held, at the prior's mean or else at the value of options.start
-/// @throws std::invalid_argument as fit_trajectory()
+/// @throws ArgumentError as fit_trajectory()
 FitResult fit_determined(const std::vector<Insertion>& insertions, const FitOptions& options);
 
 }  // namespace bevel::diagnosis

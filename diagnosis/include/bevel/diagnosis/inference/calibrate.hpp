@@ -10,7 +10,7 @@ namespace bevel::inference {
 // minimum. Not valid where the base cannot follow the recordings.
 Fit tempered_base(const System& system, const Readings& outliers, const Noise& noise);
 
-// From the standard deviations that the data claim. Throws std::domain_error where the base alone cannot follow the
+// From the standard deviations that the data claim. Throws DomainError where the base alone cannot follow the
 // recordings.
 Calibration calibrate(const System& system);
 

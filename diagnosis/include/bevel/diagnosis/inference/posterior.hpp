@@ -104,7 +104,7 @@ struct LeftOutSelection {
   const Fit* fit = nullptr;          // the likeliest without the recording; it lives as long as the search
   std::vector<LeftOutShare> shares;  // those that are worth a computation, the likeliest first
 };
-// Throws std::domain_error where no model has a mode without one of them.
+// Throws DomainError where no model has a mode without one of them.
 std::vector<LeftOutSelection> leave_out_selection(const Search& search);
 
 }  // namespace bevel::inference

@@ -63,7 +63,7 @@ class Search {
   using Progress = std::function<void(const std::string&)>;
   // From readings without those outliers, and a noise to begin with. What the linear model promises depends on the
   // noise, and on what else the tip does: it is asked again about the likeliest set, until that is the same. Throws
-  // std::domain_error where the model without effects cannot follow the recordings.
+  // DomainError where the model without effects cannot follow the recordings.
   void run(const Readings& outliers, const Noise& noise, const Progress& progress = {});
   const std::map<ModelSet, Visited>& visited() const { return visited_; }
   const Visited& best() const;

@@ -48,7 +48,7 @@ inline constexpr double kLatencyLowest_s = -0.2, kLatencyHighest_s = 1.0;  // wh
 inline constexpr double kLatencyWorst_s = 0.01;  // what is not known to this (within_95_s) is refused
 
 // `needle` without a camera_latency of its own. `tips` of one camera, those whose status is 0; in any order. Throws
-// std::invalid_argument for fewer than two actuator samples and std::domain_error where the model's needle leaves the
+// ArgumentError for fewer than two actuator samples and DomainError where the model's needle leaves the
 // domain of the slip law.
 LatencyFit fit_latency(const model::AugmentedNeedle& needle, std::span<const model::ActuatorState> actuators,
                        std::span<const model::TipMeasurement> tips);

@@ -16,7 +16,7 @@ struct DiagnosisOptions {
   std::function<void(const std::string&)> progress;
 };
 
-// `model` is what is in use. Throws std::invalid_argument with one sentence for input that cannot be diagnosed.
+// `model` is what is in use. Throws ArgumentError with one sentence for input that cannot be diagnosed.
 Findings diagnose(const RecordedCase& recorded, const model::NeedleParameters& model, const DiagnosisOptions& options);
 
 }  // namespace bevel::diagnosis

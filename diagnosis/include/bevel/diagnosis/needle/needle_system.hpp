@@ -46,7 +46,7 @@ inline constexpr double kLambda2Width = 0.3;
 
 class NeedleSystem final : public inference::System {
  public:
-  // Throws std::invalid_argument where `known` is too much to add anything to. An effect that is known is no candidate.
+  // Throws ArgumentError where `known` is too much to add anything to. An effect that is known is no candidate.
   NeedleSystem(RecordedCase recorded, const model::NeedleParameters& model, KnownPhysics known = {});
 
   const RecordedCase& recorded() const { return recorded_; }

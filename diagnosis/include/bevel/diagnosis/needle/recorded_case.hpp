@@ -65,7 +65,7 @@ struct RawRecording {
 
 // Where one recording has no clock, none has: each different time of its readings is one stop, evenly apart, and the
 // needle was guided by hand (scatter_near_entry.hpp).
-// Throws std::invalid_argument, naming the recording and what is wrong: no usable tip measurement, no motion, clocks of
+// Throws ArgumentError, naming the recording and what is wrong: no usable tip measurement, no motion, clocks of
 // camera and axes apart, fewer than two recordings, recordings of different rigs (cameras that see other axes, or frame
 // periods or claimed noise that differ more than threefold).
 RecordedCase make_case(std::vector<RawRecording> raw);

@@ -17,7 +17,7 @@ namespace bevel::camera {
 
 class CalibratedView : public View {
  public:
-  /// Throws std::invalid_argument naming the camera, the key, the value and what is allowed: also of a camera that
+  /// Throws ArgumentError naming the camera, the key, the value and what is allowed: also of a camera that
   /// looks along the needle, within 20 degrees of z of {A}, or that does not see its own picture's middle.
   explicit CalibratedView(const CameraModel& model);
 

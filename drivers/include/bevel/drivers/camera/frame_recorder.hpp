@@ -33,7 +33,7 @@ std::vector<RecordedFrame> read_frame_index(const std::filesystem::path& folder)
 
 class FrameRecorder {
  public:
-  /// Makes the folder if it is not there. Throws std::runtime_error if it cannot, or if there are frames in it already.
+  /// Makes the folder if it is not there. Throws IoError if it cannot, or if there are frames in it already.
   explicit FrameRecorder(const std::filesystem::path& folder, size_t queue_frames = 32);
   /// Writes what is queued.
   ~FrameRecorder();

@@ -5,12 +5,12 @@
 #include <chrono>
 #include <cstdint>
 #include <memory>
-#include <stdexcept>
 #include <string>
 #include <string_view>
 #include <variant>
 
 #include <bevel/drivers/camera/frame.hpp>
+#include <bevel/error.hpp>
 
 namespace bevel::camera {
 
@@ -37,8 +37,8 @@ class FrameSource {
 };
 
 /// Bad configuration or a source that cannot be opened. what() names the key, the value and what is allowed.
-class SourceError : public std::runtime_error {
-  using std::runtime_error::runtime_error;
+class SourceError : public DeviceError {
+  using DeviceError::DeviceError;
 };
 
 enum class SourceKind { folder, video, device, stream };

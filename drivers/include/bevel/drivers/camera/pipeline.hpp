@@ -57,7 +57,7 @@ class CameraPipeline {
   using Clock = std::function<int64_t()>;  ///< microseconds since the epoch
   using Result = std::variant<TipObservation, FrameTimeout, EndOfFrames, SourceFailure>;
 
-  /// An empty `clock` means that age has no meaning (files). Throws std::invalid_argument: no camera, the same number
+  /// An empty `clock` means that age has no meaning (files). Throws ArgumentError: no camera, the same number
   /// twice, no view, or a bad tracker configuration, which names the camera.
   CameraPipeline(std::unique_ptr<FrameSource> source, const std::vector<CameraSetup>& cameras, Clock clock = {});
 

@@ -23,7 +23,7 @@ struct PlanarViewConfig {
 
 class PlanarView : public View {
  public:
-  /// Throws std::invalid_argument naming the key, the value and what is allowed.
+  /// Throws ArgumentError naming the key, the value and what is allowed.
   explicit PlanarView(const PlanarViewConfig& config);
 
   Vector3 position_mm(const cv::Point2d& pixel) const override;

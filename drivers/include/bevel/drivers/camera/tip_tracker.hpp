@@ -55,7 +55,7 @@ struct TipResult {
 
 class TipTracker {
  public:
-  /// `px_per_mm` of the view. Throws std::invalid_argument (tracker_config.hpp).
+  /// `px_per_mm` of the view. Throws ArgumentError (tracker_config.hpp).
   TipTracker(const TrackerConfig& config, double px_per_mm);
 
   /// `now_utime`: the time of the call, for `late`; 0 where age has no meaning (files).

@@ -58,7 +58,7 @@ struct TrackerConfig {
   Background background = Background::local;
 };
 
-/// Throws std::invalid_argument naming the key, the value and what is allowed.
+/// Throws ArgumentError naming the key, the value and what is allowed.
 void check(const TrackerConfig& config);
 
 }  // namespace bevel::camera

@@ -19,7 +19,7 @@ namespace bevel::can {
 class LocalBus final : public SocketBus {
  public:
   // path: of the hub's socket. A hub that is not there yet is waited for.
-  // Throws std::runtime_error when the path is empty or too long for a socket address (107 characters).
+  // Throws DeviceError when the path is empty or too long for a socket address (107 characters).
   LocalBus(std::string path, std::span<const std::uint32_t> listen);
 
   SendResult send(const Frame& frame) override;
@@ -38,7 +38,7 @@ class LocalBus final : public SocketBus {
 class LocalHub {
  public:
   /// Binds the socket; a socket file whose hub has ended is replaced.
-  /// @throws std::runtime_error if another process serves the path, or if the path names a file that is no socket
+  /// @throws DeviceError if another process serves the path, or if the path names a file that is no socket
   explicit LocalHub(const std::string& path);
   ~LocalHub();
   LocalHub(const LocalHub&) = delete;

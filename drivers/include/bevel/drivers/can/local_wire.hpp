@@ -19,6 +19,6 @@ inline constexpr std::uint8_t kEcho = 1;  // set by the hub on what goes back to
 
 Packet encode(const Frame& frame);
 std::optional<Frame> decode(std::span<const std::uint8_t> packet);  // nothing where it is not a frame
-sockaddr_un address_of(const std::string& path);                    // throws std::runtime_error
+sockaddr_un address_of(const std::string& path);                    // throws DeviceError
 
 }  // namespace bevel::can::wire

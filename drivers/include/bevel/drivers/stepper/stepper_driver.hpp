@@ -105,7 +105,7 @@ std::string describe(const AxesReport& report);
 /// themselves, follows where a drive does not confirm or report. Uses no files, clocks or messages.
 class StepperDriver {
  public:
-  // bus: must outlive the driver and hear listen_ids(). Throws std::invalid_argument listing every problem of config.
+  // bus: must outlive the driver and hear listen_ids(). Throws ArgumentError listing every problem of config.
   StepperDriver(can::Bus& bus, const StepperConfig& config);
   StepperDriver(const StepperDriver&) = delete;
   StepperDriver& operator=(const StepperDriver&) = delete;

@@ -15,7 +15,7 @@ class BandLdlt {
   explicit BandLdlt(std::size_t capacity) : rows_(capacity), inverse_pivots_(capacity) {}
 
   // Zeroes the matrix from row `kept` on and sets its size. The rows before keep what they have, factors where they
-  // have been factored: none of them depends on a later one. Throws std::length_error above the capacity; never
+  // have been factored: none of them depends on a later one. Throws DomainError above the capacity; never
   // allocates.
   void reset(std::size_t size, std::size_t kept = 0);
 
@@ -24,7 +24,7 @@ class BandLdlt {
   // Adds to A(row, column); row >= column >= row - kHalfBandwidth (the lower triangle) is the caller's duty.
   void add(std::size_t row, std::size_t column, double value) { rows_[row][row - column] += value; }
 
-  // Replaces A by its factors, from the first row that was not kept. Throws std::domain_error if a pivot is not
+  // Replaces A by its factors, from the first row that was not kept. Throws DomainError if a pivot is not
   // positive (the matrix is not definite).
   void factor();
 

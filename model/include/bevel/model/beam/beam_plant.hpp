@@ -54,7 +54,7 @@ struct BeamPlantConfig {
   double cell_length_mm = 0.5;       // of the tissue's memory
   double max_step_mm = 0.5;          // longer feeds are cut into steps of at most this
 
-  // Throws std::invalid_argument naming the field, its value and what is allowed.
+  // Throws ArgumentError naming the field, its value and what is allowed.
   void validate() const;
 };
 
@@ -65,7 +65,7 @@ class BeamPlant {
 
   // Feeds the shaft by insertion_increment_mm (< 0 retracts) while its base turns by rotation_increment_rad
   // (right-handed about the heading) and dt_s >= 0 passes, all at constant rates. Allocates nothing. Throws
-  // std::invalid_argument for input that is not finite or dt_s < 0, std::out_of_range for a feed beyond max_depth_mm;
+  // ArgumentError for input that is not finite or dt_s < 0, DomainError for a feed beyond max_depth_mm;
   // the plant is then unchanged.
   void advance(double insertion_increment_mm, double rotation_increment_rad, double dt_s);
 

@@ -33,7 +33,7 @@ class HermiteBeam {
 
   // Starts a new problem with the tip at this depth: mesh, bending stiffness, no loads. Down to settled_mm the springs
   // are those of the problem before, solved: there its equations and their factors stay, and what is added is left out
-  // (add_spring); the solution is the same to the last digit. Throws std::out_of_range unless clamp < tip_mm <=
+  // (add_spring); the solution is the same to the last digit. Throws DomainError unless clamp < tip_mm <=
   // max_tip_mm.
   void set_tip(double tip_mm, double settled_mm = -std::numeric_limits<double>::infinity());
   // What is added at less depth than this changes nothing: it is in there.

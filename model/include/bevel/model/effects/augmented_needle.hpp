@@ -57,7 +57,7 @@ struct HeadingReading {
 class AugmentedNeedle {
  public:
   // columns: how many sensitivities are carried (0 to kMaxColumns). Effects are put into the order of the registry.
-  // At most kMaxEffects; throws std::invalid_argument past that.
+  // At most kMaxEffects; throws ArgumentError past that.
   AugmentedNeedle(const NeedleParameters& needle, std::vector<ActiveEffect> effects = {}, int columns = 0,
                   const NeedleColumns& needle_columns = {});
 

@@ -34,7 +34,7 @@ struct KnotWeights {
 KnotWeights weights_at(std::span<const double> at, bool periodic, double place);
 
 // The curve as an effect. Its parameters, none of them in model files, are added to the values of four of its knots,
-// [first, first + 4): what a fit or a variance wants to know the derivatives by. Throws std::invalid_argument for a
+// [first, first + 4): what a fit or a variance wants to know the derivatives by. Throws ArgumentError for a
 // curve with a fault.
 inline constexpr std::size_t kKnotsOfPart = kMaxEffectParameters;
 std::shared_ptr<const Effect> make_discrepancy(DiscrepancyCurve curve, std::size_t first = 0);

@@ -19,7 +19,7 @@ struct Motion {
 };
 
 // Both in order of time. Positions between actuator samples are interpolated linearly; outside their span the base
-// stands. Throws std::invalid_argument for fewer than two actuator samples, or times that run backwards.
+// stands. Throws ArgumentError for fewer than two actuator samples, or times that run backwards.
 Motion make_motion(std::span<const ActuatorState> actuators, std::span<const std::int64_t> reading_utimes);
 
 struct OpenLoop {

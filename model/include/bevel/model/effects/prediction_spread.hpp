@@ -9,7 +9,7 @@
 namespace bevel::model {
 
 // Covariance (mm^2) of each reading about what predict() gives for the same needle, effects and, behind them,
-// discrepancies. Throws std::domain_error where the tip leaves the domain of the slip law.
+// discrepancies. Throws DomainError where the tip leaves the domain of the slip law.
 std::vector<Eigen::Matrix3d> reading_covariances(const NeedleParameters& needle,
                                                  const std::vector<ActiveEffect>& effects,
                                                  const std::vector<DiscrepancyCurve>& discrepancies,

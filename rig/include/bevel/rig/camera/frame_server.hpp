@@ -18,14 +18,14 @@ namespace bevel::rig {
 class FrameServer {
  public:
   /// Binds the socket; a socket file whose server has ended is replaced.
-  /// @throws std::runtime_error if \p socket_path is too long or names a file that is no socket, if another process
+  /// @throws IoError if \p socket_path is too long or names a file that is no socket, if another process
   ///   serves it, or if it cannot be bound
   explicit FrameServer(const std::string& socket_path);
   ~FrameServer();
   FrameServer(const FrameServer&) = delete;
   FrameServer& operator=(const FrameServer&) = delete;
 
-  /// Throws std::invalid_argument unless frame.gray is CV_8UC1 and of an allowed size.
+  /// Throws ArgumentError unless frame.gray is CV_8UC1 and of an allowed size.
   void publish(const camera::Frame& frame);
 
   int64_t dropped() const { return dropped_; }  ///< frames times clients

@@ -62,7 +62,7 @@ struct NeedlePicture {
 
 class NeedleRenderer {
  public:
-  /// Throws std::invalid_argument naming the key, the value and what is allowed.
+  /// Throws ArgumentError naming the key, the value and what is allowed.
   NeedleRenderer(const SceneConfig& scene, const camera::PlanarView& view);
   /// Of any view, with its own lens and wall: the axis lies where it is seen, the width is that at the picture's
   /// middle.

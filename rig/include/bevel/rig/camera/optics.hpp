@@ -20,7 +20,7 @@ struct FlatRefraction {
 
 class Optics {
  public:
-  /// Throws std::invalid_argument naming the key, the value and what is allowed.
+  /// Throws ArgumentError naming the key, the value and what is allowed.
   Optics(const LensDistortion& lens, const FlatRefraction& refraction, cv::Size picture_px, double px_per_mm);
   bool trivial() const { return trivial_; }
   /// Where a point is seen that an ideal camera would see at `p`; px.

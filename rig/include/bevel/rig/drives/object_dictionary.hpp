@@ -50,7 +50,7 @@ class ObjectDictionary {
   void remove(const Key& key) { objects_.erase(key); }
 
   const Object* find(std::uint16_t index, std::uint8_t sub) const;
-  std::uint32_t get(std::uint16_t index, std::uint8_t sub = 0) const;  // throws std::out_of_range
+  std::uint32_t get(std::uint16_t index, std::uint8_t sub = 0) const;  // throws DomainError
   std::int32_t get_signed(std::uint16_t index, std::uint8_t sub = 0) const;
   void set(std::uint16_t index, std::uint8_t sub, std::uint32_t value);  // by the drive itself: no access check
 

@@ -32,7 +32,7 @@ enum class Cut { kept, forgotten };
 class KinematicPlant : public Plant {
  public:
   // roll_rad: of the bevel at the start; own: what this insertion has of its own. The cut is kept without effects only:
-  // theirs are defined for tips that cut wherever they are. Throws std::invalid_argument for more effects than a model
+  // theirs are defined for tips that cut wherever they are. Throws ArgumentError for more effects than a model
   // holds.
   explicit KinematicPlant(const model::NeedleParameters& needle, std::vector<model::ActiveEffect> effects = {},
                           double roll_rad = 0, const model::OwnValues& own = {}, Cut cut = Cut::forgotten);

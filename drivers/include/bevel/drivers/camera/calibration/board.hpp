@@ -28,7 +28,7 @@ struct BoardSpec {
 
 class Charuco;
 
-/// Throws std::invalid_argument naming the key, the value and what is allowed.
+/// Throws ArgumentError naming the key, the value and what is allowed.
 void check(const BoardSpec& spec);
 
 /// Corners found in one picture; empty if there was no board.

@@ -61,11 +61,11 @@ struct RigSd {
 };
 
 /// Improves `rig`; `loss_px`: from where on a corner counts less (Huber's), 0 for least squares. Throws
-/// std::runtime_error if Ceres cannot go on, naming what it says.
+/// Error if Ceres cannot go on, naming what it says.
 void fit_rig(const Board& board, const std::vector<Shot>& shots, const FitOptions& options, double loss_px, Rig& rig);
 
 /// Standard deviations at the end of a fit by least squares, by the residuals' own scatter. Throws
-/// std::runtime_error if the pictures leave something undetermined.
+/// Error if the pictures leave something undetermined.
 RigSd deviations(const Board& board, const std::vector<Shot>& shots, const FitOptions& options, const Rig& rig);
 
 /// The board alone, in front of cameras that are known: `pose` is moved to its best; corners whose id has the parity

@@ -68,8 +68,8 @@ struct CalibrationInput {
   FitOptions options;
 };
 
-/// Throws std::invalid_argument (what is wrong with the input: the thing, the value, what is allowed) or
-/// std::runtime_error (the fit failed or leaves something undetermined).
+/// Throws ArgumentError (what is wrong with the input: the thing, the value, what is allowed) or
+/// Error (the fit failed or leaves something undetermined).
 Calibrated calibrate(const Board& board, const CalibrationInput& input);
 
 /// Numbers of repeated views, by camera: in air, immersed.

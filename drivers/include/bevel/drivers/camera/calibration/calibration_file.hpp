@@ -4,11 +4,11 @@
 // (k1 k2 p1 p2 k3) under OpenCV's own names; rotation_camera_from_A and translation_camera_from_A_mm (p_C = R p_A + t);
 // `wall` where there is one (projection.hpp); `fit`, figures to be read by people. The last line is a checksum of all
 // before it: a file that was cut, or changed by hand, is refused and not half believed.
-#include <stdexcept>
 #include <string>
 #include <vector>
 
 #include <bevel/drivers/camera/calibration/camera_model.hpp>
+#include <bevel/error.hpp>
 
 namespace bevel::camera {
 
@@ -42,8 +42,8 @@ struct Calibration {
 };
 
 /// what() names the file, the thing, the value and what is allowed.
-class CalibrationError : public std::runtime_error {
-  using std::runtime_error::runtime_error;
+class CalibrationError : public ParseError {
+  using ParseError::ParseError;
 };
 
 std::string to_yaml(const Calibration& calibration);

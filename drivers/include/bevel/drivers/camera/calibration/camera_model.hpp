@@ -42,7 +42,7 @@ struct CameraModel {
   std::optional<Ray> ray(const cv::Point2d& pixel) const;
 };
 
-/// Throws std::invalid_argument naming the camera, the key, the value and what is allowed.
+/// Throws ArgumentError naming the camera, the key, the value and what is allowed.
 void check(const CameraModel& model);
 
 /// x/z, y/z of the light that falls on a pixel; nothing where the lens folds over.

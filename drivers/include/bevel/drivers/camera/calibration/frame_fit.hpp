@@ -11,7 +11,7 @@ struct FiducialPlace {
   cv::Vec3d origin_A_mm;  ///< of {B}, the outer corner of the first square
 };
 
-/// R_AB of axes "+z", "-x" and so on of {A} along which the board's x and y run. Throws std::invalid_argument naming
+/// R_AB of axes "+z", "-x" and so on of {A} along which the board's x and y run. Throws ArgumentError naming
 /// the text and what is allowed.
 cv::Matx33d rotation_of_axes(const std::string& board_x_along, const std::string& board_y_along);
 
@@ -24,7 +24,7 @@ struct FrameFigures {
   int readings = 0;
 };
 
-/// `calibration` is that of `rig`, whatever frame it has. Throws std::invalid_argument if no
+/// `calibration` is that of `rig`, whatever frame it has. Throws ArgumentError if no
 /// camera found the fiducial.
 FrameFigures set_frame_by_fiducial(const Board& board, const Shot& fiducial, const FiducialPlace& place, const Rig& rig,
                                    Calibration& calibration);
@@ -39,7 +39,7 @@ struct InsertedTip {
 /// Fits p(s) = o + s d to the readings of a needle that goes in straight (rotate it steadily, or use one without a
 /// bevel). The new z runs along d, the new origin is o, where the insertion is 0; the line knows nothing of the angle
 /// about it, so -x points, as near as may be, the way the first camera looks, turned by `roll_rad` about z. Throws
-/// std::invalid_argument naming what is wrong: fewer than 20 readings or 20 mm, one camera only (a line through rays of
+/// ArgumentError naming what is wrong: fewer than 20 readings or 20 mm, one camera only (a line through rays of
 /// one eye has no depth), a length seen that is not the length inserted within 5 %.
 FrameFigures set_frame_by_insertion(const std::vector<InsertedTip>& tips, double roll_rad, Calibration& calibration);
 
