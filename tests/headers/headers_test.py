@@ -19,7 +19,7 @@ MODULES = ["model", "estimator", "controller", "diagnosis", "drivers", "io", "ri
 
 
 def flags_of(build, module):
-    """The compiler and those flags that say where headers are: of a source of the module, without its private folder."""
+    """Returns the compiler with the include paths of a source of the module, without the module's private folder."""
     commands = json.loads((build / "compile_commands.json").read_text())
     # The module's folder with the most dependencies: camera code also finds OpenCV.
     preferred = {"drivers": "drivers/src/camera/calibration/", "rig": "rig/src/camera/"}.get(module, f"{module}/src/")
