@@ -10,7 +10,8 @@ std::string shipped_file(const std::string& relative) {
   std::error_code none;
   fs::path folder = fs::read_symlink("/proc/self/exe", none).parent_path();
   for (; !none && folder.has_relative_path(); folder = folder.parent_path())
-    if (fs::exists(folder / relative, none)) return (folder / relative).string();
+    for (const fs::path& file : {folder / relative, folder / "share/bevel" / relative})
+      if (fs::exists(file, none)) return file.string();
   return relative;
 }
 

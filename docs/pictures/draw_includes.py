@@ -16,19 +16,24 @@ def git(*arguments):
     return subprocess.run(["git", *arguments], check=True, capture_output=True, text=True).stdout
 
 
-def read(revision, rooms):
-    """Per file without its ending: room, lines, what it includes."""
+def read(revision, folders):
+    """Per file without its ending: folder, lines, included files. Public headers are in include/bevel/diagnosis, all other
+    files in src; older revisions have both in one folder."""
     files = {}
     for path in git("ls-tree", "-r", "--name-only", revision, "diagnosis").split():
-        match = re.fullmatch(r"(.*)/(\w+)\.[ch]pp", path)
-        if not match or match[1] not in rooms:
+        match = re.fullmatch(r"(diagnosis)/(?:src/|include/bevel/diagnosis/)?(?:(.*)/)?(\w+)\.[ch]pp", path)
+        folder = match and "/".join(part for part in match.group(1, 2) if part)
+        if folder not in folders:
             continue
         text = git("show", f"{revision}:{path}")
-        room, lines, included = files.setdefault(f"{match[1]}/{match[2]}", (match[1], 0, set()))
-        included |= set(re.findall(r'#include "([\w/]+)\.hpp"', text))
-        files[f"{match[1]}/{match[2]}"] = (room, lines + text.count("\n"), included)
-    return {name: (room, lines, {i for i in included if i in files and i != name})
-            for name, (room, lines, included) in files.items()}
+        name = f"{folder}/{match[3]}"
+        _, lines, included = files.setdefault(name, (folder, 0, set()))
+        included |= set(re.findall(r'#include "(diagnosis/[\w/]+)\.hpp"', text))
+        included |= set(re.findall(r"#include <bevel/(diagnosis/[\w/]+)\.hpp>", text))
+        included |= {"diagnosis/" + private for private in re.findall(r'#include "([\w/]+)\.hpp"', text)}
+        files[name] = (folder, lines + text.count("\n"), included)
+    return {name: (folder, lines, {i for i in included if i in files and i != name})
+            for name, (folder, lines, included) in files.items()}
 
 
 def floors_of(files):
@@ -57,8 +62,8 @@ def floors_of(files):
     return rows
 
 
-def draw(title, revision, rooms, left, out):
-    files = read(revision, rooms)
+def draw(title, revision, folders, left, out):
+    files = read(revision, folders)
     rows = floors_of(files)
     width = STEP_X * max(map(len, rows))
     at = {}
@@ -73,10 +78,10 @@ def draw(title, revision, rooms, left, out):
             (x, y), (u, v) = at[name], at[other]
             out.append(f'<path d="M{x:.0f} {y + HEIGHT / 2:.0f} C{x:.0f} {y + 42:.0f} {u:.0f} {v - 42:.0f} {u:.0f} '
                        f'{v - HEIGHT / 2:.0f}" class="e"/>')
-    for name, (room, count, _) in sorted(files.items()):
+    for name, (folder, count, _) in sorted(files.items()):
         x, y = at[name]
         out.append(f'<rect x="{x - WIDTH / 2:.0f}" y="{y - HEIGHT / 2:.0f}" width="{WIDTH}" height="{HEIGHT}" rx="4" '
-                   f'class="{FILL[room]}"/><text x="{x:.0f}" y="{y - 1:.0f}" font-size="11">{name.split("/")[-1]}</text>'
+                   f'class="{FILL[folder]}"/><text x="{x:.0f}" y="{y - 1:.0f}" font-size="11">{name.split("/")[-1]}</text>'
                    f'<text x="{x:.0f}" y="{y + 12:.0f}" font-size="8" class="l">{count}</text>')
     return left + width, 70 + STEP_Y * len(rows)
 

@@ -22,7 +22,7 @@ struct PlacedReadings {
   std::vector<Placed<model::TipHeading>> headings;
 };
 
-// Takes out rows that are implausible beside their neighbours (bevel/io/plausibility.hpp), and says each in `left_out`:
+// Removes rows that are implausible given their neighbours (bevel/io/plausibility.hpp), and lists each in `left_out`:
 // "FILE:LINE: what; the row is left out". If tip and base share their rows, a row is left out as a whole. Throws
 // Error for motion that lasts, and where more than a fifth would have to go.
 void leave_out_the_implausible(PlacedReadings& readings, const std::string& tip_path, const std::string& base_path,

@@ -1,6 +1,6 @@
 #pragma once
-// The blind trial's generator as a client of the engine (bevel/diagnosis/inference/system.hpp): its own integrator, its
-// own forms of the effects, those on no list too, under the same priors of needle, variation and noise as the needle's.
+// The generator of the validation as a system of the inference engine (bevel/diagnosis/inference/system.hpp). It has a
+// separate integrator and separate forms of the effects, including unmodelled ones, under the needle's priors.
 // What the tool is measured against, so it belongs to neither room: proof/ and diagnosis/ meet here alone.
 //
 // Of one trial it has what the logs do not say: the share of the physical forms (HiddenPhysics::departure) and the

@@ -27,7 +27,7 @@ class Constant:
 
 def files_of(cell):
     for name in re.split(r"[,;]\s*", cell):
-        for folder in ("diagnosis", "."):
+        for folder in ("diagnosis/src", "diagnosis/include/bevel/diagnosis", "model/include", "."):
             if (ROOT / folder / name).is_file():
                 yield pathlib.Path(folder) / name
 

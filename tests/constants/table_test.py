@@ -31,7 +31,7 @@ class Table(unittest.TestCase):
         named = no_choice | {c.name for c in constants_table.constants()} | set(re.findall(r"`(k\w+)`", below))
         numbers = 0
         for folder in ("inference", "needle", "mismatch"):
-            for path in sorted((constants_table.ROOT / "diagnosis" / folder).iterdir()):
+            for path in sorted((constants_table.ROOT / "diagnosis").glob(f"**/{folder}/*.[ch]pp")):
                 for line in path.read_text().splitlines():
                     for name in re.findall(r"\b(k[A-Z]\w*) = [-+\d.]", line) if "constexpr" in line else []:
                         with self.subTest(file=path.name):

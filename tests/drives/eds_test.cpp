@@ -15,7 +15,7 @@ namespace {
 using Section = std::map<std::string, std::string>;
 
 std::map<std::string, Section> read_eds() {
-  std::ifstream file(BEVEL_SOURCE_DIR "/rig/drives/bevel_drive.eds");
+  std::ifstream file(BEVEL_SOURCE_DIR "/rig/src/drives/bevel_drive.eds");
   EXPECT_TRUE(file.good());
   std::map<std::string, Section> sections;
   std::string line, name;

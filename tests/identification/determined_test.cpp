@@ -56,11 +56,11 @@ TEST(Determined, SlipThatNoRotationSeparatesFromAMisfitIsHeld) {
   EXPECT_GT(std::abs(free.needle.curvature_per_mm / kCurvature_per_mm - 1), 0.25) << "slip absorbs this misfit";
   const FitResult fit = fit_determined(data, options);
   ASSERT_EQ(fit.held.size(), 2U);
-  EXPECT_TRUE(is_held(fit, kLambda1) && is_held(fit, kLambda2));
+  EXPECT_TRUE(is_held(fit, kNeedleLambda1) && is_held(fit, kNeedleLambda2));
   EXPECT_EQ(fit.needle.lambda1_per_rad, 0.49);
   EXPECT_EQ(fit.needle.lambda2, 0.22);
-  EXPECT_EQ(fit.find(kLambda1), nullptr) << "a held parameter has no standard error";
-  ASSERT_NE(fit.find(kCurvature), nullptr);
+  EXPECT_EQ(fit.find(kNeedleLambda1), nullptr) << "a held parameter has no standard error";
+  ASSERT_NE(fit.find(kNeedleCurvature), nullptr);
 
   const auto all = fit_candidates(data, options);
   const Candidate& best = all[preferred(all)];
@@ -80,9 +80,9 @@ TEST(Determined, HeldSlipIsThePriorsMeanWhereThereIsAPrior) {
 TEST(Determined, SlipOfARotatedShaftIsFitted) {
   const FitResult fit = fit_determined(trials(needle(0.3, 0.1), std::numbers::pi, 0), options_from(needle(0.49, 0.22)));
   EXPECT_TRUE(fit.held.empty());
-  ASSERT_NE(fit.find(kLambda1), nullptr);
-  EXPECT_NEAR(fit.needle.lambda1_per_rad, 0.3, 4 * fit.find(kLambda1)->std_error);
-  EXPECT_NEAR(fit.needle.curvature_per_mm, kCurvature_per_mm, 4 * fit.find(kCurvature)->std_error);
+  ASSERT_NE(fit.find(kNeedleLambda1), nullptr);
+  EXPECT_NEAR(fit.needle.lambda1_per_rad, 0.3, 4 * fit.find(kNeedleLambda1)->std_error);
+  EXPECT_NEAR(fit.needle.curvature_per_mm, kCurvature_per_mm, 4 * fit.find(kNeedleCurvature)->std_error);
 }
 
 TEST(Determined, AWheelbaseWithLessInformationThanItsRangeIsHeld) {
@@ -91,14 +91,14 @@ TEST(Determined, AWheelbaseWithLessInformationThanItsRangeIsHeld) {
   plan.rotation_rad = 1;
   const std::vector<Insertion> data{simulate_insertion(needle(0.144, 0.032), plan, random)};
   FitOptions options = options_from(needle(0.144, 0.032));
-  options.fitted[kWheelbase] = true;
+  options.fitted[kNeedleWheelbase] = true;
   options.correct_correlation = false;
   const FitResult fit = fit_determined(data, options);
-  EXPECT_TRUE(is_held(fit, kWheelbase));
+  EXPECT_TRUE(is_held(fit, kNeedleWheelbase));
   EXPECT_EQ(fit.needle.wheelbase_mm, options.start.wheelbase_mm);
   for (const FittedParameter& p : fit.parameters)
-    if (p.parameter != kCurvature) {
-      EXPECT_LE(p.data_std_error, p.parameter == kLambda1 ? 0.2 : 0.1);
+    if (p.parameter != kNeedleCurvature) {
+      EXPECT_LE(p.data_std_error, p.parameter == kNeedleLambda1 ? 0.2 : 0.1);
     }
 }
 
@@ -122,7 +122,7 @@ TEST(Candidates, TiltedEntriesArePreferredWhereTheDataShowThem) {
   all = fit_candidates(data, options);
   ASSERT_EQ(preferred(all), 2U) << all[preferred(all)].model;
   EXPECT_NEAR(all[2].fit.needle.curvature_per_mm, kCurvature_per_mm, 0.05 * kCurvature_per_mm);
-  EXPECT_NEAR(all[2].fit.entries[2](kTiltX), 0.08, 0.01);
+  EXPECT_NEAR(all[2].fit.entries[2](kEntryTiltX), 0.08, 0.01);
 }
 
 TEST(Candidates, RecordingsInOnePlaneLeaveTheStructureOfTheModelFile) {

@@ -106,11 +106,11 @@ TEST(TrajectoryFit, EntryPoseIsFoundWhereItIsFree) {
   plan.initial_roll_rad = 0.2;
   const auto data = trials(truth, 4, plan, 13);
   auto options = from_plastisol();
-  options.entry_sigma(kRoll) = 0.3;
-  options.entry_sigma(kTiltX) = options.entry_sigma(kTiltY) = 0.01;
+  options.entry_sigma(kEntryRoll) = 0.3;
+  options.entry_sigma(kEntryTiltX) = options.entry_sigma(kEntryTiltY) = 0.01;
   const auto fit = fit_from_many_starts(data, options);
   expect_within_four_errors(fit, truth);
-  for (const Entry& e : fit.entries) EXPECT_NEAR(e(kRoll), 0.2, 0.03);
+  for (const Entry& e : fit.entries) EXPECT_NEAR(e(kEntryRoll), 0.2, 0.03);
 }
 
 // Eight insertions, one of which turns, each with a heading of its own at the entry: fitted together with the needle,
@@ -124,7 +124,7 @@ TEST(TrajectoryFit, OwnHeadingsDoNotBiasTheNeedle) {
   std::normal_distribution<double> normal;
   FitOptions options;
   options.start = truth;
-  options.entry_sigma(kTiltX) = options.entry_sigma(kTiltY) = kTilt_rad;
+  options.entry_sigma(kEntryTiltX) = options.entry_sigma(kEntryTiltY) = kTilt_rad;
   options.loss = Loss::square;
   options.estimate_scale = options.correct_correlation = false;
   double sum = 0, squares = 0;
@@ -135,7 +135,7 @@ TEST(TrajectoryFit, OwnHeadingsDoNotBiasTheNeedle) {
       plan.rotation_rad = i == 7 ? std::numbers::pi : 0;
       Insertion one = simulate_insertion(truth, plan, random);
       Entry own = Entry::Zero();
-      own(kTiltX) = kTilt_rad * normal(random), own(kTiltY) = kTilt_rad * normal(random);
+      own(kEntryTiltX) = kTilt_rad * normal(random), own(kEntryTiltY) = kTilt_rad * normal(random);
       Path square, tilted;
       ASSERT_TRUE(integrate(one, truth, Entry::Zero(), false, square) && integrate(one, truth, own, false, tilted));
       for (std::size_t k = 0; k < one.observations.size(); ++k)
@@ -144,7 +144,7 @@ TEST(TrajectoryFit, OwnHeadingsDoNotBiasTheNeedle) {
     }
     const FittedParameter* k = nullptr;
     const auto fit = fit_trajectory(data, options);
-    ASSERT_TRUE((k = fit.find(kCurvature)) != nullptr);
+    ASSERT_TRUE((k = fit.find(kNeedleCurvature)) != nullptr);
     const double z = (k->value - truth.curvature_per_mm) / k->std_error;
     sum += z, squares += z * z;
   }
@@ -162,7 +162,7 @@ TEST(TrajectoryFit, SaysWhichDirectionTheDataLeaveOpen) {
   plan.measurements = 60;
   const auto data = trials(truth, 1, plan, 14);
   auto options = from_plastisol();
-  options.fitted[kWheelbase] = true;
+  options.fitted[kNeedleWheelbase] = true;
   options.start = truth;
   options.correct_correlation = false;
   const auto fit = fit_trajectory(data, options);
@@ -172,9 +172,9 @@ TEST(TrajectoryFit, SaysWhichDirectionTheDataLeaveOpen) {
   // With a prior the same data decide next to nothing along that direction, and the result says whose word it is.
   options.priors = table_one_plastisol();
   const auto with_prior = fit_trajectory(data, options);
-  EXPECT_GT(with_prior.find(kLambda1)->prior_share, 0.5);
-  EXPECT_LT(with_prior.find(kLambda1)->std_error, 0.18);
-  EXPECT_LT(with_prior.find(kCurvature)->prior_share, 1e-12);
+  EXPECT_GT(with_prior.find(kNeedleLambda1)->prior_share, 0.5);
+  EXPECT_LT(with_prior.find(kNeedleLambda1)->std_error, 0.18);
+  EXPECT_LT(with_prior.find(kNeedleCurvature)->prior_share, 1e-12);
 }
 
 TEST(TrajectoryFit, StopsAtTheBoundOfTheDomainAndSaysSo) {
@@ -183,9 +183,9 @@ TEST(TrajectoryFit, StopsAtTheBoundOfTheDomainAndSaysSo) {
   plan.measurements = 20;
   const auto data = trials(needle(0.02, 0.1), 1, plan, 15);
   auto options = from_plastisol();
-  options.priors[kLambda1] = Prior{-0.5, 0.01};
+  options.priors[kNeedleLambda1] = Prior{-0.5, 0.01};
   const auto fit = fit_from_many_starts(data, options);
-  EXPECT_TRUE(fit.find(kLambda1)->at_bound);
+  EXPECT_TRUE(fit.find(kNeedleLambda1)->at_bound);
   EXPECT_FALSE(model::find_domain_violation(fit.needle));
   EXPECT_NEAR(fit.needle.lambda1_per_rad, fit.needle.lambda2 * fit.needle.lambda2 / (2 * std::numbers::pi), 1e-5);
 }
@@ -200,7 +200,7 @@ TEST(TrajectoryFit, RefusesWhatItCannotFit) {
   options.fitted = {};
   EXPECT_THROW(fit_trajectory(data, options), bevel::ArgumentError);
   options = from_plastisol();
-  options.priors[kCurvature] = Prior{0.005, 0};
+  options.priors[kNeedleCurvature] = Prior{0.005, 0};
   EXPECT_THROW(fit_trajectory(data, options), bevel::ArgumentError);
 }
 
@@ -229,7 +229,7 @@ TEST(AngleRate, RecoversLambdaFromCleanPathsAndLosesItInNoise) {
   const auto noisy = trials(truth, 3, plan, 19);
   FitOptions options = from_plastisol();
   options.start.curvature_per_mm = truth.curvature_per_mm;
-  options.fitted[kCurvature] = false;  // the same unknowns for both methods
+  options.fitted[kNeedleCurvature] = false;  // the same unknowns for both methods
   const auto rate = fit_angle_rate(noisy, start);
   const auto trajectory = fit_trajectory(noisy, options);
   EXPECT_LT(error_figures(noisy, trajectory.needle, Compare::same_insertion).rms_mm,

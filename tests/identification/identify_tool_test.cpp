@@ -136,7 +136,7 @@ TEST_F(IdentifyTool, MethodsAndPriorsAreHeard) {
   const auto plain = identify(options, std::cerr);
   options.prior = "table1-plastisol";
   const auto with_prior = identify(options, std::cerr);
-  EXPECT_GT(with_prior.fit.find(diagnosis::kLambda1)->prior_share, 0);
+  EXPECT_GT(with_prior.fit.find(diagnosis::kNeedleLambda1)->prior_share, 0);
   EXPECT_LT(with_prior.chosen.lambda1_per_rad, plain.chosen.lambda1_per_rad);
   options.method = "angle-rate";
   const auto rate = identify(options, std::cerr);

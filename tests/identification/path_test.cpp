@@ -56,14 +56,14 @@ TEST(Path, JacobianAgreesWithPerturbation) {
     Path path;
     ASSERT_TRUE(integrate(insertion, needle, entry, true, path));
     for (int column = 0; column < kPathColumns; ++column) {
-      const double h = column == kCurvature ? 1e-7 : 1e-5;
+      const double h = column == kNeedleCurvature ? 1e-7 : 1e-5;
       const auto moved = [&](double by) {
         auto n = needle;
         Entry e = entry;
-        if (column == kCurvature) n.curvature_per_mm += by;
-        if (column == kLambda1) n.lambda1_per_rad += by;
-        if (column == kLambda2) n.lambda2 += by;
-        if (column == kWheelbase) n.wheelbase_mm += by;
+        if (column == kNeedleCurvature) n.curvature_per_mm += by;
+        if (column == kNeedleLambda1) n.lambda1_per_rad += by;
+        if (column == kNeedleLambda2) n.lambda2 += by;
+        if (column == kNeedleWheelbase) n.wheelbase_mm += by;
         if (column >= kNeedleParameters) e(column - kNeedleParameters) += by;
         Path p;
         EXPECT_TRUE(integrate(insertion, n, e, false, p));

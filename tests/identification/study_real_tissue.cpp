@@ -91,8 +91,8 @@ FitOptions options_for(const Variant& v) {
   o.start.lambda1_per_rad = 0.144;
   o.start.lambda2 = 0.032;
   o.start.front_wheel = v.wheel;
-  o.entry_sigma(kOffsetX) = o.entry_sigma(kOffsetY) = 0.7;
-  o.entry_sigma(kTiltX) = o.entry_sigma(kTiltY) = v.tilt_rad;
+  o.entry_sigma(kEntryOffsetX) = o.entry_sigma(kEntryOffsetY) = 0.7;
+  o.entry_sigma(kEntryTiltX) = o.entry_sigma(kEntryTiltY) = v.tilt_rad;
   return v.extended ? o : bicycle_options(o);
 }
 
@@ -167,7 +167,7 @@ void study_tissue(const fs::path& folder, const std::string& tissue) {
       const FitResult own = fit_trajectory({third}, entry_only);
       out_own_entry.add(error_figures({third}, fit.needle, Compare::same_insertion, own.entries));
       char text[160];
-      const bool bound = v.extended && fit.find(kLambda1)->at_bound;
+      const bool bound = v.extended && fit.find(kNeedleLambda1)->at_bound;
       std::snprintf(text, sizeof text, "  [k %.4f l1 %.2f l2 %.2f%s open %d]", fit.needle.curvature_per_mm,
                     fit.needle.lambda1_per_rad, fit.needle.lambda2, bound ? " BOUND" : "", fit.unfixed_directions());
       lambdas += text;

@@ -35,7 +35,7 @@ TEST(Table1, OverSeedsTheEstimateIsUnbiasedAndItsErrorHonest) {
   constexpr int kSeeds = 30;
   for (int i = 0; i < kSeeds; ++i) {
     const auto fit = identify_tissue(path, 1000 + 10 * static_cast<std::uint64_t>(i)).fit;
-    const auto& p = *fit.find(diagnosis::kLambda1);
+    const auto& p = *fit.find(diagnosis::kNeedleLambda1);
     sum += (p.value - 0.49) / p.std_error;
     squares += std::pow((p.value - 0.49) / p.std_error, 2);
   }

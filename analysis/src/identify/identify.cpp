@@ -24,11 +24,11 @@ FitOptions fit_options(const IdentifyOptions& options, const model::NeedleParame
   fit.start = start;
   if (options.prior == "table1-agar") fit.priors = table_one_agar();
   if (options.prior == "table1-plastisol") fit.priors = table_one_plastisol();
-  fit.fitted[kWheelbase] = options.fit_wheelbase;
+  fit.fitted[kNeedleWheelbase] = options.fit_wheelbase;
   if (options.square_loss) fit.loss = Loss::square;
-  fit.entry_sigma(kTiltX) = fit.entry_sigma(kTiltY) = options.entry_tilt_rad;
-  fit.entry_sigma(kRoll) = options.entry_roll_rad;
-  fit.entry_sigma(kOffsetX) = fit.entry_sigma(kOffsetY) = options.entry_offset_mm;
+  fit.entry_sigma(kEntryTiltX) = fit.entry_sigma(kEntryTiltY) = options.entry_tilt_rad;
+  fit.entry_sigma(kEntryRoll) = options.entry_roll_rad;
+  fit.entry_sigma(kEntryOffsetX) = fit.entry_sigma(kEntryOffsetY) = options.entry_offset_mm;
   fit.entry_sigma(kLateEntry) = options.late_entry_mm;
   fit.fit_slip_in_plane = options.fit_slip_in_plane;
   return fit;

@@ -131,7 +131,7 @@ Tissue identify_tissue(const TissuePath& path, std::uint64_t seed) {
   tissue.angle_rate = fit_angle_rate(all, options.start);
   tissue.angle_rate_k = fit_angle_rate(all, options.start, true);
   FitOptions tilted = options;
-  tilted.entry_sigma(kTiltX) = 0.3;
+  tilted.entry_sigma(kEntryTiltX) = 0.3;
   tissue.tilted_bicycle = fit_trajectory(all, bicycle_options(tilted));
   tissue.tilted_error =
       error_figures(all, tissue.tilted_bicycle.needle, Compare::same_depth, tissue.tilted_bicycle.entries);

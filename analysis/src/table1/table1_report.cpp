@@ -50,12 +50,13 @@ std::vector<std::vector<std::string>> rows_of(const std::vector<Tissue>& tissues
         return p.tissue == t.path.tissue && p.speed_mm_s == r.speed_mm_s;
       });
       const auto& fit = t.fit;
-      const bool bound = fit.find(kLambda1)->at_bound;
+      const bool bound = fit.find(kNeedleLambda1)->at_bound;
       rows.push_back({t.path.tissue, text("%.0f", r.speed_mm_s),
                       text("%.3f", paper->lambda1) + " / " + text("%.3f", paper->lambda2),
                       text("%.3f", fit.needle.lambda1_per_rad) + " / " + text("%.3f", fit.needle.lambda2) +
                           (bound ? " (bound)" : ""),
-                      text("%.3f", fit.find(kLambda1)->std_error) + " / " + text("%.3f", fit.find(kLambda2)->std_error),
+                      text("%.3f", fit.find(kNeedleLambda1)->std_error) + " / " +
+                          text("%.3f", fit.find(kNeedleLambda2)->std_error),
                       text("%.3f", t.angle_rate.needle.lambda1_per_rad) + " / " +
                           text("%.3f", t.angle_rate.needle.lambda2) + (t.angle_rate.in_domain ? "" : " (out)"),
                       text("%.2f", paper->largest_extended_mm), text("%.2f", r.largest_extended_mm),
@@ -208,7 +209,7 @@ void print(std::ostream& out, const Table1Study& study) {
   out << "\nA bicycle whose entry may be tilted, nothing else (largest error over all trials, noise included):\n";
   for (const auto* tissues : {&study.kinematic, &study.beam})
     for (const auto& t : *tissues)
-      out << t.path.description << ": tilt " << text("%.3f", t.tilted_bicycle.entries[0](kTiltX)) << " rad, k "
+      out << t.path.description << ": tilt " << text("%.3f", t.tilted_bicycle.entries[0](kEntryTiltX)) << " rad, k "
           << text("%.5f", t.tilted_bicycle.needle.curvature_per_mm) << " /mm, RMS "
           << text("%.2f", t.tilted_error.rms_mm) << ", largest " << text("%.2f", t.tilted_error.largest_mm)
           << " mm; extended RMS "

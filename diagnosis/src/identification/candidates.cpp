@@ -60,7 +60,7 @@ std::string extended_name(const model::NeedleParameters& needle) {
 FitOptions bicycle_options(FitOptions options) {
   options.start.lambda1_per_rad = 0;
   options.start.lambda2 = 0;
-  options.fitted[kLambda1] = options.fitted[kLambda2] = options.fitted[kWheelbase] = false;
+  options.fitted[kNeedleLambda1] = options.fitted[kNeedleLambda2] = options.fitted[kNeedleWheelbase] = false;
   return options;
 }
 
@@ -85,12 +85,12 @@ std::vector<Candidate> fit_candidates(const std::vector<Insertion>& insertions, 
       all.push_back(fit_one(extended_name(o.start), true, insertions, o));
     }
   fill_bic(all, 0, 0);
-  if (options.entry_sigma(kTiltX) > 0 || options.entry_sigma(kTiltY) > 0) return all;
+  if (options.entry_sigma(kEntryTiltX) > 0 || options.entry_sigma(kEntryTiltY) > 0) return all;
   const std::size_t untilted = all.size();
   for (const std::size_t best : {std::size_t{0}, best_of(all, 1, untilted)}) {
     if (best >= untilted || !all[best].possible) continue;
     FitOptions tilted = fitted[best];
-    tilted.entry_sigma(kTiltX) = tilted.entry_sigma(kTiltY) = kTiltOfRealRigs_rad;
+    tilted.entry_sigma(kEntryTiltX) = tilted.entry_sigma(kEntryTiltY) = kTiltOfRealRigs_rad;
     all.push_back(fit_one(all[best].model + ", tilted entries", all[best].extended, insertions, tilted));
   }
   fill_bic(all, untilted, 2 * static_cast<double>(insertions.size()));

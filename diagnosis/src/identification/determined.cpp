@@ -9,7 +9,9 @@ namespace bevel::diagnosis {
 namespace {
 
 double& value_of(model::NeedleParameters& needle, Parameter parameter) {
-  return parameter == kLambda1 ? needle.lambda1_per_rad : parameter == kLambda2 ? needle.lambda2 : needle.wheelbase_mm;
+  return parameter == kNeedleLambda1   ? needle.lambda1_per_rad
+         : parameter == kNeedleLambda2 ? needle.lambda2
+                                       : needle.wheelbase_mm;
 }
 
 void hold(Parameter parameter, const std::string& reason, FitOptions& options, std::vector<HeldParameter>& held) {
@@ -32,7 +34,7 @@ const FittedParameter* least_determined(const FitResult& fit, const FitOptions& 
   const FittedParameter* least = nullptr;
   double largest = 1;
   for (const FittedParameter& p : fit.parameters) {
-    if (p.parameter == kCurvature || p.at_bound) continue;
+    if (p.parameter == kNeedleCurvature || p.at_bound) continue;
     const auto& prior = options.priors[p.parameter];
     const double sd = prior ? prior->sigma : kPlausibleRange[p.parameter];
     if (!(p.data_std_error > largest * sd)) continue;
@@ -52,7 +54,7 @@ FitResult fit_determined(const std::vector<Insertion>& insertions, const FitOpti
   std::vector<HeldParameter> held;
   char text[160];
   if (!options.fit_slip_in_plane && !separate_slip(insertions))
-    for (const Parameter lambda : {kLambda1, kLambda2}) {
+    for (const Parameter lambda : {kNeedleLambda1, kNeedleLambda2}) {
       if (!options.fitted[lambda]) continue;
       std::snprintf(text, sizeof text, "the shaft rotates by %.2g rad while it inserts; %.2g rad are required",
                     widest_roll_rad(insertions), kSeparatingRoll_rad);

@@ -10,11 +10,11 @@ constexpr double kNormal95 = 1.959963984540054;
 
 double value_of(const model::NeedleParameters& needle, Parameter parameter) {
   switch (parameter) {
-    case kCurvature:
+    case kNeedleCurvature:
       return needle.curvature_per_mm;
-    case kLambda1:
+    case kNeedleLambda1:
       return needle.lambda1_per_rad;
-    case kLambda2:
+    case kNeedleLambda2:
       return needle.lambda2;
     default:
       return needle.wheelbase_mm;

@@ -17,28 +17,28 @@ FitResult fit_from_many_starts(const std::vector<Insertion>& insertions, const F
     }
   };
   attempt(options);
-  if (fits.empty() && options.fitted[kCurvature]) {  // a needle as curved as the start leaves the domain of (25)
+  if (fits.empty() && options.fitted[kNeedleCurvature]) {  // a needle as curved as the start leaves the domain of (25)
     FitOptions straight = options;
     straight.start.curvature_per_mm = 0;
     attempt(straight);
   }
-  if (options.fitted[kLambda1] && options.fitted[kLambda2])
+  if (options.fitted[kNeedleLambda1] && options.fitted[kNeedleLambda2])
     for (const auto& priors : {table_one_agar(), table_one_plastisol()}) {
       FitOptions from = options;
-      from.start.lambda1_per_rad = priors[kLambda1]->mean;
-      from.start.lambda2 = priors[kLambda2]->mean;
+      from.start.lambda1_per_rad = priors[kNeedleLambda1]->mean;
+      from.start.lambda2 = priors[kNeedleLambda2]->mean;
       attempt(from);
     }
   // The bicycle is a corner of the extended model's domain: what it fits, the extended model must fit as well.
-  if (options.fitted[kCurvature] && options.fitted[kLambda1]) {
+  if (options.fitted[kNeedleCurvature] && options.fitted[kNeedleLambda1]) {
     FitOptions bicycle = options;
     bicycle.start.lambda1_per_rad = bicycle.start.lambda2 = 0;
-    bicycle.fitted[kLambda1] = bicycle.fitted[kLambda2] = bicycle.fitted[kWheelbase] = false;
+    bicycle.fitted[kNeedleLambda1] = bicycle.fitted[kNeedleLambda2] = bicycle.fitted[kNeedleWheelbase] = false;
     bicycle.start.curvature_per_mm = 0;
     FitOptions from = options;
     from.start.curvature_per_mm = fit_trajectory(insertions, bicycle).needle.curvature_per_mm;
     from.start.lambda1_per_rad = 0.01;
-    if (options.fitted[kLambda2]) from.start.lambda2 = 0;
+    if (options.fitted[kNeedleLambda2]) from.start.lambda2 = 0;
     if (!model::find_domain_violation(from.start)) attempt(from);
   }
   if (fits.empty()) throw ArgumentError(refusal);
@@ -53,8 +53,8 @@ FitResult fit_from_many_starts(const std::vector<Insertion>& insertions, const F
 namespace {
 Priors table_one(double lambda1, double lambda2) {
   Priors priors;
-  priors[kLambda1] = Prior{lambda1, 0.173};
-  priors[kLambda2] = Prior{lambda2, 0.094};
+  priors[kNeedleLambda1] = Prior{lambda1, 0.173};
+  priors[kNeedleLambda2] = Prior{lambda2, 0.094};
   return priors;
 }
 }  // namespace

@@ -8,22 +8,22 @@ using BodyColumns = Eigen::Matrix<double, 6, kPathColumns>;  // d(body perturbat
 
 model::Pose entry_pose(const Entry& entry, BodyColumns& D) {
   // Tilt as one rotation vector in the xy plane, then roll about the shaft.
-  const Vector3d tilt(entry(kTiltX), entry(kTiltY), 0);
-  const Eigen::Matrix3d unroll = model::exp_so3({0, 0, -entry(kRoll)});
+  const Vector3d tilt(entry(kEntryTiltX), entry(kEntryTiltY), 0);
+  const Eigen::Matrix3d unroll = model::exp_so3({0, 0, -entry(kEntryRoll)});
   model::Pose pose;
   pose.R = model::exp_so3(tilt) * unroll.transpose();
-  pose.p_mm = {entry(kOffsetX), entry(kOffsetY), 0};
+  pose.p_mm = {entry(kEntryOffsetX), entry(kEntryOffsetY), 0};
   D.setZero();
-  D.block<3, 2>(3, entry_column(kTiltX)) = unroll * model::right_jacobian_so3(tilt).leftCols<2>();
-  D(5, entry_column(kRoll)) = 1;
-  D.block<3, 2>(0, entry_column(kOffsetX)) = pose.R.transpose().leftCols<2>();
+  D.block<3, 2>(3, entry_column(kEntryTiltX)) = unroll * model::right_jacobian_so3(tilt).leftCols<2>();
+  D(5, entry_column(kEntryRoll)) = 1;
+  D.block<3, 2>(0, entry_column(kEntryOffsetX)) = pose.R.transpose().leftCols<2>();
   return pose;
 }
 
 void add_step(const model::StepJacobian& J, BodyColumns& D) {
   D = (J.pose * D).eval();
-  D.col(kCurvature) += J.input.col(2);
-  D.middleCols<3>(kLambda1) += J.slip;
+  D.col(kNeedleCurvature) += J.input.col(2);
+  D.middleCols<3>(kNeedleLambda1) += J.slip;
 }
 
 // Weights of the cubic on [0, 1] for both ends' values and slopes.

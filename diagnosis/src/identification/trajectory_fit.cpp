@@ -19,13 +19,13 @@ FitResult TrajectoryFit::run() {
   VectorXd x = VectorXd::Zero(size_);
   const auto& s = options_.start;
   for (Eigen::Index i = 0; i < globals_; ++i) switch (parameters_[static_cast<std::size_t>(i)]) {
-      case kCurvature:
+      case kNeedleCurvature:
         x(i) = s.curvature_per_mm;
         break;
-      case kLambda1:
+      case kNeedleLambda1:
         x(i) = s.lambda1_per_rad - s.lambda2 * s.lambda2 / (2 * std::numbers::pi);
         break;
-      case kLambda2:
+      case kNeedleLambda2:
         x(i) = s.lambda2;
         break;
       default:
@@ -141,10 +141,11 @@ FitResult TrajectoryFit::result(const VectorXd& x, const std::vector<Block>& blo
       r.needle.lambda1_per_rad > 1.01 * r.needle.lambda2 * r.needle.lambda2 / (2 * std::numbers::pi);
   for (Eigen::Index i = 0; i < globals_; ++i) {
     const Parameter p = parameters_[static_cast<std::size_t>(i)];
-    free.push_back(x(i) > low_(i) && x(i) < high_(i) && !(at_slip_limit && (p == kLambda1 || p == kLambda2)));
-    if (parameters_[static_cast<std::size_t>(i)] == kLambda1)
+    free.push_back(x(i) > low_(i) && x(i) < high_(i) &&
+                   !(at_slip_limit && (p == kNeedleLambda1 || p == kNeedleLambda2)));
+    if (parameters_[static_cast<std::size_t>(i)] == kNeedleLambda1)
       for (Eigen::Index j = 0; j < globals_; ++j)
-        if (parameters_[static_cast<std::size_t>(j)] == kLambda2)
+        if (parameters_[static_cast<std::size_t>(j)] == kNeedleLambda2)
           to_coordinates(i, j) = -r.needle.lambda2 / std::numbers::pi;
   }
   fill_uncertainty(to_coordinates.transpose() * M * to_coordinates, parameters_, free, options_.priors, r);

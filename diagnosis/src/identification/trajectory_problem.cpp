@@ -54,13 +54,13 @@ model::NeedleParameters TrajectoryFit::needle(const VectorXd& x) const {
   model::NeedleParameters n = options_.start;
   double mu = -1;
   for (Eigen::Index i = 0; i < globals_; ++i) switch (parameters_[static_cast<std::size_t>(i)]) {
-      case kCurvature:
+      case kNeedleCurvature:
         n.curvature_per_mm = x(i);
         break;
-      case kLambda1:
+      case kNeedleLambda1:
         mu = x(i);
         break;
-      case kLambda2:
+      case kNeedleLambda2:
         n.lambda2 = x(i);
         break;
       default:
@@ -81,18 +81,18 @@ void TrajectoryFit::set_bounds(const VectorXd& x) {
   low_ = VectorXd::Constant(size_, -1e9);
   high_ = VectorXd::Constant(size_, 1e9);
   for (Eigen::Index i = 0; i < globals_; ++i) switch (parameters_[static_cast<std::size_t>(i)]) {
-      case kCurvature:
+      case kNeedleCurvature:
         low_(i) = -0.0499;
         high_(i) = 0.0499;
         break;
-      case kLambda1:
+      case kNeedleLambda1:
         low_(i) = kLambdaMargin;
         high_(i) = 20;
         break;
-      case kLambda2: {
+      case kNeedleLambda2: {
         low_(i) = -5;
         high_(i) = 0.99;
-        if (options_.fitted[kLambda1]) break;  // then mu looks after (26)
+        if (options_.fitted[kNeedleLambda1]) break;  // then mu looks after (26)
         const double limit = std::sqrt(2 * std::numbers::pi * needle(x).lambda1_per_rad) - kLambdaMargin;
         low_(i) = -limit;
         high_(i) = std::min(high_(i), limit);
@@ -123,7 +123,8 @@ void TrajectoryFit::evaluate_one(const VectorXd& x, std::size_t i, Block& block)
       const Parameter p = parameters_[static_cast<std::size_t>(c)];
       Eigen::Vector3d column = J.col(p);
       // At fixed mu, lambda1 moves with lambda2.
-      if (p == kLambda2 && options_.fitted[kLambda1]) column += J.col(kLambda1) * n.lambda2 / std::numbers::pi;
+      if (p == kNeedleLambda2 && options_.fitted[kNeedleLambda1])
+        column += J.col(kNeedleLambda1) * n.lambda2 / std::numbers::pi;
       block.jacobian.col(c).segment(row, o.rank).noalias() = W * column;
     }
     for (Eigen::Index c = 0; c < locals_; ++c)
@@ -171,7 +172,7 @@ void TrajectoryFit::renew_scale(const std::vector<Block>& blocks) {
 // The parameters that priors speak of: lambda1 itself, not its coordinate mu.
 VectorXd as_parameters(VectorXd x, const std::vector<Parameter>& parameters, const model::NeedleParameters& needle) {
   for (std::size_t i = 0; i < parameters.size(); ++i)
-    if (parameters[i] == kLambda1) x(static_cast<Eigen::Index>(i)) = needle.lambda1_per_rad;
+    if (parameters[i] == kNeedleLambda1) x(static_cast<Eigen::Index>(i)) = needle.lambda1_per_rad;
   return x;
 }
 
@@ -222,9 +223,9 @@ void TrajectoryFit::normal_equations(const VectorXd& x, const std::vector<Block>
     if (prior_weight_(i) == 0) continue;
     row.setZero();
     row(i) = 1;
-    if (i < globals_ && parameters_[static_cast<std::size_t>(i)] == kLambda1)
+    if (i < globals_ && parameters_[static_cast<std::size_t>(i)] == kNeedleLambda1)
       for (Eigen::Index j = 0; j < globals_; ++j)
-        if (parameters_[static_cast<std::size_t>(j)] == kLambda2) row(j) = n.lambda2 / std::numbers::pi;
+        if (parameters_[static_cast<std::size_t>(j)] == kNeedleLambda2) row(j) = n.lambda2 / std::numbers::pi;
     H_ += prior_weight_(i) * row * row.transpose();
     g_ += prior_weight_(i) * off(i) * row;
   }

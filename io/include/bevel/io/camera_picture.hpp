@@ -1,4 +1,5 @@
-// CAMERA_PICTURE, the one message with bytes of its own: its checked decode, beside bevel/io/checked_decode.hpp's.
+// Checked decoding of CAMERA_PICTURE, the only message that contains raw bytes. All others:
+// bevel/io/checked_decode.hpp.
 #pragma once
 
 #include <array>

@@ -1,7 +1,7 @@
 // A message as a JSON object with the columns of bevel/io/csv_columns.hpp for names, flat, and in their order. Numbers
 // have as many digits as it takes to read the same one back. JSON has no NaN: what was not seen is not there, and the
 // schema does not require it (`null`, as files of before have it, is read too). A number that a message holds along an
-// axis of which it says nothing goes by the name unseen_..., so that the message comes back whole; +0 goes by none.
+// axis without information has the name unseen_..., so that the message is restored completely; +0 is not written.
 #pragma once
 
 #include <array>

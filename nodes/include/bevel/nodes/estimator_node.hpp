@@ -3,9 +3,9 @@
 // at its time, and one for each reading as it arrives, at that moment, the axes carried on at the rates that they last
 // reported. Who acts on it need not wait for the next actuator state.
 //
-// Of the operator's words (bevel/nodes/operator_words.hpp) it obeys `entry` (the tip is at the entry point: begin
-// there), `confirm` (go on from where the axes say the needle is, although nobody watched it go there) and `arm`
-// (inputs that were refused are believed again).
+// It carries out three operator commands (bevel/nodes/operator_words.hpp): `entry` (start with the tip at the entry
+// point), `confirm` (continue from the positions of the axes, although the motion was not observed) and `arm` (accept
+// inputs again that were rejected).
 #include <optional>
 #include <string>
 
@@ -36,7 +36,7 @@ class EstimatorNode {
 
   LcmPort& port() { return port_; }
   const estimator::NeedleEstimator& estimator() const { return estimator_; }
-  // Of the newest estimate and of what arrives; bits of bevel/estimator/health.hpp.
+  // Returns the health bits (bevel/estimator/health.hpp) of the newest estimate and of the inputs.
   std::int32_t health() const;
 
  private:

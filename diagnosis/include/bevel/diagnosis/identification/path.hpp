@@ -15,12 +15,20 @@
 namespace bevel::diagnosis {
 
 // Columns of a path's Jacobian: four of the needle, then those of the entry.
-enum Parameter : int { kCurvature, kLambda1, kLambda2, kWheelbase, kNeedleParameters };
+enum Parameter : int { kNeedleCurvature, kNeedleLambda1, kNeedleLambda2, kNeedleWheelbase, kNeedleParameters };
 inline constexpr std::array<const char*, kNeedleParameters> kParameterNames = {"curvature_per_mm", "lambda1_per_rad",
                                                                                "lambda2", "wheelbase_mm"};
 
 // How the needle stood when it entered, against nominal: a stage is never quite square to the tissue.
-enum EntryParameter : int { kTiltX, kTiltY, kRoll, kOffsetX, kOffsetY, kLateEntry, kEntryParameters };
+enum EntryParameter : int {
+  kEntryTiltX,
+  kEntryTiltY,
+  kEntryRoll,
+  kEntryOffsetX,
+  kEntryOffsetY,
+  kLateEntry,
+  kEntryParameters
+};
 inline constexpr int kPathColumns = static_cast<int>(kNeedleParameters) + static_cast<int>(kEntryParameters);
 constexpr int entry_column(EntryParameter parameter) {
   return static_cast<int>(kNeedleParameters) + static_cast<int>(parameter);

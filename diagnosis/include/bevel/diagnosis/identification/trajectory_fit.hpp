@@ -11,7 +11,7 @@
 // Solution
 //   Levenberg-Marquardt with analytic Jacobians, weights renewed each iteration (IRLS), bounds by an active set; where
 //   entries are asked for, from there to the least of twice that and log det of the entries' own part of the normal
-//   equations, which integrates them out (bevel/diagnosis/inference/own_volume.hpp says why).
+//   equations, which integrates them out (reason: bevel/diagnosis/inference/own_volume.hpp).
 // Result
 //   Estimate, covariance (Huber 1981, 7.6, for the loss; multiplied by (1 + rho)/(1 - rho) where successive residuals
 //   correlate, because a camera's error is not white), and what the data do not fix (fit_statistics.hpp).
