@@ -146,7 +146,7 @@ class Pages(unittest.TestCase):
 
 
 class SpdxScript(unittest.TestCase):
-    """tools/ci/spdx on a small source tree of its own."""
+    """tools/ci/spdx on a small temporary source tree."""
 
     def run_in_tree(self, files, *options):
         folder = tempfile.TemporaryDirectory()
