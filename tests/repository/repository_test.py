@@ -137,12 +137,31 @@ class Containers(unittest.TestCase):
 
 
 class Pages(unittest.TestCase):
-    def test_links_of_the_root_pages_lead_to_files(self):
-        for page in [*ROOT.glob("*.md"), ROOT / "docs/compatibility.md"]:
-            for target in re.findall(r"\]\(([^)#\s]+)(?:#[^)]*)?\)", page.read_text(encoding="utf-8")):
-                if "://" not in target:
-                    with self.subTest(f"{page.name}: {target}"):
-                        self.assertTrue((page.parent / target).exists())
+    def test_links_between_pages_lead_to_files_and_headings(self):
+        checked = 0
+        for page in [*ROOT.glob("*.md"), *ROOT.glob("docs/**/*.md"), *ROOT.glob("examples/**/*.md")]:
+            for target in re.findall(r"\]\(([^)\s]+)\)", without_code(page)):
+                file, _, anchor = target.partition("#")
+                if "://" in target:
+                    continue
+                with self.subTest(f"{page.relative_to(ROOT)}: {target}"):
+                    leads_to = page.parent / file if file else page
+                    self.assertTrue(leads_to.exists(), "the file is missing")
+                    if anchor and leads_to.suffix == ".md":
+                        self.assertIn(anchor, anchors(leads_to), "the heading is missing")
+                checked += 1
+        self.assertGreater(checked, 100)
+
+
+def without_code(page):
+    return re.sub(r"^```.*?^```", "", page.read_text(encoding="utf-8"), flags=re.M | re.S)
+
+
+def anchors(page):
+    """Names that GitHub gives to the headings of a page."""
+    headings = re.findall(r"^#+ (.*)$", without_code(page), re.M)
+    plain = (re.sub(r"\[([^\]]*)\]\([^)]*\)", r"\1", heading).strip().lower() for heading in headings)
+    return {re.sub(r"[^\w\- ]", "", heading).replace(" ", "-") for heading in plain}
 
 
 class SpdxScript(unittest.TestCase):
