@@ -42,6 +42,9 @@ ONLY_CHECKED = {
     "tools/fleet": "has tests of its own", "tools/close-the-loop": "takes minutes",
     "tools/bevel-spy": "needs a display", "tests/peers/compare": "takes an hour", "tests/fleet/kills.py": "takes half an hour",
     "tests/loop/processes_test.sh": "measures, in real time",
+    "tools/ci/lint": "installs from PyPI", "tools/ci/doxygen": "may install a package", "tools/ci/tidy": "needs another build",
+    "tools/ci/suite": "runs this test", "tools/ci/wheel": "needs another build", "tools/ci/container": "needs Docker",
+    "tools/ci/spdx": "is the test repository.spdx",
     "sudo": "changes this machine's network",
     "bevel-camera": "works until it is told to end", "bevel-estimator": "works until it is told to end",
     "bevel-controller": "works until it is told to end", "bevel-stepper": "needs drives",
@@ -62,7 +65,7 @@ FOLDERS = {path.name for path in ROOT.iterdir() if path.is_dir() and not path.na
 
 
 def pages():
-    files = [ROOT / "README.md", ROOT / "examples/README.md", *sorted((ROOT / "docs").rglob("*.md"))]
+    files = [ROOT / "README.md", ROOT / "CONTRIBUTING.md", ROOT / "examples/README.md", *sorted((ROOT / "docs").rglob("*.md"))]
     return {str(path.relative_to(ROOT)): path.read_text(encoding="utf-8") for path in files}
 
 

@@ -5,7 +5,6 @@ stops one. Nothing of the project but bevel-stepper runs.
 """
 import math
 import signal
-import sys
 import threading
 import time
 import unittest

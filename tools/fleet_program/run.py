@@ -11,7 +11,7 @@ import signal
 import sys
 
 from . import cases, engines, one_case, progress
-from .command_line import USAGE, Parser
+from .command_line import Parser
 
 OK, FAILED, DAMAGED, INTERRUPTED = 0, 1, 3, 130
 SLURM_JOBS = 100
