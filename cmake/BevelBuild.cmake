@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: MIT
 # Compiler settings and the functions that define every target of the project:
 #   bevel_component()  an installed library of the public API, bevel::NAME
 #   bevel_library()    an internal static library of tools/, tests/, proof/, report/ and view/

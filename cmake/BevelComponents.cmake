@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: MIT
 # Which parts are built. Sets BEVEL_WITH_<component> for each component, including those that a requested one depends on.
 set(BEVEL_ALL_COMPONENTS model estimator controller diagnosis drivers camera io sim nodes)
 set(BEVEL_NEEDS_model "")

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: MIT
 # Headers and package files of the components. Targets are installed where they are defined (bevel_component()).
 include(CMakePackageConfigHelpers)
 install(DIRECTORY core/include/ DESTINATION ${CMAKE_INSTALL_INCLUDEDIR} COMPONENT dev)  # exceptions, used by every component

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: MIT
 # Finds LCM and defines bevel_lcm_bindings(). Two sources of LCM: the PyPI wheel under .deps/lcm (default; headers, liblcm,
 # lcm-gen, lcm.jar, Python), or Debian's liblcm-dev, liblcm-bin and liblcm-java. Defines the target bevel_lcm.
 option(BEVEL_SYSTEM_LCM "Use the system's liblcm even where .deps/lcm exists" OFF)

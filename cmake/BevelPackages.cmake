@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: MIT
 # Packages of others, each only for the components that use it. All are Debian's, except LCM (the PyPI wheel in .deps/lcm,
 # or Debian's liblcm). cmake/bevelConfig.cmake.in repeats those that users of an installed component need.
 if(BEVEL_WITH_model)

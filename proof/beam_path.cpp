@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 #include "proof/beam_path.hpp"
 
 #include <Eigen/Geometry>

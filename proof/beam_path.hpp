@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 #pragma once
 // The beam plant in the trials: what it is drawn from, the tip's path, and the beam in elastic tissue closest to a
 // path.

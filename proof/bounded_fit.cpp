@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 #include "proof/bounded_fit.hpp"
 
 #include <Eigen/Cholesky>

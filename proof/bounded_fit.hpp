@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 #pragma once
 // Least squares in a box, by finite differences: what the refits of the generator's own integrator need, and no more.
 #include <Eigen/Core>

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 #pragma once
 // The cameras' noise: coloured, with heavy tails, wild values, lost and late frames.
 #include <Eigen/Cholesky>

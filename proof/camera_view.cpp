@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // What the cameras make of the tip's path.
 #include <algorithm>
 #include <cmath>

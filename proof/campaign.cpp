@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 #include "proof/campaign.hpp"
 
 #include <atomic>

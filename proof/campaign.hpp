@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 #pragma once
 // The whole proof: draw and seal all trials, let the tool under test see each, hash its verdicts, open the truths,
 // score. Each step of each trial that is on disk already is skipped, so an interrupted campaign goes on where it was.

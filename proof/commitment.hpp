@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 #pragma once
 // Commitments: a truth is bound by SHA-256(salt + text) before the tool under test runs, and opened afterwards.
 #include <string>

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 #pragma once
 // The figures of the published distribution: drawn from in trial.cpp, printed in describe.cpp.
 #include <array>

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 #include "proof/drive_train.hpp"
 
 #include <algorithm>

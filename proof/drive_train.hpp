@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 #pragma once
 // From the axes' encoders to the tip: what the drives, the gears and the shaft do on the way.
 #include <vector>

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 #include "proof/hidden_physics.hpp"
 
 #include <algorithm>

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 #pragma once
 // Everything that a trial may conceal, in one structure with neutral defaults, and the catalogue from which trials
 // draw.

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 #include "proof/insertion_variation.hpp"
 
 #include <Eigen/SVD>

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 #pragma once
 // What one insertion has of its own, as on any rig: no two start alike or meet quite the same tissue.
 #include <Eigen/Core>

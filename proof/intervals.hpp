@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 #pragma once
 // How sure a share counted in few trials is.
 namespace bevel::proof {

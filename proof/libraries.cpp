@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 #include "proof/libraries.hpp"
 
 #include <elf.h>

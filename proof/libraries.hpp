@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 #pragma once
 /// \file
 /// Shared libraries of a program, read from its ELF headers. Nothing of the program is run: ldd would load its audit

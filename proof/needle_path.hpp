@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 #pragma once
 // The plant of the trials: the extended bicycle in a form of its own, and what a camera makes of its tip.
 //

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 #pragma once
 // The result as one page that opens anywhere: figures first, pictures, every trial at the end.
 #include <string>

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 #include "proof/page_figures.hpp"
 
 #include <algorithm>

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 #pragma once
 // The two pictures of the page that are no plots of y over x.
 #include <map>

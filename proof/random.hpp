@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 #pragma once
 // Random numbers that are the same on every machine: the standard fixes the engine, but not its distributions, and a
 // proof that is to be rerun elsewhere needs both.

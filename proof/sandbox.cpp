@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 #include "proof/sandbox.hpp"
 
 #include <unistd.h>

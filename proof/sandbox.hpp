@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 #pragma once
 /// \file
 /// Sandbox of one process tree, by bubblewrap: the system's programs and libraries, the given folder read-only, the

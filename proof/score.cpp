@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 #include "proof/score.hpp"
 
 #include <algorithm>

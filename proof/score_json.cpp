@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // Scores and their tally as JSON: score.json of each trial, results.json of all.
 #include <algorithm>
 #include <cmath>

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 #pragma once
 // What the needle is told to do: eight short recordings of the kinds that a lab makes, and the axes' motion that
 // follows.

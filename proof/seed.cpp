@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 #include "proof/seed.hpp"
 
 #include <charconv>

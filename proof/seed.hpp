@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 #pragma once
 /// \file
 /// Seed of a campaign. It is never given on a command line, which every process of the machine can read.

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 #pragma once
 // All trials together: the figures of the proof.
 #include <map>

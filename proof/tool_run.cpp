@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 #include "proof/tool_run.hpp"
 
 #include <fcntl.h>

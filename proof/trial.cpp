@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 #include "proof/trial.hpp"
 
 #include <Eigen/Geometry>

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 #pragma once
 // One trial as drawn from the published distribution: what is concealed, what the camera saw, what the lab believes.
 #include <cstdint>

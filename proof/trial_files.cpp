@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 #include "proof/trial_files.hpp"
 
 #include <unistd.h>

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 #pragma once
 // A trial on disk. What the tool may see is one folder; the truth is in another.
 //

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 #include "proof/verdict.hpp"
 
 #include <algorithm>

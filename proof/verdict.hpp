@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 #pragma once
 // verdict.json of the tool under test, as far as it is scored. Nothing here trusts it.
 #include <map>

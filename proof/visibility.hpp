@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 #pragma once
 // How much of what is concealed can be seen at all: the part of its change of the paths that k, lambda1 and lambda2
 // cannot absorb, nor variation between insertions where there is any, in standard deviations of the noise, summed over

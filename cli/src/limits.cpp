@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 #include <bevel/cli/limits.hpp>
 
 #include <fcntl.h>

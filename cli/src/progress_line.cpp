@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 #include <bevel/cli/progress_line.hpp>
 
 #include <unistd.h>

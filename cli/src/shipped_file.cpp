@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 #include <bevel/cli/shipped_file.hpp>
 
 #include <filesystem>

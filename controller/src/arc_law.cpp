@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 #include <bevel/controller/arc_law.hpp>
 
 #include <algorithm>

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 #include <bevel/controller/arc_walk.hpp>
 
 #include <algorithm>

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 #include <bevel/controller/axis_model.hpp>
 
 #include <algorithm>

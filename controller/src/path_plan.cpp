@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 #include <bevel/controller/path_plan.hpp>
 
 #include <algorithm>

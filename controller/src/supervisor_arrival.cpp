@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // Which targets are accepted, the predicted miss on the way, and the outcome at the closest approach.
 #include <algorithm>
 #include <cmath>

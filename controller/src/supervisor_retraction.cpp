@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // Back along the path on command, and where a needle that was drawn back will cut again.
 #include <algorithm>
 #include <cmath>

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // What the supervisor steers by, and the rates that the law wants.
 #include <algorithm>
 #include <cmath>

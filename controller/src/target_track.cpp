@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 #include <bevel/controller/target_track.hpp>
 
 #include <algorithm>

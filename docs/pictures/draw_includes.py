@@ -1,4 +1,5 @@
 #!/usr/bin/env python3
+# SPDX-License-Identifier: MIT
 """Draws diagnosis-rooms.svg: the files of the diagnosis (header and source as one) with their lines, each above what it
 includes, as they were before the one-posterior method and as they are now.
 

@@ -1,4 +1,5 @@
 #!/usr/bin/env python3
+# SPDX-License-Identifier: MIT
 """implants.py SET OUT [--seed N]: a set of repeated insertions (csv), split in two at random: OUT/none/before and /after, and
 OUT/CHANGE/after, the same second half with a change put in by arithmetic on its rows; OUT/CHANGE/before is the first half.
 

@@ -1,4 +1,5 @@
 #!/usr/bin/env python3
+# SPDX-License-Identifier: MIT
 """LARA's electromagnetic tip poses (lara-unb/NeedleSteering) as the CSV that docs/import/lara-em.toml reads: in the frame
 of the first pose that was seen, z along the tip, -y where the needle bends.
 

@@ -1,4 +1,5 @@
 #!/usr/bin/env python3
+# SPDX-License-Identifier: MIT
 """predicted.py VERDICT...: of each verdict.json the RMSE (mm) in the bend's plane / across it, the share of all readings within
 their 95 % intervals and the log density (natural, per reading, headings too), as a new insertion (all readings) and continued from
 its first third (beyond it); last line: all.

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 #include <bevel/drivers/socket_file.hpp>
 
 #include <fcntl.h>

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 #include <bevel/estimator/channel.hpp>
 
 #include <algorithm>

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // The filter's propagation through a channel that the tip has cut (channel.hpp).
 //
 // The channel is the path of (10), and is gone through backwards by running the same model backwards with the bevel as

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // The filter's propagation and measurement with the effects of a model file.
 #include <cmath>
 

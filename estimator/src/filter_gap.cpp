@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // The filter across a gap: an interval in which nobody observed the axes.
 //
 // Known are their positions at both ends, the length dt of the gap and the rates V, W that no axis exceeds. Unknown is

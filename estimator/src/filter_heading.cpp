@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // The filter's measurement of the heading.
 //
 // A heading is of a sensor in the needle, which points along R e3, or of a camera that sees the shaft, which ends in

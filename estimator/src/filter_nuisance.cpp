@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // The filter's slowly known states of the rig (nuisance.hpp).
 //
 // Wind-up: friction holds the inserted shaft, so that the tip's roll follows the base's with a play of half width

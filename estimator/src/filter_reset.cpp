@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // Declared resets of the filter: the pose is no longer trusted, and its covariance is widened accordingly.
 #include <algorithm>
 #include <cmath>

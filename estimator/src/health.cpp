@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 #include <bevel/estimator/health.hpp>
 
 namespace bevel::estimator {

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // The reason of an unhealthy estimate, with its value and its limit.
 #include <algorithm>
 #include <cmath>

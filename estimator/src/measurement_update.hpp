@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 #pragma once
 // The Kalman update that every kind of reading ends in: a residual of three numbers, of which some axes are seen.
 #include <Eigen/Cholesky>

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 #include <bevel/estimator/needle_filter.hpp>
 
 #include <Eigen/Eigenvalues>

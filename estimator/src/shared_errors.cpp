@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // The filter's states for errors that neighbouring readings of a camera share (ReadingNoise): coloured measurement
 // noise by augmentation (Bryson and Johansen 1965, IEEE TAC 10(1)), so that the covariance knows that frames are alike.
 //

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // The filter's propagation where the shaft is stiff: the tip of a beam on an elastic foundation, cutting where it is.
 //
 // The bicycle of (10) with two more motions of the tip. With K = k the curvature deep in the tissue, b the bending

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 #include <bevel/io/base_lag.hpp>
 
 #include <Eigen/Dense>

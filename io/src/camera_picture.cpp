@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 #include <bevel/io/camera_picture.hpp>
 
 #include <cmath>

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 #include <bevel/io/checked_decode.hpp>
 
 #include <algorithm>

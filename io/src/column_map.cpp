@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 #include <bevel/io/column_map.hpp>
 
 #include <Eigen/Geometry>

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 #include <bevel/io/config.hpp>
 
 // toml++ 3.3 asserts that a table's header goes on with a key, where a file may say "[[[a]]]", and reports the parse

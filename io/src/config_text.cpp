@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // What a message about a configuration says: numbers, ranges, and the name that was probably meant.
 #include <algorithm>
 #include <charconv>

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // What cannot be true of a needle's recording, whatever its columns are called: rows that no rig makes, and a tip that
 // does not go where the base pushes it.
 #pragma once

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 #include <bevel/io/csv_header.hpp>
 
 #include <algorithm>

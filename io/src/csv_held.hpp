@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 #pragma once
 /// \file
 /// Removes repeated values of slow sensors from the rows of a CSV recording.

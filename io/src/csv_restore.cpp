@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // An exported folder back into a recording, and that into a log.
 #include <algorithm>
 #include <array>

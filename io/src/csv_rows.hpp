@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // Rows of a CSV file as readings in the project's units and frame, by a column map. What was not seen (an empty cell)
 // is not there; it is never 0.
 #pragma once

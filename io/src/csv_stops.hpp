@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 #pragma once
 // Rows of a stepwise insertion into stops: of each depth that was commanded, what the sensor says while the needle lies
 // still.

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 #include <bevel/io/entry_frame.hpp>
 
 #include <Eigen/Dense>

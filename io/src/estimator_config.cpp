@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 #include <bevel/io/estimator_config.hpp>
 
 #include <cmath>

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 #include <bevel/io/file_bytes.hpp>
 
 #include <fcntl.h>

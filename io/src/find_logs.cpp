@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 #include <bevel/io/find_logs.hpp>
 
 #include <algorithm>

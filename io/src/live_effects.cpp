@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 #include <bevel/io/live_effects.hpp>
 
 namespace bevel::io {

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 #include <bevel/io/log_order.hpp>
 
 #include <algorithm>

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 #include <bevel/io/log_reader.hpp>
 
 #include <algorithm>

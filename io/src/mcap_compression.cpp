@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 #include "mcap_compression.hpp"
 
 #include <lz4frame.h>

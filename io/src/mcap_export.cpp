@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 #include <bevel/io/mcap_export.hpp>
 
 #include <bevel/io/json_message.hpp>

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 #include <bevel/io/mcap_reader.hpp>
 
 #include <algorithm>

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 #include <bevel/io/messages.hpp>
 
 namespace bevel::io {

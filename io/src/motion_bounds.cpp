@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 #include <bevel/io/motion_bounds.hpp>
 
 #include <algorithm>

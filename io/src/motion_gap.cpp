@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 #include <bevel/io/motion_gap.hpp>
 
 #include <algorithm>

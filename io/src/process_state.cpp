@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 #include <bevel/io/process_state.hpp>
 
 namespace bevel::io {

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 #include <bevel/io/recording.hpp>
 
 #include <algorithm>

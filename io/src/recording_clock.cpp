@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 #include <bevel/io/recording_clock.hpp>
 
 #include <bevel/error.hpp>

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 #include <bevel/io/result_file.hpp>
 
 #include <fcntl.h>

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 #include <bevel/io/second_insertion.hpp>
 
 #include <algorithm>

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 #include <bevel/io/sender_watch.hpp>
 
 #include <algorithm>

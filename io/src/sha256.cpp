@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 #include <bevel/io/sha256.hpp>
 
 #include <openssl/evp.h>

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 #include "toml_limits.hpp"
 
 #include <algorithm>

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 #pragma once
 /// \file
 /// Limits of a TOML file, checked before it is parsed: toml++ recurses once for each part of a key and for each nested

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 #include "toml_text.hpp"
 
 #include <bevel/io/config.hpp>

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 #include <bevel/model/slip.hpp>
 
 #include <cmath>

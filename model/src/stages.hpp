@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 #pragma once
 // What the stages of a step are made of, for kinematics.cpp alone: the insertion axis seen in the body, the slip's
 // lateral velocity there by (25), the twist that goes with it (kinematics.hpp), and their derivatives.

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 #include <bevel/nodes/camera_watch.hpp>
 
 #include <cmath>

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 #include <bevel/nodes/claim_name.hpp>
 
 #include <sys/socket.h>

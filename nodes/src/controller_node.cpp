@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 #include <bevel/nodes/controller_node.hpp>
 
 #include <Eigen/Eigenvalues>

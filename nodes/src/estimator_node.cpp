@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 #include <bevel/nodes/estimator_node.hpp>
 
 #include <array>

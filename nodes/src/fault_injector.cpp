@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 #include <bevel/nodes/fault_injector.hpp>
 
 #include <Eigen/Geometry>

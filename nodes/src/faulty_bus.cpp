@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 #include <bevel/nodes/faulty_bus.hpp>
 
 #include <utility>

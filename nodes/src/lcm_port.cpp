@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 #include <bevel/nodes/lcm_port.hpp>
 
 #include <cstdio>

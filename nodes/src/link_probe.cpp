@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 #include <bevel/nodes/link_probe.hpp>
 
 #include <algorithm>

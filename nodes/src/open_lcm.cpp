@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 #include <bevel/nodes/open_lcm.hpp>
 
 #include <algorithm>

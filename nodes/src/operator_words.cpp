@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 #include <bevel/nodes/operator_words.hpp>
 
 #include <string_view>

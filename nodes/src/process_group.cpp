@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 #include <bevel/nodes/process_group.hpp>
 
 #include <fcntl.h>

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 #include <bevel/nodes/rig_node.hpp>
 
 #include <Eigen/Geometry>

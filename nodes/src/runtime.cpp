@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 #include <bevel/nodes/runtime.hpp>
 
 #include <poll.h>

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 #include <bevel/nodes/stepper_node.hpp>
 
 #include <algorithm>

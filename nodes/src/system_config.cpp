@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 #include <bevel/nodes/system_config.hpp>
 
 #include <algorithm>

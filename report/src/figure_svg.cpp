@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 #include <bevel/report/figure_svg.hpp>
 
 #include <algorithm>

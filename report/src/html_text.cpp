@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 #include <bevel/report/html_text.hpp>
 
 namespace bevel::report {

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 #include <bevel/report/label_place.hpp>
 
 #include <algorithm>

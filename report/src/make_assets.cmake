@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: MIT
 # cmake -DOUT=FILE -DSOURCE=DIR -P make_assets.cmake: the page's style sheets and scripts as one C++ text.
 set(code "#include <bevel/report/assets.hpp>\n\nnamespace bevel::report {\n")
 foreach(name IN ITEMS page_css page_js)

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 #include <bevel/report/numbers.hpp>
 
 #include <algorithm>

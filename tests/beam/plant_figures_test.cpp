@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // Figures of the beam plant: deflection and best circle over the range of tissues, convergence, cost, allocations.
 #include <gtest/gtest.h>
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // The beam plant's behaviour: signs, symmetry, closed form of the moving needle, memory, relaxation, wind-up, errors.
 #include <bevel/model/beam/beam_plant.hpp>
 

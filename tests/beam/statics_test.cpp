@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // The parts of the beam plant against closed forms: band solver, beam, springs of the cut, wind-up.
 #include <gtest/gtest.h>
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // A general camera behind the port of views: rays, their information, and two cameras' answer against the truth.
 #include <gtest/gtest.h>
 

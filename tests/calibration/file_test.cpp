@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // The YAML: read back as written, by OpenCV too; what is damaged, stale or impossible is refused by name.
 #include <gtest/gtest.h>
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // Lens, stereo and wall from synthetic boards, projected by other means (true_optics.hpp).
 #include <gtest/gtest.h>
 

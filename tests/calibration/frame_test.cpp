@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // The frame {A}: from a board at a known place, and from a straight insertion; then, end to end, the tip of a needle in
 // the gel from a YAML that was fitted to pictures of boards.
 #include <gtest/gtest.h>

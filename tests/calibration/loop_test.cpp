@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // The loop with two calibrated cameras that look obliquely through walls: what estimator and controller make of rays.
 // The same steering as with two planar views, so that a needle is as near its target as there.
 #include <gtest/gtest.h>

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // The way of real pictures: boards rendered ray by ray, found by the detector, fitted.
 #include <gtest/gtest.h>
 

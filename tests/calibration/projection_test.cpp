@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // The camera's equations against others: Fermat for the wall, OpenCV for the lens, differences for derivatives.
 #include <ceres/jet.h>
 #include <gtest/gtest.h>

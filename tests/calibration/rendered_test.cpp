@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // From pixels on: needles drawn as two calibrated cameras see them through their walls, tracked, and put together from
 // what the pipeline says of each.
 #include <gtest/gtest.h>

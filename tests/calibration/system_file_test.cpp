@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // [[camera]] calibration = "...": what the processes take of a calibration, and what they refuse.
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // bevel-calibrate from picture files on: what it writes is what finds a tip in the gel, and what it refuses it names.
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 #include "tests/calibration/true_optics.hpp"
 
 #include <opencv2/calib3d.hpp>

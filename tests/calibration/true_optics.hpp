@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 #pragma once
 // Cameras whose truth is known, by other means than those under test: a point in gel is seen along the path of least
 // time (Fermat), found by Newton's method over the points where it crosses the pane; pixels by OpenCV's projectPoints;

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // Cost of one frame: `bench_camera --benchmark_min_time=1`. One thread, as in the camera process.
 #include <benchmark/benchmark.h>
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // Video4Linux's buffers: their numbers, clocks and pixels, and a source on a recorded stream of them; a real device
 // where BEVEL_V4L2_DEVICE names one.
 #include <gmock/gmock.h>

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // What the needle is compared with on its sides, on made pictures.
 #include <bevel/drivers/camera/centreline.hpp>
 

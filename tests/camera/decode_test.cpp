@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // Decoding of images: rows and columns of the sensor whatever the orientation tag, one brightness scale per bit depth,
 // and no decoder in the source tree but this one.
 #include <bevel/drivers/camera/decode.hpp>

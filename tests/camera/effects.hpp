@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 #pragma once
 // What spoils pictures, one thing at a time, and how the tracker stands it: for the test and for the study of
 // thousands.

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // The tracker in pictures that are spoilt, one effect at a time. tip_study prints the same of thousands.
 #include "tests/camera/effects.hpp"
 

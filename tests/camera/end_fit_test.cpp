@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // The model of a bevelled end: its moments against the silhouette counted point by point, and the fit against profiles
 // made of the model.
 #include <bevel/drivers/camera/end_fit.hpp>

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 #pragma once
 // Images with an orientation tag, as phones and some cameras write them.
 #include <cstdint>

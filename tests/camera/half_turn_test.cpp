@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // A needle that is turned over at rest each 10 mm changes the sign of its curvature at once. What its tip is seen aside
 // by, as it goes on from the turn: a filter that averages many frames takes for curvature whatever they have in common.
 #include <gtest/gtest.h>

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // The heading that a picture shows, against rendered needles of known tangent: its error over what is claimed of it.
 #include <gtest/gtest.h>
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // A line thinner than the lens's blur, located across: against made profiles of known place.
 #include <bevel/drivers/camera/line_location.hpp>
 

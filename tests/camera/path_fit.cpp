@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 #include "tests/camera/path_fit.hpp"
 
 #include <Eigen/Cholesky>

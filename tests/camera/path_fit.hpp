@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 #pragma once
 // Planar needle models fitted to the tips seen in one insertion's pictures, of which the insertion is known (one
 // picture a step) and the base's place, roll and duty cycle are not: what lies aside against depth.

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // Fits of planar paths against closed forms and made paths.
 #include "tests/camera/path_fit.hpp"
 

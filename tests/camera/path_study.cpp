@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // Planar models fitted to the tips of real pictures, held out by frame: path_study FOLDER_OF_FOLDERS OUT. A table on
 // stdout; into OUT one picture a folder, its last frame with the tips (yellow), the bicycle's path (green) and that of
 // the extended model with the slip of agar (red, thin), both fitted to all frames but the last four and drawn on.

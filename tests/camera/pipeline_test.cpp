@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 #include <bevel/drivers/camera/pipeline.hpp>
 
 #include <gtest/gtest.h>

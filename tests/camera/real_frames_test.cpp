@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // Frames by others: a bevel needle in gelatin, one picture per 8 mm of insertion (LARA, University of Brasilia; no
 // licence, so they are looked at where they lie and never copied). Their tips were labelled by eye (real_tips.csv).
 // Folders `held_out` were not worked on; what was looked at of them is said in docs/camera.md.

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 #pragma once
 // The tracker on real frames, beside tips labelled by eye (real_tips.csv): what the test and the contact sheet share.
 #include <array>

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // Frames kept while they are tracked: played back they give the same readings to the last bit, and a slow or broken
 // disk costs frames, never the tracker.
 #include <bevel/drivers/camera/frame_recorder.hpp>

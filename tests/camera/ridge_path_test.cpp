@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // Which path is a needle's, and where it ends, on responses drawn by hand.
 #include <bevel/drivers/camera/ridge_path.hpp>
 

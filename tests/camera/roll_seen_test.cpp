@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // Two cameras that look at one bevel from two sides see it at two rolls: against the metal itself, a cylinder cut by a
 // plane, of which each camera's picture is a shadow.
 #include <gtest/gtest.h>

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 #pragma once
 // Random needles for the camera tests: arcs in the plane y-z of {A} as the bicycle draws them.
 #include <algorithm>

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // Detections on real frames, to be looked at: one tile a labelled frame. Green: where the tip was found and the two
 // standard deviations that are claimed; yellow: the label; red frame: not ok.
 #include <cstdio>

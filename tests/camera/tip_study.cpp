@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // Errors of the tip in rendered pictures, one effect at a time: tip_study [FRAMES_OF_EACH] [SEED]. Errors in px of 0.2
 // mm.
 #include <cstdio>

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // Real frames changed as other cameras, lights and mountings would change them: what of them is found still, and how
 // far from the labels, which are changed alike. Frames alone, each through a tracker that has seen nothing else.
 // tip_variations FOLDER_OF_FOLDERS LABELS.csv [tuned|held_out]; errors in px of the frames as they are.

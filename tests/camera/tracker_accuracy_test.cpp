@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // The tracker against rendered needles of known tip. Figures are printed; the bounds are the goals.
 #include <gtest/gtest.h>
 

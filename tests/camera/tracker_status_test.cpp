@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // Each reason for which a frame gives no position, provoked.
 #include <gtest/gtest.h>
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // Video files on the path of a camera: rendered needles of known tip, written as MJPEG in AVI and H.264 in MP4 by
 // OpenCV's FFmpeg, tracked frame by frame beside the pictures that were never compressed.
 #include <gmock/gmock.h>

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 #include "tests/ceiling/ceiling.hpp"
 
 #include <algorithm>

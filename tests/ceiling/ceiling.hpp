@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 #pragma once
 // One trial of a campaign, judged twice by one evidence: the tool's search, by the library's forms, and what was really
 // concealed, by the generator's own.

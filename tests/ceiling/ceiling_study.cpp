@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // The ceiling of a blind trial: in how many trials what was concealed, by the generator's own forms, is likelier than
 // every other answer that the tool's search found.
 //   ceiling_study CAMPAIGN [TRIAL...] [--results RESULTS.json] [--out COMPARED.jsonl]

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 #include "tests/ceiling/generator_prior.hpp"
 
 #include <Eigen/Cholesky>

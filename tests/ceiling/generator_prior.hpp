@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 #pragma once
 // What the generator draws an effect's sizes from, as a density (docs/proof/distribution.md): half of them as the field
 // reports them, uniform over a range; half scaled by a factor, of at most 1.5, so that a number of standard deviations

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // The generator's density of sizes against draws: its own catalogue's, scaled as docs/proof/distribution.md says.
 #include "tests/ceiling/generator_prior.hpp"
 

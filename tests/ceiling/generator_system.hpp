@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 #pragma once
 // The generator of the validation as a system of the inference engine (bevel/diagnosis/inference/system.hpp). It has a
 // separate integrator and separate forms of the effects, including unmodelled ones, under the needle's priors.

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // The generator as a client of the engine: its readings are the simulator's, its derivatives those of another step.
 #include "tests/ceiling/generator_system.hpp"
 

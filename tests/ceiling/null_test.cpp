@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // Where nothing is concealed, the generator and the library are one model in two forms: the same evidence.
 #include <gmock/gmock.h>
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // A trial out of a campaign's folder.
 #include "proof/trial_files.hpp"
 #include "tests/ceiling/ceiling.hpp"

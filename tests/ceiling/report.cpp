@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // Tables of what was compared.
 #include <algorithm>
 #include <array>

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 #pragma once
 // A trial of the generator's, made for a test, and its case as the tool reads it.
 #include <gtest/gtest.h>

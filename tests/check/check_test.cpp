@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // bevel-check against simulated drives in simulated time: a good rig, and each thing broken in turn.
 #include <gmock/gmock.h>
 

@@ -1,4 +1,5 @@
 #!/usr/bin/env bash
+# SPDX-License-Identifier: MIT
 # check_test.sh BIN_DIR SOURCE_DIR: bevel-check with the real processes, in a network namespace: a good rig, a camera
 # that is too slow, no bus, no multicast; its exit status and what it says to type. Status 77: skipped; it says why.
 set -uo pipefail

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // A concealed effect, found, put back into rig, estimator and controller: each gets better by it.
 #include <bevel/analysis/close_loop/close_loop.hpp>
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // A case as a lab would hand it over, made with the simulated rig: a folder of a model file without the effect, and
 // recordings of motions that excite it.
 #pragma once

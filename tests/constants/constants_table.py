@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: MIT
 """The table of constants in docs/diagnosis.md, and where in the code each stands."""
 import dataclasses
 import pathlib

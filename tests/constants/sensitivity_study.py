@@ -1,4 +1,5 @@
 #!/usr/bin/env python3
+# SPDX-License-Identifier: MIT
 """Which verdicts hang on the constants that nothing fixes: all of them halved or doubled at random, at once.
 
 Of a copy of the tree a program is built that takes from the environment what docs/diagnosis.md calls a judgement or set

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: MIT
 """Each constant of the table in docs/diagnosis.md is in the file that it names, with the value that it names."""
 import re
 import unittest

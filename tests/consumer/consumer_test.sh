@@ -1,4 +1,5 @@
 #!/usr/bin/env bash
+# SPDX-License-Identifier: MIT
 # Builds and runs an outside project that uses bevel's libraries.
 #
 # Usage: consumer_test.sh installed BUILD [CMAKE OPTION...]
@@ -10,7 +11,7 @@
 # CMake options are passed on, so that ccache finds the objects of the main build.
 # Exit status: 0 passed, 1 failed, 2 usage.
 set -euo pipefail
-[ $# -ge 2 ] || { sed -n '2,/^[^#]/s/^# \{0,1\}//p' "$0" >&2; exit 2; }
+[ $# -ge 2 ] || { sed -n '3,/^[^#]/s/^# \{0,1\}//p' "$0" >&2; exit 2; }
 mode=$1 tree=$2
 shift 2
 here=$(cd "$(dirname "$0")/project" && pwd)

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // The needle in agar, Table I.
 #pragma once
 

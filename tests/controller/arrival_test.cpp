@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // Which targets are accepted and at what cost, what is reported of the miss on the way, and the outcome.
 #include <gmock/gmock.h>
 

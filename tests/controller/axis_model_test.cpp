@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // The dead band between base and tip, against its closed form; and what it is worth on the way to a roll.
 #include <bevel/controller/axis_model.hpp>
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // One step of each law, at 100 mm to go: what a control period has to have room for.
 #include <benchmark/benchmark.h>
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 #include <bevel/controller/command_watch.hpp>
 
 #include <gtest/gtest.h>

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // Paths round obstacles, judged by computations of their own: distances by sampling, paths integrated in small steps,
 // and a search by brute force where the planner says that there is none.
 #include <bevel/controller/path_plan.hpp>

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // Back along the path by the operator's word: rates, checks, and where it is steered from afterwards.
 #include <algorithm>
 #include <functional>

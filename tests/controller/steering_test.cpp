@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 #include <bevel/controller/steering_law.hpp>
 
 #include <gtest/gtest.h>

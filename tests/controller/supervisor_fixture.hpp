@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // A supervisor that is given good readings, until a test gives it others.
 #pragma once
 

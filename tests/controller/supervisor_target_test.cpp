@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // Targets: out of reach, behind obstacles, by way-points, moving, met.
 #include "tests/controller/supervisor_fixture.hpp"
 

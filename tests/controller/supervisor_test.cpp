@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // What moves, and what stops it.
 #include <functional>
 #include <limits>

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // An estimate that doubts its newest readings: the needle comes to rest by the ramp, and goes on by itself.
 #include <gtest/gtest.h>
 

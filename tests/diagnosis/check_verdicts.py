@@ -1,4 +1,5 @@
 #!/usr/bin/env python3
+# SPDX-License-Identifier: MIT
 """Runs bevel-diagnose over every case there is and checks the invariants of its verdicts in verdict.json.
 
 Usage: check_verdicts.py BIN SOURCE SHARED [CASE ...]

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 #include "tests/diagnosis/made_up_findings.hpp"
 
 #include <cmath>

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // Findings of each verdict, made up without a diagnosis: what the page and the files are tried on. The paths are real
 // ones: the needle with and without an effect along a rich motion.
 #pragma once

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // The page and the files from findings of each verdict. That the page looks right is for eyes; here: complete,
 // self-contained, no figure that is none.
 #include <gmock/gmock.h>

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // bevel-diagnose as a program: its files, its messages, its exit status, and an end from outside.
 #include <fcntl.h>
 #include <gmock/gmock.h>

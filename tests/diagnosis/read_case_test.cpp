@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // Input that cannot be diagnosed: each has one clear message.
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>

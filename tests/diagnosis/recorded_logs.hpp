@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // Logs as a rig writes them, with or without a concealed effect.
 #pragma once
 

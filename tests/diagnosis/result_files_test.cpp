@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // Results: what is in them, all of them or none, and the schema.
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>

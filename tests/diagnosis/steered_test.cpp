@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // Steered to targets with one model in the software and with another; and when that is not done.
 #include <bevel/analysis/diagnose/steered.hpp>
 

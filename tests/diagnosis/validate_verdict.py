@@ -1,4 +1,5 @@
 #!/usr/bin/env python3
+# SPDX-License-Identifier: MIT
 """validate_verdict.py VERDICT...: each against docs/verdict.schema.json; exit status 1 and the first fault if one fails."""
 import json
 import pathlib

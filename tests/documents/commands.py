@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: MIT
 """The commands in a page of documentation: those that stand as code, one a line, and those that stand in a sentence."""
 import dataclasses
 import re

@@ -1,4 +1,5 @@
 #!/usr/bin/env python3
+# SPDX-License-Identifier: MIT
 """Every command of the documents: that its program, its options, its tests and its files are there; and those that are quick
 and need nothing that is not here are run, as they stand.
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // No allocation in what the driver does on a bus over sockets, from configuring to a stop and again: operator new is
 // counted.
 #include <gtest/gtest.h>

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // A test bench in simulated time: the driver and two simulated drives on one wire, one millisecond per tick.
 #pragma once
 

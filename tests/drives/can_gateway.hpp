@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // The kernel's CAN gateway (can-gw): which frames of one interface it sends on to another, said and asked over netlink
 // in the terms of linux/can/gw.h, so that no program is needed for it. A rule takes the frames of one filter; what no
 // rule takes is dropped. Rules go with their interfaces.

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // Drives as makers ship them, by the simulated drive's dialects: right, or refused before the power stage is enabled.
 #include <gmock/gmock.h>
 

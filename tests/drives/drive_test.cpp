@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // The simulated drive as a bench would judge one: what it reports of its motion, its units, its limits, its way of
 // stopping.
 #include <gmock/gmock.h>

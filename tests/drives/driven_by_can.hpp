@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // The driver on a real CAN_RAW interface, in real time: what the tests on vcan and on slcan share.
 #pragma once
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // The driver at one end of a line of the kernel's, two simulated drives at the other, in real time: what the tests
 // share that spoil what is between the ends.
 #pragma once

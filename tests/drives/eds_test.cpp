@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // rig/src/drives/bevel_drive.eds against the drive: every object of the file is asked for and written to over SDO, and
 // the drive has none that the file lacks.
 #include <gmock/gmock.h>

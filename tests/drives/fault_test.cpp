@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // Each row of the fault table that can be made on a wire in memory. Every stop is latched: see expect_latched().
 #include <gmock/gmock.h>
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 #include <bevel/drivers/stepper/follow_watch.hpp>
 
 #include <gtest/gtest.h>

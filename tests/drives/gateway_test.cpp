@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // A CAN gateway between driver and drives that sends on what it likes: the kernel's own (can-gw) between two vcans.
 // netem (vxcan_test.cpp) loses frames by chance; this loses one kind of frame and lets all others through. Run through
 // on_can.sh.

@@ -1,4 +1,5 @@
 #!/usr/bin/env bash
+# SPDX-License-Identifier: MIT
 # in_vm_test.sh IN_VM ON_CAN: the contract of tools/in-vm that the CAN tests rely on: whose status comes out, when another
 # way to a kernel is tried, and that what is not tested is said. Status 77: no guest boots here, so only the half was seen.
 set -u

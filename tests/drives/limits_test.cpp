@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // The drives' software limits (0x607D): written from the configuration, moved with the entry, kept by the drive.
 #include <gmock/gmock.h>
 

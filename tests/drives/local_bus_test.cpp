@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // The local bus over real sockets: echo, broadcast, filters, and what happens when the hub goes and comes.
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // A stop counts when it is measured: drives that acknowledge a stop and do not carry it out, settings that change while
 // the axes move, and drives that are lost after a stop.
 #include <gmock/gmock.h>

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // Profile velocity and cyclic synchronous velocity, and what the drives themselves supervise: the same insertion in
 // both.
 #include <gmock/gmock.h>

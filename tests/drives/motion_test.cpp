@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // The driver against two simulated drives, without faults: states, positions, limits, set-point ages.
 #include <gmock/gmock.h>
 

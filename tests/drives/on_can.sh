@@ -1,4 +1,5 @@
 #!/usr/bin/env bash
+# SPDX-License-Identifier: MIT
 # on_can.sh IN_VM PROGRAM [ARG...]: runs PROGRAM where there is a vcan0: here, or inside tools/in-vm. Neither: status 77,
 # which ctest reports as skipped. BEVEL_VM is that of tools/in-vm; none keeps it out of any guest (sanitized programs do
 # not run in user-mode Linux).

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // CANopen details: SDO answers that are late, doubled, wrong or refused; identity; state decoding; the drive's own
 // rules.
 #include <gmock/gmock.h>

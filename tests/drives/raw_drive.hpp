@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // One simulated drive and a master of raw frames, in simulated time: for rules that the driver alone would never break.
 #pragma once
 

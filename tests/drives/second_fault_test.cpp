@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // A second fault while the axes are being stopped for a first one: during the quick stop, and while the drive is still
 // being asked which limit it was (0x60FD), whose answer is held back so that this takes as long as it can.
 #include <gmock/gmock.h>

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // A CAN controller that goes passive or off the bus, and a queue that nobody empties: the kernel's slcan driver on a
 // pseudo-terminal says so, as hardware would. Run through on_can.sh.
 #include <fcntl.h>

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // The driver and two simulated drives over a real CAN_RAW interface, in real time. Run through on_can.sh. The machine
 // may be slow and have one processor: these tests assert order and generous bounds.
 #include <gmock/gmock.h>

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // A drive that never receives its RPDO, while all else goes through: heartbeats, SYNC, SDO, its positions.
 #include <gmock/gmock.h>
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // A participant whose line loses, doubles and delays what others send: a can::Bus round another one. What the
 // participant itself sends goes out as it is (its own line is another one's to spoil), and echoes and events come at
 // once.

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // Frames lost, doubled, late and out of order at every participant, whatever they are, as on a bad line: on a wire in
 // memory and over the rig's local bus. The same by the kernel itself: vxcan_test.cpp.
 #include <gmock/gmock.h>

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // A bad line by the kernel itself: the driver on one end of a vxcan pair, the drives on the other, and netem between
 // them. (On a vcan netem changes nothing: what its sockets hear never passes a queue.) Run through on_can.sh.
 #include <cstdlib>

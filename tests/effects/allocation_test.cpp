@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // A leg and a reading allocate nothing, with effects and sensitivities: operator new is counted.
 #include <gtest/gtest.h>
 

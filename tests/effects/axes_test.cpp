@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // Effects between the base's axes and the tip's, against gap variables by brute force and closed forms.
 #include <gtest/gtest.h>
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // What a leg costs: AugmentedNeedle::advance per leg and model::predict per recording, by columns and effects.
 #include <benchmark/benchmark.h>
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 #include "tests/effects/brute_force.hpp"
 
 #include <Eigen/Geometry>

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 #pragma once
 // The needle by brute force, for tests: (10) with the slip of (25), integrated in steps of 50 us by a midpoint rule on
 // rotation matrices, gamma by bisection. Shares no code with the product but Eigen, and knows nothing of legs: an

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // Effects of the cameras: maps of the point seen, and its stamp.
 #include <gtest/gtest.h>
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // What a reading was taken at, against motions made by hand.
 #include <bevel/model/effects/covariates.hpp>
 

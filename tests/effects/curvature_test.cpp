@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // Effects on the curvature, against closed forms and brute force.
 #include <gtest/gtest.h>
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // Discrepancies against motions that are made by hand, against differences, and what they and the variation between
 // insertions make uncertain against draws.
 #include <bevel/model/effects/discrepancy.hpp>

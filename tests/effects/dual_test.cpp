@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // Elementary functions of dual numbers, their slopes against central differences.
 #include <bevel/model/effects/dual.hpp>
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // Effects on the pose at the entry point.
 #include <gtest/gtest.h>
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // Measured headings, and the effects that only they or a shift of the readings show.
 #include <gtest/gtest.h>
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // Effects that move the point which the cameras see.
 #include <gtest/gtest.h>
 

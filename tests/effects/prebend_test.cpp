@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // The example of docs/adding-an-effect.md, compiled out of that page: what it says works, and works everywhere.
 #include <gtest/gtest.h>
 

@@ -1,4 +1,5 @@
 #!/usr/bin/env python3
+# SPDX-License-Identifier: MIT
 """The tip along a log by plain Python: an independent check of bevel-predict.
 
     predict_peer.py MODEL.toml LOG PREDICTED.csv LARGEST_MM

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // bevel-predict as a program: its lines against a peer in Python, its messages and its exit status.
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // What holds for every effect of the registry: none at its `none`, right sensitivities, an order of its own.
 #include <gtest/gtest.h>
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // The simulated rig with the effects of a model file: its plant, its pictures, its configuration.
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 #pragma once
 // Motion scripts of constant rates, and effects run along them.
 #include <cmath>

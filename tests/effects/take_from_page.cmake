@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: MIT
 # Takes the example out of docs/adding-an-effect.md: its C++ becomes EFFECT_OUT, its added line goes into a copy of the
 # registry, REGISTRY_OUT. Anything that is not as the page says is an error.
 file(READ ${PAGE} page)

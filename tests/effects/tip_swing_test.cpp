@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // The stiff shaft: against closed forms, brute force, and the beam of the simulated plant, which knows no effects.
 #include <gtest/gtest.h>
 

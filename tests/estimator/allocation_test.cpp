@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // No allocation in a step, late measurements, resets and relinearisation included: operator new is counted.
 #include <gtest/gtest.h>
 

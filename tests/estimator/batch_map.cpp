@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 #include "tests/estimator/batch_map.hpp"
 
 #include <ceres/ceres.h>

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 #pragma once
 // The batch maximum a posteriori of an insertion without process noise: the best that any filter can do on the data.
 // Unknown: the start, 6 of a body-frame error exp(delta) at the entry pose and 3 of the parameters; Ceres.

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // Cost of predict + update, of the whole estimator per message, and of a plain dense product-sum of the same flops.
 #include <benchmark/benchmark.h>
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // A needle that is drawn back goes through the channel it has cut, and inserted again to its front: the filter against
 // the kinematic plant, which remembers poses, and the beam, which remembers where its tissue was cut.
 #include <gtest/gtest.h>

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 #pragma once
 // Errors of readings that are alike from frame to frame.
 #include <map>

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // Readings whose errors are alike: the six states for what they share, against closed forms and on drawn insertions.
 #include <gtest/gtest.h>
 

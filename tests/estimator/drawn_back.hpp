@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 #pragma once
 // Needles that are drawn back and inserted again: axes at 100 Hz, two cameras, and any plant in between.
 #include <functional>

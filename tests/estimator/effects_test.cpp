@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // Effects of a model file in the filter, on data simulated with them: innovations are what they should be with the
 // effect in the model and not without.
 #include <gtest/gtest.h>

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 #include <bevel/estimator/entry_line.hpp>
 
 #include <gtest/gtest.h>

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // Gaps in the reports of the axes: the estimate after one is as uncertain as the motion that nobody observed can have
 // made it, and no measurement within one is applied where the axes are not known.
 #include <gtest/gtest.h>

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // What headings bring over many insertions, and whether the filter knows: NEES, NIS, and errors paired with those of
 // the same insertions without headings.
 #include <gtest/gtest.h>

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // The heading as a measurement: derivatives, the update against its closed form, the gate, order, and what is counted.
 #include <gtest/gtest.h>
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // Parameters learned on other insertions: what one log's filter has learned starts another's.
 #include <bevel/analysis/replay/held_out.hpp>
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 #include <bevel/estimator/innovation_watch.hpp>
 
 #include <gtest/gtest.h>

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 #pragma once
 // A simulated insertion for the estimator's tests: true path, actuator states at 100 Hz, tip measurements at 30 Hz, and
 // headings with them if asked for.

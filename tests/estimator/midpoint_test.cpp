@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // The derivatives that the filter takes, beside those that are checked by perturbation.
 #include <gtest/gtest.h>
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 #include <bevel/estimator/needle_estimator.hpp>
 
 #include <gtest/gtest.h>

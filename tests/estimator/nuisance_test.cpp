@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // The slowly known states of the rig: wind-up against the beam and the library's effect, latencies of cameras
 // against readings that are late.
 #include <gtest/gtest.h>

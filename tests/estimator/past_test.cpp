@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // Readings of cameras that look along no axis of {A}, joined into one: what the one says of any place is what they all
 // said.
 #include <gtest/gtest.h>

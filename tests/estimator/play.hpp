@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 #pragma once
 // A simulated insertion through the estimator, and how far the result is from the truth.
 #include <Eigen/Cholesky>

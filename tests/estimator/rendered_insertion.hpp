@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 #pragma once
 // A simulated insertion watched by two cameras whose pictures are rendered and tracked: what TIP_MEASUREMENT and
 // TIP_HEADING hold then, with all that neighbouring frames' errors have in common.

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // States of the estimate that a source of measurements has brought about, once that source is gone.
 #include <gtest/gtest.h>
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // The filter with a stiff shaft against the beam itself, which shares nothing with it.
 #include <gtest/gtest.h>
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // How alike the errors of neighbouring frames are, and what that does to the filter. `study_colour WHAT [N [SEED]]`:
 //   frames    autocorrelation of the tip's error in rendered and tracked frames, N insertions a row
 //   colour    N insertions of the kinematic plant whose readings' errors are alike, the shaft turned to and fro or on

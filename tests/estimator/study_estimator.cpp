@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // The needle filter beside its peers on the same insertions, and on a plant that is not its model. Prints two tables.
 #include <Eigen/Cholesky>
 #include <ctime>

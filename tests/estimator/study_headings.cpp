@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // What the headings of cameras bring: insertions whose pictures are rendered and tracked, through the filter with their
 // headings and without. `study_headings [INSERTIONS [SEED]]`.
 //

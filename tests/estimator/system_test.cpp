@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // The live estimator as a rig's file sets it up, and replays against the truth that a rig writes.
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>

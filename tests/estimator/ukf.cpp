@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 #include "tests/estimator/ukf.hpp"
 
 #include <Eigen/Cholesky>

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 #pragma once
 // An unscented Kalman filter of the same state, model and measurements as the needle filter: a second way to the same
 // posterior, to compare with. In order, at full cost, for tests only.

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // A model file that says what it does not know: the filter starts as wide as insertions differ and widens by the errors
 // of a curve. Consistency on simulated insertions that differ so, and the lack of it where the filter is not told.
 #include <gtest/gtest.h>

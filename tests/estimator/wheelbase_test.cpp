@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // ell as the tenth state, on request.
 #include <gtest/gtest.h>
 

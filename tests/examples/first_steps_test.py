@@ -1,4 +1,5 @@
 #!/usr/bin/env python3
+# SPDX-License-Identifier: MIT
 """Checks the first steps of a reader who has nothing but the sources, README.md and examples/README.md.
 
 The commands are taken from the two pages in their order. The build folder of this test starts empty. A command that

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // Drives that acknowledge a stop and do not carry it out, and settings that change while they move.
 #include <cmath>
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // Every fault of every component at any instant of an insertion, in simulated time, judged by the same four laws:
 //   1. both axes rest within 200 ms of the fault, by the true motion of the drives' shafts; where nothing can stop an
 //      axis, the driver declares within 200 ms that it does not stop;

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // Ten thousand faults. BEVEL_FAULTS=N for another number, BEVEL_FAULT_SEED=S for other first seeds; with
 // BEVEL_FAULTS=1 a single one can be looked at (the class is seed modulo the number of classes).
 #include <gtest/gtest.h>

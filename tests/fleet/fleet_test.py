@@ -1,4 +1,5 @@
 #!/usr/bin/env python3
+# SPDX-License-Identifier: MIT
 """tools/fleet by its parts and as a whole, with stand_in.py in place of bevel-diagnose.
 
 Usage: fleet_test.py [unittest OPTION...]. Status 77 where Snakemake, Dask and pyarrow are not there (tools/setup --fleet).

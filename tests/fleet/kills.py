@@ -1,4 +1,5 @@
 #!/usr/bin/env python3
+# SPDX-License-Identifier: MIT
 """Many cases through tools/fleet, undisturbed and with random kills: nothing lost, nothing done twice, the same verdicts.
 
 Usage: tests/fleet/kills.py --out DIR [--cases N] [--seed S] [--engine E] [--every-s T] [--kills K] [--stand-in [--seconds T]]

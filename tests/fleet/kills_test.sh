@@ -1,4 +1,5 @@
 #!/usr/bin/env bash
+# SPDX-License-Identifier: MIT
 # kills_test.sh SOURCE_DIR PYTHON: a fleet of six whose processes are killed, small enough for every test run.
 set -euo pipefail
 source=$1 python=$2

@@ -1,4 +1,5 @@
 #!/usr/bin/env python3
+# SPDX-License-Identifier: MIT
 """Stands in for Slurm under the names sbatch, srun, sacct, sacctmgr, scancel: what Snakemake's executor says to them. A job
 is a process of this machine; $STAND_IN_FOR_SLURM is a folder with a file a job, and calls.txt of all that was asked."""
 import os

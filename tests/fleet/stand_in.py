@@ -1,4 +1,5 @@
 #!/usr/bin/env python3
+# SPDX-License-Identifier: MIT
 """Stands in for bevel-diagnose: -q --threads N --model M --out DIR LOG... The model says how it behaves (seconds, status);
 k, its noise and a friction in the verdict are those the logs begin with, else drawn from their bytes."""
 import hashlib

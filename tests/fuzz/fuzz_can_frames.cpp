@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // Arbitrary frames, faults and orders, in arbitrary order, for the stepper driver and two simulated drives on one wire.
 // Whatever happens: nothing is enabled without an enable() that was accepted, a latched stop lasts until rearm(), and
 // no commanded rate is above its limit or changes faster than its acceleration.

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // Arbitrary bytes as each of the messages. What is accepted is exactly what encoding it gives, within its bounds by a
 // second, independent look, and no other type; what is refused leaves nothing behind.
 #include <utility>

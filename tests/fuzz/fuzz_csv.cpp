@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // Arbitrary text as a table, by a column map of the input's own or by a fixed one. It is refused with a sentence that
 // names the file, or every row is accounted for and time grows.
 //

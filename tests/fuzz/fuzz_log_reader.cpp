@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // Arbitrary bytes as a log. Every byte is accounted for once, every event lies where it says, the events alone make an
 // intact log, and a recording of the same bytes holds each event once and only messages that pass their checks.
 #include <map>

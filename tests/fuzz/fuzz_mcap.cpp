@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // Arbitrary bytes as an MCAP file. What is read lies in the file, damage has words, and the same bytes give the same;
 // as a recording it is refused with a sentence, or every message passes its checks and survives being written and read.
 #include <bevel/io/checked_decode.hpp>

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // The SDO client against a server that answers what it likes, beside a model of what CiA 301 allows it to believe; then
 // against the simulated drive's own server, which has to answer every request.
 //

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // What the fuzz targets share: an assertion that no build switches off, numbers out of the input, a file without a
 // disk.
 #pragma once

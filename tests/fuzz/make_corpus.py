@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: MIT
 """Writes the seeds of the fuzz targets that are easier made than typed, into corpus/ beside this file.
 
 PYTHONPATH=build/lcmtypes/python python3 tests/fuzz/make_corpus.py

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // Feeds the kept inputs of one fuzz target to it, without libFuzzer: the corpus as a test of every build.
 // Arguments: files, or folders of them. Exit status 0 if all went through, 2 if there was none.
 #include <algorithm>

@@ -1,4 +1,5 @@
 #!/usr/bin/env python3
+# SPDX-License-Identifier: MIT
 """Compiles each public header alone, and all headers of a module together, by the compiler and flags of the build.
 
     headers_test.py BUILD [MODULE...]

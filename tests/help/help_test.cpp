@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // --help of everything that users call: safe, quick, alike. And what a mistyped option is answered.
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // What someone who waits is told: the estimate, its words, and how often.
 #include <bevel/cli/progress_line.hpp>
 

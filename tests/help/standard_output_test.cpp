@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // Exit status of a program whose standard output cannot be written.
 #include <gtest/gtest.h>
 #include <sys/wait.h>

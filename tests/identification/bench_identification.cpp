@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // Trajectory fit of 12 recordings of 300 measurements, 3 parameters. The peer is tests/peers/scipy_trajectory_fit.py:
 // `--export FILE` writes the same data for it.
 #include <benchmark/benchmark.h>

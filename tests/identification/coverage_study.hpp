@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 #pragma once
 // How often the 95 % intervals contain the truth, over simulated data sets.
 #include <array>

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // A smaller edition of the coverage study: fewer sets, hence a wider band. The study of 200 is study_coverage.
 #include "tests/identification/coverage_study.hpp"
 

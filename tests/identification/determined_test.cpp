@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // Parameters that recordings do not determine stay at their value beforehand; the candidates and their selection.
 #include <gtest/gtest.h>
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // The fits: what they find, what they say they cannot find, and where they stop.
 #include <gtest/gtest.h>
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // bevel-identify from logs on disk to its files.
 #include <gtest/gtest.h>
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // The path and its Jacobian, and the making of insertions from axis and camera samples.
 #include <bevel/diagnosis/identification/path.hpp>
 

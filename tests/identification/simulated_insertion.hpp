@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 #pragma once
 // Recordings of a simulated needle, made with the model's own fine steps: 100 Hz of actuator states, a camera at 30 Hz
 // that sees y and z (or all three axes), white Gaussian noise of the size that its information states.

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // 200 simulated data sets: how often do the 95 % intervals contain the truth? Prints counts with Wilson's band and
 // writes a page with pictures: study_coverage [PAGE.html] [SETS].
 #include <algorithm>

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // Table I's question on real tissue: bicycle against extended model, fitted on two insertions and tested on the third.
 // Data: 12 hand-pushed insertions (Bernardes et al. 2023; no licence, hence not part of this project), looked for in
 // $BEVEL_SHARED or <source>/../shared. Without them the program says so and ends with status 0.

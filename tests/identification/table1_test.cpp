@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // The study behind Table I: what goes in comes out, and the figures that the documents quote.
 #include <gtest/gtest.h>
 

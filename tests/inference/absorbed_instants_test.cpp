@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // A step that happened in some recordings, and what these have of their own took up: from there an instant is worth
 // nothing anywhere, with all else as it is.
 #include <gtest/gtest.h>

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // The arrow's solution against the same least squares written out in full.
 #include <gtest/gtest.h>
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // Where a fit goes along a valley that is bent, and where a bound is in the way of a step.
 #include <gtest/gtest.h>
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // What all recordings share looks like recordings that differ: a curve that is common, and a smaller one that stands
 // out beside what a wide spread leaves.
 #include <gtest/gtest.h>

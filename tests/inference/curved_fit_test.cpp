@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // A discrepancy that is too large for the linear model about none.
 #include <bevel/diagnosis/inference/curved_fit.hpp>
 

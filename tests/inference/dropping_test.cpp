@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // What a set loses without a member, by the linear model: a way out of a local minimum.
 #include <gtest/gtest.h>
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // What a set promises of a larger one depends on the noise by which it is asked: its own, or that of a reference.
 #include <gtest/gtest.h>
 

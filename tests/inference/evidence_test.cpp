@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // The evidence against closed forms: of a model linear in everything it is a normal density of all readings together.
 #include <gtest/gtest.h>
 

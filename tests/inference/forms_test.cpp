@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // Equations for a discrepancy, against dense normal densities of a linear system.
 #include <bevel/diagnosis/inference/forms.hpp>
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // Noise with heavy tails: found where it is, and the likelihood, the evidence and the errors of Student's t.
 #include <gtest/gtest.h>
 

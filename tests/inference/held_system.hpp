@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 #pragma once
 // A system that holds what it is made of; what it predicts is left to each.
 #include <cmath>

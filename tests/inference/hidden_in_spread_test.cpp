@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // What some recordings share looks like recordings that differ, until it has a name; and what recordings differ by
 // looks like noise, until they may.
 #include <gtest/gtest.h>

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // An instant from which on readings go another way: no jump says where it is, only where they are later.
 #include <gtest/gtest.h>
 

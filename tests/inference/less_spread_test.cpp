@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // What a fit has with less spread: by the linear model about it, and about its mode there.
 #include <gtest/gtest.h>
 

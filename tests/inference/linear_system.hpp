@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 #pragma once
 // A client of the engine whose evidence is known in closed form: readings linear in everything.
 #include <Eigen/Cholesky>

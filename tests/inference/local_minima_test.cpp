@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // Instants, whose likelihood has one minimum a reading wide.
 #include <bevel/diagnosis/inference/local_minima.hpp>
 

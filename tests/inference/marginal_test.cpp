@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // What stands beside a set, by the linear model about its fit, against dense least squares and a normal density.
 #include <bevel/diagnosis/inference/marginal.hpp>
 

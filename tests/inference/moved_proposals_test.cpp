@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // Steps that another effect, which took up their mean, has shifted.
 #include <gtest/gtest.h>
 

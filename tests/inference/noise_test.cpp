@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // The noise: found beside structure that is no noise, its outliers, and again about a model.
 #include <gtest/gtest.h>
 

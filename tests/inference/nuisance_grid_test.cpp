@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // Combinations of standard deviations: that those with a share are found from any of them, and few others asked for.
 #include <bevel/diagnosis/inference/nuisance_grid.hpp>
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // What each recording has of its own, integrated out: against the density of the readings in full.
 #include <bevel/diagnosis/inference/own_volume.hpp>
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // Work on several threads: every piece once, whatever their number; a failure comes out when all have ended.
 #include <gtest/gtest.h>
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // What comes out does not depend on how many threads it took.
 #include <gtest/gtest.h>
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 #pragma once
 // A second client of the engine, with nothing of a needle: a driven pendulum, its angle read by a noisy sensor.
 //

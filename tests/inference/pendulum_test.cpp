@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // The engine on a system that is no needle: it names what is concealed, nothing where there is nothing, and a
 // discrepancy where it is on no list.
 #include <gtest/gtest.h>

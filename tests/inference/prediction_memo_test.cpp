@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // What was predicted last is not computed again, and is the same to the last bit.
 #include <bevel/diagnosis/inference/prediction_memo.hpp>
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // The noise by which recordings are predicted: simulated recordings that differ, one channel white and one that drifts.
 #include <bevel/diagnosis/inference/prediction_noise.hpp>
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // Predictions of one recording, new and continued, and its nuisances, against dense normal densities of all readings.
 #include <bevel/diagnosis/inference/predictive.hpp>
 

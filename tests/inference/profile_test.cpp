@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // The likelihood along one unknown, and from one effect to another, against closed forms.
 #include <bevel/diagnosis/inference/profile.hpp>
 

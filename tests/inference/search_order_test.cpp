@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // Which set is looked around next.
 #include <gtest/gtest.h>
 

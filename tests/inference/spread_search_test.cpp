@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // Which spread is fitted next: the most promising, none twice, and nearer where the linear model was wrong.
 #include <bevel/diagnosis/inference/spread_search.hpp>
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // Sums of squares of normals with means, against exact distributions and draws.
 #include <bevel/diagnosis/inference/squared_size.hpp>
 

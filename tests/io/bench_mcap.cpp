@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // bench_mcap [SECONDS] [ROUNDS]: how fast MCAP is written and read, beside cp of the same file and beside what of it is
 // a floor: the digits of the same numbers alone, and the CRC-32 of the same bytes. MB of the .mcap file by seconds of
 // one processor (other processes may have the others), the median of the rounds. Seed 1.

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // CAMERA_PICTURE: made of a frame, through LCM's encoding and the checked decode, and against every way in which bytes
 // can be wrong.
 #include <bevel/io/camera_picture.hpp>

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: MIT
 """Reads the log OURS with LCM's own Python reader and writes the same events to THEIRS with its writer."""
 import sys
 

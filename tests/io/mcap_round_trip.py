@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: MIT
 """mcap_round_trip.py SOURCE BUILD: what the Python package mcap, which shares no code with ours, reads in our files, and we
 in its files: in chunks and without, with its indices and without, in another order, and as files of before were.
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 #pragma once
 #include <bevel/needle_state_t.hpp>
 #include <cmath>

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // The checked decode against every way in which bytes can be wrong; each test runs over all message types and fields.
 #include <gtest/gtest.h>
 

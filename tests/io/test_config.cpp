@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // The typed configuration: what is read, and what each kind of mistake is answered with.
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>

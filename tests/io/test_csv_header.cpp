@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // Which line of a CSV file is its header, and what separates cells and lines.
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>

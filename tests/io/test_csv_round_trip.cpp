@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // Export, import, export: the same bytes, whatever a recording holds.
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // One's own CSV: units, separators, empty cells, streams; and what cannot be true of a needle.
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>

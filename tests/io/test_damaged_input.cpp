@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // What an attacker or a full disk leaves of a log, through each program that reads logs or CSV: how it ends, what it
 // says, and how long it takes.
 #include <gmock/gmock.h>

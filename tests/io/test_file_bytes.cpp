@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // Reading files that are not what they should be: one message each, at once, and never a signal.
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // Which files of a folder are logs, and that no two results get one name.
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>

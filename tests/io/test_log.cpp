@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // Logs: written, read back, damaged at every byte, and read by LCM's own tools.
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>

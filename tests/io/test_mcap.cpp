@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // MCAP: what goes out comes back to the last bit, and what is damaged is said and harms nobody.
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>

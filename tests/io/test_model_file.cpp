@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // The model file: round trips and the mistakes that can be made in one.
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // What a model file says beside the needle and its effects: discrepancies and variation. Round trips, and the mistakes
 // that can be made in them.
 #include <gmock/gmock.h>

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // What is told of samples, what is left out, and above all what is neither: the ordinary faults of cameras and benches.
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // Logs in which camera and drives have different clocks, and names of logs that are not those of a file.
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // Result files on a disk that is full, over links and devices, and beside a file that is there.
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>

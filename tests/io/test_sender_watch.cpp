@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // Who sends, told by seq and utime; what can be motion.
 #include <gtest/gtest.h>
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // Programs that take several logs keep the results of all of them, whatever the logs are named.
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>

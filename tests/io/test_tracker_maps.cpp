@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // Recordings of trackers: another frame, another zero of the depth, held values, lags and gaps of the base.
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // The bound of each integer code of each message is the last value of its enumeration.
 #include <gtest/gtest.h>
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // The latency of a camera from simulated insertions, whose needle is not the one that the fit believes in; against the
 // truth, against its own standard error, and against a correlation of depth rates that knows no model.
 #include <gmock/gmock.h>

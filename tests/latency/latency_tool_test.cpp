@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // bevel-calibrate --latency from a log on: what it prints goes into a system file as it stands.
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>

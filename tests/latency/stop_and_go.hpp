@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 #pragma once
 // A simulated insertion that stops and goes, seen by a camera whose stamps are late.
 #include <cmath>

@@ -1,4 +1,5 @@
 #!/usr/bin/env bash
+# SPDX-License-Identifier: MIT
 # Starts each program under resource limits that are too low, in a network namespace. Each run must end by itself, with
 # status 1 and a message that names the limit and the remedy; a crash and a hang have a status of 128 and more.
 # Usage: limits_test.sh BIN_DIR SOURCE_DIR. Exit status 77: skipped, no network namespaces.

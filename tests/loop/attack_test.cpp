@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // Messages from others than those who should send them, and clocks that are set: nothing moves the needle, blinds the
 // estimator or clears a stop.
 #include <limits>

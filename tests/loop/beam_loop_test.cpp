@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // The loop with a needle that is not the model: a beam in elastic tissue, by drives and messages as they run live.
 #include <gmock/gmock.h>
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // What the drives say of their rates, read from the bus beside the driver: for studies with real processes.
 #pragma once
 

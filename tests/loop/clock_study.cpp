@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // The wall clock of real processes is set while they steer a needle, by libfaketime; the steady clock goes on. Usage:
 // clock_study BIN_DIR CONFIG OUT_DIR LIBFAKETIME WHOSE JUMP_S..., inside a network namespace of its own
 // (processes_test.sh). WHOSE: `all`, one machine with all processes; or `camera`, `estimator`, `controller`, `stepper`,

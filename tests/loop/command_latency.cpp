@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // How long from a MOTION_COMMAND to the frame that carries its rate on the bus, through bevel-stepper, beside the least
 // that it can be, in the same run:
 //

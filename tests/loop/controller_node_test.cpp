@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // bevel-controller as a rig's file sets it up: what it commands for the same state, with effects and without.
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>

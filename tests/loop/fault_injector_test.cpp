@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // What the fault injector makes of a camera that gives positions and headings: both fail as one.
 #include <gtest/gtest.h>
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // A driver of the axes that stalls, or is started again, while the needle is in the tissue: what the estimate is worth
 // afterwards, and when the needle may be steered again.
 #include <boost/math/distributions/chi_squared.hpp>

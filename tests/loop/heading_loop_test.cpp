@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // The loop with a sensor in the needle that tells its heading: it arrives, and false headings stop it.
 #include <gtest/gtest.h>
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // Real processes, killed or stopped in flight, and how long until both axes rest, read from the drives' own frames on
 // the bus. Usage: kill_study BIN_DIR CONFIG OUT_DIR BUS TRIALS SEED [PROGRAM SIGNAL], inside a network namespace of its
 // own (tests/loop/processes_test.sh): PROGRAM (such as bevel-demo) and SIGNAL (KILL or STOP) of every trial, drawn

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // Each latched state over the wire: what causes it, and the one command or condition that clears it
 // (docs/running.md#latched-states-and-what-clears-them).
 #include <gmock/gmock.h>

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // Warnings about LCM providers, before a program that uses one starts.
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // What the estimator says live, over LCM, is what a replay of the log of the same messages says.
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 #include "tests/loop/live_rig.hpp"
 
 #include <algorithm>

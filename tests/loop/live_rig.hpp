@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // The five processes for real, started one by one as a study wants each (under another clock, with less of the
 // processor), an operator for them, and somebody who watches from outside: the drives' own frames on the bus, and when
 // each process was last heard. For programs in a network namespace of their own (processes_test.sh).

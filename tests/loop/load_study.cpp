@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // Real processes steer a needle while stress-ng overloads the machine that they run on. Usage: load_study BIN_DIR
 // CONFIG OUT_DIR SEED LOAD..., inside a network namespace of its own (processes_test.sh). A LOAD is KIND:WORKERS:NICE:
 // what stress-ng does (matrix, switch, vm, or mixed: all three), how many workers of each per processor, and its

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // A loop for tests, and how long until both axes rest.
 #pragma once
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // The loop of tests/loop/simulated_loop.hpp: an insertion that arrives, and what stops one. Rest is that of both axes.
 #include "tests/loop/loop_fixture.hpp"
 

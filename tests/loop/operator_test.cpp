@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // Requests of the operator program over LCM, and its heartbeat.
 #include <gmock/gmock.h>
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // Obstacles and way-points through all the nodes: the file, the operator's words, drives and messages as they run live.
 #include <gtest/gtest.h>
 

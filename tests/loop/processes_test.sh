@@ -1,4 +1,5 @@
 #!/usr/bin/env bash
+# SPDX-License-Identifier: MIT
 # The five processes for real, in a network namespace: an insertion that arrives, and all the ways in which one may end
 # before. Usage: processes_test.sh BIN_DIR SOURCE_DIR CASE [ARG...]. Exit status 77: skipped, for want of network
 # namespaces or of what the case needs; it says so.

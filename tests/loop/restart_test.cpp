@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // Processes that are started again while the needle is in the tissue.
 #include <Eigen/Geometry>
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // Back along the path through all the nodes: the operator's word, drives and messages as they run live.
 #include <algorithm>
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // The configuration cannot switch safety off: every key of the chain from a fault to rest has both its limits, and a
 // message that names key, value, what is allowed and why.
 #include <gmock/gmock.h>

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 #include "tests/loop/simulated_loop.hpp"
 
 #include <cstdlib>

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // The whole loop in one process: estimator, controller and stepper driver as they run live, over LCM in memory, against
 // simulated drives on a bus, a needle, and a camera that is mocked at its message. Time is simulated, so a minute of
 // steering takes seconds and every run is the same. With BEVEL_CAN=can0 (or vcan0) the frames go over a real SocketCAN

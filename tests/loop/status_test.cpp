@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // PROCESS_STATUS says how the process's loop keeps its time.
 #include <gtest/gtest.h>
 

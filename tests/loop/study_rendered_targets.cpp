@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // The first of bevel-targets' targets, with the same needles and beliefs, by what runs live: estimator, controller and
 // stepper driver over LCM in memory, simulated drives on a bus, and pictures rendered and tracked, two cameras of the
 // demo's system file at 30 Hz whose pictures arrive 50 ms after they were taken. Simulated time: the same seed gives

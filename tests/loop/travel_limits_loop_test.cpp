@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // An axis that comes to its end: a limit switch of the rig ([rig.limit_switches]) or the drive's own software limit.
 // Run into, at rest, latched with its reason, armed again by word and backed off.
 #include <gmock/gmock.h>

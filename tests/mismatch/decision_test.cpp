@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // The verdict from a posterior, with posteriors made up on the sets that a search of the pendulum visited.
 #include <bevel/diagnosis/mismatch/decision.hpp>
 

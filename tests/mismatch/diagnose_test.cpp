@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // A whole diagnosis of a small rig: do the findings make sense together.
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // What to record next: motions within limits, and how far two explanations differ in them.
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>

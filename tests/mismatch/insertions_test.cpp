@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // Insertions that differ: what each has of its own, and each predicted as a new one and continued from its first third.
 #include <gtest/gtest.h>
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // The invariants of a verdict, on findings that were made up and on whole diagnoses of simulated rigs.
 #include <bevel/diagnosis/mismatch/invariants.hpp>
 

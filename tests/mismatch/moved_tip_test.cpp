@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // By how much one part of a model moves the tip, against closed forms.
 #include <bevel/diagnosis/mismatch/moved_tip.hpp>
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // Practice recordings of a simulator that shares no code with this project, where they are at hand.
 #include <gtest/gtest.h>
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // A library with one effect more, out of a proposal: what was unknown without it has its name.
 #include <gtest/gtest.h>
 

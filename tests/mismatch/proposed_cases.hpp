@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 #pragma once
 // Proposals of every form in every kind of component, over covariates of every kind between them.
 #include <numbers>

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // Effects out of proposals, compiled as they were written: they say the equations that were weighed, with their slopes,
 // and are effects like all others.
 #include <gmock/gmock.h>

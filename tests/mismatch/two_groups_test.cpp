@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // What changed between two groups of recordings of a rig, and what headings add.
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // Writes the sources of all proposed_cases() into a folder, or of one of them, and the registry with their lines, where
 // the sources say that they stand.
 //   write_proposed REGISTRY FOLDER [NAME]

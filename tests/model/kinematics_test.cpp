@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 #include <bevel/model/motion_direction.hpp>
 
 #include <gtest/gtest.h>

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 #include <bevel/model/lie.hpp>
 
 #include <gtest/gtest.h>

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // The spatial integrator against the planar equations (13)-(17) as printed, solved by another method (Bulirsch-Stoer,
 // Boost.Odeint) in other variables: gamma is integrated by (17), not obtained from theta.
 #include <gtest/gtest.h>

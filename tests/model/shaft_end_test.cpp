@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 #include <bevel/model/shaft_end.hpp>
 
 #include <gtest/gtest.h>

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // Curves over what the base does: which there are, what they weigh, what they do to readings.
 #include <bevel/diagnosis/needle/curves.hpp>
 

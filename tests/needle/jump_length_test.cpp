@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // The length of a tip's jumps, from half of it and from twice: every second place is right there, and no small step
 // leads away.
 #include <gtest/gtest.h>

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // A discrepancy of the needle's that is no small thing: what it does to the readings, and whether it is found.
 #include <gtest/gtest.h>
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // The needle behind the engine's interface, against differences and against the model itself.
 #include <bevel/diagnosis/needle/needle_system.hpp>
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // Which channels a case has, and which recordings cannot be diagnosed.
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>

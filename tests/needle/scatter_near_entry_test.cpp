@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // How much more readings scatter near the entry: against made-up readings of which it is known, and against restricted
 // likelihoods by dense matrices.
 #include <bevel/diagnosis/needle/scatter_near_entry.hpp>

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 #include "tests/needle/simulated_rig.hpp"
 
 namespace bevel::diagnosis::testing {

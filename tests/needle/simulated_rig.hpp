@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 #pragma once
 // Short recordings of a rig of which everything is known: the needle, what the model of it leaves out, and the noise.
 // The tip's path is that of model::predict, which the diagnosis uses too: what is tested here is what is concluded from

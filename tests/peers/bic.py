@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: MIT
 """Plain BIC selection: maximum likelihood through the integrator, forward steps, white or AR(1) noise.
 
 As its users write it: every effect as a list of parameters with starts, scipy.optimize.least_squares with finite

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: MIT
 """Two drives by python-canopen under bevel-stepper, commanded over LCM as bevel-controller would: a whole insertion, and what
 stops one. Nothing of the project but bevel-stepper runs.
 

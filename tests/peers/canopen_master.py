@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: MIT
 """python-canopen, a master that shares no code with the project, against the drives of bevel-rig.
 
     tests/peers/canopen_test.sh build/bin . canopen_master

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: MIT
 """What the two tests with python-canopen share: skipping, the bus, programs of the project, waiting.
 
 Settings come from the environment, which canopen_test.sh fills in: BEVEL_BIN (folder of the programs), BEVEL_SOURCE (folder

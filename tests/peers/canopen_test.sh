@@ -1,4 +1,5 @@
 #!/usr/bin/env bash
+# SPDX-License-Identifier: MIT
 # canopen_test.sh BIN_DIR SOURCE_DIR TEST [CLASS]: TEST.py of this folder, python-canopen against programs of the project, where
 # nobody else hears their LCM and their CAN: in a network namespace of its own, or in a machine that has no network but
 # lo and CAN (tools/in-vm). With BEVEL_CAN=vcan0 on that interface, else on a local bus. Status 77: skipped; it says why.

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: MIT
 """A CiA 402 drive made of python-canopen's LocalNode: SDO server, NMT slave, PDO maps and emergencies are the library's, the
 power state machine, the motor and the watch over the master are written here from IEC 61800-7-201. It shares no code with the
 project and knows of it only rig/src/drives/bevel_drive.eds.

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: MIT
 """A Gaussian-process discrepancy after Kennedy and O'Hagan (2001, J. R. Statist. Soc. B 63), by scikit-learn.
 
 Modular, as most who apply it do: k, lambda1, lambda2 are calibrated first, then each axis of measured - predicted is a

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: MIT
 """The rig's local bus for python-can: frames over a Unix socket, as drivers/include/bevel/drivers/can/local_wire.hpp has them.
 
     bus = LocalBus("/tmp/bus")                          # a participant

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: MIT
 """The extended bicycle model with the effects that may be left out, in their plain form: one compiled loop.
 
 The path is integrated on the samples of ACTUATOR_STATE (half the turn, the advance by its mid-point, half the turn) and

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: MIT
 """Camera noise, and the figures by which held-out predictions are judged."""
 import dataclasses
 import math

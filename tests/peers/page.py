@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: MIT
 """Tables and picture of a comparison, from its JSON.
 
 page.py RESULT.json PAGE.md puts them between the page's markers and next to it.

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: MIT
 """The pendulum of tests/inference/pendulum.hpp and the densities of its readings and unknowns, written anew from their
 equations: a second opinion on what the engine integrates. Many points at a time.
 """

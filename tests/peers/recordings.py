@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: MIT
 """A case as every peer gets it: the logs of one rig and the model in use there."""
 import dataclasses
 import pathlib

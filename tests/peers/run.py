@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: MIT
 """Runs bevel-diagnose and its peers on the same cases and compares them; tests/peers/compare sets up what it needs.
 
 A case is a folder with model.toml and logs. Everybody gets these and nothing else. Of the logs the peers get the

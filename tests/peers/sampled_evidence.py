@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: MIT
 """The evidence by Laplace's method, of diagnosis/src/inference, against sampled evidence on small cases.
 
     PYTHONPATH=.deps/python tests/peers/sampled_evidence.py build/bin/sampled_evidence_cases

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // sampled_evidence_cases CASE: one small case with a set of effects. Prints a line of JSON (the engine's evidence, its
 // mode, its unknowns and their priors), then answers points on stdin with log likelihood and log prior on stdout until
 // stdin ends. Both are doubles of this machine. A point: shared unknowns, then each recording's own.

@@ -1,4 +1,5 @@
 #!/usr/bin/env python3
+# SPDX-License-Identifier: MIT
 """The trajectory fit of bench_identification by SciPy: the same model, data, start, tolerances and loss.
 
     tests/peers/scipy_trajectory_fit.py build/bin/bench_identification

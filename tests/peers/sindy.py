@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: MIT
 """PySINDy on the velocity residual: d/dt (measured - predicted tip), as a sparse sum of terms in what the log tells.
 
 As its users run it: SmoothedFiniteDifference (Savitzky-Golay) over readings put on an even grid, sequentially

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: MIT
 """Maximum likelihood of the trajectory: k, lambda1, lambda2 and any effects, on several recordings at once."""
 import dataclasses
 import math

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // Audit library of the dynamic linker (rtld-audit(7)): leaves a file where its code runs.
 #include <cstdio>
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 #include "proof/camera_noise.hpp"
 
 #include <gmock/gmock.h>

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // A whole campaign with stub tools: it goes on where it was, ends clean, and does not mix.
 #include "proof/campaign.hpp"
 

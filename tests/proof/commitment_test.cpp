@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 #include "proof/commitment.hpp"
 
 #include <gmock/gmock.h>

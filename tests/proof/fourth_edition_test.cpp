@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // The kinds that the fourth edition has beside those of the third: what they are, each by its own law, that they can be
 // seen, and that the editions before it draw what they drew.
 #include <gmock/gmock.h>

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // The plant of the blind trial against closed forms, and against the SE(3) model with which it shares no code.
 #include <gmock/gmock.h>
 

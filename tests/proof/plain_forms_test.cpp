@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // Two implementations that share no code, the trials' plant and the library of effects: at the plain forms they are one
 // physics, each effect alone and every two together. What two effects make of each other is where they would part.
 #include <gmock/gmock.h>

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // The tool under test sees its case and nothing else. Each way out that is tried sealed is tried unsealed as well:
 // there it must succeed, or the test would prove nothing.
 #include "proof/sandbox.hpp"

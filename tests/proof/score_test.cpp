@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // Scores of verdicts made by hand.
 #include "proof/score.hpp"
 

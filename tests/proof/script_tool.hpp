@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 #pragma once
 // Tools under test, made of a few lines of shell.
 #include <filesystem>

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // The seed of a campaign: from a file, from the campaign, or random.
 #include "proof/seed.hpp"
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 #include "proof/tally.hpp"
 
 #include <gmock/gmock.h>

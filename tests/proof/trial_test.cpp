@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // What is drawn, and what of it gets onto the disk.
 #include "proof/trial.hpp"
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // Visible size, where it is known in closed form.
 #include "proof/visibility.hpp"
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // How long the processors of this machine stand still for who is ready to run: one thread on each wakes every 2 ms, and
 // the longest it overslept, in ms, is in the file named, for as long as this runs. A test whose processes have
 // deadlines of 80 ms says nothing about them on a machine that was away for as long.

@@ -1,4 +1,5 @@
 #!/usr/bin/env bash
+# SPDX-License-Identifier: MIT
 # tried.sh [--on-purpose] STALL_WATCH COMMAND [ARG...]: a test in real time, tried up to three times, with a watch of the
 # machine beside it. Processes with deadlines of some ten ms stop, as they should, on a machine that stands still for as
 # long; what is wrong with them shows in every try. After three failures it has failed, unless the machine stood still

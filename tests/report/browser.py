@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: MIT
 """A page in headless Chromium, driven over the pipe of its DevTools protocol: no driver, no package, no port.
 
 Errors of scripts, warnings of the content policy and everything that the page asks a network for are kept.

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: MIT
 """browser_test.py WRITE_EXAMPLE: the example page (example_page.cpp) as a browser shows it: what is read off, what is
 linked, what a zoom does, colours, paper, and a page without scripts. Status 77: skipped, for want of a browser."""
 import os

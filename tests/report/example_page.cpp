@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 #include "tests/report/example_page.hpp"
 
 #include <cmath>

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // A page with one figure of each kind, whose values are known: what a browser shows of it is compared with them.
 #pragma once
 

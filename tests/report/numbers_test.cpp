@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // Statistics without a value: of nothing, of one, of what does not vary.
 #include <bevel/report/numbers.hpp>
 

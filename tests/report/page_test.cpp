@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // Pages as text: complete, escaped, self-contained, the same bytes each time, and with nothing lost where no script
 // runs. What a browser makes of them: browser_test.py.
 #include <gmock/gmock.h>

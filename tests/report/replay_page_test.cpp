@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // bevel-replay's page of a log in which two cameras take turns, one of which alone sees x.
 #include <gtest/gtest.h>
 

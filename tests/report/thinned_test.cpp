@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // Thinning against its promise: every extreme stays, nothing aliases, gaps stay gaps.
 #include <gtest/gtest.h>
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // write_example PAGE.html: the example page as a file, for a browser.
 #include <cstdio>
 

@@ -1,4 +1,5 @@
 #!/usr/bin/env bash
+# SPDX-License-Identifier: MIT
 # plugin_test.sh BUILD_DIR TEST.java JAVAC LCM_JAR [PICTURE.png]: compiles the test against the plug-in as built, runs it.
 set -euo pipefail
 build=$1 source=$2 javac=$3 lcm=$4

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 #include <bevel/diagnosis/statistics/ljung_box.hpp>
 
 #include <gtest/gtest.h>

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // The laws of the literature that steering is measured by: their closed forms, and what they do to a needle that bends
 // along circles.
 #include <bevel/rig/steering/baseline_steering.hpp>

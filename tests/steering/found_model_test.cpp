@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // Invariant 8 of a verdict: a rig that is the found model is not steered worse by it than by the nominal model.
 #include <gtest/gtest.h>
 

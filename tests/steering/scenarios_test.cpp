@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // Which scenarios another loop can take over: by name, so that one that has something new to it is looked at.
 #include <bevel/rig/steering/scenarios.hpp>
 

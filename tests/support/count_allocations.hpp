@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 #pragma once
 // Counts every operator new of the program that includes this, once. For tests that a step does not allocate.
 #include <atomic>

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 #pragma once
 // A program of this build run to its end, with a limit on its time. Needs BEVEL_BINARY_DIR, which every test has.
 #include <sys/wait.h>

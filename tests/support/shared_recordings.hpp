@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 #pragma once
 // Recordings and frames by others, which are not part of this project: looked at where they lie, never copied. Needs
 // BEVEL_SOURCE_DIR, which every test has.

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 #pragma once
 // The socket file that a process leaves behind when it is killed.
 #include <sys/socket.h>

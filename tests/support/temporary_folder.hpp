@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 #pragma once
 // A folder of its own for each test, which goes with its owner, and the files in it.
 #include <cstdlib>

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // Peers of the live page that send too much, too slowly, too often, or from the page of another site.
 #include <arpa/inet.h>
 #include <gmock/gmock.h>

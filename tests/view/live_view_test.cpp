@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 #include <bevel/view/live_view.hpp>
 
 #include <gmock/gmock.h>

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // Serves the live page with an insertion that is made up, for a test of what the page shows: camera 1 falls silent, the
 // controller has stopped. Prints the address; ends when its standard input does.
 #include <poll.h>

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 'use strict';
 // Runs the script of the live page on a stand-in for the browser and checks what it writes: captions and axis labels.
 // Usage: node page_logic_test.js view/src/page/view.js

@@ -1,4 +1,5 @@
 #!/usr/bin/env bash
+# SPDX-License-Identifier: MIT
 # page_test.sh FEEDER: what a browser shows of the live page. Status 77: skipped, for want of a browser; it says so.
 set -uo pipefail
 feeder=$1

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // bevel-blindtrial: puts a mismatch tool before needles with concealed physics and scores its verdicts.
 // Exit status: 0 finished, 1 failed, 2 usage, 130 interrupted (the same command goes on).
 #include <iostream>

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // bevel-calibrate: cameras from pictures of a board, how late they are from an insertion.
 #include <iostream>
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // bevel-check: proves the link before motion, and says what to type to mend what is not right.
 #include <cstdio>
 

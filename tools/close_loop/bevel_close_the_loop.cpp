@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // bevel-close-the-loop: diagnoses a case, and shows rig, estimator and controller before and after.
 #include <algorithm>
 #include <filesystem>

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // bevel-demo: starts the five processes, steers the simulated needle to a target, records, reports, ends everything.
 // Exit status: 0 the needle arrived within the tolerance, as the controller reports and by the true tip; 1 it did not,
 // or something failed; 2 usage; 130 interrupted.

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 #include "tools/demo_loop/demo_run.hpp"
 
 #include <chrono>

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 #include "tools/demo_loop/loop_figures.hpp"
 
 #include <algorithm>

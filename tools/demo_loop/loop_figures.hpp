@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 #pragma once
 // What a recorded run of the loop shows: errors, parameters, rates, latencies. From the log alone.
 #include <Eigen/Core>

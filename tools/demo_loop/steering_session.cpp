@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 #include "tools/demo_loop/steering_session.hpp"
 
 #include <cstdio>

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 #pragma once
 // The operator program of one insertion: records everything on LCM to a log, arms and starts as soon as the processes
 // are ready, prints progress and recognises the end. One loop does all of it, the operator's heartbeat included: when

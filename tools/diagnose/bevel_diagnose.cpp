@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // bevel-diagnose: what physics the model in use leaves out, from recordings.
 #include <algorithm>
 #include <iostream>

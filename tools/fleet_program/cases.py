@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: MIT
 """The cases of a fleet, from a table or from a folder of case folders; and the key under which a case's result is kept."""
 import csv
 import dataclasses

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: MIT
 """What the scripts say of a command line that they do not understand: the option, and the one that was probably meant."""
 import argparse
 import difflib

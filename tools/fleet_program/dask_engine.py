@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: MIT
 """Runs the cases of a fleet by Dask. Usage: python3 dask_engine.py CONFIG.json
 
 A worker runs the same command as a job of Snakemake; only the standard library is asked of it.

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: MIT
 """The trend of a figure with time: a straight line by weighted least squares, with its uncertainty."""
 import dataclasses
 import math

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: MIT
 """The engines: the command line of each, and one process of it that is started, watched, and ended in order."""
 import json
 import os

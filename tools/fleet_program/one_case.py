@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: MIT
 """Does one case: OUT/results/KEY is there afterwards, whole, or not at all.
 
 Usage: python3 one_case.py AT_ONCE OUT KEY; OUT/cases/KEY.json says what to do. It is what every engine runs, alone.

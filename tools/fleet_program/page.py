@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: MIT
 """The page of a fleet: verdicts, and by rig what drifts. One file beside the results; it needs no network."""
 import collections
 import datetime

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: MIT
 """How far a fleet is: cases done of how many, the time so far, and what is expected to remain. As tools/common/progress_line
 says it, by the same rules."""
 import sys

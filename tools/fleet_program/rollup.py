@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: MIT
 """A row a case, of its verdict.json and of how it was made; and the rows as a Parquet file."""
 import json
 import math

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: MIT
 """tools/fleet from its command line to its page."""
 import argparse
 import fcntl

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // bevel-identify: the needle's parameters from recorded insertions.
 #include <iostream>
 

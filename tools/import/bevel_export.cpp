@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // bevel-export: what an LCM log holds, as one CSV file a channel, or as one MCAP file.
 #include <bevel/analysis/convert/export.hpp>
 #include <bevel/cli/command_line.hpp>

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // bevel-import: CSV recordings to LCM logs, by a column map, or what bevel-export wrote.
 #include <bevel/analysis/convert/import.hpp>
 #include <bevel/cli/command_line.hpp>

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // bevel-predict: where the model says the tip was, from the axes alone.
 #include <iostream>
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // bevel-camera: frames in (the rig, a folder, a video file, a V4L2 device), TIP_MEASUREMENT out.
 #include <bevel/error.hpp>
 #include <bevel/nodes/camera_node.hpp>

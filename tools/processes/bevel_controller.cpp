@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // bevel-controller: NEEDLE_STATE, ACTUATOR_STATE and STEERING_TARGET in, MOTION_COMMAND out.
 #include <bevel/nodes/controller_node.hpp>
 #include "tools/processes/process_main.hpp"

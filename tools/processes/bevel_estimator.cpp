@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // bevel-estimator: TIP_MEASUREMENT, TIP_HEADING and ACTUATOR_STATE in, NEEDLE_STATE out.
 #include <bevel/nodes/controller_node.hpp>
 #include <bevel/nodes/estimator_node.hpp>

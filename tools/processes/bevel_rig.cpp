@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // bevel-rig: the simulated rig, two CiA 402 drives, a needle in tissue, and the cameras that look at it.
 #include <cstdio>
 #include <thread>

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // bevel-stepper: MOTION_COMMAND in, two CiA 402 drives over CAN (or the rig's local bus), ACTUATOR_STATE out.
 #include <cstdio>
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 #include "tools/processes/process_main.hpp"
 
 #include <cmath>

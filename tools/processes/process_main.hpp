@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 #pragma once
 // What the five processes' mains share: the system file, LCM, their name on the rig, and how they end.
 #include <lcm/lcm-cpp.hpp>

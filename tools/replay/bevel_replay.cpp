@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // bevel-replay: logs through the estimator that runs live, deterministic and faster than real time.
 #include <iostream>
 

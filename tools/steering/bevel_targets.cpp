@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // bevel-targets: steers to many targets in simulated time, on needles that are the filter's model and on some that are
 // not. Exit status: 0 finished, 1 failed, 2 usage.
 #include <iostream>

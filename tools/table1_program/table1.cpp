@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // bevel-table1: the paper's Table I and Figures 5, 7, 8 on simulated plants, beside the paper's figures.
 #include <filesystem>
 #include <iostream>

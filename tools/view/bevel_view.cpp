@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // bevel-view: a running loop, or a log that is played back, on a live page.
 #include <unistd.h>
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 #include <bevel/view/http_request.hpp>
 
 #include <algorithm>

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: MIT
 # cmake -DOUT=FILE -DSOURCE=DIR -P make_page.cmake: the page's parts as one C++ text.
 set(page ${SOURCE}/view/src/page)
 set(uplot ${SOURCE}/third_party/uplot)

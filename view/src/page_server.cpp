@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 #include <bevel/view/page_server.hpp>
 
 #include <arpa/inet.h>

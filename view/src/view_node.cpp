@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 #include <bevel/view/view_node.hpp>
 
 #include <utility>

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 #include <bevel/analysis/calibrate/calibrate_tool.hpp>
 
 #include <chrono>

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 #include <bevel/analysis/close_loop/close_loop.hpp>
 
 #include <ostream>

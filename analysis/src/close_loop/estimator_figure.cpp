@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 #include <bevel/analysis/close_loop/estimator_figure.hpp>
 
 #include <algorithm>

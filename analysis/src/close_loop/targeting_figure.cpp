@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 #include <bevel/analysis/close_loop/targeting_figure.hpp>
 
 #include <algorithm>

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 #include <bevel/analysis/convert/import.hpp>
 
 #include <algorithm>

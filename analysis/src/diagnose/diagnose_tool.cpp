@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 #include <bevel/analysis/diagnose/diagnose_tool.hpp>
 
 #include <algorithm>

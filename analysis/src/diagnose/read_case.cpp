@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 #include <bevel/analysis/diagnose/read_case.hpp>
 
 #include <algorithm>

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 #include <bevel/analysis/diagnose/result_files.hpp>
 
 #include <sys/stat.h>

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 #include <bevel/analysis/diagnose/verdict_json.hpp>
 
 #include <cmath>

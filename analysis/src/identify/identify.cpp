@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 #include <bevel/analysis/identify/identify.hpp>
 
 #include <algorithm>

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 #include <bevel/analysis/replay/batch.hpp>
 
 #include <algorithm>

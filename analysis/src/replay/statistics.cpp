@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 #include <bevel/analysis/replay/statistics.hpp>
 
 #include <algorithm>

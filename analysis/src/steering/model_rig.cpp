@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 #include <bevel/analysis/steering/model_rig.hpp>
 
 #include <cmath>

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 #include <bevel/analysis/table1/protocol.hpp>
 
 #include <algorithm>

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 #include <bevel/analysis/table1/table1_report.hpp>
 
 #include <algorithm>

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 #pragma once
 // The exceptions of every module. Functions on the control path (filter and control steps, drive cycles) throw none:
 // they return a status.
@@ -36,7 +37,8 @@ class ArgumentError : public Error {
   using Error::Error;
 };
 
-/// A computation leaves the domain of its model, for example that of the slip law (Eq. 25), or data do not determine it.
+/// A computation leaves the domain of its model, for example that of the slip law (Eq. 25), or data do not determine
+/// it.
 class DomainError : public Error {
  public:
   using Error::Error;

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 #include <bevel/diagnosis/identification/angle_rate.hpp>
 
 #include <ceres/ceres.h>

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 #include <bevel/diagnosis/identification/candidates.hpp>
 
 #include <algorithm>

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // A fit that holds the parameters that the recordings do not determine.
 #include <algorithm>
 #include <cstdio>

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 #include <bevel/diagnosis/identification/figures.hpp>
 
 #include <bevel/error.hpp>

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 #include <bevel/diagnosis/identification/fit_statistics.hpp>
 
 #include <Eigen/Dense>

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // The needle where the entries are integrated out, not fitted: together with the rest they draw it to where a tilt
 // moves the readings most and takes up most of the noise. As bevel/diagnosis/inference/own_volume.hpp, in this
 // problem's terms.

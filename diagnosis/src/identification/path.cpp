@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 #include <bevel/diagnosis/identification/path.hpp>
 
 namespace bevel::diagnosis {

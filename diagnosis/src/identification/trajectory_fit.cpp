@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 #include <bevel/diagnosis/identification/trajectory_fit.hpp>
 
 #include <Eigen/Dense>

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 #include "identification/trajectory_problem.hpp"
 
 #include <Eigen/Dense>

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 #pragma once
 // What fit_trajectory() minimises, and its solution: for trajectory_fit.cpp alone.
 #include <vector>

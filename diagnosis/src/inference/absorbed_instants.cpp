@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 #include <bevel/diagnosis/inference/absorbed_instants.hpp>
 
 #include <Eigen/Cholesky>

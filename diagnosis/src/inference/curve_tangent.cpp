@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 #include <bevel/diagnosis/inference/curve_tangent.hpp>
 
 #include <atomic>

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 #include <bevel/diagnosis/inference/error_spread.hpp>
 
 #include <Eigen/Cholesky>

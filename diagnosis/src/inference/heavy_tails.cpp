@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 #include <bevel/diagnosis/inference/heavy_tails.hpp>
 
 #include <boost/math/special_functions/gamma.hpp>

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 #include "inference/instant_posterior.hpp"
 
 #include <algorithm>

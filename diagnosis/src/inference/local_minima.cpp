@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 #include <bevel/diagnosis/inference/local_minima.hpp>
 
 #include <Eigen/Cholesky>

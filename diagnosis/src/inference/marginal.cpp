@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 #include <bevel/diagnosis/inference/marginal.hpp>
 
 #include <Eigen/Eigenvalues>

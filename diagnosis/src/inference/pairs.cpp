@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 #include <Eigen/Cholesky>
 #include <algorithm>
 #include <cmath>

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 #include <bevel/diagnosis/inference/posterior.hpp>
 
 #include <Eigen/Cholesky>

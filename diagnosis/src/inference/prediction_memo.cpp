@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 #include <bevel/diagnosis/inference/prediction_memo.hpp>
 
 #include <algorithm>

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 #include <Eigen/Eigenvalues>
 #include <Eigen/SVD>
 #include <algorithm>

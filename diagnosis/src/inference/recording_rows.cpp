@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 #include <bevel/diagnosis/inference/recording_rows.hpp>
 
 #include <cmath>

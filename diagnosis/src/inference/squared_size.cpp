@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 #include <bevel/diagnosis/inference/squared_size.hpp>
 
 #include <Eigen/Cholesky>

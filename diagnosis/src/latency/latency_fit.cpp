@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 #include <bevel/diagnosis/latency/latency_fit.hpp>
 
 #include <Eigen/Dense>

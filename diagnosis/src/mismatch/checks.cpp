@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 #include "mismatch/checks.hpp"
 
 #include <algorithm>

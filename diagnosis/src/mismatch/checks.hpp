@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 #pragma once
 /// \file
 /// Checks of the final model's residuals. They are printed; the verdict does not depend on them.

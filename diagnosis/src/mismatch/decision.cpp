@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 #include <bevel/diagnosis/mismatch/decision.hpp>
 
 #include <algorithm>

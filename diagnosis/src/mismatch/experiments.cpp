@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 #include <bevel/diagnosis/mismatch/experiments.hpp>
 
 #include <Eigen/Cholesky>

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 #include <bevel/diagnosis/mismatch/found_effects.hpp>
 
 #include <algorithm>

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 #include "mismatch/held_out.hpp"
 
 #include <algorithm>

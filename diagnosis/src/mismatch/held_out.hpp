@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 #pragma once
 // Each recording predicted from the others, as a new insertion: how far off, and how probable.
 #include <bevel/diagnosis/mismatch/decision.hpp>

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 #pragma once
 // Locates the missing physics: in which recordings, from when on, and over which range of the covariate that the
 // effect depends on.

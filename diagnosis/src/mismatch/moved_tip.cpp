@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 #include <bevel/diagnosis/mismatch/moved_tip.hpp>
 
 #include <algorithm>

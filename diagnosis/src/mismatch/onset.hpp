@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 #pragma once
 // When the missing physics begins to act in one recording.
 #include <optional>

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 #include "mismatch/prediction_sums.hpp"
 
 #include <algorithm>

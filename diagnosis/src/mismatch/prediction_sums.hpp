@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 #pragma once
 // Sums over readings that were predicted, recording by recording, and the figures of them.
 #include <limits>

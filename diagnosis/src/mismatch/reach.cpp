@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 #include "mismatch/reach.hpp"
 
 #include <algorithm>

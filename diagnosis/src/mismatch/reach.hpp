@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 #pragma once
 // What these recordings could have shown: of each effect the smallest size, which effects look alike, and the motion
 // that would show what stays below.

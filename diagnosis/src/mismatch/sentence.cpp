@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 #include "mismatch/sentence.hpp"
 
 namespace bevel::diagnosis {

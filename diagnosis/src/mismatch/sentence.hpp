@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 #pragma once
 // The verdict in one sentence.
 #include <bevel/diagnosis/mismatch/findings.hpp>

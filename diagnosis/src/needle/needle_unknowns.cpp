@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // What is unknown of a needle: its parameters, the variation between insertions, the library's effects, what changed,
 // and errors that all recordings share; each with its prior.
 #include <algorithm>

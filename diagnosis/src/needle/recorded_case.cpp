@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 #include <bevel/diagnosis/needle/recorded_case.hpp>
 
 #include <Eigen/Eigenvalues>

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 #include <bevel/diagnosis/needle/scatter_near_entry.hpp>
 
 #include <Eigen/QR>

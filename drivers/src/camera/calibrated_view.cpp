@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 #include <bevel/drivers/camera/calibrated_view.hpp>
 
 #include <algorithm>

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // Frames from a Video4Linux device.
 #include <linux/videodev2.h>
 

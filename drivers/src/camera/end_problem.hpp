@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 #pragma once
 // The least-squares problem behind fit_end() (end_fit.hpp): parameters, residuals and gradients, damped descent with
 // weights that forgive what is no needle, the noise that the residuals show, and what the parameters say of the end

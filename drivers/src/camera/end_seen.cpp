@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 #include "camera/end_problem.hpp"
 
 #include <algorithm>

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // Frames from files: an image folder, a video.
 #include <algorithm>
 #include <cctype>

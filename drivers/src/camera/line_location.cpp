@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 #include <bevel/drivers/camera/line_location.hpp>
 
 #include <algorithm>

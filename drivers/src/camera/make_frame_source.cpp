@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 #include <cmath>
 
 #include <bevel/drivers/camera/frame_sources.hpp>

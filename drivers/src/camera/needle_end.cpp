@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 #include <bevel/drivers/camera/needle_end.hpp>
 
 #include <algorithm>

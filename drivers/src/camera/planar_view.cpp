@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 #include <bevel/drivers/camera/planar_view.hpp>
 
 #include <bevel/error.hpp>

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 #include <bevel/drivers/camera/ridge_path.hpp>
 
 #include <algorithm>

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // Frames over a Unix socket from the rig's frame server.
 #include <poll.h>
 #include <sys/socket.h>

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 #include <bevel/drivers/camera/tip_tracker.hpp>
 
 #include <algorithm>

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 #include <bevel/drivers/camera/tracker_config.hpp>
 
 #include <bevel/error.hpp>

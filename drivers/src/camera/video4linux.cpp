@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // The adapter of capture_device.hpp to a /dev/videoN: single-planar capture, streaming by mapped buffers.
 // Source: Linux media API, "Streaming I/O (Memory Mapping)".
 #include <fcntl.h>

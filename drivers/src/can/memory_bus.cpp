@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 #include <bevel/drivers/can/memory_bus.hpp>
 
 #include <algorithm>

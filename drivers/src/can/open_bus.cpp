@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 #include <bevel/drivers/can/open_bus.hpp>
 
 #include <bevel/drivers/can/local_bus.hpp>

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 #include <bevel/drivers/can/socket_bus.hpp>
 
 #include <unistd.h>

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 #include "can/socketcan_bus.hpp"
 
 #include <fcntl.h>

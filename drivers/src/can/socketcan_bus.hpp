@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // Bus over a Linux SocketCAN interface (can0, vcan0, ...). See Documentation/networking/can.rst of the kernel.
 #pragma once
 

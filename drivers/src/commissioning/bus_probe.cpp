@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 #include <bevel/drivers/commissioning/bus_probe.hpp>
 
 #include <algorithm>

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 #include <bevel/drivers/commissioning/judgement.hpp>
 
 #include <algorithm>

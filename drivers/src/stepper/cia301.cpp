@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 #include <bevel/drivers/stepper/cia301.hpp>
 
 namespace bevel::stepper::cia301 {

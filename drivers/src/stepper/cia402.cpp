@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 #include <bevel/drivers/stepper/cia402.hpp>
 
 namespace bevel::stepper::cia402 {

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 #include <bevel/drivers/stepper/configuration_script.hpp>
 
 #include <algorithm>

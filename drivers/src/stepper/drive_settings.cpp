@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // The drive's settings: written by the configuration script, read back after writing, and read back cyclically.
 #include <algorithm>
 #include <cmath>

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 #include <bevel/drivers/stepper/stepper_driver.hpp>
 
 #include <algorithm>

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // The driver while the axes are enabled: from set-points to rates within the limits, and whether the axes follow them.
 #include <algorithm>
 #include <cmath>

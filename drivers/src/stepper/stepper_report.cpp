@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // What the driver tells: its report, assembled from the drives and the transmitter.
 #include <algorithm>
 #include <string>

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // How the driver stops the axes, and how it measures that they have come to rest.
 #include <algorithm>
 #include <cmath>

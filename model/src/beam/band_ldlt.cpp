@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 #include <bevel/model/beam/band_ldlt.hpp>
 
 #include <algorithm>

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 #include <bevel/model/beam/beam_plant.hpp>
 
 #include <Eigen/Geometry>

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 #include <bevel/model/beam/cut_path.hpp>
 
 #include <algorithm>

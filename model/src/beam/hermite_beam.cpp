@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 #include <bevel/model/beam/hermite_beam.hpp>
 
 #include <algorithm>

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 #include <bevel/model/effects/augmented_needle.hpp>
 
 #include <algorithm>

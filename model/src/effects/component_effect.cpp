@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 #include <bevel/model/effects/component_effect.hpp>
 
 #include <cmath>

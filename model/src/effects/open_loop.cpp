@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 #include <bevel/model/effects/open_loop.hpp>
 
 #include <algorithm>

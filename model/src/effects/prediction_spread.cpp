@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 #include <bevel/model/effects/prediction_spread.hpp>
 
 #include <bevel/error.hpp>

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // The list of effects, in the order in which they act on a leg: mounting, motor, gears, shaft, tissue, camera.
 // Adding one: its file beside this one, and its line here.
 #include <array>

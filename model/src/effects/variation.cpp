@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 #include <bevel/model/effects/variation.hpp>
 
 #include <array>

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 #include <bevel/rig/camera/frame_server.hpp>
 
 #include <fcntl.h>

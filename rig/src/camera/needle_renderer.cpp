@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 #include <bevel/rig/camera/needle_renderer.hpp>
 
 #include <algorithm>

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 #include <bevel/rig/camera/optics.hpp>
 
 #include <algorithm>

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 #include <bevel/rig/drives/drive_motion.hpp>
 
 #include <algorithm>

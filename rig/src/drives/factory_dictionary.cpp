@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // What the simulated drive's objects are as it leaves the factory: CiA 301 from 0x1000, CiA 402 from 0x6000. The same
 // list for other people's software is bevel_drive.eds beside this file; tests/drives/eds_test.cpp compares the two.
 #include <bevel/rig/drives/object_dictionary.hpp>

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 #include <bevel/rig/drives/homing.hpp>
 
 namespace bevel::rig {

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // Little-endian fields inside a frame, as CANopen packs them.
 #pragma once
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 #include <bevel/rig/drives/object_dictionary.hpp>
 
 namespace bevel::rig {

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 #include <bevel/rig/drives/power_state_machine.hpp>
 
 namespace bevel::rig {

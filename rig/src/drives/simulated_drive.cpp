@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 #include <bevel/rig/drives/simulated_drive.hpp>
 
 #include <algorithm>

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // What the simulated drive's objects of CiA 402 do to its motor, and the motor to them: modes of operation, ramps,
 // limits, supervision of the following error, status.
 #include <algorithm>

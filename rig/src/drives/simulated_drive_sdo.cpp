@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // The simulated drive's SDO server (CiA 301 section 7.2.4; expedited transfers, and texts in segments) and its rules
 // for changing PDOs.
 #include <algorithm>

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 #include <bevel/rig/plant/plant.hpp>
 
 #include <algorithm>

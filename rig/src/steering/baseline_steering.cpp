@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 #include <bevel/rig/steering/baseline_steering.hpp>
 
 #include <algorithm>

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 #include <bevel/rig/steering/steered_insertion.hpp>
 
 #include <Eigen/Cholesky>

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // Simulates an insertion of 100 mm, gives measured tip positions to the estimator and prints true and estimated tip.
 #include <iostream>
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 #pragma once
 // Command lines for all programs, with CLI11 behind it: that header costs ten seconds a main, here it is compiled once.
 // Exit status everywhere: 0 ok, 1 failed, 2 usage; of what reads recordings also 3, see exit_status.hpp. --help is

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 #pragma once
 // Exit status of every program. 2 is CommandLine's own.
 

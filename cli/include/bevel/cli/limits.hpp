@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 #pragma once
 /// \file
 /// Resource limits of a process, checked before anything is started. liblcm and GLib crash or abort when a descriptor,

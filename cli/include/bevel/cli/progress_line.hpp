@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 #pragma once
 // How far work in pieces is, for someone who waits: done of how many, the time so far, and what is expected to remain.
 // One line on stderr, rewritten in place on a terminal; elsewhere a line now and then.

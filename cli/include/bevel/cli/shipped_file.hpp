@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 #pragma once
 // Files that come with the programs: config/demo.toml, for instance.
 #include <string>

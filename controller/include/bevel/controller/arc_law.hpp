@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 #pragma once
 // Steering by arcs: the bevel rests, and is turned only when the predicted miss leaves what can still be corrected.
 //

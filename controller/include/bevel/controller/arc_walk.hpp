@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 #pragma once
 // Steps along an arc that the needle makes with the bevel kept, or turned all the time so that only a share of the bend
 // is left. With a stiff shaft (bevel/model/shaft_end.hpp) turning swings the tip about the middle of a circle: the walk

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 #pragma once
 // Outcome of an insertion: the distance from the tip to the target, predicted and final, with its uncertainty.
 

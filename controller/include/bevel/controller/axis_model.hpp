@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 #pragma once
 // Transmission between the axes and the tip by the effects of a model file. The law acts on the tip; AxisModel computes
 // how far the axes have to move for it: through a dead band of the rotation (backlash, wind-up of the shaft), and to

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 #pragma once
 // What was commanded of late, for the judgement of what the axes report: a report is judged by the commands of its own
 // time, however late it arrives. Rates in mm/s and rad/s, times in microseconds of the one clock that stamps both.

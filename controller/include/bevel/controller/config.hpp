@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 #pragma once
 // What the controller may do and when it stops. One plain structure, filled from a file elsewhere.
 #include <vector>

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 #pragma once
 // What the needle must not touch: a capsule, all that lies within a radius of a line between two points; a sphere where
 // the two are one. Lengths in mm, in {A}.

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 #pragma once
 // A path to the target that keeps clear of the obstacles, of arcs that the needle can make.
 //

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 #pragma once
 // States of the controller, and why motion stops.
 

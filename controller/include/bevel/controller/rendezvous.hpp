@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 #pragma once
 // Where and when tip and target meet: the target is aimed at where it will be when the tip gets there. Of a target that
 // breathes the tip may be made to arrive where it turns round (gating): about then it hardly moves, so that neither the

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 #pragma once
 // The operator's word, by its number in steering_target_t.request, where what each means is said. One list for all who
 // hear it: the nodes, and of them the controller's supervisor.

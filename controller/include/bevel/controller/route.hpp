@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 #pragma once
 // The path while it is followed. With each estimate it is drawn anew from where the tip is through the points that are
 // left, and the law is aimed at where it is a look-ahead later (pure pursuit: Coulter, CMU-RI-TR-92-01). It is planned

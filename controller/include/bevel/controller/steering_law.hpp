@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 #pragma once
 // Sliding-mode steering of the bevel toward a target (Rucker et al., IEEE T-RO 2013, PMC4231884).
 //

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 #pragma once
 // When the needle may move. States: off, armed, steering, retracting, hold, stopped (latched, with its reason), fault.
 // Motion fails safe: whatever is missing, stale, unhealthy or out of bounds stops within one period, and only an

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 #pragma once
 // Where a target that moves will be: a middle that drifts and a breath about it. Along each axis, after a time t from
 // now,

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 #pragma once
 // Independent pieces of work on a few threads, and pieces of pieces on those that have nothing to do. Results go where
 // their index says: what comes out does not depend on the number of threads.

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 #pragma once
 /// \file
 /// File of a UNIX domain socket: removed if it is stale, and never another file that has its path.

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 #include <bevel/drivers/camera/calibration/calibration_file.hpp>
 
 #include <cstdint>

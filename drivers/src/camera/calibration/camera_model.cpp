@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 #include <bevel/drivers/camera/calibration/camera_model.hpp>
 
 #include <string>

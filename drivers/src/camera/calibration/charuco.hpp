@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 #pragma once
 // One pattern of a ChArUco board, with the same numbering and axes for all versions of OpenCV. Private to board.cpp.
 #include <opencv2/aruco/charuco.hpp>

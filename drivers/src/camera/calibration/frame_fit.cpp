@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 #include <bevel/drivers/camera/calibration/frame_fit.hpp>
 
 #include <algorithm>

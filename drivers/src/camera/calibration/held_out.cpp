@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // What a calibration is worth: boards that it has not seen. Of such a board the pose is not known, so it is fitted to
 // one half of the corners, the cameras held, and judged by the other half; and the other way round. Where two cameras
 // see it, its corners are triangulated and compared with the board's own shape.

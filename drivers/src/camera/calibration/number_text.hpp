@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 #pragma once
 // Numbers in messages: as few digits as tell them, "nan" and "inf" as such.
 #include <cstdio>

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // First guesses for bundle.hpp: lenses by OpenCV's calibrateCamera, boards by its solvePnP, walls by trying distances.
 #include <limits>
 #include <opencv2/calib3d.hpp>

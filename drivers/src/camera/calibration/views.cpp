@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // How many different views of the board there are: repeated ones, and orientations of the board.
 #include <algorithm>
 #include <cmath>

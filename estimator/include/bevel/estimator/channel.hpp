@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 #pragma once
 // The channel that the tip has cut, as far as the model does not know it from where the tip is: how the bevel stood at
 // each depth. A needle that is drawn back goes through it again, whichever way the bevel points by then.

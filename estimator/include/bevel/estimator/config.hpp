@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 #pragma once
 // What the estimator believes before it has seen anything, and how much it lets the model err.
 #include <algorithm>

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 #pragma once
 // The motions of a stiff shaft's end beside the bicycle's (stiff_shaft.cpp, where they are derived). mm, rad, in {B}.
 #include <Eigen/Core>

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 #pragma once
 // Along what line the needle went in, from the first centimetres of an insertion, as {A} of the readings sees it. A
 // slope that insertions on this rig do not have, by the width that is expected of them, says that the camera's frame is

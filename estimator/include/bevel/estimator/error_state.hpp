@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 #pragma once
 // The error of a FilterState as a vector of nine, or of ten with ell, and its covariance as one matrix. With the errors
 // that readings share behind them they are fifteen or sixteen; the nuisance states, where there are any, come last.

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 #pragma once
 // Why an estimate must not be trusted: the bits of needle_state_t.health. Zero is healthy.
 #include <cstdint>

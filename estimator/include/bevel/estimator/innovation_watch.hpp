@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 #pragma once
 // By how much the readings of each camera have been farther off of late than the filter expects: squared innovations
 // over their variance, per axis, over the last seconds (normalised innovation squared: Bar-Shalom, Li, Kirubarajan,

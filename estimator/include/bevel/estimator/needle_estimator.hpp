@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 #pragma once
 // The filter over a bounded, time-ordered history: measurements that arrive late or out of order are applied at their
 // own capture time and rolled forward, so that shuffled input gives the same state as sorted input, bit for bit.

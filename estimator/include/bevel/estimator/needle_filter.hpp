@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 #pragma once
 // Extended Kalman filter of the needle: pose on SE(3), curvature and lambda, driven by actuator increments.
 //

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 #pragma once
 // What a rig does that its file does not say, as slowly known states behind the filter's own (filter_nuisance.cpp):
 //   0      wind-up: lag of the tip's roll at 100 mm inserted (rad), as torsional_windup of the library

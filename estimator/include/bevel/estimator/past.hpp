@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 #pragma once
 // What has left the estimator's history, as the few steps that NeedleFilter::relinearise runs again: neighbours of one
 // direction whose rates are nearly in proportion become one stretch, and what was measured on the way one reading,

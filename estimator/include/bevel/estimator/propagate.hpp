@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 #pragma once
 // Covariance of pose (6) and parameters through one step of the model: P <- F P F^T with F = [Phi G; 0 I].
 #include <Eigen/Core>

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 #pragma once
 /// \file
 /// Time lag of the base's sensor relative to the tip's, estimated from an insertion.

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // Checked decoding of CAMERA_PICTURE, the only message that contains raw bytes. All others:
 // bevel/io/checked_decode.hpp.
 #pragma once

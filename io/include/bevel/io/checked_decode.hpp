@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // The one way from bytes to a message. LCM's generated decoders trust their input: they accept trailing bytes and NaN,
 // and allocate what a length in the message says. Here bytes are refused, with a reason and the field, before any harm:
 // no exception, and no allocation except for strings whose lengths have been checked against the bytes that are there.

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // What the columns of a CSV recording made elsewhere mean: a TOML file that names them, with their units. No unit is
 // guessed. docs/import.md has examples.
 //

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // TOML configuration read into typed structures.
 //
 // One function per structure lists its keys, and that list is the only place where a key's presence and range stand:

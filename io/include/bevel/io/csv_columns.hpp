@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // The columns of an exported CSV file, once for writing and for reading. visit_columns(message, visitor) calls, in the
 // order of the columns,
 //   visitor.whole(name, value)            integers

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // A recording as CSV files for spreadsheets and scripts: tip_measurement.csv, tip_heading.csv, actuator_state.csv,
 // motion_command.csv, needle_state.csv, needle_truth.csv and config.toml, only those the recording has, and rows.toml
 // with the number of rows of each table. The first line has the fields' names with units. Numbers have as many digits

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 #pragma once
 /// \file
 /// Lines and cells of a CSV file, and the search for its header: the line that names the columns.

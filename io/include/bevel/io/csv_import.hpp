@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // CSV recordings made elsewhere, by a column map (column_map.hpp), into the messages of the contract.
 #pragma once
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // One CSV file, read row by row, as spreadsheets and scripts write them: separated by comma, semicolon, pipe, tab or
 // blanks, numbers with a point or a comma, with or without quotes and a byte order mark, lines ended by LF, CR LF or
 // CR. csv_header.hpp describes which line is the header. Comments (# or %) and empty lines are skipped, but a comment

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 #pragma once
 /// \file
 /// The frame {A} of a recording whose tracker frame has another origin and orientation, estimated from the insertion.

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 #pragma once
 /// \file
 /// Range of an enumeration, computed by the compiler from its enumerators, so that a bound of the checked decode cannot

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // Estimator settings from TOML: the section [estimator] of a system file, or the root of a file of its own.
 #pragma once
 

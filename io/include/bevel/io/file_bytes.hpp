@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // The one way in which a file is read: a regular file, whole, into memory of this program.
 //
 // Regular files only: a FIFO keeps whoever opens it waiting for a writer, /dev/zero never ends. read() and not mmap():

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 #pragma once
 /// \file
 /// Sample-and-hold columns: a slow sensor's value that a faster table repeats until the next one arrives.

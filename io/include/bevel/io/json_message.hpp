@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // A message as a JSON object with the columns of bevel/io/csv_columns.hpp for names, flat, and in their order. Numbers
 // have as many digits as it takes to read the same one back. JSON has no NaN: what was not seen is not there, and the
 // schema does not require it (`null`, as files of before have it, is read too). A number that a message holds along an

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 #pragma once
 // What a model file knows before an insertion. Effects with an unknown of the single recording (an instant, a phase)
 // are left out: the next one's is not known, and a guess would be taken for a measurement.

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // In which order a recording's messages stand in a log: tips, headings and axes as they came, the others where their
 // times put them.
 #pragma once

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // The one reader of LCM logs. LCM's own trusts the lengths in a log (a data length of 2^31-1 crashes it) and takes
 // damage for the end of the file. This one believes an event only if its header is possible and something that can
 // follow an event follows it; otherwise it looks for the next one, and accounts for every byte.

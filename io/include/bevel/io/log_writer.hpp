@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // Writes LCM logs that lcm-logplayer, lcm-logfilter and Python's lcm.EventLog read. Format: bevel/io/log_reader.hpp.
 #pragma once
 

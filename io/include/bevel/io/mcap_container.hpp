@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // What writer and reader of MCAP files share. MCAP is a container of messages on channels, each with a schema
 // (https://mcap.dev/spec, version 0): records of an opcode, a 64-bit length and a content, integers little-endian,
 // between magic bytes at both ends of the file. Records of schemas, channels and messages stand in chunks, each with a

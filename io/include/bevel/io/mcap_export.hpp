@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // A recording as an MCAP file for Foxglove, PlotJuggler and scripts, and back: what bevel/io/csv_export.hpp has in a
 // folder, in one file, and each message to its last bit. A channel of each kind of message, named as on LCM, of JSON
 // messages (bevel/io/json_message.hpp) in the order of the log; log_time and publish_time are the message's utime,

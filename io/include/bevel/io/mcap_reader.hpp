@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // Reads what is in an MCAP file, from bytes in memory, and reports what cannot be read. Lengths in the file are
 // compared with the bytes that are there: none is used for an allocation, none leads outside. The size of a compressed
 // chunk is limited. Records are read in the order of the file; the summary serves to continue behind damage, and to

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // Writes MCAP files with JSON messages that Foxglove, PlotJuggler and the mcap packages read: chunks without
 // compression, each with its CRC-32 and index, attachments, and a summary.
 #pragma once

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // Every field of every message with its bounds, in one place: the checked decode and its tests walk this list.
 //
 // visit_fields(message, visitor) calls, in the order of the fields,

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // LCM messages to and from the plain structures of the core. Field by field; no checks (bevel/io/checked_decode.hpp has
 // them).
 #pragma once

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // The model file: the needle's parameters, the effects found by the mismatch tool, what it found and has no name for,
 // and by how much insertions differ. TOML:
 //

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 #pragma once
 // The parts of a model file that say what the model does not: [[discrepancy]], curves without a name, and [variation],
 // by how much insertions differ.

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // Whether two messages of one stream can both be true: nothing moves faster than the axes can drive it.
 #pragma once
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 #pragma once
 /// \file
 /// Intervals between two axis samples in which the motion of the axes is not known.

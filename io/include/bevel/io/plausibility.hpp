@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // What no rig does, said of decoded samples. LCM's logs carry no checksum: a flipped byte that leaves a message finite
 // and within its type's bounds can only be told by its neighbours.
 //

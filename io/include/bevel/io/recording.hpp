@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // A whole log in memory, decoded, checked, and judged by its neighbours, as the plain structures of the core. Every
 // tool that makes something of a log reads it here.
 #pragma once

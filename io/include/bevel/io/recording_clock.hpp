@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 #pragma once
 // Whether a log's times mean anything: a stepwise insertion by hand has an order of stops, and no clock. Its log says
 // so in its CONFIG: [recording] clock = "none".

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 #pragma once
 /// \file
 /// Result files. A file gets its name once it is complete and on the disk, so that a full disk or a program that ends

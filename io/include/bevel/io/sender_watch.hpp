@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // Who sends on a channel, told by seq and utime: LCM itself does not say. A sender counts its messages up and stamps
 // them ever later; what does not continue its stream while it is alive comes from somebody else, or is an old message
 // sent again. Pure: both clocks come in as arguments.

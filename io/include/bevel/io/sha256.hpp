@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 #pragma once
 // What a file or text is known by: SHA-256, as `sha256sum` prints it.
 #include <span>

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 #pragma once
 // How old a stamp is. Stamps come from outside and may be anything an int64 holds, so differences saturate: a stamp at
 // the end of time is never "fresh" because its age has wrapped round.

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 #pragma once
 // The functions of an angle t that the exponential of SO(3) and SE(3) and its Jacobians are made of, all even in t and
 // therefore taken of t^2. Kept in a header because the integrator needs several of them in one step.

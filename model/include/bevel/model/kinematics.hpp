@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 #pragma once
 // The extended bicycle model in SE(3): its body twist, and one integration step with analytic Jacobians.
 //

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 #pragma once
 // SE(3) and SO(3): exponential, right Jacobian, adjoint. Twists are (v | omega) = (translation, rotation), as in (10).
 // Source: Barfoot, State Estimation for Robotics (2017), chapter 7 (Q of the Jacobian: 7.86b); right Jacobian = left

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 #pragma once
 // Which way the tip moves when the needle is inserted, gamma of (15) and (16), beside the bicycle's heading theta,
 // which is e3 of {B}: in the body along V1's velocity (f_x, f_y, 1), bevel/model/kinematics.hpp.

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 #pragma once
 // The needle's parameters, and the set in which the extended bicycle model is defined.
 // Source: "Extended Bicycle Model for Needle Steering in Soft Tissue" (IROS 2015), Section III.A; equation numbers are

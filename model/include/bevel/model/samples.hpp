@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 #pragma once
 // What flows between the parts: one plain struct per message, its time first, the unit in every name.
 // No part of the core reads a clock: time arrives with the samples.

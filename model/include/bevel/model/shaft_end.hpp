@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 #pragma once
 // How the end of a stiff shaft yields, for a bicycle that is to stand for it.
 //

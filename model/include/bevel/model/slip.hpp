@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 #pragma once
 // The slip law (25) as a function of the tilt, in closed form, with its derivatives.
 #include <cmath>

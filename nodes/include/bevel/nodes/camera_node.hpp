@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 #pragma once
 // bevel-camera: frames in, TIP_MEASUREMENT out, and TIP_HEADING of the same frame, stamp and number for cameras that
 // are told to give it. The estimate, if there is one, says where to look.

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 #pragma once
 // What cameras see, made small for people to look at: at most a few pictures a second, each with the tip that was found
 // in it.

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 #pragma once
 // What the arrival of a camera's messages tells, beside what they say: whether it still sends, and whether what it
 // sends still changes. By the steady clock, so that a wall clock that is set cannot keep a dead camera alive.

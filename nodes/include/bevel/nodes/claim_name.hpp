@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 #pragma once
 // One of each process on a rig.
 #include <lcm/lcm-cpp.hpp>

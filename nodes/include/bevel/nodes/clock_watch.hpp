@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 #pragma once
 // The two clocks of a process, and whether somebody has set the wall clock.
 #include <cstdint>

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 #pragma once
 // Whether the estimate has been there since the needle entered the tissue. An estimator that begins with the needle
 // inside knows where the axes stand, but not the way: its attitude is a guess that measurements of position mend

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 #pragma once
 // bevel-estimator: TIP_MEASUREMENT, TIP_HEADING and ACTUATOR_STATE in, NEEDLE_STATE out: one for each actuator state,
 // at its time, and one for each reading as it arrives, at that moment, the axes carried on at the rates that they last

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 #pragma once
 // Spoils what one component sends, as failing cameras, processes and networks do, to prove that motion stops: in
 // simulated time by the thousand (tests/faults) and live (bevel-demo --fault camera:off@5s). Nothing else uses it.

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 #pragma once
 // A drive's place on the bus, spoiled from one instant on: the counterpart of FaultInjector for what is on CAN. For the
 // simulated rig alone.

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 #pragma once
 // LCM for the nodes. Every message that comes in passes the one checked decode, the watch over its sender (io/
 // sender_watch.hpp) and, where the channel carries motion, a check that it can be true (bevel/io/motion_bounds.hpp);

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // The measurements of bevel-check that need sockets and clocks.
 #pragma once
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 #pragma once
 // The pose of needle_state_t: position in {A} and a unit quaternion, w first.
 #include <bevel/needle_state_t.hpp>

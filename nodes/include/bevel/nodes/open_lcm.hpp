@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 #pragma once
 #include <lcm/lcm-cpp.hpp>
 #include <memory>

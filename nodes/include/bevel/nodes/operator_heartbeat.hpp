@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 #pragma once
 /// \file
 /// The operator program's heartbeat, on OPERATOR_HEARTBEAT: its sender, for operator programs, and its watch, for

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 #pragma once
 // The operator's word, STEERING_TARGET, as every node that obeys it hears it: fresh, newer than the last, meant for
 // this run since its last stop. A stop or a hold is obeyed from anybody at any time.

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 #pragma once
 // Child processes that are started together and end together.
 #include <sys/types.h>

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 #pragma once
 // bevel-rig: a needle, two cameras and two drives that exist only as programs. Drives on a CAN bus, frames on a Unix
 // socket, the true tip on NEEDLE_TRUTH, and its heading on TIP_HEADING if the needle has a sensor for it. The rest of

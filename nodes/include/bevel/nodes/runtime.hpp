@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 #pragma once
 // What every main needs: one of it on this machine, a clean end on Ctrl-C, and its loop.
 #include <atomic>

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 #pragma once
 // Publishes the state of a node on PROCESS_STATUS, twice a second and at each change, and keeps the node's session: the
 // number that an operator's request must carry, and that changes at each latched stop.

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 #pragma once
 // bevel-stepper: MOTION_COMMAND in, the two axes over CAN, ACTUATOR_STATE out.
 //

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 #pragma once
 // One file for a whole rig: every process reads all of it, so that a wrong key is found by whichever starts first, and
 // uses its own part. Keys, ranges and defaults stand in system_config.cpp and in the structures named here.

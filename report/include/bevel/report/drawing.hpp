@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // Pictures as inline SVG, drawn straight: figures on paper and where no script runs, and whatever is no plot of y over
 // x (bars with names, heat maps). They take a tenth of the bytes of a general plotting program's, and no process.
 #pragma once

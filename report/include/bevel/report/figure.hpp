@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // What a page draws, as plain values: a figure of y over x, and a path in space. How it looks, in a browser and on
 // paper, is decided in this room, once.
 #pragma once

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // Figures as the page's script reads them (report/src/page/report.js).
 #pragma once
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // Figures as they stand on paper, and where no script runs.
 #pragma once
 

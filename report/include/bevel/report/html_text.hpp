@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // Text inside a page.
 #pragma once
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // Where a reference's name goes in a figure: on its line, where it lies over nothing that is drawn.
 #pragma once
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // Numbers as people read them, never with an exponent where none is needed.
 #pragma once
 

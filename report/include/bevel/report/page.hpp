@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // One self-contained page: text, tables and figures, no network. All text given is escaped here. Where no script runs,
 // and on paper, every figure is a picture; elsewhere it can be zoomed and read off. The same input gives the same
 // bytes.

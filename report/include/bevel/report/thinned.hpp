@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // Fewer samples that show the same: every extreme stays, and nothing is picked at equal steps, so that a series in
 // which several sources take turns (two cameras) keeps all of them.
 #pragma once

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 package bevel.spy;
 
 import bevel.needle_state_t;

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // What the live page shows, from the messages of a running loop or of a log that is played back. Pure: time comes in,
 // text goes out. Units are in the names; positions in {A}, mm.
 #pragma once

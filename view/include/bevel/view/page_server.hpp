@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // The live page over HTTP: read-only, on this machine alone. GET / is the page, /events the snapshots as server-sent
 // events, /history what a page begins with, /state the newest snapshot. A page that reads slowly gets the newest
 // snapshot, not a queue of old ones.

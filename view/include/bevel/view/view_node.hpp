@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // The live page wired to LCM: subscribes to every channel of the loop and publishes nothing.
 #pragma once
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 #pragma once
 // bevel-calibrate: pictures of a board to a YAML of cameras and a page that says how good they are; the frame {A} from
 // a fiducial or from the log of a straight insertion; a board to print; how late the stamps of cameras are.

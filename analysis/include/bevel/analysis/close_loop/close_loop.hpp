@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // What a diagnosis is good for: the model that it leaves, put back into the rig, the estimator and the controller, and
 // what each does with it against what it did before.
 #pragma once

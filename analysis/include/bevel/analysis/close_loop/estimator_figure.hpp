@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // The estimator on the case's recordings: are its innovations those of a model that leaves nothing out?
 #pragma once
 

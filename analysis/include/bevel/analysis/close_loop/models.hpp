@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // The models that are compared, and what they are compared on.
 #pragma once
 

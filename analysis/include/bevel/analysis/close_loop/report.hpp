@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // The three figures as a table for the terminal, as JSON, and as a page.
 #pragma once
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // The simulated rig beside its recordings: plant and cameras moved as the base was, nothing corrected on the way.
 #pragma once
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // Many steered insertions: how far from the target the needle comes to rest, with one model in the software or another.
 #pragma once
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 #pragma once
 // What bevel-import does with its arguments.
 #include <string>

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // bevel-diagnose: from logs and the model in use to verdict.json, report.html and model.toml, and for an unknown effect
 // to the source of the one that is proposed.
 #pragma once

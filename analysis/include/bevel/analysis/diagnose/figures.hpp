@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // Numbers as the tool prints them, on the page and on the terminal.
 #pragma once
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // The page's figures and pictures; none where there is nothing to show. A picture is an <svg> element. Where nothing is
 // missing, before and after are one model, and it is drawn once.
 #pragma once

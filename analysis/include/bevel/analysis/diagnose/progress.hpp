@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // What the tool is at, for someone who waits: a line at a time, with the seconds since it began.
 #pragma once
 

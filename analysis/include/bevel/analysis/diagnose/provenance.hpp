@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // Of what a verdict was made: the same version and the same inputs give the same verdict, to the last bit.
 #pragma once
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // Logs into a case, or one sentence that says why not.
 #pragma once
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // report.html: what was found, how sure that is, and the pictures that show it. One file, nothing fetched.
 #pragma once
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // The files of a result, all of them or none.
 #pragma once
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // The miss at a target by closed loop: what the model file as it stands costs, and what the model that was found
 // leaves.
 #pragma once

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // verdict.json. Its keys are a contract (docs/verdict.schema.json); figures that are not finite become null.
 #pragma once
 

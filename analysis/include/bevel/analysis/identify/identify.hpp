@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 #pragma once
 // bevel-identify without its command line: logs and a starting model in, model.toml, figures.json, report.html out.
 #include <iosfwd>

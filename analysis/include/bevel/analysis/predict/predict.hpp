@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 #pragma once
 // bevel-predict without its command line: a model file and a log in, the path as the cameras would report it out, with
 // how far off it is to be expected where the model file says what is uncertain.

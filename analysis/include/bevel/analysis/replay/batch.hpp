@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 #pragma once
 // Many logs in parallel, and the table over folders of recordings that share a rig.
 #include <iosfwd>

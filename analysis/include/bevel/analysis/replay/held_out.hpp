@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 #pragma once
 // Parameters learned on the other insertions of one tissue, so that a log is predicted by what it has had no part in.
 #include <vector>

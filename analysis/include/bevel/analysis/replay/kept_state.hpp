@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 #pragma once
 // A filter's state as a replay keeps it, one for each actuator state of a log: the lower half of the symmetric
 // covariance, and nothing of effects. Half the memory of a FilterState; fetching that from the system took a quarter of

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 #pragma once
 // One log through the estimator: the same NeedleEstimator that runs live, fed in the log's order of arrival.
 #include <array>

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 #pragma once
 // What bevel-replay prints, and the files that it writes. The same replay gives the same bytes, except for the speed,
 // which only print_speed() mentions.

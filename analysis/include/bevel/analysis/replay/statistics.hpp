@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 #pragma once
 // What innovations say about a filter: size against their own covariance, whiteness, and the camera's own noise.
 #include <cstdint>

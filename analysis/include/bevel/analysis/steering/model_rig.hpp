@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // A model file put to work: what the software believes of it, and a rig that is it.
 #pragma once
 

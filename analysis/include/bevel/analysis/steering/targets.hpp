@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 #pragma once
 // Many targets in each scenario by each law, in simulated time: how far from them the needle comes to rest.
 #include <cstdint>

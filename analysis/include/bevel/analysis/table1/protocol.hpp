@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 #pragma once
 // Section IV's protocol on a simulated plant: 130 mm of depth, no rotation, three trials, a 30 Hz webcam above.
 #include <string>

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 #pragma once
 // The study behind bevel-table1 and how it is told.
 #include <array>

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 #pragma once
 // The identification of Section IV, as printed: kept for comparison, not for use (it differentiates noise).
 //

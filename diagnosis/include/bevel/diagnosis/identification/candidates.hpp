@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 #pragma once
 // Comparison of the kinematic models on the same insertions, and the selection of one of them: the bicycle, the
 // extended model with either slip and either front wheel, and the best of these with entries that are tilted.

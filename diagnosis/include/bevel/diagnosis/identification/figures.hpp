@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 #pragma once
 // How far a model's path is from what was seen, in the two ways that the literature mixes.
 #include <vector>

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 #pragma once
 // What a fit's information matrix says: covariance, prior's share, and the directions that the data leave open.
 #include <bevel/diagnosis/identification/trajectory_fit.hpp>

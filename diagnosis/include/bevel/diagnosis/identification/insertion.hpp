@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 #pragma once
 // One insertion as identification sees it: what the two axes did, and where the tip was seen.
 //

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 #pragma once
 // The tip along one insertion by the model, with derivatives by the needle's and the entry's parameters.
 //

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 #pragma once
 // Maximum likelihood of the needle's parameters on measured tip positions, through the integrated model, over all
 // insertions at once.

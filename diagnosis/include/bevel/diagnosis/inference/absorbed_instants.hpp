@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 #pragma once
 // Steps that happened in some recordings, and that these took up as their own.
 #include <bevel/diagnosis/inference/likelihood.hpp>

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 #pragma once
 // Least squares in which each recording has unknowns of its own beside those that all share: the normal equations have
 // the shape of an arrow, and each recording's own part is eliminated by its Schur complement.

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 #pragma once
 // The noise to begin with and the outliers: what a flexible curve leaves beside the base alone.
 #include <bevel/diagnosis/inference/likelihood.hpp>

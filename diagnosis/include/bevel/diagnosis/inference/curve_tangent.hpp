@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 #pragma once
 // Where a discrepancy is no small thing, its linear model about none is not enough: the readings, and their derivatives
 // by its curves' values, about other values of them.

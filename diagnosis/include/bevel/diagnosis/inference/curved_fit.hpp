@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 #pragma once
 // The mode of a set beside a discrepancy that may be too large for the linear model about none.
 #include <bevel/diagnosis/inference/discrepancy.hpp>

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 #pragma once
 // What was read, and nothing of what made it: series of readings per recording and channel. Immutable once made.
 #include <Eigen/Core>

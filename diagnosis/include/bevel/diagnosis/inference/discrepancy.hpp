@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 #pragma once
 // The discrepancy that nobody has a name for: a sum of curves, each a Gaussian process of one covariate in one
 // component (Kennedy and O'Hagan 2001, J. R. Stat. Soc. B 63), linear through the sensitivities, beside any set of

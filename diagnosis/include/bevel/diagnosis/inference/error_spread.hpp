@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 #pragma once
 // What the errors of a model may be, given its readings: those at the mode, and what the spread of the unknowns about
 // it does to them. A fit bends toward the readings, so its residuals are smaller than the errors are: the noise for

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 #pragma once
 // The evidence of a set of effects: the integral of likelihood times prior over everything unknown. By Laplace's method
 // in what is nonlinear, exactly in what is linear about the mode; over grids for the standard deviations of the

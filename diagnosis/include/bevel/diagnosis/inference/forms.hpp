@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 #pragma once
 // The simplest equation of one covariate that does for a discrepancy what its curve does:
 //   d(x) = a f(x; shape)

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 #pragma once
 // Noise with heavier tails than the normal distribution's: innovations are Student's t. Beside a fit each has a
 // precision of its own, by expectation and maximisation (Lange, Little and Taylor 1989, JASA 84), with which all else

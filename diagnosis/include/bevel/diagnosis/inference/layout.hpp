@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 #pragma once
 // Which unknown stands where, for one set of effects.
 #include <bevel/diagnosis/inference/system.hpp>

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 #pragma once
 // The likelihood of readings under a set of effects, a discrepancy and autocorrelated noise, and its mode.
 //

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 #pragma once
 // Ways out of local minima: phases, instants and shapes of effects at the best of a grid, as derivatives do not see
 // them.

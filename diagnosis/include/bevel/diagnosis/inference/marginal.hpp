@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 #pragma once
 // What a fit leaves to columns that are not in it: its shared unknowns, each recording's own and its curve integrated
 // out, with their priors, by the linear model about it (the null-space projection of least squares, where the priors

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 #pragma once
 // The sensors' noise: autocorrelated, of first order or second, one standard deviation per channel, and a share of
 // outliers. It begins as what a flexible curve leaves of the residuals, so that missing physics does not pass for

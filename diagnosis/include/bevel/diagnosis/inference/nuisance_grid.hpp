@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 #pragma once
 // Combinations of the standard deviations that the groups of nuisances may have.
 #include <functional>

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 #pragma once
 // What each recording has of its own, and what all share, beside one fit, over the standard deviations of the
 // nuisances.

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 #pragma once
 // Readings that belong to nothing, and the noise without them: what a flexible curve leaves of a model's errors.
 #include <bevel/diagnosis/inference/noise.hpp>

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 #pragma once
 // The mode of the shared unknowns where what each recording has of its own is integrated out, not fitted.
 //

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 #pragma once
 // What follows from the sets that were visited: probabilities of sets, of each effect, of a discrepancy; each unknown's
 // posterior; what each recording would have been given the others.

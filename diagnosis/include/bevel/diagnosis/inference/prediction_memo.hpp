@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 #pragma once
 // What a system predicted last. A mode is fitted, linearised, judged by a new noise and fitted on from where it is: the
 // noise changes, what the system predicts there does not, and predicting is most of what all of it costs.

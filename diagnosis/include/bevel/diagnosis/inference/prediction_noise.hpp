@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 #pragma once
 // The noise by which recordings are predicted: the likeliest of the readings' density with everything else integrated
 // out, by the linear model about a fit, each channel with an autocorrelation of its own. Beside a set one

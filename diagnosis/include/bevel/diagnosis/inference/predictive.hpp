@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 #pragma once
 // One recording predicted from the others, reading by reading, in two ways: as a new recording, and continued from its
 // first readings. By the linear model about a mode, exact where the readings are linear in everything:

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 #pragma once
 // Prior densities, each with the normal one that stands for it where an integral needs a quadratic: the integral is
 // then multiplied by the ratio of the two densities at its mode (Laplace's method; Tierney and Kadane 1986, JASA 81).

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 #pragma once
 // The likelihood along one shared unknown, all else following: where it has many local minima, is cut off by a bound or
 // is no parabola, this is what says how well the unknown is known.

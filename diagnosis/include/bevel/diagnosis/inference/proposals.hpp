@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 #pragma once
 // What each effect would do to the readings, from a grid of starts, once, about one fit; and from it, without any new
 // fit, what each promises beside a set that was fitted: an estimate of its log Bayes factor, and where to begin.

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 #pragma once
 // The rows of one recording in two parts, the first readings and the rest, and its noise between them: whitening, its
 // inverse, and what the first part says of the rest. Rows are those of the likelihood: channel after channel, in time.

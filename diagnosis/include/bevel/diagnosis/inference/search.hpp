@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 #pragma once
 // Which sets of effects are likely: an Occam window (Madigan and Raftery 1994, JASA 89) over all sets of up to
 // `largest`, searched from a queue by adding, dropping and swapping, with refits where the linear model comes near.

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 #pragma once
 // The mode of a set where fit, noise and the nuisances' standard deviations agree, with the evidence about it.
 #include <limits>

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 #pragma once
 // Which standard deviations of the nuisances a fit is made with next. The linear model about a fit says what each
 // combination promises; where it was wrong so many steps of the grid away, it is asked for half as many: a trust region

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 #pragma once
 // How large a curve is that is known with errors: the distribution of a sum of squares of normals, sum_i w_i (z_i +
 // m_i)^2, z_i standard normal and independent, by its first four cumulants (Liu, Tang and Zhang 2009, Computational

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 #pragma once
 // What the engine sees of a model: readings with their derivatives by shared parameters and by each recording's own
 // unknowns, a discrepancy's components, and effects with their priors. It knows nothing else of what it judges; a

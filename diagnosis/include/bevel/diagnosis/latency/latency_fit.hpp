@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 #pragma once
 // How late the stamps of one camera are, from an insertion whose rate changes.
 //

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 #pragma once
 // What the posterior says, as a verdict, and the model that stands for it.
 //

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 #pragma once
 // From recordings and a model in use to a verdict: what physics was left out. Everything follows from one posterior
 // (diagnosis/src/inference); deterministic, whatever the number of threads.

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 #pragma once
 // The equation proposed for a discrepancy as the source of an effect: put into model/src/effects/, with a line in the
 // registry, it is one like all others (docs/adding-an-effect.md).

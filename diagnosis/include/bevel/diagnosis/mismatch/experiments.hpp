@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 #pragma once
 // What to record next: of a list of safe motions, the one in which two explanations would differ most, the rival's own
 // parameters refitted; or in which an effect that these recordings cannot show would show.

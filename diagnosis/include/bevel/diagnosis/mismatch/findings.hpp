@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 #pragma once
 // What the mismatch tool found, as plain data: verdict.json, report.html and model.toml are made from this alone.
 #include <array>

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 #pragma once
 // The effects of a decision with their sizes and rivals, and the ranking of all that were tried.
 #include <bevel/diagnosis/mismatch/decision.hpp>

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 #pragma once
 // Invariants of a verdict: what must hold of every diagnosis, whatever the recordings.
 #include <string>

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 #pragma once
 // What a part of a model does to the tip: two models side by side, open loop along the recordings' own base motion.
 #include <bevel/diagnosis/inference/layout.hpp>

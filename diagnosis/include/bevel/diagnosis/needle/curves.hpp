@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 #pragma once
 // The discrepancy of a needle (bevel/model/effects/discrepancy.hpp) as the engine's curves: every component over every
 // covariate that varies in the recordings.

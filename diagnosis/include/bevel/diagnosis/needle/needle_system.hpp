@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 #pragma once
 // The needle as the engine's client (diagnosis/src/inference): readings of the cameras from the base's motion, with
 // what differs between insertions, the effects of the library, and a discrepancy in each component of the tip's twist

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 #pragma once
 // The recordings of one rig, as the mismatch tool sees them: the base's motion, and for each camera axis a series of
 // readings. Everything later works on these.

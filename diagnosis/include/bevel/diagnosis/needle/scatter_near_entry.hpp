@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 #pragma once
 // Readings scatter more where a needle has hardly entered: a hand guides it, and little tissue holds its tip. Taken as
 // equally good, what a few insertions do there by chance passes for physics.

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 #pragma once
 // Is a series white? Ljung and Box 1978, "On a measure of lack of fit in time series models", Biometrika 65(2).
 #include <Eigen/Core>

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 #pragma once
 // What is seen of the end of a bevelled needle: a cylinder of radius 1 cut by a plane over the length B, looked at from
 // the side. Along the axis, at the distance x behind the foremost point, metal covers the part [lo, hi] of the width:

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 #pragma once
 // A camera whose lens, pose and wall are known (calibration/camera_model.hpp), behind the same port as PlanarView.
 // Pixels are undistorted, never pictures.

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 #pragma once
 // The tracker is written once, for a needle that comes in at the top, runs down and is a few pixels wide. This turns
 // and shrinks other pictures that way: canonical (col, row) against picture (u, v).

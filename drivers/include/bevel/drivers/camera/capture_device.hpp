@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 #pragma once
 // Port between a camera's frames and Video4Linux, and what is made of its buffers: pure but for the port's adapter.
 // Source: Linux media API, struct v4l2_buffer, "Buffer flags" and "Buffer timestamp".

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 #pragma once
 // Sub-pixel geometry of a found needle (canonical: it runs down the patch).
 #include <opencv2/core.hpp>

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 #pragma once
 // Where a bevelled needle ends, along and across its own axis, from what is dark around its centreline: at the arc
 // length s along a nominal line, darkness m0 summed across the needle and its first moment m1 about that line. The

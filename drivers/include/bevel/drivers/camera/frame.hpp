@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 #pragma once
 // One picture of one camera, with the time at which the light fell in.
 #include <cstdint>

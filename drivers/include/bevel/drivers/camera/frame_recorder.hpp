@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 #pragma once
 // Frames to a folder while they are tracked, by a thread of its own: PNG, so that nothing is lost, named by capture
 // time, camera and number, and frames.csv, one line a frame, which makes the folder a source with its own stamps. The

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 #pragma once
 // Port: where frames come from. Adapters are made by make_frame_source() only, so a program names a source in its
 // configuration and never sees which class it got.

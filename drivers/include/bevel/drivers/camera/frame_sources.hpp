@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 #pragma once
 // The adapters behind make_frame_source(); include frame_source.hpp instead unless you are a test.
 #include <filesystem>

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 #pragma once
 // Wire format of the frame stream: a fixed header, then width*height bytes of gray. Same machine, so native byte order;
 // a peer of the other order fails on the magic. Every field is checked before a byte of the picture is read, and

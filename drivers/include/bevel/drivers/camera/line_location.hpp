@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 #pragma once
 // Where across the needle its last, thinnest part lies: least squares of a line that is thinner than the lens's blur.
 #include <vector>

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 #pragma once
 // From a path down a patch to the needle's end: nominal centreline, darkness and its moment along it, the model of a
 // bevelled end fitted to both. Canonical coordinates of the patch (the needle runs down).

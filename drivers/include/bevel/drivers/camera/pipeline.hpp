@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 #pragma once
 // One source, one tracker per camera: frames in, tip observations out. What bevel-camera wires to LCM.
 #include <chrono>

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 #pragma once
 // A rectified picture of one plane: every pixel is the same number of mm, and each picture axis lies along an axis of
 // {A}. It holds for a camera that looks squarely at the plane in which the needle bends, and for pictures rectified

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 #pragma once
 // Finding the needle in a patch (canonical: it runs down from the first row): a dark-ridge response at the needle's
 // width, and the path down the patch that collects most of it. A path collects evidence over all its rows, so gaps

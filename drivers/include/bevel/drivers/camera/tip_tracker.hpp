@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 #pragma once
 // The tip of a dark needle in the frames of one camera. Steps: region of interest from the estimate or the last tips
 // (whole picture when lost), background and illumination gain, ridge response and best path (ridge_path.hpp), sub-pixel

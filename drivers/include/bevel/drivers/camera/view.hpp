@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 #pragma once
 // Port: what a pixel of one camera says about a point of {A} (mm; origin at the entry point, z into the tissue).
 #include <array>

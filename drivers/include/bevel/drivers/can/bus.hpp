@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // The port between everything that speaks CAN and whatever carries the frames: SocketCAN, the rig's local bus, or
 // memory.
 //

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // What has arrived on a bus, handed on by its kind.
 #pragma once
 

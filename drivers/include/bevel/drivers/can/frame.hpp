@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // A classical CAN data frame with an 11-bit identifier: all that CANopen needs.
 #pragma once
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // A CAN bus without CAN: frames over a Unix socket (SOCK_SEQPACKET) between the processes of one machine, for machines
 // whose kernel has no SocketCAN. A hub, run by the rig, passes each frame to all other clients and echoes it to its
 // sender.

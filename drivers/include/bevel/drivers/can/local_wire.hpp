@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // How a frame travels over the local bus: 16 bytes, id (little-endian), size, flags, two zero bytes, data.
 #pragma once
 

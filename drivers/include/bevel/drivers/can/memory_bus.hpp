@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // A bus inside one process, for tests and simulated time: deterministic, with the faults of a real one on request.
 #pragma once
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // From an address in a configuration file to a bus.
 #pragma once
 

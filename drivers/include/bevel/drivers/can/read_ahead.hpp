@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // Datagrams of a socket, fetched several in one system call: in each cycle some ten frames wait, and a command that has
 // just come must not stand behind a call for each of them.
 #pragma once

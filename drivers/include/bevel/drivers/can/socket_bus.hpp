@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // What buses over a socket share: it is opened again after a loss, and each loss or return is told once.
 #pragma once
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // Talks to the two drives as far as is possible without a drive moving or leaving its NMT state: who is on the bus,
 // does what is sent reach the wire, who are the drives, how evenly do their hearts beat. Pure: time is handed in.
 //

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // One line of bevel-check: what was measured, what is allowed, and what to type where it is not.
 #pragma once
 

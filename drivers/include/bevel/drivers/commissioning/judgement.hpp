@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // From what was measured to what is said of it. Pure.
 #pragma once
 

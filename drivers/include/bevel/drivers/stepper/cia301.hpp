@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // The part of CANopen (CiA 301) that a master of two drives needs: identifiers, NMT, SYNC, heartbeat, expedited SDO.
 #pragma once
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // CiA 402 (IEC 61800-7-201): the drive's state machine as seen from the master. Transition numbers are the standard's.
 #pragma once
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // One drive as its master sees it: presence, configuration, state, position.
 #pragma once
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // Whether an axis goes where it is told. An axis that answers with a delay of no more than the allowed lag stands where
 // the integral of the commanded rate has been at some time within that lag; one that stands outside all of these does
 // not follow: it is blocked, runs away, or is driven by somebody else. Pure.

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // From a wanted rate to one that an axis may be asked for: within its rate, acceleration and workspace limits. Pure.
 #pragma once
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // Why the axes were stopped.
 #pragma once
 

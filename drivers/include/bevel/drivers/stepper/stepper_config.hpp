@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // Settings of the stepper driver. Plain data: whoever reads a file fills it in.
 #pragma once
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // Sends through a bus such that no identifier of ours ever has more than one frame waiting: a bus that stalls can then
 // release at most one old command per drive when it returns.
 #pragma once

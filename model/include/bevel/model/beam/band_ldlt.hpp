@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 #pragma once
 // A = L D L^T for symmetric positive definite matrices with three diagonals beside the main one, which is what cubic
 // Hermite beam elements give (two unknowns per node, neighbours coupled). Linear in the number of unknowns.

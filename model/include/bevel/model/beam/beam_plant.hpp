@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 #pragma once
 // A needle in tissue, from mechanics: the plant on which steering is tried when the plant must not be the model.
 //

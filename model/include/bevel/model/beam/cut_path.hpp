@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 #pragma once
 // The tissue's side of the plant: where the tip has cut, and the springs that hold the shaft to that cut.
 //

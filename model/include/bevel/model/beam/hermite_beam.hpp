@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 #pragma once
 // Statics of a slender beam of growing length: Euler-Bernoulli, small slopes, cubic Hermite elements.
 //

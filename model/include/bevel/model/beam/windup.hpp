@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 #pragma once
 // Torsion of the shaft: tissue friction, a constant torque m per mm of inserted length, against the shaft's stiffness
 // GJ. Where the whole length slips, the torque at depth z is m (L - z) and the tip lags the base by W = m L^2 / (2 GJ).

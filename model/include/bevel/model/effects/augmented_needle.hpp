@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 #pragma once
 // The needle with the effects of a model file: open-loop propagation from the base's motion, with sensitivities by any
 // of its parameters in the same pass. Without effects it is bevel/model/kinematics.hpp, bit for bit (tested).

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 #pragma once
 // Where the base was over the last while: by how much its speed changed, and how long ago.
 #include <array>

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 #pragma once
 // An effect in one component of the tip's motion or of the reading, as a function v of one covariate c. Over a leg in
 // which the base moves by ds mm and dR rad (frames: bevel/model/kinematics.hpp), c at its end, but the tip's place at

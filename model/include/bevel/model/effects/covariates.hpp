@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 #pragma once
 // What a discrepancy is looked at against, and what a reading was taken at: from the base's motion alone, but for where
 // the tip is.

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 #pragma once
 // The discrepancy that nobody has a name for: a curve over one covariate, in one component of the tip's motion or of
 // the reading, as an effect beside those of the registry. At the place c of its covariate it has the value

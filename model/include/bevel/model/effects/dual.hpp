@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 #pragma once
 // A number with its derivatives by up to kMaxColumns unknowns (forward mode, dual numbers): an effect states its
 // equation once, its sensitivities follow. Fixed size, no allocation; the compiler makes vector code of the slopes.

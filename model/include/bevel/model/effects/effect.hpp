@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 #pragma once
 // One piece of physics that the bicycle model leaves out, as a set of hooks into the integrator. An effect is one file:
 // a class without state, derived from Effect, that states its equation in dual numbers (dual.hpp) and so yields its

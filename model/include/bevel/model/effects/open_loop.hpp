@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 #pragma once
 // The tip along a recording from the base's motion alone, as the cameras would report it, with sensitivities.
 #include <array>

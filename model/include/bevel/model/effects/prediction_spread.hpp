@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 #pragma once
 // How far off an open-loop prediction is to be expected: by what an insertion has of its own and by the standard errors
 // of the discrepancies, carried to the readings by their sensitivities (linearised: right while the spread is small

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 #pragma once
 // No rig repeats itself exactly: by how much insertions differ beside what they share. Each has, of its own and drawn
 // from normal densities about the model's values, a curvature, a heading and a roll at the entry, and a registration.

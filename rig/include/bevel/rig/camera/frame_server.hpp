@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 #pragma once
 // Frames to any number of clients over a Unix socket, in the format of bevel/drivers/camera/frame_stream.hpp. publish()
 // only copies the picture and returns; a thread writes. A client that reads slowly loses frames (their seq shows the

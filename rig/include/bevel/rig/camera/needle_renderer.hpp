@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 #pragma once
 // A picture of a needle whose tip is known: what the trackers of drivers/src/camera are measured against. The
 // silhouette is that of a cylinder cut by a plane (the bevel), supersampled; then bubbles, what stands before it,

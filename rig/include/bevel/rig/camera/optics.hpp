@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 #pragma once
 // What lies between a plane that is seen squarely and its picture: a lens that is not perfect, and light that bends
 // where it leaves the gel. Both move a point along its radius from the optical axis, which stands at the picture's

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // The power stage, motor and encoder of the simulated drive: ramps, following error, position. Encoder increments and
 // seconds.
 //

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // Homing mode of CiA 402 (mode 6) inside the simulated drive: which way to turn, and where home is. Methods 17 and 18
 // (off the edge of the negative or positive limit switch) and 35 and 37 (here). Pure; increments and seconds.
 #pragma once

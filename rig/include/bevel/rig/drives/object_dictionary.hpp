@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // The object dictionary of the simulated drive: every object with its size, access, range and whether a PDO may carry
 // it.
 #pragma once

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // The CiA 402 state machine inside the simulated drive (IEC 61800-7-201, figure "FSA"): transitions by controlword, by
 // standstill and by faults. Written from the drive's side; shares nothing with the master that it tests.
 #pragma once

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // A CiA 402 stepper drive that exists only as a program: it answers on a can::Bus as a real one would and gives the
 // plant the motion of its shaft. CANopen here is written from the device's side and shares nothing but the frame and
 // the bus with drivers/src/stepper, so that each checks the other. Modes: profile velocity (3), homing (6), cyclic

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // How far the simulated drive's shaft may go: limit switches stop what moves towards them, software limits (607D) make
 // the demand come to rest on them. Pure; increments and seconds.
 #pragma once

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // The drive's user units (CiA 402-2, factor group): its motor turns in encoder increments, its objects speak in what
 // the master has set. Objects 608F (increments per motor revolution), 6091 (motor per shaft revolutions), 6092
 // (position units per shaft revolution), 6096 (velocity units per position unit/s), each a numerator and a divisor.

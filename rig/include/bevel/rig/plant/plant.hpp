@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 #pragma once
 // The needle in its tissue, as the simulated rig moves it: axis increments in, tip and shaft out. Two of them: the
 // model that everything else believes in, and mechanics that it does not.

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 #pragma once
 // Two laws of the literature, to measure the controller's by on the same targets; no rig is offered them.
 //

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 #pragma once
 // Needles, tissue and cameras that steering is tried on, and what the software is told of each.
 #include <cstdint>

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 // One steered insertion in simulated time: a plant with its cameras and axes, and the estimator and the controller as
 // they run live, with a model of their own. No clock, no messages; the same seed gives the same run.
 #pragma once

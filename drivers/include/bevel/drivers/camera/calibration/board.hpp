@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 #pragma once
 // Boards to calibrate with: a chessboard, or a ChArUco board (a chessboard with a marker in each white square, so that
 // a part of it is enough and no corner is taken for another). {B}, mm: origin at the outer corner of the first square,

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 #pragma once
 // Cameras, walls and boards fitted to the corners of all pictures at once (bundle adjustment, by Ceres), and what such
 // a fit says of pictures it has not seen. Frames: {B} of the board (board.hpp), {C0} of the first camera, in which all

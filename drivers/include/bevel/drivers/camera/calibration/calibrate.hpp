@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 #pragma once
 // Sightings of a board into calibrated cameras, in the order of the files: a start (start.cpp), the fit with what is
 // far out left out, pictures held out (held_out.cpp). Pure: no files, no clock.

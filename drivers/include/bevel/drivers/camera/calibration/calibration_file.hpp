@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 #pragma once
 // What bevel-calibrate writes and [[camera]] calibration = "..." reads: YAML as cv::FileStorage has it, so that any
 // program with OpenCV reads it too. Per camera: image_width, image_height, camera_matrix and distortion_coefficients

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 #pragma once
 // One calibrated camera: lens, where it stands in {A}, and the flat wall of gel it looks through, if there is one.
 // Lengths in mm; {C} has its origin in the lens, x to the right and y down in the picture, z ahead. The equations stand

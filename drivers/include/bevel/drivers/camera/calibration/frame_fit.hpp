@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 #pragma once
 // Where {A} is: origin at the entry point, z into the tissue along the needle's guide. A calibration knows its cameras
 // among each other only; a board at a known place (a fiducial) or a straight first insertion gives the rest.

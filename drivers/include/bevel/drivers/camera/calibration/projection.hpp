@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 #pragma once
 // The equations of a camera before a flat wall, once, for doubles and for the jets of automatic differentiation.
 //
