@@ -167,7 +167,25 @@ TEST(NeedleSystem, LooksOnlyForWhatTheRecordingsCanShow) {
   for (const auto& curve : stops.curves()) EXPECT_THAT(curve.covariate, ::testing::Not(::testing::HasSubstr("_s")));
 }
 
-// With three effects, two curves and what differs between insertions there are as many as a needle carries.
+// Without a retraction, backlash of the insertion is an offset of the depth, as an error of the registration is.
+TEST(NeedleSystem, LooksForInsertionBacklashWhereTheNeedleIsRetracted) {
+  const auto has_backlash = [](const SimulatedRig& rig) {
+    const NeedleSystem system(record_case(rig, 7), rig.needle);
+    return std::ranges::any_of(system.effects(),
+                               [](const auto& effect) { return effect.name == "insertion_backlash"; });
+  };
+  SimulatedRig rig;
+  const double least_sd_mm = rig.sigma_mm.minCoeff();
+  EXPECT_TRUE(has_backlash(rig));
+  const auto retracted_by = [&](double mm) {
+    rig.script = [mm](int) { return model::testing::Script{{4, 10, 0}, {1, -mm, 1}, {4, 10, 1}}; };
+    return has_backlash(rig);
+  };
+  EXPECT_FALSE(retracted_by(0));
+  EXPECT_FALSE(retracted_by(0.9 * least_sd_mm)) << "less than the tracker's noise";
+  EXPECT_TRUE(retracted_by(1.1 * least_sd_mm));
+}
+
 // Without rotation slip and curvature bend the path in one plane: lambda keeps the value of the model file.
 TEST(NeedleSystem, HoldsLambdaWhereTheShaftNeverTurns) {
   SimulatedRig rig{.recordings = 4, .changed_from = 2};
@@ -192,7 +210,7 @@ TEST(NeedleSystem, HoldsLambdaWhereTheShaftNeverTurns) {
 TEST(NeedleSystem, PriorsDoNotDependOnTheRecordings) {
   SimulatedRig rig{.recordings = 2};
   const NeedleSystem deep(record_case(rig, 1), rig.needle);
-  rig.script = [](int) { return model::testing::Script{{1, 10, 0.5}, {1, 5, -0.5}}; };
+  rig.script = [](int) { return model::testing::Script{{1, 10, 0.5}, {1, 5, -0.5}, {0.2, -5, 0}}; };
   rig.frame_s = 0.1;
   const NeedleSystem shallow(record_case(rig, 1), rig.needle);
   ASSERT_EQ(deep.effects().size(), shallow.effects().size());
@@ -207,6 +225,7 @@ TEST(NeedleSystem, PriorsDoNotDependOnTheRecordings) {
     }
 }
 
+// With three effects, two curves and what differs between insertions there are as many as a needle carries.
 TEST(NeedleSystem, HoldsAsManyKnownEffectsAsLeaveRoomForTheOthers) {
   const SimulatedRig rig;
   const auto known = [](std::size_t count) {

@@ -74,6 +74,16 @@ void remark_on_clock(const NeedleSystem& system, Findings& findings) {
                              left_out + ")");
 }
 
+void remark_on_retraction(const NeedleSystem& system, Findings& findings) {
+  if (system.recorded().has_retraction()) return;
+  std::string excluded;
+  for (const model::Effect* effect : model::all_effects())
+    if (effect->needs_retraction()) excluded += (excluded.empty() ? "" : ", ") + std::string(effect->name());
+  findings.remarks.push_back(excluded +
+                             ": not a candidate, because no recording retracts the needle; insert 10 mm and retract "
+                             "4 mm repeatedly to measure it");
+}
+
 // Where the posterior is as wide as the belief that the model file is.
 void remark_on_beliefs(const NeedleSystem& system, const NeedleEstimate& needle, Findings& findings) {
   constexpr double kAsWide = 0.8;
@@ -263,6 +273,7 @@ Findings diagnose(const RecordedCase& recorded, const model::NeedleParameters& m
   findings.traces = make_traces(system, calibration.outliers, base, decision.model, model);
   remark_on_short_recordings(recorded, findings);
   remark_on_clock(system, findings);
+  remark_on_retraction(system, findings);
   remark_on_groups(recorded, findings);
   remark_on_beliefs(system, findings.needle, findings);
   remark_on_bounds(findings);

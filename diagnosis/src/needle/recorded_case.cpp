@@ -282,6 +282,20 @@ double RecordedCase::deepest_mm() const {
   return deepest_mm;
 }
 
+bool RecordedCase::has_retraction() const {
+  double least_sd_mm = std::numeric_limits<double>::infinity();
+  for (const Channel& channel : channels)
+    if (!channel.heading) least_sd_mm = std::min(least_sd_mm, channel.claimed_sd);
+  return std::ranges::any_of(recordings, [&](const Recording& recording) {
+    double deepest_mm = -std::numeric_limits<double>::infinity(), retracted_mm = 0;
+    for (const auto& node : recording.motion.nodes) {
+      deepest_mm = std::max(deepest_mm, node.insertion_mm);
+      retracted_mm = std::max(retracted_mm, deepest_mm - node.insertion_mm);
+    }
+    return retracted_mm > least_sd_mm;
+  });
+}
+
 std::size_t RecordedCase::measurements() const {
   std::size_t count = 0;
   for (const auto& recording : recordings)

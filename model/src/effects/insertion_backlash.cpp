@@ -7,11 +7,12 @@ namespace {
 class InsertionBacklash final : public Effect {
  public:
   InsertionBacklash()
-      : Effect({.name = "insertion_backlash",
-                .meaning = "the drive of the insertion has backlash",
-                .covariate = Covariate::since_reversal_mm,
-                .parameters = {
-                    {.name = "width_mm", .lower = 0, .upper = 10, .none = 0, .starts = {1.0}, .reported = 2}}}) {}
+      : Effect(
+            {.name = "insertion_backlash",
+             .meaning = "the drive of the insertion has backlash",
+             .covariate = Covariate::since_reversal_mm,
+             .parameters = {{.name = "width_mm", .lower = 0, .upper = 10, .none = 0, .starts = {1.0}, .reported = 2}},
+             .needs_retraction = true}) {}
 
   void axes(Parameters p, const LegView& leg, EffectMemory& memory, Dual& insertion_mm,
             Dual& /*rotation_rad*/) const override {

@@ -46,11 +46,14 @@ struct Recording {
 struct RecordedCase {
   std::vector<Channel> channels;
   std::vector<Recording> recordings;
-  double frame_s = 0;                // median time between readings of a channel
-  bool has_clock = true;             // false: times are an order, and mean nothing else
-  bool has_headings() const;         // of some channel
-  bool two_groups() const;           // some recordings are of the second group
-  double deepest_mm() const;         // of the base, in any recording
+  double frame_s = 0;         // median time between readings of a channel
+  bool has_clock = true;      // false: times are an order, and mean nothing else
+  bool has_headings() const;  // of some channel
+  bool two_groups() const;    // some recordings are of the second group
+  double deepest_mm() const;  // of the base, in any recording
+  /// Returns whether a recording retracts the needle by more than the smallest claimed standard deviation of a
+  /// position.
+  bool has_retraction() const;
   std::size_t measurements() const;  // scalar readings in use
 };
 

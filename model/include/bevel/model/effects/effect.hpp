@@ -170,6 +170,8 @@ struct EffectDescription {
   Covariate covariate;
   std::vector<EffectParameter> parameters;
   bool of_headings = false;  // no position shows it, only a measured heading
+  /// The effect acts where the insertion changes direction. Without a retraction it is an offset of the depth.
+  bool needs_retraction = false;
   // Within hundredths of a millimetre of the base: its own error decides which reading still is before, which after.
   bool sudden = false;
 };
@@ -186,6 +188,7 @@ class Effect {
   Covariate covariate() const { return description_.covariate; }
   const std::vector<EffectParameter>& parameters() const { return description_.parameters; }
   bool of_headings() const { return description_.of_headings; }
+  bool needs_retraction() const { return description_.needs_retraction; }
   bool sudden() const { return description_.sudden; }
 
   virtual void change_needle(NeedleParameters&) const {}
