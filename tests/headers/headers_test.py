@@ -1,6 +1,6 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: MIT
-"""Compiles each public header alone, and all headers of a module together, by the compiler and flags of the build.
+"""Compiles each public header alone, and all public headers together, by the compiler and include paths of the build.
 
     headers_test.py BUILD [MODULE...]
 
@@ -19,24 +19,22 @@ ROOT = pathlib.Path(__file__).resolve().parents[2]
 MODULES = ["model", "estimator", "controller", "diagnosis", "drivers", "io", "rig", "nodes"]
 
 
-def flags_of(build, module):
-    """Returns the compiler with the include paths of a source of the module, without the module's private folder."""
+def flags_of(build, modules):
+    """Returns the compiler with the include paths of all sources of the modules, without the private folders."""
+    folders = tuple(f"{ROOT / module}/src/" for module in modules)
+    private = [f"-I{folder[:-1]}" for folder in folders]
     commands = json.loads((build / "compile_commands.json").read_text())
-    # The module's folder with the most dependencies: camera code also finds OpenCV.
-    preferred = {"drivers": "drivers/src/camera/calibration/", "rig": "rig/src/camera/"}.get(module, f"{module}/src/")
-    mine = [c for c in commands if c["file"].startswith(str(ROOT / preferred))]
-    words = shlex.split(mine[-1]["command"])
-    if "ccache" in words[0]:
-        words = words[1:]
-    flags, at = [words[0], "-std=c++20", "-fsyntax-only", "-Wall", "-Wextra", "-Werror"], 1
-    while at < len(words):
-        if words[at] == "-isystem":
-            flags += words[at:at + 2]
-            at += 1
-        elif words[at].startswith(("-I", "-D")) and words[at] != f"-I{ROOT / module / 'src'}":
-            flags.append(words[at])
-        at += 1
-    return flags
+    mine = [shlex.split(c["command"]) for c in commands if c["file"].startswith(folders)]
+    includes = {}  # in the order of first use
+    for words in mine:
+        for at, word in enumerate(words):
+            if word == "-isystem":
+                includes[word, words[at + 1]] = None
+            elif word.startswith("-I") and word not in private:
+                includes[(word,)] = None
+    compiler = mine[0][1] if "ccache" in mine[0][0] else mine[0][0]
+    flags = [word for include in includes for word in include]
+    return [compiler, "-std=c++20", "-fsyntax-only", "-Wall", "-Wextra", "-Werror", *flags]
 
 
 def compiles(name, flags, headers, folder):
@@ -50,19 +48,22 @@ def main():
     build = pathlib.Path(sys.argv[1])
     failed = checked = 0
     with tempfile.TemporaryDirectory() as folder, concurrent.futures.ThreadPoolExecutor(os.cpu_count()) as pool:
-        jobs = []
-        for module in sys.argv[2:] or MODULES:
+        jobs, everything = [], []
+        modules = sys.argv[2:] or MODULES
+        for module in modules:
             include = ROOT / module / "include"
             headers = sorted(str(path.relative_to(include)) for path in include.rglob("*.hpp"))
-            flags = flags_of(build, module)
-            jobs.append(pool.submit(compiles, module + "/all", flags, headers, pathlib.Path(folder)))
+            everything += headers
+            flags = flags_of(build, [module])
             jobs += [pool.submit(compiles, h, flags, [h], pathlib.Path(folder)) for h in headers]
+        jobs.append(pool.submit(compiles, "all headers together", flags_of(build, modules), everything,
+                                pathlib.Path(folder)))
         for job in jobs:
             name, passed, errors = job.result()
             checked += 1
             if not passed:
                 failed += 1
-                print(f"{name} does not compile alone:\n{errors[:2000]}")
+                print(f"{name}: does not compile:\n{errors[:2000]}")
     print(f"{checked - failed} of {checked} compile")
     return 1 if failed or not checked else 0
 

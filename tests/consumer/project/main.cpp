@@ -7,17 +7,17 @@
 
 int main() {
   const bevel::model::NeedleParameters needle;
-  bevel::estimator::NeedleEstimator estimator(bevel::estimator::EstimatorConfig{});
+  const bevel::model::StepInput step{.insertion_mm = 0.1, .curvature_per_mm = {needle.curvature_per_mm, 0}};
+  bevel::estimator::NeedleEstimator estimator{bevel::estimator::EstimatorConfig()};
   bevel::model::Pose tip;
-  bevel::model::ActuatorState axes;
-  for (axes.utime = 1'000'000; axes.insertion_mm <= 100; axes.utime += 10'000, axes.insertion_mm += 0.1, ++axes.seq) {
-    bevel::model::TipMeasurement measurement{.utime = axes.utime, .seq = axes.seq, .position_mm = tip.p_mm};
-    measurement.information_per_mm2.setIdentity();
-    estimator.add(axes);
-    estimator.add(measurement);
-    bevel::model::advance(tip, {.insertion_mm = 0.1}, slip_parameters(needle));
+  for (int i = 0; i <= 1000; ++i) {
+    if (i > 0 && !bevel::model::advance(tip, step, slip_parameters(needle))) return 1;
+    const std::int64_t utime = 1'000'000 + 10'000 * i;
+    estimator.add(bevel::model::ActuatorState{.utime = utime, .seq = i, .insertion_mm = i * step.insertion_mm});
+    estimator.add(bevel::model::TipMeasurement{
+        .utime = utime, .seq = i, .position_mm = tip.p_mm, .information_per_mm2 = Eigen::Matrix3d::Identity()});
   }
-  const auto estimate = estimator.estimate(axes.utime);
-  std::cout << "true tip " << tip.p_mm.transpose() << " mm, estimated " << estimate.tip.p_mm.transpose() << " mm\n";
-  return (estimate.tip.p_mm - tip.p_mm).norm() < 1 ? 0 : 1;
+  const Eigen::Vector3d estimated = estimator.estimate(1'000'000 + 10'000 * 1000).tip.p_mm;
+  std::cout << "true tip " << tip.p_mm.transpose() << " mm, estimated " << estimated.transpose() << " mm\n";
+  return (estimated - tip.p_mm).norm() < 1 ? 0 : 1;
 }
