@@ -1,8 +1,10 @@
 #include <nanobind/stl/filesystem.h>
+#include <nanobind/stl/tuple.h>
 
 #include <cmath>
 #include <filesystem>
 #include <stdexcept>
+#include <tuple>
 
 #include "arrays.hpp"
 #include "io/live_effects.hpp"
@@ -61,8 +63,18 @@ std::string repr_of(const io::EffectEntry& effect) {
   return text + ")";
 }
 
-// By the model file's own checks: names, bounds, and what is required.
-void check(const std::vector<io::EffectEntry>& effects) { io::active_effects(effects, ""); }
+// Names, required parameters and bounds, as in a model file.
+void check(const std::vector<io::EffectEntry>& effects) {
+  io::active_effects(effects, "");
+  for (const io::EffectEntry& entry : effects)
+    for (const model::EffectParameter& parameter : model::find_effect(entry.name)->parameters()) {
+      const auto given = entry.parameters.find(std::string(parameter.name));
+      if (given == entry.parameters.end()) continue;
+      if (!(given->second >= parameter.lower && given->second <= parameter.upper))
+        throw std::invalid_argument("effect \"" + entry.name + "\": " + given->first + " is " + text_of(given->second) +
+                                    "; allowed: " + text_of(parameter.lower) + " to " + text_of(parameter.upper));
+    }
+}
 
 std::map<std::string, double> numbers(const nb::kwargs& arguments) {
   std::map<std::string, double> values;
@@ -122,6 +134,15 @@ void bind_needle(nb::module_& m) {
           nb::kw_only(), "curvature_per_mm"_a = nb::none(), "lambda1_per_rad"_a = nb::none(), "lambda2"_a = nb::none(),
           "wheelbase_mm"_a = nb::none(), "slip"_a = nb::none(), "front_wheel"_a = nb::none(),
           "Returns a copy with the given parameters replaced.")
+      .def("__getstate__",
+           [](const NeedleParameters& n) {
+             return nb::make_tuple(n.curvature_per_mm, n.lambda1_per_rad, n.lambda2, n.wheelbase_mm, name_of(n.slip),
+                                   name_of(n.front_wheel));
+           })
+      .def("__setstate__",
+           [](NeedleParameters& self, const std::tuple<double, double, double, double, std::string, std::string>& s) {
+             new (&self) NeedleParameters(std::apply(make_needle, s));
+           })
       .def("__eq__", [](const NeedleParameters& a, const NeedleParameters& b) { return a == b; })
       .def("__repr__", [](const NeedleParameters& n) { return repr_of(n); });
 }
@@ -248,6 +269,9 @@ void bind_model_file(nb::module_& m) {
       .def_prop_ro(
           "discrepancies", [](const ModelFile& self) { return self.discrepancies.size(); },
           "Number of discrepancy terms (unmodelled physics without a name).")
+      .def("__getstate__", [](const ModelFile& self) { return io::to_toml(self); })
+      .def("__setstate__",
+           [](ModelFile& self, const std::string& text) { new (&self) ModelFile(io::parse_model_file(text, "model")); })
       .def("__eq__", [](const ModelFile& a, const ModelFile& b) { return a == b; })
       .def("__repr__", [](const ModelFile& self) {
         std::string text = "Model(" + repr_of(self.needle);
