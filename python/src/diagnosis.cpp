@@ -115,7 +115,7 @@ void bind_diagnosis(nb::module_& m) {
           "verdict", [](const Verdict& v) { return diagnosis::name_of(v.findings.verdict, v.findings.two_groups); },
           "'nothing-missing', 'effects-found', 'unknown-effect' or 'inconclusive'; for two groups 'unchanged', "
           "'changed', 'changed-unknown' or 'inconclusive'.")
-      .def_prop_ro("sentence", part(&Findings::sentence), "What was found, a sentence.")
+      .def_prop_ro("sentence", part(&Findings::sentence), "Summary of the verdict, a sentence.")
       .def_prop_ro("probability", part(&Findings::probability), "Posterior probability of the verdict.")
       .def_prop_ro("reasons", part(&Findings::reasons), "Why likely effects are not named, or nothing is concluded.")
       .def_prop_ro("effects", part(&Findings::effects), "Effects that were found.")
@@ -127,10 +127,11 @@ void bind_diagnosis(nb::module_& m) {
       .def_prop_ro("needle_before", part(&Findings::base), "Needle refitted without effects.")
       .def_prop_ro("needle", part(&Findings::needle), "Needle refitted with the effects that were found.")
       .def_prop_ro("next_experiment", part(&Findings::next_experiment), "Motion that would decide; None: not needed.")
-      .def_prop_ro("remarks", part(&Findings::remarks), "What was not usable, and what cannot be distinguished.")
+      .def_prop_ro("remarks", part(&Findings::remarks),
+                   "Remarks: damaged input, and effects that cannot be distinguished.")
       .def_prop_ro("nothing_probability", part(&Findings::nothing_probability),
                    "Posterior probability that nothing is missing.")
-      .def_prop_ro("model", &model_of, "The model in use with what was found.")
+      .def_prop_ro("model", &model_of, "The model in use, with the effects that the verdict names.")
       .def("to_json", &json_of, "Returns the text of verdict.json (docs/verdict.schema.json).")
       .def(
           "to_dict", [](const Verdict& v) { return nb::module_::import_("json").attr("loads")(json_of(v)); },
@@ -155,7 +156,8 @@ void bind_diagnosis(nb::module_& m) {
         "    changed: insertions after a change; the verdict is then on what differs from `recordings`.\n"
         "    threads: number of threads; the verdict does not depend on it.\n"
         "    targets: number of simulated targets that are steered to with both models; 0: none.\n"
-        "    progress: called on this thread with a line of text between stages. What it raises ends the diagnosis.\n\n"
+        "    progress: called on this thread with a line of text between stages. An exception in it ends the "
+        "diagnosis.\n\n"
         "Raises:\n"
         "    ValueError: the recordings cannot be diagnosed together.\n"
         "    Error: a recording is damaged beyond use.\n"

@@ -35,7 +35,7 @@ void bind_effects(nb::module_& m) {
       .def_ro("std_error", &FoundParameter::std_error, "Standard error.")
       .def_ro("ci95", &FoundParameter::ci95, "Interval that holds 95 % of the posterior.")
       .def_ro("at_bound", &FoundParameter::at_bound, "The estimate is at a bound of the parameter.")
-      .def_ro("none", &FoundParameter::none, "Value at which the effect vanishes; NaN: there is none.")
+      .def_ro("none", &FoundParameter::none, "Value at which the effect vanishes, or NaN.")
       .def("__repr__",
            [](const FoundParameter& p) { return printed("<%s %.6g +- %.2g>", p.name.c_str(), p.value, p.std_error); });
   nb::class_<FoundInRecording>(m, "FoundInRecording", "Parameters of an effect in one recording.")
@@ -44,7 +44,7 @@ void bind_effects(nb::module_& m) {
           "parameters", [](const FoundInRecording& r) { return r.parameters; }, "Estimates.");
   nb::class_<FoundEffect>(m, "FoundEffect", "An effect that the recordings show and the model leaves out.")
       .def_ro("name", &FoundEffect::name, "Name in the effect library.")
-      .def_ro("meaning", &FoundEffect::meaning, "What the effect is, a clause.")
+      .def_ro("meaning", &FoundEffect::meaning, "Description of the effect, a clause.")
       .def_ro("probability", &FoundEffect::probability, "Posterior probability of the effect.")
       .def_ro("joint_probability", &FoundEffect::joint_probability,
               "Posterior probability of the effect or one of its confounders.")
@@ -111,10 +111,10 @@ void bind_figures(nb::module_& m) {
               "Chi-square per measurement; 1 is consistent with the predicted uncertainty.")
       .def_ro("log_density", &FitFigures::log_density, "Predictive log density per measurement, natural.");
   nb::class_<HeldOut>(m, "HeldOut", "Each recording predicted from the others.")
-      .def_ro("as_it_stands", &HeldOut::as_it_stands, "By the model file.")
+      .def_ro("as_it_stands", &HeldOut::as_it_stands, "Predicted by the model file.")
       .def_ro("before", &HeldOut::before, "With the needle refitted to the other recordings.")
       .def_ro("after", &HeldOut::after, "With the needle and the effects that the other recordings select.")
-      .def_ro("noise_floor", &HeldOut::noise_floor, "Of an exact prediction: noise alone.")
+      .def_ro("noise_floor", &HeldOut::noise_floor, "Expected for an exact prediction: noise alone.")
       .def_ro("gain", &HeldOut::gain, "Gain of log predictive density over all recordings, natural.");
   nb::class_<NextExperiment>(m, "NextExperiment", "A motion that separates two explanations.")
       .def_ro("script", &NextExperiment::script, "Motion to command.")

@@ -154,7 +154,7 @@ void bind_effect_types(nb::module_& m) {
           "name", [](const EffectParameter& p) { return std::string(p.name); }, "Name; it ends with the unit.")
       .def_ro("lower", &EffectParameter::lower, "Smallest allowed value.")
       .def_ro("upper", &EffectParameter::upper, "Largest allowed value.")
-      .def_ro("none", &EffectParameter::none, "Value at which the effect vanishes; NaN: there is none.")
+      .def_ro("none", &EffectParameter::none, "Value at which the effect vanishes, or NaN.")
       .def_prop_ro(
           "per_recording", [](const EffectParameter& p) { return p.scope == model::Scope::recording; },
           "Whether each recording has its own value (an event time, a phase).");
@@ -162,7 +162,8 @@ void bind_effect_types(nb::module_& m) {
       .def_prop_ro(
           "name", [](const model::Effect& e) { return std::string(e.name()); }, "Name in model files and verdicts.")
       .def_prop_ro(
-          "meaning", [](const model::Effect& e) { return std::string(e.meaning()); }, "What the effect is, a clause.")
+          "meaning", [](const model::Effect& e) { return std::string(e.meaning()); },
+          "Description of the effect, a clause.")
       .def_prop_ro(
           "parameters", [](const model::Effect& e) { return e.parameters(); },
           "The parameters, a list of EffectParameter.")
@@ -213,10 +214,13 @@ void bind_variation(nb::module_& m) {
           },
           nb::kw_only(), "curvature_relative"_a = 0.0, "entry_angle_rad"_a = 0.0, "entry_point_mm"_a = 0.0,
           "roll_rad"_a = 0.0)
-      .def_ro("curvature_relative", &Variation::curvature_relative, "Of the curvature, as a share of it.")
-      .def_ro("entry_angle_rad", &Variation::entry_angle_rad, "Of the heading at the entry about x and about y, rad.")
-      .def_ro("entry_point_mm", &Variation::entry_point_mm, "Of the entry point along x and along y, mm.")
-      .def_ro("roll_rad", &Variation::roll_rad, "Of the roll at the entry, rad.")
+      .def_ro("curvature_relative", &Variation::curvature_relative,
+              "Standard deviation of the curvature, as a share of it.")
+      .def_ro("entry_angle_rad", &Variation::entry_angle_rad,
+              "Standard deviation of the heading at the entry about x and about y, rad.")
+      .def_ro("entry_point_mm", &Variation::entry_point_mm,
+              "Standard deviation of the entry point along x and along y, mm.")
+      .def_ro("roll_rad", &Variation::roll_rad, "Standard deviation of the roll at the entry, rad.")
       .def("__repr__", [](const Variation& v) {
         return "Variation(curvature_relative=" + text_of(v.curvature_relative) +
                ", entry_angle_rad=" + text_of(v.entry_angle_rad) + ", entry_point_mm=" + text_of(v.entry_point_mm) +

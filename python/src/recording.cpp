@@ -141,7 +141,7 @@ void bind_recording(nb::module_& m) {
       .def_prop_ro(
           "intact", [](const Recording& r) { return r.data->intact(); },
           "Whether no byte and no message of the log was lost or rejected.")
-      .def_ro("remarks", &Recording::remarks, "What is damaged or implausible, one line each; '' if nothing is.")
+      .def_ro("remarks", &Recording::remarks, "Damaged or implausible parts, one line each; '' for none.")
       .def(
           "named",
           [](const Recording& r, const std::string& name) {

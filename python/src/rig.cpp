@@ -49,7 +49,7 @@ SimulatedRig beam_rig(double modulus_kPa, double force_N, double stiffness_N_mm2
 void bind_rig(nb::module_& m) {
   nb::class_<SimulatedRig>(m, "Rig",
                            "A simulated insertion: axes are moved, the tip is measured with noise, all is recorded.\n\n"
-                           "The same seed gives the same insertion.")
+                           "Equal seeds give equal insertions.")
       .def(
           "__init__",
           [](SimulatedRig* self, const io::ModelFile& model, const Sigma& noise_mm, double heading_noise_rad,

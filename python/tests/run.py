@@ -36,7 +36,7 @@ def run_pytest(python, env):
 
 
 def run_notebooks(python, env):
-    """Executes each notebook in a folder of its own; a cell that raises fails the test."""
+    """Executes each notebook; a cell that raises fails the test."""
     run([python, Path(__file__).with_name("run_notebooks.py"), ROOT / "python" / "notebooks"], env)
 
 

@@ -60,7 +60,9 @@ def test_late_measurements_give_the_same_state():
     samples = []
     for step in range(60):
         rig.move(0.1, 0.01, 0.02)
-        samples.append((rig.time_s, rig.insertion_mm, rig.rotation_rad, rig.measure_position() if step % 3 == 0 else None))
+        samples.append(
+            (rig.time_s, rig.insertion_mm, rig.rotation_rad, rig.measure_position() if step % 3 == 0 else None)
+        )
     in_order, late = (bevel.Estimator(bevel.Needle(0.0047, 0.3, 0.13)) for _ in range(2))
     waiting = []
     for time_s, insertion, rotation, measured in samples:
