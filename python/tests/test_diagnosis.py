@@ -50,7 +50,7 @@ def test_diagnose_finds_stick_slip(verdict):
     assert [effect.name for effect in found.effects] == ["stick_slip"]
     jump = found.effects[0].parameters[0]
     assert jump.name == "jump_mm" and abs(jump.value - 0.8725) < 1e-3
-    assert found.probability > 0.98
+    assert found.effects[0].probability > 0.98
     assert found.held_out.after.chi2_per_dof < found.held_out.before.chi2_per_dof
     assert lines and all(isinstance(line, str) for line in lines)
 

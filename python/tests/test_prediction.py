@@ -65,7 +65,7 @@ def test_standard_deviations_come_with_a_variation(flipping):
 def test_leaving_the_domain_is_a_domain_error():
     motion = bevel.Motion(np.array([0.0, 20.0]), np.array([0.0, 200.0]))
     with pytest.raises(bevel.DomainError, match="slip law"):
-        bevel.predict(bevel.Needle(0.02), motion)
+        bevel.predict(bevel.Needle(0.02, 0.3, 0.13, front_wheel="nonslip"), motion)
 
 
 @pytest.mark.parametrize(

@@ -37,7 +37,7 @@ def test_beam_bends_toward_its_bevel():
 
 
 def test_leaving_the_domain_moves_nothing():
-    rig = bevel.Rig(bevel.Needle(0.02))
+    rig = bevel.Rig(bevel.Needle(0.02, 0.3, 0.13, front_wheel="nonslip"))
     with pytest.raises(bevel.DomainError):
         for _ in range(200):
             rig.move(1.0, 0.0, 0.2)
