@@ -303,6 +303,9 @@ void bind_estimator(nb::module_& m) {
            "    insertion_rate_mm_s, rotation_rate_rad_s: rates, used by extrapolation only.")
       .def("add_position", &add_position, "time_s"_a, "position_mm"_a, "sigma_mm"_a = 0.2, nb::kw_only(),
            "information_per_mm2"_a = nb::none(), "camera"_a = 0,
+           nb::sig("def add_position(self, time_s: float, position_mm: numpy.typing.ArrayLike, sigma_mm: float | "
+                   "numpy.typing.ArrayLike = 0.2, *, information_per_mm2: numpy.typing.NDArray[numpy.float64] | None = "
+                   "None, camera: int = 0) -> None"),
            "Adds a measured position of the tip.\n\n"
            "Args:\n"
            "    time_s: time of capture, s.\n"
@@ -311,6 +314,8 @@ void bind_estimator(nb::module_& m) {
            "    information_per_mm2: inverse covariance, 1/mm^2, shape (3, 3), any rank, in place of sigma_mm.\n"
            "    camera: number of the camera.")
       .def("add_heading", &add_heading, "time_s"_a, "heading"_a, "sigma_rad"_a, nb::kw_only(), "camera"_a = 0,
+           nb::sig("def add_heading(self, time_s: float, heading: numpy.typing.ArrayLike, sigma_rad: float, *, "
+                   "camera: int = 0) -> None"),
            "Adds a measured heading.\n\n"
            "Args:\n"
            "    time_s: time of capture, s.\n"

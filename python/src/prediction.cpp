@@ -214,6 +214,8 @@ void bind_prediction(nb::module_& m) {
           "(n, 3, 4); None unless asked for.")
       .def("__len__", [](const Prediction& p) { return p.time_s.size(); });
   m.def("predict", &predict_motion, "model"_a, "motion"_a, "at_s"_a = nb::none(), nb::kw_only(), "jacobian"_a = false,
+        nb::sig("def predict(model: Model | Needle, motion: Motion, at_s: numpy.typing.NDArray[numpy.float64] | None = "
+                "None, *, jacobian: bool = False) -> Prediction"),
         "Predicts the path of the tip from the motion of the axes alone.\n\n"
         "The first sample of the motion is the entry: the tip is at the origin of {A}, its heading along z.\n\n"
         "Args:\n"
@@ -224,6 +226,7 @@ void bind_prediction(nb::module_& m) {
         "Raises:\n"
         "    DomainError: the needle leaves the domain of the slip law (Eq. 25).");
   m.def("predict", &predict_recording, "model"_a, "recording"_a, nb::kw_only(), "jacobian"_a = false,
+        nb::sig("def predict(model: Model | Needle, recording: Recording, *, jacobian: bool = False) -> Prediction"),
         "Predicts the measured positions of a recording from the motion of its axes; one row per position.");
 }
 
