@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: MIT
 """Steer bevel-tip needles, and identify unmodelled physics from recorded insertions.
 
 Units are mm, s and rad. Positions are in frame {A}: right-handed, origin at the entry point, z into the tissue.
@@ -8,6 +9,7 @@ from bevel._core import (
     Axes,
     CandidateFit,
     Commands,
+    ArgumentError,
     ConfigurationError,
     DetectableSize,
     DomainError,
@@ -59,6 +61,7 @@ __all__ = [
     "Axes",
     "CandidateFit",
     "Commands",
+    "ArgumentError",
     "ConfigurationError",
     "DetectableSize",
     "DomainError",

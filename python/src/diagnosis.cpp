@@ -1,24 +1,24 @@
+// SPDX-License-Identifier: MIT
 #include <nanobind/stl/filesystem.h>
 
 #include <algorithm>
 #include <filesystem>
-#include <stdexcept>
 #include <utility>
 
+#include <bevel/analysis/diagnose/diagnose_tool.hpp>
+#include <bevel/analysis/diagnose/read_case.hpp>
+#include <bevel/analysis/diagnose/report.hpp>
+#include <bevel/analysis/diagnose/result_files.hpp>
+#include <bevel/analysis/diagnose/steered.hpp>
+#include <bevel/analysis/diagnose/verdict_json.hpp>
+#include <bevel/diagnosis/mismatch/diagnose.hpp>
+#include <bevel/io/file_bytes.hpp>
+#include <bevel/io/recording_clock.hpp>
 #include "arrays.hpp"
-#include "diagnosis/mismatch/diagnose.hpp"
 #include "interruptible.hpp"
-#include "io/file_bytes.hpp"
-#include "io/recording_clock.hpp"
 #include "io_error.hpp"
 #include "module.hpp"
 #include "recording.hpp"
-#include "tools/diagnose/diagnose_tool.hpp"
-#include "tools/diagnose/read_case.hpp"
-#include "tools/diagnose/report.hpp"
-#include "tools/diagnose/result_files.hpp"
-#include "tools/diagnose/steered.hpp"
-#include "tools/diagnose/verdict_json.hpp"
 #include "verdict.hpp"
 
 namespace bevel::python {
@@ -42,7 +42,7 @@ Verdict run(const Question& question, Task& task) {
   const bool two_groups = !question.changed.empty();
   const auto take = [&](const Recording& recording, const std::string& group, bool changed) {
     const std::string name = group + recording.name;
-    if (const std::string remark = diagnose::judge_damage(name, *recording.data); !remark.empty())
+    if (const std::string remark = analysis::judge_damage(name, *recording.data); !remark.empty())
       remarks.push_back(remark);
     raw.push_back({.name = name,
                    .actuators = recording.data->actuators,
@@ -64,7 +64,7 @@ Verdict run(const Question& question, Task& task) {
   out.findings = diagnosis::diagnose(recorded, question.model.needle, options);
   if (question.targets > 0) {
     task.report("steering to targets");
-    diagnose::steer_to_targets(recorded, question.model, diagnose::model_of(out.findings, question.model),
+    analysis::steer_to_targets(recorded, question.model, analysis::model_of(out.findings, question.model),
                                {question.targets, question.threads}, out.findings);
   }
   out.findings.remarks.insert(out.findings.remarks.begin(), remarks.begin(), remarks.end());
@@ -78,16 +78,16 @@ void require_distinct_names(const std::vector<Recording>& recordings) {
   for (const Recording& recording : recordings) names.push_back(recording.name);
   std::ranges::sort(names);
   if (const auto twice = std::ranges::adjacent_find(names); twice != names.end())
-    throw std::invalid_argument("two recordings have the name \"" + *twice + "\"; give each its own by named()");
+    throw ArgumentError("two recordings have the name \"" + *twice + "\"; give each its own by named()");
 }
 
 Verdict diagnose_recordings(std::vector<Recording> recordings, const io::ModelFile& model,
                             std::vector<Recording> changed, int threads, int targets, nb::object progress) {
   constexpr int kMostThreads = 256, kMostTargets = 1000;
   if (threads < 1 || threads > kMostThreads)
-    throw std::invalid_argument("threads is " + std::to_string(threads) + "; allowed: 1 to 256");
+    throw ArgumentError("threads is " + std::to_string(threads) + "; allowed: 1 to 256");
   if (targets < 0 || targets > kMostTargets)
-    throw std::invalid_argument("targets is " + std::to_string(targets) + "; allowed: 0 to 1000");
+    throw ArgumentError("targets is " + std::to_string(targets) + "; allowed: 0 to 1000");
   require_distinct_names(recordings);
   require_distinct_names(changed);
   return compute_interruptible([question = Question{std::move(recordings), std::move(changed), model, threads,
@@ -95,14 +95,14 @@ Verdict diagnose_recordings(std::vector<Recording> recordings, const io::ModelFi
                                std::move(progress));
 }
 
-std::string json_of(const Verdict& v) { return diagnose::verdict_json(v.findings, v.made_of); }
-io::ModelFile model_of(const Verdict& v) { return diagnose::model_of(v.findings, v.in_use); }
+std::string json_of(const Verdict& v) { return analysis::verdict_json(v.findings, v.made_of); }
+io::ModelFile model_of(const Verdict& v) { return analysis::model_of(v.findings, v.in_use); }
 
 void save(const Verdict& v, const fs::path& folder) {
   const nb::gil_scoped_release release;
   with_io_errors([&] {
-    diagnose::check_writable(folder);
-    diagnose::write_together(folder, diagnose::result_files(v.findings, model_of(v), v.made_of));
+    analysis::check_writable(folder);
+    analysis::write_together(folder, analysis::result_files(v.findings, model_of(v), v.made_of));
   });
 }
 
@@ -137,7 +137,7 @@ void bind_diagnosis(nb::module_& m) {
           "to_dict", [](const Verdict& v) { return nb::module_::import_("json").attr("loads")(json_of(v)); },
           nb::sig("def to_dict(self) -> dict[str, typing.Any]"), "Returns the content of verdict.json.")
       .def(
-          "report_html", [](const Verdict& v) { return diagnose::report_html(v.findings, v.made_of); },
+          "report_html", [](const Verdict& v) { return analysis::report_html(v.findings, v.made_of); },
           "Returns the report, one HTML page that needs no network.")
       .def("save", &save, "folder"_a, "Writes verdict.json, report.html and model.toml into a folder.")
       .def("__repr__", [](const Verdict& v) {

@@ -1,10 +1,10 @@
+// SPDX-License-Identifier: MIT
 #include <nanobind/nanobind.h>
 
 #include <stdexcept>
 #include <string>
 
-#include "io/config.hpp"
-#include "io_error.hpp"
+#include <bevel/error.hpp>
 #include "module.hpp"
 
 namespace bevel::python {
@@ -15,6 +15,7 @@ struct Types {
   PyObject* error = nullptr;
   PyObject* configuration = nullptr;
   PyObject* io = nullptr;
+  PyObject* argument = nullptr;
   PyObject* domain = nullptr;
 };
 
@@ -36,11 +37,15 @@ void translate(const std::exception_ptr& thrown, void*) {
   const Types& type = types();
   try {
     std::rethrow_exception(thrown);
-  } catch (const io::ConfigError& e) {
+  } catch (const ConfigurationError& e) {
     PyErr_SetString(type.configuration, e.what());
   } catch (const IoError& e) {
     PyErr_SetString(type.io, e.what());
-  } catch (const std::domain_error& e) {
+  } catch (const ParseError& e) {
+    PyErr_SetString(type.io, e.what());
+  } catch (const ArgumentError& e) {
+    PyErr_SetString(type.argument, e.what());
+  } catch (const DomainError& e) {
     PyErr_SetString(type.domain, e.what());
   } catch (const std::runtime_error& e) {
     PyErr_SetString(type.error, e.what());
@@ -57,6 +62,8 @@ void bind_errors(nb::module_& m) {
                             "line, each with file and line.",
                             type.error);
   type.io = make(m, "IoError", "A file cannot be read or written, or its content cannot be used.", type.error);
+  type.argument = make(m, "ArgumentError", "An argument has a value that is not allowed.",
+                       nb::make_tuple(nb::handle(type.error), nb::handle(PyExc_ValueError)));
   type.domain = make(m, "DomainError", "The needle leaves the domain of the slip model (Eq. 25).",
                      nb::make_tuple(nb::handle(type.error), nb::handle(PyExc_ValueError)));
   nb::register_exception_translator(translate);

@@ -1,17 +1,17 @@
+// SPDX-License-Identifier: MIT
 #include "estimator.hpp"
 
 #include <nanobind/stl/filesystem.h>
 
 #include <cmath>
 #include <filesystem>
-#include <stdexcept>
 #include <utility>
 
+#include <bevel/estimator/health.hpp>
+#include <bevel/io/config.hpp>
+#include <bevel/io/estimator_config.hpp>
+#include <bevel/io/live_effects.hpp>
 #include "arrays.hpp"
-#include "estimator/health.hpp"
-#include "io/config.hpp"
-#include "io/estimator_config.hpp"
-#include "io/live_effects.hpp"
 #include "io_error.hpp"
 #include "module.hpp"
 #include "motion.hpp"
@@ -30,7 +30,7 @@ struct Estimator {
 };
 
 void require_finite(const Eigen::Vector3d& v, const char* what) {
-  if (!v.allFinite()) throw std::invalid_argument(std::string(what) + " is not finite");
+  if (!v.allFinite()) throw ArgumentError(std::string(what) + " is not finite");
 }
 
 using Sigma = std::variant<double, Vector3>;
@@ -42,8 +42,8 @@ Eigen::Matrix3d information_of(const Sigma& sigma) {
   Eigen::Matrix3d information = Eigen::Matrix3d::Zero();
   for (Eigen::Index i = 0; i < 3; ++i) {
     if (!(sd[i] > 0))
-      throw std::invalid_argument("sigma_mm is " + std::to_string(sd[i]) +
-                                  " mm; allowed: above 0, inf for an axis that was not measured");
+      throw ArgumentError("sigma_mm is " + std::to_string(sd[i]) +
+                          " mm; allowed: above 0, inf for an axis that was not measured");
     information(i, i) = std::isinf(sd[i]) ? 0 : 1 / (sd[i] * sd[i]);
   }
   return information;
@@ -51,9 +51,9 @@ Eigen::Matrix3d information_of(const Sigma& sigma) {
 
 Eigen::Matrix3d information_of(const nb::DRef<const Eigen::MatrixXd>& matrix, const char* name) {
   if (matrix.rows() != 3 || matrix.cols() != 3)
-    throw std::invalid_argument(std::string(name) + " is " + std::to_string(matrix.rows()) + " x " +
-                                std::to_string(matrix.cols()) + "; allowed: 3 x 3");
-  if (!matrix.allFinite()) throw std::invalid_argument(std::string(name) + " is not finite");
+    throw ArgumentError(std::string(name) + " is " + std::to_string(matrix.rows()) + " x " +
+                        std::to_string(matrix.cols()) + "; allowed: 3 x 3");
+  if (!matrix.allFinite()) throw ArgumentError(std::string(name) + " is not finite");
   return matrix;
 }
 
@@ -96,9 +96,8 @@ void add_heading(Estimator& self, double time_s, const Vector3& heading, double 
   reading.heading = to_eigen(heading);
   require_finite(reading.heading, "heading");
   if (std::abs(reading.heading.norm() - 1) > kUnit)
-    throw std::invalid_argument("heading has length " + std::to_string(reading.heading.norm()) +
-                                "; allowed: 1, within 0.001");
-  if (!(sigma_rad > 0)) throw std::invalid_argument("sigma_rad is " + std::to_string(sigma_rad) + "; allowed: above 0");
+    throw ArgumentError("heading has length " + std::to_string(reading.heading.norm()) + "; allowed: 1, within 0.001");
+  if (!(sigma_rad > 0)) throw ArgumentError("sigma_rad is " + std::to_string(sigma_rad) + "; allowed: above 0");
   reading.heading.normalize();
   reading.information_per_rad2 =
       (Eigen::Matrix3d::Identity() - reading.heading * reading.heading.transpose()) / (sigma_rad * sigma_rad);
@@ -119,8 +118,7 @@ void setting(nb::class_<EstimatorConfig>& config, const char* name, Get get, con
       [get, name](EstimatorConfig& c, Value value) {
         if constexpr (std::is_same_v<Value, double>)
           if (!(value >= 0) || !std::isfinite(value))
-            throw std::invalid_argument(std::string(name) + " is " + std::to_string(value) +
-                                        "; allowed: 0 and above, finite");
+            throw ArgumentError(std::string(name) + " is " + std::to_string(value) + "; allowed: 0 and above, finite");
         get(c) = value;
       },
       doc);
@@ -284,7 +282,7 @@ void bind_estimator(nb::module_& m) {
           [](Estimator* self, const io::ModelFile& model, const EstimatorConfig& config, std::size_t history) {
             constexpr std::size_t kLeast = 4, kMost = 100'000;
             if (history < kLeast || history > kMost)
-              throw std::invalid_argument("history is " + std::to_string(history) + "; allowed: 4 to 100000");
+              throw ArgumentError("history is " + std::to_string(history) + "; allowed: 4 to 100000");
             new (self) Estimator{estimator::NeedleEstimator(for_model(config, model), history)};
           },
           "model"_a, "config"_a = EstimatorConfig{}, "history"_a = 64,

@@ -1,8 +1,9 @@
+// SPDX-License-Identifier: MIT
 #pragma once
 /// \file
 /// The estimator's configuration and estimate, as bevel.EstimatorConfig and bevel.Estimate hold them.
-#include "estimator/needle_estimator.hpp"
-#include "io/model_file.hpp"
+#include <bevel/estimator/needle_estimator.hpp>
+#include <bevel/io/model_file.hpp>
 
 namespace bevel::python {
 

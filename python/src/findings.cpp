@@ -1,7 +1,8 @@
+// SPDX-License-Identifier: MIT
 #include <utility>
 
+#include <bevel/diagnosis/mismatch/findings.hpp>
 #include "arrays.hpp"
-#include "diagnosis/mismatch/findings.hpp"
 #include "module.hpp"
 
 #include <nanobind/stl/pair.h>

@@ -1,13 +1,14 @@
+// SPDX-License-Identifier: MIT
 #include <algorithm>
-#include <stdexcept>
 #include <utility>
 
+#include <bevel/diagnosis/identification/angle_rate.hpp>
+#include <bevel/diagnosis/identification/candidates.hpp>
+#include <bevel/error.hpp>
+#include <bevel/io/model_file.hpp>
+#include <bevel/io/second_insertion.hpp>
 #include "arrays.hpp"
-#include "diagnosis/identification/angle_rate.hpp"
-#include "diagnosis/identification/candidates.hpp"
 #include "interruptible.hpp"
-#include "io/model_file.hpp"
-#include "io/second_insertion.hpp"
 #include "module.hpp"
 #include "recording.hpp"
 
@@ -45,12 +46,12 @@ diagnosis::Priors priors_of(const std::string& name) {
   if (name == "none") return {};
   if (name == "table1-agar") return diagnosis::table_one_agar();
   if (name == "table1-plastisol") return diagnosis::table_one_plastisol();
-  throw std::invalid_argument("prior is \"" + name + "\"; allowed: \"none\", \"table1-agar\", \"table1-plastisol\"");
+  throw ArgumentError("prior is \"" + name + "\"; allowed: \"none\", \"table1-agar\", \"table1-plastisol\"");
 }
 
 void require_needle_alone(const io::ModelFile& model) {
   if (!model.effects.empty() || !model.discrepancies.empty() || model.variation)
-    throw std::invalid_argument(
+    throw ArgumentError(
         "the model has effects, discrepancy terms or a variation; identify() fits the needle alone, use diagnose()");
 }
 
@@ -62,16 +63,16 @@ Identification identify(const std::vector<Recording>& recordings, const model::N
   out.candidates = diagnosis::fit_candidates(insertions, options);
   out.preferred = bicycle ? 0 : diagnosis::preferred(out.candidates);
   const Candidate& preferred = out.candidates[out.preferred];
-  if (!preferred.possible) throw std::runtime_error(preferred.model + ": " + preferred.why);
+  if (!preferred.possible) throw DomainError(preferred.model + ": " + preferred.why);
   out.needle = preferred.fit.needle;
   if (angle_rate) {
     out.needle = diagnosis::fit_angle_rate(insertions, start).needle;
     if (const auto violation = model::find_domain_violation(out.needle))
-      throw std::domain_error("the angle-rate fit leaves the model's domain: " + model::describe(*violation));
+      throw DomainError("the angle-rate fit leaves the model's domain: " + model::describe(*violation));
   }
   try {
     out.before = diagnosis::error_figures(insertions, start, diagnosis::Compare::same_insertion);
-  } catch (const std::domain_error&) {  // the start need not be able to follow the recordings
+  } catch (const DomainError&) {  // the start need not be able to follow the recordings
   }
   out.after = diagnosis::error_figures(insertions, out.needle, diagnosis::Compare::same_insertion,
                                        angle_rate ? std::vector<diagnosis::Entry>{} : preferred.fit.entries);
@@ -83,8 +84,8 @@ Identification identify_recordings(const std::vector<Recording>& recordings, con
                                    bool fit_wheelbase, bool fit_slip_in_plane, double entry_tilt_rad,
                                    double entry_roll_rad, double entry_offset_mm) {
   if (method != "trajectory" && method != "angle-rate")
-    throw std::invalid_argument("method is \"" + method + "\"; allowed: \"trajectory\", \"angle-rate\"");
-  if (recordings.empty()) throw std::invalid_argument("no recording is given; at least one is needed");
+    throw ArgumentError("method is \"" + method + "\"; allowed: \"trajectory\", \"angle-rate\"");
+  if (recordings.empty()) throw ArgumentError("no recording is given; at least one is needed");
   require_needle_alone(model);
   FitOptions options;
   options.start = model.needle;

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 #include "interruptible.hpp"
 
 #include <nanobind/stl/string.h>

@@ -1,17 +1,17 @@
+// SPDX-License-Identifier: MIT
 #include <nanobind/stl/filesystem.h>
 #include <nanobind/stl/tuple.h>
 
 #include <cmath>
 #include <filesystem>
-#include <stdexcept>
 #include <tuple>
 
+#include <bevel/io/live_effects.hpp>
+#include <bevel/io/model_file.hpp>
+#include <bevel/model/effects/effect.hpp>
+#include <bevel/model/needle.hpp>
 #include "arrays.hpp"
-#include "io/live_effects.hpp"
-#include "io/model_file.hpp"
 #include "io_error.hpp"
-#include "model/effects/effect.hpp"
-#include "model/needle.hpp"
 #include "module.hpp"
 
 namespace bevel::python {
@@ -22,7 +22,7 @@ using model::NeedleParameters;
 model::SlipDirection slip_of(const std::string& name) {
   if (name == "isotropic") return model::SlipDirection::isotropic;
   if (name == "bevel-plane") return model::SlipDirection::bevel_plane;
-  throw std::invalid_argument("slip is \"" + name + "\"; allowed: \"isotropic\", \"bevel-plane\"");
+  throw ArgumentError("slip is \"" + name + "\"; allowed: \"isotropic\", \"bevel-plane\"");
 }
 const char* name_of(model::SlipDirection slip) {
   return slip == model::SlipDirection::isotropic ? "isotropic" : "bevel-plane";
@@ -30,7 +30,7 @@ const char* name_of(model::SlipDirection slip) {
 model::FrontWheel front_wheel_of(const std::string& name) {
   if (name == "published") return model::FrontWheel::published;
   if (name == "nonslip") return model::FrontWheel::nonslip;
-  throw std::invalid_argument("front_wheel is \"" + name + "\"; allowed: \"published\", \"nonslip\"");
+  throw ArgumentError("front_wheel is \"" + name + "\"; allowed: \"published\", \"nonslip\"");
 }
 const char* name_of(model::FrontWheel front_wheel) {
   return front_wheel == model::FrontWheel::published ? "published" : "nonslip";
@@ -44,8 +44,7 @@ NeedleParameters make_needle(double k, double lambda1, double lambda2, double wh
                                 .lambda2 = lambda2,
                                 .slip = slip_of(slip),
                                 .front_wheel = front_wheel_of(front_wheel)};
-  if (const auto violation = model::find_domain_violation(needle))
-    throw std::invalid_argument(model::describe(*violation));
+  if (const auto violation = model::find_domain_violation(needle)) throw ArgumentError(model::describe(*violation));
   return needle;
 }
 
@@ -71,8 +70,8 @@ void check(const std::vector<io::EffectEntry>& effects) {
       const auto given = entry.parameters.find(std::string(parameter.name));
       if (given == entry.parameters.end()) continue;
       if (!(given->second >= parameter.lower && given->second <= parameter.upper))
-        throw std::invalid_argument("effect \"" + entry.name + "\": " + given->first + " is " + text_of(given->second) +
-                                    "; allowed: " + text_of(parameter.lower) + " to " + text_of(parameter.upper));
+        throw ArgumentError("effect \"" + entry.name + "\": " + given->first + " is " + text_of(given->second) +
+                            "; allowed: " + text_of(parameter.lower) + " to " + text_of(parameter.upper));
     }
 }
 
@@ -209,7 +208,7 @@ void bind_variation(nb::module_& m) {
           [](Variation* self, double curvature, double angle, double point, double roll) {
             for (const double sd : {curvature, angle, point, roll})
               if (!(sd >= 0) || !std::isfinite(sd))
-                throw std::invalid_argument("a standard deviation is " + text_of(sd) + "; allowed: 0 and above");
+                throw ArgumentError("a standard deviation is " + text_of(sd) + "; allowed: 0 and above");
             new (self) Variation{curvature, angle, point, roll};
           },
           nb::kw_only(), "curvature_relative"_a = 0.0, "entry_angle_rad"_a = 0.0, "entry_point_mm"_a = 0.0,

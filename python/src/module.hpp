@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 #pragma once
 /// \file
 /// Parts of the module bevel._core: each function registers the classes and functions of one source file.

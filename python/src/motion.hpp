@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 #pragma once
 /// \file
 /// The motion of the two axes, and times as Python has them.
@@ -5,7 +6,7 @@
 #include <cstdint>
 #include <vector>
 
-#include "model/samples.hpp"
+#include <bevel/model/samples.hpp>
 
 namespace bevel::python {
 

@@ -1,13 +1,14 @@
+// SPDX-License-Identifier: MIT
 #include <algorithm>
 #include <cmath>
 #include <cstdio>
 #include <numbers>
-#include <stdexcept>
 
+#include <bevel/error.hpp>
+#include <bevel/io/model_file.hpp>
+#include <bevel/model/effects/open_loop.hpp>
+#include <bevel/model/effects/prediction_spread.hpp>
 #include "arrays.hpp"
-#include "io/model_file.hpp"
-#include "model/effects/open_loop.hpp"
-#include "model/effects/prediction_spread.hpp"
 #include "module.hpp"
 #include "motion.hpp"
 #include "recording.hpp"
@@ -34,7 +35,7 @@ struct Prediction {
                 "the needle leaves the domain of the slip law (Eq. 25) at %.3f s, %.1f mm of insertion, with its "
                 "heading at %.0f degrees to z",
                 state.base.time_s, state.base.insertion_mm, model::tilt_rad(state.pose) * 180 / std::numbers::pi);
-  throw std::domain_error(text.data());
+  throw DomainError(text.data());
 }
 
 Prediction predict_at(const io::ModelFile& model, const std::string& log, const std::vector<model::ActuatorState>& axes,
@@ -67,7 +68,7 @@ Prediction predict_motion(const io::ModelFile& model, const AxisMotion& motion, 
   const std::vector<model::ActuatorState> axes = actuator_states(motion);
   std::vector<std::int64_t> utimes;
   for (const double time_s : times) utimes.push_back(utime_of(time_s));
-  if (!std::ranges::is_sorted(utimes)) throw std::invalid_argument("at_s decreases; allowed: times in order");
+  if (!std::ranges::is_sorted(utimes)) throw ArgumentError("at_s decreases; allowed: times in order");
   const nb::gil_scoped_release release;
   Prediction out = predict_at(model, "", axes, utimes, with_jacobian);
   out.time_s = times;
@@ -81,10 +82,9 @@ Prediction predict_recording(const io::ModelFile& model, const Recording& record
   std::vector<std::int64_t> utimes;
   for (const model::TipMeasurement& tip : recording.data->tips) utimes.push_back(tip.utime);
   if (axes.empty() || utimes.empty())
-    throw std::invalid_argument(recording.name + ": has no axis sample or no position; both are needed");
+    throw ArgumentError(recording.name + ": has no axis sample or no position; both are needed");
   if (!std::ranges::is_sorted(utimes))
-    throw std::invalid_argument(recording.name +
-                                ": positions are not in order of time; allowed: a log in order of time");
+    throw ArgumentError(recording.name + ": positions are not in order of time; allowed: a log in order of time");
   Prediction out = predict_at(model, recording.name, axes, utimes, with_jacobian);
   out.time_s.resize(static_cast<Eigen::Index>(utimes.size()));
   for (std::size_t i = 0; i < utimes.size(); ++i)
@@ -96,16 +96,16 @@ Prediction predict_recording(const io::ModelFile& model, const Recording& record
 AxisMotion motion_from_legs(const nb::DRef<const Eigen::MatrixXd>& legs, double rate_hz) {
   constexpr double kSlowest_hz = 1e-3, kFastest_hz = 1e5;
   if (legs.cols() != 3 || legs.rows() == 0)
-    throw std::invalid_argument("legs is " + std::to_string(legs.rows()) + " x " + std::to_string(legs.cols()) +
-                                "; allowed: n x 3, n above 0: insertion_mm, rotation_rad, duration_s");
+    throw ArgumentError("legs is " + std::to_string(legs.rows()) + " x " + std::to_string(legs.cols()) +
+                        "; allowed: n x 3, n above 0: insertion_mm, rotation_rad, duration_s");
   if (!(rate_hz >= kSlowest_hz && rate_hz <= kFastest_hz))
-    throw std::invalid_argument("rate_hz is " + std::to_string(rate_hz) + "; allowed: 0.001 to 100000");
+    throw ArgumentError("rate_hz is " + std::to_string(rate_hz) + "; allowed: 0.001 to 100000");
   std::vector<Eigen::Vector3d> nodes{Eigen::Vector3d::Zero()};  // time, insertion, rotation
   for (Eigen::Index i = 0; i < legs.rows(); ++i) {
     const double duration_s = legs(i, 2);
     if (!(duration_s > 0) || !std::isfinite(duration_s))
-      throw std::invalid_argument("duration of leg " + std::to_string(i) + " is " + std::to_string(duration_s) +
-                                  " s; allowed: above 0");
+      throw ArgumentError("duration of leg " + std::to_string(i) + " is " + std::to_string(duration_s) +
+                          " s; allowed: above 0");
     const Eigen::Vector3d from = nodes.back();
     const double steps = std::max(1.0, std::round(duration_s * rate_hz));
     for (double step = 1; step <= steps; ++step)
@@ -158,23 +158,23 @@ void bind_motion(nb::module_& m) {
 void AxisMotion::validate() const {
   const Eigen::Index n = time_s.size();
   if (n < 2 || insertion_mm.size() != n || rotation_rad.size() != n)
-    throw std::invalid_argument("time_s, insertion_mm and rotation_rad have " + std::to_string(n) + ", " +
-                                std::to_string(insertion_mm.size()) + " and " + std::to_string(rotation_rad.size()) +
-                                " samples; allowed: the same number, at least 2");
+    throw ArgumentError("time_s, insertion_mm and rotation_rad have " + std::to_string(n) + ", " +
+                        std::to_string(insertion_mm.size()) + " and " + std::to_string(rotation_rad.size()) +
+                        " samples; allowed: the same number, at least 2");
   for (Eigen::Index i = 0; i < n; ++i) {
     const std::string at = " of sample " + std::to_string(i);
     if (!std::isfinite(insertion_mm[i]) || !std::isfinite(rotation_rad[i]))
-      throw std::invalid_argument("insertion or rotation" + at + " is not finite");
+      throw ArgumentError("insertion or rotation" + at + " is not finite");
     if (i > 0 && utime_of(time_s[i]) <= utime_of(time_s[i - 1]))
-      throw std::invalid_argument("time_s" + at + " is " + std::to_string(time_s[i]) + " s, after " +
-                                  std::to_string(time_s[i - 1]) + " s; allowed: later by 1 us or more");
+      throw ArgumentError("time_s" + at + " is " + std::to_string(time_s[i]) + " s, after " +
+                          std::to_string(time_s[i - 1]) + " s; allowed: later by 1 us or more");
   }
 }
 
 std::int64_t utime_of(double time_s) {
   constexpr double kLatest_s = 1e10;
   if (!(time_s >= 0 && time_s <= kLatest_s))
-    throw std::invalid_argument("time is " + std::to_string(time_s) + " s; allowed: 0 to 1e10 s");
+    throw ArgumentError("time is " + std::to_string(time_s) + " s; allowed: 0 to 1e10 s");
   return kZero_us + std::llround(time_s * 1e6);
 }
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 #include "recording.hpp"
 
 #include <nanobind/stl/filesystem.h>
@@ -7,14 +8,13 @@
 #include <cstdio>
 #include <filesystem>
 #include <iterator>
-#include <stdexcept>
 #include <tuple>
 #include <utility>
 
+#include <bevel/io/csv_export.hpp>
+#include <bevel/io/csv_import.hpp>
+#include <bevel/io/recording_clock.hpp>
 #include "arrays.hpp"
-#include "io/csv_export.hpp"
-#include "io/csv_import.hpp"
-#include "io/recording_clock.hpp"
 #include "io_error.hpp"
 #include "module.hpp"
 #include "motion.hpp"

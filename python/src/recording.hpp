@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 #pragma once
 /// \file
 /// A recording in memory, as bevel.Recording holds it.
@@ -5,7 +6,7 @@
 #include <memory>
 #include <string>
 
-#include "io/recording.hpp"
+#include <bevel/io/recording.hpp>
 
 namespace bevel::python {
 

@@ -1,10 +1,11 @@
+// SPDX-License-Identifier: MIT
 #include "recording_tables.hpp"
 
 #include <string>
 #include <utility>
 
+#include <bevel/model/samples.hpp>
 #include "arrays.hpp"
-#include "model/samples.hpp"
 
 namespace bevel::python {
 namespace {

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 #pragma once
 /// \file
 /// One channel of a recording as a table of NumPy views.
@@ -7,7 +8,7 @@
 #include <memory>
 #include <vector>
 
-#include "io/recording.hpp"
+#include <bevel/io/recording.hpp>
 
 namespace bevel::python {
 

@@ -1,14 +1,15 @@
+// SPDX-License-Identifier: MIT
 #include <algorithm>
 #include <cmath>
-#include <stdexcept>
 #include <utility>
 
+#include <bevel/error.hpp>
+#include <bevel/estimator/needle_estimator.hpp>
+#include <bevel/io/live_effects.hpp>
+#include <bevel/io/motion_gap.hpp>
 #include "arrays.hpp"
 #include "estimator.hpp"
-#include "estimator/needle_estimator.hpp"
 #include "interruptible.hpp"
-#include "io/live_effects.hpp"
-#include "io/motion_gap.hpp"
 #include "module.hpp"
 #include "recording.hpp"
 
@@ -106,7 +107,7 @@ Replay run(const Recording& recording, estimator::EstimatorConfig config, std::s
   const io::Recording& data = *recording.data;
   std::vector<model::ActuatorState> sorted = data.actuators;
   std::ranges::stable_sort(sorted, {}, &model::ActuatorState::utime);
-  if (sorted.empty()) throw std::invalid_argument(recording.name + ": has no axis sample; at least one is needed");
+  if (sorted.empty()) throw ArgumentError(recording.name + ": has no axis sample; at least one is needed");
   if (config.axes.gap_s > 0 && sorted.size() > 1) config.axes.gap_s = io::longest_interval_s(sorted, config.axes.gap_s);
   estimator::NeedleEstimator needle(config, history);
   std::vector<Row> rows;

@@ -1,14 +1,15 @@
+// SPDX-License-Identifier: MIT
 #include <cmath>
 #include <memory>
-#include <stdexcept>
 #include <utility>
 
+#include <bevel/error.hpp>
+#include <bevel/io/model_file.hpp>
+#include <bevel/model/beam/beam_plant.hpp>
+#include <bevel/model/effects/variation.hpp>
+#include <bevel/rig/plant/plant.hpp>
 #include "arrays.hpp"
-#include "io/model_file.hpp"
-#include "model/beam/beam_plant.hpp"
-#include "model/effects/variation.hpp"
 #include "module.hpp"
-#include "rig/plant/plant.hpp"
 #include "simulated_rig.hpp"
 
 namespace bevel::python {
@@ -22,8 +23,8 @@ SimulatedRig::Noise noise_of(const Sigma& sigma, double heading_rad) {
                             heading_rad};
   for (const double sd : {noise.sigma_mm[0], noise.sigma_mm[1], noise.sigma_mm[2], heading_rad})
     if (!(sd > 0))
-      throw std::invalid_argument("a standard deviation of the noise is " + std::to_string(sd) +
-                                  "; allowed: above 0, inf for an axis that is not measured");
+      throw ArgumentError("a standard deviation of the noise is " + std::to_string(sd) +
+                          "; allowed: above 0, inf for an axis that is not measured");
   return noise;
 }
 

@@ -1,11 +1,12 @@
+// SPDX-License-Identifier: MIT
 #include "simulated_rig.hpp"
 
 #include <algorithm>
 #include <cmath>
 #include <iterator>
-#include <stdexcept>
 
-#include "model/kinematics.hpp"
+#include <bevel/error.hpp>
+#include <bevel/model/kinematics.hpp>
 
 namespace bevel::python {
 namespace {
@@ -17,8 +18,8 @@ void require_inside_domain(const rig::Plant& plant, double insertion_mm, double 
   model::Pose pose = plant.tip();
   const model::StepInput input{insertion_mm, rotation_rad, Eigen::Vector2d(needle.curvature_per_mm, 0)};
   if (!model::advance(pose, input, model::slip_parameters(needle)))
-    throw std::domain_error("the needle leaves the domain of the slip law (Eq. 25): its heading is at " +
-                            std::to_string(model::tilt_rad(plant.tip())) + " rad to z");
+    throw DomainError("the needle leaves the domain of the slip law (Eq. 25): its heading is at " +
+                      std::to_string(model::tilt_rad(plant.tip())) + " rad to z");
 }
 
 }  // namespace
@@ -44,10 +45,10 @@ void SimulatedRig::record_axes(double insertion_rate_mm_s, double rotation_rate_
 
 void SimulatedRig::move(double insertion_mm, double rotation_rad, double duration_s) {
   if (!std::isfinite(insertion_mm) || !std::isfinite(rotation_rad))
-    throw std::invalid_argument("insertion_mm or rotation_rad is not finite");
+    throw ArgumentError("insertion_mm or rotation_rad is not finite");
   constexpr double kShortest_s = 1e-4, kLongest_s = 3600;
   if (!(duration_s >= kShortest_s && duration_s <= kLongest_s))
-    throw std::invalid_argument("duration is " + std::to_string(duration_s) + " s; allowed: 1e-4 to 3600 s");
+    throw ArgumentError("duration is " + std::to_string(duration_s) + " s; allowed: 1e-4 to 3600 s");
   const double steps = std::max({1.0, std::ceil(std::abs(insertion_mm) / kLongestStep_mm - 1e-9),
                                  std::ceil(std::abs(rotation_rad) / kLargestStep_rad - 1e-9),
                                  std::ceil(duration_s / kLongestStep_s - 1e-9)});
@@ -122,7 +123,7 @@ Eigen::Vector3d SimulatedRig::measure_heading() {
 void SimulatedRig::follow(const AxisMotion& motion, double camera_hz, bool headings) {
   constexpr double kFastest_hz = 1000;
   if (!(camera_hz >= 0 && camera_hz <= kFastest_hz))
-    throw std::invalid_argument("camera_hz is " + std::to_string(camera_hz) + "; allowed: 0 to 1000");
+    throw ArgumentError("camera_hz is " + std::to_string(camera_hz) + "; allowed: 0 to 1000");
   const double start_s = time_s_, period_s = camera_hz > 0 ? 1 / camera_hz : motion.time_s.maxCoeff() * 2 + 1;
   double due_s = start_s;
   const auto measure_if_due = [&] {

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT
 #pragma once
 /// \file
 /// A simulated insertion: the plant, its axes and its measurements, recorded as a rig would.
@@ -7,10 +8,10 @@
 #include <string>
 #include <vector>
 
-#include "io/recording.hpp"
+#include <bevel/io/recording.hpp>
+#include <bevel/rig/plant/plant.hpp>
 #include "motion.hpp"
 #include "recording.hpp"
-#include "rig/plant/plant.hpp"
 
 namespace bevel::python {
 

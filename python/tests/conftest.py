@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: MIT
 """Shared inputs of the tests."""
 
 from pathlib import Path

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: MIT
 """Pure NumPy versions of two computations of the library, written from the equations alone.
 
 - predict(): the extended bicycle model, integrated by the classical Runge-Kutta method of fourth order.

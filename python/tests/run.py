@@ -1,4 +1,5 @@
 #!/usr/bin/env python3
+# SPDX-License-Identifier: MIT
 """Runs the tests of the Python package.
 
 Usage: run.py build-tree PACKAGE | run.py notebooks PACKAGE | run.py wheel

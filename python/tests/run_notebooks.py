@@ -1,4 +1,5 @@
 #!/usr/bin/env python3
+# SPDX-License-Identifier: MIT
 """Executes every notebook of a folder, and fails at the first cell that raises.
 
 Usage: run_notebooks.py FOLDER

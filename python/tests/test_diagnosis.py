@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: MIT
 """identify() and diagnose() on simulated insertions."""
 
 import _thread

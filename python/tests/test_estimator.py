@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: MIT
 """bevel.Estimator against the pure NumPy oracle, and its use."""
 
 import numpy as np

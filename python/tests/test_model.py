@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: MIT
 """Needles, effects and model files."""
 
 import pickle

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: MIT
 """bevel.predict against the pure NumPy oracle."""
 
 import numpy as np

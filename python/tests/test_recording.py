@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: MIT
 """Logs and CSV files as arrays."""
 
 import numpy as np

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: MIT
 """Simulated insertions, and a closed loop in Python."""
 
 import numpy as np
