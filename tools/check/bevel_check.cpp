@@ -24,10 +24,10 @@ int main(int argc, char** argv) {
   return command_line.run(argc, argv, [&] {
     nodes::catch_signals();
     const nodes::SystemConfig config = nodes::load_system_config(config_path);
-    const auto findings = drivers::check_all(config, lcm_url.empty() ? config.lcm_url : lcm_url,
-                                             can.empty() ? config.can : can, config_path);
+    const auto findings = nodes::check_all(config, lcm_url.empty() ? config.lcm_url : lcm_url,
+                                           can.empty() ? config.can : can, config_path);
     std::fputs(drivers::to_text(findings).c_str(), stdout);
-    if (nodes::stop_requested()) throw bevel::IoError("interrupted: what is above is not all");
+    if (nodes::stop_requested()) throw bevel::Error("interrupted: what is above is not all");
     return drivers::any_failed(findings) ? cli::kFailed : cli::kOk;
   });
 }

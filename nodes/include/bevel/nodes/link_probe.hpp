@@ -14,12 +14,12 @@
 namespace bevel::nodes {
 
 // Sends itself messages on a channel that nobody else reads.
-MulticastMeasured measure_multicast(lcm::LCM& lcm);
+drivers::MulticastMeasured measure_multicast(lcm::LCM& lcm);
 
 // Findings about the bus and the drives on it; an address that can never work is one of them. Takes 2 to 5 s, in which
 // `meanwhile` is called about every millisecond.
-Findings check_bus(const stepper::StepperConfig& config, const std::string& address, const std::string& system_file,
-                   const std::function<void()>& meanwhile);
+drivers::Findings check_bus(const stepper::StepperConfig& config, const std::string& address,
+                            const std::string& system_file, const std::function<void()>& meanwhile);
 
 // Lateness of each wake-up of a loop of this period, for a second.
 std::vector<std::int64_t> measure_lateness(std::int64_t period_ns);
@@ -30,18 +30,18 @@ class CameraEars {
   explicit CameraEars(lcm::LCM& lcm);  // must outlive this
   void listen();                       // handles what has arrived
   std::int64_t listened_ns() const;
-  std::map<int, CameraMeasured> heard() const;
+  std::map<int, drivers::CameraMeasured> heard() const;
 
  private:
   lcm::LCM& lcm_;
   std::int64_t begun_ns_;
-  std::map<int, CameraMeasured> cameras_;
+  std::map<int, drivers::CameraMeasured> cameras_;
   std::map<int, std::int64_t> last_ns_;
   nodes::LcmPort port_;
 };
 
 // All of them, in the order in which one is needed for the next.
-Findings check_all(const nodes::SystemConfig& config, const std::string& lcm_url, const std::string& can,
-                   const std::string& system_file);
+drivers::Findings check_all(const nodes::SystemConfig& config, const std::string& lcm_url, const std::string& can,
+                            const std::string& system_file);
 
 }  // namespace bevel::nodes
