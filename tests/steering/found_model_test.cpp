@@ -12,6 +12,9 @@
 #include <bevel/diagnosis/parallel.hpp>
 
 namespace bevel::rig {
+
+using namespace analysis;  // NOLINT(google-build-using-namespace): rigs and figures of a model file
+
 namespace {
 
 constexpr std::uint64_t kSeed = 20'261'129;

@@ -33,7 +33,7 @@ constexpr double kFarewell_s = 0.3;  // for the stop and what follows it to reac
 
 enum class End { at_depth, stopped, died, timed_out, interrupted };
 
-End steer(SteeringSession& session, ProcessGroup& processes, lcm::LCM& lcm, const DemoOptions& options) {
+End steer(SteeringSession& session, nodes::ProcessGroup& processes, lcm::LCM& lcm, const DemoOptions& options) {
   End end = End::interrupted;
   const std::int64_t start_ns = nodes::now().ns;
   const auto step = [&](const nodes::Now& now, double) {
@@ -81,7 +81,7 @@ std::string program_of(const nodes::Fault& fault) {
 }
 
 // Not one of the processes that the needle depends on.
-void start_view(ProcessGroup& viewer, const std::string& lcm_url, const DemoOptions& options) {
+void start_view(nodes::ProcessGroup& viewer, const std::string& lcm_url, const DemoOptions& options) {
   const std::string log_path = options.out + "/bevel-view.txt";
   std::vector<std::string> command{options.programs + "/bevel-view"};
   if (!lcm_url.empty()) command.insert(command.end(), {"--lcm-url", lcm_url});
@@ -121,7 +121,7 @@ int run_demo(const DemoOptions& options) {
   End end = End::interrupted;
   bool clean = false;
   {
-    ProcessGroup viewer, processes;
+    nodes::ProcessGroup viewer, processes;
     if (options.view) start_view(viewer, config.lcm_url, options);
     for (const char* program : kPrograms) {
       std::vector<std::string> command{options.programs + "/" + program, "--config", options.config_path};

@@ -17,13 +17,13 @@ int main(int argc, char** argv) {
                       "send each camera's picture, made small, so often, for bevel-view; 0: never", 0.0,
                       nodes::kMostPictures_hz);
   command_line.flag("--print", print, "print each observation as CSV");
-  return cli::process_main(command_line, argc, argv, nodes::camera_process_name, [&](cli::ProcessContext& context) {
+  return tools::process_main(command_line, argc, argv, nodes::camera_process_name, [&](tools::ProcessContext& context) {
     nodes::SystemConfig& config = context.config;
     if (!source.empty()) config.source.path = source;
     if (config.source.kind == camera::SourceKind::folder || config.source.kind == camera::SourceKind::video)
       config.source.start_utime = nodes::now().utime;
     nodes::CameraNode node(context.lcm, config, pictures_hz);
-    cli::inject(context, node.port());
+    tools::inject(context, node.port());
     if (!record.empty()) node.record(record);
     if (print) {
       std::puts("utime,seq,camera,status,x_mm,y_mm,z_mm,u_px,v_px,reason");

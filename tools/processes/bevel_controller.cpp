@@ -10,10 +10,10 @@ int main(int argc, char** argv) {
       "bevel-controller", "Steers the needle to the target on STEERING_TARGET, and stops it when anything is wrong.");
   command_line.example("bevel-controller --config config/demo.toml");
   const auto name = [](const nodes::SystemConfig&) { return "bevel-controller"; };
-  return cli::process_main(command_line, argc, argv, name, kPriority, [](cli::ProcessContext& context) {
-    cli::warn_of_effects_left_out(context.config, "bevel-controller");
+  return tools::process_main(command_line, argc, argv, name, kPriority, [](tools::ProcessContext& context) {
+    tools::warn_of_effects_left_out(context.config, "bevel-controller");
     nodes::ControllerNode node(context.lcm, context.config);
-    cli::inject(context, node.port());
+    tools::inject(context, node.port());
     const nodes::Loop loop{context.config.controller.period_s, [&](const nodes::Now& now) { node.tell_time(now); },
                            [&](const nodes::Now& now, double late_s) {
                              node.step(now, late_s);

@@ -11,10 +11,10 @@ int main(int argc, char** argv) {
       "Estimates the needle's pose, curvature and lambda from tip measurements, headings and axis positions.");
   command_line.example("bevel-estimator --config config/demo.toml");
   const auto name = [](const nodes::SystemConfig&) { return "bevel-estimator"; };
-  return cli::process_main(command_line, argc, argv, name, [](cli::ProcessContext& context) {
-    cli::warn_of_effects_left_out(context.config, "bevel-estimator");
+  return tools::process_main(command_line, argc, argv, name, [](tools::ProcessContext& context) {
+    tools::warn_of_effects_left_out(context.config, "bevel-estimator");
     nodes::EstimatorNode node(context.lcm, context.config.estimator, nodes::motion_bounds(context.config.stepper));
-    cli::inject(context, node.port());
+    tools::inject(context, node.port());
     // Messages are handled as they arrive; the period is that of the health checks.
     nodes::run_periodic(context.lcm, {0.01, [&](const nodes::Now& now) { node.tell_time(now); },
                                       [&](const nodes::Now& now, double) {

@@ -15,7 +15,7 @@ int main(int argc, char** argv) {
   cli::CommandLine command_line("bevel-rig", "Simulates needle, cameras and drives; the other processes cannot tell.");
   command_line.example("bevel-rig --config config/demo.toml");
   const auto name = [](const nodes::SystemConfig&) { return "bevel-rig"; };
-  return cli::process_main(command_line, argc, argv, name, [](cli::ProcessContext& context) {
+  return tools::process_main(command_line, argc, argv, name, [](tools::ProcessContext& context) {
     const nodes::SystemConfig& config = context.config;
     // On a local bus the rig is also the hub; a CAN interface needs none.
     constexpr std::string_view kLocal = "unix:";
@@ -36,7 +36,7 @@ int main(int argc, char** argv) {
     if (config.rig.variation != model::Variation{})
       std::fprintf(stderr, "bevel-rig: this insertion differs, drawn with seed %lld: %s\n",
                    static_cast<long long>(config.rig.seed), model::describe(node.own_values()).c_str());
-    if (context.fault) node.break_drive(*context.fault, context.started_ns, cli::kFaultSeed);
+    if (context.fault) node.break_drive(*context.fault, context.started_ns, tools::kFaultSeed);
     const nodes::Loop loop{0.001, {}, [&](const nodes::Now& now, double) {
                              node.step(now);
                              return true;

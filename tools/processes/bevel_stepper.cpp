@@ -15,11 +15,11 @@ int main(int argc, char** argv) {
   std::string can;
   command_line.option("--can", can, "bus instead of the file's: can0, or unix:/path for the rig's local bus");
   const auto name = [](const nodes::SystemConfig&) { return "bevel-stepper"; };
-  return cli::process_main(command_line, argc, argv, name, kPriority, [&](cli::ProcessContext& context) {
+  return tools::process_main(command_line, argc, argv, name, kPriority, [&](tools::ProcessContext& context) {
     const stepper::StepperConfig& config = context.config.stepper;
     const auto bus = can::open_bus(can.empty() ? context.config.can : can, stepper::StepperDriver::listen_ids(config));
     nodes::StepperNode node(context.lcm, *bus, config);
-    cli::inject(context, node.port());
+    tools::inject(context, node.port());
     const auto loop = [&](bool to_rest) {
       return nodes::Loop{static_cast<double>(config.period_ns) * 1e-9,
                          [&](const nodes::Now& now) { node.tell_time(now); },

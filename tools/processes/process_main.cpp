@@ -12,7 +12,7 @@
 
 namespace bevel::tools {
 
-int process_main(CommandLine& command_line, int argc, char** argv, const ProcessName& name, int realtime_priority,
+int process_main(cli::CommandLine& command_line, int argc, char** argv, const ProcessName& name, int realtime_priority,
                  const ProcessBody& body) {
   std::string config_path, lcm_url, fault;
   int parent = 0;

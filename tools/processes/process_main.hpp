@@ -27,9 +27,9 @@ using ProcessName = std::function<std::string(const nodes::SystemConfig& config)
 // Adds --config, --lcm-url, --fault and --end-with, parses, loads, starts LCM, catches signals, claims the name, runs.
 // realtime_priority: of SCHED_FIFO, asked for before LCM starts where the file wants it, so that the thread on which
 // LCM receives has it too; a refusal is said and not fatal. 0: never. Returns the exit status.
-int process_main(CommandLine& command_line, int argc, char** argv, const ProcessName& name, int realtime_priority,
+int process_main(cli::CommandLine& command_line, int argc, char** argv, const ProcessName& name, int realtime_priority,
                  const ProcessBody& body);
-inline int process_main(CommandLine& command_line, int argc, char** argv, const ProcessName& name,
+inline int process_main(cli::CommandLine& command_line, int argc, char** argv, const ProcessName& name,
                         const ProcessBody& body) {
   return process_main(command_line, argc, argv, name, 0, body);
 }

@@ -81,8 +81,8 @@ TargetingFigure summarised(const std::vector<rig::Insertion>& insertions, double
 std::vector<Eigen::Vector3d> choose_targets(const model::NeedleParameters& needle, double deepest_mm) {
   std::vector<Eigen::Vector3d> targets;
   for (const double share : kDepthShares) {
-    const double depth_mm = share * std::min(deepest_mm, rig::kDeepestTarget_mm);
-    const double radius_mm = rig::kShareOfFarthestAside * analysis::farthest_aside_mm(needle, depth_mm);
+    const double depth_mm = share * std::min(deepest_mm, analysis::kDeepestTarget_mm);
+    const double radius_mm = analysis::kShareOfFarthestAside * analysis::farthest_aside_mm(needle, depth_mm);
     for (int i = 0; i < kDirections; ++i) {
       const double angle = 2 * std::numbers::pi * (i + 0.25) / kDirections;
       const Eigen::Vector3d target(radius_mm * std::cos(angle), radius_mm * std::sin(angle), depth_mm);

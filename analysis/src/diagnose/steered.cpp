@@ -53,7 +53,7 @@ std::vector<Eigen::Vector3d> draw_targets(int count, const std::array<double, 2>
                                           const model::NeedleParameters& one, const model::NeedleParameters& other) {
   constexpr int kTries = 20;  // for each
   constexpr double kTolerance_mm = 1;
-  const double widest_mm = rig::kShareOfFarthestAside * std::min(analysis::farthest_aside_mm(one, depth_mm[0]),
+  const double widest_mm = analysis::kShareOfFarthestAside * std::min(analysis::farthest_aside_mm(one, depth_mm[0]),
                                                                  analysis::farthest_aside_mm(other, depth_mm[0]));
   std::mt19937_64 random(kSeed);
   std::uniform_real_distribution<double> share(0, 1);
@@ -142,7 +142,7 @@ void steer_to_targets(const RecordedCase& recorded, const io::ModelFile& in_use,
                       const SteeringOptions& options, Findings& f) {
   const auto moved = moved_at_depth(f);
   if (options.targets < 1 || f.two_groups || !moved || !moves_the_tip(f)) return;
-  const double deepest_mm = std::min(moved->depth_mm[1], rig::kDeepestTarget_mm);
+  const double deepest_mm = std::min(moved->depth_mm[1], analysis::kDeepestTarget_mm);
   f.not_steered = obstacle_to_steering(recorded, f, in_use, deepest_mm);
   if (!f.not_steered.empty()) return;
   const std::array<double, 2> depth_mm{kShallowestShare * deepest_mm, deepest_mm};

@@ -8,8 +8,8 @@
 
 namespace bevel::analysis {
 
-Believed believed_of(const io::ModelFile& model) {
-  Believed out;
+rig::Believed believed_of(const io::ModelFile& model) {
+  rig::Believed out;
   out.estimator.prior.needle = model.needle;
   out.estimator.prior.variation = model.variation.value_or(model::Variation{});
   out.estimator.effects = out.undone = io::live_effects(model.effects, model.discrepancies).active;
@@ -31,8 +31,8 @@ std::vector<model::ActiveEffect> for_one_insertion(const io::ModelFile& model, d
   return effects;
 }
 
-Cameras cameras_of(const diagnosis::RecordedCase& recorded, const inference::Noise& noise) {
-  Cameras cameras;
+rig::Cameras cameras_of(const diagnosis::RecordedCase& recorded, const inference::Noise& noise) {
+  rig::Cameras cameras;
   cameras.ar1 = noise.ar1, cameras.frame_s = noise.frame_s;
   for (std::size_t c = 0; c < recorded.channels.size(); ++c)
     if (!recorded.channels[c].heading)

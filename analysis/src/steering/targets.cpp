@@ -21,6 +21,9 @@
 #include <bevel/rig/steering/scenarios.hpp>
 
 namespace bevel::analysis {
+
+using namespace rig;  // NOLINT(google-build-using-namespace): scenarios and simulated insertions
+
 namespace {
 
 struct LawTried {

@@ -14,14 +14,14 @@ namespace bevel::analysis {
 
 // The estimator and the controller by their defaults, of the model what bevel-estimator and bevel-controller take of
 // it: effects that are known before an insertion, and no others (bevel/io/live_effects.hpp).
-Believed believed_of(const io::ModelFile& model);
+rig::Believed believed_of(const io::ModelFile& model);
 
 // The model's effects as another insertion of this duration might have them: their angles of single recordings
 // anywhere, their instants while the needle goes in. The same for the same seed.
 std::vector<model::ActiveEffect> for_one_insertion(const io::ModelFile& model, double duration_s, std::uint64_t seed);
 
 // Cameras that see the tip as those of the recordings, with this noise.
-Cameras cameras_of(const diagnosis::RecordedCase& recorded, const inference::Noise& noise);
+rig::Cameras cameras_of(const diagnosis::RecordedCase& recorded, const inference::Noise& noise);
 
 /// Computes the lateral distance of the tip, mm, where a needle that never rotates reaches a depth (mm along z of {A}),
 /// or where it turns back before it.
