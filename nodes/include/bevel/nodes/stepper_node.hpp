@@ -2,11 +2,11 @@
 #pragma once
 // bevel-stepper: MOTION_COMMAND in, the two axes over CAN, ACTUATOR_STATE out.
 //
-// The operator's word is STEERING_TARGET (bevel/nodes/operator_words.hpp): arm re-arms a latched stop and enables the
-// axes, stop stops them. Axes count from the entry point. Where the drives' own counters stand near zero at the start,
-// the first arm takes that as the entry; where they do not, the needle may be in the tissue, and a word has to say
-// which it is: `entry`, the tip is at the entry point now, or `confirm`, the counters still count from there. The same
-// after a drive was lost.
+// STEERING_TARGET carries the operator's command (bevel/nodes/operator_words.hpp): arm clears a latched stop and
+// enables the axes, stop stops them. Axes count from the entry point. Where the drives' own counters stand near zero at
+// the start, the first arm takes that as the entry; where they do not, the needle may be in the tissue, and the
+// operator has to command which it is: `entry`, the tip is at the entry point now, or `confirm`, the counters still
+// count from there. The same after a drive was lost.
 #include <optional>
 #include <string>
 

@@ -3,8 +3,8 @@
 // A picture of a needle whose tip is known: what the trackers of drivers/src/camera are measured against. The
 // silhouette is that of a cylinder cut by a plane (the bevel), supersampled; then bubbles, what stands before it,
 // uneven light, glare, blur, gain and noise in the order in which light meets them. Lens and refraction move the
-// background and the axis's points (optics.hpp), not the needle's width. Each is off, or as small as it says, unless it
-// is asked for.
+// background and the axis's points (optics.hpp), not the needle's width. Each disturbance is off, or has
+// the stated small default, unless it is configured.
 #include <cstdint>
 #include <memory>
 #include <opencv2/core.hpp>
