@@ -4,7 +4,6 @@
 #include "diagnosis/mismatch/findings.hpp"
 #include "module.hpp"
 
-#include <nanobind/stl/pair.h>
 
 namespace bevel::python {
 namespace {
