@@ -4,7 +4,6 @@
 #include "diagnosis/mismatch/findings.hpp"
 #include "module.hpp"
 
-
 namespace bevel::python {
 namespace {
 
