@@ -5,6 +5,7 @@ Units are mm, s and rad. Positions are in frame {A}: right-handed, origin at the
 docs/python.md is a short how-to.
 """
 
+from bevel._core import VERSION as __version__
 from bevel._core import (
     ArgumentError,
     Axes,
@@ -47,7 +48,6 @@ from bevel._core import (
     Variation,
     VariationEstimate,
     Verdict,
-    __version__,
     diagnose,
     effect_types,
     identify,

@@ -5,8 +5,6 @@
 #include "arrays.hpp"
 #include "module.hpp"
 
-#include <nanobind/stl/pair.h>
-
 namespace bevel::python {
 namespace {
 

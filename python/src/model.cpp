@@ -142,7 +142,9 @@ void bind_needle(nb::module_& m) {
            [](NeedleParameters& self, const std::tuple<double, double, double, double, std::string, std::string>& s) {
              new (&self) NeedleParameters(std::apply(make_needle, s));
            })
-      .def("__eq__", [](const NeedleParameters& a, const NeedleParameters& b) { return a == b; })
+      .def(
+          "__eq__", [](const NeedleParameters& a, const NeedleParameters& b) { return a == b; }, nb::is_operator(),
+          nb::sig("def __eq__(self, other: object, /) -> bool"))
       .def("__repr__", [](const NeedleParameters& n) { return repr_of(n); });
 }
 
@@ -196,7 +198,9 @@ void bind_effect_types(nb::module_& m) {
       .def_prop_ro(
           "recordings", [](const io::EffectEntry& e) { return e.recordings; },
           "Values of single recordings: name of the log -> values by name.")
-      .def("__eq__", [](const io::EffectEntry& a, const io::EffectEntry& b) { return a == b; })
+      .def(
+          "__eq__", [](const io::EffectEntry& a, const io::EffectEntry& b) { return a == b; }, nb::is_operator(),
+          nb::sig("def __eq__(self, other: object, /) -> bool"))
       .def("__repr__", [](const io::EffectEntry& e) { return repr_of(e); });
 }
 
@@ -275,7 +279,9 @@ void bind_model_file(nb::module_& m) {
       .def("__getstate__", [](const ModelFile& self) { return io::to_toml(self); })
       .def("__setstate__",
            [](ModelFile& self, const std::string& text) { new (&self) ModelFile(io::parse_model_file(text, "model")); })
-      .def("__eq__", [](const ModelFile& a, const ModelFile& b) { return a == b; })
+      .def(
+          "__eq__", [](const ModelFile& a, const ModelFile& b) { return a == b; }, nb::is_operator(),
+          nb::sig("def __eq__(self, other: object, /) -> bool"))
       .def("__repr__", [](const ModelFile& self) {
         std::string text = "Model(" + repr_of(self.needle);
         if (!self.effects.empty()) {

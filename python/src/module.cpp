@@ -14,7 +14,7 @@ constexpr const char* kDoc =
 NB_MODULE(_core, m) {
   using namespace bevel::python;  // NOLINT(google-build-using-namespace): the macro opens the scope
   m.doc() = kDoc;
-  m.attr("__version__") = BEVEL_VERSION;
+  m.attr("VERSION") = BEVEL_VERSION;
   bind_errors(m);
   bind_interruptible(m);
   bind_model(m);

@@ -20,6 +20,7 @@ def test_needle_replaced():
     other = needle.replaced(curvature_per_mm=-0.004)
     assert (other.k, other.lambda1, needle.k) == (-0.004, 0.3, 0.005)
     assert needle == bevel.Needle(0.005, 0.3, 0.13) != other
+    assert needle != 3
     assert eval(repr(needle), {"Needle": bevel.Needle}) == needle
 
 

@@ -243,8 +243,6 @@ bool GeneratorSystem::read(const proof::Setting& setting, const Plant& plant, st
     return false;
   } catch (const ArgumentError&) {
     return false;
-  } catch (const DomainError&) {
-    return false;
   }
   return out.allFinite();
 }
