@@ -90,11 +90,11 @@ Identification identify_recordings(const std::vector<Recording>& recordings, con
   FitOptions options;
   options.start = model.needle;
   options.priors = priors_of(prior);
-  options.fitted[diagnosis::kWheelbase] = fit_wheelbase;
+  options.fitted[diagnosis::kNeedleWheelbase] = fit_wheelbase;
   options.fit_slip_in_plane = fit_slip_in_plane;
-  options.entry_sigma(diagnosis::kTiltX) = options.entry_sigma(diagnosis::kTiltY) = entry_tilt_rad;
-  options.entry_sigma(diagnosis::kRoll) = entry_roll_rad;
-  options.entry_sigma(diagnosis::kOffsetX) = options.entry_sigma(diagnosis::kOffsetY) = entry_offset_mm;
+  options.entry_sigma(diagnosis::kEntryTiltX) = options.entry_sigma(diagnosis::kEntryTiltY) = entry_tilt_rad;
+  options.entry_sigma(diagnosis::kEntryRoll) = entry_roll_rad;
+  options.entry_sigma(diagnosis::kEntryOffsetX) = options.entry_sigma(diagnosis::kEntryOffsetY) = entry_offset_mm;
   return compute_interruptible([recordings, start = model.needle, options, angle_rate = method == "angle-rate",
                                 bicycle](Task&) { return identify(recordings, start, options, angle_rate, bicycle); },
                                nb::none());

@@ -24,7 +24,7 @@ class SimulatedRig {
   SimulatedRig(std::unique_ptr<rig::Plant> plant, const Noise& noise, std::uint64_t seed);
 
   /// Moves the axes by increments at constant rates within \p duration_s, and records an axis sample at the end.
-  /// @throws std::domain_error before anything moves, where the needle would leave the domain of the slip law
+  /// @throws DomainError before anything moves, where the needle would leave the domain of the slip law
   void move(double insertion_mm, double rotation_rad, double duration_s);
   /// Measures the position, records it with the truth, and returns it; NaN along an axis that is not measured.
   Eigen::Vector3d measure_position();
