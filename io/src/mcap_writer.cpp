@@ -54,7 +54,7 @@ void Writer::Times::add(std::uint64_t time_ns, bool is_first) {
 
 Writer::Writer(const std::string& path)
     : path_(path), unfinished_(path + ".unfinished"), file_(std::fopen(unfinished_.c_str(), "wbe")) {
-  if (!file_) throw ParseError(path_ + ": cannot be written: " + std::strerror(errno));
+  if (!file_) throw IoError(path_ + ": cannot be written: " + std::strerror(errno));
   emit(kMagic);
   emit(Content().text("").text("bevel").record(Op::header));
 }
@@ -68,7 +68,7 @@ Writer::~Writer() {
 
 void Writer::put_bytes(std::string_view bytes) {
   if (std::fwrite(bytes.data(), 1, bytes.size(), file_.get()) != bytes.size())
-    throw ParseError(path_ + ": cannot be written: " + std::strerror(errno));
+    throw IoError(path_ + ": cannot be written: " + std::strerror(errno));
   offset_ += bytes.size();
 }
 
@@ -218,7 +218,7 @@ void Writer::close() {
     const std::string reason = std::strerror(errno);
     std::error_code ignored;
     std::filesystem::remove(unfinished_, ignored);
-    throw ParseError(path_ + ": cannot be written: " + reason);
+    throw IoError(path_ + ": cannot be written: " + reason);
   }
   std::filesystem::rename(unfinished_, path_);
 }

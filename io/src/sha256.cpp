@@ -30,7 +30,7 @@ std::string sha256_hex(std::string_view bytes) {
 
 std::string sha256_of_file(const std::string& path) {
   std::ifstream file(path, std::ios::binary);
-  if (!file) throw ParseError(path + ": cannot be read");
+  if (!file) throw IoError(path + ": cannot be read");
   const std::string bytes{std::istreambuf_iterator<char>(file), {}};
   return sha256_hex(bytes);
 }

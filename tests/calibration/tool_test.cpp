@@ -33,7 +33,7 @@ const camera::BoardSpec kBoard{BoardKind::charuco, 8, 6, 9.0, 6.75};
 const cv::Vec3d kEntry_W = test::kBox_mm + cv::Vec3d(0, -30, 0);
 const cv::Matx33d kR_WA = test::turned(0.03, -0.02, 0.02) * cv::Matx33d(0, 1, 0, 0, 0, 1, 1, 0, 0);  // x ahead, z down
 
-// BoardPictures of two cameras: 10 places in air, 8 immersed, a fiducial in the needle's plane; made once, they take
+// Pictures of two cameras: 10 places in air, 8 immersed, a fiducial in the needle's plane; made once, they take
 // seconds.
 class Tool : public testing::Test {
  protected:

@@ -4,8 +4,8 @@
 #include <Eigen/Cholesky>
 #include <Eigen/LU>
 #include <algorithm>
+#include <bevel/error.hpp>
 #include <cmath>
-#include <stdexcept>
 
 #include <bevel/model/slip.hpp>
 

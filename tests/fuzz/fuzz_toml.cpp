@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// Arbitrary text as each of the TOML files. It is refused with a ConfigError that says where, or it is a
+// Arbitrary text as each of the TOML files. It is rejected with a ConfigError that states the place, or it is a
 // configuration: a model file then survives being written and read, to the last bit, and can be put to work.
 #include <cmath>
 #include <limits>

@@ -199,7 +199,7 @@ CalibrationVerdict verdict_of(const Calibrated& got) {
             " % of the image. If the needle goes where the maps below are empty, take pictures of the board there."};
   return {
       good, "Good",
-      "BoardPictures that were held out are predicted to the precision of the corners, and the lens is determined to " +
+      "Pictures that were held out are predicted to the precision of the corners, and the lens is determined to " +
           format_significant(100 * error, 2) + " % of the focal length."};
 }
 
@@ -270,11 +270,11 @@ void write_report(const Calibrated& got, const BoardSettings& told, const std::s
   for (const std::string& table : told.tables) tables += (tables.empty() ? "" : "\n\n") + table;
   page.code(tables);
   page.paragraph(
-      "Then look at what the cameras say: bevel-check, and bevel-camera --config SYSTEM.toml. BoardPictures of another "
+      "Then look at what the cameras say: bevel-check, and bevel-camera --config SYSTEM.toml. Pictures of another "
       "size "
       "are refused, "
       "and so is the file if a byte of it has changed.");
-  page.heading("BoardPictures");
+  page.heading("Pictures");
   tell_pictures(got, page);
   page.save((std::filesystem::path(folder) / "report.html").string());
 }

@@ -160,7 +160,7 @@ int run(const std::string& model_path, const std::string& log_path, std::ostream
     if (!headings.empty()) out << cells_of(headings, p.utime);
     out << '\n';
   }
-  if (!(out << std::flush)) throw ParseError("the output cannot be written");
+  if (!(out << std::flush)) throw IoError("the output cannot be written");
   return recording.intact() ? cli::kOk : cli::kDamagedInput;
 }
 

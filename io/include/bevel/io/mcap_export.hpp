@@ -17,7 +17,7 @@ namespace bevel::io {
 // JSON of a message takes up to three times what the log has of it.
 inline constexpr std::uint64_t kLargestMcap_bytes = 3 * kLargestLog_bytes;
 
-// Throws ParseError naming the file where it cannot be written; there is none then.
+// Throws IoError naming the file if it cannot be written; no file is left then.
 void export_mcap(const Recording& recording, const std::string& path);
 
 struct ImportedMcap {

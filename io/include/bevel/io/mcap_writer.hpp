@@ -16,7 +16,7 @@ namespace bevel::io::mcap {
 
 class Writer {
  public:
-  // A file that is there whole or not at all: it has another name until close(). Throws ParseError naming the
+  // A file that is there whole or not at all: it has another name until close(). Throws IoError naming the
   // file and the reason, as all of these do.
   explicit Writer(const std::string& path);
   ~Writer();

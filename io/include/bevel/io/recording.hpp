@@ -65,7 +65,7 @@ struct Recording {
 };
 
 Recording read_recording(std::span<const std::uint8_t> log);
-// Throws ParseError if the file cannot be read; damage inside it is reported in the result.
+// Throws IoError if the file cannot be read; damage inside it is reported in the result.
 Recording read_recording(const std::string& path);
 // Throws ParseError with the name and the refusal, if there is one.
 void require_usable(const std::string& name, const Recording& recording);

@@ -62,7 +62,7 @@ struct RigSd {
 };
 
 /// Improves `rig`; `loss_px`: from where on a corner counts less (Huber's), 0 for least squares. Throws
-/// Error if Ceres cannot go on, naming what it says.
+/// DomainError with the message of Ceres if Ceres fails.
 void fit_rig(const Board& board, const std::vector<Shot>& shots, const FitOptions& options, double loss_px, Rig& rig);
 
 /// Standard deviations at the end of a fit by least squares, by the residuals' own scatter. Throws
