@@ -74,7 +74,7 @@ double PathFit::aside_mm(double depth_mm) const {
 
 PathFit fit_path(const std::vector<PathTip>& tips, PathModel model) {
   const int n = free_parameters(model);
-  if (static_cast<int>(tips.size()) < std::min(n, 4)) throw std::invalid_argument("path: fewer tips than parameters");
+  if (static_cast<int>(tips.size()) < std::min(n, 4)) throw bevel::ArgumentError("path: fewer tips than parameters");
   PathFit fit;
   fit.model = model;
   fit.first_depth_mm = tips.front().depth_mm;
