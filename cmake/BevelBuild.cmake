@@ -124,6 +124,7 @@ function(bevel_program name)
 endfunction()
 
 # bevel_test(NAME SOURCES... [LINK libs...] [LABELS labels...]): a GoogleTest program; ctest lists each of its tests.
+# Label `long`: more than 10 s in all. Every other test without the label `slow` has the label `fast`.
 # Label `threads`: the tests start threads of this project's code, so the thread sanitizer runs them (preset tsan).
 add_custom_target(threaded_tests)
 set(BEVEL_TEST_TIMEOUT 300)
@@ -132,6 +133,9 @@ if(BEVEL_SANITIZE)
 endif()
 function(bevel_test name)
   cmake_parse_arguments(arg "" "" "LINK;LABELS" ${ARGN})
+  if(NOT arg_LABELS MATCHES "slow|long|nightly|processes|can|beam")
+    list(APPEND arg_LABELS fast)
+  endif()
   add_executable(test_${name} ${arg_UNPARSED_ARGUMENTS})
   target_link_libraries(test_${name} PRIVATE bevel_options ${arg_LINK} GTest::gmock GTest::gtest_main)
   target_compile_definitions(test_${name} PRIVATE BEVEL_SOURCE_DIR="${PROJECT_SOURCE_DIR}"
