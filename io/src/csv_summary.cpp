@@ -116,8 +116,7 @@ std::string lag_line(const ImportedRecording& r) {
   if (!r.lag) return "";
   const BaseLag& lag = *r.lag;
   const std::string value = text("%.2f +- %.2f s", lag.lag_s, lag.sd_s);
-  if (!lag.determined)
-    return "  lag      of the base relative to the tip: not determined by this motion (" + value + ")\n";
+  if (!lag.determined) return "  lag      of the base relative to the tip: not determined by this motion\n";
   if (!lag.significant()) return "  lag      of the base relative to the tip: " + value + ", consistent with none\n";
   return "  lag      of the base relative to the tip: " + value +
          "; not corrected. To correct it, put into the map: " + r.lag_setting + "\n";

@@ -4,9 +4,9 @@
 #include <Eigen/Cholesky>
 #include <Eigen/LU>
 #include <algorithm>
-#include <bevel/error.hpp>
 #include <cmath>
 
+#include <bevel/error.hpp>
 #include <bevel/model/slip.hpp>
 
 namespace bevel::test {
