@@ -99,6 +99,21 @@ TEST(Violations, AValueAtTheEndOfItsRangeIsMarked) {
   EXPECT_THAT(violations(f), IsEmpty());
 }
 
+TEST(Violations, AnEquationWhoseSizeMayBeNoneIsOne) {
+  Findings f = sound();
+  f.proposals = {{.equation = "a exp(-x / s)",
+                  .amplitude = -58,
+                  .amplitude_sd = 668,
+                  .shape = 1,
+                  .shape_low = 0.5,
+                  .shape_high = 2}};
+  EXPECT_THAT(violations(f), UnorderedElementsAre(HasSubstr("includes none")));
+  f.proposals[0].amplitude_sd = 20;
+  EXPECT_THAT(violations(f), IsEmpty());
+  f.proposals[0].shape = 0.4;
+  EXPECT_THAT(violations(f), UnorderedElementsAre(HasSubstr("outside its interval")));
+}
+
 TEST(Violations, AnInconclusiveVerdictNamesNothingAndStatesWhy) {
   Findings f = sound();
   f.verdict = Verdict::inconclusive;

@@ -89,6 +89,8 @@ void refine(FormFit& fit, const Curve& curve, double from, double to,
       below += std::exp(logs[static_cast<std::size_t>(i)] - all);
     }
     fit.amplitude_sd = std::sqrt(variance);
+    fit.shape_low = std::min(fit.shape_low, fit.shape);  // a mode at the end of the range may lie outside equal tails
+    fit.shape_high = std::max(fit.shape_high, fit.shape);
     const double step = (to - from) / kFiner;
     from = std::max(from, fit.shape_low - 2 * step);
     to = std::min(to, fit.shape_high + 2 * step);

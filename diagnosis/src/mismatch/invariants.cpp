@@ -77,6 +77,10 @@ std::vector<std::string> violations(const Findings& findings) {
   for (const ProposedForm& form : findings.proposals)
     if (!std::isfinite(form.amplitude) || !std::isfinite(form.shape))
       out.push_back("the equation " + form.equation + " has a value that is no number");
+    else if (std::abs(form.amplitude) <= 1.96 * form.amplitude_sd)
+      out.push_back("the interval of a in the equation " + form.equation + " includes none");
+    else if (form.shape < form.shape_low || form.shape > form.shape_high)
+      out.push_back("the value of s in the equation " + form.equation + " is outside its interval");
   if (findings.verdict == Verdict::inconclusive) {
     if (!findings.effects.empty() || !findings.discrepancies.empty())
       out.emplace_back("an inconclusive verdict names an effect or a discrepancy");

@@ -40,9 +40,13 @@ std::string equation_of(const inference::FormFit& fit, const inference::Curve& c
   return "";
 }
 
-// Whether the amplitude, and the value at each knot, lie within what a model file may hold of the component.
+constexpr double k95 = 1.96;
+
+// Whether the 95 % interval of the amplitude excludes none, and amplitude and value at each knot lie within what a
+// model file may hold of the component.
 bool is_possible(const inference::FormFit& fit, const inference::Curve& curve, model::DiscrepancyComponent component) {
   const double largest = info_of(component).largest;
+  if (!(std::abs(fit.amplitude) > k95 * fit.amplitude_sd)) return false;
   if (!(std::abs(fit.amplitude) <= largest)) return false;
   return std::ranges::all_of(curve.at, [&](double x) {
     return std::abs(fit.amplitude * value_of(fit.form, curve, fit.shape, fit.phase_rad, x)) <= largest;

@@ -15,7 +15,8 @@ namespace bevel::diagnosis {
 ///   3. a log Bayes factor that is reported is a number that was computed;
 ///   4. the adopted model predicts left-out recordings no worse than the refitted nominal model: the mean difference in
 ///      log density between recordings is not below zero by more than its standard error;
-///   5. a proposed equation has finite values;
+///   5. a proposed equation has finite values, the interval of its amplitude excludes none, and that of its shape
+///      includes the estimate;
 ///   6. a parameter at a bound of its range is marked.
 /// 1, 2 and 4 are not asked of an inconclusive verdict: it adopts nothing. Instead it names nothing and states a
 /// reason.
