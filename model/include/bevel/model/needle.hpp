@@ -33,7 +33,7 @@ struct NeedleParameters {
   SlipDirection slip = SlipDirection::isotropic;   ///< direction of the slip when the shaft rotates
   FrontWheel front_wheel = FrontWheel::published;  ///< sign of f in (13)
 
-  /// Returns whether all parameters are equal.
+  /// @return true if all parameters are equal
   bool operator==(const NeedleParameters&) const = default;
 };
 

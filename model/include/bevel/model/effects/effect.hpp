@@ -47,7 +47,7 @@ struct EffectParameter {
   std::string_view name;  ///< name with unit; part of the formats of verdict.json and model.toml
   double lower,           ///< lower bound in model files and fits, in the parameter's unit
       upper;              ///< upper bound in model files and fits, in the parameter's unit
-  double none;            ///< value at which the effect vanishes; NaN if there is none, as for a layer's depth
+  double none;            ///< value at which the effect vanishes; NaN if no such value exists, as for a layer's depth
   /// Start values of a fit, in the parameter's unit: one value for one local minimum of the negative log-likelihood, a
   /// grid for several (a depth, a frequency).
   std::vector<double> starts;
@@ -59,7 +59,7 @@ struct EffectParameter {
   Scope scope = Scope::rig;  ///< recordings that share the value
   bool periodic = false;     ///< true for an angle; the bounds are one period apart
   /// For a periodic parameter: index of the angle that shifts by half of its period when this one shifts by one period;
-  /// -1 if there is none.
+  /// -1 if no such angle exists.
   int half_turns = -1;
   bool frequency = false;  ///< true for a frequency in Hz; the sampling interval of the measurements limits it
   /// True for a size that also determines the form. Responses at different values are not proportional, and a fit uses
@@ -186,15 +186,15 @@ struct LegView {
   Dual tip_rotation_rad;              ///< rotation of the tip at the start of the leg, rad
   SpeedChanges speed_changes_mm_s{};  ///< speed changes before the end of the leg, mm/s; valid from `settle` on
 
-  /// Returns the duration of the leg, s.
+  /// @return the duration of the leg, s
   double duration_s() const { return to.time_s - from.time_s; }
-  /// Returns the insertion of the actuator over the leg, mm.
+  /// @return the insertion of the actuator over the leg, mm
   double base_insertion_mm() const { return to.insertion_mm - from.insertion_mm; }
-  /// Returns the rotation of the actuator over the leg, rad.
+  /// @return the rotation of the actuator over the leg, rad
   double base_rotation_rad() const { return to.rotation_rad - from.rotation_rad; }
-  /// Returns the magnitude of the insertion rate |u1|, mm/s; 0 for a leg without duration.
+  /// @return the magnitude of the insertion rate |u1|, mm/s; 0 for a leg without duration
   double speed_mm_s() const { return duration_s() > 0 ? std::abs(base_insertion_mm()) / duration_s() : 0; }
-  /// Returns the magnitude of the rotation rate |u2|, rad/s; 0 for a leg without duration.
+  /// @return the magnitude of the rotation rate |u2|, rad/s; 0 for a leg without duration
   double turn_rate_rad_s() const { return duration_s() > 0 ? std::abs(base_rotation_rad()) / duration_s() : 0; }
   /// Transforms a lateral vector from {A} to {B}, with {B} halfway through the rotation of the leg.
   /// @param world x and y in {A}, any unit; z is 0
@@ -257,19 +257,19 @@ class Effect {
   Effect& operator=(const Effect&) = delete;
   virtual ~Effect() = default;
 
-  /// Returns EffectDescription::name.
+  /// @return EffectDescription::name
   std::string_view name() const { return description_.name; }
-  /// Returns EffectDescription::meaning.
+  /// @return EffectDescription::meaning
   std::string_view meaning() const { return description_.meaning; }
-  /// Returns EffectDescription::covariate.
+  /// @return EffectDescription::covariate
   Covariate covariate() const { return description_.covariate; }
-  /// Returns EffectDescription::parameters.
+  /// @return EffectDescription::parameters
   const std::vector<EffectParameter>& parameters() const { return description_.parameters; }
-  /// Returns EffectDescription::of_headings.
+  /// @return EffectDescription::of_headings
   bool of_headings() const { return description_.of_headings; }
-  /// Returns EffectDescription::needs_retraction.
+  /// @return EffectDescription::needs_retraction
   bool needs_retraction() const { return description_.needs_retraction; }
-  /// Returns EffectDescription::sudden.
+  /// @return EffectDescription::sudden
   bool sudden() const { return description_.sudden; }
 
   /// Modifies the needle parameters, once per model.
@@ -293,7 +293,8 @@ class Effect {
   virtual void sensor(Parameters, const EffectMemory&, Dual2& /*tilt_rad*/) const {}
   /// Transforms a direction in {A} into the frame in which the sensor reports it.
   virtual void frame(Parameters, Dual3& /*direction*/) const {}
-  /// Returns the latency of the measurements, s: a measurement at time t shows the tip at t minus the latency.
+  /// Computes the latency of the measurements. A measurement at time t shows the tip at t minus the latency.
+  /// @return the latency, s
   virtual Dual latency_s(Parameters) const { return {}; }
 
   /// Adds the variance of the pose over the leg that is due to the uncertainty of the effect; called after settle. The
@@ -303,11 +304,13 @@ class Effect {
   /// error.
   virtual void blur(const EffectMemory&, std::array<double, 3>& /*variance_mm2*/) const {}
 
-  /// Returns whether measurements jump at the event time of a variant, an element of variants(). The likelihood then
-  /// has no derivative with respect to the event time.
+  /// Checks whether measurements jump at the event time of a variant. The likelihood then has no derivative with
+  /// respect to the event time.
+  /// @param kind element of variants()
+  /// @return true if they jump
   virtual bool jumps(std::uint32_t /*kind*/) const { return false; }
   /// Lists the sets of parameters that are fitted together, one per variant of the effect.
-  /// @return one bit mask per variant: bit i stands for parameter i; static storage. The default is one mask with all
+  /// @return one bit mask per variant: bit i represents parameter i; static storage. The default is one mask with all
   ///     bits set.
   virtual std::span<const std::uint32_t> variants() const;
 
