@@ -305,8 +305,7 @@ class Effect {
   virtual void blur(const EffectMemory&, std::array<double, 3>& /*variance_mm2*/) const {}
 
   /// Checks whether measurements jump at the event time of a variant. The likelihood then has no derivative with
-  /// respect to the event time.
-  /// @param kind element of variants()
+  /// respect to the event time. The argument is an element of variants().
   /// @return true if they jump
   virtual bool jumps(std::uint32_t /*kind*/) const { return false; }
   /// Lists the sets of parameters that are fitted together, one per variant of the effect.
