@@ -8,6 +8,7 @@
 #include <Eigen/Core>
 #include <Eigen/Geometry>
 
+/// Needle models: extended bicycle model, effects, open-loop prediction and a mechanical plant.
 namespace bevel::model {
 
 /// Twist or body perturbation (v | omega), mm | rad.
