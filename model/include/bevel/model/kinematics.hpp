@@ -42,15 +42,15 @@ SlipParameters slip_parameters(const NeedleParameters& needle);
 /// pose_after exp(delta).
 struct StepJacobian {
   Matrix6d pose;                      ///< 6 x 6, with respect to the body perturbation of the pose before the step
-  Eigen::Matrix<double, 6, 4> input;  ///< with respect to insertion (1/mm), rotation (1/rad), kappa_x, kappa_y (mm)
-  Eigen::Matrix<double, 6, 3> slip;   ///< with respect to lambda1 (rad), lambda2 and wheelbase (1/mm)
+  Eigen::Matrix<double, 6, 4> input;  ///< per mm of insertion, per rad of rotation, per 1/mm of kappa_x and kappa_y
+  Eigen::Matrix<double, 6, 3> slip;   ///< per 1/rad of lambda1, per unit of lambda2, per mm of wheelbase
 };
 
 /// Derivatives of the pose after a step without those with respect to the increments. A filter of the needle parameters
 /// needs only these, at less than half the cost of StepJacobian.
 struct NeedleJacobian {
   Matrix6d pose;                       ///< 6 x 6, with respect to the body perturbation of the pose before the step
-  Eigen::Matrix<double, 6, 4> needle;  ///< with respect to kappa_x (mm), lambda1 (rad), lambda2 and wheelbase (1/mm)
+  Eigen::Matrix<double, 6, 4> needle;  ///< by kappa_x, lambda1, lambda2 and wheelbase, as in StepJacobian
 };
 
 /// Computes the body twist of one step, as increments and not as rates: u1 V1 + u2 V2 of (10), with slip.

@@ -7,7 +7,9 @@
 ///   The shaft is a straight elastic beam in a guide, clamped at z = -guide_gap_mm. The bevel force F pushes it
 ///   sideways at the tip. Distributed springs of modulus k hold the inserted part to the path that the tip has cut. The
 ///   shape is the equilibrium at each time (quasi-static, small slopes):
-///       EI w'''' + k (w - cut) = 0,   w = w' = 0 at the guide,   w'' = 0 and EI w''' = -F at the tip.
+///
+///       EI w'''' + k (w - cut) = 0,   w = w' = 0 at the guide,   w'' = 0 and EI w''' = -F at the tip
+///
 ///   The tip cuts at its own position: cut(L) = w(L) at the time when the tip first reaches depth L.
 ///   Here z is the length along the shaft, and w' is the angle between its tangent and the axis of {A}. Tissue has no
 ///   preferred direction, so a path that is cut steadily is a circle. (With z as the depth and w' as a slope, the
@@ -16,8 +18,11 @@
 ///
 /// Frames and signs
 ///   {A} has its origin at the entry point and z into the tissue; w = x + i y. {B} is at the tip: e3 is the tangent of
-///   the shaft, and e1 and e2 are rotated by the roll phi of the tip. The bevel force points to -e2: F = -i |F| exp(i
-///   phi), so phi = 0 bends toward -y.
+///   the shaft, and e1 and e2 are rotated by the roll phi of the tip. The bevel force F points to -e2:
+///
+///       F = -i |F| exp(i phi)
+///
+///   With phi = 0 the needle bends toward -y.
 ///
 /// Consequences (lambda^4 = k / (4 EI); steady state, deep in uniform tissue)
 ///   The curvature of the path is F / (EI lambda). The tip moves at the slip angle F / (2 EI lambda^2) to its tangent,

@@ -6,7 +6,9 @@
 /// The depth is divided into equal cells fixed in the tissue. A cell stores the mean lateral position of the tip during
 /// its first passage, the anchor of the spring. An uncut cell has no anchor, and a second passage changes nothing. Per
 /// length of shaft the spring is a standard linear solid, in which a fraction r of k relaxes with time constant T:
-///   force = -k (1 - r) e - k r (e - q),   dq/dt = (e - q) / T,   e = w - anchor.
+///
+///     force = -k (1 - r) e - k r (e - q),   dq/dt = (e - q) / T,   e = w - anchor
+///
 /// q is integrated exactly for e linear in time within the step, so the step may be long compared with T.
 #include <complex>
 #include <cstddef>

@@ -5,6 +5,7 @@
 ///
 /// Over a leg the actuator moves by ds mm and dR rad (frames: bevel/model/kinematics.hpp). c is evaluated at the end of
 /// the leg; a tip position is evaluated at its start.
+///
 /// | component | equation |
 /// | --- | --- |
 /// | curvature_bevel | kappa_x += v |

@@ -4,7 +4,9 @@
 /// Discrepancy term: unmodelled physics as a piecewise linear function of one covariate. It acts on one component of
 /// the tip's motion or of the measurement, in addition to the effects of the registry. At the value c of its covariate
 /// it is
-///   v(c) = sum_i w_i(c) values[i].
+///
+///     v(c) = sum_i w_i(c) values[i]
+///
 /// The weights w are linear between the knots and constant outside them. On a periodic covariate they wrap around.
 /// component_effect.hpp defines the components.
 #include <memory>

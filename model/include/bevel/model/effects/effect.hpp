@@ -154,8 +154,8 @@ using SpeedChanges = std::array<double, kSpeedChanges>;
 
 /// State of an effect between the legs of one insertion, with sensitivities.
 struct EffectMemory {
-  static constexpr std::size_t kSlots = 4,  ///< number of slots
-      kNumbers = 6;                         ///< number of numbers
+  static constexpr std::size_t kSlots = 4,  ///< number of elements of `slot`
+      kNumbers = 6;                         ///< number of elements of `number`
   std::array<Dual, kSlots> slot;            ///< state with sensitivities; each effect defines the meaning
   std::array<double, kNumbers> number{};    ///< state whose sensitivities are negligible
   int phase = 0;                            ///< 0 before the first leg; each effect defines the other values
