@@ -1,9 +1,11 @@
 // SPDX-License-Identifier: MIT
 #pragma once
-// The exceptions of every module. Functions on the control path (filter and control steps, drive cycles) throw none:
-// they return a status.
+/// @file
+/// Exceptions of all modules. Functions on the control path (filter and control steps, drive cycles) throw no
+/// exceptions; they return a status.
 #include <stdexcept>
 
+/// Steering of bevel-tip needles and diagnosis of unmodelled physics.
 namespace bevel {
 
 /// Base class of the exceptions that this project throws. what() states the place, the value found, the values allowed

@@ -1,23 +1,28 @@
 // SPDX-License-Identifier: MIT
 #pragma once
-// The functions of an angle t that the exponential of SO(3) and SE(3) and its Jacobians are made of, all even in t and
-// therefore taken of t^2. Kept in a header because the integrator needs several of them in one step.
+/// @file
+/// Functions of an angle t in the exponentials of SO(3) and SE(3) and their Jacobians. All are even in t, so their
+/// argument is t^2. They are inline because the integrator evaluates several of them per step.
 #include <cmath>
 
-// The stages of a step hand each other vectors of two and three; called out of line, they would wait for their own
-// stores. GCC's estimate of size decides otherwise.
+/// Forces inlining. The stages of a step pass small vectors to each other; calls would stall on store forwarding. GCC's
+/// size heuristic does not inline them.
 #define BEVEL_IN_PLACE [[gnu::always_inline]] inline
 
 namespace bevel::model {
 
+/// Values of the functions at one angle t, rad.
 struct AngleFunctions {
-  double a;  // sin t / t
-  double b;  // (1 - cos t) / t^2
-  double c;  // (t - sin t) / t^3
-  double d;  // (t^2/2 + cos t - 1) / t^4
-  double e;  // (2 t - 3 sin t + t cos t) / (2 t^5)
+  double a;  ///< sin t / t
+  double b;  ///< (1 - cos t) / t^2
+  double c;  ///< (t - sin t) / t^3
+  double d;  ///< (t^2/2 + cos t - 1) / t^4
+  double e;  ///< (2 t - 3 sin t + t cos t) / (2 t^5)
 };
 
+/// Computes the functions at any angle: by power series below t^2 = 0.3, otherwise in closed form.
+/// @param t2 squared angle, rad^2, >= 0
+/// @return the values
 inline AngleFunctions angle_functions_of_larger(double t2) {
   const double x = t2;
   if (x < 0.3) {
@@ -40,9 +45,11 @@ inline AngleFunctions angle_functions_of_larger(double t2) {
           (2 * t - 3 * s + t * c) / (2 * t2 * t2 * t)};
 }
 
+/// Computes the functions, by a short power series for small angles. The closed forms lose digits by cancellation
+/// there. The series is exact to rounding up to 2.5 degrees, which covers nearly all steps.
+/// @param t2 squared angle, rad^2, >= 0
+/// @return the values
 BEVEL_IN_PLACE AngleFunctions angle_functions(double t2) {
-  // Series: the closed forms lose digits to cancellation here, and steps of a needle are small turns. The short one is
-  // complete to rounding up to 2.5 degrees, the length of nearly all steps.
   const double x = t2;
   if (!(x < 2e-3)) return angle_functions_of_larger(t2);
   const auto series = [x](double c0, double c1, double c2, double c3) { return c0 + x * (c1 + x * (c2 + x * c3)); };

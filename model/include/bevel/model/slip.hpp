@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: MIT
 #pragma once
-// The slip law (25) as a function of the tilt, in closed form, with its derivatives.
+/// @file
+/// Slip law (25) as a closed-form function of the tilt, with its derivatives.
 #include <cmath>
 #include <numbers>
 
@@ -9,39 +10,54 @@
 
 namespace bevel::model {
 
-// For a tilt theta >= 0 (the odd extension serves the other side): gamma, alpha = gamma - theta, f = tan(alpha),
-// and the derivatives of f that the integrator needs.
+/// Slip at a tilt theta >= 0. For theta < 0 the caller uses the odd extension. Here gamma is the direction of motion of
+/// the tip, alpha = gamma - theta the slip angle and f = tan(alpha). All other fields are zero if in_domain is false.
 struct Slip {
-  double gamma_rad;
-  double alpha_rad;
-  double f;                  // tan(alpha): lateral over forward velocity of the tip
-  double f_by_tilt_per_rad;  // df/dtheta
-  double f_by_lambda1_rad;   // df/dlambda1
-  double f_by_lambda2;       // df/dlambda2
-  bool in_domain;  // false: no real gamma, or gamma or alpha at or past 90 degrees; the other fields are then zero
+  double gamma_rad;          ///< angle between the tip's direction of motion and z_A, rad
+  double alpha_rad;          ///< slip angle, rad
+  double f;                  ///< tan(alpha): ratio of the lateral to the forward velocity of the tip
+  double f_by_tilt_per_rad;  ///< df/dtheta, 1/rad
+  double f_by_lambda1_rad;   ///< df/dlambda1, rad
+  double f_by_lambda2;       ///< df/dlambda2, dimensionless
+  bool in_domain;            ///< false if no real gamma exists, or gamma or |alpha| is 90 degrees or more
 };
 
-// gamma solves theta = gamma - alpha(gamma) = (1 - lambda2) gamma + lambda1 gamma |gamma|, from (25).
+/// Evaluates the slip law (25) at one tilt. gamma solves
+/// theta = gamma - alpha(gamma) = (1 - lambda2) gamma + lambda1 gamma |gamma|.
+/// With lambda1 = lambda2 = 0 (the bicycle) f is exactly zero; the derivatives remain those of the law.
+/// @param tilt_rad tilt theta of the heading, rad, >= 0
+/// @param lambda1_per_rad lambda1 of (25), 1/rad
+/// @param lambda2 lambda2 of (25), dimensionless
+/// @return the slip and its derivatives; in_domain is false outside the domain of (25)
 Slip evaluate_slip(double tilt_rad, double lambda1_per_rad, double lambda2);
 
-// The law at tilts near one at which it is already known, to rounding the same as evaluate_slip(): without its roots
-// and its tangent where the change is small, as it is between the stages of a step.
+/// Evaluates the slip law near a tilt at which the slip is known. The result equals that of evaluate_slip() to
+/// rounding. For small changes, as between the stages of a step, power series replace the square root and the tangent.
 class SlipNear {
  public:
+  /// Stores the expansion point.
+  /// @param known slip at the expansion point; in_domain must be true, and the object must outlive this one
+  /// @param lambda1_per_rad lambda1 of (25) for which \p known was evaluated, 1/rad
+  /// @param lambda2 lambda2 of (25) for which \p known was evaluated
   SlipNear(const Slip& known, double lambda1_per_rad, double lambda2)
       : known_(known),
         lambda1_per_rad_(lambda1_per_rad),
         lambda2_(lambda2),
         by_root_(1 + known.f_by_tilt_per_rad / (1 + known.f * known.f)) {}
 
+  /// Evaluates the slip law at any tilt, by evaluate_slip().
+  /// @param tilt_rad tilt of the heading, rad, >= 0
+  /// @return the slip at that tilt
   Slip at(double tilt_rad) const { return evaluate_slip(tilt_rad, lambda1_per_rad_, lambda2_); }
 
-  // The sine of the change of tilt, which is less than 90 degrees.
+  /// Evaluates the slip law at the tilt of the expansion point plus a change.
+  /// @param sine sine of the change of tilt; the change is below 90 degrees in magnitude
+  /// @return the slip at the changed tilt
   BEVEL_IN_PLACE Slip at_change(double sine) const {
     constexpr double kShort = 3e-3;
     const double s2 = sine * sine;
     const double change = sine * (1 + s2 * (1.0 / 6 + s2 * (3.0 / 40)));
-    // gamma and d gamma/d tilt = 1/root in powers of z: Catalan's numbers, as of every root of a quadratic.
+    // Power series of gamma and d gamma/d tilt = 1/root in z. The coefficients follow from the Catalan numbers.
     const double z = lambda1_per_rad_ * by_root_ * by_root_ * change;
     if (!(std::abs(sine) < kShort) || !(std::abs(z) < kShort) || (lambda1_per_rad_ == 0 && lambda2_ == 0))
       return at_larger_change(sine);
@@ -69,7 +85,7 @@ class SlipNear {
 
   const Slip& known_;
   double lambda1_per_rad_, lambda2_;
-  double by_root_;  // 1/root of what is known
+  double by_root_;  // d gamma/d tilt at the expansion point
 };
 
 }  // namespace bevel::model

@@ -1,7 +1,9 @@
 // SPDX-License-Identifier: MIT
 #pragma once
-// A = L D L^T for symmetric positive definite matrices with three diagonals beside the main one, which is what cubic
-// Hermite beam elements give (two unknowns per node, neighbours coupled). Linear in the number of unknowns.
+/// @file
+/// Factorisation A = L D L^T of symmetric positive definite matrices with three subdiagonals. Cubic Hermite beam
+/// elements yield such matrices (two unknowns per node, neighbours coupled). The cost is linear in the number of
+/// unknowns.
 #include <array>
 #include <complex>
 #include <cstddef>
@@ -9,30 +11,44 @@
 
 namespace bevel::model {
 
+/// Symmetric positive definite band matrix and its factors, in place.
 class BandLdlt {
  public:
+  /// Number of subdiagonals.
   static constexpr std::size_t kHalfBandwidth = 3;
 
+  /// Allocates the memory.
+  /// @param capacity largest number of rows
   explicit BandLdlt(std::size_t capacity) : rows_(capacity), inverse_pivots_(capacity) {}
 
-  // Zeroes the matrix from row `kept` on and sets its size. The rows before keep what they have, factors where they
-  // have been factored: none of them depends on a later one. Throws DomainError above the capacity; never
-  // allocates.
+  /// Sets the size and clears the matrix from row \p kept on. The rows before keep their content or their factors,
+  /// which depend on no later row. The function does not allocate.
+  /// @param size number of rows, at most the capacity
+  /// @param kept number of rows that are kept
+  /// @throws bevel::DomainError if \p size exceeds the capacity
   void reset(std::size_t size, std::size_t kept = 0);
 
+  /// @return the number of rows
   [[nodiscard]] std::size_t size() const { return size_; }
 
-  // Adds to A(row, column); row >= column >= row - kHalfBandwidth (the lower triangle) is the caller's duty.
+  /// Adds a value to A(row, column) in the lower triangle. The indices are not checked.
+  /// @param row row, below size()
+  /// @param column column; required: row >= column >= row - kHalfBandwidth
+  /// @param value value to add
   void add(std::size_t row, std::size_t column, double value) { rows_[row][row - column] += value; }
 
-  // Replaces A by its factors, from the first row that was not kept. Throws DomainError if a pivot is not
-  // positive (the matrix is not definite).
+  /// Replaces A by its factors, from the first row that was not kept.
+  /// @throws bevel::DomainError if a pivot is not positive, because the matrix is then not positive definite
   void factor();
 
-  // Solves A x = b in place, after factor(). Real and imaginary part are two right-hand sides. b: size() entries.
+  /// Solves A x = b in place, after factor(). Real and imaginary part are two right-hand sides.
+  /// @param[in,out] b right-hand sides, size() elements; afterwards the solutions
   void solve(std::vector<std::complex<double>>& b) const;
-  // The same in halves: L y = b, of whose rows those that were kept hold y already; then D L^T x = y.
+  /// Solves L y = b in place, the first half of solve().
+  /// @param[in,out] b right-hand sides, size() elements; the kept rows contain y already. Afterwards y.
   void forward(std::vector<std::complex<double>>& b) const;
+  /// Solves D L^T x = y in place, the second half of solve().
+  /// @param[in,out] y result of forward(), size() elements; afterwards the solutions
   void backward(std::vector<std::complex<double>>& y) const;
 
  private:

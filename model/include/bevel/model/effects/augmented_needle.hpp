@@ -1,8 +1,9 @@
 // SPDX-License-Identifier: MIT
 #pragma once
-// The needle with the effects of a model file: open-loop propagation from the base's motion, with sensitivities by any
-// of its parameters in the same pass. Without effects it is bevel/model/kinematics.hpp, bit for bit (tested).
-// Source: shared definitions in effect.hpp; sensitivities by the chain rule through StepJacobian.
+/// @file
+/// Needle with effects: open-loop propagation from the actuator motion, with sensitivities to any of its parameters in
+/// the same pass. Without effects the result equals that of bevel/model/kinematics.hpp bit for bit (tested).
+/// Source: definitions in effect.hpp; the sensitivities follow by the chain rule from StepJacobian.
 #include <array>
 #include <memory>
 #include <vector>
@@ -13,84 +14,120 @@
 
 namespace bevel::model {
 
+/// Effect of a model with the values of its parameters.
 struct ActiveEffect {
-  const Effect* effect = nullptr;
-  std::array<Dual, kMaxEffectParameters> parameters;  // in the order of effect->parameters()
-  std::shared_ptr<const Effect> owned{};              // of an effect that is not in the registry: it lives as long
+  const Effect* effect = nullptr;                     ///< effect; must outlive this object; not null in a model
+  std::array<Dual, kMaxEffectParameters> parameters;  ///< values in the order of effect->parameters()
+  std::shared_ptr<const Effect> owned{};              ///< owner of an effect that is not in the registry
 };
 
-// In which column of the sensitivities a parameter of the needle or of its entry stands; -1: not wanted.
+/// Sensitivity columns of the parameters of the needle and of its entry. -1: the sensitivity is not computed.
 struct NeedleColumns {
-  int curvature = -1;
-  int lambda1 = -1;
-  int lambda2 = -1;
-  int wheelbase = -1;
-  int tilt_x = -1, tilt_y = -1, roll = -1;  // of the entry, as EntryPose has them
-  int entry_x = -1, entry_y = -1;           // mm, of the entry point in {A}
+  int curvature = -1;  ///< column of k, 1/mm
+  int lambda1 = -1;    ///< column of lambda1, 1/rad
+  int lambda2 = -1;    ///< column of lambda2
+  int wheelbase = -1;  ///< column of ell, mm
+  int tilt_x = -1,     ///< column of EntryPose::tilt_x_rad
+      tilt_y = -1,     ///< column of EntryPose::tilt_y_rad
+      roll = -1;       ///< column of EntryPose::roll_rad
+  int entry_x = -1,    ///< column of x of the entry point in {A}, mm
+      entry_y = -1;    ///< column of y of the entry point in {A}, mm
 };
 
-// Row by row, as slopes lie in a dual number.
+/// Sensitivities of a body perturbation (mm | rad), 6 x columns; row-major, as the slopes of a dual number.
 using BodyColumns = Eigen::Matrix<double, 6, Eigen::Dynamic, Eigen::RowMajor, 6, kMaxColumns>;
+/// Sensitivities of a point or direction in {A}, 3 x columns; row-major, as the slopes of a dual number.
 using PointColumns = Eigen::Matrix<double, 3, Eigen::Dynamic, Eigen::RowMajor, 3, kMaxColumns>;
 
-// Everything that an insertion carries from leg to leg. Copyable, no heap.
+/// State of one insertion between legs. The object is copyable and uses no heap memory.
 struct AugmentedState {
-  Pose pose;
-  BodyColumns D;  // d(body perturbation of the pose)/d(columns), 6 x columns
-  BaseMotion entry, base;
-  Dual tip_insertion_mm, tip_rotation_rad;
-  std::array<EffectMemory, kMaxEffects> memory;
-  BaseHistory history;  // kept where an effect asks for it
+  Pose pose;                                     ///< pose of {B} in {A}
+  BodyColumns D;                                 ///< d(body perturbation of the pose)/d(columns), 6 x columns
+  BaseMotion entry,                              ///< actuator motion at the entry
+      base;                                      ///< actuator motion at the end of the last leg
+  Dual tip_insertion_mm,                         ///< position of the tip's insertion axis, mm
+      tip_rotation_rad;                          ///< position of the tip's rotation axis, rad
+  std::array<EffectMemory, kMaxEffects> memory;  ///< memory of each effect, in the order of AugmentedNeedle::effects()
+  BaseHistory history;                           ///< past actuator motion; updated only if an effect requires it
 };
 
-// A point the cameras see, and its derivatives.
+/// Observed tip position with sensitivities.
 struct TipReading {
-  Eigen::Vector3d position_mm;
-  PointColumns D;  // 3 x columns
+  Eigen::Vector3d position_mm;  ///< position in {A}, mm
+  PointColumns D;               ///< d(position)/d(columns), 3 x columns
 };
 
-// A measured heading: unit vector in {A}, and its derivatives.
+/// Measured heading with sensitivities.
 struct HeadingReading {
-  Eigen::Vector3d direction;
-  PointColumns D;  // 3 x columns
+  Eigen::Vector3d direction;  ///< unit vector in {A}
+  PointColumns D;             ///< d(direction)/d(columns), 3 x columns
 };
 
+/// Extended bicycle model with effects.
 class AugmentedNeedle {
  public:
-  // columns: how many sensitivities are carried (0 to kMaxColumns). Effects are put into the order of the registry.
-  // At most kMaxEffects; throws ArgumentError past that.
+  /// Constructs the model. The effects are sorted into the order of the registry.
+  /// @param needle needle parameters before effects
+  /// @param effects effects with their parameters, at most kMaxEffects
+  /// @param columns number of sensitivities that are computed, 0 to kMaxColumns
+  /// @param needle_columns columns of the needle and entry parameters, each below \p columns
+  /// @throws bevel::ArgumentError if there are too many effects or columns
   AugmentedNeedle(const NeedleParameters& needle, std::vector<ActiveEffect> effects = {}, int columns = 0,
                   const NeedleColumns& needle_columns = {});
 
-  // At the entry point, unrolled, along z_A but for what the effects say; the base as it stands then.
+  /// Computes the state at the entry point. Without effects the tip is unrolled and along z_A.
+  /// @param base actuator motion at the entry
+  /// @return the state
   AugmentedState entry(const BaseMotion& base) const;
-  // Moves the base. False outside the domain of the slip law; pose and base are then unchanged. Does not allocate.
-  // `spread` takes in what the effects do not know of themselves.
+  /// Propagates the state over one leg. The function does not allocate.
+  /// @param[in,out] state state; on failure its pose and actuator motion are unchanged
+  /// @param to actuator motion at the end of the leg
+  /// @param[in,out] spread variance to which that of the effects is added, mm^2 | rad^2; null to omit it
+  /// @return false outside the domain of the slip law (25)
   bool advance(AugmentedState& state, const BaseMotion& to, Spread* spread = nullptr) const;
-  // Where the tip is, as a point in {A} before the cameras: effects with an offset included.
+  /// Computes the observed point in {A}, with the offsets of the effects and before the cameras.
+  /// @param state state
+  /// @param[out] reading point, mm in {A}, with sensitivities
   void point(const AugmentedState& state, TipReading& reading) const;
-  // What the cameras make of such a point.
+  /// Applies the camera effects to an observed point.
+  /// @param[in,out] reading point from point(), mm in {A}; afterwards the point that the cameras report
   void through_cameras(TipReading& reading) const;
-  // What a sensor in the needle's tip reports of its heading, before and after the frame in which it does.
+  /// Computes the heading that a sensor in the tip measures, with its misalignment and before the frame effects.
+  /// @param state state
+  /// @param[out] reading unit vector in {A}, with sensitivities
   void heading(const AugmentedState& state, HeadingReading& reading) const;
+  /// Applies the frame effects to a heading.
+  /// @param[in,out] reading heading from heading(); afterwards the direction that the sensor reports
   void through_frame(HeadingReading& reading) const;
-  // What the effects do not know of a reading, along the axes of {A}.
+  /// Computes the variance of a position measurement due to the uncertainty of the effects.
+  /// @param state state
+  /// @return variances along the axes of {A}, mm^2
   std::array<double, 3> blur_mm2(const AugmentedState& state) const;
-  // By how much readings are late; zero without camera_latency.
+  /// Computes the latency of the measurements.
+  /// @return the latency, s; zero without the effect camera_latency
   Dual latency_s() const;
-  // Whether an effect may put a jump into the path.
+  /// Checks whether an effect can put a jump into the path (EffectDescription::sudden).
+  /// @return true if at least one effect is sudden
   bool is_sudden() const;
 
+  /// @return the needle parameters, modified by the effects
   const NeedleParameters& needle() const { return needle_; }
+  /// @return the effects in the order in which they act; valid during the life of the object
   std::span<const ActiveEffect> effects() const { return effects_; }
+  /// @return the number of sensitivities
   int columns() const { return columns_; }
-  // For a filter, whose curvature and lambda are states, and ell on request.
+  /// Sets the parameters that a filter estimates. Effects do not modify them afterwards.
+  /// @param curvature_per_mm k, 1/mm
+  /// @param lambda1_per_rad lambda1 of (25), 1/rad
+  /// @param lambda2 lambda2 of (25)
+  /// @param wheelbase_mm ell, mm
   void set_needle(double curvature_per_mm, double lambda1_per_rad, double lambda2, double wheelbase_mm);
 
  private:
   bool advance_plain(AugmentedState& state, const BaseMotion& to) const;
   bool advance_with_effects(AugmentedState& state, const BaseMotion& to, Spread* spread) const;
-  // The pose over a leg, and its derivatives but for those that come in through the leg's own increments and curvature.
+  // Integrates the pose over a leg. The derivatives through the increments and the curvature of the leg remain to be
+  // added.
   bool integrate(AugmentedState& state, const StepInput& input, StepJacobian& J) const;
   Parameters parameters(const ActiveEffect& active) const {
     return {active.parameters.data(), active.effect->parameters().size()};

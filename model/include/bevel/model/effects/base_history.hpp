@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: MIT
 #pragma once
-// Where the base was over the last while: by how much its speed changed, and how long ago.
+/// @file
+/// Recent history of the insertion axis: size and age of the changes of its velocity.
 #include <array>
 #include <cstddef>
 
@@ -8,15 +9,20 @@
 
 namespace bevel::model {
 
-// Positions at ticks of its own, linear between them and to where it is now; before the entry it stood there.
+/// Ring of past actuator positions at fixed ticks of 25 ms. Positions between ticks are interpolated linearly. Before
+/// the entry the actuator is stationary.
 class BaseHistory {
  public:
+  /// Starts the history at the entry.
+  /// @param entry actuator motion at the entry
   explicit BaseHistory(const BaseMotion& entry = {}) : last_s_(entry.time_s), now_(entry) {
     insertion_mm_.fill(entry.insertion_mm);
   }
+  /// Appends one leg at constant rates.
+  /// @param to actuator motion at the end of the leg, not before the previous one
   void advance(const BaseMotion& to);
-  // The changes of a speed that is a mean over kSpeedChange_s: at i that from the mean before (i + 1) kSpeedChange_s
-  // ago to the mean after it.
+  /// Computes the changes of the insertion velocity, which is averaged over kSpeedChange_s.
+  /// @return element i: mean velocity after the time (i + 1) kSpeedChange_s ago minus the mean before it, mm/s
   SpeedChanges speed_changes_mm_s() const;
 
  private:
@@ -25,7 +31,7 @@ class BaseHistory {
 
   double insertion_mm(double before_s) const;
 
-  std::array<double, kTicks> insertion_mm_{};  // at the tick at last_s_, and at those before it
+  std::array<double, kTicks> insertion_mm_{};  // at the tick at last_s_ and at the preceding ticks
   double last_s_;
   BaseMotion now_;
 };

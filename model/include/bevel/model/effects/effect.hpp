@@ -1,12 +1,16 @@
 // SPDX-License-Identifier: MIT
 #pragma once
-// One piece of physics that the bicycle model leaves out, as a set of hooks into the integrator. An effect is one file:
-// a class without state, derived from Effect, that states its equation in dual numbers (dual.hpp) and so yields its
-// sensitivities; and one line in registry.cpp. docs/adding-an-effect.md walks through it.
-//
-// Order within a leg (augmented_needle.hpp): axes -> curvature -> the integrator -> settle; then, for a measurement:
-// offset -> camera; for a measured heading: sensor -> frame. Several effects act in the order of the registry, motor
-// first, camera last.
+/// @file
+/// Interface of an effect: one piece of physics that the nominal model omits, as a set of hooks into the integrator.
+///
+/// An effect is one file with a class without state, derived from Effect, and one line in registry.cpp. The class
+/// states its equation in dual numbers (dual.hpp), which yields its sensitivities. docs/adding-an-effect.md explains
+/// the steps.
+///
+/// A leg is the actuator motion between two nodes, at constant rates. Order of the hooks within a leg
+/// (augmented_needle.hpp): axes, curvature, the integrator, settle. For a position measurement follow offset and
+/// camera; for a heading measurement follow sensor and frame. Several effects act in the order of the registry, from
+/// the motor to the camera.
 #include <cstdint>
 #include <limits>
 #include <optional>
@@ -20,217 +24,311 @@
 
 namespace bevel::model {
 
+/// Largest number of parameters of one effect.
 inline constexpr int kMaxEffectParameters = 4;
+/// Largest number of effects in one model.
 inline constexpr int kMaxEffects = 8;
 
+/// Recordings that share the value of a parameter.
 enum class Scope {
-  rig,        // the same in all recordings
-  recording,  // a phase or an instant of its own in each
+  rig,        ///< one value for all recordings
+  recording,  ///< one value per recording, for example a phase or an event time
 };
 
-// What a parameter says of where its effect begins to act. Before that it changes nothing.
+/// Meaning of a parameter that states where its effect begins. The effect changes nothing before that.
 enum class Begins {
-  unsaid,
-  depth,    // there, in mm of the tip along z
-  instant,  // then, in s from the start of the recording; 0: not in this recording
+  unsaid,   ///< the parameter does not state where the effect begins
+  depth,    ///< at this depth of the tip along z, mm
+  instant,  ///< at this event time, s from the start of the recording; 0: not in this recording
 };
 
+/// Properties of one effect parameter: bounds, start values of a fit and facts for the prior density.
 struct EffectParameter {
-  std::string_view name;  // a contract, with the unit: verdict.json, model.toml
-  double lower, upper;    // of the model file and of a fit
-  double none;            // where the effect vanishes; NaN: it does not vanish by this parameter (a layer's depth)
-  // Where fits begin: one value if the likelihood has one valley, a grid if several (a depth, a frequency).
+  std::string_view name;  ///< name with unit; part of the formats of verdict.json and model.toml
+  double lower,           ///< lower bound in model files and fits, in the parameter's unit
+      upper;              ///< upper bound in model files and fits, in the parameter's unit
+  double none;            ///< value at which the effect vanishes; NaN if no such value exists, as for a layer's depth
+  /// Start values of a fit, in the parameter's unit: one value for one local minimum of the negative log-likelihood, a
+  /// grid for several (a depth, a frequency).
   std::vector<double> starts;
-  double reported = 0;  // largest distance from `none` that the literature reports; 0 where `none` is NaN
-  // Likely range by the literature and the length of needles, for a parameter without `none` that is not periodic. The
-  // prior density is uniform over it, with one part in twenty uniform over [lower, upper].
-  double likely_low = 0, likely_high = 0;
-  Scope scope = Scope::rig;
-  bool periodic = false;   // an angle: the bounds are one period apart
-  int half_turns = -1;     // periodic: the angle that has to turn by half of its own period when this one turns by one
-  bool frequency = false;  // in Hz: readings too far apart do not show it
-  // A size on which the form depends as well: readings at one value are no multiple of those at another, and a start
-  // is taken as it stands.
+  double reported = 0;  ///< largest distance from `none` that the literature reports; 0 where `none` is NaN
+  /// Likely range from the literature and the length of needles, for a parameter that has no `none` and is not
+  /// periodic. The prior density is uniform over this range, with one part in twenty uniform over [lower, upper].
+  double likely_low = 0,
+         likely_high = 0;    ///< upper end of the likely range, in the parameter's unit
+  Scope scope = Scope::rig;  ///< recordings that share the value
+  bool periodic = false;     ///< true for an angle; the bounds are one period apart
+  /// For a periodic parameter: index of the angle that shifts by half of its period when this one shifts by one period;
+  /// -1 if no such angle exists.
+  int half_turns = -1;
+  bool frequency = false;  ///< true for a frequency in Hz; the sampling interval of the measurements limits it
+  /// True for a size that also determines the form. Responses at different values are not proportional, and a fit uses
+  /// each start value unchanged.
   bool shape = false;
-  Begins begins = Begins::unsaid;
-  // Values so far apart are the same to all readings but those while it happens; the one nearest to `none` is meant.
-  // 0: none are. A periodic parameter is kept within its bounds and needs none.
+  Begins begins = Begins::unsaid;  ///< where the effect begins, if the parameter states it
+  /// Distance between equivalent values, in the parameter's unit. Only measurements during the event distinguish them;
+  /// meant() selects the one nearest to `none`. 0 if no values are equivalent. A periodic parameter stays within its
+  /// bounds and needs none.
   double modulo = 0;
-  double smallest_seen = 0;  // how far from `none` the effect's causes bring it at least
-  double largest_seen = std::numeric_limits<double>::infinity();  // the largest value that they bring about
-  double usual = std::numeric_limits<double>::quiet_NaN();        // where a model file does not say; NaN: it has to
-  // Standard uncertainty, in the parameter's unit, that this form of the effect adds to a value found by it (JCGM 100,
-  // 4.3: one that no repetition shows); the same as a share of the value. 0: none is known.
-  double form_sd = 0, form_share = 0;
+  double smallest_seen = 0;  ///< smallest distance from `none` that the causes of the effect produce
+  double largest_seen = std::numeric_limits<double>::infinity();  ///< largest value that the causes produce
+  /// Default if the model file has no value; NaN: `none` is the default, and without it the value is required.
+  double usual = std::numeric_limits<double>::quiet_NaN();
+  /// Standard uncertainty that the assumed form adds to an estimate, in the parameter's unit. Repetition does not
+  /// reveal it (JCGM 100, 4.3). 0 if unknown.
+  double form_sd = 0,
+         form_share = 0;  ///< the same as a fraction of the value; 0 if unknown
 };
-// Starts from first to last, evenly: as close as the effect is narrow, or a fit never finds it.
+/// Lists start values at even spacing. The spacing must not exceed the width of the effect, or a fit can miss it.
+/// @param step spacing, in the parameter's unit, > 0
+/// @param first first value
+/// @param last upper limit of the values
+/// @return first, first + step, ... up to \p last
 std::vector<double> starts_every(double step, double first, double last);
-// Where a model file does not say, or another kind of the effect is meant; NaN: it has to be said.
+/// Returns the default of a parameter, for a model file without a value and for variants without this parameter.
+/// @param parameter parameter of an effect
+/// @return 0 for Scope::recording, otherwise `usual`, or `none` if `usual` is NaN; NaN if the value is required
 double value_if_unsaid(const EffectParameter& parameter);
-// Of all values that are the same (EffectParameter::modulo) the one that is meant.
+/// Maps a value to the equivalent value nearest to `none` (EffectParameter::modulo).
+/// @param parameter parameter of an effect
+/// @param value value, in the parameter's unit
+/// @return the equivalent value; \p value if `modulo` is 0
 double meant(const EffectParameter& parameter, double value);
-// Insertion needles are up to 150 mm long (brachytherapy and biopsy needles, 100 to 150 mm).
+/// Length of the longest insertion needles, mm (brachytherapy and biopsy needles: 100 to 150 mm).
 inline constexpr double kLongestNeedle_mm = 150;
+/// Value of EffectParameter::none for a parameter at which the effect does not vanish.
 inline constexpr double kNoNone = std::numeric_limits<double>::quiet_NaN();
 
-// Against what the effect is to be looked at: where it shows.
+/// Covariates of a discrepancy: the quantities against which an effect is plotted and tested. All but the tip positions
+/// follow from the actuator motion.
 enum class Covariate {
-  time_s,
-  depth_mm,
-  speed_mm_s,
-  turn_rate_rad_s,
-  since_stop_s,
-  since_reversal_mm,
-  roll_rad,
-  turned_rad,
-  withdrawn_mm,
-  tip_x_mm,
-  tip_y_mm,
-  tip_xy_mm,
-  tip_yx_mm,
-  since_speed_change_s
+  time_s,               ///< time since the start of the recording, s
+  depth_mm,             ///< position of the insertion axis, mm
+  speed_mm_s,           ///< magnitude of the insertion rate, mm/s
+  turn_rate_rad_s,      ///< magnitude of the rotation rate, rad/s
+  since_stop_s,         ///< time since insertion stopped, s; 0 during insertion
+  since_reversal_mm,    ///< insertion since the last rotation of the shaft, mm
+  roll_rad,             ///< position of the rotation axis, rad
+  turned_rad,           ///< rotation since the entry, rad, full turns included
+  withdrawn_mm,         ///< retraction from the deepest position so far, mm
+  tip_x_mm,             ///< tip position along x of {A}, mm
+  tip_y_mm,             ///< tip position along y of {A}, mm
+  tip_xy_mm,            ///< tip position along (x + y)/sqrt(2) of {A}, mm
+  tip_yx_mm,            ///< tip position along (y - x)/sqrt(2) of {A}, mm
+  since_speed_change_s  ///< time since the last change of the insertion velocity, s
 };
+/// Number of covariates.
 inline constexpr std::size_t kCovariates = 14;
+/// Returns the name of a covariate, which is that of its enumerator.
+/// @param covariate covariate
+/// @return the name with its unit, for example "depth_mm"
 std::string_view name_of(Covariate covariate);
-bool needs_clock(Covariate covariate);  // time, speed, rate, rest: unknown where only the order of readings is
-// Unit vector (x, y of {A}) along which a covariate says where the tip is; nothing for one of the base's motion. An
-// axis of {A} is no better than a direction between: tissue does not know them.
+/// Returns whether a covariate requires time stamps: time, speed, rotation rate, and time since a stop or speed change.
+/// @param covariate covariate
+/// @return true if recordings without time stamps do not determine it
+bool needs_clock(Covariate covariate);
+/// Returns the direction along which a covariate measures the tip position. The diagonals are included because no axis
+/// of {A} is a preferred direction of tissue.
+/// @param covariate covariate
+/// @return unit vector (x, y) in {A}; empty for a covariate of the actuator motion
 std::optional<Eigen::Vector2d> tip_direction(Covariate covariate);
+/// Lists all covariates.
+/// @return the covariates in the order of the enumeration; static storage
 std::span<const Covariate> all_covariates();
-// Whether it counts from each of several causes, of which each still acts: what they bring adds up.
+/// Returns whether the contributions of several past events add up. This holds only for changes of speed.
+/// @param covariate covariate
+/// @return true for Covariate::since_speed_change_s
 inline bool adds_up(Covariate covariate) { return covariate == Covariate::since_speed_change_s; }
 
-// By how much the base's speed of insertion changed, mm/s: at i, since_speed_change_s(i) ago (base_history.hpp).
+/// Number of past intervals in SpeedChanges.
 inline constexpr std::size_t kSpeedChanges = 12;
+/// Length of one interval of SpeedChanges, s.
 inline constexpr double kSpeedChange_s = 0.1;
+/// Returns the age of an element of SpeedChanges.
+/// @param i index, below kSpeedChanges
+/// @return the age, s
 constexpr double since_speed_change_s(std::size_t i) { return static_cast<double>(i + 1) * kSpeedChange_s; }
+/// Changes of the insertion velocity of the actuator, mm/s. Element i is the change since_speed_change_s(i) ago
+/// (base_history.hpp).
 using SpeedChanges = std::array<double, kSpeedChanges>;
 
-// What an effect remembers between legs of one insertion. Slopes come with it.
+/// State of an effect between the legs of one insertion, with sensitivities.
 struct EffectMemory {
-  static constexpr std::size_t kSlots = 4, kNumbers = 6;
-  std::array<Dual, kSlots> slot;
-  std::array<double, kNumbers> number{};  // what no unknown moves much
-  int phase = 0;                          // 0 until it has seen a leg
+  static constexpr std::size_t kSlots = 4,  ///< number of elements of `slot`
+      kNumbers = 6;                         ///< number of elements of `number`
+  std::array<Dual, kSlots> slot;            ///< state with sensitivities; each effect defines the meaning
+  std::array<double, kNumbers> number{};    ///< state whose sensitivities are negligible
+  int phase = 0;                            ///< 0 before the first leg; each effect defines the other values
 };
 
-// The base, as the encoders say, at the ends of a leg; t counts from the start of the recording.
+/// Actuator motion at the end of a leg, as measured by the encoders.
 struct BaseMotion {
-  double time_s = 0;
-  double insertion_mm = 0;
-  double rotation_rad = 0;
+  double time_s = 0;        ///< time since the start of the recording, s
+  double insertion_mm = 0;  ///< position of the insertion axis, mm
+  double rotation_rad = 0;  ///< position of the rotation axis, rad
 };
 
-// What a leg looks like to an effect.
+/// Leg as an effect sees it: actuator motion, tip pose at its start and increments, with sensitivities.
 struct LegView {
-  BaseMotion entry, from, to;  // of the insertion, of this leg
-  Dual tip_depth_mm;           // z of the tip at the start of the leg
-  Dual2 tip_side_mm;           // its x and y there
-  Dual heading_z;              // cosine of the tilt there
-  Eigen::Matrix3d R;           // orientation of {B} at the start, and its derivatives as body rotations:
-  bool R_moves = false;        // with an unknown: then
-  Eigen::Matrix<double, 3, kMaxColumns> R_body;  // d(rotation vector in {B})/d(column)
-  Dual curvature_per_mm;                         // the needle's own k, whatever effects make of it
-  // Known from `axes` on:
-  Dual insertion_mm, rotation_rad;    // increments of the tip
-  Dual tip_rotation_rad;              // of the tip at the start of the leg
-  SpeedChanges speed_changes_mm_s{};  // before the leg's end; known from `settle` on
+  BaseMotion entry,      ///< actuator motion at the entry of this insertion
+      from,              ///< actuator motion at the start of the leg
+      to;                ///< actuator motion at the end of the leg
+  Dual tip_depth_mm;     ///< z of the tip in {A} at the start of the leg, mm
+  Dual2 tip_side_mm;     ///< x and y of the tip in {A} at the start of the leg, mm
+  Dual heading_z;        ///< cosine of the tilt at the start of the leg
+  Eigen::Matrix3d R;     ///< orientation of {B} in {A} at the start of the leg, 3 x 3
+  bool R_moves = false;  ///< true if R depends on a parameter; R_body is valid only then
+  /// Derivatives of R: d(rotation vector in {B})/d(column), rad per unit of the column, 3 x kMaxColumns.
+  Eigen::Matrix<double, 3, kMaxColumns> R_body;
+  Dual curvature_per_mm;              ///< nominal curvature k of the needle, 1/mm, without effects
+  Dual insertion_mm,                  ///< insertion of the tip over the leg, mm; valid after `axes`
+      rotation_rad;                   ///< rotation of the tip over the leg, rad; valid after `axes`
+  Dual tip_rotation_rad;              ///< rotation of the tip at the start of the leg, rad
+  SpeedChanges speed_changes_mm_s{};  ///< speed changes before the end of the leg, mm/s; valid from `settle` on
 
+  /// @return the duration of the leg, s
   double duration_s() const { return to.time_s - from.time_s; }
+  /// @return the insertion of the actuator over the leg, mm
   double base_insertion_mm() const { return to.insertion_mm - from.insertion_mm; }
+  /// @return the rotation of the actuator over the leg, rad
   double base_rotation_rad() const { return to.rotation_rad - from.rotation_rad; }
-  // |u1|, |u2|
+  /// @return the magnitude of the insertion rate |u1|, mm/s; 0 for a leg without duration
   double speed_mm_s() const { return duration_s() > 0 ? std::abs(base_insertion_mm()) / duration_s() : 0; }
+  /// @return the magnitude of the rotation rate |u2|, rad/s; 0 for a leg without duration
   double turn_rate_rad_s() const { return duration_s() > 0 ? std::abs(base_rotation_rad()) / duration_s() : 0; }
-  // A vector of {A} seen in {B} halfway through the leg's own rotation.
+  /// Transforms a lateral vector from {A} to {B}, with {B} halfway through the rotation of the leg.
+  /// @param world x and y in {A}, any unit; z is 0
+  /// @return x and y in {B}, in the same unit
   Dual2 lateral_in_body(const Dual2& world) const;
-  // Curvature in {B} by which the heading turns toward +x and +y of {A} by so much per mm. As a rotation vector that is
-  // (-y, x): the heading moves by kappa x e3 = (kappa_y, -kappa_x).
+  /// Computes the curvature in {B} that turns the heading toward +x and +y of {A} at given rates. As a rotation vector
+  /// in {A} it is (-y, x), because the heading moves by kappa x e3 = (kappa_y, -kappa_x).
+  /// @param world rates toward +x and +y of {A}, 1/mm
+  /// @return (kappa_x, kappa_y) in {B}, 1/mm
   Dual2 curvature_toward(const Dual2& world) const { return lateral_in_body({-world[1], world[0]}); }
-  // A lateral vector of {B} at the start of the leg, as its x and y in {A}; all of it.
+  /// Transforms a lateral vector from {B} at the start of the leg to {A}, without its z component.
+  /// @param body x and y in {B}, any unit; z is 0
+  /// @return x and y in {A}, in the same unit
   Dual2 lateral_in_world(const Dual2& body) const;
+  /// Transforms a lateral vector from {B} at the start of the leg to {A}.
+  /// @param body x and y in {B}, any unit; z is 0
+  /// @return x, y and z in {A}, in the same unit
   Dual3 in_world(const Dual2& body) const;
-  // Unit vector in {B} at the start of the leg toward the bevel's side, halfway through the leg's own rotation: the
-  // heading turns toward body -y for k > 0.
+  /// Computes the unit vector toward the bevel side, halfway through the rotation of the leg. The heading turns toward
+  /// body -y for k > 0.
+  /// @return x and y in {B} at the start of the leg
   Dual2 toward_bevel() const;
 };
 
+/// Pose of the tip at the entry relative to z_A, with sensitivities.
 struct EntryPose {
-  Dual tilt_x_rad, tilt_y_rad;  // rotation vector of the heading
-  Dual roll_rad;                // about the heading, after the tilt
+  Dual tilt_x_rad,  ///< x of the rotation vector of the heading in {A}, rad
+      tilt_y_rad;   ///< y of the rotation vector of the heading in {A}, rad
+  Dual roll_rad;    ///< roll about the heading, rad, applied after the tilt
 };
 
+/// Values of an effect's parameters, in the order of Effect::parameters().
 using Parameters = std::span<const Dual>;
 
-// What an effect does not know of itself, over one leg: variance of the pose as a body perturbation, mm^2 | rad^2.
+/// Variance of the pose over one leg due to the uncertainty of the effects, as a body perturbation: mm^2 | rad^2.
 using Spread = std::array<double, 6>;
 
+/// Static properties of an effect.
 struct EffectDescription {
-  std::string_view name;     // a contract: verdict.json, model.toml
-  std::string_view meaning;  // one clause for the report: what is going on in the rig
-  Covariate covariate;
-  std::vector<EffectParameter> parameters;
-  bool of_headings = false;  // no position shows it, only a measured heading
+  std::string_view name;                    ///< identifier; part of the formats of verdict.json and model.toml
+  std::string_view meaning;                 ///< one clause for the report: the physical cause in the rig
+  Covariate covariate;                      ///< covariate against which the effect is plotted
+  std::vector<EffectParameter> parameters;  ///< parameters, at most kMaxEffectParameters
+  bool of_headings = false;                 ///< true if only heading measurements depend on the effect
   /// The effect acts where the insertion changes direction. Without a retraction it is an offset of the depth.
   bool needs_retraction = false;
-  // Within hundredths of a millimetre of the base: its own error decides which reading still is before, which after.
+  /// True if the tip jumps within hundredths of a millimetre of actuator motion. The position error of the actuator
+  /// then decides which measurement lies before the jump.
   bool sudden = false;
 };
 
+/// Base class of the effects. An object has no mutable state; EffectMemory stores the state of an insertion. The
+/// default of each hook changes nothing.
 class Effect {
  public:
+  /// Stores the description.
+  /// @param description static properties
   explicit Effect(EffectDescription description) : description_(std::move(description)) {}
   Effect(const Effect&) = delete;
   Effect& operator=(const Effect&) = delete;
   virtual ~Effect() = default;
 
+  /// @return EffectDescription::name
   std::string_view name() const { return description_.name; }
+  /// @return EffectDescription::meaning
   std::string_view meaning() const { return description_.meaning; }
+  /// @return EffectDescription::covariate
   Covariate covariate() const { return description_.covariate; }
+  /// @return EffectDescription::parameters
   const std::vector<EffectParameter>& parameters() const { return description_.parameters; }
+  /// @return EffectDescription::of_headings
   bool of_headings() const { return description_.of_headings; }
+  /// @return EffectDescription::needs_retraction
   bool needs_retraction() const { return description_.needs_retraction; }
+  /// @return EffectDescription::sudden
   bool sudden() const { return description_.sudden; }
 
+  /// Modifies the needle parameters, once per model.
   virtual void change_needle(NeedleParameters&) const {}
+  /// Modifies the pose at the entry, given the effect's parameters.
   virtual void enter(Parameters, EntryPose&) const {}
-  // Positions of the tip's axes at the end of the leg; come in as those of the base.
+  /// Modifies the axis positions of the tip at the end of the leg: insertion, mm, and rotation, rad. The input is the
+  /// actuator positions, modified by the preceding effects.
   virtual void axes(Parameters, const LegView&, EffectMemory&, Dual& /*insertion_mm*/, Dual& /*rotation_rad*/) const {}
-  // Curvature in {B} over the leg; comes in as (k, 0).
+  /// Modifies the curvature over the leg, in {B}, 1/mm. The input is (k, 0), modified by the preceding effects.
   virtual void curvature(Parameters, const LegView&, EffectMemory&, Dual2& /*kappa_per_mm*/) const {}
-  // After the leg has been integrated: memory that an offset needs. leg.R is still that of its start.
+  /// Updates the memory after the integration of the leg, for effects with an offset. LegView::R remains that of the
+  /// start of the leg.
   virtual void settle(Parameters, const LegView&, EffectMemory&) const {}
-  // Moves the point that the cameras see, in {A}.
+  /// Moves the observed point, mm in {A}, at a time in s since the start of the recording.
   virtual void offset(Parameters, const EffectMemory&, double /*time_s*/, Dual3& /*position_mm*/) const {}
-  // What the cameras make of the point.
+  /// Transforms the observed point, mm in {A}, into the point that the cameras report.
   virtual void camera(Parameters, Dual3& /*position_mm*/) const {}
-  // Rotation vector about x and y of {B} by which the sensor of the heading, or what it sits in, is askew.
+  /// Adds the misalignment of the heading sensor, or of the part that holds it: x and y of its rotation vector in {B},
+  /// rad.
   virtual void sensor(Parameters, const EffectMemory&, Dual2& /*tilt_rad*/) const {}
-  // What a turned frame makes of a direction.
+  /// Transforms a direction in {A} into the frame in which the sensor reports it.
   virtual void frame(Parameters, Dual3& /*direction*/) const {}
-  // The reading shows the needle as it was so much earlier.
+  /// Computes the latency of the measurements. A measurement at time t shows the tip at t minus the latency.
+  /// @return the latency, s
   virtual Dual latency_s(Parameters) const { return {}; }
 
-  // After settle: adds what is not known of the effect, as independent from leg to leg as makes the sum right.
+  /// Adds the variance of the pose over the leg that is due to the uncertainty of the effect; called after settle. The
+  /// legs count as independent, so an effect scales its contributions until their sum is correct.
   virtual void spread(const LegView&, const EffectMemory&, Spread&) const {}
-  // Adds the variance of the offset in one reading, along the axes of {A}; neighbouring readings share the error.
+  /// Adds the variance of the offset in one measurement, mm^2 along the axes of {A}. Consecutive measurements share the
+  /// error.
   virtual void blur(const EffectMemory&, std::array<double, 3>& /*variance_mm2*/) const {}
 
-  // Whether readings jump at the instant of one of its kinds, so that no derivative says where it is.
+  /// Checks whether measurements jump at the event time of a variant. The likelihood then has no derivative with
+  /// respect to the event time. The argument is an element of variants().
+  /// @return true if they jump
   virtual bool jumps(std::uint32_t /*kind*/) const { return false; }
-  // Which parameters are fitted together: bit i for parameter i. More than one where the effect comes in kinds.
+  /// Lists the sets of parameters that are fitted together, one per variant of the effect.
+  /// @return one bit mask per variant: bit i represents parameter i; static storage. The default is one mask with all
+  ///     bits set.
   virtual std::span<const std::uint32_t> variants() const;
 
  private:
   EffectDescription description_;
 };
 
-// Every effect there is, in the order in which they act.
+/// Lists all effects of the library.
+/// @return the effects in the order in which they act; static storage
 std::span<const Effect* const> all_effects();
-// Null if there is none of that name.
+/// Finds an effect by its name.
+/// @param name identifier, for example "layer"
+/// @return the effect, with static storage; null if the library has none of that name
 const Effect* find_effect(std::string_view name);
 
-// First parameter outside its bounds, or not finite: index, or -1.
+/// Finds the first parameter that is not finite or outside its bounds.
+/// @param effect effect
+/// @param values one value per parameter of \p effect, in its unit and order
+/// @return the index of the parameter; -1 if all are valid
 int find_parameter_violation(const Effect& effect, std::span<const double> values);
 
 }  // namespace bevel::model

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: MIT
 #pragma once
-// The tip along a recording from the base's motion alone, as the cameras would report it, with sensitivities.
+/// @file
+/// Open-loop prediction of the tip measurements of a recording from the actuator motion, with sensitivities.
 #include <array>
 #include <cstdint>
 #include <span>
@@ -11,40 +12,55 @@
 
 namespace bevel::model {
 
-// The base's motion cut into legs: at every moment at which a reading is wanted, where a rate jumps, and so often that
-// no leg is longer than 1 mm or 0.2 rad. Times count from the first actuator sample.
+/// Actuator motion divided into legs. Nodes lie at the measurements, at jumps of a rate (1 mm/s or 0.5 rad/s), and at
+/// the first actuator sample more than 1 mm or 0.2 rad after the previous node. Times count from the first actuator
+/// sample.
 struct Motion {
-  std::vector<BaseMotion> nodes;  // the first is the entry
-  std::vector<std::size_t> at;    // node of each reading
-  std::int64_t start_utime = 0;
+  std::vector<BaseMotion> nodes;  ///< nodes in order of time; the first is the entry
+  std::vector<std::size_t> at;    ///< index into `nodes` of each measurement
+  std::int64_t start_utime = 0;   ///< time of the first actuator sample, us since the epoch
 };
 
-// Both in order of time. Positions between actuator samples are interpolated linearly; outside their span the base
-// stands. Throws ArgumentError for fewer than two actuator samples, or times that run backwards.
+/// Divides the actuator motion of a recording into legs. Positions between actuator samples are interpolated linearly.
+/// The actuators are stationary before the first and after the last sample.
+/// @param actuators actuator samples in order of time, at least two
+/// @param reading_utimes times of the measurements in order of time, us since the epoch
+/// @return the motion, with one element of Motion::at per measurement
+/// @throws bevel::ArgumentError if there are fewer than two actuator samples, or times decrease
 Motion make_motion(std::span<const ActuatorState> actuators, std::span<const std::int64_t> reading_utimes);
 
+/// Predicted measurements of one recording, with sensitivities and the working memory of predict().
 struct OpenLoop {
-  std::vector<Eigen::Vector3d> position_mm;  // one per reading
-  Eigen::MatrixXd jacobian;                  // 3 rows per reading, by the needle's columns
-  // Without columns: variance of each by what effects do not know of themselves, along the axes of {A}.
+  std::vector<Eigen::Vector3d> position_mm;  ///< predicted tip position per measurement, mm in {A}
+  Eigen::MatrixXd jacobian;                  ///< sensitivities of the positions, (3 measurements) x columns
+  /// Variance of each position due to the uncertainty of the effects, mm^2 along the axes of {A}. Empty if the needle
+  /// has sensitivity columns.
   std::vector<std::array<double, 3>> blur_mm2;
-  // Unit vectors; where headings are asked for, one per reading.
+  /// Predicted heading per measurement, unit vector in {A}; empty if headings are not requested.
   std::vector<Eigen::Vector3d> heading;
-  Eigen::MatrixXd heading_jacobian;
+  Eigen::MatrixXd heading_jacobian;  ///< sensitivities of the headings, (3 measurements) x columns
 
-  // Room for predict(), kept from one call to the next: vectors and their derivatives, of the nodes and, where the tip
-  // jumps between nodes, of late readings.
+  /// Working memory of predict(), kept between calls: a vector and its derivatives per entry. The entries are the
+  /// nodes, or the delayed measurements if the tip jumps between nodes.
   struct Track {
-    std::vector<Eigen::Vector3d> value;
-    Eigen::MatrixXd jacobian;  // 3 rows each
+    std::vector<Eigen::Vector3d> value;  ///< vectors: mm, or unit vectors
+    Eigen::MatrixXd jacobian;            ///< sensitivities, (3 entries) x columns
   };
-  Track node_position_mm, node_heading, late_position_mm, late_heading;
-  std::vector<std::array<double, 3>> node_blur_mm2;
+  Track node_position_mm,                            ///< working memory: tip positions at the nodes, mm
+      node_heading,                                  ///< working memory: headings at the nodes
+      late_position_mm,                              ///< working memory: tip positions of delayed measurements, mm
+      late_heading;                                  ///< working memory: headings of delayed measurements
+  std::vector<std::array<double, 3>> node_blur_mm2;  ///< working memory: blur_mm2 at the nodes, mm^2
 };
 
-// False where the tip leaves the domain of the slip law. A late camera sees the path between two nodes as straight, but
-// where effects are sudden, which put a jump there; sensitivities by the latency are means over the leg in any case:
-// the path's own would be none where a tip is held, and without end where it jumps.
+/// Predicts all measurements of a recording. With a latency, the path between two nodes is taken as straight, unless a
+/// sudden effect can put a jump there. Sensitivities with respect to the latency are averages over the leg. The exact
+/// ones are zero where the tip sticks and infinite where it jumps.
+/// @param needle needle with effects; its columns determine the sensitivities
+/// @param motion actuator motion from make_motion(), at least one node
+/// @param[in,out] out predicted measurements; incomplete on failure. Reusing the object avoids allocations.
+/// @param headings true to predict headings in addition to positions
+/// @return false if the tip leaves the domain of the slip law (25)
 bool predict(const AugmentedNeedle& needle, const Motion& motion, OpenLoop& out, bool headings = false);
 
 }  // namespace bevel::model
