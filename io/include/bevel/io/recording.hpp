@@ -62,8 +62,9 @@ struct Recording {
 
   /// Returns the number of rejected messages on all channels.
   std::int64_t rejected() const;
-  /// Returns true if nothing is damaged, rejected or implausible, and if no camera has more than #kLargestShareOutside
-  /// of its measurements outside the time of the actuators. Events that were sorted by time are not damage.
+  /// Returns whether the recording is complete. Events that were sorted by time are not damage.
+  /// @return true if nothing is damaged, rejected or implausible, and if no camera has more than kLargestShareOutside
+  /// of its measurements outside the time of the actuators
   bool intact() const {
     return damage.intact() && rejected() == 0 && tip_oddities.empty() && heading_oddities.empty() &&
            actuator_oddities.empty() && coverage.faults.empty() && file_change.empty();
@@ -97,7 +98,7 @@ struct Recording {
 /// @return the recording; Recording::refusal() tells whether it is usable
 Recording read_recording(std::span<const std::uint8_t> log);
 /// Reads a log file. Damage in the file is reported in the result.
-/// @param path  a regular file of at most #kLargestLog_bytes
+/// @param path  a regular file of at most kLargestLog_bytes
 /// @return the recording; Recording::refusal() tells whether it is usable
 /// @throws IoError if the file cannot be read
 Recording read_recording(const std::string& path);
