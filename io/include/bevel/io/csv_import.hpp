@@ -14,7 +14,7 @@
 
 namespace bevel::io {
 
-/// Result of import_csv(): samples in the order of time, and what was left out or found.
+/// Result of import_csv(): samples in the order of time, omitted rows and findings.
 struct ImportedRecording {
   std::vector<model::ActuatorState> actuators;  ///< positions in mm and rad; rates are differences of the positions
   std::vector<model::TipMeasurement> tips;      ///< in {A}, mm; information is 0 along axes without a measurement
@@ -38,7 +38,7 @@ struct ImportedRecording {
 
   /// Returns true if no row is implausible and the actuator motion has no gap.
   bool intact() const { return left_out.empty() && motion_gap.empty(); }
-  /// Formats what was left out for stderr.
+  /// Formats the findings and the omitted rows for stderr.
   /// @param name  name of the file, at the start of the lines that concern the whole file
   /// @return lines that end with a line feed; "" if there is nothing to report
   std::string remarks(const std::string& name) const;

@@ -20,12 +20,14 @@ inline constexpr double kWithdrawn_mm = 1;
 
 /// Finds where a second insertion begins: the needle was inserted, was withdrawn to where the recording began, and is
 /// inserted again. A needle that is withdrawn only partly, or for good, is one insertion.
-/// @param actuators in order of time
-/// @return index of the last sample before the second insertion at which the needle is farthest out
+/// @param actuators  in order of time
+/// @return index of the last sample before the second insertion at which the needle is farthest out; nothing for one
+/// insertion
 std::optional<std::size_t> second_insertion(std::span<const model::ActuatorState> actuators);
 
 /// Throws for a recording of more than one insertion, for programs that fit one entry pose for each recording.
-/// @param actuators in any order
+/// @param name  name of the recording for the error message
+/// @param actuators  in any order
 /// @throws ParseError with \p name, the time of the second insertion and the remedy
 void require_one_insertion(const std::string& name, std::span<const model::ActuatorState> actuators);
 
