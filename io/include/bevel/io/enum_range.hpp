@@ -21,6 +21,9 @@ consteval bool is_enumerator() {
 }  // namespace detail
 
 /// Returns the largest enumerator of \p Enum, whose enumerators count up from 0 without a gap.
+/// @tparam Enum  enumeration
+/// @tparam from  first enumerator that is examined; 0 for the caller
+/// @return value of the largest enumerator
 template <class Enum, std::int32_t from = 0>
 consteval std::int32_t last_code() {
   static_assert(detail::is_enumerator<static_cast<Enum>(from)>(), "the enumerators must begin with 0");
@@ -31,6 +34,9 @@ consteval std::int32_t last_code() {
 }
 
 /// Returns the union of the enumerators of \p Flags; each enumerator is one bit.
+/// @tparam Flags  enumeration
+/// @tparam bit  first bit that is examined; 0 for the caller
+/// @return bitwise or of all enumerators
 template <class Flags, int bit = 0>
 consteval std::int32_t all_flags() {
   constexpr int kBits = 31;  // of a non-negative int32
