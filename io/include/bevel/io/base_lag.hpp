@@ -25,6 +25,7 @@ struct BaseLag {
   double rms_mm = 0;        ///< root mean square of the residuals of the path length, in mm
   bool determined = false;  ///< the standard error is below kLargestLagSd_s and the optimum is inside the search range
   /// Returns whether the lag is determined and differs from zero by more than three standard errors.
+  /// @return false if the lag is consistent with zero or not determined
   bool significant() const;
 };
 

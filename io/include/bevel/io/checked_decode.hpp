@@ -53,8 +53,10 @@ struct Decoded {
   /// Returns true if the message is valid.
   explicit operator bool() const { return !error; }
   /// Returns the message.
+  /// @return the decoded message; all fields are zero after a fault
   const Message& operator*() const { return message; }
   /// Returns a pointer to the message.
+  /// @return address of the decoded message; never null
   const Message* operator->() const { return &message; }
 };
 

@@ -70,6 +70,7 @@ struct TimeColumn {
   double rate_hz = 0;        ///< rate of the rows, used if \ref column is ""
   double offset_s = 0;       ///< added to the time
   /// Returns the unit of the column: "s", "ms", "us" or "ns".
+  /// @return static text
   const char* unit() const;
 };
 
@@ -119,10 +120,13 @@ struct ColumnMap {
       unseen;                                   ///< cell texts that mean the same as an empty cell
 
   /// Returns whether the times of the rows are meaningful: false for stepwise insertions.
+  /// @return true if the recording has time stamps
   bool has_clock() const { return !settled && !stops; }
   /// Returns whether a tip needs all three axes: a rotation of the frame mixes them.
+  /// @return true with a transform or an estimated frame
   bool needs_all_axes() const { return transform.has_value() || frame != TipFrame::axes; }
   /// Returns whether the map has columns for the heading or for a quaternion.
+  /// @return true if headings are imported
   bool has_heading() const { return !heading.empty() || quaternion.has_value(); }
 };
 

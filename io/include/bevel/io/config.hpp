@@ -41,6 +41,7 @@ class ConfigError : public ConfigurationError {
   /// @param messages  one for each fault
   explicit ConfigError(std::vector<std::string> messages);
   /// Returns one message for each fault.
+  /// @return lines of what()
   const std::vector<std::string>& messages() const { return messages_; }
 
  private:
@@ -71,6 +72,7 @@ struct Range {
   /// @return "from 0 to 5", "above 0", "at least 1" or "any finite number" for instance, followed by the reason
   std::string describe() const;
   /// Describes the limits without the reason.
+  /// @return "from 0 to 5" for instance
   std::string describe_limits() const;
   /// Returns a copy of the range with a reason.
   /// @param why  static text
@@ -95,6 +97,7 @@ constexpr Range at_least(double lowest) { return {lowest, std::numeric_limits<do
 /// @return values above \p lowest
 constexpr Range above(double lowest) { return {lowest, std::numeric_limits<double>::infinity(), true}; }
 /// Returns a range without limits.
+/// @return all finite numbers
 constexpr Range any_finite() { return {}; }
 
 /// Names of enumerators in configuration files.
@@ -111,14 +114,17 @@ struct ConfigContents;
 class Section {
  public:
   /// Returns whether the file contains the table.
+  /// @return false for an absent optional table
   bool present() const { return table_ != nullptr; }
   /// Returns whether the table contains a key.
   /// @param key  name without dots
   /// @return false if the table is absent
   bool has(std::string_view key) const;
   /// Returns the dotted path of the table, "" for the root.
+  /// @return "estimator.prior" for instance
   const std::string& path() const { return path_; }
   /// Returns the line of the table in the file, from 1; 0 if the table is absent.
+  /// @return line number in the file
   int line() const;
 
   /// Reads a number.
@@ -206,6 +212,7 @@ class Section {
   /// @return the tables in the order of the file
   std::vector<Section> sections(std::string_view key, Presence presence);
   /// Returns all tables of this table in the order of the file.
+  /// @return one section for each table; empty if this table is absent
   std::vector<Section> children();
 
   /// Records a fault, which ConfigFile::finish() reports with file, line and dotted key.
@@ -253,6 +260,7 @@ class ConfigFile {
   ~ConfigFile();
 
   /// Returns the table of the whole file.
+  /// @return section with an empty path
   Section root();
   /// Returns a table of the root, as Section::section().
   /// @param key  name without dots
@@ -265,8 +273,10 @@ class ConfigFile {
   /// @return the tables in the order of the file
   std::vector<Section> sections(std::string_view key, Presence presence) { return root().sections(key, presence); }
   /// Returns the path, or the name given to parse().
+  /// @return file name for error messages
   const std::string& name() const;
   /// Returns the text as read, for the CONFIG channel.
+  /// @return TOML text
   const std::string& text() const;
 
   /// Checks that all keys of the sections that were opened have been read, and reports all faults.

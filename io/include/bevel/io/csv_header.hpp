@@ -26,6 +26,7 @@ class CsvLines {
   /// @return false after the last line
   bool next(std::string_view& line);
   /// Returns the number of the last line that next() returned, from 1.
+  /// @return 0 before the first line
   int number() const { return number_; }
 
  private:

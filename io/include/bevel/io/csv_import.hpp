@@ -37,6 +37,7 @@ struct ImportedRecording {
   double time_shift_s = 0;  ///< added to all times if the file's clock begins at 0 or below; log times are positive
 
   /// Returns true if no row is implausible and the actuator motion has no gap.
+  /// @return false if the recording is incomplete
   bool intact() const { return left_out.empty() && motion_gap.empty(); }
   /// Formats the findings and the omitted rows for stderr.
   /// @param name  name of the file, at the start of the lines that concern the whole file

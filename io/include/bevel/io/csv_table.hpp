@@ -71,17 +71,20 @@ class CsvTable {
   /// @return path and line
   std::string place(int line) const { return path_ + ":" + std::to_string(line) + ": "; }
   /// Returns the path of the file.
+  /// @return argument of the constructor
   const std::string& path() const { return path_; }
   /// Returns the number of the row's line, from 1.
+  /// @return line number in the file
   int line() const { return lines_.number(); }
   /// Describes the format that was detected: "';' between cells, decimal comma".
+  /// @return text without a line end
   std::string format() const;
 
  private:
   std::string path_, text_;
   CsvLines lines_;
   CsvHeader header_;
-  char mark_ = 0;  // of decimals; 0 until one was seen
+  char mark_ = 0;  // decimal mark; 0 until a number with one is read
   std::vector<std::string> unseen_;
   std::map<std::string, std::size_t> index_;
   std::vector<std::string> cells_;

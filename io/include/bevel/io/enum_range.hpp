@@ -10,6 +10,7 @@ namespace bevel::io {
 namespace detail {
 
 /// Returns whether \p value is an enumerator: GCC and Clang print another value as a cast, "(Request)10".
+/// @return false for a value without an enumerator
 template <auto value>
 consteval bool is_enumerator() {
   constexpr std::string_view text = __PRETTY_FUNCTION__;

@@ -29,8 +29,10 @@ class FileBytes {
   /// @throws IoError with the file, its kind or size and what is allowed
   explicit FileBytes(const std::string& path, std::uint64_t largest_bytes = kLargestLog_bytes);
   /// Returns the bytes that were read.
+  /// @return view that is valid as long as this object
   std::span<const std::uint8_t> bytes() const { return bytes_; }
   /// Returns how the file changed while it was read; "" if it did not.
+  /// @return a sentence with both sizes
   const std::string& change() const { return change_; }
 
  private:

@@ -53,10 +53,13 @@ class JsonLayout {
     return layout;
   }
   /// Returns the fields in their order.
+  /// @return one entry for each column
   const std::vector<JsonColumn>& columns() const { return columns_; }
   /// Returns whether the last field is the position in the order of arrival.
+  /// @return true if of() was called with numbers_arrivals
   bool numbers_arrivals() const { return numbers_arrivals_; }
   /// Returns the largest number of bytes of a message as JSON.
+  /// @return upper bound in bytes
   std::size_t largest_size() const { return largest_size_; }
   /// Returns the JSON Schema. Each field has one type: Foxglove does not read schemas in which a field has two, such as
   /// ["number", "null"].
@@ -136,7 +139,7 @@ class JsonWriter {
   void digits(double value) {
     if (!std::isfinite(value)) throw ParseError("a number that is not finite, which JSON has not");
     at_ = std::to_chars(at_, at_ + kLongestNumber, value).ptr;
-    // Whoever takes "-0" for a whole number loses its sign.
+    // A parser that reads "-0" as an integer loses the sign.
     if (value == 0 && std::signbit(value)) *at_++ = '.', *at_++ = '0';
   }
   const JsonColumn* column_;

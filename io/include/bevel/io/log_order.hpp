@@ -54,6 +54,7 @@ class ArrivalsByNumber {
   /// @param where  channel and index of the sample
   void add(std::int64_t number, std::int64_t utime, Arrival where) { numbered_.push_back({number, utime, where}); }
   /// Sorts the samples by position, then by time, then by the order of the calls of add().
+  /// @return the value of Recording::arrivals
   std::vector<Arrival> sorted();
 
  private:

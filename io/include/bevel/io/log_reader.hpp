@@ -35,8 +35,10 @@ struct LogDamage {
   std::int64_t torn_tail_bytes = 0;  ///< size of an event that is cut off by the end of the file
 
   /// Returns true if no bytes were skipped and no event is cut off.
+  /// @return false if a part of the log is unreadable
   bool intact() const { return skipped_bytes == 0 && torn_tail_bytes == 0; }
   /// Returns "intact", or a sentence with the number of skipped and cut bytes.
+  /// @return text without a line end
   std::string describe() const;
 };
 
@@ -50,6 +52,7 @@ class LogReader {
   /// @return nothing at the end of the log
   std::optional<LogEvent> next();
   /// Returns the damage of the part of the log that has been read.
+  /// @return damage up to the last event that next() returned
   const LogDamage& damage() const { return damage_; }
 
  private:

@@ -52,6 +52,7 @@ class LogWriter {
   /// @throws IoError with the file and the reason
   void close();
   /// Returns the number of events written.
+  /// @return number of successful calls of write()
   std::int64_t events() const { return events_; }
 
  private:

@@ -33,6 +33,7 @@ struct ImportedMcap {
   std::string faults;   ///< one line for each fault; "" if the file is intact
   std::string notes;    ///< one line for each channel with fields that are not read
   /// Returns true if the file has no fault.
+  /// @return false if a part of the file was left out
   bool intact() const { return faults.empty(); }
   /// Formats faults and notes for stderr.
   /// @param name  name of the file, at the start of each line

@@ -45,12 +45,14 @@ struct Damage {
   /// @param what  description
   void note(Fault fault, std::uint64_t offset, std::string what);
   /// Returns true if no place was added.
+  /// @return false if the file is damaged
   bool intact() const { return places.empty(); }
   /// Returns whether a kind of damage occurs.
   /// @param fault  kind of damage
   /// @return true if \ref places contains it
   bool has(Fault fault) const;
   /// Lists the places, one line for each.
+  /// @return lines that end with a line feed; "" without damage
   std::string describe() const;
 };
 

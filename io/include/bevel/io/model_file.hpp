@@ -52,6 +52,7 @@ struct EffectEntry {
   std::map<std::string, std::map<std::string, double>> recordings{};
 
   /// Compares all members.
+  /// @return true if they are equal
   bool operator==(const EffectEntry&) const = default;
 };
 
@@ -63,6 +64,7 @@ struct ModelFile {
   std::optional<model::Variation> variation{};           ///< [variation]; empty if the variation is unknown
 
   /// Compares all members.
+  /// @return true if they are equal
   bool operator==(const ModelFile&) const = default;
 };
 

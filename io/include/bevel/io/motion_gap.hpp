@@ -35,7 +35,9 @@ struct MotionGap {
   double moved_mm = 0;       ///< insertion between both ends, in mm
   double turned_rad = 0;     ///< rotation between both ends, in rad
   double allowed_s = 0;      ///< longest interval that is not a gap, in s
-  std::string what() const;  ///< one sentence with the figures and the allowed values
+  /// Describes the gap with its figures and the allowed values.
+  /// @return text without a line end
+  std::string what() const;
 };
 
 /// Finds the first gap in which the axes moved by more than kMovedInGap_mm or kTurnedInGap_rad. Import and diagnosis

@@ -61,6 +61,7 @@ struct Recording {
   std::int64_t bytes = 0;            ///< size of the log
 
   /// Returns the number of rejected messages on all channels.
+  /// @return sum over all channels and faults
   std::int64_t rejected() const;
   /// Returns whether the recording is complete. Events that were sorted by time are not damage.
   /// @return true if nothing is damaged, rejected or implausible, and if no camera has more than kLargestShareOutside

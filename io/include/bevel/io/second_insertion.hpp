@@ -12,10 +12,10 @@
 
 namespace bevel::io {
 
-/// Depth from which a needle counts as inserted. Over 10 mm a needle of curvature 0.005 /mm bends by 0.25 mm, the noise
-/// of one measurement; less is a needle that touches the tissue and is moved back.
+/// Depth (mm) from which a needle counts as inserted. Over 10 mm a needle of curvature 0.005 /mm bends by 0.25 mm, the
+/// noise of one measurement. At a smaller depth a needle touches the tissue and is moved back.
 inline constexpr double kInserted_mm = 10;
-/// Depth at which a withdrawn needle counts as out: the tip is at the entry point, as closely as hands and axes return.
+/// Depth (mm) below which a withdrawn needle counts as out: hands and axes return to the entry point this accurately.
 inline constexpr double kWithdrawn_mm = 1;
 
 /// Finds where a second insertion begins: the needle was inserted, was withdrawn to where the recording began, and is

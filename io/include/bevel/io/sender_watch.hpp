@@ -62,8 +62,10 @@ class SenderWatch {
   /// @return true if two senders are likely
   bool out_of_order() const { return std::popcount(lates_) > 1; }
   /// Returns the number of missing messages.
+  /// @return sum of the gaps of `seq`
   std::int64_t lost() const { return lost_; }
   /// Returns the number of senders that restarted after silence.
+  /// @return number of restarts since construction
   std::int64_t restarts() const { return restarts_; }
 
  private:
