@@ -22,7 +22,7 @@
 /// [tip.transform] (optional) from the frame of axes, origin, heading and quaternion.axes to {A}: a position p becomes
 ///              R p + translation_mm, a heading h becomes R h. R: rotation = [9 numbers, row by row] or
 ///              quaternion = [w, x, y, z]
-/// [insertion]  column = "-Base y", unit as the tip's; settled = true or stops = true (see below)
+/// [insertion]  column = "-Base y", unit as in [tip]; settled = true or stops = true (see below)
 ///              offset_mm: added after sign and unit
 /// [rotation]   column, unit = "rad" | "deg" | "rev", scale (optional factor, that of a gear); absent: no rotation
 /// [base]       insertion and rotation are in a separate file (bevel-import --base) with
@@ -67,8 +67,8 @@ struct TimeColumn {
   std::string column,        ///< name of the time column; "" if the rows have a constant rate or no time
       nanoseconds;           ///< name of the column with the fraction of a second in ns; "" if absent
   double us_per_unit = 1e6;  ///< us per unit of \ref column
-  double rate_hz = 0;        ///< rate of the rows, used if \ref column is ""
-  double offset_s = 0;       ///< added to the time
+  double rate_hz = 0;        ///< rate of the rows, Hz, used if \ref column is ""
+  double offset_s = 0;       ///< added to the time, s
   /// Returns the unit of the column: "s", "ms", "us" or "ns".
   /// @return static text
   const char* unit() const;
@@ -99,7 +99,7 @@ enum class TipFrame {
 struct ColumnMap {
   TimeColumn time;                        ///< time of the tip's file
   std::optional<TimeColumn> base_time;    ///< time of the file of insertion and rotation, if they have a separate file
-  double base_offset_s = 0;               ///< added to the time of insertion and rotation in the tip's file
+  double base_offset_s = 0;               ///< added to the time of insertion and rotation in the tip's file, s
   TipFrame frame = TipFrame::axes;        ///< frame of the tip's axes
   std::optional<TipTransform> transform;  ///< transform of positions and headings to {A}
   std::array<SignedColumn, 3> tip;        ///< column of each axis of the tip position

@@ -34,6 +34,7 @@ std::vector<std::pair<std::string, std::int64_t>> export_csv(const Recording& re
 /// @return the recording, without implausibility checks
 /// @throws ParseError with the file, the line and the column if the folder is not an export, if it is incomplete, or if
 /// readers would reject a message
+/// @throws IoError if a file cannot be read
 Recording import_exported(const std::string& folder);
 /// Returns whether a folder contains a table of an export.
 /// @param folder  path of the folder

@@ -34,7 +34,7 @@ struct ImportedRecording {
   std::string lag_setting;          ///< line of the column map that removes the lag: "[base.time] offset_s = -0.31"
   std::string format;               ///< detected format of the file: "',' between cells"
   bool has_clock = true;            ///< false for stepwise insertions, whose times are meaningless
-  double time_shift_s = 0;  ///< added to all times if the file's clock begins at 0 or below; log times are positive
+  double time_shift_s = 0;  ///< added to all times if the file's clock begins at 0 or below, s; log times are positive
 
   /// Returns true if no row is implausible and the actuator motion has no gap.
   /// @return false if the recording is incomplete

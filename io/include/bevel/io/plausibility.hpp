@@ -49,7 +49,7 @@ struct Oddity {
   enum class Kind {
     time,    ///< `utime` differs from that of the neighbour by more than kLongestPause_s
     order,   ///< `seq` decreases or repeats while `utime` increases
-    motion,  ///< an axis exceeds the largest rate, or moves out and back between two samples
+    motion,  ///< an axis exceeds its largest rate or position, or moves out and back between two samples
     reading  ///< the tip jumps away and back, the information is implausibly large, or a camera occurs once
   };
   Kind kind = Kind::time;  ///< kind of implausibility
