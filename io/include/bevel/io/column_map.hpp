@@ -3,7 +3,7 @@
 /// Column maps: TOML files that define the meaning and the unit of the columns of a CSV recording. No unit is guessed.
 /// docs/import.md has examples.
 ///
-/// \verbatim
+/// \code{.unparsed}
 /// [time]       seconds = "..." and, if the fraction has its own column, nanoseconds = "..."
 ///              or column = "..." with unit = "s" | "ms" | "us" | "ns", or rate_hz = 30.0 (rows at a constant rate);
 ///              absent with stops = true. offset_s: added to the time
@@ -31,7 +31,7 @@
 ///              rotation
 /// [rows]       nonzero = ["Tip x", ...]: rows in which one of these is zero contain no data
 ///              unseen = ["nan", "-9999"]: cells that mean the same as an empty cell: no measurement
-/// \endverbatim
+/// \endcode
 ///
 /// Stepwise insertions: a person pushes the needle by a step, and the insertion column takes its new value when the
 /// step is complete. The depth between two values is unknown. With settled = true only the first row of each new value

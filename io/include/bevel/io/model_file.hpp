@@ -2,7 +2,7 @@
 /// \file
 /// Model files: needle parameters, effects, discrepancy terms and the variation between insertions, as TOML.
 ///
-/// \verbatim
+/// \code{.unparsed}
 /// [needle]                      # curvature_per_mm, wheelbase_mm, lambda1_per_rad, lambda2 are required;
 /// ...                           # slip = "isotropic" and front_wheel = "published" are the defaults
 /// [[effect]]                    # zero or more
@@ -24,7 +24,7 @@
 /// entry_angle_rad = 0.007       # about x and about y, each
 /// entry_point_mm = 0.12         # along x and along y, each
 /// roll_rad = 0.04
-/// \endverbatim
+/// \endcode
 ///
 /// Programs reject a file with a part that they do not support. To ignore the part would mean to treat its uncertainty
 /// as zero.
