@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: MIT
 #pragma once
 /// \file
-/// Time lag of the base's sensor relative to the tip's, estimated from an insertion.
+/// Time lag of the actuator positions relative to the tip measurements, estimated from an insertion.
 
 #include <optional>
 #include <span>
@@ -16,29 +16,31 @@ namespace bevel::io {
 /// second.
 inline constexpr double kLargestLag_s = 2;
 
-/// How late the base's measurements are.
+/// Time lag of the actuator positions.
 struct BaseLag {
-  double lag_s = 0;  ///< positive: the base's time stamps are later than the tip's for the same motion
+  double lag_s = 0;  ///< positive: the actuator's time stamps are later than the tip's for the same motion
   /// Standard error: the largest of that from leaving out each of ten parts in turn, that of the residuals with their
   /// autocorrelation, and a quarter of the range of lags that fit as well within two standard deviations.
   double sd_s = 0;
-  double rms_mm = 0;         ///< root mean square of the residuals of the path length, in mm
-  bool determined = false;   ///< the standard error is below kLargestLagSd_s and the optimum is inside the search range
-  bool significant() const;  ///< determined, and more than three standard errors from zero
+  double rms_mm = 0;        ///< root mean square of the residuals of the path length, in mm
+  bool determined = false;  ///< the standard error is below kLargestLagSd_s and the optimum is inside the search range
+  /// Returns whether the lag is determined and differs from zero by more than three standard errors.
+  /// @return false if the lag is consistent with zero or not determined
+  bool significant() const;
 };
 
 /// Standard error (s) from which on the motion does not determine the lag. At 10 mm/s it is a depth of 1 mm.
 inline constexpr double kLargestLagSd_s = 0.1;
 
-/// Estimates the lag of the base relative to the tip.
+/// Estimates the lag of the actuator positions relative to the tip.
 ///
-/// The tip's z at time t is a cubic polynomial of the depth that the base reports at t + lag. The polynomial covers
-/// entry tilt, curvature, scale and zero of the depth; the lag minimises the sum of squared residuals. At a constant
-/// rate of insertion a lag is the same as another zero of the depth, and is not determined. A tip that follows the base
-/// late for a mechanical reason (friction, a compliant shaft) looks like a lag.
-/// @param actuators  positions of the axes, in order of time
-/// @param tips  positions in {A}, in order of time
-/// @return nothing for less than 4 s or 40 measurements, or if z was not measured
+/// The tip's z at time t is modelled as a cubic polynomial of the insertion that the actuator reports at t + lag. The
+/// polynomial covers entry tilt, curvature, scale and zero of the insertion; the lag minimises the sum of squared
+/// residuals. At a constant insertion rate a lag is confounded with another zero of the insertion and is not
+/// determined. A mechanical delay of the tip (friction, a compliant shaft) is confounded with a lag too.
+/// @param actuators  insertion in mm, in order of time
+/// @param tips  positions in {A}, mm, in order of time
+/// @return the lag with its standard error; nothing for less than 4 s or 40 measurements, or if z was not measured
 std::optional<BaseLag> estimate_base_lag(std::span<const model::ActuatorState> actuators,
                                          std::span<const model::TipMeasurement> tips);
 

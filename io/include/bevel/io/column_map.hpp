@@ -1,42 +1,49 @@
 // SPDX-License-Identifier: MIT
-// What the columns of a CSV recording made elsewhere mean: a TOML file that names them, with their units. No unit is
-// guessed. docs/import.md has examples.
-//
-//   [time]       seconds = "..." and, if the fraction stands apart, nanoseconds = "..."
-//                or column = "..." with unit = "s" | "ms" | "us" | "ns", or rate_hz = 30.0 (rows are that far apart);
-//                left out with stops = true. offset_s: added to it
-//   [tip]        axes = ["Tip z", "-Tip x", "-Tip y"]: the column, with its sign, that each axis of {A} is
-//                unit = "um" | "mm" | "cm" | "m" | "in"
-//                origin = the same for the entry point (optional), in the tip's unit: its first row; default 0
-//                sigma_mm = [x, y, z]: standard deviations; 0 for an axis that was not measured
-//                frame = "axes" (default): the axes are those of {A}, or "from-straight-insertion": z and origin of {A}
-//                are estimated from each recording (entry_frame.hpp) heading = [x, y, z] (optional): columns, with
-//                signs as axes, of the unit vector along the needle's tip heading_sd_rad: its standard deviation to any
-//                side; required with heading or quaternion
-//   [tip.quaternion] (optional, in place of heading) columns = ["qw", "qx", "qy", "qz"]: of the sensor in the tracker's
-//                frame, w first; along = "+z": the sensor's axis that points along the needle to its tip;
-//                axes = ["z", "-x", "-y"]: the axis of the tracker's frame that each axis of {A} is
-//   [tip.transform] (optional) from the frame of axes, origin, heading and quaternion.axes to {A}: a position p becomes
-//                R p + translation_mm, a heading R h. R: rotation = [9 numbers, row by row] or quaternion = [w, x, y,
-//                z]
-//   [insertion]  column = "-Base y", unit as the tip's; settled = true or stops = true (see below)
-//                offset_mm: added to it, after sign and unit
-//   [rotation]   column, unit = "rad" | "deg" | "rev", scale (optional factor, a gear's); left out: no rotation
-//   [base]       the insertion and rotation stand in a file of their own (bevel-import --base), with
-//   [base.time]  its own time, as [time]
-//                or, with insertion and rotation in the tip's file, offset_s: added to the time of insertion and
-//                rotation
-//   [rows]       nonzero = ["Tip x", ...]: rows in which one of these is zero hold no data
-//                unseen = ["nan", "-9999"]: cells that mean what an empty one does, that nothing was seen
-//
-// Stepwise insertions: a person pushes the needle by a step, and the insertion column takes its new value when the step
-// is done. In between nobody knows how deep the base was, so with settled = true only the first row of each new value
-// is used: one ACTUATOR_STATE and one TIP_MEASUREMENT each, and one TIP_HEADING where it has columns. A row with depth
-// 0 at the entry point begins the log. With a [rotation] the needle may be turned between: a row of a new insertion or
-// rotation whose tip was not seen is a place that the base went through.
-// With stops = true the column is the depth commanded, and all rows of one depth are one stop: its reading is their
-// median, without the rows in which the needle was moving (csv_stops.hpp), and with the information of a median.
-// sigma_mm and heading_sd_rad are of one row. Either way the log says that it has no clock (recording_clock.hpp).
+/// \file
+/// Column maps: TOML files that define the meaning and the unit of the columns of a CSV recording. No unit is guessed.
+/// docs/import.md has examples.
+///
+/// \code{.unparsed}
+/// [time]       seconds = "..." and, if the fraction has its own column, nanoseconds = "..."
+///              or column = "..." with unit = "s" | "ms" | "us" | "ns", or rate_hz = 30.0 (rows at a constant rate);
+///              absent with stops = true. offset_s: added to the time
+/// [tip]        axes = ["Tip z", "-Tip x", "-Tip y"]: the column, with its sign, of each axis of {A}
+///              unit = "um" | "mm" | "cm" | "m" | "in"
+///              origin = columns of the entry point (optional), with signs as axes, in the tip's unit; the first row
+///              applies; default 0
+///              sigma_mm = [x, y, z]: standard deviations; 0 for an axis without measurements
+///              frame = "axes" (default): the axes are those of {A}, or "from-straight-insertion": z and origin of {A}
+///              are estimated from each recording (entry_frame.hpp)
+///              heading = [x, y, z] (optional): columns, with signs as axes, of the unit vector along the needle's tip
+///              heading_sd_rad: its standard deviation in each direction; required with heading or quaternion
+/// [tip.quaternion] (optional, in place of heading) columns = ["qw", "qx", "qy", "qz"]: orientation of the sensor in
+///              the tracker's frame, w first; along = "+z": the sensor's axis that points along the needle to its tip;
+///              axes = ["z", "-x", "-y"]: the axis of the tracker's frame for each axis of {A}
+/// [tip.transform] (optional) from the frame of axes, origin, heading and quaternion.axes to {A}: a position p becomes
+///              R p + translation_mm, a heading h becomes R h. R: rotation = [9 numbers, row by row] or
+///              quaternion = [w, x, y, z]
+/// [insertion]  column = "-Base y", unit as in [tip]; settled = true or stops = true (see below)
+///              offset_mm: added after sign and unit
+/// [rotation]   column, unit = "rad" | "deg" | "rev", scale (optional factor, that of a gear); absent: no rotation
+/// [base]       insertion and rotation are in a separate file (bevel-import --base) with
+/// [base.time]  its own time, as [time]
+///              or, with insertion and rotation in the tip's file, offset_s: added to the time of insertion and
+///              rotation
+/// [rows]       nonzero = ["Tip x", ...]: rows in which one of these is zero contain no data
+///              unseen = ["nan", "-9999"]: cells that mean the same as an empty cell: no measurement
+/// \endcode
+///
+/// Stepwise insertions: a person pushes the needle by a step, and the insertion column takes its new value when the
+/// step is complete. The depth between two values is unknown. With settled = true only the first row of each new value
+/// is used: one ACTUATOR_STATE, one TIP_MEASUREMENT, and one TIP_HEADING if it has columns. A row with depth 0 at the
+/// entry point begins the log. With a [rotation] the needle may be rotated between steps: a row of a new insertion or
+/// rotation without a tip measurement is a position that the actuator passed.
+///
+/// With stops = true the column is the commanded depth, and all consecutive rows of one depth are one stop. Its
+/// measurement is the median of the rows in which the needle does not move, with the information of a median. sigma_mm
+/// and heading_sd_rad are those of one row.
+///
+/// In both cases the log states that it has no clock (recording_clock.hpp).
 #pragma once
 
 #include <Eigen/Core>
@@ -49,64 +56,84 @@
 
 namespace bevel::io {
 
+/// Column with a sign.
 struct SignedColumn {
-  std::string name;
-  double sign = 1;
+  std::string name;  ///< name in the header of the CSV file
+  double sign = 1;   ///< 1 or -1
 };
 
+/// Columns and unit of the time of a file.
 struct TimeColumn {
-  std::string column, nanoseconds;  // names; "" if absent
-  double us_per_unit = 1e6;         // of `column`
-  double rate_hz = 0;               // used if `column` is ""
-  double offset_s = 0;
-  const char* unit() const;  // of `column`
+  std::string column,        ///< name of the time column; "" if the rows have a constant rate or no time
+      nanoseconds;           ///< name of the column with the fraction of a second in ns; "" if absent
+  double us_per_unit = 1e6;  ///< us per unit of \ref column
+  double rate_hz = 0;        ///< rate of the rows, Hz, used if \ref column is ""
+  double offset_s = 0;       ///< added to the time, s
+  /// Returns the unit of the column: "s", "ms", "us" or "ns".
+  /// @return static text
+  const char* unit() const;
 };
 
+/// Columns of a quaternion from which the heading is computed.
 struct QuaternionColumns {
-  std::array<std::string, 4> wxyz;
-  std::size_t along = 2;  // axis of the sensor
-  double along_sign = 1;
-  std::array<std::size_t, 3> axis{};  // of the tracker's frame, for each of {A}
-  std::array<double, 3> sign{1, 1, 1};
+  std::array<std::string, 4> wxyz;      ///< names of the columns; sensor to tracker frame, w first
+  std::size_t along = 2;                ///< axis of the sensor along the needle to its tip: 0, 1 or 2
+  double along_sign = 1;                ///< 1 or -1: direction of this axis
+  std::array<std::size_t, 3> axis{};    ///< axis of the tracker's frame for each axis of {A}: 0, 1 or 2
+  std::array<double, 3> sign{1, 1, 1};  ///< 1 or -1 for each of these axes
 };
 
-/// Rigid transform from the frame of the tip's columns to {A}: p_A = rotation p + translation_mm.
+/// Rigid transform from the frame of the tip's columns to {A}: p_A = rotation p_tip + translation_mm.
 struct TipTransform {
-  Eigen::Matrix3d rotation = Eigen::Matrix3d::Identity();
-  Eigen::Vector3d translation_mm = Eigen::Vector3d::Zero();
+  Eigen::Matrix3d rotation = Eigen::Matrix3d::Identity();    ///< 3x3 rotation matrix
+  Eigen::Vector3d translation_mm = Eigen::Vector3d::Zero();  ///< origin of the columns' frame in {A}, mm
 };
 
-/// Meaning of the tip's axes: those of {A}, or of a frame from which {A} is estimated.
-enum class TipFrame { axes, from_straight_insertion };
+/// Frame of the tip's axes.
+enum class TipFrame {
+  axes,                    ///< the axes are those of {A}
+  from_straight_insertion  ///< {A} is estimated from the insertion (entry_frame.hpp)
+};
 
+/// Contents of a column map.
 struct ColumnMap {
-  TimeColumn time;
-  std::optional<TimeColumn> base_time;  // if the base has a file of its own
-  double base_offset_s = 0;             // added to the time of insertion and rotation in the tip's file
-  TipFrame frame = TipFrame::axes;
-  std::optional<TipTransform> transform;
-  std::array<SignedColumn, 3> tip;
-  std::vector<SignedColumn> origin;  // empty, or three
-  double mm_per_tip_unit = 1;        // of tip and origin
-  std::array<double, 3> sigma_mm{};
-  std::vector<SignedColumn> heading;  // empty, or three
-  std::optional<QuaternionColumns> quaternion;
-  double heading_sd_rad = 0;
-  SignedColumn insertion;
-  double mm_per_insertion_unit = 1;
-  double insertion_offset_mm = 0;
-  bool settled = false, stops = false;
-  std::vector<SignedColumn> rotation;  // empty, or one
-  double rad_per_rotation_unit = 1;    // gear included
-  std::vector<std::string> nonzero, unseen;
+  TimeColumn time;                        ///< time of the tip's file
+  std::optional<TimeColumn> base_time;    ///< time of the file of insertion and rotation, if they have a separate file
+  double base_offset_s = 0;               ///< added to the time of insertion and rotation in the tip's file, s
+  TipFrame frame = TipFrame::axes;        ///< frame of the tip's axes
+  std::optional<TipTransform> transform;  ///< transform of positions and headings to {A}
+  std::array<SignedColumn, 3> tip;        ///< column of each axis of the tip position
+  std::vector<SignedColumn> origin;       ///< columns of the entry point: none or three
+  double mm_per_tip_unit = 1;             ///< mm per unit of tip and origin
+  std::array<double, 3> sigma_mm{};       ///< standard deviation of each axis in mm; 0: not measured
+  std::vector<SignedColumn> heading;      ///< columns of the heading: none or three
+  std::optional<QuaternionColumns> quaternion;  ///< columns of the sensor's orientation, in place of the heading
+  double heading_sd_rad = 0;                    ///< standard deviation of the heading in each direction, rad
+  SignedColumn insertion;                       ///< column of the insertion
+  double mm_per_insertion_unit = 1;             ///< mm per unit of the insertion
+  double insertion_offset_mm = 0;               ///< added to the insertion after sign and unit, mm
+  bool settled = false,                         ///< stepwise insertion: only the first row of each depth is used
+      stops = false;                            ///< stepwise insertion: all rows of a depth are one stop
+  std::vector<SignedColumn> rotation;           ///< column of the rotation: none or one
+  double rad_per_rotation_unit = 1;             ///< rad per unit of the rotation, including the gear
+  std::vector<std::string> nonzero,             ///< columns whose zero means that the row contains no data
+      unseen;                                   ///< cell texts that mean the same as an empty cell
 
+  /// Returns whether the times of the rows are meaningful: false for stepwise insertions.
+  /// @return true if the recording has time stamps
   bool has_clock() const { return !settled && !stops; }
-  /// Whether a tip needs all three axes: a rotation of the frame mixes them.
+  /// Returns whether a tip needs all three axes: a rotation of the frame mixes them.
+  /// @return true with a transform or an estimated frame
   bool needs_all_axes() const { return transform.has_value() || frame != TipFrame::axes; }
+  /// Returns whether the map has columns for the heading or for a quaternion.
+  /// @return true if headings are imported
   bool has_heading() const { return !heading.empty() || quaternion.has_value(); }
 };
 
-// Throws ConfigError with every fault.
+/// Reads a column map.
+/// @param path  TOML file
+/// @return the column map
+/// @throws ConfigError with all faults of the file
 ColumnMap load_column_map(const std::string& path);
 
 }  // namespace bevel::io

@@ -1,9 +1,12 @@
 // SPDX-License-Identifier: MIT
-// A recording as CSV files for spreadsheets and scripts: tip_measurement.csv, tip_heading.csv, actuator_state.csv,
-// motion_command.csv, needle_state.csv, needle_truth.csv and config.toml, only those the recording has, and rows.toml
-// with the number of rows of each table. The first line has the fields' names with units. Numbers have as many digits
-// as it takes to read the same one back. A position's cell is empty along an axis that the measurement does not
-// observe. `arrival` numbers tips, headings and axes together in the order in which they arrived.
+/// \file
+/// Export of recordings as a folder of CSV files for spreadsheets and scripts, and import of such folders.
+///
+/// The folder contains tip_measurement.csv, tip_heading.csv, actuator_state.csv, motion_command.csv, needle_state.csv,
+/// needle_truth.csv and config.toml, as far as the recording has them, and rows.toml with the number of rows of each
+/// table. The first line of a table contains the names of the fields with units (csv_columns.hpp). Numbers have as many
+/// digits as are needed to read the same number back. The cell of a position is empty along an axis without
+/// information. The column `arrival` numbers tips, headings and actuator states together in the order of arrival.
 #pragma once
 
 #include <string>
@@ -14,19 +17,34 @@
 
 namespace bevel::io {
 
-// Makes `folder`, and replaces the files of an earlier export in it. All files are written to `folder`.unfinished
-// first, so that an export that fails changes nothing. Returns each file with its number of rows. Throws
-// Error naming a file it cannot write.
+/// Writes a recording to a folder. The files are written to `folder`.unfinished first, so that an export that fails
+/// changes nothing.
+/// @param recording  recording to export
+/// @param folder  created if it does not exist; files of an earlier export in it are replaced
+/// @return path and number of rows of each table; empty, and no folder, if the recording has no samples
+/// @throws IoError with the file that cannot be written
+/// @throws std::filesystem::filesystem_error if a folder cannot be created or a file cannot be renamed
 std::vector<std::pair<std::string, std::int64_t>> export_csv(const Recording& recording, const std::string& folder);
 
-// Such a folder back. Not in it: steering targets and status, and when a message was received (it is taken to have been
-// at its own time, in the order of arrival). Throws ParseError naming file, line and column for what is no
-// export, is incomplete or would be refused by readers.
+/// Reads a folder that export_csv() wrote.
+///
+/// The folder does not contain steering targets, process status and times of receipt. The time of receipt of a message
+/// is its own time, in the order of arrival. Tables without a column `arrival` are sorted by time.
+/// @param folder  path of the folder
+/// @return the recording, without implausibility checks
+/// @throws ParseError with the file, the line and the column if the folder is not an export, if it is incomplete, or if
+/// readers would reject a message
+/// @throws IoError if a file cannot be read
 Recording import_exported(const std::string& folder);
-// Whether a folder is meant to be one: it has one of the files.
+/// Returns whether a folder contains a table of an export.
+/// @param folder  path of the folder
+/// @return true if at least one table exists; its contents are not checked
 bool is_exported(const std::string& folder);
 
-// Throws ParseError, and leaves no file.
+/// Writes a log completely or not at all, with the messages in the order of log_order().
+/// @param recording  recording to write; steering targets are not written
+/// @param log_path  destination; an existing file is replaced
+/// @throws IoError with the file and the reason
 void write_log(const Recording& recording, const std::string& log_path);
 
 }  // namespace bevel::io

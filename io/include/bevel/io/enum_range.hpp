@@ -10,6 +10,7 @@ namespace bevel::io {
 namespace detail {
 
 /// Returns whether \p value is an enumerator: GCC and Clang print another value as a cast, "(Request)10".
+/// @return false for a value without an enumerator
 template <auto value>
 consteval bool is_enumerator() {
   constexpr std::string_view text = __PRETTY_FUNCTION__;
@@ -21,6 +22,9 @@ consteval bool is_enumerator() {
 }  // namespace detail
 
 /// Returns the largest enumerator of \p Enum, whose enumerators count up from 0 without a gap.
+/// @tparam Enum  enumeration
+/// @tparam from  first enumerator that is examined; 0 for the caller
+/// @return value of the largest enumerator
 template <class Enum, std::int32_t from = 0>
 consteval std::int32_t last_code() {
   static_assert(detail::is_enumerator<static_cast<Enum>(from)>(), "the enumerators must begin with 0");
@@ -31,6 +35,9 @@ consteval std::int32_t last_code() {
 }
 
 /// Returns the union of the enumerators of \p Flags; each enumerator is one bit.
+/// @tparam Flags  enumeration
+/// @tparam bit  first bit that is examined; 0 for the caller
+/// @return bitwise or of all enumerators
 template <class Flags, int bit = 0>
 consteval std::int32_t all_flags() {
   constexpr int kBits = 31;  // of a non-negative int32

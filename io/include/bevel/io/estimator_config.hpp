@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: MIT
-// Estimator settings from TOML: the section [estimator] of a system file, or the root of a file of its own.
+/// \file
+/// Settings of the estimator in TOML: the section [estimator] of a system file, or the root of a separate file.
 #pragma once
 
 #include <bevel/estimator/config.hpp>
@@ -7,7 +8,10 @@
 
 namespace bevel::io {
 
-// Everything but the prior's means, which are the model file's. Absent keys keep the structure's defaults.
+/// Reads all settings except the means of the prior, which are in the model file. Faults are reported by
+/// ConfigFile::finish().
+/// @param section  section with the settings
+/// @param[in,out] config  settings; those without a key are unchanged
 void read_estimator_config(Section section, estimator::EstimatorConfig& config);
 
 }  // namespace bevel::io

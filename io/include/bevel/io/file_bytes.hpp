@@ -1,9 +1,10 @@
 // SPDX-License-Identifier: MIT
-// The one way in which a file is read: a regular file, whole, into memory of this program.
-//
-// Regular files only: a FIFO keeps whoever opens it waiting for a writer, /dev/zero never ends. read() and not mmap():
-// a file cut by someone else while it is mapped ends the program with SIGBUS; read, it is merely shorter than it was,
-// and that is said.
+/// \file
+/// Reads complete regular files into memory.
+///
+/// Other files are rejected: to open a FIFO blocks until a writer opens it, and /dev/zero never ends. The file is read
+/// with read() and not mapped with mmap(): if another program shortens a mapped file, SIGBUS ends this program. A file
+/// that is shortened while it is read yields fewer bytes, which is reported.
 #pragma once
 
 #include <cstdint>
@@ -14,18 +15,24 @@
 
 namespace bevel::io {
 
-// A day of recording at 80 messages a second takes 1 GiB.
+/// Largest log, bytes: 1 GiB. A day of recording at 80 messages per second takes as much.
 inline constexpr std::uint64_t kLargestLog_bytes = std::uint64_t{1} << 30U;
-// Text (TOML, CSV) is written by hand or a row at a time.
+/// Largest text file (TOML, CSV), bytes: 64 MiB.
 inline constexpr std::uint64_t kLargestText_bytes = std::uint64_t{64} << 20U;
 
-// Throws IoError naming the file, what it is and what is allowed: for what is not there or not a regular
-// file (told before it is opened), and for more than `largest_bytes`.
+/// Contents of a file.
 class FileBytes {
  public:
+  /// Reads a file.
+  /// @param path  a regular file; other kinds are rejected before they are opened
+  /// @param largest_bytes  largest size allowed
+  /// @throws IoError with the file, its kind or size and what is allowed
   explicit FileBytes(const std::string& path, std::uint64_t largest_bytes = kLargestLog_bytes);
+  /// Returns the bytes that were read.
+  /// @return view that is valid as long as this object
   std::span<const std::uint8_t> bytes() const { return bytes_; }
-  // "", or how the file changed while it was read; bytes() is what was got.
+  /// Returns how the file changed while it was read; "" if it did not.
+  /// @return a sentence with both sizes
   const std::string& change() const { return change_; }
 
  private:
@@ -33,7 +40,10 @@ class FileBytes {
   std::string change_;
 };
 
-// A text file whole: one that changes while it is read is refused too, since half a configuration is none.
+/// Reads a text file. A file that changes while it is read is rejected, since a partial configuration is not usable.
+/// @param path  a regular file of at most kLargestText_bytes
+/// @return the text
+/// @throws IoError as FileBytes, and if the file changed
 std::string read_text_file(const std::string& path);
 
 }  // namespace bevel::io

@@ -15,8 +15,8 @@ namespace bevel::io {
 struct HeldValues {
   double period_s = 0;          ///< mean interval between new values
   double row_interval_s = 0;    ///< median interval between rows
-  std::vector<bool> is_update;  ///< for each row; false: the row repeats a value that was read before
-  std::size_t repeated = 0;     ///< number of rows that are no update
+  std::vector<bool> is_update;  ///< for each row; false: the row repeats the value of an earlier row
+  std::size_t repeated = 0;     ///< number of rows that repeat a value
 };
 
 /// Detects a column whose value is held between regular updates.
@@ -27,7 +27,7 @@ struct HeldValues {
 /// A value that stays the same for several periods has one update in each of them.
 /// @param times_us  time of each row that has the value, increasing
 /// @param is_new  whether the row's value differs from that of the row before; the first element is ignored
-/// @return nothing if the value is not held, or if it changes too rarely to decide
+/// @return period and updates; nothing if the value is not held, or if it changes too rarely to decide
 std::optional<HeldValues> find_held_values(std::span<const std::int64_t> times_us, const std::vector<bool>& is_new);
 
 }  // namespace bevel::io

@@ -1,7 +1,8 @@
 // SPDX-License-Identifier: MIT
 #pragma once
-// What a model file knows before an insertion. Effects with an unknown of the single recording (an instant, a phase)
-// are left out: the next one's is not known, and a guess would be taken for a measurement.
+/// \file
+/// The part of a model file that is known before an insertion. Effects with insertion-specific parameters (an event
+/// time, a phase) are left out, since the values for the next insertion are unknown.
 #include <string>
 #include <vector>
 
@@ -9,17 +10,22 @@
 
 namespace bevel::io {
 
-// Names of the effect's parameters that differ from recording to recording, with commas in between; empty if the
-// effect is known beforehand, or if there is no such effect.
+/// Lists the parameters of an effect that differ between recordings.
+/// @param effect  entry of a model file
+/// @return names separated by commas; "" if there are none, or if the effect does not exist
 std::string unknown_beforehand(const EffectEntry& effect);
 
+/// Effects for an insertion that has not taken place yet.
 struct LiveEffects {
-  std::vector<model::ActiveEffect> active;
-  std::vector<std::string> left_out;  // for each of the others a sentence with its name and what is not known
+  std::vector<model::ActiveEffect> active;  ///< effects and discrepancy terms that are known
+  std::vector<std::string> left_out;        ///< for each other effect a sentence with its name and what is unknown
 };
-// For whoever acts on a model while the needle moves: the estimator and the controller have the same effects. Throws
-// ArgumentError as active_effects() does.
-// The discrepancies, which are all known beforehand, come behind the effects.
+/// Selects the effects for programs that use a model while the needle moves, so that the estimator and the controller
+/// have the same effects.
+/// @param effects  effects of a model file
+/// @param discrepancies  discrepancy terms of a model file; all of them are known
+/// @return the effects, followed by the discrepancy terms
+/// @throws ArgumentError as active_effects()
 LiveEffects live_effects(const std::vector<EffectEntry>& effects,
                          const std::vector<model::DiscrepancyCurve>& discrepancies = {});
 

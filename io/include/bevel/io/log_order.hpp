@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: MIT
-// In which order a recording's messages stand in a log: tips, headings and axes as they came, the others where their
-// times put them.
+/// \file
+/// Order of the messages of a recording in a log: tips, headings and actuator states in the order of arrival, all other
+/// messages at their times.
 #pragma once
 
 #include <cstdint>
@@ -10,28 +11,50 @@
 
 namespace bevel::io {
 
+/// One message with its place in a log.
 struct Placed {
-  enum class Channel : std::uint8_t { tip, heading, actuator, command, estimate, truth };
-  std::int64_t time_us = 0;  // of receipt, of which a recording knows no more: the message's own, but none before the
-                             // one before it on its channel (tips, headings and axes together)
-  Channel channel = Channel::tip;
-  std::size_t index = 0;  // into the recording's samples of that channel
+  /// Channel of the message.
+  enum class Channel : std::uint8_t {
+    tip,       ///< TIP_MEASUREMENT
+    heading,   ///< TIP_HEADING
+    actuator,  ///< ACTUATOR_STATE
+    command,   ///< MOTION_COMMAND
+    estimate,  ///< NEEDLE_STATE
+    truth      ///< NEEDLE_TRUTH
+  };
+  /// Assumed time of receipt, us since the epoch: the time of the message, or that of the message before it on its
+  /// channel if that is later. Tips, headings and actuator states count as one channel.
+  std::int64_t time_us = 0;
+  Channel channel = Channel::tip;  ///< channel of the message
+  std::size_t index = 0;           ///< index into the recording's samples of the channel
 };
 
-// In order of time; of equal times in the order of Channel.
+/// Computes the order of the messages in a log. Steering targets are not included.
+/// @param recording  recording with its order of arrival
+/// @return the messages in the order of time; at equal times those of Recording::arrivals come first, in their order,
+/// then commands, estimates and truths
 std::vector<Placed> log_order(const Recording& recording);
 
-// The number of each sample's arrival among tips, headings and axes.
+/// Positions of samples in the order of arrival of tips, headings and actuator states, from 0.
 struct ArrivalNumbers {
+  /// Computes the positions.
+  /// @param recording  recording with its order of arrival
   explicit ArrivalNumbers(const Recording& recording);
-  std::vector<std::size_t> tips, headings, actuators;
+  std::vector<std::size_t> tips,  ///< position of each tip measurement
+      headings,                   ///< position of each heading
+      actuators;                  ///< position of each actuator state
 };
 
-// Collects samples read channel by channel, each with its number of arrival, into recording.arrivals.
+/// Computes Recording::arrivals from samples that are read channel by channel with their positions.
 class ArrivalsByNumber {
  public:
+  /// Adds a sample.
+  /// @param number  position in the order of arrival
+  /// @param utime  time of the sample, us since the epoch
+  /// @param where  channel and index of the sample
   void add(std::int64_t number, std::int64_t utime, Arrival where) { numbered_.push_back({number, utime, where}); }
-  // Of equal number by time, and of equal times as they were added.
+  /// Sorts the samples by position, then by time, then by the order of the calls of add().
+  /// @return the value of Recording::arrivals
   std::vector<Arrival> sorted();
 
  private:

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: MIT
-// Writes MCAP files with JSON messages that Foxglove, PlotJuggler and the mcap packages read: chunks without
-// compression, each with its CRC-32 and index, attachments, and a summary.
+/// \file
+/// Writer of MCAP files with JSON messages for Foxglove, PlotJuggler and the mcap packages: chunks without compression,
+/// each with its CRC-32 and index, attachments, and a summary.
 #pragma once
 
 #include <cstdint>
@@ -14,19 +15,41 @@
 
 namespace bevel::io::mcap {
 
+/// Writes one MCAP file completely or not at all. The file has the name `path.unfinished` until close().
 class Writer {
  public:
-  // A file that is there whole or not at all: it has another name until close(). Throws IoError naming the
-  // file and the reason, as all of these do.
+  /// Opens the file and writes its header.
+  /// @param path  destination; close() replaces an existing file
+  /// @throws IoError with the file and the reason
   explicit Writer(const std::string& path);
+  /// Removes the file if it was not closed.
   ~Writer();
   Writer(const Writer&) = delete;
   Writer& operator=(const Writer&) = delete;
 
-  // `json_schema` as in JSON Schema. Returns the channel's id, the first one's is 1.
+  /// Adds a channel with its schema.
+  /// @param topic  name of the channel
+  /// @param schema_name  name of the schema
+  /// @param json_schema  text of the schema, JSON Schema
+  /// @return id of the channel; the ids count from 1
   std::uint16_t add_channel(std::string_view topic, std::string_view schema_name, std::string_view json_schema);
+  /// Appends a message.
+  /// @param channel  id from add_channel()
+  /// @param sequence  number of the message on its channel
+  /// @param time_ns  log time and publish time, ns since the epoch
+  /// @param json  one JSON object
+  /// @throws IoError with the file and the reason
+  /// @throws std::out_of_range if the channel does not exist
   void write(std::uint16_t channel, std::uint32_t sequence, std::uint64_t time_ns, std::string_view json);
+  /// Appends an attachment.
+  /// @param name  file name
+  /// @param media_type  media type, "application/toml" for instance
+  /// @param data  contents
+  /// @throws IoError with the file and the reason
   void attach(std::string_view name, std::string_view media_type, std::string_view data);
+  /// Writes the summary, closes the file and gives it its final name.
+  /// @throws IoError with the file and the reason
+  /// @throws std::filesystem::filesystem_error if the file cannot be renamed
   void close();
 
  private:

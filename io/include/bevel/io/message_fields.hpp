@@ -1,14 +1,17 @@
 // SPDX-License-Identifier: MIT
-// Every field of every message with its bounds, in one place: the checked decode and its tests walk this list.
-//
-// visit_fields(message, visitor) calls, in the order of the fields,
-//   visitor.time(name, value)                         int64 us since the epoch; positive
-//   visitor.count(name, value)                        int64 counter; not negative
-//   visitor.code(name, value, lowest, highest)        int32; the bounds of an enumeration come from it (enum_range.hpp)
-//   visitor.number(name, values, size, largest)       doubles; finite and |value| <= largest
-//   visitor.text(name, value)                         string
-// `message` may be const or not; so may the values. The bounds are no physical limits (those belong to the
-// configuration): they keep what no bench can produce away from arithmetic that would overflow on it.
+/// \file
+/// All fields of all messages with their limits. The checked decode and its tests use this list.
+///
+/// visit_fields(message, visitor) calls, in the order of the fields,
+/// \code
+///   visitor.time(name, value)                    // int64 us since the epoch; positive
+///   visitor.count(name, value)                   // int64 counter; not negative
+///   visitor.code(name, value, lowest, highest)   // int32; limits of an enumeration by enum_range.hpp
+///   visitor.number(name, values, size, largest)  // doubles; finite and |value| <= largest
+///   visitor.text(name, value)                    // string
+/// \endcode
+/// `message` and the values may be const or not. The limits are not physical limits, which belong to the configuration.
+/// They reject values that no bench produces and that could overflow in later computations.
 #pragma once
 
 #include <bevel/actuator_state_t.hpp>
@@ -32,23 +35,30 @@
 
 namespace bevel::io {
 
-inline constexpr double kLargestLength_mm = 1e5;
-inline constexpr double kLargestRate_mm_s = 1e5;
-inline constexpr double kLargestAngle_rad = 1e7;  // a shaft turned at 10 rev/s for a day is 5e6 rad
-inline constexpr double kLargestRate_rad_s = 1e5;
-inline constexpr double kLargestInformation_per_mm2 = 1e12;   // a standard deviation of 1 nm
-inline constexpr double kLargestInformation_per_rad2 = 1e12;  // a standard deviation of 1 urad
-// Smallest trace of an information matrix that is not zero.
-inline constexpr double kSmallestInformation_per_mm2 = 1e-6;   // a standard deviation of 1 m
-inline constexpr double kSmallestInformation_per_rad2 = 1e-2;  // a standard deviation of 10 rad
-inline constexpr double kLargestPlainNumber = 1e12;
-// Numbers of cameras, counts, and the status of a measurement: 0 is usable, every other value is a reason of its sender
-// why it is not, and senders of other makers define other reasons.
+inline constexpr double kLargestLength_mm = 1e5;   ///< limit of positions and lengths, mm
+inline constexpr double kLargestRate_mm_s = 1e5;   ///< limit of insertion rates, mm/s
+inline constexpr double kLargestAngle_rad = 1e7;   ///< limit of angles, rad; 10 rev/s for a day are 5e6 rad
+inline constexpr double kLargestRate_rad_s = 1e5;  ///< limit of rotation rates, rad/s
+inline constexpr double kLargestInformation_per_mm2 =
+    1e12;  ///< limit of information, 1/mm^2; a standard deviation of 1 nm
+inline constexpr double kLargestInformation_per_rad2 =
+    1e12;  ///< limit of information, 1/rad^2; a standard deviation of 1 urad
+/// Smallest trace of an information matrix that is not zero, 1/mm^2; a standard deviation of 1 m.
+inline constexpr double kSmallestInformation_per_mm2 = 1e-6;
+/// Smallest trace of an information matrix that is not zero, 1/rad^2; a standard deviation of 10 rad.
+inline constexpr double kSmallestInformation_per_rad2 = 1e-2;
+inline constexpr double kLargestPlainNumber = 1e12;  ///< limit of other numbers
+/// Limit of camera numbers, counts and the status of a measurement. Status 0 means usable. Each other value is a reason
+/// of the sender why the measurement is not usable; senders of other makers define other reasons.
 inline constexpr std::int32_t kAnyCode = std::numeric_limits<std::int32_t>::max();
 
+/// Requires \p Message to be \p Type, const or not.
 template <class Message, class Type>
 concept MessageOf = std::is_same_v<std::remove_const_t<Message>, Type>;
 
+/// Visits the fields of a TIP_MEASUREMENT.
+/// @param m  message; its values may be changed by the visitor
+/// @param v  visitor
 template <MessageOf<tip_measurement_t> Message, class Visitor>
 void visit_fields(Message& m, Visitor&& v) {
   v.time("utime", m.utime);
@@ -59,6 +69,7 @@ void visit_fields(Message& m, Visitor&& v) {
   v.number("information_per_mm2", m.information_per_mm2, 9, kLargestInformation_per_mm2);
 }
 
+/// Visits the fields of a TIP_HEADING.
 template <MessageOf<tip_heading_t> Message, class Visitor>
 void visit_fields(Message& m, Visitor&& v) {
   v.time("utime", m.utime);
@@ -69,6 +80,7 @@ void visit_fields(Message& m, Visitor&& v) {
   v.number("information_per_rad2", m.information_per_rad2, 9, kLargestInformation_per_rad2);
 }
 
+/// Visits the fields of an ACTUATOR_STATE.
 template <MessageOf<actuator_state_t> Message, class Visitor>
 void visit_fields(Message& m, Visitor&& v) {
   v.time("utime", m.utime);
@@ -81,6 +93,7 @@ void visit_fields(Message& m, Visitor&& v) {
   v.number("rotation_rate_rad_s", &m.rotation_rate_rad_s, 1, kLargestRate_rad_s);
 }
 
+/// Visits the fields of a MOTION_COMMAND.
 template <MessageOf<motion_command_t> Message, class Visitor>
 void visit_fields(Message& m, Visitor&& v) {
   v.time("utime", m.utime);
@@ -90,6 +103,7 @@ void visit_fields(Message& m, Visitor&& v) {
   v.number("rotation_rate_rad_s", &m.rotation_rate_rad_s, 1, kLargestRate_rad_s);
 }
 
+/// Visits the fields of a NEEDLE_STATE or NEEDLE_TRUTH.
 template <MessageOf<needle_state_t> Message, class Visitor>
 void visit_fields(Message& m, Visitor&& v) {
   v.time("utime", m.utime);
@@ -107,6 +121,7 @@ void visit_fields(Message& m, Visitor&& v) {
   v.code("reset_count", m.reset_count, 0, kAnyCode);
 }
 
+/// Visits the fields of a NEEDLE_SHAFT.
 template <MessageOf<needle_shaft_t> Message, class Visitor>
 void visit_fields(Message& m, Visitor&& v) {
   v.time("utime", m.utime);
@@ -116,6 +131,7 @@ void visit_fields(Message& m, Visitor&& v) {
   v.number("guide_mm", &m.guide_mm, 1, kLargestLength_mm);
 }
 
+/// Visits the fields of a STEERING_TARGET.
 template <MessageOf<steering_target_t> Message, class Visitor>
 void visit_fields(Message& m, Visitor&& v) {
   v.time("utime", m.utime);
@@ -126,6 +142,7 @@ void visit_fields(Message& m, Visitor&& v) {
   v.number("tolerance_mm", &m.tolerance_mm, 1, kLargestLength_mm);
 }
 
+/// Visits the fields of an OPERATOR_HEARTBEAT.
 template <MessageOf<operator_heartbeat_t> Message, class Visitor>
 void visit_fields(Message& m, Visitor&& v) {
   v.time("utime", m.utime);
@@ -133,6 +150,7 @@ void visit_fields(Message& m, Visitor&& v) {
   v.count("session", m.session);
 }
 
+/// Visits the fields of a PROCESS_STATUS.
 template <MessageOf<process_status_t> Message, class Visitor>
 void visit_fields(Message& m, Visitor&& v) {
   v.time("utime", m.utime);

@@ -1,18 +1,22 @@
 // SPDX-License-Identifier: MIT
 #pragma once
-// Whether a log's times mean anything: a stepwise insertion by hand has an order of stops, and no clock. Its log says
-// so in its CONFIG: [recording] clock = "none".
+/// \file
+/// Recordings without time stamps. A stepwise insertion by hand has an order of stops, but no clock. Its log states
+/// this in its CONFIG: [recording] clock = "none".
 #include <string>
 
 #include <bevel/io/recording.hpp>
 
 namespace bevel::io {
 
+/// Text of the CONFIG of a log without a clock.
 inline constexpr const char* kNoClockConfig =
     "# Stops of a stepwise insertion in their order: times between them mean nothing.\n"
     "[recording]\nclock = \"none\"\n";
 
-// False where the log's CONFIG says that there is none. Of text that is no TOML: true.
+/// Returns whether the times of a recording are meaningful.
+/// @param recording  recording with the text of its CONFIG
+/// @return false if CONFIG states clock = "none"; true otherwise, also if CONFIG is not TOML
 bool has_clock(const Recording& recording);
 
 }  // namespace bevel::io

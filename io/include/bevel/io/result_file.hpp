@@ -13,9 +13,13 @@ class PendingFile {
  public:
   /// Writes \p contents and synchronises them with the disk.
   /// @param path  destination; an existing symbolic link is followed
+  /// @param contents  bytes of the file
   /// @throws IoError with \p path and the reason if the folder cannot be written or the disk is full
   PendingFile(const std::string& path, std::string_view contents);
+  /// Removes the file if it has no final name.
   ~PendingFile();
+  /// Takes the file over.
+  /// @param other  has no file afterwards
   PendingFile(PendingFile&& other) noexcept;
   PendingFile(const PendingFile&) = delete;
   PendingFile& operator=(const PendingFile&) = delete;
@@ -30,10 +34,13 @@ class PendingFile {
 };
 
 /// Checks that a file can be made at \p path; one that is there keeps its contents.
+/// @param path  destination
 /// @throws IoError as PendingFile
 void require_writable(const std::string& path);
 
 /// Writes a file completely or not at all. A device or FIFO at \p path is written to directly.
+/// @param path  destination; an existing file is replaced
+/// @param contents  bytes of the file
 /// @throws IoError as PendingFile
 void write_result_file(const std::string& path, std::string_view contents);
 
