@@ -45,7 +45,8 @@ def run_wheel():
     with tempfile.TemporaryDirectory(prefix="bevel-wheel-") as folder:
         wheels, fresh = Path(folder) / "wheels", Path(folder) / "venv"
         build = [sys.executable, "-m", "pip", "wheel", "--no-build-isolation", "--no-deps", "--wheel-dir", wheels, ROOT]
-        run(build, environment())
+        # Compiler and flags of the preset ci: ccache then has most of the objects.
+        run([*build, "--config-settings=cmake.define.BEVEL_WERROR=ON"], {**environment(), "CXX": "c++"})
         venv.create(fresh, with_pip=True)
         python = fresh / "bin" / "python"
         (wheel,) = wheels.glob("bevel-*.whl")
