@@ -12,24 +12,24 @@ namespace bevel::controller {
 /// Limits of rate, acceleration and rotation.
 struct SteeringLimits {
   double insertion_rate_mm_s = 5.0;  ///< nominal insertion rate, mm/s
-  double insertion_rate_min_share =
-      0.25;  ///< smallest share of the nominal rate, used while the bevel rotates or points away from the target
+  /// Smallest share of the nominal rate, used while the bevel rotates or points away from the target.
+  double insertion_rate_min_share = 0.25;
   double rotation_rate_rad_s = 8.0;            ///< largest rotation rate, rad/s
   double rotation_acceleration_rad_s2 = 40.0;  ///< largest rotational acceleration, rad/s^2
   double insertion_acceleration_mm_s2 = 40.0;  ///< largest acceleration of the insertion, mm/s^2
   double retraction_rate_mm_s = 5.0;           ///< rate of a retraction, mm/s
-  double total_rotation_rad =
-      62.8;  ///< largest rotation from the axis' zero in either direction, rad; limit of the cable
+  /// Largest rotation from the axis' zero in either direction, rad; limit of the cable.
+  double total_rotation_rad = 62.8;
 };
 
 /// Gains of the laws.
 struct SteeringGains {
-  double convergence_rad_s =
-      1.5;  ///< eta, guaranteed rate at which sigma approaches 0 outside the boundary layer, rad/s
+  /// Eta, guaranteed rate at which sigma approaches 0 outside the boundary layer, rad/s.
+  double convergence_rad_s = 1.5;
   double boundary_layer_rad = 0.25;  ///< Phi, width of the boundary layer, rad
   double tube_share = 0.6;           ///< Law::arcs and Law::flip: width of the tube as a share of the remaining bend
-  double tolerance_mm =
-      0.05;  ///< predicted miss below which the law does not rotate, mm; a smaller tolerance of the target replaces it
+  /// Predicted miss below which the law does not rotate, mm; a smaller tolerance of the target replaces it.
+  double tolerance_mm = 0.05;
   double parameter_uncertainty = 0.3;  ///< relative error of k and f that the drift bound covers
 };
 
