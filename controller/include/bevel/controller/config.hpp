@@ -28,7 +28,7 @@ struct SteeringGains {
   double convergence_rad_s = 1.5;
   double boundary_layer_rad = 0.25;  ///< Phi, width of the boundary layer, rad
   double tube_share = 0.6;           ///< Law::arcs and Law::flip: width of the tube as a share of the remaining bend
-  /// Predicted miss below which the law does not rotate, mm; a smaller tolerance of the target replaces it.
+  /// Predicted miss that the law does not correct, mm; a smaller arrival tolerance replaces it.
   double tolerance_mm = 0.05;
   double parameter_uncertainty = 0.3;  ///< relative error of k and f that the drift bound covers
 };

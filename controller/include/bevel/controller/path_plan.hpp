@@ -30,7 +30,8 @@ inline constexpr std::size_t kMostPoints = kMostWayPoints + 3;  ///< largest num
 
 /// Look-ahead distance of the law on a path, mm. A shorter one causes more rotations, a longer one cuts corners.
 inline constexpr double kLookahead_mm = 30,
-                        kLeaves = 0.1;  ///< bound of the deviation from a path over k kLookahead_mm^2; tested
+                        kLeaves = 0.1;  ///< bound of the deviation from a path by alternating, as a share of the bend
+                                        ///< k kLookahead_mm^2 (tests/controller/path_plan_test.cpp)
 
 /// Point of a path.
 struct PathPoint {
