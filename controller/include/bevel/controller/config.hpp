@@ -7,6 +7,7 @@
 #include <bevel/controller/obstacle.hpp>
 #include <bevel/controller/rendezvous.hpp>
 
+/// Control of the needle: steering laws, path planning, target prediction and supervision.
 namespace bevel::controller {
 
 /// Limits of rate, acceleration and rotation.

@@ -9,6 +9,7 @@
 #include <bevel/model/effects/augmented_needle.hpp>
 #include <bevel/model/effects/variation.hpp>
 
+/// Estimation of the needle: extended Kalman filter, history, health and entry line.
 namespace bevel::estimator {
 
 /// Mean and standard deviations of the state at the entry point.
