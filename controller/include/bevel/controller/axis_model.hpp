@@ -1,8 +1,7 @@
 // SPDX-License-Identifier: MIT
 #pragma once
-// Transmission between the axes and the tip by the effects of a model file. The law acts on the tip; AxisModel computes
-// how far the axes have to move for it: through a dead band of the rotation (backlash, wind-up of the shaft), and to
-// the place where a tip that advances by jumps (stick-slip, puncture) rests nearest to the target.
+/// @file
+/// Transmission between the axes and the tip by the effects of a model file.
 #include <array>
 #include <vector>
 
@@ -12,31 +11,41 @@
 
 namespace bevel::controller {
 
+/// Computes how far the axes have to move for a motion of the tip: through a dead band of the rotation (backlash,
+/// wind-up of the shaft), and to the insertion at which a tip that advances by jumps (stick-slip, puncture) stops
+/// nearest to the target.
 class AxisModel {
  public:
-  // Effects that do nothing between base and tip may be among them. Throws ArgumentError for more than
-  // model::kMaxEffects.
+  /// Constructs the transmission of a list of effects.
+  /// @param effects effects of the model file; those without influence between actuator and tip are allowed
+  /// @throws bevel::ArgumentError if there are more than model::kMaxEffects
   explicit AxisModel(std::vector<model::ActiveEffect> effects);
 
-  // Whether anything among the effects can keep the tip from turning with the base.
+  /// Returns whether an effect can keep the tip from rotating with the actuator.
+  /// @return true if the rotation has a dead band
   bool turns_late() const { return turns_late_; }
-  /// Returns whether an effect makes the tip stick and jump while the base advances evenly.
+  /// Returns whether an effect makes the tip stick and jump while the actuator advances steadily.
+  /// @return true if the tip advances by jumps
   bool advances_by_jumps() const { return advances_by_jumps_; }
 
-  // Follows the base; the first call is the entry, with nothing wound up. tip_depth_mm: z of the tip in {A}. Does not
-  // allocate.
+  /// Updates the effects by the actuator motion. The first call is the entry, without wind-up. Does not allocate.
+  /// @param actuator positions of the axes, mm and rad
+  /// @param tip_depth_mm z of the tip in {A}, mm
   void follow(const model::ActuatorState& actuator, double tip_depth_mm);
 
-  // How far the base still has to turn, toward +1 or -1, until the tip turns with it. A dead band passes on what is
-  // beyond it: what of a long turn does not arrive is the dead band.
+  /// Computes the rotation of the actuator until the tip rotates with it. It is the part of a long rotation that does
+  /// not reach the tip.
+  /// @param direction sign of the rotation
+  /// @return remaining dead band in that direction, rad, not negative
   double take_up_rad(double direction) const;
 
-  /// Computes the insertion of the base, mm, until the tip rests nearest to a point on its way.
+  /// Computes the insertion of the actuator until the tip stops nearest to a point on its path. Does not allocate.
   ///
-  /// A tip that jumps rests only between two jumps; the nearest of these places may lie before or beyond the point.
-  /// @param ahead_mm distance from the tip to the point along its way, positive
-  /// @return 0 if the tip cannot come nearer by any insertion; \p ahead_mm if it does not advance by jumps. Does not
-  ///     allocate.
+  /// A tip that jumps stops only between two jumps; the nearest of these positions may lie before or beyond the point.
+  /// @param ahead_mm distance from the tip to the point along its path, mm, positive
+  /// @return insertion, mm; 0 if no insertion brings the tip nearer; \p ahead_mm if the tip does not advance by jumps
+  /// or
+  ///     the point is more than 15 mm ahead
   double insertion_to_nearest_mm(double ahead_mm) const;
 
  private:
@@ -57,9 +66,14 @@ class AxisModel {
   Tip tip_;
 };
 
-// Rate of the base for a wanted rate of the tip: faster by as much as the axis can brake within what is to be taken up.
-// share in [0, 1]: how much the law wants to turn; inside its boundary layer the dead band is crossed in proportion, so
-// that noise in sigma does not throw the base from side to side.
+/// Computes the rotation rate of the actuator for a rate of the tip. The rate is increased by as much as the axis can
+/// brake within the remaining dead band.
+/// @param tip_rate_rad_s rate of the tip, rad/s
+/// @param take_up_rad remaining dead band in that direction, rad (AxisModel::take_up_rad)
+/// @param share share of the increase, in [0, 1]; within the boundary layer it is proportional to sigma, so that noise
+///     does not move the actuator across the dead band
+/// @param limits limits of rate and acceleration
+/// @return rate of the actuator, rad/s
 double base_rate_rad_s(double tip_rate_rad_s, double take_up_rad, double share, const SteeringLimits& limits);
 
 }  // namespace bevel::controller

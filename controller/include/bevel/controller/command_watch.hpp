@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: MIT
 #pragma once
-// What was commanded of late, for the judgement of what the axes report: a report is judged by the commands of its own
-// time, however late it arrives. Rates in mm/s and rad/s, times in microseconds of the one clock that stamps both.
+/// @file
+/// Comparison of the reported rates with the recent commands.
 #include <array>
 #include <cstddef>
 #include <cstdint>
@@ -11,16 +11,28 @@
 
 namespace bevel::controller {
 
+/// Holds the recent commands, and compares each report of the axes with the commands of the report's own time, whatever
+/// its latency is. Commands and reports have time stamps of the same clock.
 class CommandWatch {
  public:
+  /// Removes all commands.
   void restart() { count_ = 0; }
+  /// Adds a command; the newest 256 are kept.
+  /// @param utime time of the command, us
+  /// @param commanded rates, mm/s and rad/s
   void remember(std::int64_t utime, const Rates& commanded) { past_[count_++ % kRoom] = {utime, commanded}; }
 
-  // By how much the reported rates lie outside all that was in force from delay_s before the report until now: an axis
-  // may do any of it. Zeros where nothing was commanded yet.
+  /// Computes the distance of the reported rates from the range of the commands that may have been in effect: those
+  /// from \p delay_s before the report until now.
+  /// @param report reported rates, mm/s and rad/s, with their time, us
+  /// @param delay_s delay of the axes, s
+  /// @return distance for each axis, mm/s and rad/s, not negative; zero without commands
   Rates excess(const model::ActuatorState& report, double delay_s) const;
 
-  // Nothing but rest was commanded in the last for_s, and something was.
+  /// Returns whether only zero rates were commanded in an interval up to now.
+  /// @param now_utime current time, us
+  /// @param for_s length of the interval, s
+  /// @return false also if the commands do not cover the interval
   bool told_to_rest(std::int64_t now_utime, double for_s) const;
 
  private:

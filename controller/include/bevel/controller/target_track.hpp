@@ -1,50 +1,70 @@
 // SPDX-License-Identifier: MIT
 #pragma once
-// Where a target that moves will be: a middle that drifts and a breath about it. Along each axis, after a time t from
-// now,
-//   m + v t + s cos(w t) + c sin(w t),
-// with one frequency w for all. The state (m, v, s, c) is linear for each w, so that for each of a grid (0.08 to 0.6
-// Hz) there is a Kalman filter, whose process noise lets the coefficients change: no breath is like the one before. The
-// frequencies are weighed by what each predicted, their likelihoods (a bank of filters: Magill, IEEE Trans. Automat.
-// Contr. 10(4), 1965). A target at rest and one that only drifts are cases of it.
-//
-// Frame {A}, mm, mm/s, times in microseconds of one clock. Nothing allocates after the constructor.
+/// @file
+/// Prediction of a target with drift and respiratory motion.
 #include <Eigen/Core>
 #include <cstdint>
 #include <vector>
 
 namespace bevel::controller {
 
+/// Prior and noise of the target's motion.
 struct TargetMotion {
-  double reading_sd_mm = 0.3;     // of a told position, along each axis
-  double velocity_sd_mm_s = 0.5;  // of the drift, prior
-  double breathing_sd_mm = 3.0;   // of s and c, prior
-  double renewed_after_s = 60.0;  // by then drift and breath may be others altogether
+  double reading_sd_mm = 0.3;     ///< standard deviation of a commanded position along each axis, mm
+  double velocity_sd_mm_s = 0.5;  ///< prior standard deviation of the drift along each axis, mm/s
+  double breathing_sd_mm = 3.0;   ///< prior standard deviation of the amplitudes s and c along each axis, mm
+  double renewed_after_s = 60.0;  ///< time after which drift and amplitudes have changed by their prior, s
 };
 
+/// Predicts the position of a target: a mean position with drift, and a respiratory motion. Along each axis, at the
+/// time t after the newest position,
+///
+///     m + v t + s cos(w t) + c sin(w t),
+///
+/// with one frequency w for all axes. The state (m, v, s, c) is linear for each w. There is one Kalman filter for each
+/// frequency of a grid (0.08 to 0.6 Hz), with process noise for the change of the coefficients. The filters are
+/// weighted by their likelihoods (bank of filters: Magill, IEEE Trans. Automat. Contr. 10(4), 1965). A stationary
+/// target and one that only drifts are special cases. All time stamps have the same clock. Nothing is allocated after
+/// construction.
 class TargetTrack {
  public:
+  /// Constructs the prediction without positions.
+  /// @param motion prior and noise; copied
   explicit TargetTrack(const TargetMotion& motion = {});
 
-  // Begins anew with the next position.
+  /// Removes all positions.
   void restart();
-  // A position that is not newer than the one before is left out. Two in a row that no breath explains are another
-  // target, with which it begins anew; one is left out.
+  /// Adds a position. A position that is not newer than the previous one is ignored. A position that the motion does
+  /// not explain is ignored once; a second one in a row is a new target, with which the prediction restarts.
+  /// @param utime time of the position, us
+  /// @param position_mm position of the target, {A}, mm
   void observe(std::int64_t utime, const Eigen::Vector3d& position_mm);
+  /// Returns whether there is no position.
+  /// @return true before the first position
   bool empty() const { return empty_; }
-  /// Returns whether there is one position only, from which no motion is predicted.
+  /// Returns whether no motion is predicted.
+  /// @return true with at most one position
   bool is_fixed() const { return at_rest_; }
 
-  // By the frequencies' mean. Before the first position: zeros.
+  /// Predicts the position: the weighted mean over the frequencies.
+  /// @param utime time of the prediction, us
+  /// @return position, {A}, mm; zero before the first position
   Eigen::Vector3d position_mm(std::int64_t utime) const;
-  // Of that prediction, along the axis that is known least: within each frequency and between them.
+  /// Computes the standard deviation of the prediction, within and between the frequencies.
+  /// @param utime time of the prediction, us
+  /// @return standard deviation along the least certain axis, mm; 0 before the first position
   double position_sd_mm(std::int64_t utime) const;
-  double period_s() const;  // of the likeliest frequency
+  /// Returns the period of the respiratory motion.
+  /// @return period of the most likely frequency, s
+  double period_s() const;
 
-  // The first instant, from `from_utime` on and within one period, at which the target turns round along the direction
-  // in which it breathes most: it hardly moves about then. The later turns of the same side are whole periods on.
+  /// Computes the next turning point of the respiratory motion along the direction of its largest amplitude. Later
+  /// turning points of the same side follow after whole periods.
+  /// @param from_utime earliest time, us
+  /// @return time of the turning point, us; \p from_utime before the first position
   std::int64_t next_turn_utime(std::int64_t from_utime) const;
-  // Largest distance from the middle of its breath; of the likeliest frequency.
+  /// Computes the amplitude of the respiratory motion for the most likely frequency.
+  /// @return largest distance from the mean position, mm
   double breathing_mm() const;
 
  private:
@@ -52,13 +72,13 @@ class TargetTrack {
   struct Breath {
     double frequency_rad_s = 0;
     Coefficients mean = Coefficients::Zero();
-    Eigen::Matrix4d covariance;  // of each axis alike
-    double log_weight = 0;       // the likeliest has 0
-    double weight = 0;           // all together 1; 0 where it is negligible
+    Eigen::Matrix4d covariance;  // identical for each axis
+    double log_weight = 0;       // 0 for the most likely
+    double weight = 0;           // the sum is 1; 0 if negligible
   };
   double ahead_s(std::int64_t utime) const;
   bool is_jump(std::int64_t utime, const Eigen::Vector3d& position_mm) const;
-  // What is read, m + s, after so long.
+  // Row that maps the coefficients to the position after ahead_s.
   static Eigen::Vector4d reading_after(const Breath& breath, double ahead_s);
   const Breath& likeliest() const;
   void weigh();
@@ -68,7 +88,7 @@ class TargetTrack {
   std::int64_t newest_utime_ = 0;
   Eigen::Vector3d origin_mm_ = Eigen::Vector3d::Zero();  // the first position
   bool empty_ = true;
-  bool at_rest_ = true;  // as far as is known: of one reading, every coefficient is zero
+  bool at_rest_ = true;  // at most one position: every coefficient is zero
   bool jumped_before_ = false;
 };
 

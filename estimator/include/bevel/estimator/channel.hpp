@@ -1,51 +1,64 @@
 // SPDX-License-Identifier: MIT
 #pragma once
-// The channel that the tip has cut, as far as the model does not know it from where the tip is: how the bevel stood at
-// each depth. A needle that is drawn back goes through it again, whichever way the bevel points by then.
-//
-// Inserted length is divided into cells of half a millimetre. A cell keeps the mean direction of the bevel while it was
-// cut, a vector of length one and less: the length is the share of the needle's curvature that is left of a cell in
-// which the bevel turned, so that the heading behind a cell comes out right whatever happened in it; within it the path
-// is off by k h^2 / 4, 3e-4 mm. Values only, of fixed size: copied with the state that it belongs to, it makes a
-// history that is rolled back right by itself. mm and rad, counted from where the estimate began.
+/// @file
+/// Channel that the tip has cut.
 #include <Eigen/Core>
 #include <array>
 #include <cstddef>
 
 namespace bevel::estimator {
 
+/// Records the bevel angle at each depth of the channel that the tip has cut. A retracted needle follows this channel,
+/// whatever its present bevel angle is.
+///
+/// The inserted length is divided into cells of 0.5 mm. A cell holds the mean direction of the bevel while the cell was
+/// cut, a vector of length up to 1. The length is the share of the curvature that remains of a cell in which the bevel
+/// rotated, so that the heading after a cell is exact. The position within it is off by k h^2 / 4, 3e-4 mm. The class
+/// is a plain value of fixed size: it is copied with the filter state, so a history of states can be rolled back.
+/// Insertion (mm) and roll (rad) count from the start of the estimate.
 class Channel {
  public:
-  static constexpr double kCell_mm = 0.5;
-  static constexpr std::size_t kCells = 400;  // what is deeper than 200 mm is not kept
+  static constexpr double kCell_mm = 0.5;     ///< length of a cell, mm
+  static constexpr std::size_t kCells = 400;  ///< number of cells; parts deeper than 200 mm are not recorded
 
+  /// Bend of one cell.
   struct Bend {
-    double share = 0;       // of the needle's curvature, in [0, 1]
-    double toward_rad = 0;  // roll at which it was cut
+    double share = 0;       ///< share of the needle's curvature, in [0, 1]
+    double toward_rad = 0;  ///< roll of the bevel when the cell was cut, rad
   };
-  // The first part of a motion: up to an edge of a cell, the front or the end.
+  /// First part of a motion: up to the edge of a cell, the end of the channel or the end of the motion.
   struct Part {
-    double insertion_mm = 0;
-    double to_mm = 0;
-    bool cut_before = false;  // in a cell that is kept
-    Bend bend;                // of it
+    double insertion_mm = 0;  ///< increment of the insertion, mm; negative for a retraction
+    double to_mm = 0;         ///< insertion at the end of the part, mm
+    bool cut_before = false;  ///< the part lies in a recorded cell
+    Bend bend;                ///< bend of that cell
   };
 
+  /// Returns the insertion.
+  /// @return insertion of the tip, mm
   double inserted_mm() const { return inserted_mm_; }
+  /// Returns the roll.
+  /// @return roll of the bevel, rad
   double rolled_rad() const { return rolled_rad_; }
-  // From the deepest point that was reached; 0 where the tip cuts.
+  /// Computes the retraction from the deepest insertion.
+  /// @return distance, mm; 0 if the tip cuts
   double drawn_back_mm() const { return front_mm_ - inserted_mm_; }
 
+  /// Computes the first part of a motion.
+  /// @param target_mm insertion at the end of the motion, mm
+  /// @return part toward \p target_mm, with the cell that it lies in
   Part next(double target_mm) const;
-  /// Takes in that part, made while the shaft turned by so much at a constant rate.
-  /// @param bend_known false: nothing is known of how the bevel stood while it was cut; the channel is kept straight.
+  /// Moves the tip by one part, and records the channel where the part cuts new tissue.
+  /// @param part part of the motion, from next()
+  /// @param rotation_rad rotation of the shaft during the part, at a constant rate, rad
+  /// @param bend_known false: the bevel angle was not observed, and the new channel is recorded as straight
   void pass(const Part& part, double rotation_rad, bool bend_known = true);
 
  private:
   void cut(double to_mm, double rotation_rad, bool bend_known);
 
   double inserted_mm_ = 0, rolled_rad_ = 0, front_mm_ = 0;
-  std::array<Eigen::Vector2f, kCells> cells_{};  // direction of the bevel times length, mm
+  std::array<Eigen::Vector2f, kCells> cells_{};  // direction of the bevel times cut length, mm
 };
 
 }  // namespace bevel::estimator

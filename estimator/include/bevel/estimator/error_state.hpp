@@ -1,37 +1,60 @@
 // SPDX-License-Identifier: MIT
 #pragma once
-// The error of a FilterState as a vector of nine, or of ten with ell, and its covariance as one matrix. With the errors
-// that readings share behind them they are fifteen or sixteen; the nuisance states, where there are any, come last.
+/// @file
+/// Error of a FilterState as a vector, and its covariance as one matrix.
+///
+/// The number of error states is 9, or 10 with ell or a bending length. The shared errors of the measurements follow
+/// (15 or 16 states), and then the nuisance states (kAllStates).
 #include <bevel/estimator/needle_filter.hpp>
 
 namespace bevel::estimator {
 
-inline constexpr double kStraight_per_mm = 1e-5;  // radius 100 m: less is no bend over any insertion
+/// Curvature below which a needle is straight, 1/mm: a radius of 100 m.
+inline constexpr double kStraight_per_mm = 1e-5;
 
+/// Error of a state, in the units of Vector9d, then mm for the tenth, standard deviations, and the nuisance states.
+/// @tparam kSize number of error states
 template <int kSize>
 using Error = Eigen::Matrix<double, kSize, 1>;
+/// Covariance of an Error.
+/// @tparam kSize number of error states
 template <int kSize>
 using Covariance = Eigen::Matrix<double, kSize, kSize>;
 
-// With the nuisance states, which come last, all are carried, in use or not: what is not has no variance, or is not
-// seen.
+/// Number of error states with nuisance states: all kinds, in use or not. An unused state has no variance, or no
+/// influence on a measurement.
 inline constexpr int kAllStates = 10 + kSharedErrors + kNuisance;
+/// Number of error states without the nuisance states.
+/// @tparam kSize number of error states
 template <int kSize>
 inline constexpr int kFiltered = kSize == kAllStates ? kSize - kNuisance : kSize;
+/// Whether the error has the shared errors of the measurements.
+/// @tparam kSize number of error states
 template <int kSize>
 inline constexpr bool kHasShared = kFiltered<kSize> > 10;
-// Of the state itself.
+/// Number of error states of the needle itself, 9 or 10.
+/// @tparam kSize number of error states
 template <int kSize>
 inline constexpr int kOwn = kHasShared<kSize> ? kFiltered<kSize> - kSharedErrors : kFiltered<kSize>;
 
+/// Returns the covariance of nine states.
+/// @param state state of the filter
+/// @return its own matrix, shape (9, 9)
 inline const Matrix9d& get_covariance(const FilterState& state, std::integral_constant<int, 9>) {
   return state.covariance;
 }
+/// Assembles the covariance of ten states.
+/// @param state state of the filter
+/// @return copy, shape (10, 10)
 inline Covariance<10> get_covariance(const FilterState& state, std::integral_constant<int, 10>) {
   Covariance<10> P;
   P << state.covariance, state.tenth_covariance, state.tenth_covariance.transpose(), state.tenth_variance;
   return P;
 }
+/// Assembles the covariance of the state with the shared errors.
+/// @tparam kSize 15 or 16
+/// @param state state of the filter
+/// @return copy, shape (kSize, kSize)
 template <int kSize>
 Covariance<kSize> get_covariance(const FilterState& state, std::integral_constant<int, kSize>) {
   const auto& with_state = state.shared.with_state.topRows<kOwn<kSize>>();
@@ -40,15 +63,27 @@ Covariance<kSize> get_covariance(const FilterState& state, std::integral_constan
       state.shared.covariance;
   return P;
 }
-// Of all (filter_nuisance.cpp).
+/// Assembles the covariance of all states (filter_nuisance.cpp).
+/// @param state state of the filter
+/// @return copy, shape (kAllStates, kAllStates)
 Covariance<kAllStates> get_covariance(const FilterState& state, std::integral_constant<int, kAllStates>);
+/// Writes the covariance of all states to the parts of a state (filter_nuisance.cpp).
+/// @param state state of the filter
+/// @param P covariance, shape (kAllStates, kAllStates)
 void set_all_covariance(FilterState& state, const Covariance<kAllStates>& P);
-// The state's own matrix where that is all of it, a copy otherwise.
+/// Returns the covariance of a state for a number of error states.
+/// @tparam kSize number of error states
+/// @param state state of the filter
+/// @return a reference to the state's own matrix for nine states, otherwise a copy; shape (kSize, kSize)
 template <int kSize>
 decltype(auto) covariance_of(const FilterState& state) {
   return get_covariance(state, std::integral_constant<int, kSize>());
 }
 
+/// Writes a covariance to the parts of a state.
+/// @tparam kSize number of error states
+/// @param state state of the filter
+/// @param P covariance, shape (kSize, kSize)
 template <int kSize>
 void set_covariance(FilterState& state, const Covariance<kSize>& P) {
   if constexpr (kSize == kAllStates) return set_all_covariance(state, P);
@@ -64,7 +99,10 @@ void set_covariance(FilterState& state, const Covariance<kSize>& P) {
   }
 }
 
-// Moves the estimate by an error in its body frame; the covariance stays.
+/// Moves the mean by an error in its body frame. The covariance does not change.
+/// @tparam kSize number of error states
+/// @param state state before and after
+/// @param error error to add, shape (kSize)
 template <int kSize>
 void move(FilterState& state, const Error<kSize>& error) {
   state.pose = state.pose * model::exp_se3(error.template head<6>());
@@ -80,7 +118,11 @@ void move(FilterState& state, const Error<kSize>& error) {
   }
 }
 
-// The error by which `from` is moved to `to`.
+/// Computes the error by which move() takes one state to another.
+/// @tparam kSize number of error states, 9 or 10
+/// @param from first state
+/// @param to second state
+/// @return error in the body frame of \p from, shape (kSize)
 template <int kSize>
 Error<kSize> difference(const FilterState& from, const FilterState& to) {
   Error<kSize> error;

@@ -1,12 +1,15 @@
 // SPDX-License-Identifier: MIT
 #pragma once
-// The filter over a bounded, time-ordered history: measurements that arrive late or out of order are applied at their
-// own capture time and rolled forward, so that shuffled input gives the same state as sorted input, bit for bit.
-//
-// Actuator states and measurements become nodes ordered by time. A measurement between two actuator states is applied
-// at positions interpolated between them; one that is newer than the newest actuator state waits for the next. Two
-// actuator states farther apart than AxisLimits::gap_s are the ends of a gap: what was measured in it is not applied,
-// since nobody knows where the axes were, and the state passes it by NeedleFilter::pass_gap, a declared reset.
+/// @file
+/// NeedleFilter over a bounded history ordered by time: measurements that arrive delayed or out of order are applied at
+/// their capture time, and the later history is recomputed. Shuffled input gives the same state as sorted input, bit
+/// for bit.
+///
+/// Actuator states and measurements become nodes ordered by time. A measurement between two actuator states is applied
+/// at positions interpolated between them; one that is newer than the newest actuator state waits for the next. Two
+/// actuator states farther apart than AxisLimits::gap_s are the ends of a gap. Measurements within a gap are not
+/// applied, since the position of the axes is unknown, and the state crosses it by NeedleFilter::pass_gap, a declared
+/// reset.
 #include <cstdint>
 #include <memory>
 #include <vector>
@@ -15,78 +18,112 @@
 
 namespace bevel::estimator {
 
-// Of one kind of reading.
+/// Number of measurements of one kind by what became of them.
 struct ReadingCounters {
-  std::int64_t offered = 0;
-  std::int64_t not_usable = 0;  // status other than 0, or no axis seen
-  std::int64_t too_old = 0;     // older than the history
-  std::int64_t duplicate = 0;
-  std::int64_t late = 0;    // arrived behind a newer node: the history was rolled back
-  std::int64_t in_gap = 0;  // taken where the motion of the axes is not known (AxisLimits::gap_s): not applied
+  std::int64_t offered = 0;     ///< given to NeedleEstimator::add
+  std::int64_t not_usable = 0;  ///< ignored: status other than 0, or no information
+  std::int64_t too_old = 0;     ///< ignored: older than the history
+  std::int64_t duplicate = 0;   ///< ignored: time, camera and number of a measurement in the history
+  std::int64_t late = 0;        ///< arrived after a newer node; the history was rolled back
+  std::int64_t in_gap = 0;      ///< not applied: taken within a gap (AxisLimits::gap_s)
 };
 
+/// Numbers of samples and of recomputations since construction.
 struct Counters {
-  ReadingCounters positions, headings;
-  std::int64_t relinearised = 0;
-  std::int64_t actuators = 0;  // offered
-  std::int64_t actuators_refused = 0;
+  ReadingCounters positions,           ///< position measurements
+      headings;                        ///< heading measurements
+  std::int64_t relinearised = 0;       ///< successful calls of NeedleFilter::relinearise
+  std::int64_t actuators = 0;          ///< actuator states given to NeedleEstimator::add
+  std::int64_t actuators_refused = 0;  ///< ignored: not newer than the oldest node, or the time of another
 };
 
-// The estimate at the newest actuator state, and what the newest position said.
+/// Estimate at the newest actuator state, with the result of the newest position measurement.
 struct Estimate {
-  std::int64_t utime = 0;  // 0: nothing yet
-  FilterState state;
-  model::Pose tip;  // NeedleFilter::tip_pose of it
-  Update newest_update;
-  std::int32_t health = 0;  // see health.hpp
+  std::int64_t utime = 0;   ///< time for which the estimate holds, us; 0 before the first actuator state
+  FilterState state;        ///< state of the filter
+  model::Pose tip;          ///< NeedleFilter::tip_pose of the state, {A}, mm
+  Update newest_update;     ///< result of the newest position measurement
+  std::int32_t health = 0;  ///< bits of Health; 0: healthy
 };
 
 struct HealthFinding;
 
+/// Estimates the needle from actuator states and measurements in any order of arrival.
+///
+/// The class reads no clock. The size of its containers is fixed at construction.
 class NeedleEstimator {
  public:
-  // history: number of nodes kept; at 100 Hz of actuators and 2 x 30 Hz of cameras 64 nodes are 0.4 s, and 0.3 s if
-  // each camera gives headings too.
+  /// Constructs the estimator; the estimate begins with the first actuator state.
+  /// @param config configuration of the filter; copied
+  /// @param history number of nodes kept, at least 8. With actuators at 100 Hz and two cameras at 30 Hz, 64 nodes are
+  ///     0.4 s, or 0.3 s if each camera measures headings too.
   explicit NeedleEstimator(const EstimatorConfig& config, std::size_t history = 64);
 
+  /// Adds an actuator state and applies the measurements that wait for it. It is counted and ignored if it is not newer
+  /// than the oldest node, or if the history has one of the same time.
+  /// @param actuator positions of the axes, mm and rad, at their time, us
   void add(const model::ActuatorState& actuator);
+
+  /// Adds a position measurement. It is counted and ignored if its status is not 0, if it has no information, if it is
+  /// older than the history, or if the history has it already (ReadingCounters).
+  /// @param measurement tip position in {A}, mm, at its capture time, us; finite values
   void add(const model::TipMeasurement& measurement);
+
+  /// Adds a heading measurement, under the same conditions as a position.
+  /// @param heading unit vector in {A} at its capture time, us; finite values
   void add(const model::TipHeading& heading);
 
-  // Begins anew, a declared reset, with the next actuator state.
+  /// Discards the history and begins a new estimate with the next actuator state. A declared reset.
   void restart();
-  /// Forgets how many measurements in a row were rejected, of each source. For an operator's arm command: a source that
-  /// is still rejected is reported again after Gate::rejects_before_unhealthy.
+
+  /// Sets the numbers of measurements rejected in a row to zero, for each source. For an operator's arm command: a
+  /// source that is still rejected is reported again after Gate::rejects_before_unhealthy.
   void forget_rejects();
-  // The clock that stamps everything was set by so much: what is known stays, under its new times; a declared reset.
+
+  /// Shifts all time stamps after the clock of the samples was set. The estimate is kept. A declared reset.
+  /// @param by_us change of the clock, us
   void shift_time(std::int64_t by_us);
 
-  // The newest estimate. `now_utime` is only for the age limits of health; pass the newest sample's time in a replay.
+  /// Returns the newest estimate, at the newest actuator state.
+  /// @param now_utime current time, us, for the age limits of the health word only; in a replay, the newest sample's
+  /// @return estimate; before the first actuator state its time is 0 and it is unhealthy
   Estimate estimate(std::int64_t now_utime) const;
 
   /// Finds the first bit of \p estimate's health word that forbids steering, with its value and its limit.
-  /// @param now_utime as for the estimate
+  /// @param estimate estimate of this estimator
+  /// @param now_utime current time, us, as for the estimate
+  /// @return the finding; its flag is kHealthy if estimate() set none of these bits
   HealthFinding finding(const Estimate& estimate, std::int64_t now_utime) const;
 
-  // The estimate where the axes stand at `axes.utime`, a guess of now by the rates they last reported: with the
-  // readings that wait for the axes, and without any trace in the history. An instant not newer than the newest node
-  // gives estimate().
+  /// Predicts the estimate to a time after the newest actuator state. Measurements that wait for the axes are applied;
+  /// the history does not change.
+  /// @param axes predicted positions of the axes, mm and rad, at the time of the prediction, us
+  /// @param now_utime current time, us, for the age limits of the health word
+  /// @return estimate at that time; estimate() if the time is not newer than the newest node
   Estimate estimate_ahead(const model::ActuatorState& axes, std::int64_t now_utime) const;
 
-  // Called, if set, once for each measurement when it is first applied: for replay's statistics. Not for late
-  // roll-backs.
+  /// A measurement and the state it was applied to, for the statistics of a replay.
   struct Applied {
-    std::int64_t utime;
-    std::int32_t camera;
-    FilterState state_before;
-    Update update;
-    const model::TipMeasurement* measurement;  // one of the two, valid during the call
-    const model::TipHeading* heading;
+    std::int64_t utime;                        ///< time of the measurement, us
+    std::int32_t camera;                       ///< number of its camera
+    FilterState state_before;                  ///< state at that time, before the update
+    Update update;                             ///< result of the update
+    const model::TipMeasurement* measurement;  ///< the position, or null for a heading; valid during the call
+    const model::TipHeading* heading;          ///< the heading, or null for a position; valid during the call
   };
+  /// Callback for measurements; the first argument is the context given to observe().
   using Observer = void (*)(void* context, const Applied&);
+  /// Sets a callback that is called once for each measurement, when it is first applied, and not when the history is
+  /// recomputed.
+  /// @param observer function to call; null for none
+  /// @param context first argument of each call
   void observe(Observer observer, void* context) { observer_ = observer, observer_context_ = context; }
 
+  /// Returns the counters.
+  /// @return numbers since construction
   const Counters& counters() const { return counters_; }
+  /// Returns the filter.
+  /// @return filter of this estimator
   const NeedleFilter& filter() const { return filter_; }
 
  private:
@@ -95,10 +132,10 @@ class NeedleEstimator {
     std::int32_t of_one = 0, of_all = 0;
   };
   Rejects rejects_in_row(const FilterState& state, std::int64_t now_utime) const;
-  // Insertion after which the past is run again; what has come since is linear.
+  // Insertion after which the past is relinearised.
   static constexpr double kFirstRelinearisation_mm = 30;
   static constexpr double kRelinearisedEvery_mm = 15;
-  // Less is how far an axis at rest is read differently.
+  // Smallest retraction: a stationary axis reports less.
   static constexpr double kDrawnBack_mm = 0.01;
   enum class Kind : std::uint8_t { actuator, position, heading };
   // Positions and status of an actuator state.
@@ -114,13 +151,13 @@ class NeedleEstimator {
     std::int64_t seq = 0;
     bool applied_before = false;
     bool counted_in_gap = false;
-    bool rejects_forgotten = false;  // when it is applied again, its rejection does not count
-    Reported axes;                   // the newest actuator state up to it
+    bool rejects_forgotten = false;  // its rejection does not count when it is applied again
+    Reported axes;                   // newest actuator state up to this node
     double insertion_mm = 0;
     double rotation_rad = 0;
-    Moved moved;                        // since the node before, by the model
-    model::TipMeasurement measurement;  // of a position
-    model::TipHeading heading;          // of a heading
+    Moved moved;                        // motion by the model since the previous node
+    model::TipMeasurement measurement;  // if kind is position
+    model::TipHeading heading;          // if kind is heading
     FilterState state;
     Update update;
   };
@@ -146,17 +183,17 @@ class NeedleEstimator {
   std::vector<std::uint32_t> order_;  // indices into the pool, by time; reserved once
   std::vector<std::uint32_t> free_;
   std::size_t processed_ = 0;             // nodes before this index hold a posterior
-  Past past_;                             // what has left the history, from its start or the last reset
-  double known_heading_sd_rad_;           // at which the past begins
-  std::unique_ptr<WalkedStep[]> walked_;  // room to run it again in: sized once, memory comes as it is used
+  Past past_;                             // steps that have left the history, since the start or the last reset
+  double known_heading_sd_rad_;           // largest, rad, at which the past begins
+  std::unique_ptr<WalkedStep[]> walked_;  // work space of relinearise(); sized once, uninitialised
   bool past_started_ = false;
-  bool past_waits_ = false;        // for a needle that was drawn back
-  bool past_begins_anew_ = false;  // then: the pose was reset meanwhile
+  bool past_waits_ = false;        // the needle is retracted
+  bool past_begins_anew_ = false;  // the pose was reset while it was
   struct {
     double insertion_mm, rotation_rad;
-  } left_{};                                 // where the axes stood when it was
-  std::array<double, 2> forgotten_since_{};  // of cameras 0 and 1, since the last reading of each in it
-  double past_mm_ = 0;                       // insertion and retraction in it
+  } left_{};                                 // axes when the retraction began
+  std::array<double, 2> forgotten_since_{};  // of cameras 0 and 1, since the last measurement of each in the past
+  double past_mm_ = 0;                       // insertion and retraction in the past
   double past_due_mm_ = kFirstRelinearisation_mm;
   Counters counters_;
   Update newest_update_;

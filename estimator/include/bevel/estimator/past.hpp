@@ -1,8 +1,7 @@
 // SPDX-License-Identifier: MIT
 #pragma once
-// What has left the estimator's history, as the few steps that NeedleFilter::relinearise runs again: neighbours of one
-// direction whose rates are nearly in proportion become one stretch, and what was measured on the way one reading,
-// where on the average it was taken. A hundred millimetres are some forty readings, whatever the frame rate.
+/// @file
+/// Steps that have left the estimator's history, for NeedleFilter::relinearise.
 #include <span>
 #include <vector>
 
@@ -10,29 +9,52 @@
 
 namespace bevel::estimator {
 
-// By how much a step of the model moved the tip, the heading and the way the tip moves, in {A}.
+/// Motion of the tip in one step of the model.
 struct Moved {
-  Eigen::Vector3d tip_mm = Eigen::Vector3d::Zero();
-  Eigen::Vector3d heading = Eigen::Vector3d::Zero();
-  Eigen::Vector3d motion = Eigen::Vector3d::Zero();
+  Eigen::Vector3d tip_mm = Eigen::Vector3d::Zero();   ///< displacement of the tip, {A}, mm
+  Eigen::Vector3d heading = Eigen::Vector3d::Zero();  ///< change of the heading's unit vector, {A}
+  Eigen::Vector3d motion = Eigen::Vector3d::Zero();   ///< change of the unit vector of the direction of motion, {A}
 };
 
+/// Compresses the past into few steps with few measurements.
+///
+/// Consecutive steps of the same direction with nearly proportional increments are joined to a stretch of at most
+/// 2.5 mm and 0.25 rad. The measurements within a stretch become one, at their mean position in it. About forty
+/// measurements represent 100 mm of insertion at any frame rate. Nothing is allocated after construction.
 class Past {
  public:
-  explicit Past(std::size_t room);  // sized here, nothing is allocated later
+  /// Constructs an empty past.
+  /// @param room largest number of steps
+  explicit Past(std::size_t room);
 
-  // Forgets everything; what comes next starts at `start`.
+  /// Removes all steps.
+  /// @param start state before the next step
   void restart(const FilterState& start);
-  // The history's step from `before`, by the increments of `step` and its measurement, to `after`.
+  /// Adds one step of the history.
+  /// @param before state before the step
+  /// @param step increments and measurements of the step
+  /// @param after state after the step
+  /// @param moved motion of the tip in the step
+  /// @param filter filter of the history
   void add(const FilterState& before, const PastStep& step, const FilterState& after, const Moved& moved,
            const NeedleFilter& filter);
-  // Ends the stretch which still grows; `end` is the state after the newest step.
+  /// Ends the present stretch, so that steps() has all steps added so far.
+  /// @param end state after the newest step
+  /// @param filter filter of the history
   void close(const FilterState& end, const NeedleFilter& filter);
 
+  /// Returns the first state.
+  /// @return state before the first step
   const FilterState& start() const { return start_; }
+  /// Returns the steps up to the last close().
+  /// @return steps in order of time
   std::span<const PastStep> steps() const { return steps_; }
+  /// Returns the capacity.
+  /// @return largest number of steps
   std::size_t room() const { return steps_.capacity(); }
-  bool complete() const { return complete_; }  // false once there was no room
+  /// Returns whether every step was recorded.
+  /// @return false if the capacity was exceeded since restart()
+  bool complete() const { return complete_; }
 
  private:
   bool joins(const PastStep& step) const;
@@ -42,10 +64,10 @@ class Past {
 
   FilterState start_;
   std::vector<PastStep> steps_;
-  PastStep open_;  // the stretch that still grows; point_mm and direction at its end
+  PastStep open_;  // the present stretch; point_mm and directions at its end
   bool has_open_ = false;
-  double progress_ = 0;  // of the stretch, |mm| + |rad|
-  // Progress at which its readings of the position were taken, on the average; without any, those of the heading.
+  double progress_ = 0;  // length of the stretch, |mm| + |rad|
+  // Mean progress of its position measurements; without any, of its heading measurements.
   double measured_at_ = 0;
   bool complete_ = true;
 };

@@ -1,15 +1,22 @@
 // SPDX-License-Identifier: MIT
 #pragma once
-// Covariance of pose (6) and parameters through one step of the model: P <- F P F^T with F = [Phi G; 0 I].
+/// @file
+/// Propagation of the covariance through one step of the model.
 #include <Eigen/Core>
 
 #include <bevel/model/kinematics.hpp>
 
 namespace bevel::estimator {
 
-// In products of pairs of numbers: Eigen's general product would pack these small operands for its blocked kernel, and
-// its lazy ones wait for what was just written in other widths; either takes more than twice as long as the arithmetic.
-// Phi's lower left block of zeros is left out; one triangle is mirrored, so that P stays symmetric to the last bit.
+/// Propagates the covariance of pose (6) and parameters through one step: P <- F P F^T with F = [Phi G; 0 I].
+///
+/// The products are written in pairs of numbers, in less than half the time of Eigen's blocked and lazy products for
+/// these sizes. The lower left block of Phi, which is zero, is skipped. One triangle is mirrored, so P stays exactly
+/// symmetric.
+/// @tparam kSize number of error states, 9 or 10
+/// @param P covariance before and after the step, shape (kSize, kSize)
+/// @param Phi derivative of the pose by the error of the previous pose, body frame (mm | rad), shape (6, 6)
+/// @param G derivative of the pose by the parameters, shape (6, kSize - 6)
 template <int kSize>
 void propagate(Eigen::Matrix<double, kSize, kSize>& P, const model::Matrix6d& Phi,
                const Eigen::Matrix<double, 6, kSize - 6>& G) {
