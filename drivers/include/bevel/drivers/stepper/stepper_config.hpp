@@ -40,9 +40,10 @@ struct AxisConfig {
   double position_min_unit = -std::numeric_limits<double>::infinity();
   /// Upper limit of the workspace, mm or rad from the entry point; greater than position_min_unit.
   double position_max_unit = std::numeric_limits<double>::infinity();
-  /// The drive's own software limits (0x607D), lower and upper, mm or rad from the entry point. Beyond them the drive
-  /// holds the axis by itself, which is a latched stop. drive_limits_of() gives the value of a limit that is not set.
-  std::optional<double> drive_position_min_unit{}, drive_position_max_unit{};
+  std::optional<double> drive_position_min_unit{},  ///< drive's own lower software limit (0x607D), mm or rad from the
+                                                    ///< entry point; the drive holds the axis beyond it, which is a
+                                                    ///< latched stop; empty: see drive_limits_of()
+      drive_position_max_unit{};                    ///< drive's own upper software limit, likewise
   /// Position error at which the drive's own supervision of its motor (0x6065, 0x6066) reports a fault, mm or rad. 0
   /// leaves the drive's setting.
   double following_error_unit = 0.0;
@@ -60,8 +61,8 @@ struct AxisConfig {
 
 /// Software limits of a drive.
 struct DriveLimits {
-  /// Lower and upper limit, mm or rad from the entry point; infinite: none.
-  double min_unit, max_unit;
+  double min_unit,  ///< lower limit, mm or rad from the entry point; infinite: none
+      max_unit;     ///< upper limit, likewise
 };
 /// Returns the software limits of the drive: as configured, otherwise the workspace widened by the travel of the axis
 /// at its rate limit in two cycles, which pass from a command to its effect, and in a quick stop. The driver brakes for
@@ -129,7 +130,7 @@ std::vector<std::string> problems_of(const StepperConfig& config);
 
 /// Checks whether the needle comes to rest within 200 ms of a fault. For rigs; not for buses in slow emulators.
 /// @param config settings of the driver
-/// @return one sentence for each setting that prevents it (key, value, allowed range); empty if there is none
+/// @return one sentence for each setting that prevents it (key, value, allowed range); an empty list if none does
 std::vector<std::string> safety_problems_of(const StepperConfig& config);
 
 }  // namespace bevel::stepper

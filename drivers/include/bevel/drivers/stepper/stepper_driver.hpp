@@ -133,7 +133,7 @@ class StepperDriver {
   StepperDriver(const StepperDriver&) = delete;
   StepperDriver& operator=(const StepperDriver&) = delete;
 
-  /// Returns the identifiers that the driver must receive, those of its own frames included.
+  /// Returns the identifiers that the driver must receive, including those that it sends.
   /// @param config settings with the node ids
   /// @return 11-bit identifiers
   static std::vector<std::uint32_t> listen_ids(const StepperConfig& config);
