@@ -46,7 +46,7 @@ const char* name_of(Component component);
 const char* channel_of(Component component);
 /// Returns all channels on which a process publishes: the headings of a camera fail with its positions.
 /// @param component component
-/// @return channels; an empty list for drives
+/// @return channels; one empty name for a drive
 std::vector<std::string> channels_of(Component component);
 
 /// A fault of one component.

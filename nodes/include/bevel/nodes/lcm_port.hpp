@@ -158,8 +158,6 @@ class LcmPort {
     virtual const char* name() const = 0;
     lcm::Subscription* lcm_subscription = nullptr;
   };
-  /// Returns the key of a message's sender: cameras number their messages independently.
-  /// @return camera number; 0 for messages without one
   template <class Message>
   struct Subscription : SubscriptionBase {
     Subscription(LcmPort& owner, const char* on_channel, Handler<Message> on)
@@ -213,15 +211,22 @@ class LcmPort {
   std::exception_ptr thrown_;
 };
 
-// Cameras number their messages each for itself.
+/// Returns the key that distinguishes the senders on a channel. Each camera numbers its own messages.
+/// @return 0; the camera number in the specialisations
 template <class Message>
 std::int32_t sender_key(const Message&) {
   return 0;
 }
+/// Returns the camera number of a tip measurement.
+/// @param message message
+/// @return camera number
 template <>
 inline std::int32_t sender_key(const tip_measurement_t& message) {
   return message.camera;
 }
+/// Returns the camera number of a tip heading.
+/// @param message message
+/// @return camera number
 template <>
 inline std::int32_t sender_key(const tip_heading_t& message) {
   return message.camera;

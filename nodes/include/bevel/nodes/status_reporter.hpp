@@ -19,7 +19,7 @@ class StatusReporter {
   /// Creates a reporter with a new session.
   /// @param port     port; must outlive this
   /// @param process  process name
-  /// @param period_s period of the node, s; 0: none
+  /// @param period_s period of the node's loop, s, as published; 0 if the node has none
   StatusReporter(LcmPort& port, std::string process, double period_s);
 
   /// @return present session
