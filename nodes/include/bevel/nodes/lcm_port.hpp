@@ -183,9 +183,10 @@ class LcmPort {
     }
     bool passes(const Message& message, const lcm::ReceiveBuffer& buffer);
 
+    /// One sender on a watched channel.
     struct Sender {
-      io::SenderWatch watch;
-      std::optional<Message> before;
+      io::SenderWatch watch;          ///< watch over its stream
+      std::optional<Message> before;  ///< newest fresh message
     };
     LcmPort& port;
     const char* channel;

@@ -27,10 +27,15 @@ struct DecodedImage {
 DecodedImage decode_gray(std::span<const uint8_t> bytes, int least_bits = 8);
 
 /// Reads and decodes a file, as decode_gray() does.
+/// @param file       path of the file
+/// @param least_bits bits in use at least, 8 to 16
+/// @return the image; `gray` is empty if the image cannot be read or decoded
 DecodedImage read_gray(const std::filesystem::path& file, int least_bits = 8);
 
-/// States that an image carries an orientation tag and that it is ignored; empty if `orientation` is 1.
-/// @param name the file or device, for the message
+/// States that an image carries an orientation tag and that it is ignored.
+/// @param name        the file or device, for the message
+/// @param orientation orientation tag, 1 to 8
+/// @return remark; empty if `orientation` is 1
 std::string orientation_remark(const std::string& name, int orientation);
 
 }  // namespace bevel::camera
