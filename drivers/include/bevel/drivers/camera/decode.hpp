@@ -1,7 +1,8 @@
 // SPDX-License-Identifier: MIT
 #pragma once
-// Decodes image files and JPEG frames to brightness. All programs and tests decode with these functions, since a plain
-// call of OpenCV's imread() rotates the image by its EXIF orientation and divides 16-bit samples by 256.
+/// \file
+/// Decoding of image files and JPEG frames to brightness. All programs and tests decode with these functions, since a
+/// plain call of OpenCV's imread() rotates the image by its EXIF orientation and divides 16-bit samples by 256.
 #include <cstdint>
 #include <filesystem>
 #include <opencv2/core.hpp>
