@@ -16,8 +16,8 @@ struct Now {
 /// Detects steps of the wall clock.
 class ClockWatch {
  public:
-  /// Computes by how much the wall clock was set since the last call. Changes of at most 20 ms between two calls, such
-  /// as those of time services (at most 500 ppm), are tolerated.
+  /// Computes the step of the wall clock since the last call. Changes of at most 20 ms between two calls are tolerated,
+  /// such as those of time services (at most 500 ppm).
   /// @param now present time
   /// @return step, us; 0 without a step
   std::int64_t step_us(const Now& now) {

@@ -11,7 +11,7 @@
 /// perpendicular to an axis, and is close to the needle, which is inserted along z. Its position along the ray carries
 /// no information, and the estimator uses none.
 ///
-/// The information is that of the pixel at this point. For a tip beside the plane, at the distance D (1 + e) from the
+/// The information is that of the pixel at this point. For a tip outside the plane, at the distance D (1 + e) from the
 /// camera instead of D, the true standard deviation is larger than stated by the factor 1 + e (10 mm at 250 mm: 4 %).
 #include <bevel/drivers/camera/calibration/camera_model.hpp>
 #include <bevel/drivers/camera/view.hpp>

@@ -16,7 +16,7 @@ struct LineLocation {
 };
 
 /// Fits height exp(-(k - offset)^2 / (2 blur^2)) to samples at each pixel k by least squares: the maximum of the
-/// matched filter (Steger 1998, "An unbiased detector of curvilinear structures"). A faint shade beside the line has a
+/// matched filter (Steger 1998, "An unbiased detector of curvilinear structures"). A faint shade next to the line has a
 /// large effect on a centre of gravity and almost none on this estimate. The offset has a normal prior around the
 /// middle. The variance accounts for the magnitude and the autocorrelation of the residuals.
 /// @param dark        darkness across the needle, grey levels; an odd number of samples, at least 7

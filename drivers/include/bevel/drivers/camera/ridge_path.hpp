@@ -65,7 +65,7 @@ class RidgePathFinder {
   /// Finds the best path.
   /// @param response response of RidgeResponse
   /// @param query    settings of the search
-  /// @return path; without columns if there is none
+  /// @return path; zero columns if no path is found
   RidgePath find(const cv::Mat& response, const PathQuery& query);
 
  private:

@@ -79,6 +79,7 @@ class TipTracker {
 
   /// Sets an image without a needle, which replaces the one taken from the first frame.
   /// @param gray image, CV_8UC1, of the size of the frames
+  /// @throws ArgumentError if the image is empty or not CV_8UC1
   void set_background(const cv::Mat& gray);
   /// Forgets the last tips: the next frame is searched as a whole.
   void forget() { track_.reset(); }

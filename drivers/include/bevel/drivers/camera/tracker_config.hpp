@@ -20,8 +20,8 @@ enum class Background {
 /// Point of the needle that is reported.
 enum class TipPoint {
   axis,  ///< the shaft's axis at the depth of the foremost point: stationary when the needle is rotated
-  /// The end that an observer would mark (end_fit.hpp): short of a point too thin to be seen, and beside the axis by up
-  /// to half the diameter, on the side of the bevel's point.
+  /// The end that an observer would mark (end_fit.hpp): short of a point too thin to be seen, and displaced from the
+  /// axis by up to half the diameter, towards the bevel's point.
   seen,
 };
 

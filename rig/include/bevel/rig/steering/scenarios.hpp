@@ -19,7 +19,7 @@ struct TrueNeedle {
   double roll_rad = 0;                           ///< roll of the bevel at the start, rad
 };
 
-/// One target with a rig of its own, and the model and settings of the software.
+/// One target with its simulated rig, and the model and settings of the software.
 struct Trial {
   SteeredRig rig;             ///< simulated rig
   TrueNeedle needle;          ///< needle of the rig
@@ -47,7 +47,7 @@ struct Scenario {
 /// @return static list
 const std::vector<Scenario>& scenarios();
 
-/// Returns whether another loop with cameras and axes of its own can run a scenario's trials: only a needle, its model
+/// Returns whether another loop that simulates cameras and axes can run a scenario's trials: only a needle, its model
 /// and a stationary target, observed by two correct cameras. No effects in addition to the needle, no obstacles or
 /// way-points.
 /// @param scenario scenario

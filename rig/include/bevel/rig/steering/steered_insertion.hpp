@@ -2,7 +2,7 @@
 #pragma once
 /// \file
 /// One steered insertion in simulated time: a plant with cameras and axes, and the estimator and controller of the live
-/// system with a model of their own. Uses no clock and no messages; a seed determines the run.
+/// system, whose model may differ from the plant. Uses no clock and no messages; a seed determines the run.
 
 #include <Eigen/Core>
 #include <cstdint>
