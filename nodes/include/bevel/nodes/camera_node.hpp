@@ -67,7 +67,7 @@ class CameraNode {
   std::function<void(const camera::TipObservation&)> on_observation;
 
  private:
-  // What PROCESS_STATUS says of the frames; empty if there is nothing to say.
+  // Returns the remark on the frames for PROCESS_STATUS; may be empty.
   std::string remark() const;
 
   LcmPort port_;
@@ -76,7 +76,7 @@ class CameraNode {
   StatusReporter status_;
   std::string failure_, remark_;
   std::int64_t remarked_ns_ = 0;
-  std::map<int, std::int64_t> seq_;  // each camera counts for itself
+  std::map<int, std::int64_t> seq_;  // by camera
   std::set<int> with_headings_;
   bool latency_known_ = false;                 // of the device's camera
   std::optional<PictureClock> picture_clock_;  // none: no pictures

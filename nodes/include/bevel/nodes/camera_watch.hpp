@@ -42,7 +42,7 @@ class CameraWatch {
   struct Camera {
     std::int64_t heard_ns = 0;
     Says says{};
-    double insertion_mm = 0;  // when it began to say the same
+    double insertion_mm = 0;  // when the value last changed
     int repeats = 0;
     bool frozen = false;
   };

@@ -29,7 +29,7 @@ class ClockWatch {
   }
 
  private:
-  // Of what messages may be ahead: a smaller step does no harm that the bounds of age do not catch.
+  // The limits of message age cover the effect of a smaller step.
   static constexpr std::int64_t kStep_us = 20'000;
   bool started_ = false;
   std::int64_t offset_us_ = 0;

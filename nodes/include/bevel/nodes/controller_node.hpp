@@ -57,7 +57,7 @@ class ControllerNode {
   controller::ControllerConfig config_;
   LcmPort port_;
   controller::Supervisor supervisor_;
-  double bending_mm_ = 0;  // newest heard of a stiff shaft; 0: as configured
+  double bending_mm_ = 0;  // newest estimate for a stiff shaft; 0: as configured
   double bending_sd_mm_ = 0;
   StatusReporter status_;
   OperatorWords words_;

@@ -85,7 +85,7 @@ class EstimatorNode {
   bool input_refused_ = false;
   std::string innovation_text_, entry_text_, nuisance_text_;  // as of described_ns_
   std::int64_t described_ns_ = 0;                             // steady
-  std::string remark_;                                        // what the last trouble was
+  std::string remark_;                                        // description of the last trouble
 };
 
 }  // namespace bevel::nodes

@@ -100,11 +100,11 @@ class FaultInjector {
     std::size_t channel;  // of channels_
     Bytes bytes;
   };
-  // at_ns never falls
+  // at_ns must not decrease between calls.
   void emit_at(std::int64_t at_ns, std::size_t channel, Bytes bytes) {
     due_.push_back({at_ns, channel, std::move(bytes)});
   }
-  const Due* newest_of(std::size_t channel) const;  // of before the fault; nullptr: none
+  const Due* newest_of(std::size_t channel) const;  // newest message before the fault; nullptr: none
   double uniform(double low, double high) { return std::uniform_real_distribution<double>(low, high)(rng_); }
   Bytes garbage(const Bytes& like);
 
@@ -116,7 +116,7 @@ class FaultInjector {
   std::int64_t shift_ns_ = 0;        // of delays
   std::int64_t pass_until_ns_ = 0;   // intermittent
   std::int64_t block_until_ns_ = 0;  // intermittent, slow
-  std::int64_t slow_sent_ns_ = 0;    // when the newest was let through, and its channel
+  std::int64_t slow_sent_ns_ = 0;    // time and channel of the newest message that passed
   std::size_t slow_channel_ = 0;
   std::vector<std::int64_t> own_seq_;  // of the second sender, on each channel
   std::deque<Due> past_;               // of the last second

@@ -69,7 +69,7 @@ class OperatorWatch {
  private:
   std::int64_t timeout_ns_;
   io::SenderWatch stream_;
-  std::int64_t session_ = 0;  // of the operator that counts; 0: none was heard
+  std::int64_t session_ = 0;  // of the operator that counts; 0: none was received
   std::int64_t made_ns_ = 0;  // steady time at which its newest heartbeat was made
   // Newest heartbeat that was refused.
   io::Standing refused_as_ = io::Standing::fresh;  // fresh: none was

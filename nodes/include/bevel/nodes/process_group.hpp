@@ -14,7 +14,7 @@ namespace bevel::nodes {
 class ProcessGroup {
  public:
   ProcessGroup() = default;
-  ~ProcessGroup();  // ends whatever still runs
+  ~ProcessGroup();
   ProcessGroup(const ProcessGroup&) = delete;
   ProcessGroup& operator=(const ProcessGroup&) = delete;
 

@@ -61,7 +61,7 @@ class RigNode {
  private:
   struct Eye {
     int camera;
-    bool along_x;  // it looks along x, and so is the one that effects of a camera concern
+    bool along_x;  // it looks along x; effects of a camera apply to it
     rig::NeedleRenderer renderer;
   };
   void move_plant(std::int64_t now_ns);
@@ -83,8 +83,8 @@ class RigNode {
   rig::FrameServer* frames_;
   std::vector<Eye> eyes_;
   struct Taken {
-    std::int64_t due_ns;  // steady: who sets the wall clock keeps no picture back
-    camera::Frame frame;  // a late camera's is stamped with the time at which it arrives
+    std::int64_t due_ns;  // steady clock: setting the wall clock must not delay images
+    camera::Frame frame;  // with camera latency, stamped with the time of arrival
   };
   std::deque<Taken> taken_;
   struct Felt {

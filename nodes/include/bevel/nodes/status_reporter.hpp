@@ -45,7 +45,7 @@ class StatusReporter {
  private:
   LcmPort& port_;
   process_status_t message_{};
-  std::int64_t run_ = 0;  // the part of session that tells runs apart
+  std::int64_t run_ = 0;  // the part of the session that identifies the run
   std::int64_t last_ns_ = 0;
   std::int64_t last_session_ = 0;
   double run_max_s_ = 0;

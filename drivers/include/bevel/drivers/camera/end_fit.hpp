@@ -40,7 +40,7 @@ struct EndPriors {
   double blur_px = 1.0;    ///< standard deviation of the lens blur
   double height = 500.0;   ///< darkness of the shaft, grey levels times px; +- 20 %
   double bevel_px = 17.0;  ///< length of the bevel
-  /// standard deviation of its logarithm: needles of one gauge are ground at 10 to 30 degrees
+  /// Standard deviation of its logarithm: needles of one gauge are ground at 10 to 30 degrees.
   double bevel_log_sd = 0.35;
   double curvature_sigma_per_px = 0.0;   ///< standard deviation of the curvature, 1/px
   double curvature_change_per_px = 0.0;  ///< standard deviation of its change along the piece, 1/px

@@ -71,7 +71,7 @@ class FrameRecorder {
     RecordedFrame frame;
   };
   void work();
-  std::string write(const Entry& entry);  // why not, or empty
+  std::string write(const Entry& entry);  // error; empty on success
 
   std::filesystem::path folder_;
   size_t queue_frames_;

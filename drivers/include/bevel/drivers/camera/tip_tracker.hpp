@@ -119,7 +119,7 @@ class TipTracker {
   int entry_row(const Canonical& turn) const;
 
   TrackerConfig config_;
-  int shrink_;  // pixels of the picture to one of those that are worked in
+  int shrink_;  // pixels of the image in one pixel of the working image
   double work_px_per_mm_;
   RidgeScale scale_;
   RidgeResponse ridge_;
@@ -129,8 +129,9 @@ class TipTracker {
   cv::Mat patch_;
   cv::Mat last_bytes_;
   static constexpr int kSetBack = 3;
-  int64_t last_utime_ = 0;    // newest
-  int64_t behind_utime_ = 0;  // of the last frame that was not newer, and how many those were in a row and in order
+  int64_t last_utime_ = 0;  // newest
+  int64_t behind_utime_ =
+      0;  // of the last frame that was not newer, and the number of such frames in a row and in order
   int behind_ = 0;
   std::optional<Track> track_;
 };

@@ -78,7 +78,7 @@ class MemoryBus : public Bus {
 
  private:
   friend class MemoryNetwork;
-  // By MemoryNetwork::attach() alone: without a place on the wire it would hear nothing.
+  // Only MemoryNetwork::attach() creates a bus, since a bus that is not attached receives nothing.
   explicit MemoryBus(MemoryNetwork& network) : network_(&network) {}
   void lose(BusEvent why);
 

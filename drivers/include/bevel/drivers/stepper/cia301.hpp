@@ -213,7 +213,7 @@ class SdoClient {
   std::uint8_t toggle_ = 0;
   std::array<char, kLongestText> text_{};
   std::size_t text_size_ = 0;
-  std::optional<Frame> abort_;  // of a transfer given up, yet to be sent
+  std::optional<Frame> abort_;  // abort of a dropped transfer, not sent yet
   std::int64_t sent_ns_ = 0;
   std::uint32_t value_ = 0;
   std::uint32_t abort_code_ = 0;

@@ -37,7 +37,7 @@ struct SdoJob {
   Kind kind = Kind::write;         ///< kind of the step
   cia301::ObjectAddress object{};  ///< object to read or write
   std::uint8_t size_bytes = 4;     ///< writes only
-  /// value to write or expected value; `amount_counts` replaces it for a quantity that is not raw
+  /// Value to write or expected value; `amount_counts` replaces it for a quantity that is not raw.
   std::uint32_t value = 0;
   std::uint32_t mask = 0xFFFFFFFF;                          ///< bits of the value that are compared
   StopReason otherwise = StopReason::configuration_failed;  ///< stop reason if the value differs

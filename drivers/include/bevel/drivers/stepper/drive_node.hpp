@@ -145,7 +145,7 @@ class DriveNode {
   void on_abort(std::int64_t now_ns);
   void decide_units(std::int64_t now_ns);
   std::uint32_t value_of(const SdoJob& job) const;
-  double velocity_units() const;  // in one mm/s or rad/s, signed
+  double velocity_units() const;  // per mm/s or rad/s, signed
   void monitor(std::int64_t now_ns, Transmitter& out);
   void judge_monitored(std::int64_t now_ns);
   bool ask_once(cia301::ObjectAddress object, bool& asked, std::int64_t now_ns, Transmitter& out);
@@ -177,7 +177,7 @@ class DriveNode {
   std::size_t monitored_ = 0;  // job whose value is read back next
   bool monitoring_ = false;    // its transfer is under way
   std::int64_t next_monitor_ns_ = 0;
-  bool voltage_ordered_ = false;  // off, by SDO, since the last restart
+  bool voltage_ordered_ = false;  // "disable voltage" was sent by SDO since the last restart
   int unanswered_ = 0;            // cyclic read-backs in a row
   int retries_ = 0;
   std::int64_t job_since_ns_ = 0;
@@ -193,8 +193,8 @@ class DriveNode {
   std::int64_t sync_ns_ = 0;
   bool status_pdo_due_ = false;
   bool position_pdo_due_ = false;
-  int surplus_pdos_ = 0;     // answers beyond one to each since the last SYNC
-  int surplus_balance_ = 0;  // those less the ones that were missed and may still come
+  int surplus_pdos_ = 0;     // PDOs beyond one of each since the last SYNC
+  int surplus_balance_ = 0;  // surplus PDOs minus missed PDOs that may still arrive
 
   std::uint16_t statusword_ = 0;
   std::uint16_t error_code_ = 0;

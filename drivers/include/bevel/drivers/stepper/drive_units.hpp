@@ -37,7 +37,7 @@ struct UnitScales {
 /// Result of scales_of(): the scales, or the reason for refusal and the object that causes it.
 struct UnitDecision {
   UnitScales scales{};  ///< scales; valid if `refusal` is StopReason::none
-  /// reason of a refusal; StopReason::none: the scales are valid
+  /// Reason of a refusal; StopReason::none: the scales are valid.
   StopReason refusal = StopReason::none;
   cia301::ObjectAddress object{};  ///< of a refusal
   std::uint32_t found = 0;         ///< value of that object; 0 if the drive does not have it

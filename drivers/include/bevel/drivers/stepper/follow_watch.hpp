@@ -64,8 +64,8 @@ class FollowWatch {
       high = std::max(high, history_.at((count_ - i) % kRoom));
     }
     const double outside = stands_ - std::clamp(stands_, low, high);
-    // What must not add up over an insertion: a scale that is not quite right, and changes of rate of which one was
-    // obeyed a little sooner than the next, which shows within the lag.
+    // Two deviations must not accumulate over an insertion: a small scale error, and a delay that differs between two
+    // changes of rate. The effect of the delay is limited to the lag.
     const double scale = kScaleError * std::abs(commanded_unit_s) * dt_s;
     by_changes_ += delay_varies_s_ * std::abs(commanded_unit_s - commanded_unit_s_);
     commanded_unit_s_ = commanded_unit_s;
@@ -94,16 +94,16 @@ class FollowWatch {
 
  private:
   static constexpr std::size_t kRoom = 128;
-  static constexpr double kScaleError = 0.02;  // of a drive's rates against its positions
-  // A command finds its drive in the middle of a cycle, sooner or later by up to half of it.
+  static constexpr double kScaleError = 0.02;  // relative, of a drive's rates compared with its positions
+  // A command reaches its drive at any time of the drive's cycle: the delay varies by half a cycle.
   static constexpr double kDelayVaries_periods = 0.5;
   static constexpr double kLeast_unit = 0.05;  // mm or rad: steps, play, an encoder's noise
 
   std::size_t window_;
   double lag_s_;
-  double delay_varies_s_;                // from a command to its being obeyed
+  double delay_varies_s_;                // variation of the delay from a command to the motion, s
   double commanded_unit_s_ = 0;          // last
-  double by_changes_ = 0;                // what changes of rate may still explain
+  double by_changes_ = 0;                // deviation that changes of rate can still explain, mm or rad
   std::array<double, kRoom> history_{};  // integral of the commanded rate, each cycle
   std::array<double, kRoom> rates_{};    // commanded rate without its sign, each cycle
   std::size_t count_ = 0;

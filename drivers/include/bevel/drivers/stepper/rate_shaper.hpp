@@ -45,8 +45,8 @@ class RateShaper {
   bool clamped() const { return clamped_; }
 
  private:
-  // The rate from which the axis comes to rest within `room`: by a fifth less than the full acceleration, and with a
-  // linear end, as a square root's slope at zero is more than any axis can follow.
+  // Returns the rate from which the axis comes to rest within `room`, at 80 % of the full acceleration. The end is
+  // linear, because no axis can follow the infinite slope of the square root at zero.
   double braking_rate(double room) const {
     constexpr double kLinearEnd_s = 0.05;
     if (room <= 0.0) return 0.0;

@@ -45,7 +45,7 @@ enum class StopReason : std::uint8_t {
   sdo_aborted,           ///< object, wanted: value written, code: abort code
   sdo_timeout,           ///< object
   unit_unstated,         ///< neither the drive nor the configuration states a velocity unit
-  /// velocities count revolutions, counts_per_revolution is not configured; object, code: found
+  /// Velocities count revolutions, counts_per_revolution is not configured; object, code: found.
   unit_needs_revolution,
   unit_contradicts,  ///< the drive states another unit or resolution than the configuration; object, code: found
   unit_unsupported,  ///< object, code: value found

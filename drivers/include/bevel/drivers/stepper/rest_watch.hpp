@@ -13,7 +13,7 @@ namespace bevel::stepper {
 struct AxisSample {
   std::int64_t sampled_ns = 0;        ///< steady clock; when the drive took the position
   std::int64_t rate_received_ns = 0;  ///< when the rate was received
-  /// position, mm or rad
+  /// Position, mm or rad.
   double position_unit = 0.0;
   double rate_unit_s = 0.0;         ///< as the drive reports it (0x606C)
   double travel_rate_unit_s = 0.0;  ///< from the newest two positions
@@ -80,7 +80,7 @@ class RestWatch {
       return verdict_;
     }
     if (sample.sampled_ns - last_.sampled_ns < kLeastInterval_ns && sample.sampled_ns != last_.sampled_ns)
-      return verdict_;  // too close to the one before to show a rate
+      return verdict_;  // too close to the previous one to determine a rate
     // An axis that has just started is still before the stop has had an effect.
     const bool fresh = sample.sampled_ns > last_.sampled_ns && sample.sampled_ns >= begun_ns_ + reaction_ns_;
     if (fresh && is_stationary(sample)) {

@@ -32,7 +32,7 @@ struct AxisConfig {
   std::uint8_t node_id = 1;         ///< node id of the drive, 1..127
   double counts_per_unit = 1000.0;  ///< position counts in one mm or rad; the sign gives the direction; not 0
   double rate_limit_unit_s = 10.0;  ///< largest rate, mm/s or rad/s; > 0
-  /// acceleration of set-points and of the drive's own ramps, mm/s^2 or rad/s^2; > 0
+  /// Acceleration of set-points and of the drive's own ramps, mm/s^2 or rad/s^2; > 0.
   double acceleration_unit_s2 = 100.0;
   double quick_stop_unit_s2 = 500.0;  ///< deceleration of a quick stop, mm/s^2 or rad/s^2; > 0
   /// Lower limit of the workspace, mm or rad from the entry point. The workspace is applied while the position is
@@ -104,7 +104,7 @@ struct StepperConfig {
   std::int64_t period_ns = 10 * kMs;            ///< period of step(), hence of SYNC
   std::int64_t listen_ns = 300 * kMs;           ///< silence required before the first frame, to detect a second driver
   std::int64_t master_heartbeat_ns = 30 * kMs;  ///< period of the driver's heartbeat
-  /// silence of the driver after which a drive stops by itself (0x1016)
+  /// Silence of the driver after which a drive stops by itself (0x1016).
   std::int64_t master_heartbeat_timeout_ns = 100 * kMs;
   std::int64_t drive_heartbeat_ns = 30 * kMs;           ///< period of the drives' heartbeats (0x1017)
   std::int64_t drive_heartbeat_timeout_ns = 100 * kMs;  ///< silence of a drive after which the axes are stopped

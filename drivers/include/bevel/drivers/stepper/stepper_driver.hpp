@@ -222,10 +222,10 @@ class StepperDriver {
 
   DriverState state_ = DriverState::off;
   Stop stop_{};
-  bool silent_ = false;  // another master was there first: not a frame from us
+  bool silent_ = false;  // another master was active first: send no frame
   bool enable_wanted_ = false;
   bool reset_faults_ = false;        // rearm() was called
-  bool withhold_heartbeat_ = false;  // a drive did not confirm the stop: its own watch over us is to stop it
+  bool withhold_heartbeat_ = false;  // a drive did not confirm the stop: its heartbeat monitoring must stop it
   std::int64_t last_step_ns_ = 0;
   std::int64_t shaped_ns_ = 0;   // when the rates were last shaped
   std::int64_t stopped_ns_ = 0;  // when the stop was latched, or the axes were disabled
@@ -244,8 +244,8 @@ class StepperDriver {
   std::array<bool, kAxes> stop_confirmed_{};
   std::array<std::int64_t, kAxes> next_nmt_stop_ns_{};
   Stop later_{};
-  std::array<bool, kAxes> command_waits_{};  // for the echo of the one before
-  std::array<bool, kAxes> at_limit_{};       // what the statuswords said last
+  std::array<bool, kAxes> command_waits_{};  // for the echo of the previous one
+  std::array<bool, kAxes> at_limit_{};       // limit bit of the newest statuswords
   DriverCounters counters_;
 };
 

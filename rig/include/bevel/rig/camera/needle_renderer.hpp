@@ -51,7 +51,7 @@ struct SceneConfig {
   std::vector<Spot> bubbles;         ///< bubbles in the gel
   std::vector<Spot> glare;           ///< reflections
   std::vector<Occluder> occluders;   ///< objects in front of the gel
-  /// relative increase of the brightness from the middle to the right and to the bottom
+  /// Relative increase of the brightness from the middle to the right and to the bottom.
   cv::Vec2d light_gradient{0.0, 0.0};
   double face_gray = -1.0;  ///< brightness of the bevel's face towards the camera, grey levels; negative: as the needle
   LensDistortion lens;      ///< lens distortion

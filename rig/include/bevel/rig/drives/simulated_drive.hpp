@@ -23,7 +23,7 @@ namespace bevel::rig {
 /// Settings of a simulated drive.
 struct SimulatedDriveConfig {
   std::uint8_t node_id = 1;  ///< node id, 1..127
-  /// encoder increments in one mm or rad, used by position_unit() and velocity_unit_s() only
+  /// Encoder increments in one mm or rad, used by position_unit() and velocity_unit_s() only.
   double counts_per_unit = 2000.0;
   double following_time_s = 0.004;  ///< lag of the shaft behind the demand, s
   Identity identity{};              ///< identity objects
@@ -131,7 +131,7 @@ class SimulatedDrive {
   PowerStateMachine power_;
   UnitFactors units_;
   Homing homing_;
-  double zero_increments_ = 0.0;  // where on the shaft the objects' positions count from
+  double zero_increments_ = 0.0;  // shaft position of the objects' zero
   double cyclic_target_ = 0.0;    // csv: the demand reaches a new target within 60C2
   double cyclic_ramp_ = 0.0;
   bool at_limit_ = false;
@@ -144,10 +144,10 @@ class SimulatedDrive {
   std::optional<std::int64_t> boots_at_ns_;  // set while it boots
   std::int64_t now_ns_ = 0;
   std::int64_t next_heartbeat_ns_ = 0;
-  std::optional<std::int64_t> master_heard_ns_;  // set once its heartbeat was heard: only then is it watched
+  std::optional<std::int64_t> master_heard_ns_;  // set by its first heartbeat, which starts the monitoring
   bool master_lost_ = false;
   double following_error_s_ = 0.0;
-  std::string upload_;  // what is left of a text that is being sent in segments
+  std::string upload_;  // remaining text of a segmented upload
   bool uploading_ = false;
   std::uint8_t toggle_ = 0;
   std::array<unsigned, kPdos> syncs_{};

@@ -29,8 +29,9 @@ struct TravelLimits {
   }
 
  private:
-  // A square root's slope at zero is more than a ramp can follow, so the velocity falls with the room at the end. Where
-  // the two parts meet the line asks for twice the root's deceleration: with two fifths of the ramp, four fifths of it.
+  // A ramp cannot follow the infinite slope of the square root at zero, so the velocity is proportional to the room at
+  // the end. Where the two parts meet, the line needs twice the deceleration of the root: 0.8 of the ramp with a share
+  // of 0.4.
   static double braking(double room, double ramp) {
     constexpr double kShare = 0.4;
     constexpr double kLinearEnd_s = 0.005;

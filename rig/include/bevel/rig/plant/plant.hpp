@@ -65,14 +65,14 @@ class KinematicPlant : public Plant {
 
   model::AugmentedNeedle needle_;
   model::AugmentedState state_;
-  // Where the tip has cut, the last at the front: by inserted length, a tenth of a millimetre apart at least.
+  // Poses along the channel that the tip has cut, by inserted length, at least 0.1 mm apart; the last is at the front.
   struct Passed {
     double insertion_mm, rotation_rad;
     model::Pose pose;
   };
   std::vector<Passed> cut_;
   bool keeps_cut_;
-  model::Pose tip_;                       // with its elastic offset
+  model::Pose tip_;                       // including its elastic offset
   std::vector<Eigen::Vector3d> path_mm_;  // where the tip has passed; last point is the tip, without offset
   std::vector<double> path_depth_mm_;     // inserted length at each point
 };
@@ -106,7 +106,7 @@ class BeamNeedle : public Plant {
   double room_mm_;
   model::AugmentedNeedle needle_;
   model::Pose entry_, tip_;
-  double due_insertion_mm_ = 0, due_rotation_rad_ = 0, due_s_ = 0;  // not solved for yet
+  double due_insertion_mm_ = 0, due_rotation_rad_ = 0, due_s_ = 0;  // motion that is not solved for yet
 };
 
 /// Computes the bicycle model of a beam deep in uniform tissue: k = F / (EI lambda), lambda^4 = modulus / (4 EI);

@@ -63,7 +63,7 @@ class DutyCycle {
                          const controller::SteeringLimits& limits);
 
  private:
-  double next_mm_ = 0;  // of insertion: the next cycle
+  double next_mm_ = 0;  // inserted length at which the next cycle begins
   std::optional<double> to_rad_;
   double spun_mm_per_rad_ = 0;
 };

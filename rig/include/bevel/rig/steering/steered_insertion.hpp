@@ -75,7 +75,7 @@ struct StopCause {
 /// Result of one steered insertion. "True" refers to the plant.
 struct Insertion {
   double miss_mm = 0;  ///< distance of the true tip from the target where it stopped, mm
-  /// the needle came to the closest approach to the target and stopped there, at any distance from it
+  /// The needle came to the closest approach to the target and stopped there, at any distance from it.
   bool at_depth = false;
   /// Outcome that the controller reports at depth; not set for a baseline law.
   controller::Miss reported;
@@ -92,11 +92,10 @@ struct Insertion {
   double nearest_mm = std::numeric_limits<double>::infinity();
   double way_point_miss_mm = 0;  ///< largest of the least distances of the true tip from the way-points, mm
   double before_miss_mm = 0,     ///< distance of the true tip from the first target, mm
-      off_the_path_mm =
-          0,  ///< largest distance of the true tip during the retraction from its path during the insertion, mm
-      drawn_back_error_mm = 0;  ///< largest distance of the estimate from the true tip during the retraction, mm
-  double inserted_mm = 0,       ///< inserted length at the end, mm
-      duration_s = 0;           ///< time from the start command to the stop, s
+      off_the_path_mm = 0,       ///< largest distance of the retracted true tip from its insertion path, mm
+      drawn_back_error_mm = 0;   ///< largest distance of the estimate from the true tip during the retraction, mm
+  double inserted_mm = 0,        ///< inserted length at the end, mm
+      duration_s = 0;            ///< time from the start command to the stop, s
 };
 
 /// Simulates one steered insertion.
