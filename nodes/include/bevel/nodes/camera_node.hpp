@@ -40,8 +40,13 @@ class CameraNode {
   /// @throws camera::SourceError if the source cannot be opened
   /// @throws ArgumentError naming the setting that is wrong
   CameraNode(lcm::LCM& lcm, const SystemConfig& config, double pictures_hz = 0);
-  /// Result of step(): a frame was processed, no frame arrived, the frames have ended, or the source failed.
-  enum class Outcome { frame, nothing, ended, failed };
+  /// Result of step().
+  enum class Outcome {
+    frame,    ///< a frame was processed
+    nothing,  ///< no frame arrived
+    ended,    ///< the frames have ended
+    failed    ///< the source failed, or another process serves the camera
+  };
   /// Sets the time at which messages are processed.
   /// @param now present time
   void tell_time(const Now& now) { port_.tell_time(now); }

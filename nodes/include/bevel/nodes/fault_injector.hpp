@@ -34,7 +34,14 @@ inline constexpr int kFaultKinds = 9;  ///< number of kinds
 const char* name_of(FaultKind kind);
 
 /// Component that fails.
-enum class Component { camera, estimator, controller, stepper, insertion_drive, rotation_drive };
+enum class Component {
+  camera,           ///< bevel-camera
+  estimator,        ///< bevel-estimator
+  controller,       ///< bevel-controller
+  stepper,          ///< bevel-stepper
+  insertion_drive,  ///< drive of the insertion axis
+  rotation_drive    ///< drive of the rotation axis
+};
 inline constexpr int kComponents = 6;  ///< number of components
 /// Returns the name of a component, as parse_fault() reads it.
 /// @param component component

@@ -46,7 +46,12 @@ struct PortCounters {
 /// A trouble in the inputs of a node.
 struct InputTrouble {
   /// Kind of trouble.
-  enum class Kind { second_sender, out_of_order, implausible, clock_step };
+  enum class Kind {
+    second_sender,  ///< a second sender, or old messages sent again
+    out_of_order,   ///< delayed messages, or two senders
+    implausible,    ///< impossible motion
+    clock_step      ///< the wall clock was set
+  };
   Kind kind = Kind::second_sender;  ///< kind of trouble
   const char* channel = "";         ///< channel, static string; "" for the clock
   io::Implausible implausible;      ///< motion found; for Kind::implausible

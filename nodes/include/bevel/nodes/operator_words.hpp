@@ -13,7 +13,11 @@ namespace bevel::nodes {
 /// Operator command.
 using Word = controller::Request;
 /// Index of a receiver's session in steering_target_t.session.
-enum class Receiver : std::size_t { controller = 0, stepper = 1, estimator = 2 };
+enum class Receiver : std::size_t {
+  controller = 0,  ///< bevel-controller
+  stepper = 1,     ///< bevel-stepper
+  estimator = 2    ///< bevel-estimator
+};
 
 /// Receives operator commands. A command counts if it is fresh, newer than the previous one, and meant for this run
 /// since its last stop. A stop or a hold from any sender is obeyed at any time.

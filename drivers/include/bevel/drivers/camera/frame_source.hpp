@@ -50,8 +50,13 @@ class SourceError : public DeviceError {
   using DeviceError::DeviceError;
 };
 
-/// Kind of a source: images in a folder, a video file, a Video4Linux device, or the rig's frame server.
-enum class SourceKind { folder, video, device, stream };
+/// Kind of a source.
+enum class SourceKind {
+  folder,  ///< images in a folder
+  video,   ///< video file
+  device,  ///< Video4Linux device
+  stream   ///< frame server of the rig
+};
 
 /// Settings of a source.
 struct SourceConfig {

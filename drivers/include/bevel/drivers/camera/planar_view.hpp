@@ -9,7 +9,11 @@
 namespace bevel::camera {
 
 /// Axes of {A}.
-enum class WorldAxis { x = 0, y = 1, z = 2 };
+enum class WorldAxis {
+  x = 0,  ///< x of {A}
+  y = 1,  ///< y of {A}
+  z = 2   ///< z of {A}
+};
 
 /// Axis of {A} parallel to an image axis.
 struct SignedAxis {

@@ -130,8 +130,8 @@ class TipTracker {
   cv::Mat last_bytes_;
   static constexpr int kSetBack = 3;
   int64_t last_utime_ = 0;  // newest
-  int64_t behind_utime_ =
-      0;  // of the last frame that was not newer, and the number of such frames in a row and in order
+  // Time of the last frame that was not newer, and the number of such frames in a row and in order.
+  int64_t behind_utime_ = 0;
   int behind_ = 0;
   std::optional<Track> track_;
 };

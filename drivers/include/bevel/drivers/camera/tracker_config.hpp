@@ -9,7 +9,12 @@ namespace bevel::camera {
 
 /// Side of the image through which the shaft enters. The needle is followed to within 45 degrees of the inward
 /// normal of this side, which covers |gamma| < pi/4 of the model.
-enum class EntrySide { top, bottom, left, right };
+enum class EntrySide {
+  top,     ///< first row
+  bottom,  ///< last row
+  left,    ///< first column
+  right    ///< last column
+};
 
 /// Reference for the brightness of a pixel.
 enum class Background {

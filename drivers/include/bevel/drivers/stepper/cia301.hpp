@@ -56,7 +56,12 @@ enum class NmtCommand : std::uint8_t {
   reset_communication = 0x82,  ///< reset of the communication
 };
 /// NMT states, coded as in a heartbeat.
-enum class NmtState : std::uint8_t { boot_up = 0x00, stopped = 0x04, operational = 0x05, pre_operational = 0x7F };
+enum class NmtState : std::uint8_t {
+  boot_up = 0x00,         ///< boot-up message
+  stopped = 0x04,         ///< stopped
+  operational = 0x05,     ///< operational
+  pre_operational = 0x7F  ///< pre-operational
+};
 
 /// SDO abort code: SDO protocol timed out.
 inline constexpr std::uint32_t kAbortTimeout = 0x05040000;

@@ -32,7 +32,12 @@ enum class AxisRest : std::uint8_t {
 
 /// Strongest order that a stop has sent to an axis. Each order follows if the one before does not bring the axis to
 /// rest.
-enum class StopOrder : std::uint8_t { none, quick_stop, disable_voltage, nmt_stop };
+enum class StopOrder : std::uint8_t {
+  none,             ///< no order
+  quick_stop,       ///< quick stop
+  disable_voltage,  ///< "disable voltage" by PDO and by SDO
+  nmt_stop          ///< NMT stop
+};
 
 /// Commanded rates of both axes.
 struct MotionSetpoint {
@@ -58,10 +63,20 @@ enum class DriverState : std::uint8_t {
 const char* to_string(DriverState state);
 
 /// State of one axis, as in actuator_state_t.
-enum class AxisStatus : std::int8_t { off = 0, ready = 1, enabled = 2, quick_stop = 3, fault = 4 };
+enum class AxisStatus : std::int8_t {
+  off = 0,         ///< not operational, or in another state
+  ready = 1,       ///< ready to switch on, or switched on
+  enabled = 2,     ///< operation enabled
+  quick_stop = 3,  ///< quick stop active
+  fault = 4        ///< fault, or fault reaction active
+};
 
 /// Answer to StepperDriver::enable().
-enum class EnableAnswer : std::uint8_t { accepted, not_ready, position_not_trusted };
+enum class EnableAnswer : std::uint8_t {
+  accepted,             ///< the following steps enable the axes
+  not_ready,            ///< the driver is not ready
+  position_not_trusted  ///< a position is not trusted: set_zero() or confirm_position() is required
+};
 
 /// Counters since construction.
 struct DriverCounters {

@@ -29,9 +29,17 @@ enum class Abort : std::uint32_t {
 };
 
 /// Access by SDO.
-enum class Access : std::uint8_t { read_only, read_write };
+enum class Access : std::uint8_t {
+  read_only,  ///< read only
+  read_write  ///< read and write
+};
 /// PDOs that may contain the object.
-enum class Mapping : std::uint8_t { none, transmit, receive, both };
+enum class Mapping : std::uint8_t {
+  none,      ///< no PDO
+  transmit,  ///< PDOs that the drive transmits
+  receive,   ///< PDOs that the drive receives
+  both       ///< PDOs of both directions
+};
 
 /// One entry of the dictionary.
 struct Object {

@@ -32,7 +32,11 @@ struct SimulatedDriveConfig {
 };
 
 /// NMT states, coded as in a heartbeat.
-enum class NmtState : std::uint8_t { stopped = 0x04, operational = 0x05, pre_operational = 0x7F };
+enum class NmtState : std::uint8_t {
+  stopped = 0x04,         ///< stopped
+  operational = 0x05,     ///< operational
+  pre_operational = 0x7F  ///< pre-operational
+};
 
 /// Simulates one drive. Modes: profile velocity (3), homing (6), cyclic synchronous velocity (9).
 /// factory_dictionary.cpp and, for other tools, bevel_drive.eds list its objects.

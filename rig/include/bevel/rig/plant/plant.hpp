@@ -35,7 +35,10 @@ class Plant {
 /// its front.
 /// forgotten: the tissue counts as uncut. A retraction integrates the model backwards with the present bevel direction,
 /// which is another path once the shaft was rotated; a second insertion cuts a new path.
-enum class Cut { kept, forgotten };
+enum class Cut {
+  kept,      ///< the needle follows its channel
+  forgotten  ///< the tissue counts as uncut
+};
 
 /// The extended bicycle model with the effects of a model file. The shaft lies where the tip has passed. Effects on
 /// camera images are not applied here.

@@ -25,7 +25,10 @@
 namespace bevel::rig {
 
 /// Steering law: duty-cycled spinning or bang-bang.
-enum class BaselineLaw { duty_cycle, bang_bang };
+enum class BaselineLaw {
+  duty_cycle,  ///< duty-cycled spinning
+  bang_bang    ///< bang-bang
+};
 
 /// Position of the target relative to the tip, and the rotation that points the bevel at it.
 struct Sight {

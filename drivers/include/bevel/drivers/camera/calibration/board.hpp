@@ -12,7 +12,10 @@
 namespace bevel::camera {
 
 /// Kind of a board.
-enum class BoardKind { chessboard, charuco };
+enum class BoardKind {
+  chessboard,  ///< chessboard
+  charuco      ///< ChArUco board
+};
 
 /// Which squares of a ChArUco board carry markers. The patterns differ for even numbers of rows only.
 enum class CharucoPattern {

@@ -21,12 +21,27 @@
 namespace bevel::camera {
 
 /// Index of each lens parameter. Focal lengths and principal point in px; distortion coefficients without a unit.
-enum LensParameter { kFx, kFy, kCx, kCy, kK1, kK2, kP1, kP2, kK3 };
+enum LensParameter {
+  kFx,  ///< focal length along u, px
+  kFy,  ///< focal length along v, px
+  kCx,  ///< principal point, u, px
+  kCy,  ///< principal point, v, px
+  kK1,  ///< radial coefficient of r^2
+  kK2,  ///< radial coefficient of r^4
+  kP1,  ///< first tangential coefficient
+  kP2,  ///< second tangential coefficient
+  kK3   ///< radial coefficient of r^6
+};
 inline constexpr int kLensParameters = 9;  ///< number of lens parameters
 
 /// Index of each wall parameter: two components of the unit normal, the distance in mm, the refractive index. The third
 /// component of the normal is sqrt(1 - nx^2 - ny^2) > 0: the wall is in front of the camera.
-enum WallParameter { kNormalX, kNormalY, kDistance, kIndex };
+enum WallParameter {
+  kNormalX,   ///< x component of the unit normal
+  kNormalY,   ///< y component of the unit normal
+  kDistance,  ///< distance, mm
+  kIndex      ///< refractive index of the gel
+};
 inline constexpr int kWallParameters = 4;  ///< number of wall parameters
 
 /// Properties of the pane that are given and not fitted.
