@@ -67,7 +67,7 @@ class StepperNode {
   std::int64_t published_ns_ = 0;
   std::int64_t seq_ = 0;
   bool enable_wanted_ = false;
-  bool ran_since_armed_ = false;  // the controller has commanded motion
+  bool ran_since_armed_ = false;  // a set-point with mode `run` arrived since the axes were armed
   bool zero_known_ = false;
   bool was_latched_ = false;
   std::string detail_;   // of the latched stop

@@ -82,7 +82,7 @@ enum class EnableAnswer : std::uint8_t {
 struct DriverCounters {
   std::uint64_t steps = 0;                ///< calls of step()
   std::uint64_t overruns = 0;             ///< calls of step() more than half a period late
-  std::uint64_t setpoints_refused = 0;    ///< set-points that were not finite or had an age below zero
+  std::uint64_t setpoints_refused = 0;    ///< set-points not finite, or with an age more than a cycle below zero
   std::uint64_t setpoints_stale = 0;      ///< steps in which the age of the set-point forced the rate to zero
   std::uint64_t setpoints_clamped = 0;    ///< steps with a rate over a limit
   std::uint64_t held_back = 0;            ///< frames not sent, as the previous one was not on the wire yet
