@@ -13,7 +13,9 @@ namespace bevel {
 class SocketFile {
  public:
   /// Binds \p socket to \p address. A socket file there whose process has ended is removed first.
-  /// @param name  start of each message: "local bus '/run/bevel.bus'"
+  /// @param socket  file descriptor of the socket
+  /// @param address address of family AF_UNIX
+  /// @param name    start of each message: "local bus '/run/bevel.bus'"
   /// @throws IoError if the path names a file that is no socket, if a process listens there, or if the
   ///   socket cannot be bound
   SocketFile(int socket, const sockaddr_un& address, const std::string& name);

@@ -1,7 +1,8 @@
 // SPDX-License-Identifier: MIT
 #pragma once
-// bevel-camera: frames in, TIP_MEASUREMENT out, and TIP_HEADING of the same frame, stamp and number for cameras that
-// are told to give it. The estimate, if there is one, says where to look.
+/// \file
+/// bevel-camera: subscribes to frames, publishes TIP_MEASUREMENT and, for cameras with `headings`, TIP_HEADING with the
+/// time stamp and number of the frame. An estimate, if available, determines the search region.
 #include <map>
 #include <set>
 
@@ -13,34 +14,65 @@
 
 namespace bevel::nodes {
 
-// bevel-camera, or bevel-camera-N for one that serves camera N of several.
+/// Returns the process name.
+/// @param config system file
+/// @return "bevel-camera", or "bevel-camera-N" for a process that serves camera N of several
 std::string camera_process_name(const SystemConfig& config);
 
-// What is published of an observation.
+/// Converts an observation to a TIP_MEASUREMENT message.
+/// @param seen observation of one frame
+/// @param seq  number of the message
+/// @return message, position in {A}, mm
 tip_measurement_t to_tip(const camera::TipObservation& seen, std::int64_t seq);
+/// Converts an observation to a TIP_HEADING message.
+/// @param seen observation of one frame
+/// @param seq  number of the message
+/// @return message, unit vector in {A}
 tip_heading_t to_heading(const camera::TipObservation& seen, std::int64_t seq);
 
+/// Node of the process bevel-camera.
 class CameraNode {
  public:
-  // Throws camera::SourceError or ArgumentError, naming what is wrong.
-  // `pictures_hz`: how often a camera's picture goes out on CAMERA_PICTURE, at most kMostPictures_hz; 0: never.
+  /// Opens the source of the frames.
+  /// @param lcm         LCM; must outlive the node
+  /// @param config      system file
+  /// @param pictures_hz rate of the images on CAMERA_PICTURE, Hz, at most kMostPictures_hz; 0: none
+  /// @throws camera::SourceError if the source cannot be opened
+  /// @throws ArgumentError naming the setting that is wrong
   CameraNode(lcm::LCM& lcm, const SystemConfig& config, double pictures_hz = 0);
-  enum class Outcome { frame, nothing, ended, failed };
+  /// Result of step().
+  enum class Outcome {
+    frame,    ///< a frame was processed
+    nothing,  ///< no frame arrived
+    ended,    ///< the frames have ended
+    failed    ///< the source failed, or another process serves the camera
+  };
+  /// Sets the time at which messages are processed.
+  /// @param now present time
   void tell_time(const Now& now) { port_.tell_time(now); }
-  // Waits at most timeout_ms for a frame and publishes what it shows.
+  /// Waits for a frame and publishes its measurement.
+  /// @param now        present time
+  /// @param timeout_ms longest wait, ms
+  /// @return result; failure() describes Outcome::failed
   Outcome step(const Now& now, int timeout_ms);
+  /// @return port of the node
   LcmPort& port() { return port_; }
-  // Keeps the frames from here on (frame_recorder.hpp). Throws IoError.
+  /// Records the frames from now on (frame_recorder.hpp).
+  /// @param folder folder to write to
+  /// @throws IoError if the folder cannot be written
   void record(const std::string& folder);
-  // Waits for the disk; then how many were kept and how many not. Empty if nothing is recorded.
+  /// Waits until the recorded frames are written.
+  /// @return numbers of recorded and dropped frames in one sentence; empty if there is no recording
   std::string end_recording();
+  /// @return reason of the last Outcome::failed
   const std::string& failure() const { return failure_; }
+  /// @return counters since construction
   const camera::CameraCounters& counters() const { return pipeline_->counters(); }
-  // Called with each observation, for programs that print them.
+  /// Called with each observation, for programs that print them.
   std::function<void(const camera::TipObservation&)> on_observation;
 
  private:
-  // What PROCESS_STATUS says of the frames; empty if there is nothing to say.
+  // Returns the remark on the frames for PROCESS_STATUS; may be empty.
   std::string remark() const;
 
   LcmPort port_;
@@ -49,7 +81,7 @@ class CameraNode {
   StatusReporter status_;
   std::string failure_, remark_;
   std::int64_t remarked_ns_ = 0;
-  std::map<int, std::int64_t> seq_;  // each camera counts for itself
+  std::map<int, std::int64_t> seq_;  // by camera
   std::set<int> with_headings_;
   bool latency_known_ = false;                 // of the device's camera
   std::optional<PictureClock> picture_clock_;  // none: no pictures

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: MIT
 #pragma once
-// What cameras see, made small for people to look at: at most a few pictures a second, each with the tip that was found
-// in it.
+/// \file
+/// Small images of the cameras for display: at most a few per second, each with the detected tip.
 #include <bevel/camera_picture_t.hpp>
 #include <chrono>
 #include <cstdint>
@@ -14,30 +14,43 @@
 
 namespace bevel::nodes {
 
-inline constexpr double kMostPictures_hz = 5;
+inline constexpr double kMostPictures_hz = 5;  ///< largest rate of images, Hz
 
-// Hands frames on as they come, and keeps the newest.
+/// Frame source that passes on the frames of another source and keeps the newest one.
 class KeptFrame : public camera::FrameSource {
  public:
+  /// Wraps a source.
+  /// @param source source of the frames; not null
   explicit KeptFrame(std::unique_ptr<camera::FrameSource> source) : source_(std::move(source)) {}
   camera::FrameResult next(std::chrono::milliseconds timeout) override;
   std::string remark() const override { return source_->remark(); }
-  const camera::Frame& frame() const { return frame_; }  // empty before the first
+  /// @return newest frame; empty before the first
+  const camera::Frame& frame() const { return frame_; }
 
  private:
   std::unique_ptr<camera::FrameSource> source_;
   camera::Frame frame_;
 };
 
-// A grey JPEG of the frame, at most 320 pixels wide and high, and where the tip is in it. The frame must not be empty.
+/// Encodes a frame as a grey JPEG of at most 320 pixels in width and height, with the position of the tip in it.
+/// @param frame frame; not empty
+/// @param seen  observation of the frame
+/// @param seq   number of the message
+/// @return message for CAMERA_PICTURE
 camera_picture_t make_picture(const camera::Frame& frame, const camera::TipObservation& seen, std::int64_t seq);
 
-// When a camera's next picture is due.
+/// Determines when the next image of each camera is due.
 class PictureClock {
  public:
-  // Throws ArgumentError unless 0 < rate_hz <= kMostPictures_hz.
+  /// Creates a clock.
+  /// @param rate_hz rate of the images of each camera, Hz
+  /// @throws ArgumentError unless 0 < rate_hz <= kMostPictures_hz
   explicit PictureClock(double rate_hz);
-  bool due(std::int32_t camera, std::int64_t now_ns);  // true: take it; the next is due one period later
+  /// Returns whether an image is due; if so, the next one is due one period later.
+  /// @param camera camera number
+  /// @param now_ns steady clock, ns
+  /// @return true if an image is to be published now
+  bool due(std::int32_t camera, std::int64_t now_ns);
 
  private:
   std::int64_t period_ns_ = 0;

@@ -1,7 +1,8 @@
 // SPDX-License-Identifier: MIT
 #pragma once
-// What the arrival of a camera's messages tells, beside what they say: whether it still sends, and whether what it
-// sends still changes. By the steady clock, so that a wall clock that is set cannot keep a dead camera alive.
+/// \file
+/// Detection of cameras that are silent or frozen, from the arrival of their messages. Uses the steady clock, so that
+/// setting the wall clock cannot hide a dead camera.
 #include <array>
 #include <bevel/tip_heading_t.hpp>
 #include <bevel/tip_measurement_t.hpp>
@@ -10,16 +11,28 @@
 
 namespace bevel::nodes {
 
+/// Monitors the messages of all cameras.
 class CameraWatch {
  public:
+  /// Creates a watch without cameras.
+  /// @param silence_s longest allowed time between two messages of a camera, s
   explicit CameraWatch(double silence_s) : silence_ns_(static_cast<std::int64_t>(silence_s * 1e9)) {}
 
-  // insertion_mm: of the axes now.
+  /// Records a tip measurement.
+  /// @param m            message
+  /// @param insertion_mm present position of the insertion axis, mm
+  /// @param now_ns       steady clock, ns
   void hear(const tip_measurement_t& m, double insertion_mm, std::int64_t now_ns);
+  /// Records a tip heading.
+  /// @param m            message
+  /// @param insertion_mm present position of the insertion axis, mm
+  /// @param now_ns       steady clock, ns
   void hear(const tip_heading_t& m, double insertion_mm, std::int64_t now_ns);
-  // Bits of bevel/estimator/health.hpp.
+  /// Evaluates all cameras. A camera is frozen if it repeats a value while the insertion axis moves.
+  /// @param now_ns steady clock, ns
+  /// @return bits kCameraSilent and kCameraFrozen of bevel/estimator/health.hpp
   std::int32_t health(std::int64_t now_ns) const;
-  // Cameras may be others from here on.
+  /// Forgets all cameras.
   void restart() { cameras_.clear(); }
 
  private:
@@ -29,7 +42,7 @@ class CameraWatch {
   struct Camera {
     std::int64_t heard_ns = 0;
     Says says{};
-    double insertion_mm = 0;  // when it began to say the same
+    double insertion_mm = 0;  // when the value last changed
     int repeats = 0;
     bool frozen = false;
   };

@@ -1,21 +1,25 @@
 // SPDX-License-Identifier: MIT
 #pragma once
-// The two clocks of a process, and whether somebody has set the wall clock.
+/// \file
+/// The steady clock and the wall clock of a process, and detection of a wall clock that was set.
 #include <cstdint>
 #include <cstdlib>
 
 namespace bevel::nodes {
 
-// Both clocks at one instant. Loops, ages of what has arrived and silences run on the steady clock; utime stamps.
+/// Both clocks at one time. Loops, ages and time-outs use the steady clock; messages are stamped with utime.
 struct Now {
-  std::int64_t ns = 0;     // steady
-  std::int64_t utime = 0;  // us since the epoch
+  std::int64_t ns = 0;     ///< steady clock, ns
+  std::int64_t utime = 0;  ///< wall clock, us since the epoch
 };
 
+/// Detects steps of the wall clock.
 class ClockWatch {
  public:
-  // By how much the wall clock was set since the last call, us; 0 while it runs as it should. Slewing, which time
-  // services do at no more than 500 ppm, is followed.
+  /// Computes the step of the wall clock since the last call. Changes of at most 20 ms between two calls are tolerated,
+  /// such as those of time services (at most 500 ppm).
+  /// @param now present time
+  /// @return step, us; 0 without a step
   std::int64_t step_us(const Now& now) {
     const std::int64_t offset_us = now.utime - now.ns / 1000;
     const std::int64_t change_us = started_ ? offset_us - offset_us_ : 0;
@@ -25,7 +29,7 @@ class ClockWatch {
   }
 
  private:
-  // Of what messages may be ahead: a smaller step does no harm that the bounds of age do not catch.
+  // The limits of message age cover the effect of a smaller step.
   static constexpr std::int64_t kStep_us = 20'000;
   bool started_ = false;
   std::int64_t offset_us_ = 0;

@@ -1,7 +1,8 @@
 // SPDX-License-Identifier: MIT
 #pragma once
-// bevel-controller: NEEDLE_STATE, ACTUATOR_STATE and STEERING_TARGET in, MOTION_COMMAND out: at a fixed rate, while it
-// steers with each estimate, and at once when motion must stop.
+/// \file
+/// bevel-controller: subscribes to NEEDLE_STATE, ACTUATOR_STATE and STEERING_TARGET, publishes MOTION_COMMAND at a
+/// fixed rate, with each estimate while it steers, and immediately when motion must stop.
 #include <array>
 
 #include <bevel/controller/supervisor.hpp>
@@ -11,22 +12,36 @@
 
 namespace bevel::nodes {
 
+/// Converts a NEEDLE_STATE message to the controller's input.
+/// @param message message
+/// @return estimate of the needle, pose in {A}, mm
 controller::NeedleView to_view(const needle_state_t& message);
 
-// What no axis of the rig exceeds, of the stepper's limits.
+/// Computes the bounds that no axis of the rig exceeds, from the limits of the stepper driver.
+/// @param config settings of the stepper driver
+/// @return bounds for checks of received motion
 io::MotionBounds motion_bounds(const stepper::StepperConfig& config);
 
+/// Node of the process bevel-controller.
 class ControllerNode {
  public:
+  /// Creates the node; it commands no motion before it is armed.
+  /// @param lcm    LCM; must outlive the node
+  /// @param config system file
   ControllerNode(lcm::LCM& lcm, const SystemConfig& config);
+  /// Sets the time at which messages are processed.
+  /// @param now present time
   void tell_time(const Now& now) { port_.tell_time(now); }
-  // Call at config.controller.period_s: the watchdog of its inputs. late_s: how much later than due; past a bound it
-  // stops motion.
+  /// Checks the inputs for time-outs and publishes the command. Call it every config.controller.period_s.
+  /// @param now    present time
+  /// @param late_s delay of this call, s; a delay over a limit stops motion
   void step(const Now& now, double late_s);
-  // Says stop, because this process ends.
+  /// Publishes a stop, because this process ends.
   void end();
 
+  /// @return port of the node
   LcmPort& port() { return port_; }
+  /// @return supervisor of the motion
   const controller::Supervisor& supervisor() const { return supervisor_; }
 
  private:
@@ -42,7 +57,7 @@ class ControllerNode {
   controller::ControllerConfig config_;
   LcmPort port_;
   controller::Supervisor supervisor_;
-  double bending_mm_ = 0;  // newest heard of a stiff shaft; 0: as configured
+  double bending_mm_ = 0;  // newest estimate for a stiff shaft; 0: as configured
   double bending_sd_mm_ = 0;
   StatusReporter status_;
   OperatorWords words_;

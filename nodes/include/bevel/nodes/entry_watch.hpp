@@ -1,21 +1,27 @@
 // SPDX-License-Identifier: MIT
 #pragma once
-// Whether the estimate has been there since the needle entered the tissue. An estimator that begins with the needle
-// inside knows where the axes stand, but not the way: its attitude is a guess that measurements of position mend
-// slowly. Pure; lengths in mm, depths along z of {A}.
+/// \file
+/// Check whether the needle was observed since it entered the tissue.
 namespace bevel::nodes {
 
+/// Decides whether the estimate has observed the whole insertion. An estimator that starts with the needle inside knows
+/// the positions of the axes, but not the path: its orientation is a guess that position measurements correct slowly.
+/// Uses no clock. Lengths in mm, depths along z of {A}.
 class EntryWatch {
  public:
-  // The axes; true where the estimate is to begin anew, at the entry point.
+  /// Records the position of the insertion axis.
+  /// @param insertion_mm position, mm
+  /// @return true if the estimate is to start again at the entry point
   bool see_axes(double insertion_mm);
-  // Where a camera sees the tip; of cameras that see the depth.
+  /// Records a tip measurement of a camera that measures the depth.
+  /// @param depth_mm measured z of the tip in {A}, mm
   void see_tip(double depth_mm);
-  // The estimate begins with the next axes.
+  /// Restarts the watch with the next position of the axes.
   void restart() { *this = EntryWatch{}; }
-  // The operator says that all is as if it had been watched.
+  /// Records the operator's confirmation: the needle counts as observed since the entry.
   void confirm() { from_entry_ = true; }
 
+  /// @return true if the needle was observed since the entry
   bool from_entry() const { return from_entry_; }
 
  private:

@@ -1,12 +1,13 @@
 // SPDX-License-Identifier: MIT
 #pragma once
-// bevel-estimator: TIP_MEASUREMENT, TIP_HEADING and ACTUATOR_STATE in, NEEDLE_STATE out: one for each actuator state,
-// at its time, and one for each reading as it arrives, at that moment, the axes carried on at the rates that they last
-// reported. Who acts on it need not wait for the next actuator state.
-//
-// It carries out three operator commands (bevel/nodes/operator_words.hpp): `entry` (start with the tip at the entry
-// point), `confirm` (continue from the positions of the axes, although the motion was not observed) and `arm` (accept
-// inputs again that were rejected).
+/// \file
+/// bevel-estimator: subscribes to TIP_MEASUREMENT, TIP_HEADING and ACTUATOR_STATE, publishes NEEDLE_STATE: one for each
+/// actuator state, at its time, and one for each measurement as it arrives, at the time of arrival. For the latter the
+/// axes are extrapolated at their last reported rates, so that a subscriber need not wait for the next actuator state.
+///
+/// The node executes three operator commands (bevel/nodes/operator_words.hpp): `entry` (start with the tip at the entry
+/// point), `confirm` (continue from the positions of the axes, although the motion was not observed) and `arm` (accept
+/// inputs again that were rejected).
 #include <optional>
 #include <string>
 
@@ -19,25 +20,44 @@
 
 namespace bevel::nodes {
 
-// What an operator should know of how the needle went in; empty where all is as expected.
+/// Describes deviations of the first part of the insertion for the operator.
+/// @param entry fit of the entry
+/// @return text; empty if everything is as expected
 std::string describe(const estimator::EntryLine& entry);
-// The ratio of each camera's innovations to what is expected of them, and which are too large. Empty before any.
+/// Describes the ratio of each camera's innovations to their expected size, and which are too large.
+/// @param innovations statistics of the innovations
+/// @return text; empty without innovations
 std::string describe(const estimator::InnovationWatch& innovations);
-// Of the states that the file gives a width, with their standard deviations. Empty where there are none.
+/// Describes the estimated nuisance states with their standard deviations.
+/// @param nuisance states that have a standard deviation in the system file
+/// @return text; empty if there are none
 std::string describe(const estimator::Nuisance& nuisance);
+/// Converts an estimate to a NEEDLE_STATE message.
+/// @param estimate estimate
+/// @param seq      number of the message
+/// @return message, pose in {A}, mm
 needle_state_t to_message(const estimator::Estimate& estimate, std::int64_t seq);
 
+/// Node of the process bevel-estimator.
 class EstimatorNode {
  public:
-  // `bounds`: what no axis of the rig exceeds.
+  /// Creates the node.
+  /// @param lcm    LCM; must outlive the node
+  /// @param config settings of the estimator
+  /// @param bounds bounds that no axis of the rig exceeds
   EstimatorNode(lcm::LCM& lcm, const estimator::EstimatorConfig& config, const io::MotionBounds& bounds);
+  /// Sets the time at which messages are processed.
+  /// @param now present time
   void tell_time(const Now& now) { port_.tell_time(now); }
-  // Health and status; everything else happens when messages arrive. Call it often (every 10 ms).
+  /// Updates health and status; all other work is done when messages arrive. Call it every 10 ms.
+  /// @param now present time
   void step(const Now& now);
 
+  /// @return port of the node
   LcmPort& port() { return port_; }
+  /// @return estimator
   const estimator::NeedleEstimator& estimator() const { return estimator_; }
-  // Returns the health bits (bevel/estimator/health.hpp) of the newest estimate and of the inputs.
+  /// @return health bits (bevel/estimator/health.hpp) of the newest estimate and of the inputs
   std::int32_t health() const;
 
  private:
@@ -65,7 +85,7 @@ class EstimatorNode {
   bool input_refused_ = false;
   std::string innovation_text_, entry_text_, nuisance_text_;  // as of described_ns_
   std::int64_t described_ns_ = 0;                             // steady
-  std::string remark_;                                        // what the last trouble was
+  std::string remark_;                                        // description of the last trouble
 };
 
 }  // namespace bevel::nodes

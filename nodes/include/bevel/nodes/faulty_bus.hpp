@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: MIT
 #pragma once
-// A drive's place on the bus, spoiled from one instant on: the counterpart of FaultInjector for what is on CAN. For the
-// simulated rig alone.
+/// \file
+/// A drive's connection to the bus with a fault: the counterpart of FaultInjector for CAN. Only for the simulated rig.
 #include <deque>
 #include <limits>
 #include <random>
@@ -11,12 +11,19 @@
 
 namespace bevel::nodes {
 
+/// Bus that corrupts the frames of one drive.
 class FaultyBus : public can::Bus {
  public:
-  // `inner` must outlive this. Lets everything pass until begin().
+  /// Creates a bus that passes everything on until begin().
+  /// @param inner   bus of the drive; must outlive this
+  /// @param node_id node id of the drive
   FaultyBus(can::Bus& inner, std::uint8_t node_id) : inner_(inner), node_id_(node_id) {}
-  // Acts from start_ns on (the clock of maintain()). FaultKind::stuck is the motor's, not the bus's: nothing happens.
+  /// Starts the fault. FaultKind::stuck has no effect here: it concerns the motor, not the bus.
+  /// @param kind     kind of fault
+  /// @param start_ns start of the fault, in the clock of maintain(), ns
+  /// @param seed     seed of the durations and bytes
   void begin(FaultKind kind, std::int64_t start_ns, std::uint64_t seed);
+  /// Ends the fault.
   void end() { start_ns_ = std::numeric_limits<std::int64_t>::max(); }
 
   can::SendResult send(const can::Frame& frame) override;

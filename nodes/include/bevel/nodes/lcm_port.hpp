@@ -1,10 +1,13 @@
 // SPDX-License-Identifier: MIT
 #pragma once
-// LCM for the nodes. Every message that comes in passes the one checked decode, the watch over its sender (io/
-// sender_watch.hpp) and, where the channel carries motion, a check that it can be true (bevel/io/motion_bounds.hpp);
-// every one that goes out is checked before. What does not pass is counted and never handed on; what tells of a second
-// sender, of motion that cannot be or of a clock that was set is a trouble that the node must stop for. One lcm::LCM
-// per thread; no exception leaves a handler: it is kept, and step() of the node raises it.
+/// \file
+/// Checked LCM input and output of the nodes.
+///
+/// Each received message passes a checked decode, the watch over its sender (io/sender_watch.hpp) and, on channels that
+/// carry motion, a plausibility check (bevel/io/motion_bounds.hpp). Each published message is checked before. A message
+/// that does not pass is counted and not passed on. Signs of a second sender, of impossible motion or of a clock that
+/// was set are troubles, for which the node must stop. Use one lcm::LCM per thread. No exception leaves a handler: it
+/// is stored, and step() of the node rethrows it.
 #include <bevel/actuator_state_t.hpp>
 #include <bevel/motion_command_t.hpp>
 #include <bevel/needle_shaft_t.hpp>
@@ -34,44 +37,68 @@
 
 namespace bevel::nodes {
 
+/// Counters of a port since construction.
 struct PortCounters {
-  std::int64_t received = 0;  // handed on
-  std::int64_t rejected = 0;  // by any of the checks, in or out
+  std::int64_t received = 0;  ///< messages passed on to a handler
+  std::int64_t rejected = 0;  ///< messages rejected by any of the checks, received or published
 };
 
+/// A trouble in the inputs of a node.
 struct InputTrouble {
-  enum class Kind { second_sender, out_of_order, implausible, clock_step };
-  Kind kind = Kind::second_sender;
-  const char* channel = "";     // static text; "" for the clock
-  io::Implausible implausible;  // of that kind
-  double clock_step_s = 0;      // of that kind
+  /// Kind of trouble.
+  enum class Kind {
+    second_sender,  ///< a second sender, or old messages sent again
+    out_of_order,   ///< delayed messages, or two senders
+    implausible,    ///< impossible motion
+    clock_step      ///< the wall clock was set
+  };
+  Kind kind = Kind::second_sender;  ///< kind of trouble
+  const char* channel = "";         ///< channel, static string; "" for the clock
+  io::Implausible implausible;      ///< motion found; for Kind::implausible
+  double clock_step_s = 0;          ///< step of the wall clock, s; for Kind::clock_step
 };
+/// Describes a trouble for the operator.
+/// @param trouble trouble
+/// @return text without a line break
 std::string describe(const InputTrouble& trouble);
 
+/// Subscribes and publishes for one node.
 class LcmPort {
  public:
-  // The LCM must be good and outlive the port.
+  /// Creates a port without subscriptions.
+  /// @param lcm LCM; must be good and outlive the port
   explicit LcmPort(lcm::LCM& lcm) : lcm_(lcm) {}
   ~LcmPort();
   LcmPort(const LcmPort&) = delete;
   LcmPort& operator=(const LcmPort&) = delete;
 
-  // The time at which what follows is handled and sent. Call it before messages are handled and before each step.
+  /// Sets the time at which messages are handled and sent. Call it before messages are handled and before each step. A
+  /// step of the wall clock is reported by on_trouble.
+  /// @param now present time
   void tell_time(const Now& now);
+  /// @return time set by tell_time()
   const Now& now() const { return now_; }
 
+  /// Function that processes a message.
   template <class Message>
   using Handler = std::function<void(const Message&)>;
+  /// Function that checks a message against the previous one of its sender.
   template <class Message>
   using MotionCheck = std::function<io::Implausible(const Message& before, const Message& next)>;
 
-  // For what people and records read: checked decode alone. `keep`: length of LCM's own queue; a full one keeps the
-  // oldest, so a node reads often and keeps it short.
+  /// Subscribes with a checked decode only, for messages that the node does not act on.
+  /// @param channel channel
+  /// @param handler called with each message
+  /// @param keep    length of LCM's own queue; a full queue keeps the oldest messages
   template <class Message>
   void subscribe(const char* channel, Handler<Message> handler, int keep = kQueue) {
     add(std::make_unique<Subscription<Message>>(*this, channel, std::move(handler)), keep);
   }
-  // For what a node acts on.
+  /// Subscribes with all checks, for messages that the node acts on.
+  /// @param channel channel
+  /// @param limits  limits of age and rate of each sender
+  /// @param handler called with each message that passes
+  /// @param check   plausibility check; empty: none
   template <class Message>
   void subscribe(const char* channel, const io::SenderLimits& limits, Handler<Message> handler,
                  MotionCheck<Message> check = nullptr) {
@@ -81,15 +108,19 @@ class LcmPort {
     add(std::move(subscription), kQueue);
   }
 
-  // Called at once when a trouble is found, before anything else is handled.
+  /// Called immediately when a trouble is found, before anything else is handled.
   std::function<void(const InputTrouble&)> on_trouble;
-  // Called for messages that a watched channel refuses without being a trouble, with the reason.
+  /// Called for messages that a watched channel rejects without a trouble, with the reason.
   std::function<void(const char* channel, io::Standing)> on_refused;
 
-  // Senders may be others from here on: the operator has looked and armed anew. His own words are still compared.
+  /// Accepts new senders from now on, after the operator has checked and armed again. The operator's own commands are
+  /// still compared with the previous ones.
   void forget_senders() { restart_watches(io::channel::kSteeringTarget); }
 
-  // False when the message is not fit to be sent (counted) or LCM refuses it.
+  /// Publishes a message.
+  /// @param channel channel
+  /// @param message message
+  /// @return false if the message has invalid fields (counted as rejected) or LCM rejects it
   template <class Message>
   bool publish(const char* channel, const Message& message) {
     if (io::check_fields(message)) {
@@ -101,20 +132,24 @@ class LcmPort {
     return send(channel, buffer_);
   }
 
-  // The configuration's text, once at start, so that a log is complete.
+  /// Publishes text without a message type, such as the configuration at the start, so that a log is complete.
+  /// @param channel channel
+  /// @param text    text
   void publish_text(const char* channel, const std::string& text);
 
-  // For tests of the stop path: what this process sends passes through the injector.
+  /// Passes the messages of this process through a fault injector, for tests of the stop.
+  /// @param injector injector; null: none
   void inject(std::unique_ptr<FaultInjector> injector) { injector_ = std::move(injector); }
 
-  /// Counts the message that is being handled as rejected: the node refuses it by a check that the port does not have.
+  /// Counts the message that is being handled as rejected: the node rejects it by a check that the port does not have.
   void reject() {
     --counters_.received;
     ++counters_.rejected;
   }
 
-  // Raises what a handler threw.
+  /// Rethrows the exception that a handler threw, if any.
   void rethrow();
+  /// @return counters since construction
   const PortCounters& counters() const { return counters_; }
 
  private:
@@ -153,9 +188,10 @@ class LcmPort {
     }
     bool passes(const Message& message, const lcm::ReceiveBuffer& buffer);
 
+    /// One sender on a watched channel.
     struct Sender {
-      io::SenderWatch watch;
-      std::optional<Message> before;
+      io::SenderWatch watch;          ///< watch over its stream
+      std::optional<Message> before;  ///< newest fresh message
     };
     LcmPort& port;
     const char* channel;
@@ -181,15 +217,22 @@ class LcmPort {
   std::exception_ptr thrown_;
 };
 
-// Cameras number their messages each for itself.
+/// Returns the key that distinguishes the senders on a channel. Each camera numbers its own messages.
+/// @return 0; the camera number in the specialisations
 template <class Message>
 std::int32_t sender_key(const Message&) {
   return 0;
 }
+/// Returns the camera number of a tip measurement.
+/// @param message message
+/// @return camera number
 template <>
 inline std::int32_t sender_key(const tip_measurement_t& message) {
   return message.camera;
 }
+/// Returns the camera number of a tip heading.
+/// @param message message
+/// @return camera number
 template <>
 inline std::int32_t sender_key(const tip_heading_t& message) {
   return message.camera;

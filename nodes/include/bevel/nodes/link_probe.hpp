@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: MIT
-// The measurements of bevel-check that need sockets and clocks.
 #pragma once
+/// \file
+/// The measurements of bevel-check that need sockets and clocks.
 
 #include <functional>
 #include <lcm/lcm-cpp.hpp>
@@ -13,23 +14,36 @@
 
 namespace bevel::nodes {
 
-// Sends itself messages on a channel that nobody else reads.
+/// Measures whether multicast works, by messages to this process on a channel without other subscribers.
+/// @param lcm LCM
+/// @return numbers of sent and received messages, and the longest delay
 drivers::MulticastMeasured measure_multicast(lcm::LCM& lcm);
 
-// Findings about the bus and the drives on it; an address that can never work is one of them. Takes 2 to 5 s, in which
-// `meanwhile` is called about every millisecond.
+/// Checks the bus and the drives on it. Takes 2 to 5 s.
+/// @param config      settings of the stepper driver
+/// @param address     address of the bus (can::open_bus()); an address that can never work is a finding
+/// @param system_file path of the system file, for remedies
+/// @param meanwhile   called about every millisecond
+/// @return findings
 drivers::Findings check_bus(const stepper::StepperConfig& config, const std::string& address,
                             const std::string& system_file, const std::function<void()>& meanwhile);
 
-// Lateness of each wake-up of a loop of this period, for a second.
+/// Measures the latency of the wake-ups of a periodic loop during one second.
+/// @param period_ns period of the loop, ns
+/// @return latency of each wake-up, ns
 std::vector<std::int64_t> measure_lateness(std::int64_t period_ns);
 
-// TIP_MEASUREMENT of every camera, from now on.
+/// Collects the TIP_MEASUREMENT messages of all cameras since construction.
 class CameraEars {
  public:
-  explicit CameraEars(lcm::LCM& lcm);  // must outlive this
-  void listen();                       // handles what has arrived
+  /// Subscribes.
+  /// @param lcm LCM; must outlive this
+  explicit CameraEars(lcm::LCM& lcm);
+  /// Handles the messages that have arrived.
+  void listen();
+  /// @return time since construction, ns
   std::int64_t listened_ns() const;
+  /// @return number of messages and longest silence of each camera, by camera number
   std::map<int, drivers::CameraMeasured> heard() const;
 
  private:
@@ -40,7 +54,12 @@ class CameraEars {
   nodes::LcmPort port_;
 };
 
-// All of them, in the order in which one is needed for the next.
+/// Performs all checks, each after those that it depends on.
+/// @param config      system file
+/// @param lcm_url     LCM provider; empty: LCM_DEFAULT_URL
+/// @param can         address of the bus (can::open_bus())
+/// @param system_file path of the system file, for remedies
+/// @return findings
 drivers::Findings check_all(const nodes::SystemConfig& config, const std::string& lcm_url, const std::string& can,
                             const std::string& system_file);
 

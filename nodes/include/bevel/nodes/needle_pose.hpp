@@ -1,12 +1,16 @@
 // SPDX-License-Identifier: MIT
 #pragma once
-// The pose of needle_state_t: position in {A} and a unit quaternion, w first.
+/// \file
+/// Pose in a needle_state_t message: position in {A} and a unit quaternion, w first.
 #include <bevel/needle_state_t.hpp>
 
 #include <bevel/model/lie.hpp>
 
 namespace bevel::nodes {
 
+/// Writes a pose into a message.
+/// @param pose    pose in {A}, mm
+/// @param message message to change
 inline void write_pose(const model::Pose& pose, needle_state_t& message) {
   Eigen::Quaterniond q(pose.R);
   q.normalize();
@@ -17,6 +21,9 @@ inline void write_pose(const model::Pose& pose, needle_state_t& message) {
   message.orientation_wxyz[3] = q.z();
 }
 
+/// Reads the pose of a message. The quaternion is normalised.
+/// @param message message
+/// @return pose in {A}, mm
 inline model::Pose read_pose(const needle_state_t& message) {
   const double* q = message.orientation_wxyz;
   return {Eigen::Quaterniond(q[0], q[1], q[2], q[3]).normalized().toRotationMatrix(),

@@ -17,11 +17,12 @@ class LcmPort;
 /// heartbeat ends when that loop hangs; a separate thread would outlive the loop.
 class OperatorHeartbeat {
  public:
-  /// Draws the session of this run. \p port must outlive this.
+  /// Draws the session of this run.
+  /// @param port port; must outlive this
   explicit OperatorHeartbeat(LcmPort& port);
 
-  /// Sends if 50 ms have passed since the last heartbeat, and returns whether it did. Call it at 20 Hz or more, after
-  /// port.tell_time().
+  /// Sends a heartbeat if 50 ms have passed since the last one. Call it at 20 Hz or more, after port.tell_time().
+  /// @return true if a heartbeat was sent
   bool beat();
 
  private:
@@ -34,21 +35,32 @@ class OperatorHeartbeat {
 /// heartbeat is older than the timeout and nothing moves. Heartbeats of another session are refused until then.
 class OperatorWatch {
  public:
+  /// Creates a watch that has received no heartbeat.
   /// @param timeout_s  largest age of the newest heartbeat, s
   explicit OperatorWatch(double timeout_s);
 
-  /// Takes in a heartbeat that arrived at \p now. Returns false if it is refused: of a second operator program, too
-  /// old, stamped in the future, or not a continuation of its sender's stream.
-  /// @param moving  the needle moves, so that the operator cannot change
+  /// Processes a heartbeat.
+  /// @param m      message
+  /// @param now    time of arrival
+  /// @param moving true: the needle moves, so that the operator program cannot change
+  /// @return false if the heartbeat is rejected: from a second operator program, too old, stamped in the future, or not
+  /// a
+  ///   continuation of its sender's stream
   bool hear(const operator_heartbeat_t& m, const Now& now, bool moving);
 
   /// Returns whether the newest heartbeat is younger than the timeout, by its time stamp.
+  /// @param now present time
+  /// @return true if an operator program counts as alive
   bool is_fresh(const Now& now) const;
 
-  /// Returns why no operator program counts as alive, with the remedy; "" if is_fresh(now).
+  /// Describes why no operator program counts as alive, with the remedy.
+  /// @param now present time
+  /// @return text; "" if is_fresh(now)
   std::string problem(const Now& now) const;
 
-  /// Returns a remark on a second operator program that was refused within the last 5 s, otherwise "".
+  /// Describes a second operator program that was rejected within the last 5 s.
+  /// @param now present time
+  /// @return remark; "" if there was none
   std::string second_operator(const Now& now) const;
 
   /// Accepts any session next: the wall clock was set, and time stamps from before and after do not compare.
@@ -57,7 +69,7 @@ class OperatorWatch {
  private:
   std::int64_t timeout_ns_;
   io::SenderWatch stream_;
-  std::int64_t session_ = 0;  // of the operator that counts; 0: none was heard
+  std::int64_t session_ = 0;  // of the operator that counts; 0: none was received
   std::int64_t made_ns_ = 0;  // steady time at which its newest heartbeat was made
   // Newest heartbeat that was refused.
   io::Standing refused_as_ = io::Standing::fresh;  // fresh: none was

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: MIT
 #pragma once
-// The operator's word, STEERING_TARGET, as every node that obeys it hears it: fresh, newer than the last, meant for
-// this run since its last stop. A stop or a hold is obeyed from anybody at any time.
+/// \file
+/// Operator commands on STEERING_TARGET, as received by each node that obeys them.
 #include <functional>
 #include <string>
 
@@ -10,17 +10,29 @@
 
 namespace bevel::nodes {
 
+/// Operator command.
 using Word = controller::Request;
-// Place of a receiver's session in steering_target_t.session.
-enum class Receiver : std::size_t { controller = 0, stepper = 1, estimator = 2 };
+/// Index of a receiver's session in steering_target_t.session.
+enum class Receiver : std::size_t {
+  controller = 0,  ///< bevel-controller
+  stepper = 1,     ///< bevel-stepper
+  estimator = 2    ///< bevel-estimator
+};
 
+/// Receives operator commands. A command counts if it is fresh, newer than the previous one, and meant for this run
+/// since its last stop. A stop or a hold from any sender is obeyed at any time.
 class OperatorWords {
  public:
-  // `obey` is called for each word that counts. The port and status must outlive this.
+  /// Subscribes to STEERING_TARGET.
+  /// @param port     port; must outlive this
+  /// @param status   reporter with the session of the node; must outlive this
+  /// @param receiver node that receives
+  /// @param obey     called for each command that counts
   OperatorWords(LcmPort& port, const StatusReporter& status, Receiver receiver,
                 std::function<void(Word, const steering_target_t&)> obey);
 
-  // Why the newest word was not obeyed; "" if it was, and some seconds after it was not.
+  /// Describes why the newest command was not obeyed.
+  /// @return reason; "" if it was obeyed, and some seconds after it was not
   std::string refusal() const;
 
  private:

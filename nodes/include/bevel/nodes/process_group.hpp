@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: MIT
 #pragma once
-// Child processes that are started together and end together.
+/// \file
+/// Child processes that are started and ended together.
 #include <sys/types.h>
 
 #include <optional>
@@ -9,18 +10,25 @@
 
 namespace bevel::nodes {
 
+/// Starts child processes and ends them in reverse order. The destructor ends those that still run.
 class ProcessGroup {
  public:
   ProcessGroup() = default;
-  ~ProcessGroup();  // ends whatever still runs
+  ~ProcessGroup();
   ProcessGroup(const ProcessGroup&) = delete;
   ProcessGroup& operator=(const ProcessGroup&) = delete;
 
-  // Throws IoError if it cannot be started. Its output goes to `log_path`.
+  /// Starts a process.
+  /// @param name     name for messages
+  /// @param command  program and arguments; not empty
+  /// @param log_path file for its output
+  /// @throws IoError if it cannot be started
   void start(const std::string& name, const std::vector<std::string>& command, const std::string& log_path);
-  // Name and how it ended of a process that is no longer there, if any: "bevel-rig: exit status 1".
+  /// Returns the name of a process that has ended and how it ended, once each.
+  /// @return text such as "bevel-rig: exit status 1"; empty if all processes run
   std::optional<std::string> first_death();
-  // SIGTERM, a second of grace, SIGKILL; by id, in reverse order of start. True if none had to be killed.
+  /// Ends all processes in reverse order of start: SIGTERM, then SIGKILL after 1 s.
+  /// @return true if no process needed SIGKILL
   bool stop_all();
 
  private:

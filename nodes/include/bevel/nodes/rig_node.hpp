@@ -1,8 +1,9 @@
 // SPDX-License-Identifier: MIT
 #pragma once
-// bevel-rig: a needle, two cameras and two drives that exist only as programs. Drives on a CAN bus, frames on a Unix
-// socket, the true tip on NEEDLE_TRUTH, and its heading on TIP_HEADING if the needle has a sensor for it. The rest of
-// the software cannot tell it from a bench.
+/// \file
+/// bevel-rig: simulates a needle, cameras and two drives. The drives are on a CAN bus, the frames on a UNIX socket, the
+/// true tip on NEEDLE_TRUTH, and its heading on TIP_HEADING if the needle has a sensor for it. The interfaces are those
+/// of a hardware rig.
 #include <deque>
 #include <memory>
 #include <optional>
@@ -20,27 +21,47 @@
 
 namespace bevel::nodes {
 
+/// Node of the process bevel-rig.
 class RigNode {
  public:
-  // One bus for each drive: two on one would eat each other's frames. `frames` may be null: no pictures.
+  /// Creates the simulated rig.
+  /// @param lcm           LCM; must outlive the node
+  /// @param insertion_bus bus of the insertion drive
+  /// @param rotation_bus  bus of the rotation drive; a different one, because two drives on one bus would take each
+  /// other's
+  ///   frames
+  /// @param config        system file
+  /// @param frames        server of the frames; null: no images
   RigNode(lcm::LCM& lcm, can::Bus& insertion_bus, can::Bus& rotation_bus, const SystemConfig& config,
           rig::FrameServer* frames);
-  // Call about every millisecond.
+  /// Simulates the time since the last call. Call it about every millisecond.
+  /// @param now present time
   void step(const Now& now);
 
-  // A fault of one of the drives, from start_ns + fault.at_s on (steady clock). Before the first step.
+  /// Plans a fault of one of the drives. Call it before the first step.
+  /// @param fault    fault; starts fault.at_s after start_ns
+  /// @param start_ns steady clock, ns
+  /// @param seed     seed of the fault
+  /// @throws ArgumentError if the component is not a drive
   void break_drive(const Fault& fault, std::int64_t start_ns, std::uint64_t seed);
+  /// Returns the bus of a drive.
+  /// @param axis 0 insertion, 1 rotation
+  /// @return bus with fault injection
   FaultyBus& faulty_bus(std::size_t axis) { return buses_.at(axis); }
 
+  /// @return simulated needle
   const rig::Plant& plant() const { return *plant_; }
-  // What this insertion has of its own, drawn from the rig's [variation] with its seed.
+  /// @return insertion-specific parameters, drawn from the rig's [variation] with its seed
   const model::OwnValues& own_values() const { return own_values_; }
+  /// Returns a simulated drive.
+  /// @param axis 0 insertion, 1 rotation
+  /// @return drive
   rig::SimulatedDrive& drive(std::size_t axis) { return *drives_[axis]; }
 
  private:
   struct Eye {
     int camera;
-    bool along_x;  // it looks along x, and so is the one that effects of a camera concern
+    bool along_x;  // it looks along x; effects of a camera apply to it
     rig::NeedleRenderer renderer;
   };
   void move_plant(std::int64_t now_ns);
@@ -62,8 +83,8 @@ class RigNode {
   rig::FrameServer* frames_;
   std::vector<Eye> eyes_;
   struct Taken {
-    std::int64_t due_ns;  // steady: who sets the wall clock keeps no picture back
-    camera::Frame frame;  // a late camera's is stamped with the time at which it arrives
+    std::int64_t due_ns;  // steady clock: setting the wall clock must not delay images
+    camera::Frame frame;  // with camera latency, stamped with the time of arrival
   };
   std::deque<Taken> taken_;
   struct Felt {

@@ -1,12 +1,13 @@
 // SPDX-License-Identifier: MIT
 #pragma once
-// bevel-stepper: MOTION_COMMAND in, the two axes over CAN, ACTUATOR_STATE out.
-//
-// STEERING_TARGET carries the operator's command (bevel/nodes/operator_words.hpp): arm clears a latched stop and
-// enables the axes, stop stops them. Axes count from the entry point. Where the drives' own counters stand near zero at
-// the start, the first arm takes that as the entry; where they do not, the needle may be in the tissue, and the
-// operator has to command which it is: `entry`, the tip is at the entry point now, or `confirm`, the counters still
-// count from there. The same after a drive was lost.
+/// \file
+/// bevel-stepper: subscribes to MOTION_COMMAND, drives the two axes over CAN, publishes ACTUATOR_STATE.
+///
+/// STEERING_TARGET carries the operator's command (bevel/nodes/operator_words.hpp): arm clears a latched stop and
+/// enables the axes, stop stops them. Axes count from the entry point. If the drives' own counters are near zero at the
+/// start, the first arm takes that as the entry. If they are not, the needle may be in the tissue, and the operator has
+/// to command which it is: `entry`, the tip is at the entry point now, or `confirm`, the counters still count from
+/// there. The operator has to do so again after a drive was lost.
 #include <optional>
 #include <string>
 
@@ -16,21 +17,34 @@
 
 namespace bevel::nodes {
 
+/// Node of the process bevel-stepper.
 class StepperNode {
  public:
-  // The bus must outlive the node and hear StepperDriver::listen_ids(config).
+  /// Creates the node.
+  /// @param lcm    LCM; must outlive the node
+  /// @param bus    bus; must outlive the node and receive StepperDriver::listen_ids(config)
+  /// @param config settings of the driver
+  /// @throws ArgumentError listing every problem of config
   StepperNode(lcm::LCM& lcm, can::Bus& bus, const stepper::StepperConfig& config);
+  /// Sets the time at which messages are processed.
+  /// @param now present time
   void tell_time(const Now& now) { port_.tell_time(now); }
-  // Between cycles, when the bus is readable; of use while a command waits for it.
+  /// @return true if a command waits for the bus, so that hear_bus() has an effect
   bool waits_for_bus() const { return driver_.command_waits(); }
+  /// Processes received frames between cycles, when the bus is readable.
+  /// @param now present time
   void hear_bus(const Now& now);
-  // One cycle of config.period_ns.
+  /// Performs one cycle of config.period_ns.
+  /// @param now present time
   void step(const Now& now);
-  // Quick stop because this process ends; step on until at_rest().
+  /// Requests a quick stop because this process ends. Call step() until at_rest().
   void end();
-  bool at_rest() const;  // both axes are measured at rest after a stop
+  /// @return true if both axes are measured at rest after a stop
+  bool at_rest() const;
 
+  /// @return port of the node
   LcmPort& port() { return port_; }
+  /// @return state of the axes and the driver
   stepper::AxesReport report() const { return driver_.report(); }
 
  private:
@@ -53,7 +67,7 @@ class StepperNode {
   std::int64_t published_ns_ = 0;
   std::int64_t seq_ = 0;
   bool enable_wanted_ = false;
-  bool ran_since_armed_ = false;  // the controller has
+  bool ran_since_armed_ = false;  // a set-point with mode `run` arrived since the axes were armed
   bool zero_known_ = false;
   bool was_latched_ = false;
   std::string detail_;   // of the latched stop

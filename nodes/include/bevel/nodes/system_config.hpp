@@ -1,7 +1,9 @@
 // SPDX-License-Identifier: MIT
 #pragma once
-// One file for a whole rig: every process reads all of it, so that a wrong key is found by whichever starts first, and
-// uses its own part. Keys, ranges and defaults stand in system_config.cpp and in the structures named here.
+/// \file
+/// Configuration of a whole rig in one file. Every process reads the whole file, so that the process that starts first
+/// finds a wrong key, and uses its own part. system_config.cpp and the structures named here define keys, ranges and
+/// defaults.
 #include <array>
 #include <limits>
 #include <optional>
@@ -20,79 +22,87 @@
 
 namespace bevel::nodes {
 
+/// One [[camera]].
 struct CameraViewConfig {
-  int camera = 0;
-  camera::PlanarViewConfig view;
-  // In its place where the camera has a `calibration`: a file of bevel-calibrate.
+  int camera = 0;                 ///< camera number
+  camera::PlanarViewConfig view;  ///< view in a plane
+  /// Replaces the view if the camera has a `calibration`: a file of bevel-calibrate.
   std::optional<camera::CameraModel> calibrated;
-  camera::TrackerConfig tracker;
-  // Whether the tangent of the shaft's end goes out on TIP_HEADING. Off by default: beside the positions of the same
-  // frames it brings the estimate next to nothing (docs/estimator.md), and to who does not know that it is the shaft's
-  // it is a wrong heading, by the slip angle. On where the estimate may have to start deep in the tissue.
+  camera::TrackerConfig tracker;  ///< settings of the tip tracker
+  /// Whether the tangent of the shaft's end is published on TIP_HEADING. Off by default: given the positions of the
+  /// same frames it barely improves the estimate (docs/estimator.md), and a subscriber that takes it for the heading of
+  /// the tip makes an error of the slip angle. Enable it if the estimate may have to start deep in the tissue.
   bool headings = false;
-  // By how much the stamps of its frames are late, as bevel-calibrate --latency finds it; taken off by bevel-camera
-  // where frames are live (source.kind device or stream).
+  /// Latency of the time stamps of the frames, s, as bevel-calibrate --latency measures it. bevel-camera subtracts it
+  /// from live frames (source.kind device or stream).
   double latency_s = 0;
-  int width_px = 640;  // of the rig's rendered picture; of a calibrated camera those of its calibration
-  int height_px = 480;
+  /// Width and height of the rig's rendered image, px; a calibrated camera has those of its calibration.
+  int width_px = 640;
+  int height_px = 480;  ///< height, px
 };
 
-// A sensor in the simulated needle that tells the tip's heading, [rig.heading].
+/// Sensor in the simulated needle that measures the heading of the tip, [rig.heading].
 struct HeadingSensorConfig {
-  double sd_rad = 0;  // to either side; 0: there is none
-  double rate_hz = 30;
-  int camera = 15;  // the number that it goes by in TIP_HEADING
+  double sd_rad = 0;    ///< standard deviation in both lateral directions, rad; 0: no sensor
+  double rate_hz = 30;  ///< rate of the measurements, Hz
+  int camera = 15;      ///< camera number in TIP_HEADING
 };
 
-// Limit switches of a simulated drive, closed at and beyond; mm or rad from where the axis stands at the start, in its
-// direction. Infinite: none.
+/// Limit switches of a simulated drive, closed at and beyond a position. Positions in mm or rad from the start, in the
+/// direction of the axis; infinite: none.
 struct LimitSwitchConfig {
-  double min_unit = -std::numeric_limits<double>::infinity();
-  double max_unit = std::numeric_limits<double>::infinity();
+  double min_unit = -std::numeric_limits<double>::infinity();  ///< position of the lower switch, mm or rad
+  double max_unit = std::numeric_limits<double>::infinity();   ///< position of the upper switch, mm or rad
 };
 
+/// Settings of the simulated rig, [rig].
 struct RigConfig {
-  // Of the simulated needle: [rig.needle], [[rig.effect]]s, [[rig.discrepancy]]s and [rig.variation], or the model file
-  // `model`; unlike [needle] and the rest at the top, which are what the software believes. Without [rig.needle] it is
-  // [needle], but nothing else is ever taken over. Unknowns of single recordings are as in the effect's own table; time
-  // counts from the start. What the insertion has of its own is drawn from the variation with `seed`.
+  /// Parameters of the simulated needle: [rig.needle], [[rig.effect]]s, [[rig.discrepancy]]s and [rig.variation], or
+  /// the model file `model`; [needle] and the other top-level sections describe what the software assumes. Without
+  /// [rig.needle] the parameters are those of [needle]; nothing else is taken over. Unknowns of single recordings are
+  /// as in the effect's own table; time counts from the start. The insertion-specific parameters are drawn from the
+  /// variation with `seed`.
   model::NeedleParameters truth;
-  std::vector<io::EffectEntry> effects;
-  std::vector<model::DiscrepancyCurve> discrepancies;
-  model::Variation variation;
-  // [rig.beam]: the needle is a beam in elastic tissue instead; of the effects those of cameras act on it.
+  std::vector<io::EffectEntry> effects;                ///< effects of the simulated needle
+  std::vector<model::DiscrepancyCurve> discrepancies;  ///< discrepancy terms of the simulated needle
+  model::Variation variation;                          ///< distribution of the insertion-specific parameters
+  /// Beam in elastic tissue that replaces the needle, [rig.beam]; only effects on camera images act on it.
   std::optional<model::BeamPlantConfig> beam;
-  double roll_error_rad = 0;  // the bevel's true roll at the start; the software believes zero
-  std::string frames_socket = "/tmp/bevel-rig-frames.sock";
-  double frame_rate_hz = 30;
-  HeadingSensorConfig heading;
-  std::array<LimitSwitchConfig, stepper::kAxes> limit_switches;
-  double noise_gray = 2;
-  double blur_px = 0.8;
-  std::int64_t seed = 1;
+  double roll_error_rad = 0;  ///< true roll of the bevel at the start, rad; the software assumes zero
+  std::string frames_socket = "/tmp/bevel-rig-frames.sock";      ///< path of the socket with the frames
+  double frame_rate_hz = 30;                                     ///< frame rate, Hz
+  HeadingSensorConfig heading;                                   ///< sensor for the heading of the tip
+  std::array<LimitSwitchConfig, stepper::kAxes> limit_switches;  ///< limit switches of each axis
+  double noise_gray = 2;                                         ///< standard deviation of the image noise, grey levels
+  double blur_px = 0.8;                                          ///< standard deviation of the lens blur, px
+  std::int64_t seed = 1;                                         ///< seed of noise and variation
 };
 
+/// Content of a system file.
 struct SystemConfig {
-  std::string lcm_url;  // empty: LCM's default, or LCM_DEFAULT_URL
-  std::string can = "unix:/tmp/bevel-rig-can.sock";
-  bool realtime = false;  // SCHED_FIFO and locked memory for controller and stepper, where the system permits
-  // What the software believes: [needle], [[effect]]s, [[discrepancy]]s and [variation], or the model file `model` at
-  // the top of the file. Of the effects, estimator (estimator.effects) and controller have those that are known before
-  // an insertion; the variation is in the estimator's prior.
+  std::string lcm_url;                               ///< LCM provider; empty: LCM's default, or LCM_DEFAULT_URL
+  std::string can = "unix:/tmp/bevel-rig-can.sock";  ///< address of the bus (can::open_bus())
+  bool realtime = false;  ///< SCHED_FIFO and locked memory for controller and stepper, if the system permits them
+  /// Parameters that the software assumes: [needle], [[effect]]s, [[discrepancy]]s and [variation], or the model file
+  /// `model` at the top of the file. Estimator (estimator.effects) and controller use the effects that are known before
+  /// an insertion; the variation is part of the estimator's prior.
   model::NeedleParameters needle;
-  std::vector<io::EffectEntry> effects;
-  std::vector<model::DiscrepancyCurve> discrepancies;
-  io::LiveEffects live_effects;
-  estimator::EstimatorConfig estimator;
-  controller::ControllerConfig controller;
-  stepper::StepperConfig stepper;
-  camera::SourceConfig source;
-  std::vector<CameraViewConfig> cameras;
-  RigConfig rig;
-  std::string text;  // the file as read, for the CONFIG channel
+  std::vector<io::EffectEntry> effects;                ///< effects of the assumed model
+  std::vector<model::DiscrepancyCurve> discrepancies;  ///< discrepancy terms of the assumed model
+  io::LiveEffects live_effects;                        ///< effects that estimator and controller use
+  estimator::EstimatorConfig estimator;                ///< settings of the estimator
+  controller::ControllerConfig controller;             ///< settings of the controller
+  stepper::StepperConfig stepper;                      ///< settings of the stepper driver
+  camera::SourceConfig source;                         ///< source of the frames
+  std::vector<CameraViewConfig> cameras;               ///< cameras
+  RigConfig rig;                                       ///< settings of the simulated rig
+  std::string text;                                    ///< text of the file, for the CONFIG channel
 };
 
-// Throws io::ConfigError with every fault of the file.
+/// Reads a system file.
+/// @param path path of the file
+/// @return configuration
+/// @throws io::ConfigError listing every fault of the file
 SystemConfig load_system_config(const std::string& path);
 
 }  // namespace bevel::nodes

@@ -1,22 +1,30 @@
 // SPDX-License-Identifier: MIT
 #pragma once
-// The tracker is written once, for a needle that comes in at the top, runs down and is a few pixels wide. This turns
-// and shrinks other pictures that way: canonical (col, row) against picture (u, v).
+/// \file
+/// Rotation and reduction of images to canonical coordinates (col, row), in which the needle enters at the top, runs
+/// down and is a few pixels wide. The tracker is implemented only for these.
 #include <opencv2/core.hpp>
 
 #include <bevel/drivers/camera/tracker_config.hpp>
 
 namespace bevel::camera {
 
+/// Maps between an image (u, v) and canonical coordinates (col, row).
 class Canonical {
  public:
-  /// `shrink`: pixels of the picture to a canonical one, along each axis.
+  /// Creates the mapping.
+  /// @param side    side of the image through which the needle enters
+  /// @param picture size of the image, px
+  /// @param shrink  pixels of the image in a canonical pixel, along each axis
   Canonical(EntrySide side, cv::Size picture, int shrink = 1)
       : side_(side), shrink_(shrink), picture_(picture.width / shrink, picture.height / shrink) {}
 
-  /// Size of the turned picture.
+  /// @return size of the canonical image, px
   cv::Size size() const { return sideways() ? cv::Size(picture_.height, picture_.width) : picture_; }
 
+  /// Converts a point.
+  /// @param pixel pixel (u, v) of the image
+  /// @return canonical (col, row)
   cv::Point2d to_canonical(const cv::Point2d& pixel) const {
     const cv::Point2d p((pixel.x + 0.5) / shrink_ - 0.5, (pixel.y + 0.5) / shrink_ - 0.5);
     switch (side_) {
@@ -32,18 +40,26 @@ class Canonical {
     return p;
   }
 
+  /// Converts a point back.
+  /// @param c canonical (col, row)
+  /// @return pixel (u, v) of the image
   cv::Point2d to_picture(const cv::Point2d& c) const {
     const cv::Point2d p = turned_back(c);
     return {(p.x + 0.5) * shrink_ - 0.5, (p.y + 0.5) * shrink_ - 0.5};
   }
 
+  /// Converts a direction.
+  /// @param d canonical (col, row)
+  /// @return direction (u, v) in the image, of unchanged length
   cv::Vec2d direction_to_picture(const cv::Vec2d& d) const {
     const cv::Point2d moved = turned_back({d[0], d[1]}) - turned_back({0.0, 0.0});
     return {moved.x, moved.y};
   }
 
-  /// The canonical rectangle `rect` of `picture`, turned and shrunk. Shares memory with it where there is nothing to
-  /// do.
+  /// Extracts a part of an image in canonical orientation and scale.
+  /// @param picture image
+  /// @param rect    canonical rectangle
+  /// @return canonical image; shares memory with `picture` if no conversion is needed
   cv::Mat crop(const cv::Mat& picture, const cv::Rect& rect) const;
 
  private:

@@ -1,7 +1,8 @@
 // SPDX-License-Identifier: MIT
 #pragma once
-// Decodes image files and JPEG frames to brightness. All programs and tests decode with these functions, since a plain
-// call of OpenCV's imread() rotates the image by its EXIF orientation and divides 16-bit samples by 256.
+/// \file
+/// Decoding of image files and JPEG frames to brightness. All programs and tests decode with these functions, since a
+/// plain call of OpenCV's imread() rotates the image by its EXIF orientation and divides 16-bit samples by 256.
 #include <cstdint>
 #include <filesystem>
 #include <opencv2/core.hpp>
@@ -27,10 +28,15 @@ struct DecodedImage {
 DecodedImage decode_gray(std::span<const uint8_t> bytes, int least_bits = 8);
 
 /// Reads and decodes a file, as decode_gray() does.
+/// @param file       path of the file
+/// @param least_bits bits in use at least, 8 to 16
+/// @return the image; `gray` is empty if the image cannot be read or decoded
 DecodedImage read_gray(const std::filesystem::path& file, int least_bits = 8);
 
-/// States that an image carries an orientation tag and that it is ignored; empty if `orientation` is 1.
-/// @param name the file or device, for the message
+/// States that an image carries an orientation tag and that it is ignored.
+/// @param name        the file or device, for the message
+/// @param orientation orientation tag, 1 to 8
+/// @return remark; empty if `orientation` is 1
 std::string orientation_remark(const std::string& name, int orientation);
 
 }  // namespace bevel::camera

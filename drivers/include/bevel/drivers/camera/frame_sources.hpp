@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: MIT
 #pragma once
-// The adapters behind make_frame_source(); include frame_source.hpp instead unless you are a test.
+/// \file
+/// Adapters behind make_frame_source(). Only tests include this file; programs include frame_source.hpp.
 #include <filesystem>
 #include <functional>
 #include <opencv2/videoio.hpp>
@@ -15,13 +16,17 @@
 
 namespace bevel::camera {
 
-/// Images of a folder in natural order; every readable image extension, nothing else. A folder that was recorded has a
-/// frames.csv (frame_recorder.hpp): its order, stamps, numbers and cameras are those.
+/// Reads the images of a folder in natural order: all files with a readable image extension. In a recorded folder,
+/// frames.csv (frame_recorder.hpp) determines order, time stamps, numbers and cameras.
 class FolderSource : public FrameSource {
  public:
+  /// Opens a folder.
+  /// @param config settings
+  /// @throws SourceError if the folder cannot be read or has no images
   explicit FolderSource(const SourceConfig& config);
   FrameResult next(std::chrono::milliseconds timeout) override;
   std::string remark() const override { return remark_; }
+  /// @return images in the order in which they are read
   const std::vector<std::filesystem::path>& files() const { return files_; }
 
  private:
@@ -33,10 +38,13 @@ class FolderSource : public FrameSource {
   std::string remark_;
 };
 
-/// Stamped by the container's own times, from its first frame on. A file that ends before the length that it states is
-/// a failure after its last good frame.
+/// Reads a video file, with the container's own times from its first frame on. A file that ends before the length that
+/// it states is a failure after its last good frame.
 class VideoSource : public FrameSource {
  public:
+  /// Opens a video file.
+  /// @param config settings
+  /// @throws SourceError if the file cannot be read
   explicit VideoSource(const SourceConfig& config);
   FrameResult next(std::chrono::milliseconds timeout) override;
   std::string remark() const override { return remark_; }
@@ -52,10 +60,18 @@ class VideoSource : public FrameSource {
   std::string remark_;
 };
 
-/// Video4Linux: the newest frame that the driver calls whole, by its own number and capture time.
+/// Reads a Video4Linux device: the newest frame that the driver reports as complete, with the driver's number and
+/// capture time.
 class DeviceSource : public FrameSource {
  public:
+  /// Opens a device.
+  /// @param config settings
+  /// @throws SourceError if the device cannot be opened
   explicit DeviceSource(const SourceConfig& config);
+  /// Uses an open device, for tests.
+  /// @param config settings
+  /// @param device device
+  /// @param clocks function that reads both clocks
   DeviceSource(const SourceConfig& config, std::unique_ptr<CaptureDevice> device, std::function<ClockPair()> clocks);
   FrameResult next(std::chrono::milliseconds timeout) override;
   std::string remark() const override { return orientation_remark(config_.path, orientation_); }
@@ -71,9 +87,12 @@ class DeviceSource : public FrameSource {
   bool failed_ = false;
 };
 
-/// Raw frames of frame_stream.hpp over a Unix socket.
+/// Reads the raw frames of frame_stream.hpp from a UNIX socket.
 class StreamSource : public FrameSource {
  public:
+  /// Connects to the server.
+  /// @param config settings
+  /// @throws SourceError if the server does not appear in time
   explicit StreamSource(const SourceConfig& config);
   ~StreamSource() override;
   FrameResult next(std::chrono::milliseconds timeout) override;

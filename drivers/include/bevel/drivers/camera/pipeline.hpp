@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: MIT
 #pragma once
-// One source, one tracker per camera: frames in, tip observations out. What bevel-camera wires to LCM.
+/// \file
+/// One source of frames and one tracker per camera, as bevel-camera connects them to LCM.
 #include <chrono>
 #include <cstdint>
 #include <functional>
@@ -17,62 +18,76 @@
 
 namespace bevel::camera {
 
-/// One camera's answer to one frame; field for field what tip_measurement_t and tip_heading_t carry, and what a display
-/// wants beside it.
+/// Result of one camera for one frame: the fields of tip_measurement_t and tip_heading_t, and additional ones for
+/// displays.
 struct TipObservation {
-  int64_t capture_utime = 0;
-  int64_t seq = 0;
-  int32_t camera = 0;
-  TipStatus status = TipStatus::lost;
-  Vector3 position_mm{};          ///< in {A}; zero unless ok
-  Matrix3 information_per_mm2{};  ///< zero unless ok, and along the optical axis
-  /// The tangent of the shaft's centreline at the tip, as this picture shows it (view.hpp); zero unless heading_status
+  int64_t capture_utime = 0;           ///< time of exposure minus latency, us since the epoch
+  int64_t seq = 0;                     ///< number of the frame
+  int32_t camera = 0;                  ///< camera number
+  TipStatus status = TipStatus::lost;  ///< status of the position
+  Vector3 position_mm{};               ///< tip in {A}, mm; zero unless ok
+  Matrix3 information_per_mm2{};       ///< 1/mm^2; zero unless ok, and along the optical axis
+  /// Tangent of the shaft's centreline at the tip, as measured in this image (view.hpp); zero unless heading_status
   /// is ok.
   SeenDirection heading;
-  TipStatus heading_status = TipStatus::lost;
-  cv::Point2d tip_px;  ///< and the rest: only if ok
-  cv::Vec2d direction_px;
-  std::string_view reason;  ///< why not ok; static storage
-  double run_s = 0;         ///< from the frame to this, without waiting for it
+  TipStatus heading_status = TipStatus::lost;  ///< status of the heading
+  cv::Point2d tip_px;                          ///< tip, pixel (u, v); valid only if ok
+  cv::Vec2d direction_px;                      ///< unit vector of the shaft in the image; valid only if ok
+  std::string_view reason;                     ///< reason of a status other than ok; static storage
+  double run_s = 0;                            ///< processing time of the frame, s
 };
 
+/// One camera of a pipeline.
 struct CameraSetup {
-  int32_t camera = 0;
-  std::shared_ptr<const View> view;
-  TrackerConfig tracker;
-  cv::Mat background;      ///< optional picture without a needle
-  int64_t latency_us = 0;  ///< taken off the stamps of its frames: by how much they are late
+  int32_t camera = 0;                ///< camera number
+  std::shared_ptr<const View> view;  ///< geometry of the camera
+  TrackerConfig tracker;             ///< settings of the tracker
+  cv::Mat background;                ///< image without a needle; may be empty
+  int64_t latency_us = 0;            ///< latency of the time stamps of its frames, us; subtracted
 };
 
+/// Counters of a pipeline since construction.
 struct CameraCounters {
-  int64_t frames = 0;
-  int64_t lost_frames = 0;  ///< gaps in seq
-  int64_t stamped_on_arrival = 0;
-  int64_t unknown_camera = 0;  ///< frames of cameras that are not set up; dropped
-  std::array<int64_t, kTipStatuses> by_status{};
-  int64_t headings = 0;  ///< frames with a usable one
+  int64_t frames = 0;                             ///< frames of cameras that are set up
+  int64_t lost_frames = 0;                        ///< gaps in seq
+  int64_t stamped_on_arrival = 0;                 ///< frames without a time of exposure
+  int64_t unknown_camera = 0;                     ///< frames of cameras that are not set up; dropped
+  std::array<int64_t, kTipStatuses> by_status{};  ///< frames by TipStatus
+  int64_t headings = 0;                           ///< frames with a usable heading
 };
 
+/// Tracks the tip in the frames of a source.
 class CameraPipeline {
  public:
-  using Clock = std::function<int64_t()>;  ///< microseconds since the epoch
+  /// Returns the present time, us since the epoch.
+  using Clock = std::function<int64_t()>;
+  /// Result of next().
   using Result = std::variant<TipObservation, FrameTimeout, EndOfFrames, SourceFailure>;
 
-  /// An empty `clock` means that age has no meaning (files). Throws ArgumentError: no camera, the same number
-  /// twice, no view, or a bad tracker configuration, which names the camera.
+  /// Creates a pipeline.
+  /// @param source  source of the frames
+  /// @param cameras cameras
+  /// @param clock   clock; empty if age has no meaning (files)
+  /// @throws ArgumentError if there is no source or camera, a camera number occurs twice, a camera has no view, or a
+  /// tracker
+  ///   configuration is wrong; the message names the camera
   CameraPipeline(std::unique_ptr<FrameSource> source, const std::vector<CameraSetup>& cameras, Clock clock = {});
 
-  /// Waits at most `timeout` for a frame of a camera that is set up and tracks it.
+  /// Waits for a frame of a camera that is set up, and tracks it.
+  /// @param timeout longest wait
+  /// @return observation, or the source's FrameTimeout, EndOfFrames or SourceFailure
   Result next(std::chrono::milliseconds timeout);
 
-  /// Where the estimator expects the tip, in {A}; used once, for the next frame of every camera.
+  /// Sets the tip that the estimator expects; used once, for the next frame of every camera.
+  /// @param position_mm tip in {A}, mm
   void predict(const Vector3& position_mm);
 
-  /// Called with each frame that was tracked and what it showed, for who keeps frames; empty by default.
+  /// Called with each tracked frame and its observation, for recorders; empty by default.
   std::function<void(const cv::Mat& gray, const TipObservation&)> on_tracked;
 
+  /// @return counters since construction
   const CameraCounters& counters() const { return counters_; }
-  /// FrameSource::remark() of its source.
+  /// @return FrameSource::remark() of the source
   std::string source_remark() const { return source_->remark(); }
 
  private:

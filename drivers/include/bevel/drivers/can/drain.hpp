@@ -1,14 +1,20 @@
 // SPDX-License-Identifier: MIT
-// What has arrived on a bus, handed on by its kind.
 #pragma once
+/// \file
+/// Dispatch of everything that has arrived on a bus.
 
 #include <bevel/drivers/can/bus.hpp>
 
 namespace bevel::can {
 
-// At most so many receptions in one call: a bus that never falls silent must not hold whoever reads it.
+/// Largest number of receptions in one call of drain(), so that continuous traffic does not block the caller.
 inline constexpr int kReceptionsPerCall = 256;
 
+/// Receives until the bus has nothing queued, at most kReceptionsPerCall times, and calls one function for each result.
+/// @param bus      bus to receive from
+/// @param on_frame called with each const Frame& of another participant
+/// @param on_echo  called with each const Frame& of this participant that is on the wire
+/// @param on_event called with each BusEvent
 template <class OnFrame, class OnEcho, class OnEvent>
 void drain(Bus& bus, OnFrame on_frame, OnEcho on_echo, OnEvent on_event) {
   for (int i = 0; i < kReceptionsPerCall; ++i) {

@@ -1,8 +1,7 @@
 // SPDX-License-Identifier: MIT
-// A CAN bus without CAN: frames over a Unix socket (SOCK_SEQPACKET) between the processes of one machine, for machines
-// whose kernel has no SocketCAN. A hub, run by the rig, passes each frame to all other clients and echoes it to its
-// sender.
 #pragma once
+/// \file
+/// CAN frames over a UNIX socket (SOCK_SEQPACKET) between the processes of one machine, for kernels without SocketCAN.
 
 #include <cstdint>
 #include <memory>
@@ -17,15 +16,20 @@
 
 namespace bevel::can {
 
+/// Client of a LocalHub.
 class LocalBus final : public SocketBus {
  public:
-  // path: of the hub's socket. A hub that is not there yet is waited for.
-  // Throws DeviceError when the path is empty or too long for a socket address (107 characters).
+  /// Connects to the hub. If the hub does not exist yet, maintain() connects later.
+  /// @param path   path of the hub's socket, 1 to 107 characters
+  /// @param listen identifiers to receive, own echoes included; empty: all
+  /// @throws DeviceError if the path is empty or too long for a socket address
   LocalBus(std::string path, std::span<const std::uint32_t> listen);
 
   SendResult send(const Frame& frame) override;
   Reception receive() override;
-  bool purge() override;  // leaves and joins again; what the hub had already taken in still goes out, so false
+  /// Closes the connection; maintain() opens it again. Frames that the hub has already read are still delivered.
+  /// @return false always
+  bool purge() override;
 
  private:
   bool open() override;
@@ -36,20 +40,30 @@ class LocalBus final : public SocketBus {
   ReadAhead<wire::Packet> arrived_;
 };
 
+/// Passes each frame to all other clients and echoes it to its sender. The simulated rig runs it.
 class LocalHub {
  public:
-  /// Binds the socket; a socket file whose hub has ended is replaced.
-  /// @throws DeviceError if another process serves the path, or if the path names a file that is no socket
+  /// Binds the socket. A socket file whose hub has ended is replaced.
+  /// @param path path of the socket, 1 to 107 characters
+  /// @throws DeviceError if the path is empty or too long for a socket address
+  /// @throws IoError if another process serves the path, if the path names a file that is no socket, or if the socket
+  ///   cannot be served
   explicit LocalHub(const std::string& path);
   ~LocalHub();
   LocalHub(const LocalHub&) = delete;
   LocalHub& operator=(const LocalHub&) = delete;
 
-  void service();                         // passes on all that waits; never blocks
-  void run(const std::stop_token& stop);  // service() until asked to stop: the body of a thread
+  /// Accepts clients and passes on the frames that have arrived. Never blocks.
+  void service();
+  /// Calls service() until a stop is requested: the body of a thread.
+  /// @param stop token of the thread; checked at least every 20 ms
+  void run(const std::stop_token& stop);
+  /// @return file descriptor that is readable when service() has work
   int poll_fd() const { return epoll_fd_; }
+  /// @return number of connected clients
   std::size_t clients() const { return clients_.size(); }
-  std::uint64_t dropped() const { return dropped_; }  // frames for clients that do not read
+  /// @return number of frames lost because the receiving client does not read
+  std::uint64_t dropped() const { return dropped_; }
 
  private:
   void accept_all();

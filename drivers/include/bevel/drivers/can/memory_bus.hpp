@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: MIT
-// A bus inside one process, for tests and simulated time: deterministic, with the faults of a real one on request.
 #pragma once
+/// \file
+/// CAN bus inside one process, for tests and simulated time: deterministic, with the faults of a real bus on request.
 
 #include <cstddef>
 #include <deque>
@@ -14,20 +15,36 @@ namespace bevel::can {
 
 class MemoryBus;
 
-// The wire. Frames arrive at once, in the order sent. It must outlive the buses attached to it.
+/// The wire. Frames arrive immediately, in the order sent. It must outlive the buses attached to it.
 class MemoryNetwork {
  public:
-  // Sees every frame about to go on the wire; may alter it; false loses it (the sender still gets its echo).
+  /// Receives each frame before it is on the wire, and may change it. If it returns false the frame is lost; the sender
+  /// still receives its echo.
   using Tap = std::function<bool(Frame&)>;
 
+  /// Adds a participant.
+  /// @return its bus; this network must outlive it
   std::unique_ptr<MemoryBus> attach();
 
+  /// Sets the function that sees each frame.
+  /// @param tap function, or empty for none
   void set_tap(Tap tap) { tap_ = std::move(tap); }
-  void set_link_up(bool up);        // down: every participant loses what it had queued, and hears link_down
-  void set_acknowledged(bool on);   // off: nobody acknowledges, frames stay in the senders' queues; on: they all go out
-  void raise(BusEvent event);       // as if every controller had reported it
-  void inject(const Frame& frame);  // from a participant that is not there
+  /// Sets the state of the link. If it goes down, each participant loses its queued frames and receives
+  /// BusEvent::link_down.
+  /// @param up true: frames are carried
+  void set_link_up(bool up);
+  /// Sets whether frames are acknowledged. While they are not, they stay in the queues of their senders; afterwards
+  /// they are all sent.
+  /// @param on true: frames are acknowledged
+  void set_acknowledged(bool on);
+  /// Reports an event to each participant, as its controller would.
+  /// @param event event to report
+  void raise(BusEvent event);
+  /// Puts a frame on the wire that comes from none of the participants.
+  /// @param frame frame to deliver
+  void inject(const Frame& frame);
 
+  /// @return true if the link is up
   bool link_up() const { return link_up_; }
 
  private:
@@ -41,9 +58,10 @@ class MemoryNetwork {
   bool acknowledged_ = true;
 };
 
+/// One participant of a MemoryNetwork, created by MemoryNetwork::attach().
 class MemoryBus : public Bus {
  public:
-  static constexpr std::size_t kTransmitQueueFrames = 10;
+  static constexpr std::size_t kTransmitQueueFrames = 10;  ///< capacity of the transmit queue, frames
 
   ~MemoryBus() override;
 
@@ -55,11 +73,12 @@ class MemoryBus : public Bus {
   int poll_fd() const override { return -1; }
   const BusCounters& counters() const override { return counters_; }
 
+  /// @return number of frames that are accepted and not yet on the wire
   std::size_t queued() const { return transmit_.size(); }
 
  private:
   friend class MemoryNetwork;
-  // By MemoryNetwork::attach() alone: without a place on the wire it would hear nothing.
+  // Only MemoryNetwork::attach() creates a bus, since a bus that is not attached receives nothing.
   explicit MemoryBus(MemoryNetwork& network) : network_(&network) {}
   void lose(BusEvent why);
 

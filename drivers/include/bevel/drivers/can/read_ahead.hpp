@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: MIT
-// Datagrams of a socket, fetched several in one system call: in each cycle some ten frames wait, and a command that has
-// just come must not stand behind a call for each of them.
 #pragma once
+/// \file
+/// Reception of several datagrams in one system call.
 
 #include <sys/socket.h>
 
@@ -12,26 +12,35 @@
 
 namespace bevel::can {
 
+/// Reads the datagrams of a socket, up to 16 in one system call. About ten frames arrive in each cycle; one call for
+/// each would delay a command that has just arrived.
 template <class Datagram>
 class ReadAhead {
  public:
+  /// One received datagram.
   struct Message {
-    Datagram data{};
-    std::size_t size = 0;  // as sent: larger than Datagram where it was cut
+    Datagram data{};       ///< payload
+    std::size_t size = 0;  ///< size as sent, bytes; larger than Datagram if the datagram was truncated
+    /// Ancillary data of one std::uint32_t.
     alignas(cmsghdr) std::array<std::byte, CMSG_SPACE(sizeof(std::uint32_t))> control{};
-    msghdr header{};
+    msghdr header{};  ///< header, with flags and ancillary data
   };
 
   ReadAhead() = default;
   ReadAhead(const ReadAhead&) = delete;
   ReadAhead& operator=(const ReadAhead&) = delete;
 
-  // The next one; null where none waits (errno is EAGAIN then) or the socket failed (errno). Never blocks.
+  /// Returns the next datagram. Never blocks.
+  /// @param fd socket to read from
+  /// @return the datagram, valid until the next call; null with errno EAGAIN if none is queued, null with another errno
+  /// if
+  ///   the socket failed
   Message* next(int fd) {
     if (next_ == fetched_ && !fetch(fd)) return nullptr;
     return &messages_.at(next_++);
   }
-  void forget() { next_ = fetched_ = 0; }  // what was fetched from a socket that is closed
+  /// Discards the datagrams that were read from a socket that is closed now.
+  void forget() { next_ = fetched_ = 0; }
 
  private:
   static constexpr std::size_t kAtOnce = 16;

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: MIT
-// What buses over a socket share: it is opened again after a loss, and each loss or return is told once.
 #pragma once
+/// \file
+/// Common part of the buses over a socket: reopening after a loss, and one event for each loss or return.
 
 #include <optional>
 
@@ -8,6 +9,7 @@
 
 namespace bevel::can {
 
+/// Base class of the buses over a socket.
 class SocketBus : public Bus {
  public:
   ~SocketBus() override { close(); }
@@ -21,15 +23,25 @@ class SocketBus : public Bus {
 
  protected:
   SocketBus() = default;
-  virtual bool open() = 0;  // sets fd_
+  /// Opens the socket and sets fd_.
+  /// @return true if the socket is open
+  virtual bool open() = 0;
+  /// Closes the socket.
   void close();
-  void lose(BusEvent why);  // closes, and tells why
+  /// Closes the socket and queues an event.
+  /// @param why event to report
+  void lose(BusEvent why);
+  /// Queues an event; one that is queued already is replaced.
+  /// @param event event to report
   void tell(BusEvent event) { event_ = event; }
+  /// @return true if an event is queued
   bool has_event() const { return event_.has_value(); }
-  Reception take_event();  // nothing if none waits
+  /// Takes the queued event.
+  /// @return the event; Reception::Kind::nothing if none is queued
+  Reception take_event();
 
-  int fd_ = -1;
-  BusCounters counters_;
+  int fd_ = -1;           ///< socket; -1 while closed
+  BusCounters counters_;  ///< counters since construction
 
  private:
   BackOff back_off_;

@@ -1,10 +1,8 @@
 // SPDX-License-Identifier: MIT
-// Talks to the two drives as far as is possible without a drive moving or leaving its NMT state: who is on the bus,
-// does what is sent reach the wire, who are the drives, how evenly do their hearts beat. Pure: time is handed in.
-//
-//   listening --(a master is heard)--> watching, without a frame from us
-//   listening --> asking (SDO: 1000, 1018, 6502, units, 1008; 1017 is set) --> watching --> restoring (1017) --> done
 #pragma once
+/// \file
+/// Check of the bus and the two drives for bevel-check, without moving a drive or changing its NMT state: masters on
+/// the bus, transmission, identity of the drives, regularity of their heartbeats. Uses no clock.
 
 #include <array>
 #include <cstdint>
@@ -19,38 +17,58 @@
 
 namespace bevel::drivers {
 
+/// Measurements of one drive.
 struct DriveMeasured {
-  bool answered = false;
-  std::uint32_t device_type = 0;                // 1000
-  std::array<std::uint32_t, 4> identity{};      // 1018:1-4: vendor, product, revision, serial
-  std::uint32_t modes = 0;                      // 6502
-  stepper::StatedUnits units{};                 // 60A8 to 60AA, 6096, 6091, 6092, 608F
-  std::string name;                             // 1008; empty where the drive has none
-  std::uint32_t heartbeats = 0;                 // heard while watching
-  std::int64_t longest_silence_ns = 0;          // between two of them
-  std::optional<std::uint32_t> refused_object;  // index << 8 | sub, and the code in refusal
-  std::uint32_t refusal = 0;
+  bool answered = false;                    ///< the drive answered an SDO request
+  std::uint32_t device_type = 0;            ///< object 0x1000
+  std::array<std::uint32_t, 4> identity{};  ///< objects 0x1018:1 to 4: vendor, product, revision, serial
+  std::uint32_t modes = 0;                  ///< object 0x6502
+  stepper::StatedUnits units{};             ///< objects 0x60A8 to 0x60AA, 0x6096, 0x6091, 0x6092, 0x608F
+  std::string name;                         ///< object 0x1008; empty if the drive does not have it
+  std::uint32_t heartbeats = 0;             ///< heartbeats received while watching
+  std::int64_t longest_silence_ns = 0;      ///< longest time between two heartbeats, ns
+  /// First object that the drive rejected, as index << 8 | sub-index; empty: none.
+  std::optional<std::uint32_t> refused_object;
+  std::uint32_t refusal = 0;  ///< abort code of the rejection
 };
 
+/// Measurements of the bus and both drives.
 struct BusMeasured {
-  bool open = false;
-  std::optional<std::uint32_t> master_id;  // identifier of a frame that only a master sends
-  bool error_passive = false, bus_off = false, lost = false;
-  std::uint64_t sent = 0, echoed = 0, received = 0;
-  std::int64_t slowest_echo_ns = 0;
-  std::array<DriveMeasured, stepper::kAxes> drives;
+  bool open = false;                       ///< the bus was open
+  std::optional<std::uint32_t> master_id;  ///< identifier of a frame that only a master sends; empty: none was received
+  bool error_passive = false,              ///< the CAN controller was error-passive
+      bus_off = false,                     ///< the CAN controller was bus-off
+      lost = false;                        ///< the link was lost
+  std::uint64_t sent = 0,                  ///< frames accepted by the bus
+      echoed = 0,                          ///< frames on the wire
+      received = 0;                        ///< frames of other participants
+  std::int64_t slowest_echo_ns = 0;        ///< longest time from a frame to its echo, ns
+  std::array<DriveMeasured, stepper::kAxes> drives;  ///< measurements of the insertion and the rotation drive
 };
 
+/// Performs the check.
+///
+///     listening --(a master is received)--> watching, without a frame from the probe
+///     listening --> asking (SDO: 1000, 1018, 6502, units, 1008; 1017 is set) --> watching --> restoring (1017) -->
+///     done
 class BusProbe {
  public:
+  /// Duration of the phase `listening`, ns.
   static constexpr std::int64_t kListen_ns = 400 * stepper::kMs;
+  /// Duration of the phase `watching`, ns.
   static constexpr std::int64_t kWatch_ns = 1500 * stepper::kMs;
 
-  // The bus must outlive the probe and hear everything.
+  /// Creates a probe.
+  /// @param bus    bus; must outlive the probe and receive all identifiers
+  /// @param config settings of the driver, with the node ids
   BusProbe(can::Bus& bus, const stepper::StepperConfig& config);
 
-  void step(std::int64_t now_ns);  // about every millisecond, until done()
+  /// Continues the check. Call it about every millisecond until done().
+  /// @param now_ns steady clock, ns
+  void step(std::int64_t now_ns);
+  /// @return true if the check is complete
   bool done() const { return phase_ == Phase::done; }
+  /// @return measurements so far
   const BusMeasured& measured() const { return measured_; }
 
  private:

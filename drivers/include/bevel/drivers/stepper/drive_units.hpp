@@ -1,5 +1,7 @@
 // SPDX-License-Identifier: MIT
 #pragma once
+/// \file
+/// Units of a drive's velocity and acceleration objects.
 
 #include <cstdint>
 #include <optional>
@@ -20,7 +22,9 @@ struct StatedUnits {
   std::optional<std::uint32_t> gear[2]{};            ///< 0x6091, motor revolutions; shaft revolutions
   std::optional<std::uint32_t> encoder[2]{};         ///< 0x608F, encoder increments; motor revolutions
 
-  /// Returns the member that holds an object, or nullptr if the object states no unit.
+  /// Returns the member that holds an object.
+  /// @param object address of the object
+  /// @return pointer to a member of this, or nullptr if the object states no unit
   std::optional<std::uint32_t>* find(cia301::ObjectAddress object);
 };
 
@@ -32,18 +36,22 @@ struct UnitScales {
 
 /// Result of scales_of(): the scales, or the reason for refusal and the object that causes it.
 struct UnitDecision {
-  UnitScales scales{};
+  UnitScales scales{};  ///< scales; valid if `refusal` is StopReason::none
+  /// Reason of a refusal; StopReason::none: the scales are valid.
   StopReason refusal = StopReason::none;
   cia301::ObjectAddress object{};  ///< of a refusal
   std::uint32_t found = 0;         ///< value of that object; 0 if the drive does not have it
 };
 
-/// Derives the scales of velocity and acceleration from what the drive and the configuration state.
+/// Derives the scales of velocity and acceleration from the drive's unit objects and the configuration.
 ///
 /// Velocities are counts/s if the velocity factor is 1:1 or 0x60A9 names the position's unit per second. Another unit
 /// is converted. A conversion between counts and revolutions needs AxisConfig::counts_per_revolution, because a drive's
-/// objects may keep factory values that do not describe its motor; if both are there they must agree. Everything else
-/// is refused: a wrong unit would move the needle at a wrong speed.
+/// objects may keep factory values that do not describe its motor; if both are available they must agree. Everything
+/// else is rejected: a wrong unit would move the needle at a wrong speed.
+/// @param stated unit objects as read from the drive
+/// @param axis   settings of the axis
+/// @return scales, or the reason of the refusal
 UnitDecision scales_of(const StatedUnits& stated, const AxisConfig& axis);
 
 }  // namespace bevel::stepper

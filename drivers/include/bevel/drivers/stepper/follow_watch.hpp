@@ -1,8 +1,7 @@
 // SPDX-License-Identifier: MIT
-// Whether an axis goes where it is told. An axis that answers with a delay of no more than the allowed lag stands where
-// the integral of the commanded rate has been at some time within that lag; one that stands outside all of these does
-// not follow: it is blocked, runs away, or is driven by somebody else. Pure.
 #pragma once
+/// \file
+/// Detection of an axis that does not follow its commanded rate.
 
 #include <algorithm>
 #include <array>
@@ -12,16 +11,25 @@
 
 namespace bevel::stepper {
 
+/// Checks whether an axis moves as commanded.
+///
+/// An axis whose response delay is at most the allowed lag is at a position that the integral of the commanded rate had
+/// at some time within that lag. An axis outside all of these positions does not follow: it is blocked, runs away, or
+/// is driven by another master. Uses no clock and does not allocate.
 class FollowWatch {
  public:
-  // period_ns: of the calls.
+  /// Creates a watch.
+  /// @param allowed_lag_ns largest allowed delay from a command to the motion, ns
+  /// @param period_ns      period of the calls of follows(), ns
   FollowWatch(std::int64_t allowed_lag_ns, std::int64_t period_ns)
       : window_(std::clamp<std::size_t>(
             static_cast<std::size_t>(allowed_lag_ns / std::max<std::int64_t>(period_ns, 1)) + 1, 2, kRoom)),
         lag_s_(static_cast<double>(allowed_lag_ns) * 1e-9),
         delay_varies_s_(kDelayVaries_periods * static_cast<double>(period_ns) * 1e-9) {}
 
-  // The axis rests at position_unit (mm or rad), and nothing is commanded.
+  /// Starts the watch on a stationary axis without a commanded rate.
+  /// @param now_ns        steady clock, ns
+  /// @param position_unit measured position, mm or rad
   void begin(std::int64_t now_ns, double position_unit) {
     now_ns_ = now_ns;
     anchor_ = position_unit;
@@ -30,13 +38,19 @@ class FollowWatch {
     rates_.fill(0);
   }
 
-  // The rate commanded until now is about to change between two cycles.
+  /// Adds the time since the last call when the commanded rate is about to change between two cycles.
+  /// @param now_ns           steady clock, ns
+  /// @param commanded_unit_s rate commanded until now, mm/s or rad/s
   void advance(std::int64_t now_ns, double commanded_unit_s) {
     told_ += commanded_unit_s * static_cast<double>(now_ns - now_ns_) * 1e-9;
     now_ns_ = now_ns;
   }
 
-  // Each cycle: the rate commanded until now, and where the axis is. False: it does not follow.
+  /// Checks the axis; called once in each cycle.
+  /// @param now_ns           steady clock, ns
+  /// @param commanded_unit_s rate commanded until now, mm/s or rad/s
+  /// @param position_unit    measured position, mm or rad
+  /// @return false if the position is more than 0.05 mm or rad outside the positions commanded within the allowed lag
   bool follows(std::int64_t now_ns, double commanded_unit_s, double position_unit) {
     const double dt_s = static_cast<double>(now_ns - now_ns_) * 1e-9;
     now_ns_ = now_ns;
@@ -50,8 +64,8 @@ class FollowWatch {
       high = std::max(high, history_.at((count_ - i) % kRoom));
     }
     const double outside = stands_ - std::clamp(stands_, low, high);
-    // What must not add up over an insertion: a scale that is not quite right, and changes of rate of which one was
-    // obeyed a little sooner than the next, which shows within the lag.
+    // Two deviations must not accumulate over an insertion: a small scale error, and a delay that differs between two
+    // changes of rate. The effect of the delay is limited to the lag.
     const double scale = kScaleError * std::abs(commanded_unit_s) * dt_s;
     by_changes_ += delay_varies_s_ * std::abs(commanded_unit_s - commanded_unit_s_);
     commanded_unit_s_ = commanded_unit_s;
@@ -62,10 +76,12 @@ class FollowWatch {
     return std::abs(outside) <= kLeast_unit;
   }
 
-  // Integral of the commanded rate since begin().
+  /// @return integral of the commanded rate since begin(), mm or rad
   double commanded_unit() const { return told_; }
 
-  // The largest rate, without its sign, that was commanded in the last cycles; at most within the allowed lag.
+  /// Returns the largest absolute rate that was commanded in the last cycles.
+  /// @param cycles number of cycles; limited to those within the allowed lag
+  /// @return rate, mm/s or rad/s; 0 without a cycle
   double fastest_commanded_unit_s(std::size_t cycles = kRoom) const {
     double fastest = 0;
     for (std::size_t i = 1; i <= std::min({count_, window_, cycles}); ++i)
@@ -73,21 +89,21 @@ class FollowWatch {
     return fastest;
   }
 
-  // What the axis has not yet gone of the way it was told.
+  /// @return commanded travel minus measured travel, mm or rad
   double behind_unit() const { return told_ - stands_; }
 
  private:
   static constexpr std::size_t kRoom = 128;
-  static constexpr double kScaleError = 0.02;  // of a drive's rates against its positions
-  // A command finds its drive in the middle of a cycle, sooner or later by up to half of it.
+  static constexpr double kScaleError = 0.02;  // relative, of a drive's rates compared with its positions
+  // A command reaches its drive at any time of the drive's cycle: the delay varies by half a cycle.
   static constexpr double kDelayVaries_periods = 0.5;
   static constexpr double kLeast_unit = 0.05;  // mm or rad: steps, play, an encoder's noise
 
   std::size_t window_;
   double lag_s_;
-  double delay_varies_s_;                // from a command to its being obeyed
+  double delay_varies_s_;                // variation of the delay from a command to the motion, s
   double commanded_unit_s_ = 0;          // last
-  double by_changes_ = 0;                // what changes of rate may still explain
+  double by_changes_ = 0;                // deviation that changes of rate can still explain, mm or rad
   std::array<double, kRoom> history_{};  // integral of the commanded rate, each cycle
   std::array<double, kRoom> rates_{};    // commanded rate without its sign, each cycle
   std::size_t count_ = 0;

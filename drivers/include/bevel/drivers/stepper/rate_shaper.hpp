@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: MIT
-// From a wanted rate to one that an axis may be asked for: within its rate, acceleration and workspace limits. Pure.
 #pragma once
+/// \file
+/// Limitation of a commanded rate to the rate, acceleration and workspace of an axis.
 
 #include <algorithm>
 #include <cmath>
@@ -10,15 +11,22 @@
 
 namespace bevel::stepper {
 
+/// Limits the rate of one axis. Uses no clock and does not allocate.
 class RateShaper {
  public:
+  /// Creates a shaper at rate 0.
+  /// @param axis settings of the axis: rate limit, acceleration, workspace
   explicit RateShaper(const AxisConfig& axis)
       : rate_limit_(axis.rate_limit_unit_s),
         acceleration_(axis.acceleration_unit_s2),
         min_(axis.position_min_unit),
         max_(axis.position_max_unit) {}
 
-  // wanted_unit_s: finite. position_unit: nothing where it is not known; the workspace is then not applied.
+  /// Returns the rate to command next.
+  /// @param wanted_unit_s wanted rate, mm/s or rad/s; finite
+  /// @param dt_s          time since the last call, s
+  /// @param position_unit measured position, mm or rad; empty if unknown: the workspace is then not applied
+  /// @return rate within the rate, acceleration and workspace limits, mm/s or rad/s
   double step(double wanted_unit_s, double dt_s, std::optional<double> position_unit) {
     double target = std::clamp(wanted_unit_s, -rate_limit_, rate_limit_);
     if (position_unit)
@@ -29,13 +37,16 @@ class RateShaper {
     return rate_;
   }
 
+  /// Sets the rate to 0.
   void reset() { rate_ = 0.0; }
+  /// @return rate returned by the last step(), mm/s or rad/s
   double rate_unit_s() const { return rate_; }
-  bool clamped() const { return clamped_; }  // the last wanted rate was over a limit
+  /// @return true if the last wanted rate exceeded the rate limit or the workspace limit
+  bool clamped() const { return clamped_; }
 
  private:
-  // The rate from which the axis comes to rest within `room`: by a fifth less than the full acceleration, and with a
-  // linear end, as a square root's slope at zero is more than any axis can follow.
+  // Returns the rate from which the axis comes to rest within `room`, at 80 % of the full acceleration. The end is
+  // linear, because no axis can follow the infinite slope of the square root at zero.
   double braking_rate(double room) const {
     constexpr double kLinearEnd_s = 0.05;
     if (room <= 0.0) return 0.0;

@@ -1,5 +1,7 @@
 // SPDX-License-Identifier: MIT
 #pragma once
+/// \file
+/// Check by measurement that a stopped axis comes to rest.
 
 #include <algorithm>
 #include <cmath>
@@ -11,6 +13,7 @@ namespace bevel::stepper {
 struct AxisSample {
   std::int64_t sampled_ns = 0;        ///< steady clock; when the drive took the position
   std::int64_t rate_received_ns = 0;  ///< when the rate was received
+  /// Position, mm or rad.
   double position_unit = 0.0;
   double rate_unit_s = 0.0;         ///< as the drive reports it (0x606C)
   double travel_rate_unit_s = 0.0;  ///< from the newest two positions
@@ -26,6 +29,7 @@ struct AxisSample {
 /// Pure: holds no clock and does not allocate.
 class RestWatch {
  public:
+  /// Result of the check.
   enum class Verdict : std::uint8_t {
     inactive,       ///< begin() was not called
     slowing,        ///< within the expected travel, not stationary yet
@@ -34,12 +38,12 @@ class RestWatch {
   };
 
   /// Starts a watch.
-  /// @param now_ns       when the stop was commanded, steady clock
+  /// @param now_ns       when the stop was commanded, steady clock, ns
   /// @param before       newest measurement before the stop
-  /// @param fastest_unit_s largest speed that the axis may have, as commanded or measured; >= 0
-  /// @param ramp_unit_s2 deceleration that the drive was configured with; > 0
-  /// @param reaction_ns  from the command to the beginning of the ramp
-  /// @param reporting_ns from the end of the ramp to a measurement that shows it
+  /// @param fastest_unit_s largest speed that the axis may have, as commanded or measured, mm/s or rad/s; >= 0
+  /// @param ramp_unit_s2 deceleration that the drive was configured with, mm/s^2 or rad/s^2; > 0
+  /// @param reaction_ns  from the command to the beginning of the ramp, ns
+  /// @param reporting_ns from the end of the ramp to a measurement that shows it, ns
   void begin(std::int64_t now_ns, const AxisSample& before, double fastest_unit_s, double ramp_unit_s2,
              std::int64_t reaction_ns, std::int64_t reporting_ns) {
     verdict_ = Verdict::slowing;
@@ -51,17 +55,22 @@ class RestWatch {
     deadline_ns_ = now_ns + reaction_ns + reporting_ns + std::llround(1e9 * fastest_unit_s / ramp_unit_s2);
   }
 
+  /// Ends the watch; the verdict is Verdict::inactive.
   void end() { verdict_ = Verdict::inactive; }
 
-  /// Moves the origin of the positions: what was at `position_unit` is 0 from now on.
+  /// Moves the origin of the positions.
+  /// @param position_unit position that is 0 from now on, mm or rad
   void set_zero(double position_unit) {
     from_.position_unit -= position_unit;
     last_.position_unit -= position_unit;
     rested_unit_ -= position_unit;
   }
 
-  /// Judges the newest measurement.
+  /// Evaluates the newest measurement.
+  /// @param now_ns  steady clock, ns
+  /// @param sample  newest measurement
   /// @param is_held false if the drive no longer holds the axis: it may be moved by hand once it has come to rest
+  /// @return verdict, which stays does_not_stop once it is
   Verdict check(std::int64_t now_ns, const AxisSample& sample, bool is_held) {
     if (verdict_ == Verdict::inactive || verdict_ == Verdict::does_not_stop) return verdict_;
     if (verdict_ == Verdict::at_rest) {
@@ -71,7 +80,7 @@ class RestWatch {
       return verdict_;
     }
     if (sample.sampled_ns - last_.sampled_ns < kLeastInterval_ns && sample.sampled_ns != last_.sampled_ns)
-      return verdict_;  // too close to the one before to show a rate
+      return verdict_;  // too close to the previous one to determine a rate
     // An axis that has just started is still before the stop has had an effect.
     const bool fresh = sample.sampled_ns > last_.sampled_ns && sample.sampled_ns >= begun_ns_ + reaction_ns_;
     if (fresh && is_stationary(sample)) {
@@ -86,8 +95,11 @@ class RestWatch {
     return verdict_;
   }
 
+  /// @return verdict of the last check()
   Verdict verdict() const { return verdict_; }
-  /// True once the axis should have been measured at rest.
+  /// Returns whether the axis should have been measured at rest.
+  /// @param now_ns steady clock, ns
+  /// @return true if the verdict is still Verdict::slowing after the deadline
   bool is_overdue(std::int64_t now_ns) const { return verdict_ == Verdict::slowing && now_ns > deadline_ns_; }
 
  private:

@@ -1,5 +1,7 @@
 // SPDX-License-Identifier: MIT
 #pragma once
+/// \file
+/// Detection of a wrong scale between commanded and measured travel.
 
 #include <algorithm>
 #include <array>
@@ -17,6 +19,7 @@ namespace bevel::stepper {
 /// Pure: does not allocate.
 class ScaleWatch {
  public:
+  /// Starts the estimation anew.
   void begin() { *this = {}; }
 
   /// Adds one cycle.
@@ -40,7 +43,8 @@ class ScaleWatch {
     path_unit_ += std::abs(travelled);
   }
 
-  /// Returns the estimated scale if it is wrong, else nothing.
+  /// Returns the estimated scale if it is wrong.
+  /// @return measured travel divided by commanded travel; empty if it is not wrong, or before 20 blocks and 1 mm or rad
   std::optional<double> wrong_scale() const {
     if (blocks_ < kLeastBlocks || path_unit_ < kLeastPath_unit) return std::nullopt;
     double residual = squares_, scale = 1.0, standard_error = 0.0;

@@ -1,5 +1,7 @@
 // SPDX-License-Identifier: MIT
 #pragma once
+/// \file
+/// Driver of the insertion and the rotation axis over CANopen.
 
 #include <array>
 #include <cstdint>
@@ -30,108 +32,163 @@ enum class AxisRest : std::uint8_t {
 
 /// Strongest order that a stop has sent to an axis. Each order follows if the one before does not bring the axis to
 /// rest.
-enum class StopOrder : std::uint8_t { none, quick_stop, disable_voltage, nmt_stop };
+enum class StopOrder : std::uint8_t {
+  none,             ///< no order
+  quick_stop,       ///< quick stop
+  disable_voltage,  ///< "disable voltage" by PDO and by SDO
+  nmt_stop          ///< NMT stop
+};
 
+/// Commanded rates of both axes.
 struct MotionSetpoint {
-  std::int64_t age_ns = 0;           // since it was made; more than a cycle below zero is refused
-  bool run = false;                  // false: stop; while the axes are being moved that is a latched quick stop
-  double insertion_rate_mm_s = 0.0;  // + into the tissue
-  double rotation_rate_rad_s = 0.0;
+  std::int64_t age_ns = 0;  ///< age, ns; a value more than a cycle below zero is rejected
+  /// false: stop. While the axes are moving this is a latched quick stop.
+  bool run = false;
+  double insertion_rate_mm_s = 0.0;  ///< insertion rate, mm/s; positive into the tissue
+  double rotation_rate_rad_s = 0.0;  ///< rotation rate, rad/s
 };
 
+/// State of the driver.
 enum class DriverState : std::uint8_t {
-  off,          // no bus, or listening whether somebody else commands the drives
-  configuring,  // also while a drive is not there yet
-  ready,
-  enabled,
-  stopped,  // latched
-  fault,    // latched: drive, configuration or another master at fault (is_fault(reason))
+  off,          ///< no bus, or listening whether another master commands the drives
+  configuring,  ///< the drives are configured; also while a drive is absent
+  ready,        ///< both drives are configured and not enabled
+  enabled,      ///< the axes follow set-points
+  stopped,      ///< latched stop
+  fault,        ///< latched stop; drive, configuration or another master at fault (is_fault(reason))
 };
+/// Returns the name of a state.
+/// @param state state of the driver
+/// @return static string
 const char* to_string(DriverState state);
 
-enum class AxisStatus : std::int8_t { off = 0, ready = 1, enabled = 2, quick_stop = 3, fault = 4 };
+/// State of one axis, as in actuator_state_t.
+enum class AxisStatus : std::int8_t {
+  off = 0,         ///< not operational, or in another state
+  ready = 1,       ///< ready to switch on, or switched on
+  enabled = 2,     ///< operation enabled
+  quick_stop = 3,  ///< quick stop active
+  fault = 4        ///< fault, or fault reaction active
+};
 
-enum class EnableAnswer : std::uint8_t { accepted, not_ready, position_not_trusted };
+/// Answer to StepperDriver::enable().
+enum class EnableAnswer : std::uint8_t {
+  accepted,             ///< the following steps enable the axes
+  not_ready,            ///< the driver is not ready
+  position_not_trusted  ///< a position is not trusted: set_zero() or confirm_position() is required
+};
 
+/// Counters since construction.
 struct DriverCounters {
-  std::uint64_t steps = 0;
-  std::uint64_t overruns = 0;  // step() more than half a period late
-  std::uint64_t setpoints_refused = 0;
-  std::uint64_t setpoints_stale = 0;    // steps in which the rate was forced to zero by age
-  std::uint64_t setpoints_clamped = 0;  // steps with a rate over a limit
-  std::uint64_t held_back = 0;          // frames not sent, as the one before was not on the wire yet
-  std::uint64_t queue_full = 0;
-  std::uint64_t missed_pdos = 0;
-  std::uint64_t malformed = 0;
-  std::uint64_t sdo_ignored = 0;
-  std::uint64_t bus_errors = 0;
-  std::uint64_t purges = 0;
-  std::uint64_t later_stops = 0;          // troubles after the one that is latched
-  std::uint64_t heartbeats_withheld = 0;  // stops that a drive did not confirm
-  std::uint64_t stops_escalated = 0;      // axes that did not slow by their quick stop
+  std::uint64_t steps = 0;                ///< calls of step()
+  std::uint64_t overruns = 0;             ///< calls of step() more than half a period late
+  std::uint64_t setpoints_refused = 0;    ///< set-points not finite, or with an age more than a cycle below zero
+  std::uint64_t setpoints_stale = 0;      ///< steps in which the age of the set-point forced the rate to zero
+  std::uint64_t setpoints_clamped = 0;    ///< steps with a rate over a limit
+  std::uint64_t held_back = 0;            ///< frames not sent, as the previous one was not on the wire yet
+  std::uint64_t queue_full = 0;           ///< frames rejected by the transmit queue
+  std::uint64_t missed_pdos = 0;          ///< SYNCs that were not answered by both PDOs of a drive
+  std::uint64_t malformed = 0;            ///< frames of a wrong length
+  std::uint64_t sdo_ignored = 0;          ///< SDO responses that did not match a request
+  std::uint64_t bus_errors = 0;           ///< error events of the bus
+  std::uint64_t purges = 0;               ///< attempts to discard queued frames
+  std::uint64_t later_stops = 0;          ///< errors after the one that is latched
+  std::uint64_t heartbeats_withheld = 0;  ///< stops that a drive did not confirm
+  std::uint64_t stops_escalated = 0;      ///< axes that did not slow by their quick stop
 };
 
+/// Measured state of both axes, and state of the driver.
 struct AxesReport {
-  std::int64_t sampled_ns = 0;  // clock of step(): the SYNC at which the older of both positions was taken; 0: none yet
-  std::array<AxisStatus, kAxes> status{};
-  double insertion_mm = 0.0;
-  double insertion_rate_mm_s = 0.0;
-  double rotation_rad = 0.0;
-  double rotation_rate_rad_s = 0.0;
-  std::array<bool, kAxes> position_trusted{};
-  std::array<std::uint16_t, kAxes> error_code{};  // last EMCY code or 0x603F
-  std::array<AxisRest, kAxes> rest{};             // in stopped and fault
-  std::array<StopOrder, kAxes> order{};           // in stopped and fault
-  std::array<bool, kAxes> waits_for_boot{};       // in configuring: an NMT reset is sent, the boot-up is awaited
-  bool heartbeat_ended = false;  // in stopped and fault: so that drives that do not confirm the stop end it themselves
-  DriverState state = DriverState::off;
-  Stop stop{};   // latched in stopped and fault; in off and configuring what stands in the way, if known
-  Stop later{};  // the first trouble of a drive or the bus after the latched stop; none if there was none
-  DriverCounters counters{};
+  /// Clock of step(), ns: the SYNC at which the older of both positions was sampled; 0: none yet.
+  std::int64_t sampled_ns = 0;
+  std::array<AxisStatus, kAxes> status{};      ///< state of each axis
+  double insertion_mm = 0.0;                   ///< inserted length from the entry point, mm
+  double insertion_rate_mm_s = 0.0;            ///< insertion rate as the drive reports it, mm/s
+  double rotation_rad = 0.0;                   ///< rotation from the entry point, rad
+  double rotation_rate_rad_s = 0.0;            ///< rotation rate as the drive reports it, rad/s
+  std::array<bool, kAxes> position_trusted{};  ///< false: the drive was not monitored; confirm_position() is required
+  std::array<std::uint16_t, kAxes> error_code{};  ///< last EMCY code or 0x603F
+  std::array<AxisRest, kAxes> rest{};             ///< in stopped and fault
+  std::array<StopOrder, kAxes> order{};           ///< in stopped and fault
+  std::array<bool, kAxes> waits_for_boot{};       ///< in configuring: an NMT reset is sent, the boot-up is awaited
+  /// In stopped and fault: the driver's heartbeat has ended, so that drives that do not confirm the stop end it
+  /// themselves.
+  bool heartbeat_ended = false;
+  DriverState state = DriverState::off;  ///< state of the driver
+  /// Latched stop in stopped and fault; in off and configuring the obstacle, if known.
+  Stop stop{};
+  /// First error of a drive or the bus after the latched stop; StopReason::none if there was none.
+  Stop later{};
+  DriverCounters counters{};  ///< counters since construction
 };
 
-/// Describes the state in one line for the operator: an axis that does not stop first, then the latched stop, what came
-/// after it, and what is awaited. Empty if there is nothing to report. Allocates.
+/// Describes the state in one line for the operator: an axis that does not stop first, then the latched stop, later
+/// errors, and what is awaited. Allocates.
+/// @param report report of StepperDriver::report()
+/// @return text without a line break; empty if there is nothing to report
 std::string describe(const AxesReport& report);
 
-/// Two CiA 402 drives, insertion and rotation, as one needle driver on a can::Bus.
+/// Drives two CiA 402 drives, insertion and rotation, as one needle driver on a can::Bus.
 ///
-///   off --(bus open, nobody else commands)--> configuring --(both drives checked, operational)--> ready
-///   ready --enable()--> enabled --disable()--> ready
-///   ready, enabled --(any trouble)--> stopped or fault, latched: quick stop on both axes until rearm()
+///     off --(bus open, no other master commands)--> configuring --(both drives checked, operational)--> ready
+///     ready --enable()--> enabled --disable()--> ready
+///     ready, enabled --(any error)--> stopped or fault, latched: quick stop on both axes until rearm()
 ///
-/// Nothing moves without enable(). Nothing recovers from a latched stop without rearm() and enable(). A stop counts as
-/// carried out when both axes are measured at rest (RestWatch). An axis that does not slow as its ramp demands gets, in
-/// this order, "disable voltage" (by PDO and by SDO) and NMT stop; the end of our heartbeat, on which drives stop by
-/// themselves, follows where a drive does not confirm or report. Uses no files, clocks or messages.
+/// Nothing moves without enable(). A latched stop ends only by rearm() and enable(). A stop counts as carried out when
+/// both axes are measured at rest (RestWatch). An axis that does not slow as its ramp requires receives, in this order,
+/// "disable voltage" (by PDO and by SDO) and NMT stop. If a drive does not confirm or report, the driver then ends its
+/// heartbeat, on which drives stop by themselves. Uses no files, clocks or messages.
 class StepperDriver {
  public:
-  // bus: must outlive the driver and hear listen_ids(). Throws ArgumentError listing every problem of config.
+  /// Creates the driver in DriverState::off.
+  /// @param bus    bus; must outlive the driver and receive listen_ids()
+  /// @param config settings
+  /// @throws ArgumentError listing every problem of config (problems_of())
   StepperDriver(can::Bus& bus, const StepperConfig& config);
   StepperDriver(const StepperDriver&) = delete;
   StepperDriver& operator=(const StepperDriver&) = delete;
 
+  /// Returns the identifiers that the driver must receive, including those that it sends.
+  /// @param config settings with the node ids
+  /// @return 11-bit identifiers
   static std::vector<std::uint32_t> listen_ids(const StepperConfig& config);
 
-  // One cycle, every config.period_ns. now_ns: steady clock. setpoint: the newest known (hand it in again while its age
-  // grows), or nothing. Does not allocate, lock or block.
+  /// Performs one cycle; call it every config.period_ns. Does not allocate, lock or block.
+  /// @param now_ns   steady clock, ns
+  /// @param setpoint newest set-point (pass it again while its age grows), or empty
   void step(std::int64_t now_ns, const std::optional<MotionSetpoint>& setpoint);
-  // Optional, between steps, when a new set-point has arrived: in profile velocity it is on the bus at once, in cyclic
-  // velocity with the next SYNC. The limits hold as in step().
+  /// Commands a new set-point between steps; optional. In profile velocity it is sent immediately, in cyclic velocity
+  /// with the next SYNC. The limits are those of step().
+  /// @param now_ns   steady clock, ns
+  /// @param setpoint new set-point
   void take(std::int64_t now_ns, const MotionSetpoint& setpoint);
-  // Optional, between steps, when the bus is readable: takes in frames as they arrive. What they ask to be stopped is
-  // told to stop at once, and a command that waited for the echo of the one before goes out, not in the next step.
+  /// Processes received frames between steps, when the bus is readable; optional. An error in them stops the axes
+  /// immediately, and a command that waited for the echo of the previous one is sent before the next step.
+  /// @param now_ns steady clock, ns
   void receive(std::int64_t now_ns);
 
-  EnableAnswer enable();                                  // carried out by the following steps
-  void disable();                                         // the drives ramp down and let go; back to ready
-  void stop_now(StopReason reason, std::int64_t now_ns);  // quick stop, latched, and sent at once
-  bool rearm();             // out of stopped or fault: configure again, reset faults. False: nothing is latched
-  void set_zero();          // both axes are at their zero now
-  void confirm_position();  // the drives' positions still hold, although a drive was out of sight
+  /// Requests that both axes are enabled; the following steps carry it out.
+  /// @return whether the request is accepted
+  EnableAnswer enable();
+  /// Requests that the drives decelerate and release the axes; the state returns to ready.
+  void disable();
+  /// Stops both axes by a quick stop, latched and sent immediately. Does nothing if a stop is latched already.
+  /// @param reason reason of the stop
+  /// @param now_ns steady clock, ns
+  void stop_now(StopReason reason, std::int64_t now_ns);
+  /// Leaves a latched stop: the drives are configured again, and faults are reset.
+  /// @return false if no stop is latched
+  bool rearm();
+  /// Makes the present position of both axes the entry point.
+  void set_zero();
+  /// Accepts the drives' positions as valid although a drive was not monitored.
+  void confirm_position();
 
-  bool command_waits() const { return command_waits_[kInsertion] || command_waits_[kRotation]; }  // for an echo
-  bool moving() const;  // a rate other than zero is commanded
+  /// @return true if a command waits for the echo of the previous one
+  bool command_waits() const { return command_waits_[kInsertion] || command_waits_[kRotation]; }
+  /// @return true if a rate other than zero is commanded
+  bool moving() const;
+  /// @return state of the axes and the driver after the last step
   AxesReport report() const;
 
  private:
@@ -180,10 +237,10 @@ class StepperDriver {
 
   DriverState state_ = DriverState::off;
   Stop stop_{};
-  bool silent_ = false;  // another master was there first: not a frame from us
+  bool silent_ = false;  // another master was active first: send no frame
   bool enable_wanted_ = false;
   bool reset_faults_ = false;        // rearm() was called
-  bool withhold_heartbeat_ = false;  // a drive did not confirm the stop: its own watch over us is to stop it
+  bool withhold_heartbeat_ = false;  // a drive did not confirm the stop: its heartbeat monitoring must stop it
   std::int64_t last_step_ns_ = 0;
   std::int64_t shaped_ns_ = 0;   // when the rates were last shaped
   std::int64_t stopped_ns_ = 0;  // when the stop was latched, or the axes were disabled
@@ -202,8 +259,8 @@ class StepperDriver {
   std::array<bool, kAxes> stop_confirmed_{};
   std::array<std::int64_t, kAxes> next_nmt_stop_ns_{};
   Stop later_{};
-  std::array<bool, kAxes> command_waits_{};  // for the echo of the one before
-  std::array<bool, kAxes> at_limit_{};       // what the statuswords said last
+  std::array<bool, kAxes> command_waits_{};  // for the echo of the previous one
+  std::array<bool, kAxes> at_limit_{};       // limit bit of the newest statuswords
   DriverCounters counters_;
 };
 

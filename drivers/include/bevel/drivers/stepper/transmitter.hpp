@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: MIT
-// Sends through a bus such that no identifier of ours ever has more than one frame waiting: a bus that stalls can then
-// release at most one old command per drive when it returns.
 #pragma once
+/// \file
+/// Transmission with at most one pending frame for each identifier.
 
 #include <array>
 #include <cstdint>
@@ -11,20 +11,42 @@
 
 namespace bevel::stepper {
 
+/// Sends frames through a bus such that no identifier of the master ever has more than one frame pending. A bus that
+/// stalls can then release at most one old command for each drive when it returns.
 class Transmitter {
  public:
+  /// Creates a transmitter for the identifiers of the master: NMT, SYNC, heartbeat, and RPDO1 and SDO request of each
+  /// drive.
+  /// @param bus    bus; must outlive the transmitter
+  /// @param config settings with the node ids
   Transmitter(can::Bus& bus, const StepperConfig& config);
 
-  // False: not accepted, because the previous frame with this identifier is not on the wire yet or the bus refused.
-  // The caller drops the frame, or makes a new one in its next step.
+  /// Sends a frame, unless the previous frame with this identifier is not on the wire yet.
+  /// @param frame  frame with an identifier of the master
+  /// @param now_ns steady clock, ns
+  /// @return false if the frame was not accepted; the caller drops it, or creates a new one in its next step
   bool send(const can::Frame& frame, std::int64_t now_ns);
+  /// Records that a frame is on the wire.
+  /// @param frame echo received from the bus
   void on_echo(const can::Frame& frame);
-  bool waits_for_echo(std::uint32_t id) const;  // a frame with this identifier was accepted and is not on the wire yet
-  void forget();                                // after the queue was lost: nothing is outstanding any more
+  /// Returns whether a frame was accepted and is not on the wire yet.
+  /// @param id identifier
+  /// @return true if a frame with this identifier is pending
+  bool waits_for_echo(std::uint32_t id) const;
+  /// Drops all pending frames, after the queue of the bus was lost.
+  void forget();
 
-  bool is_ours(std::uint32_t id) const;  // an identifier that only the master of these drives sends
+  /// Returns whether only the master of these drives sends an identifier.
+  /// @param id identifier
+  /// @return true for the identifiers of the constructor
+  bool is_ours(std::uint32_t id) const;
+  /// Returns the age of the oldest pending frame.
+  /// @param now_ns steady clock, ns
+  /// @return age, ns; 0 if none is pending
   std::int64_t longest_wait_ns(std::int64_t now_ns) const;
+  /// @return number of frames that the bus rejected since the last one it accepted
   int refused_in_a_row() const { return refused_in_a_row_; }
+  /// @return number of frames not sent because the previous one with the identifier was pending
   std::uint64_t held_back() const { return held_back_; }
 
  private:

@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: MIT
 #pragma once
-// Frames to any number of clients over a Unix socket, in the format of bevel/drivers/camera/frame_stream.hpp. publish()
-// only copies the picture and returns; a thread writes. A client that reads slowly loses frames (their seq shows the
-// gap) and nobody else notices.
+/// \file
+/// Server of frames for any number of clients over a UNIX socket, in the format of
+/// bevel/drivers/camera/frame_stream.hpp.
 #include <atomic>
 #include <cstdint>
 #include <memory>
@@ -16,9 +16,12 @@
 
 namespace bevel::rig {
 
+/// Sends frames to its clients. publish() only copies the image and returns; a thread writes. A client that reads
+/// slowly loses frames (their seq shows the gap) without an effect on other clients.
 class FrameServer {
  public:
-  /// Binds the socket; a socket file whose server has ended is replaced.
+  /// Binds the socket. A socket file whose server has ended is replaced.
+  /// @param socket_path path of the socket
   /// @throws IoError if \p socket_path is too long or names a file that is no socket, if another process
   ///   serves it, or if it cannot be bound
   explicit FrameServer(const std::string& socket_path);
@@ -26,10 +29,14 @@ class FrameServer {
   FrameServer(const FrameServer&) = delete;
   FrameServer& operator=(const FrameServer&) = delete;
 
-  /// Throws ArgumentError unless frame.gray is CV_8UC1 and of an allowed size.
+  /// Sends a frame to all clients.
+  /// @param frame frame
+  /// @throws ArgumentError unless frame.gray is CV_8UC1 and of an allowed size
   void publish(const camera::Frame& frame);
 
-  int64_t dropped() const { return dropped_; }  ///< frames times clients
+  /// @return number of frames lost, summed over the clients
+  int64_t dropped() const { return dropped_; }
+  /// @return number of connected clients
   int clients() const { return clients_; }
 
  private:

@@ -1,5 +1,7 @@
 // SPDX-License-Identifier: MIT
 #pragma once
+/// \file
+/// Differences between the drives of several makers and the simulated drive.
 
 #include <cstdint>
 #include <map>
@@ -9,19 +11,26 @@
 
 namespace bevel::rig {
 
-/// How a maker's drive differs from the simulated drive's own way. The values are those of public manuals and issue
-/// trackers; each difference is a case that a master must handle or refuse.
+/// Deviations of a maker's drive from the default behaviour of the simulated drive. The values are those of public
+/// manuals and issue trackers. A master must handle or reject each deviation.
 struct DriveDialect {
-  double boot_s = 0.0;  ///< from a reset to the boot-up message; a reset meanwhile begins the boot anew
+  /// Time from a reset to the boot-up message, s; a reset in between restarts the boot.
+  double boot_s = 0.0;
   /// Unit of velocities and accelerations, coded as 0x60A9, of a drive without 0x6096; 0: position units per second,
   /// scaled by 0x6096.
   std::uint32_t velocity_unit = 0;
-  bool states_unit = true;                         ///< false: the unit is fixed, and no object states it
-  bool needs_bit_30 = false;                       ///< of the COB-ID of a TPDO
-  bool rejects_bit_30 = false;                     ///< of any COB-ID
-  bool shows_mode_only_enabled = false;            ///< 0x6061 is 0 before
-  std::vector<ObjectDictionary::Key> lacks;        ///< objects that it does not have
-  std::map<ObjectDictionary::Key, Abort> rejects;  ///< objects whose writing it aborts, and how
+  /// false: the unit is fixed, and no object states it.
+  bool states_unit = true;
+  /// A write to the COB-ID of a TPDO is accepted only with bit 30.
+  bool needs_bit_30 = false;
+  /// A write to any COB-ID is rejected with bit 30.
+  bool rejects_bit_30 = false;
+  /// 0x6061 is 0 while the drive is not enabled.
+  bool shows_mode_only_enabled = false;
+  /// Objects that the drive does not have.
+  std::vector<ObjectDictionary::Key> lacks;
+  /// Objects that cannot be written, with the abort code.
+  std::map<ObjectDictionary::Key, Abort> rejects;
 };
 
 }  // namespace bevel::rig

@@ -1,9 +1,8 @@
 // SPDX-License-Identifier: MIT
-// A CiA 402 stepper drive that exists only as a program: it answers on a can::Bus as a real one would and gives the
-// plant the motion of its shaft. CANopen here is written from the device's side and shares nothing but the frame and
-// the bus with drivers/src/stepper, so that each checks the other. Modes: profile velocity (3), homing (6), cyclic
-// synchronous velocity (9). Its objects are in factory_dictionary.cpp, and for others in bevel_drive.eds.
 #pragma once
+/// \file
+/// Simulated CiA 402 stepper drive. It answers on a can::Bus and moves the plant. Its CANopen is implemented from the
+/// device's side and shares only frame and bus with drivers/src/stepper, so that each checks the other.
 
 #include <array>
 #include <cstdint>
@@ -21,42 +20,72 @@
 
 namespace bevel::rig {
 
+/// Settings of a simulated drive.
 struct SimulatedDriveConfig {
-  std::uint8_t node_id = 1;
-  double counts_per_unit = 2000.0;  // encoder increments to a mm or rad, for position_unit() only
-  double following_time_s = 0.004;  // lag of the shaft behind the demand
-  Identity identity{};
-  LimitSwitches switches{};  // in increments of the shaft, which stands at 0 when the drive is made
-  DriveDialect dialect{};
+  std::uint8_t node_id = 1;  ///< node id, 1..127
+  /// Encoder increments in one mm or rad, used by position_unit() and velocity_unit_s() only.
+  double counts_per_unit = 2000.0;
+  double following_time_s = 0.004;  ///< lag of the shaft behind the demand, s
+  Identity identity{};              ///< identity objects
+  LimitSwitches switches{};         ///< positions in increments of the shaft, which starts at 0
+  DriveDialect dialect{};           ///< deviations of a maker's drive
 };
 
-enum class NmtState : std::uint8_t { stopped = 0x04, operational = 0x05, pre_operational = 0x7F };
+/// NMT states, coded as in a heartbeat.
+enum class NmtState : std::uint8_t {
+  stopped = 0x04,         ///< stopped
+  operational = 0x05,     ///< operational
+  pre_operational = 0x7F  ///< pre-operational
+};
 
+/// Simulates one drive. Modes: profile velocity (3), homing (6), cyclic synchronous velocity (9).
+/// factory_dictionary.cpp and, for other tools, bevel_drive.eds list its objects.
 class SimulatedDrive {
  public:
-  // bus: of this drive alone (two drives on one Bus would eat each other's frames); must outlive it.
+  /// Creates a drive with factory settings.
+  /// @param bus    bus of this drive only, since two drives on one Bus would take each other's frames; must outlive it
+  /// @param config settings
   SimulatedDrive(can::Bus& bus, const SimulatedDriveConfig& config);
 
-  // Takes in frames, moves on to now_ns, sends what is due. Call it about every millisecond; the clock is the caller's.
+  /// Processes frames, simulates until now_ns, and sends frames that are due. Call it about every millisecond.
+  /// @param now_ns clock of the caller, ns
   void step(std::int64_t now_ns);
 
-  // True motion of the shaft, for the plant.
+  /// @return true position of the shaft, mm or rad
   double position_unit() const { return motion_.position() / config_.counts_per_unit; }
+  /// @return true velocity of the shaft, mm/s or rad/s
   double velocity_unit_s() const { return motion_.velocity_per_s() / config_.counts_per_unit; }
 
+  /// @return state of the CiA 402 state machine
   PowerStateMachine::State state() const { return power_.state(); }
+  /// @return NMT state
   NmtState nmt_state() const { return nmt_; }
+  /// @return object dictionary
   const ObjectDictionary& objects() const { return od_; }
 
-  // Faults to order.
-  void set_silent(bool silent) { silent_ = silent; }            // its connector is pulled: hears and says nothing
-  void set_pdos_frozen(bool frozen) { pdos_frozen_ = frozen; }  // heartbeat alive, PDOs neither sent nor obeyed
+  /// Simulates a disconnected bus cable: the drive neither receives nor sends.
+  /// @param silent true: disconnected
+  void set_silent(bool silent) { silent_ = silent; }
+  /// Simulates a drive whose heartbeat continues while PDOs are neither sent nor obeyed.
+  /// @param frozen true: frozen
+  void set_pdos_frozen(bool frozen) { pdos_frozen_ = frozen; }
+  /// Simulates a blocked shaft.
+  /// @param blocked true: blocked
   void set_motor_blocked(bool blocked) { motion_.set_blocked(blocked); }
-  void set_power_stage_stuck(bool stuck) { power_stage_stuck_ = stuck; }  // turns on whatever it is ordered
-  // Changes a setting without a frame, as a defect of its memory or another way into the drive would.
+  /// Simulates a power stage that keeps turning regardless of commands.
+  /// @param stuck true: keeps turning
+  void set_power_stage_stuck(bool stuck) { power_stage_stuck_ = stuck; }
+  /// Changes a setting without a frame, as a memory defect or another access to the drive would.
+  /// @param index index of the object
+  /// @param sub   sub-index
+  /// @param value new value
+  /// @throws std::out_of_range if the object does not exist
   void corrupt(std::uint16_t index, std::uint8_t sub, std::uint32_t value);
-  void power_cycle();                          // all settings are lost, and where its zero was; boot-up
-  void raise_fault(std::uint16_t error_code);  // as if a supervision inside the drive had tripped
+  /// Simulates a power cycle: all settings and the position's zero are lost; sends the boot-up message.
+  void power_cycle();
+  /// Simulates a fault that a supervision in the drive detects.
+  /// @param error_code code of the emergency message
+  void raise_fault(std::uint16_t error_code);
 
  private:
   static constexpr std::size_t kPdos = 4;
@@ -106,7 +135,7 @@ class SimulatedDrive {
   PowerStateMachine power_;
   UnitFactors units_;
   Homing homing_;
-  double zero_increments_ = 0.0;  // where on the shaft the objects' positions count from
+  double zero_increments_ = 0.0;  // shaft position of the objects' zero
   double cyclic_target_ = 0.0;    // csv: the demand reaches a new target within 60C2
   double cyclic_ramp_ = 0.0;
   bool at_limit_ = false;
@@ -119,10 +148,10 @@ class SimulatedDrive {
   std::optional<std::int64_t> boots_at_ns_;  // set while it boots
   std::int64_t now_ns_ = 0;
   std::int64_t next_heartbeat_ns_ = 0;
-  std::optional<std::int64_t> master_heard_ns_;  // set once its heartbeat was heard: only then is it watched
+  std::optional<std::int64_t> master_heard_ns_;  // set by its first heartbeat, which starts the monitoring
   bool master_lost_ = false;
   double following_error_s_ = 0.0;
-  std::string upload_;  // what is left of a text that is being sent in segments
+  std::string upload_;  // remaining text of a segmented upload
   bool uploading_ = false;
   std::uint8_t toggle_ = 0;
   std::array<unsigned, kPdos> syncs_{};

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: MIT
-// How far the simulated drive's shaft may go: limit switches stop what moves towards them, software limits (607D) make
-// the demand come to rest on them. Pure; increments and seconds.
 #pragma once
+/// \file
+/// Travel limits of the simulated drive. Units are increments and seconds.
 
 #include <algorithm>
 #include <cmath>
@@ -9,13 +9,19 @@
 
 namespace bevel::rig {
 
+/// Limits the velocity: limit switches stop motion towards them, and software limits (0x607D) make the demand come to
+/// rest at them.
 struct TravelLimits {
-  double low = -std::numeric_limits<double>::infinity();  // software limits, of the demand's position
-  double high = std::numeric_limits<double>::infinity();
-  bool negative_switch = false;  // closed
-  bool positive_switch = false;
+  double low = -std::numeric_limits<double>::infinity();  ///< lower software limit of the demand's position, increments
+  double high = std::numeric_limits<double>::infinity();  ///< upper software limit of the demand's position, increments
+  bool negative_switch = false;                           ///< negative limit switch is closed
+  bool positive_switch = false;                           ///< positive limit switch is closed
 
-  // What remains of a wanted velocity for a demand that stands at `position` and brakes by `ramp` (per s^2, > 0).
+  /// Limits a velocity.
+  /// @param wanted   wanted velocity, increments/s
+  /// @param position position of the demand, increments
+  /// @param ramp     deceleration, increments/s^2; > 0
+  /// @return allowed velocity, increments/s
   double left_of(double wanted, double position, double ramp) const {
     const double up = positive_switch ? 0.0 : braking(high - position, ramp);
     const double down = negative_switch ? 0.0 : braking(position - low, ramp);
@@ -23,8 +29,9 @@ struct TravelLimits {
   }
 
  private:
-  // A square root's slope at zero is more than a ramp can follow, so the velocity falls with the room at the end. Where
-  // the two parts meet the line asks for twice the root's deceleration: with two fifths of the ramp, four fifths of it.
+  // A ramp cannot follow the infinite slope of the square root at zero, so the velocity is proportional to the room at
+  // the end. Where the two parts meet, the line needs twice the deceleration of the root: 0.8 of the ramp with a share
+  // of 0.4.
   static double braking(double room, double ramp) {
     constexpr double kShare = 0.4;
     constexpr double kLinearEnd_s = 0.005;
@@ -32,10 +39,10 @@ struct TravelLimits {
   }
 };
 
-// Where the switches are, in increments of the shaft; none without one. Closed at and beyond.
+/// Positions of the limit switches, increments of the shaft; closed at and beyond. Infinite: no switch.
 struct LimitSwitches {
-  double negative_at = -std::numeric_limits<double>::infinity();
-  double positive_at = std::numeric_limits<double>::infinity();
+  double negative_at = -std::numeric_limits<double>::infinity();  ///< position of the negative switch
+  double positive_at = std::numeric_limits<double>::infinity();   ///< position of the positive switch
 };
 
 }  // namespace bevel::rig

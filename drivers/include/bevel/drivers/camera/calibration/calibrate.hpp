@@ -1,7 +1,8 @@
 // SPDX-License-Identifier: MIT
 #pragma once
-// Sightings of a board into calibrated cameras, in the order of the files: a start (start.cpp), the fit with what is
-// far out left out, pictures held out (held_out.cpp). Pure: no files, no clock.
+/// \file
+/// Calibration of cameras from sightings of a board, in the order of the source files: initial values (start.cpp), fit
+/// without outliers, evaluation by held-out images (held_out.cpp). Uses no files and no clock.
 #include <array>
 #include <cstdint>
 
@@ -10,93 +11,134 @@
 
 namespace bevel::camera {
 
-/// Fewer pictures in air, of one camera, fix no lens.
+/// Least number of images in air of one camera that determine a lens.
 inline constexpr int kFewestPictures = 6;
-/// Fewer corners in a picture are no picture.
+/// Least number of corners of a usable image.
 inline constexpr int kFewestCorners = 8;
 
 /// Two pictures show the same view if the corners differ by less than this share of the image width, RMS. Distortion
 /// and perspective change by less than 1 % over such a displacement, so the second picture adds nothing about the lens.
 inline constexpr double kSameViewShare = 0.01;
-/// Boards whose normals differ by less than this have the same orientation: half of the smallest tilt that is asked
-/// for.
+/// Boards whose normals differ by less than this have the same orientation, degrees: half of the smallest tilt that is
+/// requested.
 inline constexpr double kDistinctTilt_deg = 10.0;
 
+/// An image that is not used.
 struct LeftOut {
-  std::string name, why;
+  std::string name,  ///< name of the shot
+      why;           ///< reason
 };
 
-/// How one picture fared.
+/// Quality of one image.
 struct PictureFigures {
-  std::string name;
-  size_t camera = 0;  ///< place in Calibrated::numbers
-  bool immersed = false;
-  int corners = 0;
-  double rms_px = 0.0;
-  double held_out_rms_px = -1.0;  ///< of pictures that were held out; negative: was not
+  std::string name;       ///< name of the shot
+  size_t camera = 0;      ///< index in Calibrated::numbers
+  bool immersed = false;  ///< the board is behind the wall
+  int corners = 0;        ///< number of corners
+  double rms_px = 0.0;    ///< root mean square of the residuals, px
+  /// Root mean square of the residuals of a held-out image, px; negative: the image was not held out.
+  double held_out_rms_px = -1.0;
 };
 
-/// What two cameras say of the corners of a board that was not fitted, mm.
+/// Triangulation by two cameras of the corners of boards that were not fitted.
 struct TriangulationFigures {
-  int shots = 0, corners = 0;
-  double shape_rms_mm = 0.0;  ///< corners against the board's own shape, wherever it lies
-  /// Of immersed boards, by straight rays of cameras calibrated in air: how far corners are put elsewhere, and against
-  /// the board's shape.
+  int shots = 0,    ///< number of shots
+      corners = 0;  ///< number of corners
+  /// Root mean square distance of the corners from the board's shape, at any pose, mm.
+  double shape_rms_mm = 0.0;
+  /// For immersed boards and straight rays of cameras calibrated in air: displacement of the corners, mm.
   double misplaced_without_wall_mm = 0.0;
+  /// For the same rays: root mean square distance of the corners from the board's shape, mm.
   double shape_without_wall_rms_mm = 0.0;
-  bool immersed = false;
+  bool immersed = false;  ///< the boards are behind the wall
 };
 
+/// Result of a calibration.
 struct Calibrated {
-  std::vector<int> numbers;
-  /// FrameKind::none: {A} is provisional, z down in the first camera's picture, x ahead, origin among the boards.
+  std::vector<int> numbers;  ///< camera numbers
+  /// Calibration with FrameKind::none: {A} is provisional, z down in the first camera's image, x ahead, origin among
+  /// the boards.
   Calibration calibration;
-  Rig rig;
-  RigSd sd;
-  std::vector<Shot> shots;  ///< with what was left out emptied
-  std::vector<Residual> residuals;
-  std::vector<PictureFigures> pictures;
-  std::vector<LeftOut> left_out;
-  std::vector<TriangulationFigures> triangulation;  ///< in air, immersed; where there are two cameras
-  int corners_left_out = 0;
-  std::vector<int> tilts;  ///< by camera: board orientations that differ by kDistinctTilt_deg or more
+  Rig rig;   ///< cameras, walls and boards
+  RigSd sd;  ///< standard deviations
+  /// Shots; sightings that were left out are empty.
+  std::vector<Shot> shots;
+  std::vector<Residual> residuals;       ///< residuals of the fit
+  std::vector<PictureFigures> pictures;  ///< quality of each image
+  std::vector<LeftOut> left_out;         ///< images that are not used
+  /// In air and immersed; with two cameras only.
+  std::vector<TriangulationFigures> triangulation;
+  int corners_left_out = 0;  ///< number of corners rejected as outliers
+  std::vector<int> tilts;    ///< by camera: board orientations that differ by kDistinctTilt_deg or more
 };
 
+/// Input of a calibration.
 struct CalibrationInput {
-  std::vector<int> numbers;        ///< of the cameras, one or two
-  std::vector<cv::Size> sizes_px;  ///< of their pictures
-  std::vector<Shot> shots;         ///< named uniquely; each with one sighting per camera, empty where nothing was found
-  FitOptions options;
+  std::vector<int> numbers;        ///< camera numbers, one or two
+  std::vector<cv::Size> sizes_px;  ///< size of the images of each camera, px
+  /// Shots with unique names; each with one sighting per camera, empty if nothing was detected.
+  std::vector<Shot> shots;
+  FitOptions options;  ///< options of the fit
 };
 
-/// Throws ArgumentError (what is wrong with the input: the thing, the value, what is allowed) or
-/// Error (the fit failed or leaves something undetermined).
+/// Calibrates one or two cameras.
+/// @param board board
+/// @param input sightings
+/// @return calibration with its figures
+/// @throws ArgumentError naming what is wrong with the input, the value and what is allowed
+/// @throws Error if the fit fails or leaves a parameter undetermined
 Calibrated calibrate(const Board& board, const CalibrationInput& input);
 
-/// Numbers of repeated views, by camera: in air, immersed.
+/// Numbers of repeated views by camera: in air, immersed.
 using Copies = std::vector<std::array<int, 2>>;
-/// Empties the sightings that repeat the view of an earlier shot (kSameViewShare) and appends them to `left_out`.
-/// Copies are not independent: they reduce the standard errors without reason, and a copy that is held out is predicted
-/// by the picture that it repeats. views.cpp.
+/// Empties the sightings that repeat the view of an earlier shot (kSameViewShare). Copies are not independent: they
+/// reduce the standard errors without reason, and a held-out copy is predicted by the image that it repeats. views.cpp.
+/// @param input    input of the calibration
+/// @param shots    shots to change
+/// @param left_out receives the images that are left out
+/// @return numbers of copies
 Copies leave_out_copies(const CalibrationInput& input, std::vector<Shot>& shots, std::vector<LeftOut>& left_out);
 
-/// Number of board orientations that one camera sees, each at least kDistinctTilt_deg from the others. Each orientation
-/// gives two constraints on the camera matrix, parallel boards give no more than one of them: Zhang, "A flexible new
-/// technique for camera calibration", PAMI 2000, sections 3.1 and 4. views.cpp.
+/// Counts the board orientations that one camera sees, each at least kDistinctTilt_deg from the others. Each
+/// orientation gives two constraints on the camera matrix, parallel boards give no more than one of them: Zhang, "A
+/// flexible new technique for camera calibration", PAMI 2000, sections 3.1 and 4. views.cpp.
+/// @param shots  shots
+/// @param rig    cameras and boards
+/// @param camera index of the camera
+/// @return number of orientations
 int distinct_tilts(const std::vector<Shot>& shots, const Rig& rig, size_t camera);
 
-/// First guess of everything; start.cpp.
+/// Computes initial values of all parameters; start.cpp.
+/// @param board    board
+/// @param shots    shots
+/// @param sizes_px size of the images of each camera, px
+/// @param options  options
+/// @return initial values
+/// @throws DomainError if no lens or wall fits the images
 Rig start_rig(const Board& board, const std::vector<Shot>& shots, const std::vector<cv::Size>& sizes_px,
               const FitOptions& options);
 
-/// Where a board stands by what one camera saw of it, as if there were no wall: {C} from {B}; start.cpp.
+/// Computes the pose of a board from one sighting, without a wall; start.cpp.
+/// @param board board
+/// @param seen  sighting
+/// @param lens  lens of the camera
+/// @return {C} from {B}
+/// @throws DomainError if the corners determine no pose
 Pose apparent_pose(const Board& board, const Sighting& seen, const Lens& lens);
 
-/// A start for the board of a shot in front of known cameras: {C0} from {B}; start.cpp.
+/// Computes an initial pose of the board in front of known cameras; start.cpp.
+/// @param board board
+/// @param shot  shot
+/// @param rig   cameras and walls
+/// @return {C0} from {B}
+/// @throws ArgumentError if no camera detected the board
 Pose start_board(const Board& board, const Shot& shot, const Rig& rig);
 
-/// Holds every fourth shot in air and every fourth immersed out, fits the others from `rig` on, and fills
-/// held_out_rms_px of `result.pictures`, of its cameras' fit, and its triangulation; held_out.cpp.
+/// Evaluates a calibration by held-out images: every fourth shot in air and every fourth immersed shot. The other shots
+/// are fitted, starting from `rig`; held_out.cpp.
+/// @param board  board
+/// @param input  input of the calibration
+/// @param result calibration; receives held_out_rms_px of the images, that of the cameras, and the triangulation
 void hold_out(const Board& board, const CalibrationInput& input, Calibrated& result);
 
 }  // namespace bevel::camera

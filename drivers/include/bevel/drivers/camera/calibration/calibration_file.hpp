@@ -1,10 +1,11 @@
 // SPDX-License-Identifier: MIT
 #pragma once
-// What bevel-calibrate writes and [[camera]] calibration = "..." reads: YAML as cv::FileStorage has it, so that any
-// program with OpenCV reads it too. Per camera: image_width, image_height, camera_matrix and distortion_coefficients
-// (k1 k2 p1 p2 k3) under OpenCV's own names; rotation_camera_from_A and translation_camera_from_A_mm (p_C = R p_A + t);
-// `wall` where there is one (projection.hpp); `fit`, figures to be read by people. The last line is a checksum of all
-// before it: a file that was cut, or changed by hand, is refused and not half believed.
+/// \file
+/// File that bevel-calibrate writes and [[camera]] calibration = "..." reads: YAML of cv::FileStorage, so that any
+/// program with OpenCV can read it. Per camera: image_width, image_height, camera_matrix and distortion_coefficients
+/// (k1 k2 p1 p2 k3) under OpenCV's names; rotation_camera_from_A and translation_camera_from_A_mm (p_C = R p_A + t);
+/// `wall` if there is one (projection.hpp); `fit`, figures for readers. The last line is a checksum of all lines before
+/// it: a truncated or edited file is rejected.
 #include <string>
 #include <vector>
 
@@ -13,58 +14,91 @@
 
 namespace bevel::camera {
 
-inline constexpr int kCalibrationVersion = 1;
+inline constexpr int kCalibrationVersion = 1;  ///< version of the format
 
-/// What {A} of a calibration is.
+/// Definition of the frame {A} of a calibration.
 enum class FrameKind {
   none,       ///< provisional, of the first camera (calibrate.hpp): not yet the needle's
   fiducial,   ///< from a board at a known place
   insertion,  ///< from a straight insertion
 };
 
-/// How good a camera's fit was; px unless named otherwise.
+/// Quality of the fit of a camera; px unless stated otherwise.
 struct FitFigures {
-  int pictures = 0, corners = 0;
-  double rms_px = 0.0;                            ///< per corner, both components
-  double held_out_rms_px = 0.0;                   ///< on pictures that were not fitted
-  std::array<double, kLensParameters> lens_sd{};  ///< standard deviations; 0 of what was held
+  int pictures = 0,  ///< number of images
+      corners = 0;   ///< number of corners
+  /// Root mean square of the residuals per corner, both components, px.
+  double rms_px = 0.0;
+  /// Root mean square of the residuals of images that were not fitted, px.
+  double held_out_rms_px = 0.0;
+  /// Standard deviations of the lens parameters; 0 for those that were fixed.
+  std::array<double, kLensParameters> lens_sd{};
+  /// Standard deviations of the wall parameters; 0 for those that were fixed.
   std::array<double, kWallParameters> wall_sd{};
 };
 
+/// One camera of a calibration.
 struct CalibratedCamera {
-  CameraModel model;
-  FitFigures fit;
+  CameraModel model;  ///< calibrated camera
+  FitFigures fit;     ///< quality of the fit
 };
 
+/// Content of a calibration file.
 struct Calibration {
-  std::string made_utc;  ///< ISO 8601; told to people, never compared
-  FrameKind frame = FrameKind::none;
-  std::vector<CalibratedCamera> cameras;
+  std::string made_utc;                   ///< time of the calibration, ISO 8601; for readers only
+  FrameKind frame = FrameKind::none;      ///< definition of {A}
+  std::vector<CalibratedCamera> cameras;  ///< cameras
 };
 
-/// what() names the file, the thing, the value and what is allowed.
+/// Wrong calibration file. what() names the file, the item, the value and what is allowed.
 class CalibrationError : public ParseError {
   using ParseError::ParseError;
 };
 
+/// Formats a calibration.
+/// @param calibration calibration
+/// @return text of the file
 std::string to_yaml(const Calibration& calibration);
-/// `name` is the file's, for messages. Throws CalibrationError.
+/// Parses a calibration.
+/// @param text text of the file
+/// @param name name of the file, for messages
+/// @return calibration
+/// @throws CalibrationError if the text is not a valid calibration
 Calibration from_yaml(const std::string& text, const std::string& name);
 
-/// Throws CalibrationError also if the file cannot be read.
+/// Reads a calibration file.
+/// @param path path of the file
+/// @return calibration
+/// @throws CalibrationError if the file cannot be read or is not a valid calibration
 Calibration load_calibration(const std::string& path);
-/// Written beside and renamed, so that no reader meets half of it. Throws CalibrationError.
+/// Writes a calibration file: to a temporary file that is then renamed, so that readers never find a partial file.
+/// @param calibration calibration
+/// @param path        path of the file
+/// @throws CalibrationError if the file cannot be written
 void save_calibration(const Calibration& calibration, const std::string& path);
 
-/// The camera of that number; throws CalibrationError naming those that `name` has.
+/// Returns a camera of a calibration.
+/// @param calibration calibration
+/// @param number      camera number
+/// @param name        name of the file, for messages
+/// @return camera; valid as long as the calibration
+/// @throws CalibrationError naming the camera numbers of the file if `number` is not one of them
 const CalibratedCamera& camera_of(const Calibration& calibration, int number, const std::string& name);
 
-/// `body` with its checksum as the last line; what from_yaml() demands.
+/// Appends the checksum that from_yaml() requires.
+/// @param body text of the file without the last line
+/// @return text of the file
 std::string with_checksum(const std::string& body);
 
+/// Returns the name of a frame definition, as in the file.
+/// @param kind definition
+/// @return static string
 std::string_view name_of(FrameKind kind);
 
-/// Every camera's pose, for a frame {A'} in which p_A = R p_A' + t.
+/// Expresses all cameras in a frame {A'} with p_A = R p_A' + t.
+/// @param R           rotation matrix
+/// @param t_mm        translation, mm
+/// @param calibration calibration to change
 void move_frame(const cv::Matx33d& R, const cv::Vec3d& t_mm, Calibration& calibration);
 
 }  // namespace bevel::camera

@@ -1,45 +1,73 @@
 // SPDX-License-Identifier: MIT
 #pragma once
-// The equations of a camera before a flat wall, once, for doubles and for the jets of automatic differentiation.
-//
-// Lens (Brown 1966, as OpenCV numbers it), at x = X/Z, y = Y/Z, r2 = x^2 + y^2:
-//   s = 1 + k1 r2 + k2 r2^2 + k3 r2^3
-//   x' = s x + 2 p1 x y + p2 (r2 + 2 x^2),  y' = s y + p1 (r2 + 2 y^2) + 2 p2 x y,  u = fx x' + cx,  v = fy y' + cy
-//
-// Wall: the camera stands in air at the origin of {C}; a plane with the unit normal n lies at the distance d along n,
-// behind it glass of the thickness t and the index m_g, then gel of the index m. Light that leaves the camera at
-// the slope tau = tan(angle to n) has in a layer of index m the slope tau / sqrt(m^2 + (m^2 - 1) tau^2) (Snell), so
-// that it meets a point at the depth h behind the glass and at rho = |lateral|^2 beside the foot of the normal where
-//   1 = q [ d + t / S(m_g) + h / S(m) ],   S(m) = sqrt(m^2 + (m^2 - 1) q^2 rho),   q = tau / |lateral|
-// Agrawal et al., "A theory of multi-layer flat refractive geometry", CVPR 2012, have the same as a polynomial. The
-// right side grows with q and is concave, so that Newton's steps from q = 0 come from below and cannot overshoot; q is
-// smooth where the point lies on the normal, tau and |lateral| are not.
+/// \file
+/// Equations of a camera in front of a flat wall, for doubles and for the jets of automatic differentiation.
+///
+/// Lens (Brown 1966, in OpenCV's numbering), at x = X/Z, y = Y/Z, r2 = x^2 + y^2:
+///   s = 1 + k1 r2 + k2 r2^2 + k3 r2^3
+///   x' = s x + 2 p1 x y + p2 (r2 + 2 x^2),  y' = s y + p1 (r2 + 2 y^2) + 2 p2 x y,  u = fx x' + cx,  v = fy y' + cy
+///
+/// Wall: the camera is in air at the origin of {C}. A plane with the unit normal n is at the distance d along n, behind
+/// it glass of the thickness t and the index m_g, then gel of the index m. Light that leaves the camera at the slope
+/// tau = tan(angle to n) has in a layer of index m the slope tau / sqrt(m^2 + (m^2 - 1) tau^2) (Snell). It meets a
+/// point at the depth h behind the glass and at rho = |lateral|^2 from the foot of the normal if
+///   1 = q [ d + t / S(m_g) + h / S(m) ],   S(m) = sqrt(m^2 + (m^2 - 1) q^2 rho),   q = tau / |lateral|
+/// Agrawal et al., "A theory of multi-layer flat refractive geometry", CVPR 2012, state it as a polynomial. The right
+/// side increases with q and is concave, so that Newton's steps from q = 0 come from below and cannot overshoot. q is
+/// smooth for a point on the normal, tau and |lateral| are not.
 #include <array>
 #include <cmath>
 
 namespace bevel::camera {
 
-/// Where each number stands in an array; px, and none.
-enum LensParameter { kFx, kFy, kCx, kCy, kK1, kK2, kP1, kP2, kK3 };
-inline constexpr int kLensParameters = 9;
+/// Index of each lens parameter. Focal lengths and principal point in px; distortion coefficients without a unit.
+enum LensParameter {
+  kFx,  ///< focal length along u, px
+  kFy,  ///< focal length along v, px
+  kCx,  ///< principal point, u, px
+  kCy,  ///< principal point, v, px
+  kK1,  ///< radial coefficient of r^2
+  kK2,  ///< radial coefficient of r^4
+  kP1,  ///< first tangential coefficient
+  kP2,  ///< second tangential coefficient
+  kK3   ///< radial coefficient of r^6
+};
+inline constexpr int kLensParameters = 9;  ///< number of lens parameters
 
-/// Of the normal two components, the third being sqrt(1 - nx^2 - ny^2) > 0: the wall stands before the camera.
-enum WallParameter { kNormalX, kNormalY, kDistance, kIndex };  // none, none, mm, none
-inline constexpr int kWallParameters = 4;
+/// Index of each wall parameter: two components of the unit normal, the distance in mm, the refractive index. The third
+/// component of the normal is sqrt(1 - nx^2 - ny^2) > 0: the wall is in front of the camera.
+enum WallParameter {
+  kNormalX,   ///< x component of the unit normal
+  kNormalY,   ///< y component of the unit normal
+  kDistance,  ///< distance, mm
+  kIndex      ///< refractive index of the gel
+};
+inline constexpr int kWallParameters = 4;  ///< number of wall parameters
 
-/// What is stated of the pane and not fitted.
+/// Properties of the pane that are given and not fitted.
 struct Pane {
-  double thickness_mm = 0.0;
-  double index = 1.52;
+  double thickness_mm = 0.0;  ///< thickness, mm
+  double index = 1.52;        ///< refractive index
 };
 
+/// Returns the value of a number.
+/// @param x number
+/// @return x
 inline double value_of(double x) { return x; }
+/// Returns the value of a jet without its derivatives.
+/// @param x jet
+/// @return value
 template <class Jet>
 double value_of(const Jet& x) {
   return x.a;
 }
 
-/// Distorted from undistorted, in units of the focal length.
+/// Applies the lens distortion, in units of the focal length.
+/// @param lens   parameters indexed by LensParameter
+/// @param x      undistorted X/Z
+/// @param y      undistorted Y/Z
+/// @param seen_x receives the distorted x'
+/// @param seen_y receives the distorted y'
 template <class T>
 void distort(const T* lens, const T& x, const T& y, T& seen_x, T& seen_y) {
   const T r2 = x * x + y * y;
@@ -49,7 +77,11 @@ void distort(const T* lens, const T& x, const T& y, T& seen_x, T& seen_y) {
   seen_y = s * y + lens[kP1] * (r2 + 2.0 * y * y) + lens[kP2] * cross;
 }
 
-/// Pixel of light that arrives from `direction` (in {C}, of any length). False behind the camera.
+/// Computes the pixel of light from a direction.
+/// @param lens      parameters indexed by LensParameter
+/// @param direction direction to the source in {C}, of any length, 3 components
+/// @param pixel     receives u and v, px
+/// @return false if the direction is behind the camera
 template <class T>
 bool direction_to_pixel(const T* lens, const T* direction, T* pixel) {
   if (!(value_of(direction[2]) > 0.0)) return false;
@@ -60,7 +92,12 @@ bool direction_to_pixel(const T* lens, const T* direction, T* pixel) {
   return true;
 }
 
-/// Direction in air (in {C}, not normalised) in which a point of {C} behind the wall is seen. False before the wall.
+/// Computes the direction in air in which a point behind the wall is seen.
+/// @param wall      parameters indexed by WallParameter
+/// @param pane      pane
+/// @param point_mm  point in {C}, mm, 3 components
+/// @param direction receives the direction in {C}, not normalised, 3 components
+/// @return false if the point is in front of the wall, or the wall's parameters are invalid
 template <class T>
 bool direction_through_wall(const T* wall, const Pane& pane, const T* point_mm, T* direction) {
   using std::sqrt;
