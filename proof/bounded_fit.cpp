@@ -3,6 +3,7 @@
 
 #include <Eigen/Cholesky>
 #include <algorithm>
+
 #include <bevel/error.hpp>
 
 namespace bevel::proof {

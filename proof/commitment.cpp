@@ -4,6 +4,7 @@
 #include <openssl/rand.h>
 
 #include <array>
+
 #include <bevel/error.hpp>
 
 namespace bevel::proof {

@@ -2,8 +2,9 @@
 #include "proof/hidden_physics.hpp"
 
 #include <algorithm>
-#include <bevel/error.hpp>
 #include <numbers>
+
+#include <bevel/error.hpp>
 
 namespace bevel::proof {
 namespace {

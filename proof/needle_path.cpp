@@ -3,9 +3,10 @@
 
 #include <Eigen/Geometry>
 #include <algorithm>
-#include <bevel/error.hpp>
 #include <cmath>
 #include <numbers>
+
+#include <bevel/error.hpp>
 
 namespace bevel::proof {
 namespace {

@@ -2,11 +2,12 @@
 #include "proof/score.hpp"
 
 #include <algorithm>
-#include <bevel/error.hpp>
 #include <cmath>
 #include <nlohmann/json.hpp>
 #include <numbers>
 #include <set>
+
+#include <bevel/error.hpp>
 
 namespace bevel::proof {
 

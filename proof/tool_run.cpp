@@ -10,13 +10,14 @@
 
 #include <algorithm>
 #include <array>
-#include <bevel/error.hpp>
 #include <cerrno>
 #include <chrono>
 #include <csignal>
 #include <cstdlib>
 #include <cstring>
 #include <system_error>
+
+#include <bevel/error.hpp>
 
 namespace bevel::proof {
 namespace {

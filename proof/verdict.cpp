@@ -2,11 +2,12 @@
 #include "proof/verdict.hpp"
 
 #include <algorithm>
-#include <bevel/error.hpp>
 #include <cmath>
 #include <filesystem>
 #include <nlohmann/json.hpp>
 #include <set>
+
+#include <bevel/error.hpp>
 
 namespace bevel::proof {
 

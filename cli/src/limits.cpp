@@ -7,7 +7,6 @@
 #include <unistd.h>
 
 #include <algorithm>
-#include <bevel/error.hpp>
 #include <cerrno>
 #include <condition_variable>
 #include <cstring>
@@ -16,6 +15,8 @@
 #include <system_error>
 #include <thread>
 #include <vector>
+
+#include <bevel/error.hpp>
 
 namespace bevel::cli {
 namespace {

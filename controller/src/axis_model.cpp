@@ -2,9 +2,10 @@
 #include <bevel/controller/axis_model.hpp>
 
 #include <algorithm>
-#include <bevel/error.hpp>
 #include <cmath>
 #include <string>
+
+#include <bevel/error.hpp>
 
 namespace bevel::controller {
 namespace {

@@ -6,9 +6,10 @@
 #include <sys/stat.h>
 #include <unistd.h>
 
-#include <bevel/error.hpp>
 #include <cerrno>
 #include <cstring>
+
+#include <bevel/error.hpp>
 
 namespace bevel {
 namespace {

@@ -3,9 +3,10 @@
 
 #include <algorithm>
 #include <array>
-#include <bevel/error.hpp>
 #include <cctype>
 #include <charconv>
+
+#include <bevel/error.hpp>
 
 namespace bevel::io {
 namespace {

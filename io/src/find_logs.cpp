@@ -3,12 +3,13 @@
 
 #include <algorithm>
 #include <array>
-#include <bevel/error.hpp>
 #include <cctype>
 #include <filesystem>
 #include <fstream>
 #include <map>
 #include <set>
+
+#include <bevel/error.hpp>
 
 namespace bevel::io {
 

@@ -2,10 +2,11 @@
 #include <bevel/io/log_writer.hpp>
 
 #include <array>
-#include <bevel/error.hpp>
 #include <cerrno>
 #include <cstring>
 #include <filesystem>
+
+#include <bevel/error.hpp>
 
 namespace bevel::io {
 namespace {

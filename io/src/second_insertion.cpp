@@ -3,9 +3,10 @@
 
 #include <algorithm>
 #include <array>
-#include <bevel/error.hpp>
 #include <cstdio>
 #include <vector>
+
+#include <bevel/error.hpp>
 
 namespace bevel::io {
 

@@ -4,9 +4,10 @@
 #include <openssl/evp.h>
 
 #include <array>
-#include <bevel/error.hpp>
 #include <fstream>
 #include <iterator>
+
+#include <bevel/error.hpp>
 
 namespace bevel::io {
 

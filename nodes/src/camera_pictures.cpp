@@ -2,11 +2,12 @@
 #include <bevel/nodes/camera_pictures.hpp>
 
 #include <algorithm>
-#include <bevel/error.hpp>
 #include <cmath>
 #include <opencv2/imgcodecs.hpp>
 #include <opencv2/imgproc.hpp>
 #include <string>
+
+#include <bevel/error.hpp>
 
 namespace bevel::nodes {
 namespace {

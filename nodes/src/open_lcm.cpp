@@ -2,10 +2,11 @@
 #include <bevel/nodes/open_lcm.hpp>
 
 #include <algorithm>
-#include <bevel/error.hpp>
 #include <cstdio>
 #include <cstdlib>
 #include <sstream>
+
+#include <bevel/error.hpp>
 
 namespace bevel::nodes {
 

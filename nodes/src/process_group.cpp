@@ -6,9 +6,10 @@
 #include <sys/wait.h>
 #include <unistd.h>
 
-#include <bevel/error.hpp>
 #include <csignal>
 #include <cstring>
+
+#include <bevel/error.hpp>
 
 extern char** environ;
 

@@ -6,11 +6,12 @@
 #include <gtest/gtest.h>
 
 #include <Eigen/Geometry>
-#include <bevel/error.hpp>
 #include <cmath>
 #include <limits>
 #include <numbers>
 #include <string>
+
+#include <bevel/error.hpp>
 
 namespace bevel::model {
 namespace {

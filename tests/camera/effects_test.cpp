@@ -4,9 +4,10 @@
 
 #include <gtest/gtest.h>
 
-#include <bevel/error.hpp>
 #include <cstdio>
 #include <string>
+
+#include <bevel/error.hpp>
 
 namespace bevel::test {
 namespace {

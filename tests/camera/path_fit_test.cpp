@@ -4,9 +4,10 @@
 
 #include <gtest/gtest.h>
 
-#include <bevel/error.hpp>
 #include <cmath>
 #include <random>
+
+#include <bevel/error.hpp>
 
 namespace bevel::test {
 namespace {

@@ -2,8 +2,9 @@
 #include <bevel/analysis/close_loop/models.hpp>
 
 #include <algorithm>
-#include <bevel/error.hpp>
 #include <filesystem>
+
+#include <bevel/error.hpp>
 
 namespace bevel::analysis {
 namespace fs = std::filesystem;

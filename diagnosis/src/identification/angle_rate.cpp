@@ -4,8 +4,9 @@
 #include <ceres/ceres.h>
 
 #include <Eigen/Dense>
-#include <bevel/error.hpp>
 #include <cmath>
+
+#include <bevel/error.hpp>
 
 namespace bevel::diagnosis {
 namespace {

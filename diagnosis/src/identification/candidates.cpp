@@ -2,8 +2,9 @@
 #include <bevel/diagnosis/identification/candidates.hpp>
 
 #include <algorithm>
-#include <bevel/error.hpp>
 #include <cmath>
+
+#include <bevel/error.hpp>
 
 namespace bevel::diagnosis {
 namespace {

@@ -1,9 +1,10 @@
 // SPDX-License-Identifier: MIT
 #include <bevel/diagnosis/identification/figures.hpp>
 
-#include <bevel/error.hpp>
 #include <cmath>
 #include <limits>
+
+#include <bevel/error.hpp>
 
 namespace bevel::diagnosis {
 namespace {

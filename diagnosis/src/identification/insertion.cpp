@@ -3,11 +3,12 @@
 
 #include <Eigen/Eigenvalues>
 #include <algorithm>
-#include <bevel/error.hpp>
 #include <cmath>
 #include <limits>
 #include <numbers>
 #include <optional>
+
+#include <bevel/error.hpp>
 
 namespace bevel::diagnosis {
 namespace {

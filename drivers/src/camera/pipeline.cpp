@@ -2,8 +2,9 @@
 #include <bevel/drivers/camera/pipeline.hpp>
 
 #include <algorithm>
-#include <bevel/error.hpp>
 #include <cmath>
+
+#include <bevel/error.hpp>
 
 namespace bevel::camera {
 namespace {

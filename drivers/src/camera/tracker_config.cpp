@@ -1,9 +1,10 @@
 // SPDX-License-Identifier: MIT
 #include <bevel/drivers/camera/tracker_config.hpp>
 
-#include <bevel/error.hpp>
 #include <cmath>
 #include <string>
+
+#include <bevel/error.hpp>
 
 namespace bevel::camera {
 namespace {

@@ -12,11 +12,12 @@
 #include <unistd.h>
 
 #include <algorithm>
-#include <bevel/error.hpp>
 #include <cerrno>
 #include <cstring>
 #include <optional>
 #include <utility>
+
+#include <bevel/error.hpp>
 
 namespace bevel::can {
 namespace {

@@ -2,8 +2,9 @@
 #include <bevel/model/beam/band_ldlt.hpp>
 
 #include <algorithm>
-#include <bevel/error.hpp>
 #include <string>
+
+#include <bevel/error.hpp>
 
 namespace bevel::model {
 

@@ -3,9 +3,10 @@
 
 #include <Eigen/Geometry>
 #include <algorithm>
-#include <bevel/error.hpp>
 #include <cmath>
 #include <sstream>
+
+#include <bevel/error.hpp>
 
 namespace bevel::model {
 namespace {

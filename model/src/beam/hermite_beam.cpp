@@ -2,9 +2,10 @@
 #include <bevel/model/beam/hermite_beam.hpp>
 
 #include <algorithm>
-#include <bevel/error.hpp>
 #include <cmath>
 #include <string>
+
+#include <bevel/error.hpp>
 
 namespace bevel::model {
 namespace {

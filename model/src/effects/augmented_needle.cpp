@@ -2,8 +2,9 @@
 #include <bevel/model/effects/augmented_needle.hpp>
 
 #include <algorithm>
-#include <bevel/error.hpp>
 #include <string>
+
+#include <bevel/error.hpp>
 
 namespace bevel::model {
 namespace {

@@ -2,11 +2,12 @@
 #include <bevel/model/effects/discrepancy.hpp>
 
 #include <algorithm>
-#include <bevel/error.hpp>
 #include <cmath>
 #include <cstdio>
 #include <limits>
 #include <numbers>
+
+#include <bevel/error.hpp>
 
 namespace bevel::model {
 namespace {

@@ -2,6 +2,7 @@
 #include <bevel/model/effects/open_loop.hpp>
 
 #include <algorithm>
+
 #include <bevel/error.hpp>
 
 namespace bevel::model {

@@ -2,11 +2,12 @@
 #include <bevel/rig/camera/needle_renderer.hpp>
 
 #include <algorithm>
-#include <bevel/error.hpp>
 #include <cmath>
 #include <limits>
 #include <opencv2/imgproc.hpp>
 #include <string>
+
+#include <bevel/error.hpp>
 
 namespace bevel::rig {
 namespace {

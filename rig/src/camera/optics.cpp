@@ -2,10 +2,11 @@
 #include <bevel/rig/camera/optics.hpp>
 
 #include <algorithm>
-#include <bevel/error.hpp>
 #include <cmath>
 #include <opencv2/imgproc.hpp>
 #include <string>
+
+#include <bevel/error.hpp>
 
 namespace bevel::rig {
 namespace {

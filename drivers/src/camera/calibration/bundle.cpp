@@ -4,8 +4,9 @@
 #include <ceres/ceres.h>
 #include <ceres/rotation.h>
 
-#include <bevel/error.hpp>
 #include <memory>
+
+#include <bevel/error.hpp>
 
 namespace bevel::camera {
 namespace {
