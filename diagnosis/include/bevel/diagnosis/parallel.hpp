@@ -55,9 +55,10 @@ class Crew {
 };
 
 /// Calls work(i) for each i in [0, count), on the calling thread and on idle threads of its crew.
+///
+/// The first exception that work throws stops further calls. It is thrown again after all threads have ended.
 /// @param count number of calls
 /// @param work callable with a std::size_t argument; called from several threads at a time
-/// @throws the first exception that work throws, after all threads have ended; no further calls start after it
 template <class Work>
 void parallel_for(std::size_t count, Work&& work) {
   std::atomic<std::size_t> next{0};
@@ -96,10 +97,11 @@ void parallel_for(std::size_t count, Work&& work) {
 }
 
 /// Calls work(i) for each i in [0, count) with a new crew.
+///
+/// Exceptions propagate as in the overload without threads.
 /// @param count number of calls
 /// @param threads largest number of threads, the calling thread included
 /// @param work callable with a std::size_t argument; called from several threads at a time
-/// @throws the first exception that work throws, after all threads have ended
 template <class Work>
 void parallel_for(std::size_t count, int threads, Work&& work) {
   Crew crew(threads);

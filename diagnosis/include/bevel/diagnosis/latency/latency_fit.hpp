@@ -19,7 +19,8 @@
 /// has to hold for other errors as well, for example of a tracker with an offset that changes when the bevel rotates
 /// during a stop and then remains. It is therefore a delete-one-group jackknife (Efron and Tibshirani, An Introduction
 /// to the Bootstrap, 1993, ch. 11). The groups are the stretches of measurements between the middles of successive
-/// stops; errors can have any correlation within a group.
+/// stops; errors can have any correlation within a group. Ten groups of equal size replace them if there are fewer than
+/// five.
 ///
 /// The method uses the log up to the first retraction. After a retraction, backlash of the insertion axis is confounded
 /// with latency.

@@ -48,12 +48,12 @@ class Experiments {
   /// confounder's parameters within the existing information.
   /// @param script index into scripts()
   /// @param truth model that generates the recording
-  /// @param rival confounder
+  /// @param rival model that explains the recording instead, after a refit
   /// @return difference in chi2, at least 0; 0 if a model leaves its domain
   double separation(std::size_t script, const Imagined& truth, const Imagined& rival) const;
   /// Selects the motion with the largest separation().
   /// @param truth model that generates the recording
-  /// @param rival confounder
+  /// @param rival model that explains the recording instead, after a refit
   /// @return the motion, the two explanations and the expected difference in chi2
   NextExperiment best(const Imagined& truth, const Imagined& rival) const;
 

@@ -213,16 +213,16 @@ class NeedleSystem final : public inference::System {
   inference::Dataset data_;
   std::vector<inference::Parameter> base_;
   std::vector<inference::Effect> effects_;
-  std::vector<const model::Effect*> physics_;  // of each effect
+  std::vector<const model::Effect*> physics_;  // one per effect
   std::vector<std::uint32_t> variants_;
   std::vector<inference::Nuisance> nuisances_;
   std::vector<inference::NuisanceGroup> groups_;
   std::vector<NeedleCurve> needle_curves_;
   std::vector<inference::Curve> curves_;
-  std::vector<std::shared_ptr<const model::Effect>> curve_physics_;  // parts of the curves, in their order
+  std::vector<std::shared_ptr<const model::Effect>> curve_physics_;  // parts of the curves, in the order of curves_
   bool two_groups_, determines_slip_, headings_;
-  std::vector<double> common_at_mm_;             // depths at which each channel has a common error; none: no groups
-  std::vector<Eigen::MatrixXd> common_columns_;  // of each recording
+  std::vector<double> common_at_mm_;             // depths of the common errors of each channel; empty: one group
+  std::vector<Eigen::MatrixXd> common_columns_;  // one per recording
 };
 
 }  // namespace bevel::diagnosis
