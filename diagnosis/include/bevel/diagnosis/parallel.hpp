@@ -1,7 +1,8 @@
 // SPDX-License-Identifier: MIT
 #pragma once
-// Independent pieces of work on a few threads, and pieces of pieces on those that have nothing to do. Results go where
-// their index says: what comes out does not depend on the number of threads.
+/// @file
+/// Parallel loops with a bounded number of threads. Nested loops use idle threads. Results that are stored by index do
+/// not depend on the number of threads.
 #include <algorithm>
 #include <atomic>
 #include <cstddef>
@@ -14,14 +15,17 @@
 
 namespace bevel {
 
-// How many threads may work at once, for as long as it lives, on behalf of the thread that made it: itself and those
-// that it and they hire. Threads without a crew work alone.
+/// Limits the number of threads of parallel_for() during its lifetime. The limit applies to the thread that constructs
+/// it and to all threads that its loops start, jointly. Loops outside of any crew run on the calling thread alone.
 class Crew {
  public:
+  /// Sets the limit for the calling thread.
+  /// @param threads largest number of threads, the calling thread included; values below 1 count as 1
   explicit Crew(int threads) : spare_(std::max(threads, 1) - 1), before_(current()) { current() = this; }
+  /// Restores the previous limit. Call it on the thread that constructed the crew.
   ~Crew() { current() = before_; }
-  Crew(const Crew&) = delete;
-  Crew& operator=(const Crew&) = delete;
+  Crew(const Crew&) = delete;             ///< not copyable
+  Crew& operator=(const Crew&) = delete;  ///< not copyable
 
  private:
   template <class Work>
@@ -31,7 +35,7 @@ class Crew {
     thread_local Crew* crew = nullptr;
     return crew;
   }
-  // As many of those with nothing to do as there are, at most so many.
+  // Reserves idle threads, no more than `most`. Returns their number.
   std::size_t hire(std::size_t most) {
     int spare = spare_.load();
     while (spare > 0 && most > 0) {
@@ -41,7 +45,7 @@ class Crew {
     return 0;
   }
   void dismiss_one() { ++spare_; }
-  // Whether none of its work was begun before.
+  // Marks the start of a loop. Returns true if no other loop of the crew is running.
   bool begin() { return !begun_.exchange(true); }
   void end() { begun_ = false; }
 
@@ -50,8 +54,11 @@ class Crew {
   Crew* before_;
 };
 
-// Calls work(i) for i in [0, count) on this thread and on those of its crew that have nothing to do; the first
-// exception thrown is thrown again here, once all threads have ended.
+/// Calls work(i) for each i in [0, count), on the calling thread and on idle threads of its crew.
+///
+/// The first exception that work throws stops further calls. It is thrown again after all threads have ended.
+/// @param count number of calls
+/// @param work callable with a std::size_t argument; called from several threads at a time
 template <class Work>
 void parallel_for(std::size_t count, Work&& work) {
   std::atomic<std::size_t> next{0};
@@ -79,17 +86,22 @@ void parallel_for(std::size_t count, Work&& work) {
         run();
         crew->dismiss_one();
       });
-  } catch (const std::system_error&) {  // the system has no more threads: fewer do it
+  } catch (const std::system_error&) {  // no more threads are available: continue with fewer
     for (std::size_t t = others.size(); t < hired; ++t) crew->dismiss_one();
   }
   run();
-  if (outermost) crew->dismiss_one();  // nothing to do until the others have ended
+  if (outermost) crew->dismiss_one();  // idle until the others have ended
   for (auto& other : others) other.join();
-  if (outermost) crew->hire(1), crew->end();  // itself
+  if (outermost) crew->hire(1), crew->end();  // reserves the calling thread again
   if (failure) std::rethrow_exception(failure);
 }
 
-// With a crew of its own.
+/// Calls work(i) for each i in [0, count) with a new crew.
+///
+/// Exceptions propagate as in the overload without threads.
+/// @param count number of calls
+/// @param threads largest number of threads, the calling thread included
+/// @param work callable with a std::size_t argument; called from several threads at a time
 template <class Work>
 void parallel_for(std::size_t count, int threads, Work&& work) {
   Crew crew(threads);

@@ -1,12 +1,14 @@
 // SPDX-License-Identifier: MIT
 #pragma once
-// The identification of Section IV, as printed: kept for comparison, not for use (it differentiates noise).
-//
-// For each insertion cubic polynomials of time are fitted to depth and deflection (and to the axis's insertion, whose
-// derivative is u1); the angle of motion is gamma = asin(dy/dd), (28), with dd the path's increment; its rate is fitted
-// to (17) for lambda1 and lambda2 by nonlinear least squares (lsqcurvefit there, Ceres here), at given k and ell. The
-// same fit of (17) with k as a third unknown is there as well, since the paper does not print k.
-// Planar: the insertions must not turn the shaft.
+/// @file
+/// Implements the identification method of Section IV of the paper, for comparison. It is not recommended for use,
+/// because it differentiates noise.
+///
+/// Cubic polynomials of time are fitted to the depth, the deflection and the actuator insertion of each insertion. The
+/// derivative of the latter is u1. The angle of motion is gamma = asin(dy/dd), Eq. (28), with dd the path's increment.
+/// Its rate is fitted to Eq. (17) for lambda1 and lambda2 at given k and ell, by nonlinear least squares (lsqcurvefit
+/// in the paper, Ceres here). Because the paper does not print k, a fit with k as a third unknown is available. The
+/// method is planar: the insertions must not turn the shaft.
 #include <string>
 #include <vector>
 
@@ -15,16 +17,23 @@
 
 namespace bevel::diagnosis {
 
+/// Result of fit_angle_rate().
 struct AngleRateResult {
-  model::NeedleParameters needle;
-  double rate_rms_rad_s = 0;  // residual of (17) on the polynomials' rate
-  bool converged = false;
-  bool in_domain = false;  // (23), (24), (26): the fit as printed does not ask for it
-  std::string message;     // of the solver
+  model::NeedleParameters needle;  ///< estimates, with the parameters that are not fitted
+  double rate_rms_rad_s = 0;       ///< root mean square residual of Eq. (17) on the polynomials' rate
+  bool converged = false;          ///< whether the solver converged
+  bool in_domain = false;          ///< whether Eqs. (23), (24), (26) hold; the method does not enforce them
+  std::string message;             ///< message of the solver
 };
 
-// `start` gives k, ell, front wheel and the lambdas to begin with. Throws ArgumentError where an insertion
-// turns the shaft by more than 0.02 rad, has fewer than 8 measurements, or does not advance.
+/// Fits lambda1 and lambda2 to the rate of the angle of motion, Eq. (17).
+/// @param insertions at least one insertion
+/// @param start k, ell, front wheel, and start values of both lambda
+/// @param fit_curvature whether k is fitted as well
+/// @return estimates and state of the solver
+/// @throws bevel::ArgumentError if there is no insertion, or one turns the shaft by more than 0.02 rad, has fewer than
+/// 8
+///   measurements or does not advance
 AngleRateResult fit_angle_rate(const std::vector<Insertion>& insertions, const model::NeedleParameters& start,
                                bool fit_curvature = false);
 

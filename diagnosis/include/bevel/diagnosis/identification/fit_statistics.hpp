@@ -1,30 +1,47 @@
 // SPDX-License-Identifier: MIT
 #pragma once
-// What a fit's information matrix says: covariance, prior's share, and the directions that the data leave open.
+/// @file
+/// Computes the statistics of a fit from its information matrix and residuals: covariance, share of the priors, and the
+/// directions that the data do not determine.
 #include <bevel/diagnosis/identification/trajectory_fit.hpp>
 
 namespace bevel::diagnosis {
 
-// Range that each parameter may plausibly have (one sigma), the unit in which "fixed by the data" is judged:
-// k 0.002 /mm, lambda1 0.2 /rad, lambda2 0.1, ell 10 mm. The two lambdas' are the differences between Table I's
-// tissues.
+/// Plausible range of each parameter (one standard deviation), by Parameter: k 0.002 1/mm, lambda1 0.2 1/rad, lambda2
+/// 0.1, ell 10 mm. A parameter without prior is determined by the data if its standard error is smaller. The ranges of
+/// both lambda follow from the differences between the tissues of Table I.
 inline constexpr std::array<double, kNeedleParameters> kPlausibleRange = {0.002, 0.2, 0.1, 10.0};
 
-// Factor on the information JtJ/s^2 for Huber's loss (1981, 7.6): mean(psi')^2 / mean(psi^2).
+/// Computes the factor mean(psi')^2 / mean(psi^2) on the information J^T J / s^2 for Huber's loss (Huber, Robust
+/// Statistics, 1981, section 7.6).
+/// @param scaled_residuals residuals in standard deviations
+/// @param threshold threshold of the loss, in standard deviations
+/// @return the factor; 1 if all residuals are zero
 double huber_efficiency(const std::vector<double>& scaled_residuals, double threshold);
 
-// Of residuals taken one after the other; `series` are offsets into `residuals` where a new series begins, the last is
-// the size. 0 when it is inside what white noise gives (2/sqrt(n)).
+/// Computes the correlation of successive residuals.
+/// @param residuals residuals of all series, in order of time
+/// @param series offsets into residuals at which a series begins; the last one is the number of residuals
+/// @return correlation, -0.99 to 0.99; 0 if it is within the range of white noise, 2/sqrt(n)
 double lag1_correlation(const std::vector<double>& residuals, const std::vector<std::size_t>& series);
 
-// 1.4826 times the median absolute value: the standard deviation of Gaussian noise, deaf to outliers. Reorders.
+/// Computes a robust standard deviation: 1.4826 times the median absolute value, consistent for Gaussian noise.
+/// @param residuals at least one residual; reordered and replaced by absolute values
+/// @return standard deviation, in the unit of the residuals
 double robust_scale(std::vector<double>& residuals);
 
-// min over s of n log s + sum rho(r/s), rho Huber's loss (an infinite threshold: the square).
+/// Computes the minimum over s of n log s + sum rho(r/s), with rho Huber's loss.
+/// @param residuals n residuals
+/// @param threshold threshold of the loss in units of s; infinite: the square
+/// @return the minimum; -1e300 if all residuals are zero
 double deviance(const std::vector<double>& residuals, double threshold);
 
-// From the information of the data (entry parameters already marginalised out) fills covariance, correlation,
-// directions and the parameters' errors. `free[i]` is false for a parameter at a bound.
+/// Computes covariance, correlation, directions and standard errors of a fit.
+/// @param data_information information of the data about the parameters, marginalised over the entries
+/// @param parameters the fitted parameters, in the order of data_information
+/// @param free one per parameter; false: at a bound, the others are conditional on its value
+/// @param priors priors by Parameter
+/// @param result fit with FitResult::needle set; receives the statistics
 void fill_uncertainty(const Eigen::MatrixXd& data_information, const std::vector<Parameter>& parameters,
                       const std::vector<bool>& free, const Priors& priors, FitResult& result);
 

@@ -1,7 +1,8 @@
 // SPDX-License-Identifier: MIT
 #pragma once
-// The equation proposed for a discrepancy as the source of an effect: put into model/src/effects/, with a line in the
-// registry, it is one like all others (docs/adding-an-effect.md).
+/// @file
+/// Generates the C++ source of an effect from the equation proposed for a discrepancy. To add the effect to the
+/// library, save the source in model/src/effects/ and add a line to the registry (docs/adding-an-effect.md).
 #include <optional>
 #include <string>
 
@@ -9,16 +10,24 @@
 
 namespace bevel::diagnosis {
 
+/// Generated source of an effect.
 struct EffectSource {
-  std::string name;  // of the effect and of its function: "advance_saturation_by_depth"
-  std::string text;  // C++
+  std::string name;  ///< name of the effect and of its function: "advance_saturation_by_depth"
+  std::string text;  ///< C++ source
 };
 
+/// Generates the source of an effect.
+/// @param proposal the equation with its estimates
+/// @return name and source
 EffectSource effect_source(const ProposedForm& proposal);
 
-// The likeliest proposal for the discrepancy that shows most, where the verdict is unknown-effect; null otherwise. And
-// its source.
+/// Selects the likeliest proposal for the discrepancy term with the largest visible size.
+/// @param findings result of a diagnosis
+/// @return pointer into findings; null if the verdict is not unknown-effect or there is no proposal
 const ProposedForm* proposed_form(const Findings& findings);
+/// Generates the source of the effect that proposed_form() selects.
+/// @param findings result of a diagnosis
+/// @return name and source; null if proposed_form() returns null
 std::optional<EffectSource> proposed_effect(const Findings& findings);
 
 }  // namespace bevel::diagnosis

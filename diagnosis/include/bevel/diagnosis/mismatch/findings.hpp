@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: MIT
 #pragma once
-// What the mismatch tool found, as plain data: verdict.json, report.html and model.toml are made from this alone.
+/// @file
+/// Result of a mismatch diagnosis, as plain data. The files verdict.json, report.html and model.toml depend on these
+/// values alone. Log Bayes factors and log densities are natural logarithms. Frame {A} is the frame of the entry point.
 #include <array>
 #include <cstdint>
 #include <limits>
@@ -14,292 +16,347 @@
 #include <bevel/model/effects/covariates.hpp>
 #include <bevel/model/effects/discrepancy.hpp>
 
+/// Mismatch diagnosis and parameter identification of bevel-tip needles from recorded insertions.
 namespace bevel::diagnosis {
 
-enum class Verdict { nothing_missing, effects_found, unknown_effect, inconclusive };
-/// Returns "nothing-missing", "effects-found" or "unknown-effect"; for two groups of recordings "unchanged", "changed"
-/// or "changed-unknown"; for both "inconclusive".
+/// Conclusion of a diagnosis.
+enum class Verdict {
+  nothing_missing,  ///< neither an effect nor a discrepancy of consequence is likelier than not
+  effects_found,    ///< effects of the library explain the mismatch
+  unknown_effect,   ///< a discrepancy of consequence remains that no effect of the library explains
+  inconclusive      ///< the evidence is insufficient for any of the above; the nominal model is kept
+};
+/// Returns the name of a verdict as used in verdict.json.
+/// @param verdict the verdict
+/// @param two_groups whether two groups of recordings are compared
+/// @return "nothing-missing", "effects-found" or "unknown-effect"; for two groups of recordings "unchanged", "changed"
+///   or "changed-unknown"; for both "inconclusive"
 std::string_view name_of(Verdict verdict, bool two_groups = false);
 /// Returns whether a model other than the nominal one is adopted.
+/// @param verdict the verdict
+/// @return true for effects_found and unknown_effect
 inline bool adopts_a_model(Verdict verdict) {
   return verdict == Verdict::effects_found || verdict == Verdict::unknown_effect;
 }
 
+/// Estimate of one parameter of an effect, in the parameter's unit.
 struct FoundParameter {
-  std::string name;
-  double value = 0;      // of the model that is written
-  double std_error = 0;  // about it: over all explanations that hold the effect, with and without a discrepancy
-  std::array<double, 2> ci95{};
-  bool at_bound = false;
-  double none = std::numeric_limits<double>::quiet_NaN();  // value at which the effect vanishes; NaN: at no value
+  std::string name;              ///< name of the parameter
+  double value = 0;              ///< estimate in the adopted model
+  double std_error = 0;          ///< standard error about value, over all models with the effect (and discrepancies)
+  std::array<double, 2> ci95{};  ///< 95 % interval, lower and upper limit
+  bool at_bound = false;         ///< whether the estimate lies at a bound of the range of the fit
+  double none = std::numeric_limits<double>::quiet_NaN();  ///< value at which the effect vanishes; NaN: none
 };
-/// Returns whether the 95 % interval of a size excludes "no effect"; false for a parameter at which no effect vanishes.
+/// Returns whether the 95 % interval of a parameter excludes the value at which the effect vanishes.
+/// @param p the estimate
+/// @return true if it does; false for a parameter without such a value
 inline bool excludes_none(const FoundParameter& p) { return p.ci95[0] > p.none || p.ci95[1] < p.none; }
 
-// Instants and phases: one entry per recording that has the effect.
+/// Parameters of an effect that are specific to one recording: event times and phases.
 struct FoundInRecording {
-  std::string log;
-  std::vector<FoundParameter> parameters;
+  std::string log;                         ///< name of the recording
+  std::vector<FoundParameter> parameters;  ///< estimates in this recording
 };
 
+/// One effect of the adopted model.
 struct FoundEffect {
-  std::string name;
-  std::string meaning;                        // one clause
-  double probability = 0;                     // of being in the model
-  double joint_probability = 0;               // of it or one of `ambiguous_with` being in the model
-  std::vector<std::string> ambiguous_with{};  // at odds of less than 20 to 1 in its place
-  std::vector<FoundParameter> parameters{};
-  std::vector<FoundInRecording> recordings{};
-  // Natural: of the model with it against the model without it, both with a discrepancy or both without one.
+  std::string name;                            ///< name in the effect library
+  std::string meaning;                         ///< description, one clause
+  double probability = 0;                      ///< posterior probability that the effect is in the model
+  double joint_probability = 0;                ///< posterior probability of the effect or one of ambiguous_with
+  std::vector<std::string> ambiguous_with{};   ///< confounders: odds against them in its place are below 20 to 1
+  std::vector<FoundParameter> parameters{};    ///< estimates that all recordings share
+  std::vector<FoundInRecording> recordings{};  ///< one entry per recording that has the effect
+  /// Log Bayes factor of the model with the effect against the model without it, both with or both without a
+  /// discrepancy.
   double log_bayes_factor = 0;
-  double visible_sigmas = 0;  // root of the fall of chi2 that it brings, given the others
-  // By how much it moves the tip where the cameras see it: the model without it against the model that was found, at
-  // the deepest reading of each recording, root mean square over recordings. NaN: without it the tip cannot follow.
+  double visible_sigmas = 0;  ///< square root of the decrease of chi2 by the effect, given the other effects
+  /// Tip displacement by the effect, mm: distance, as the cameras see it, between the adopted model with and without
+  /// the effect, at the deepest measurement of each recording, root mean square over recordings. NaN: without the
+  /// effect the tip leaves the domain of the slip law.
   double moved_at_depth_mm = 0;
 };
 
 /// When the missing physics begins to act in a recording.
 struct Location {
-  std::string log;
-  std::string channel;          // in which it lowers chi2 most
-  double from_s = 0, to_s = 0;  // 95 % interval of the onset
-  std::string covariate;
-  std::array<double, 2> range{};  // of the covariate, during the onset
-  double share = 0;               // of the whole mismatch, in chi2
+  std::string log;                ///< name of the recording
+  std::string channel;            ///< channel in which the adopted model lowers chi2 most
+  double from_s = 0,              ///< lower limit of the 95 % interval of the onset, s
+      to_s = 0;                   ///< upper limit of the 95 % interval of the onset, s
+  std::string covariate;          ///< name of the covariate that range refers to
+  std::array<double, 2> range{};  ///< least and largest covariate during the onset, in the covariate's unit
+  double share = 0;               ///< share of the decrease of chi2 over all recordings, in [0, 1]
 };
 
-// Of scalar readings; errors in mm of positions alone, headings count in chi2 and density. chi2 counts what was not
-// known beforehand too (parameters, variation between insertions): 1 is a prediction that knows how sure it is.
+/// Accuracy of predictions over scalar measurements. Errors in mm are of positions alone; headings count in chi2 and
+/// density. chi2 includes the variance of unknown parameters and of insertion-specific parameters.
 struct FitFigures {
-  double rmse_mm = 0, rmse_se_mm = 0;  // its standard error: from recording to recording
-  double max_mm = 0, chi2_per_dof = 0;
-  double log_density = 0, log_density_se = 0;  // predictive, natural, per reading, of mm
+  double rmse_mm = 0,      ///< root mean square error, mm
+      rmse_se_mm = 0;      ///< standard error of rmse_mm from its variation between recordings, mm
+  double max_mm = 0,       ///< largest absolute error, mm
+      chi2_per_dof = 0;    ///< chi2 per measurement; 1 = consistent with the predicted uncertainty
+  double log_density = 0,  ///< log predictive density per measurement, of mm
+      log_density_se = 0;  ///< standard error of log_density from its variation between recordings
 };
-// Of one channel's readings: root mean square of measured - predicted in the channel's unit, and the share that lies
-// within its 95 % interval.
+/// Prediction error of one channel.
 struct ChannelFigures {
-  double rmse = 0, share_in_95 = 0;
+  double rmse = 0,      ///< root mean square of measured minus predicted, in the channel's unit
+      share_in_95 = 0;  ///< share of the measurements within their predicted 95 % interval
 };
-// Of readings that were predicted as normals or sums of them; rmse_mm of positions, density and share of headings too.
+/// Accuracy of predictions whose density is a normal density or a mixture of normal densities.
 struct PredictionFigures {
-  double rmse_mm = 0;
-  double log_density = 0;  // natural, per reading, in mm and rad
-  double share_in_95 = 0;
-  std::vector<ChannelFigures> channels;  // in the order of Findings::channels; NaN: it has none of the readings
-  std::size_t readings = 0;              // scalar
+  double rmse_mm = 0;                    ///< root mean square error of positions, mm
+  double log_density = 0;                ///< log predictive density per measurement, in mm and rad
+  double share_in_95 = 0;                ///< share of all measurements within their predicted 95 % interval
+  std::vector<ChannelFigures> channels;  ///< in the order of Findings::channels; NaN: no measurement of the channel
+  std::size_t readings = 0;              ///< number of scalar measurements
 };
-// By one model, its parameters and its variation from the other recordings: as a new insertion, of which the standard
-// deviations between insertions are all that is known; and continued from its own first third, in time.
+/// Prediction of a left-out recording by one model, whose parameters and between-insertion standard deviations are
+/// estimated from the other recordings.
 struct InsertionPredicted {
-  PredictionFigures whole;      // all readings, as of a new insertion
-  PredictionFigures beyond;     // those beyond the first third, as of a new insertion
-  PredictionFigures continued;  // the same ones, given the first third
+  PredictionFigures whole;      ///< all measurements, predicted as a new insertion
+  PredictionFigures beyond;     ///< measurements after the first third, predicted as a new insertion
+  PredictionFigures continued;  ///< measurements after the first third, conditional on the first third
 };
+/// Prediction of one left-out recording from the other recordings.
 struct HeldOutRecording {
-  std::string log;
-  FitFigures before, after;
-  InsertionPredicted predicted_before, predicted_after;
+  std::string log;                      ///< name of the recording
+  FitFigures before,                    ///< by the refitted nominal model
+      after;                            ///< by the model that the other recordings select
+  InsertionPredicted predicted_before,  ///< measurement by measurement, by the refitted nominal model
+      predicted_after;                  ///< measurement by measurement, by the models that the other recordings select
 };
-// Each recording (of two groups: of the second) predicted as a new insertion.
+/// Cross-validation: each recording (of two groups: of the second group) predicted as a new insertion.
 struct HeldOut {
-  FitFigures as_it_stands;   // by the model file; noise alone is known
-  FitFigures before, after;  // refitted to the others: the needle alone, and what the others select
-  FitFigures noise_floor;    // of a prediction that is true and sure
-  // Reading by reading, with intervals: before by the noise and the variation of the needle alone.
-  InsertionPredicted predicted_before, predicted_after;
-  std::vector<HeldOutRecording> recordings;
-  double gain = 0;  // of log predictive density, natural, over all recordings
+  FitFigures as_it_stands;              ///< by the model file without refit; noise is the only uncertainty
+  FitFigures before,                    ///< by the nominal model, refitted to the other recordings
+      after;                            ///< by the model that the other recordings select
+  FitFigures noise_floor;               ///< expected figures of an exact prediction: errors are measurement noise alone
+  InsertionPredicted predicted_before,  ///< by the nominal model with its own noise and between-insertion deviations
+      predicted_after;                  ///< by the models that the other recordings select
+  std::vector<HeldOutRecording> recordings;  ///< each recording separately
+  double gain = 0;                           ///< gain in log predictive density of after over before, all recordings
 };
 
-// A set of effects and its share in the posterior.
+/// A candidate model and its share of the posterior.
 struct Explanation {
-  std::vector<std::string> effects;
-  double probability = 0;
-  double with_discrepancy = 0;  // part of it
+  std::vector<std::string> effects;  ///< labels of its effects; empty: the nominal model
+  double probability = 0;            ///< posterior probability
+  double with_discrepancy = 0;       ///< part of probability that belongs to the model with a discrepancy
 };
 
-// One line of the ranking: an effect tried alone, or beside what was found.
+/// One line of the ranking: an effect added to the nominal model or to the adopted model.
 struct TriedEffect {
-  std::string name;
-  std::string beside;  // "" = alone
-  // Natural, against its absence, both with a discrepancy or both without one; null: not computed.
+  std::string name;    ///< label of the effect
+  std::string beside;  ///< the model to which the effect is added; "": the nominal model
+  /// Log Bayes factor against the model without the effect, both with or both without a discrepancy; null: not
+  /// computed.
   std::optional<double> log_bayes_factor{};
-  bool with_discrepancy = false;  // both
-  bool fitted = false;            // else estimated from the linear model
-  bool likelier = false;          // its prior odds included
-  std::vector<std::pair<std::string, double>> parameters{};
+  bool with_discrepancy = false;  ///< whether both models have a discrepancy
+  bool fitted = false;            ///< whether the model was fitted; false: estimated from the linearised model
+  bool likelier = false;          ///< whether the effect is likelier than its absence, prior odds included
+  std::vector<std::pair<std::string, double>> parameters{};  ///< names and estimates of its parameters
 };
 
-// The smallest size that these recordings would have shown.
+/// Smallest size of an effect that these recordings could have shown.
 struct DetectableSize {
-  std::string effect, parameter;
-  double size = 0;         // against "none"; infinite: cannot be shown at all
-  double typical = 0;      // what the field reports, for comparison (a start of the fits)
-  double absorbed = 0;     // share of its signature that k, lambda1, lambda2 and the variation take over
-  std::string experiment;  // motion that would show it, if this size is above typical
+  std::string effect,      ///< name of the effect
+      parameter;           ///< name of the parameter that measures its size
+  double size = 0;         ///< distance from the value at which the effect vanishes; infinite: not detectable
+  double typical = 0;      ///< typical size in the literature (a start value of the fits), for comparison
+  double absorbed = 0;     ///< share of its signature absorbed by k, lambda1, lambda2 and insertion-specific parameters
+  std::string experiment;  ///< motion that would show the effect, if size is above typical
 };
 
-// What remains unexplained, described: which quantity of the motion is off by how much, against what. Several add up.
+/// One discrepancy term: an unexplained deviation of a component of the motion as a function of a covariate. Several
+/// terms add up.
 struct Discrepancy {
-  model::DiscrepancyCurve curve;
-  double log_bayes_factor = 0;   // natural: of the likeliest one against none, of so many against one less
-  double visible_size = 0;       // root mean square over the readings, in standard deviations of the noise
-  double moved_at_depth_mm = 0;  // as of an effect
+  model::DiscrepancyCurve curve;  ///< component, covariate and values
+  double log_bayes_factor = 0;    ///< of the likeliest term against none, given the terms before it
+  double visible_size = 0;        ///< root mean square over the measurements, in standard deviations of the noise
+  double moved_at_depth_mm = 0;   ///< tip displacement by the term, mm; as FoundEffect::moved_at_depth_mm
 };
 
-// The simplest equation that does for one of the discrepancies what its curve does, beside the others: a proposal for
-// an effect, not a cause.
+/// Simplest closed form that replaces one discrepancy term, given the others. It is a proposal for a new effect, not
+/// an established cause.
 struct ProposedForm {
-  model::DiscrepancyComponent component = model::DiscrepancyComponent::curvature_bevel;
-  model::Covariate covariate = model::Covariate::depth_mm;
-  inference::Form form = inference::Form::step;
-  std::string equation;                             // "a (1 - exp(-(x - 0.2) / s))"; x is the covariate
-  double amplitude = 0, amplitude_sd = 0;           // a, in the component's unit
-  double shape = 0, shape_low = 0, shape_high = 0;  // s, with 95 %
-  double log_bayes_factor = 0;                      // natural, of this one against the curves together
-  double phase_rad = 0;                             // of a sinusoid
-  double low = 0, range = 0;                        // of the covariate in the recordings: inference/forms.hpp
-  bool periodic = false;                            // the covariate is an angle, s a share of its circle
-  std::vector<double> shapes{};                     // those that were tried
-  std::size_t discrepancy = 0;                      // which of Findings::discrepancies it stands for
+  model::DiscrepancyComponent component = model::DiscrepancyComponent::curvature_bevel;  ///< affected component
+  model::Covariate covariate = model::Covariate::depth_mm;                               ///< argument x
+  inference::Form form = inference::Form::step;                                          ///< kind of equation
+  std::string equation;          ///< equation with x the covariate, for example "a (1 - exp(-(x - 0.2) / s))"
+  double amplitude = 0,          ///< a, in the component's unit
+      amplitude_sd = 0;          ///< standard deviation of a
+  double shape = 0,              ///< s
+      shape_low = 0,             ///< lower limit of the 95 % interval of s
+      shape_high = 0;            ///< upper limit of the 95 % interval of s
+  double log_bayes_factor = 0;   ///< of this form against all curves together
+  double phase_rad = 0;          ///< phase of a sinusoid, rad
+  double low = 0,                ///< least covariate in the recordings (inference/forms.hpp)
+      range = 0;                 ///< largest minus least covariate in the recordings
+  bool periodic = false;         ///< whether the covariate is an angle; s is then a share of the full circle
+  std::vector<double> shapes{};  ///< grid of s that was evaluated
+  std::size_t discrepancy = 0;   ///< index into Findings::discrepancies of the replaced term
 };
 
-// How much insertions differ: the standard deviation of one quantity between them.
+/// Between-insertion standard deviation of one quantity.
 struct VariationEstimate {
-  std::string name, unit;
-  double sd = 0;             // posterior mean
-  double none = 0;           // probability that they do not differ
-  double low = 0, high = 0;  // 95 %, of the values that were tried
-  bool at_end = false;       // the interval reaches the largest of them: a limit, not a measurement
+  std::string name,     ///< name of the quantity
+      unit;             ///< unit of sd, low and high
+  double sd = 0;        ///< posterior mean of the standard deviation
+  double none = 0;      ///< posterior probability that insertions do not differ
+  double low = 0,       ///< lower limit of the 95 % interval, a value of the evaluated grid
+      high = 0;         ///< upper limit of the 95 % interval, a value of the evaluated grid
+  bool at_end = false;  ///< whether the interval reaches the end of the grid; high is then a bound, not an estimate
 };
 
-// What one insertion has of its own, as a deviation from what all share: curvature as a share of the needle's, the
-// heading about x and y and the bevel's roll at the entry in rad, registration in x and y (where depths were read by
-// hand, z) in mm.
+/// Insertion-specific parameter, as a deviation from the value that all insertions share: relative curvature, rotation
+/// of the heading about x and y and roll of the bevel at the entry (rad), registration in x and y (z as well where
+/// depths are read by hand; mm).
 struct InsertionValue {
-  std::string name;   // as in model::OwnValues: "curvature_relative", "tilt_x_rad", ...
-  std::string group;  // of VariationEstimate::name
-  double value = 0, std_error = 0;
-  std::array<double, 2> ci95{};
+  std::string name;              ///< as in model::OwnValues: "curvature_relative", "tilt_x_rad", ...
+  std::string group;             ///< VariationEstimate::name of its standard deviation
+  double value = 0,              ///< estimate
+      std_error = 0;             ///< standard error
+  std::array<double, 2> ci95{};  ///< 95 % interval, lower and upper limit
 };
+/// Insertion-specific parameters of one recording.
 struct InsertionValues {
-  std::string log;
-  std::vector<InsertionValue> values;
+  std::string log;                     ///< name of the recording
+  std::vector<InsertionValue> values;  ///< its parameters
 };
 
+/// Recommended next recording.
 struct NextExperiment {
-  std::string script;  // what to command
-  std::array<std::string, 2> separates;
-  double expected_gain = 0;  // of chi2, in one recording of it
+  std::string script;                    ///< motion to command
+  std::array<std::string, 2> separates;  ///< the two explanations that it separates
+  double expected_gain = 0;              ///< expected difference in chi2 in one recording of the motion
 };
 
+/// Estimate of the needle's parameters.
 struct NeedleEstimate {
-  model::NeedleParameters value;
-  double curvature_sd_per_mm = 0, lambda1_sd_per_rad = 0, lambda2_sd = 0;
+  model::NeedleParameters value;   ///< estimates
+  double curvature_sd_per_mm = 0,  ///< standard deviation of the curvature, 1/mm
+      lambda1_sd_per_rad = 0,      ///< standard deviation of lambda1, 1/rad
+      lambda2_sd = 0;              ///< standard deviation of lambda2
   /// False: the shaft turns too little to separate slip from curvature. Both lambda keep the values of the model file,
   /// and their standard deviations are those of the prior density.
   bool slip_determined = true;
 };
 
-// Insertions steered in simulated time with one model in the software: true tip to target where the needle came to
-// rest, of those that arrived; NaN where none did.
+/// Simulated closed-loop insertions with one controller model: distance from the true tip to the target where the
+/// needle stops, over the insertions that arrive; NaN if none arrives.
 struct SteeredFigures {
-  std::size_t arrived = 0;
-  double median_mm = 0, worst_mm = 0;  // the upper of the middle two, of an even count
-  std::string stopped_by{};            // the commonest reason of those that did not arrive; "": all did
+  std::size_t arrived = 0;   ///< number of insertions that reach the depth of their target
+  double median_mm = 0,      ///< median distance, mm; of an even count the upper of the middle two
+      worst_mm = 0;          ///< largest distance, mm
+  std::string stopped_by{};  ///< most frequent reason of the insertions that do not arrive; "": all arrive
   /// The insertions that ended before the depth of their target, counted by reason.
   struct Stopped {
-    std::string reason;  ///< of an unhealthy estimate with the quantity: "needle state unhealthy, age of ..."
-    std::size_t count = 0;
+    std::string reason;             ///< an unhealthy estimate with the quantity: "needle state unhealthy, age of ..."
+    std::size_t count = 0;          ///< number of insertions
     std::array<double, 2> value{};  ///< least and largest of the quantity
     double limit = 0;               ///< largest allowed; 0: the reason has none
-    std::string unit;
-    std::array<double, 2> depth_mm{};  ///< least and largest z of the true tip
+    std::string unit;               ///< unit of value and limit
+    std::array<double, 2> depth_mm{};  ///< least and largest z of the true tip, mm
   };
-  std::vector<Stopped> stopped{};  ///< the commonest first
+  std::vector<Stopped> stopped{};  ///< most frequent reason first
 };
 /// Mean difference of the distances from tip to target, over the targets at which both models arrive.
 struct PairedMiss {
-  std::size_t targets = 0;
-  double farther_mm = 0;    ///< with the model that was found, less as it stands: negative if it steers nearer
-  double std_error_mm = 0;  ///< of the mean
+  std::size_t targets = 0;  ///< number of targets
+  double farther_mm = 0;    ///< adopted model minus model file, mm; negative if the adopted model ends nearer
+  double std_error_mm = 0;  ///< standard error of the mean, mm
 };
-// To the same targets on a rig that is the model that was found, with the recordings' noise.
+/// Comparison of two controller models that steer to identical targets; the plant matches the adopted model and has
+/// the recordings' noise.
 struct SteeredToTargets {
-  std::size_t targets = 0;
-  std::uint64_t seed = 0;
-  std::array<double, 2> depth_mm{};  // of the targets, along z: from, to
-  SteeredFigures as_it_stands{}, found{};
-  PairedMiss paired{};
-  std::vector<std::string> not_known_live{};  // effects that no software knows of an insertion beforehand
+  std::size_t targets = 0;                    ///< number of targets
+  std::uint64_t seed = 0;                     ///< seed of the random numbers
+  std::array<double, 2> depth_mm{};           ///< least and largest depth of the targets along z, mm
+  SteeredFigures as_it_stands{},              ///< with the model file
+      found{};                                ///< with the adopted model
+  PairedMiss paired{};                        ///< difference of the two
+  std::vector<std::string> not_known_live{};  ///< effects whose parameters are unknown before an insertion
 };
 
-// For pictures: one recording against time.
+/// One recording against time, for figures. All positions in {A}, mm.
 struct Trace {
-  std::string log;
-  std::vector<double> time_s;  // one per reading
-  std::vector<model::Covariates> covariates;
-  std::vector<Eigen::Vector3d> measured_mm, model_file_mm, before_mm, after_mm;
-  std::vector<char> outlier;  // 1: taken for one
-  // Whitened residuals per channel (NaN where the channel has no reading): of the base refit, and of what was found.
-  std::vector<std::vector<double>> white_before, white_after;
+  std::string log;                                ///< name of the recording
+  std::vector<double> time_s;                     ///< one per measurement, s
+  std::vector<model::Covariates> covariates;      ///< one per measurement
+  std::vector<Eigen::Vector3d> measured_mm,       ///< measured tip; NaN where a measurement has no position
+      model_file_mm,                              ///< prediction by the model file
+      before_mm,                                  ///< prediction by the refitted nominal model
+      after_mm;                                   ///< prediction by the adopted model
+  std::vector<char> outlier;                      ///< 1: classified as an outlier
+  std::vector<std::vector<double>> white_before,  ///< whitened residuals per channel, refitted nominal model; NaN: none
+      white_after;                                ///< whitened residuals per channel, adopted model; NaN: none
 };
 
-// Printed for people; no verdict depends on them.
+/// Goodness of fit of the adopted model. The values are printed for information; no verdict depends on them.
 struct Checks {
-  double chi2_per_dof = 0;
-  std::array<double, 2> band{};  // 99 % of it if the model is right and the noise as found
-  double ljung_box_p = 1;        // smallest over the series, times their number
-  bool clean = true;             // both as chance leaves them in 99 of 100
+  double chi2_per_dof = 0;       ///< chi2 per degree of freedom
+  std::array<double, 2> band{};  ///< 99 % band of chi2_per_dof for a correct model and the estimated noise
+  double ljung_box_p = 1;        ///< smallest p-value over the series, multiplied by their number
+  bool clean = true;             ///< whether both values are within what chance gives in 99 of 100 cases
 };
 
+/// Duration of one stage of the diagnosis.
 struct StageTime {
-  std::string stage;
-  double seconds = 0;
+  std::string stage;   ///< name of the stage
+  double seconds = 0;  ///< duration, s
 };
 
+/// All results of a diagnosis.
 struct Findings {
-  Verdict verdict = Verdict::nothing_missing;
-  bool two_groups = false;  // what is said is of what the second has and the first has not
-  double stop_s = 0;     // logs without a clock: by how much "times" of neighbouring stops are apart; 0: they have one
-  std::string sentence;  // what was found, in one
-  double probability = 0;  // of the verdict, given that one of the fitted models is true; inconclusive: 0
-  // Why likely effects are not named, one sentence each; inconclusive: why nothing is concluded.
+  Verdict verdict = Verdict::nothing_missing;  ///< the conclusion
+  bool two_groups = false;  ///< whether the results describe the change from the first to the second group
+  double stop_s = 0;        ///< recordings without time stamps: nominal interval between stops, s; otherwise 0
+  std::string sentence;     ///< the conclusion in one sentence
+  double probability = 0;   ///< of the verdict, if one of the fitted models is true; inconclusive: 0
+  /// Why likely effects are not named, one sentence each; inconclusive: why nothing is concluded.
   std::vector<std::string> reasons{};
-  std::vector<FoundEffect> effects;
-  std::vector<Explanation> explanations;  // the likeliest first
-  double nothing_probability = 0;         // of no effect, and no discrepancy of any consequence
-  double discrepancy_probability = 0;     // of one of consequence
-  double discrepancy_sigmas = 0;          // of the one in the model, all its curves: visible standard deviations
-  double not_visited = 0;                 // share of sets that were judged by the linear model alone
-  std::vector<Location> where;
-  inference::Noise noise;
-  std::vector<std::string> channels, units;  // in the order of noise.sigma
-  std::vector<ScatterNearEntry> scatter{};   // the same; noise is that deep down
-  std::vector<VariationEstimate> variation;
-  std::vector<InsertionValues> insertions;  // in the order of the recordings
-  HeldOut held_out;
-  NeedleEstimate base, needle;  // refitted without, and with what was found
-  model::NeedleParameters model_file;
-  std::vector<TriedEffect> tried;   // alone, best first
-  std::vector<TriedEffect> beside;  // beside what was found, best first
-  std::vector<DetectableSize> detectable;
-  std::vector<Discrepancy> discrepancies;         // unknown-effect only
-  std::vector<ProposedForm> proposals;            // of each discrepancy in turn, the likeliest first
-  std::optional<NextExperiment> next_experiment;  // null: none is needed, or none of the known motions decides
-  std::optional<SteeredToTargets> steered;        // by whoever has a controller: diagnose() leaves it empty
-  std::string not_steered;                        // why, in a clause, where something found might matter to steering
-  std::vector<std::string> confusion_names;
-  Eigen::MatrixXd confusion;  // |cosine| between visible parts
-  Checks checks;
-  std::vector<std::string> remarks;  // plain sentences: what was not usable, what cannot be told apart
-  std::vector<Trace> traces;
-  std::size_t readings = 0, outliers = 0;  // messages
-  std::vector<StageTime> times;
+  std::vector<FoundEffect> effects;          ///< effects of the adopted model
+  std::vector<Explanation> explanations;     ///< candidate models, the likeliest first
+  double nothing_probability = 0;            ///< posterior probability of no effect and no discrepancy of consequence
+  double discrepancy_probability = 0;        ///< posterior probability of a discrepancy of consequence
+  double discrepancy_sigmas = 0;             ///< visible size of all discrepancy terms in the adopted model, sigma
+  double not_visited = 0;                    ///< posterior share of candidate models evaluated by linearisation alone
+  std::vector<Location> where;               ///< onsets of the missing physics, the largest share first
+  inference::Noise noise;                    ///< estimated measurement noise
+  std::vector<std::string> channels,         ///< names of the channels, in the order of noise.sigma
+      units;                                 ///< units of the channels, in the order of noise.sigma
+  std::vector<ScatterNearEntry> scatter{};   ///< per channel; noise is the noise at large depth
+  std::vector<VariationEstimate> variation;  ///< between-insertion standard deviations
+  std::vector<InsertionValues> insertions;   ///< insertion-specific parameters, in the order of the recordings
+  HeldOut held_out;                          ///< cross-validation
+  NeedleEstimate base,                       ///< estimate in the nominal model
+      needle;                                ///< estimate in the adopted model
+  model::NeedleParameters model_file;        ///< parameters of the model file
+  std::vector<TriedEffect> tried;            ///< effects added to the nominal model, best first
+  std::vector<TriedEffect> beside;           ///< effects added to the adopted model, best first
+  std::vector<DetectableSize> detectable;    ///< smallest detectable sizes
+  std::vector<Discrepancy> discrepancies;    ///< discrepancy terms; Verdict::unknown_effect only
+  std::vector<ProposedForm> proposals;       ///< proposals for each discrepancy in turn, the likeliest first
+  std::optional<NextExperiment> next_experiment;  ///< null: none is needed, or no available motion is informative
+  std::optional<SteeredToTargets> steered;        ///< filled by callers with a controller; diagnose() leaves it empty
+  std::string not_steered;                   ///< clause: why steered is empty although a finding may affect steering
+  std::vector<std::string> confusion_names;  ///< names of the rows and columns of confusion
+  Eigen::MatrixXd confusion;                 ///< absolute cosine between the projected signatures of two effects
+  Checks checks;                             ///< goodness of fit
+  std::vector<std::string> remarks;          ///< sentences: unusable input and effects that cannot be separated
+  std::vector<Trace> traces;                 ///< one per recording
+  std::size_t readings = 0,                  ///< number of measurement messages
+      outliers = 0;                          ///< number of messages classified as outliers
+  std::vector<StageTime> times;              ///< duration of each stage
 };
 
-/// From this probability of a verdict on, no experiment is needed to separate it from other explanations.
+/// Probability of a verdict from which no further experiment is recommended.
 inline constexpr double kNoDoubt = 0.99;
+/// Returns whether a further experiment is recommended.
+/// @param findings result of a diagnosis
+/// @return true for an inconclusive verdict or one with a probability below kNoDoubt
 inline bool is_experiment_needed(const Findings& findings) {
   return findings.verdict == Verdict::inconclusive || findings.probability < kNoDoubt;
 }

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: MIT
 #pragma once
-// Invariants of a verdict: what must hold of every diagnosis, whatever the recordings.
+/// @file
+/// Checks the invariants of a verdict, which hold for every diagnosis and all recordings.
 #include <string>
 #include <vector>
 
@@ -18,8 +19,9 @@ namespace bevel::diagnosis {
 ///   5. a proposed equation has finite values, the interval of its amplitude excludes none, and that of its shape
 ///      includes the estimate;
 ///   6. a parameter at a bound of its range is marked.
-/// 1, 2 and 4 are not asked of an inconclusive verdict: it adopts nothing. Instead it names nothing and states a
+/// Rules 1, 2 and 4 do not apply to an inconclusive verdict, which adopts no model. It must name no effect and state a
 /// reason.
+/// @param findings result of a diagnosis
 /// @return one sentence for each violation; empty if all invariants hold
 std::vector<std::string> violations(const Findings& findings);
 

@@ -1,17 +1,22 @@
 // SPDX-License-Identifier: MIT
 #pragma once
-// Readings scatter more where a needle has hardly entered: a hand guides it, and little tissue holds its tip. Taken as
-// equally good, what a few insertions do there by chance passes for physics.
+/// @file
+/// Estimates the excess variance of measurements near the entry, where a hand guides the needle and little tissue
+/// supports its tip. Without this term, random deviations of a few insertions near the entry are confounded with
+/// physics.
 #include <bevel/diagnosis/needle/recorded_case.hpp>
 
 namespace bevel::diagnosis {
 
-// For each channel the likeliest by restricted maximum likelihood, beside a parabola of each recording (of headings, a
-// line) and a path that all recordings of a group share, none of them a needle's; where chance would bring as much of a
-// gain once in 1000, it is none.
+/// Estimates the excess of each channel by restricted maximum likelihood. The mean is a parabola per recording (for
+/// headings a line) plus a path that all recordings of a group share; no needle model is used. There is no excess
+/// unless the gain in likelihood is one that chance gives in fewer than 1 of 1000 cases.
+/// @param recorded recordings
+/// @return one entry per channel
 std::vector<ScatterNearEntry> find_scatter_near_entry(const RecordedCase& recorded);
 
-// Channels with theirs, and the claimed standard deviations multiplied by it.
+/// Sets Channel::scatter to find_scatter_near_entry() and multiplies the claimed standard deviations by it.
+/// @param recorded recordings, changed in place
 void widen_near_entry(RecordedCase& recorded);
 
 }  // namespace bevel::diagnosis
