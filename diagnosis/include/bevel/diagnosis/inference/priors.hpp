@@ -35,7 +35,7 @@ struct Prior {
 /// @param standard_deviation Standard deviation, positive.
 /// @return Prior of Form::normal.
 Prior normal_prior(double mean, double standard_deviation);
-/// Makes a uniform prior over [lower, upper]; the density outside is not reduced, so callers keep the value inside.
+/// Makes a uniform prior over [lower, upper]. log_density() does not test the range.
 /// @param lower Lower end of the range.
 /// @param upper Upper end of the range, above \p lower.
 /// @return Prior of Form::flat without a wider range.
