@@ -104,6 +104,9 @@ class Search {
   /// Returns the prepared effects. Call run() first.
   /// @return Proposals of the last round.
   const Proposals& proposals() const { return *proposals_; }
+  /// Returns the settings.
+  /// @return Argument of the constructor.
+  const SearchRules& rules() const { return rules_; }
   /// Returns the likelihood with whose noise the discrepancy terms were prepared. Call run() first.
   /// @return Likelihood of the last round.
   const Likelihood& likelihood() const { return *likelihood_; }
