@@ -59,8 +59,8 @@ struct LinearModel {
 /// @param mean Mean about which the model is linear.
 /// @return Priors with the mean last.
 Pulls pulls_with_mean(const Pulls& pulls, const Eigen::VectorXd& mean);
-/// Computes the prior precision of the mean: that of the largest standard deviation of each group; infinite in effect
-/// where the recordings do not differ.
+/// Computes the prior precision of the mean: that of the largest standard deviation of its group, or of
+/// kNone_sd where the recordings do not differ.
 /// @param system Model.
 /// @param nuisance_sd Standard deviation per group.
 /// @return One precision per insertion-specific parameter.
