@@ -70,9 +70,9 @@ class Marginal {
   Added added(const std::vector<Eigen::MatrixXf>& X) const;
 
  private:
-  // By rows that are orthogonal to what they leave out, a recording's own unknowns by Q and the shared ones by MZR, all
-  // products are no larger than the columns: where paths diverge, derivatives are 10^9, and of their own products in
-  // single precision, or of normal equations, nothing is left.
+  // Q removes the local unknowns and MZR the shared ones. Both are orthogonal projections, so no product is larger than
+  // the columns. Where paths diverge, derivatives reach 1e9: their inner products in single precision, or normal
+  // equations, would lose all digits.
   ModelSet set_;
   std::vector<Eigen::MatrixXf> own_, shared_;  // Q and MZR, per recording
   std::vector<Eigen::VectorXf> left_;          // w - L l - Z z at the mode

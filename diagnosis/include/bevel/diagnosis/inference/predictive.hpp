@@ -40,7 +40,7 @@ struct Forecasts {
   double log_others = 0;         ///< Result of log_evidence_of_others().
 };
 
-/// Selects the combinations of standard deviations whose posterior weight is not negligible (negligible_of()).
+/// Selects the combinations of standard deviations whose posterior weight exceeds 1e-4.
 /// @param grid Grid.
 /// @param weights Posterior over \p grid.
 /// @return Selected columns.

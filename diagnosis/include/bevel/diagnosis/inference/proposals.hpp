@@ -103,7 +103,7 @@ class Proposals {
   };
   struct Candidate {
     std::vector<std::size_t> amplitudes;
-    int local = -1;  // parameter that each recording has for itself
+    int local = -1;  // parameter with a value per recording
     bool instant = false;
     std::vector<Signature> signatures;
     std::vector<std::vector<double>> choices;  // of the local parameter, per recording
@@ -119,7 +119,7 @@ class Proposals {
   };
   Candidate make_candidate(const Likelihood& likelihood, std::span<const Fit> views, std::size_t effect) const;
   Proposal judge(const Candidate& candidate, std::size_t effect, const Marginal& beside, std::size_t starts) const;
-  // Where the linear model has the shared unknowns beside each signature, as steps: shared x signatures.
+  // Steps of the shared unknowns that the linear model gives for each signature: shared x signatures.
   static Eigen::MatrixXd steps_beside(const Candidate& candidate, const Marginal& beside);
   Proposal judge_local(const Candidate& candidate, std::size_t effect, const Marginal& beside,
                        std::size_t starts) const;

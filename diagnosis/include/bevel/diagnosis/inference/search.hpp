@@ -161,23 +161,22 @@ class Search {
     std::vector<Eigen::VectorXd> local;
     Eigen::VectorXd nuisance_sd;
     bool beside_curve = false;
-    bool beside_several = false;  // with the first alone there is little of what is promised
-    bool foremost = false;        // fitted though it does not come near: a smaller set that was not yet
-    // Log posterior that it may have by the linear model, and by how much of that the model may be wrong; what nothing
-    // was promised of is fitted in any case.
+    bool beside_several = false;  // the prediction requires several curves
+    bool foremost = false;        // fitted although outside the window: a smaller model that was not fitted yet
+    // Predicted log posterior, with the linear model's possible error; models without a prediction are always fitted.
     double promised = std::numeric_limits<double>::infinity();
     double doubtful = 0;
-    std::shared_ptr<const Fit> large_curve{};  // with curves too large for the linear model: the same begins there
+    std::shared_ptr<const Fit> large_curve{};  // fit with curves too large for the linear model: start values
   };
-  // What further effects bring beside one fit of a set, by the linear model.
+  // Predicted gains of further effects about one fit, by the linear model.
   struct Beside {
     Fit about;
     std::vector<Proposal> proposals;
-    // Of a log Bayes factor: the larger set's log posterior, but for the prior odds of what joins.
+    // Converts a log Bayes factor to the larger model's log posterior, without the prior odds of the joining effect.
     std::function<double(double)> log_promised;
     double log_reference = 0;  // log posterior of the model that the effects join
-    // Beside less spread: what promises no more than it did elsewhere is not begun from here, nor anything before that
-    // has been looked at about its mode.
+    // For a fit with smaller standard deviations: only effects with a larger predicted gain than elsewhere start here,
+    // and only after the prediction was repeated about the mode.
     std::function<Beside()> at_its_mode{};
   };
   void expand(const ModelSet& set);
@@ -186,10 +185,10 @@ class Search {
   std::vector<Job> larger_sets(const ModelSet& set, const Beside& beside);
   double most_promised(const ModelSet& set) const;
   double log_promised(const Beside& beside, const Proposal& one) const;
-  double doubtful(double log_promised) const;  // by which a fit may exceed what the linear model says of it
+  double doubtful(double log_promised) const;  // by which a fit may exceed the prediction
   std::vector<Job> sets_without_a_member(const Fit& fit, double log_here);
   std::optional<Job> smaller_set(const Fit& about, std::size_t member, double log_here, double log_cost) const;
-  // A fit whose member at `place` leaves, and what is proposed beside the rest, that member too.
+  // A fit, the member at `place` to remove, and the proposals about the fit without it (that member among them).
   struct Swapped {
     const Likelihood& own;
     const CurveColumns& curve;
@@ -202,66 +201,66 @@ class Search {
   void append_swaps(const Swapped& from, double log_here, std::vector<Job>& out);
   void keep(const ModelSet& set, const std::shared_ptr<const Evaluated>& at);
   void drop_repeated(std::vector<Job>& jobs) const;
-  // Without a curve, all kept that are valid; what comes to a lower log posterior is left as it is.
+  // Without a curve. Keeps all valid results; fits stop early below this log posterior.
   std::vector<std::shared_ptr<Evaluated>> evaluate_without_curve(std::span<const Job> jobs, double give_up_below);
   void evaluate_all(std::vector<Job> jobs);
-  // Modes that were asked for a curve: of a set, with its log evidence.
+  // Modes for which a curve was tried: candidate model and its log evidence.
   using Modes = std::vector<std::pair<ModelSet, double>>;
   void evaluate_with_curve(std::span<const Job> jobs, Modes& asked);
   static Job job_at(const Fit& fit);
-  // A job that is begun from a fit with a curve asks for one, too, and begins with a large one from there.
+  // Requests a curve for a job that starts from a fit with one; a large curve keeps its values as start.
   void ask_for_curve_of(const Fit& fit, Job& job) const;
   void ask_for_curve_of(const Fit& fit, std::shared_ptr<const Likelihood> by, Job& job) const;
   Job job_from(const Fit& fit, std::size_t effect, const StartPoint& start) const;
   Job job_from_alike(const Fit& fit, std::size_t effect, StartPoint start) const;
   bool has_instants(std::size_t effect) const;
-  // Null: its noise is normal.
+  // Returns null if the noise is normal.
   std::shared_ptr<const Likelihood> with_heavy_tails(const Fit& fit) const;
-  // Whether the likeliest set's noise has, which alone can say: what jumps is no noise, once it has a name.
+  // Tests the noise of the most likely model. Only that one is conclusive: jumps that are modelled are not noise.
   bool look_for_heavy_tails();
   double best_log() const;
   const Fit& likeliest_fit() const { return best().likelier_fit(); }
   bool is_visited(const ModelSet& set) const { return visited_.contains(set); }
 
-  // The base alone, from where it is fitted.
+  // Start values of the nominal model's fit.
   struct Start {
     Eigen::VectorXd shared;
     std::vector<Eigen::VectorXd> local;
     Eigen::VectorXd nuisance_sd;
   };
   void look_in_rounds(std::shared_ptr<const Likelihood> reference, Start& start, std::vector<Job> known);
-  // Of a set that is visited: so far below the likeliest that no curve is sought beside it any more.
+  // Tests whether a visited model is so far below the most likely one that no curve is tried.
   bool is_hopeless(const ModelSet& set) const;
   double hopeless_below() const;
   double hopeless_with_curve(const ModelSet& set) const;  // log evidence
-  // Each alone and without a curve, before any is sought.
+  // Fits the best effects alone and without a curve, before any curve is tried.
   void look_at_foremost_effects();
-  // Whether nothing stays hopeless with all that is promised of a curve.
+  // Tests whether the nominal model stays pruned with the predicted gain of a curve.
   bool is_nothing_hopeless_with_a_curve() const;
-  // Promises that were made by this noise are not worth much by that of what was found since; the last goes on.
+  // Predictions with the round's noise are poor once the best model's noise differs; the last round continues.
   bool is_round_over() const;
   bool is_out_of_steps() const { return likelihood_->steps() >= rules_.most_steps; }
   void look_around();
-  void look_at_what_is_left();  // in the window, the likeliest first
+  void look_at_what_is_left();  // in the window, the most likely first
   void fit_what_was_left();     // SearchRules::most_not_fitted
 
   const System& system_;
   SearchRules rules_;
   CurveRules curve_rules_;
-  std::shared_ptr<const Likelihood> likelihood_;  // for what is linear; each set is judged by its own noise
+  std::shared_ptr<const Likelihood> likelihood_;  // for the linear predictions; each model has its own noise
   std::unique_ptr<const Discrepancy> discrepancy_;
   std::unique_ptr<const Proposals> proposals_;
   std::map<ModelSet, Visited> visited_;
   std::set<ModelSet> expanded_, refitted_;       // once a round each
-  std::set<std::pair<ModelSet, bool>> swapped_;  // beside a curve and without one, the same
+  std::set<std::pair<ModelSet, bool>> swapped_;  // with a curve and without one
   Progress progress_;
   std::map<ModelSet, Predicted> promised_;
-  std::map<ModelSet, Job> left_;                      // not fitted for want of steps, where the most was predicted
-  std::shared_ptr<const Likelihood> heavy_;           // by noise with heavy tails; null: normal, as far as is known
-  std::shared_ptr<const Evaluated> asked_for_tails_;  // the likeliest set, when that was asked
-  bool tails_known_ = false;                          // not asked any more
+  std::map<ModelSet, Job> left_;                      // not fitted for want of steps, with the largest prediction
+  std::shared_ptr<const Likelihood> heavy_;           // noise with heavy tails; null: normal so far
+  std::shared_ptr<const Evaluated> asked_for_tails_;  // most likely model when the tails were tested
+  bool tails_known_ = false;                          // not tested again
   bool last_round_ = false;
-  bool nothing_is_hopeless_ = false;  // whatever the noise: beside it no curve is sought any more
+  bool nothing_is_hopeless_ = false;  // nominal model pruned for any noise: no curve is tried
 };
 
 }  // namespace bevel::inference
