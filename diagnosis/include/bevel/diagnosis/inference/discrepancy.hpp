@@ -89,9 +89,9 @@ class Discrepancy {
   std::vector<Eigen::Index> first_, size_;    // columns of each curve
   std::vector<Eigen::MatrixXf> raw_, white_;  // per recording, of all curves; raw_: with the outliers
   std::vector<Eigen::MatrixXf> square_;       // per recording: inner products within each curve, side by side
-  std::vector<Eigen::MatrixXd> visible_;      // per curve: mean square over readings, as a quadratic form
+  std::vector<Eigen::MatrixXd> visible_;      // per curve: mean square over rows, as a quadratic form
   std::vector<Eigen::VectorXd> per_sd_;  // per recording: of its rows, 1 / standard deviation of the noise; outliers: 0
-  Eigen::MatrixXd absorbed_, absorbing_;  // by the base's parameters: (J'J)^-1 J'C and J'C, of all curves
+  Eigen::MatrixXd absorbed_, absorbing_;  // nominal parameters: (J'J)^-1 J'C and J'C of all curves
   double rows_ = 0;
 };
 

@@ -179,7 +179,7 @@ class Likelihood {
   Readings outliers_;
   Dataset data_;
   Noise noise_;
-  std::vector<std::vector<Eigen::Index>> rows_;    // of the system's, that are left
+  std::vector<std::vector<Eigen::Index>> rows_;    // the system's rows without the outliers
   std::vector<std::vector<Whitening>> whitening_;  // per recording and channel
   std::vector<Eigen::VectorXd> measured_;          // per recording
   Eigen::VectorXd log_weights_;                    // per recording

@@ -76,7 +76,7 @@ class Marginal {
   ModelSet set_;
   std::vector<Eigen::MatrixXf> own_, shared_;  // Q and MZR, per recording
   std::vector<Eigen::VectorXf> left_;          // w - L l - Z z at the mode
-  std::vector<Eigen::VectorXf> weight_;        // of the rows of columns; empty: one. All of the above have it already
+  std::vector<Eigen::VectorXf> weight_;        // of the columns' rows; empty: one. Already applied to the members above
   Eigen::VectorXd step_;
   Eigen::MatrixXd root_;
   bool valid_ = false;

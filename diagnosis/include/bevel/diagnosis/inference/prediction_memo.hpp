@@ -38,7 +38,7 @@ class PredictionMemo {
   };
   struct OfRecording {
     std::mutex mutex;
-    std::vector<Known> known;  // the last asked first
+    std::vector<Known> known;  // most recent first
   };
   const System* system_;
   std::vector<OfRecording> recordings_;
