@@ -1,13 +1,19 @@
 // SPDX-License-Identifier: MIT
+/// @file
+/// Events that occurred in some recordings and that the insertion-specific parameters absorbed.
 #pragma once
-// Steps that happened in some recordings, and that these took up as their own.
 #include <bevel/diagnosis/inference/likelihood.hpp>
 
 namespace bevel::inference {
 
-// Every instant once more with what a recording has of its own following from where it is like the others, at the size
-// at which all recordings together cost least, then all else: what happened in some and was not seen at first passes
-// for what these have of their own, and what one of them has wrong is the size for all.
+/// Scans every event time again from insertion-specific parameters that are equal in all recordings.
+///
+/// The scan uses the effect size with the least total cost over all recordings; then all other unknowns are fitted.
+/// This finds events in some recordings that the insertion-specific parameters absorbed. The common size also corrects
+/// a recording that alone has a wrong one.
+/// @param likelihood Likelihood.
+/// @param curve Columns of the fit's curves.
+/// @param[in,out] fitted Fit.
 void look_from_alike(const Likelihood& likelihood, const CurveColumns& curve, Fit& fitted);
 
 }  // namespace bevel::inference

@@ -1,32 +1,50 @@
 // SPDX-License-Identifier: MIT
+/// @file
+/// Noise with heavier tails than the normal distribution: the innovations follow Student's t.
+///
+/// About a fit each innovation has its own precision, by expectation and maximisation (Lange, Little and Taylor 1989,
+/// JASA 84). All other computations are those for normal noise. For a square s in units of the square of t's scale,
+/// with nu degrees of freedom,
+///
+/// \code{.unparsed}
+///   -(nu + 1)/2 log(1 + s/nu) = max over w of [-w s/2 - c(w)],   w = (nu + 1)/(nu + s)
+/// \endcode
+///
+/// because the logarithm is concave in s. With these weights a fit has the likelihood of Student's t. The weights
+/// overstate the information about a mean: their expected information is 1, that of t is f = (nu + 1)/(nu + 3). The
+/// cost therefore sums f w s. log_density_beyond() holds the rest of the density, averaged over the squares.
 #pragma once
-// Noise with heavier tails than the normal distribution's: innovations are Student's t. Beside a fit each has a
-// precision of its own, by expectation and maximisation (Lange, Little and Taylor 1989, JASA 84), with which all else
-// is as for normal noise. Of its square s in squares of t's scale, with nu degrees of freedom,
-//
-//   -(nu + 1)/2 log(1 + s/nu) = max over w of [-w s/2 - c(w)],   w = (nu + 1)/(nu + s)
-//
-// (the logarithm is concave in s): by the weights that belong to it a fit has the likelihood of Student's t. Weights
-// say more of a mean than t does: their expected information is 1, that of t f = (nu + 1)/(nu + 3). What is added up is
-// f w s; the rest of the density, in the mean over squares, is in log_density_beyond().
 #include <span>
 
 namespace bevel::inference {
 
+/// Distribution of the innovations.
 struct Tails {
-  double degrees = 0;  // of freedom; 0: normal
-  double scale = 1;    // square of t's scale, in variances of the noise. Outliers are taken out: no fixed share of it
+  double degrees = 0;  ///< Degrees of freedom; 0: normal.
+  /// Square of t's scale, in variances of the noise. It is estimated, because the removal of outliers changes it.
+  double scale = 1;
+  /// Compares all members.
+  /// @return True if the distributions are equal.
   bool operator==(const Tails&) const = default;
 };
 
-// The likeliest of squared innovations, in variances; normal, unless t is so much likelier as chance brings once in
-// 1000.
+/// Estimates the most likely distribution of innovations.
+/// @param squares Squared innovations, in variances of the noise.
+/// @return Student's t if its likelihood gain has a probability below 0.001 by chance; otherwise normal.
 Tails likeliest_tails(std::span<const double> squares);
-// Of an innovation's square in variances, relative to a normal one's.
+/// Computes the precision of an innovation relative to normal noise.
+/// @param square Squared innovation, in variances of the noise.
+/// @param tails Distribution; not normal.
+/// @return Precision, dimensionless.
 double precision_of(double square, const Tails& tails);
-// The sum of precision times square falls short of their number by this factor.
+/// Computes the expected sum of precision times square divided by the number of innovations.
+/// @param tails Distribution.
+/// @return (degrees + 1) / (degrees + 3); 1 for normal noise.
 double information_of(const Tails& tails);
-// Logarithm of the density less log(precision)/2 - precision square/2.
+/// Computes the log density minus (log(precision) - precision square) / 2.
+/// @param precision Precision of the innovation (precision_of()).
+/// @param tails Distribution; not normal.
+/// @return Natural log.
 double log_density_beyond(double precision, const Tails& tails);
 
 }  // namespace bevel::inference

@@ -1,54 +1,87 @@
 // SPDX-License-Identifier: MIT
+/// @file
+/// Escape from local minima: grid scans of the phases, event times and shapes of effects, which derivatives do not
+/// find.
 #pragma once
-// Ways out of local minima: phases, instants and shapes of effects at the best of a grid, as derivatives do not see
-// them.
 #include <bevel/diagnosis/inference/likelihood.hpp>
 
 namespace bevel::inference {
 
-// Between instants that are tried.
+/// Spacing of the event times in a scan, in s.
 inline constexpr double kInstantSpacing_s = 0.3;
 
-// Of a shared parameter: its starts are a grid (a depth, a jump).
+/// Tests whether the starts of a shared parameter are a grid (for example a depth or a jump).
+/// @param parameter Parameter.
+/// @return True if its likelihood has many local minima.
 bool has_many_minima(const Parameter& parameter);
 
-// Of its starts: from a value's neighbour to the next.
+/// Computes the spacing of a parameter's starts around a value.
+/// @param parameter Parameter with at least two starts.
+/// @param value Value, in the parameter's unit.
+/// @return Distance of the two nearest starts, in the parameter's unit.
 double grid_spacing(const Parameter& parameter, double value);
 
-// Whether a member of the set happens at instants at which readings jump.
+/// Tests whether a member of a candidate model has event times at which the predictions jump.
+/// @param layout Layout of the candidate model.
+/// @param member Position of the effect in the candidate model.
+/// @return True if it has.
 bool has_jump(const Layout& layout, int member);
 
-// What an instant has to bring in a recording to be taken for one, in chi2: its expected odds.
+/// Computes the reduction of chi-square that an event must bring in a recording to be accepted, from its expected odds.
+/// @param duration_s Duration in which the event can occur, in s.
+/// @return Cost, in units of chi-square.
 double instant_cost(double duration_s);
-// The cost of a fit, its instants' with it.
+/// Computes the cost of a fit plus instant_cost() of each of its events.
+/// @param fit Fit.
+/// @return Cost, in units of chi-square.
 double cost_with_instants(const Fit& fit);
-// Of a grid over a recording.
+/// Computes the number of event times in the scan of a recording.
+/// @param duration_s Duration, in s.
+/// @return Number, at least 4.
 int instants_of(double duration_s);
 
-// Whether it has phases or instants.
+/// Tests whether a candidate model has phases or event times.
+/// @param layout Layout of the candidate model.
+/// @return True if it has.
 bool has_scanned(const Layout& layout);
 
-// Every phase and instant at the best of a grid, all else as it is, again and again until that helps no more.
+/// Moves every phase and event time to the best value of a grid with all else constant, until the cost no longer falls.
+/// @param likelihood Likelihood.
+/// @param curve Columns of the fit's curves.
+/// @param[in,out] fitted Fit.
 void scan_locals(const Likelihood& likelihood, const CurveColumns& curve, Fit& fitted);
 
-// Each instant in turn taken out, all else fitted anew: kept out, or put elsewhere in its recording, where it is not
-// missed. What a scan finds beside parameters that are still off may hold them there. One that is missed by far by the
-// linear model stays.
+/// Removes each event in turn, fits all else again, and keeps the event out or moves it if the cost falls. A scan with
+/// wrong parameters can place events that then keep the parameters wrong. An event stays if its removal costs far too
+/// much by the linear model.
+/// @param likelihood Likelihood.
+/// @param curve Columns of the fit's curves.
+/// @param[in,out] fitted Fit.
 void doubt_instants(const Likelihood& likelihood, const CurveColumns& curve, Fit& fitted);
 
-// Each shared parameter that has many local minima along a finer grid about where it is, all else following by the
-// linear model, and the instants too.
+/// Scans each shared parameter with many local minima on a finer grid around its value. The linear model adjusts all
+/// other unknowns; the event times are adjusted too.
+/// @param likelihood Likelihood.
+/// @param curve Columns of the fit's curves.
+/// @param[in,out] fitted Fit.
 void scan_shapes(const Likelihood& likelihood, const CurveColumns& curve, Fit& fitted);
 
-// From a fit to one in which another effect does what one of its members does: that member is taken out step by step,
-// and all else follows, the other effect too, from where it starts (its shared parameters). Between two names of one
-// path the rest of the model has to change as well, and what has many local minima (a depth, a jump) is lost on the
-// way if the change is made at once. Not settled yet: without scans. Invalid where the way leaves the model's domain.
+/// Replaces a member of a fit by another effect that describes the same path. The member is removed step by step and
+/// all else follows, because an immediate change would lose parameters with many local minima (a depth, a jump).
+/// @param likelihood Likelihood.
+/// @param curve Columns of the fit's curves.
+/// @param from Fit.
+/// @param member Position of the member to remove.
+/// @param effect Index into System::effects() of the new effect.
+/// @param start Start values of the new effect's shared parameters.
+/// @return Fit without final scans; not valid if a step leaves the model's domain.
 Fit replaced(const Likelihood& likelihood, const CurveColumns& curve, const Fit& from, std::size_t member,
              std::size_t effect, const Eigen::VectorXd& start);
 
-// By the linear model: by how much the log likelihood falls where one member's sizes are none, for each member.
-// Infinite for one that has no size to be none, or one that presses against a bound other than that.
+/// Predicts the decrease of the log likelihood if one member's sizes are set to `none`, by the linear model.
+/// @param fit Fit with its likelihood.
+/// @param curve Columns of the fit's curves.
+/// @return One decrease per member; infinite if the member has no size, or is at a bound other than `none`.
 std::vector<double> log_costs_of_dropping(const Fit& fit, const CurveColumns& curve = {});
 
 }  // namespace bevel::inference

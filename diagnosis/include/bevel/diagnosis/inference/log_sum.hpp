@@ -1,4 +1,6 @@
 // SPDX-License-Identifier: MIT
+/// @file
+/// Logarithm of a sum of exponentials.
 #pragma once
 #include <algorithm>
 #include <cmath>
@@ -7,7 +9,9 @@
 
 namespace bevel::inference {
 
-// log of a sum of exponentials, of the largest first so that none overflows; minus infinity of nothing.
+/// Computes the natural log of a sum of exponentials, relative to the largest so that none overflows.
+/// @param logs Natural logs.
+/// @return Log of the sum; -infinity for an empty list.
 inline double log_sum(std::span<const double> logs) {
   double largest = -std::numeric_limits<double>::infinity();
   for (const double one : logs) largest = std::max(largest, one);

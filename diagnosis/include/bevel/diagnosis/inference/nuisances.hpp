@@ -1,21 +1,33 @@
 // SPDX-License-Identifier: MIT
+/// @file
+/// Posteriors of the insertion-specific and the shared unknowns about one fit, over the between-insertion standard
+/// deviations.
 #pragma once
-// What each recording has of its own, and what all share, beside one fit, over the standard deviations of the
-// nuisances.
 #include <bevel/diagnosis/inference/posterior.hpp>
 
 namespace bevel::inference {
 
-// Variances of a recording's own unknowns, in the order of free_locals. solution: with its whole
-// covariance.
+/// Computes the variances of a recording's local unknowns.
+/// @param block Normal equations of the recording.
+/// @param solution Solution of all recordings, with its full covariance.
+/// @return One variance per entry of free_locals().
 Eigen::VectorXd local_variances(const ArrowBlock& block, const ArrowSolution& solution);
 
-// Mean squares of how far the shared unknowns are from the fit's, and mean products. blocks: the linear model about the
-// fit; weights: over nuisance_grid(), as Evaluated has them.
+/// Computes the mean products of the shared unknowns' deviations from the fit.
+/// @param fit Fit.
+/// @param blocks Normal equations about \p fit.
+/// @param curve Columns of the fit's curves.
+/// @param weights Posterior over nuisance_grid(), as in Evaluated.
+/// @return Square matrix.
 Eigen::MatrixXd shared_covariance(const Fit& fit, std::vector<ArrowBlock> blocks, const CurveColumns& curve,
                                   const Eigen::VectorXd& weights);
 
-// [recording][nuisance]. blocks: the linear model about the fit; weights: over nuisance_grid(), as Evaluated has them.
+/// Computes the posteriors of the insertion-specific parameters.
+/// @param fit Fit.
+/// @param blocks Normal equations about \p fit.
+/// @param curve Columns of the fit's curves.
+/// @param weights Posterior over nuisance_grid(), as in Evaluated.
+/// @return Posteriors, indexed by recording and parameter.
 std::vector<std::vector<Mixture>> nuisance_posterior(const Fit& fit, std::vector<ArrowBlock> blocks,
                                                      const CurveColumns& curve, const Eigen::VectorXd& weights);
 

@@ -1,17 +1,20 @@
 // SPDX-License-Identifier: MIT
+/// @file
+/// Noise for the prediction of recordings: each channel has its own autocorrelation, and all other unknowns are
+/// integrated out by the linear model about a fit.
+///
+/// The noise of a candidate model has one autocorrelation for all channels. If one channel drifts, that autocorrelation
+/// absorbs differences between recordings in the others. The method is expectation and maximisation (error_spread.hpp)
+/// at the most likely between-insertion standard deviations of the grid.
 #pragma once
-// The noise by which recordings are predicted: the likeliest of the readings' density with everything else integrated
-// out, by the linear model about a fit, each channel with an autocorrelation of its own. Beside a set one
-// autocorrelation has to do for all channels:
-// where one of them drifts, it takes up in the others what recordings differ by.
-//
-// By expectation and maximisation (error_spread.hpp); the nuisances' standard deviations are the likeliest of the grid
-// meanwhile.
 #include <bevel/diagnosis/inference/predictive.hpp>
 
 namespace bevel::inference {
 
-// model: with the nuisances' mean or without. As it begins where it fails: outside the model's domain.
+/// Estimates the noise for predictions.
+/// @param model Linear model, with or without a mean of the insertion-specific parameters.
+/// @param curve Columns of the fit's curves.
+/// @return Noise; the initial noise outside the model's domain.
 Noise prediction_noise(const LinearModel& model, const CurveColumns& curve);
 
 }  // namespace bevel::inference

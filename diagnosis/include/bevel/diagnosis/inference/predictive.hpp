@@ -1,74 +1,114 @@
 // SPDX-License-Identifier: MIT
+/// @file
+/// Prediction of one recording from the others, row by row: as a new recording, and continued from its first
+/// measurements. The linear model about a mode is exact where the measurements are linear in all unknowns:
+///
+/// \code{.unparsed}
+///   y = h(m) + A (u - m) + e     u = (shared unknowns, curve values, local unknowns of the recording)
+/// \endcode
+///
+/// u is normal: given the other recordings, and about zero with the between-insertion standard deviations. The result
+/// is a sum over those, weighted by the evidence of the other recordings (and, continued, of the first measurements).
+/// To continue, u is conditioned on the first measurements (Rasmussen and Williams 2006, A.6), and so is the noise. Its
+/// whitening W is lower triangular in time. For a later part 2 given part 1 the errors are W22^-1 [W (y - h)]_2, the
+/// derivatives W22^-1 [W A]_2, and the noise covariance is (W22' W22)^-1.
+///
+/// The local unknowns are normal about zero or about an unknown mean that all recordings share. The mean is normal
+/// about zero with the largest standard deviation of its group, and zero where the recordings do not differ. The
+/// evidence of candidate models uses zero mean; a prediction may use the mean, because the next recording shares it.
 #pragma once
-// One recording predicted from the others, reading by reading, in two ways: as a new recording, and continued from its
-// first readings. By the linear model about a mode, exact where the readings are linear in everything:
-//
-//   y = h(m) + A (u - m) + e     u = (shared unknowns, the curve's values, the recording's own)
-//
-// u is normal: given the others, and about zero with the nuisances' standard deviations; over those there is a sum,
-// each weighed by what it makes of the others (and, continued, of the first readings). Continued, u is conditioned on
-// the first readings (Rasmussen and Williams 2006, A.6) and so is the noise: its whitening W is lower triangular in
-// time, so that of a later part 2, given part 1, errors are W22^-1 [W (y - h)]_2, derivatives W22^-1 [W A]_2, and the
-// noise's covariance is (W22' W22)^-1.
-//
-// What the recording has of its own is normal about zero, or about a mean that all recordings share and nobody knows:
-// normal about zero with the largest standard deviation that is tried for its group, none where the recordings do not
-// differ. Which set explains what recordings have in common is asked by the evidence, with a mean of zero; a prediction
-// need not have the answer, and what the others have in common the next has too.
 #include <optional>
 
 #include <bevel/diagnosis/inference/evidence.hpp>
 
 namespace bevel::inference {
 
-// Of some of a recording's readings.
+/// Prediction of some of a recording's measurements.
 struct Forecast {
-  std::vector<Eigen::Index> rows;  // which: in the order of the likelihood's rows
-  Eigen::VectorXd error;           // measured - mean, in the channels' units
-  Eigen::VectorXd below;           // probability of less than was measured: uniform in (0, 1) if the model is right
-  double log_density = 0;          // of all of these readings together, natural
+  std::vector<Eigen::Index> rows;  ///< Predicted rows, in the order of the likelihood.
+  Eigen::VectorXd error;           ///< Measured minus mean, in the channels' units.
+  Eigen::VectorXd below;           ///< Probability of less than was measured: uniform in (0, 1) for a correct model.
+  double log_density = 0;          ///< Joint natural log density of these measurements.
 };
 
+/// Predictions of one recording.
 struct Forecasts {
-  Forecast all;                  // every reading, as of a new recording
-  Forecast beyond;               // those after until_s, as of a new recording
-  Forecast continued;            // the same ones, given the readings up to until_s
-  double log_density_first = 0;  // of the readings up to until_s together
-  double log_others = 0;         // log_evidence_of_others()
+  Forecast all;                  ///< All measurements, as a new recording.
+  Forecast beyond;               ///< Measurements after until_s, as a new recording.
+  Forecast continued;            ///< The rows of \p beyond, given the measurements up to until_s.
+  double log_density_first = 0;  ///< Joint natural log density of the measurements up to until_s.
+  double log_others = 0;         ///< Result of log_evidence_of_others().
 };
 
-// Those combinations of the nuisances' standard deviations that have a share in the posterior worth a computation.
+/// Selects the combinations of standard deviations whose posterior weight exceeds 1e-4.
+/// @param grid Grid.
+/// @param weights Posterior over \p grid.
+/// @return Selected columns.
 NuisanceGrid likely_part(const NuisanceGrid& grid, const Eigen::VectorXd& weights);
 
-// A mode and the linear model about it, of all recordings.
+/// Mode of all recordings with the linear model about it.
 struct LinearModel {
-  const Fit* fit = nullptr;
-  std::vector<ArrowBlock> blocks;
-  Eigen::VectorXd mean{};  // of the nuisances, where it is an unknown: about this; its columns are the last shared ones
+  const Fit* fit = nullptr;        ///< Fit; must outlive this object.
+  std::vector<ArrowBlock> blocks;  ///< Normal equations about \p fit.
+  /// Mean of the insertion-specific parameters about which the model is linear, if it is an unknown; its columns are
+  /// the last shared ones. Empty: the mean is zero.
+  Eigen::VectorXd mean{};
 };
-// Priors of its shared part with that mean, about the model's; and its precision: normal by the widest standard
-// deviation that is tried, none where the nuisances do not vary.
+/// Adds an unknown mean of the insertion-specific parameters to the priors.
+/// @param pulls Priors of the model's shared unknowns.
+/// @param mean Mean about which the model is linear.
+/// @return Priors with the mean last.
 Pulls pulls_with_mean(const Pulls& pulls, const Eigen::VectorXd& mean);
+/// Computes the prior precision of the mean: that of the largest standard deviation of its group, or of
+/// kNone_sd where the recordings do not differ.
+/// @param system Model.
+/// @param nuisance_sd Standard deviation per group.
+/// @return One precision per insertion-specific parameter.
 Eigen::VectorXd mean_precision_of(const System& system, const Eigen::VectorXd& nuisance_sd);
-// The same with a mean of the nuisances that is unknown, about that of the other recordings' (of all: past the last).
+/// Adds an unknown mean of the insertion-specific parameters to a model, linear about the mean of the other recordings.
+/// @param model Model without a mean.
+/// @param recording Recording to leave out; the number of recordings: none.
+/// @return Model with a mean.
 LinearModel with_mean(LinearModel model, std::size_t recording);
-// Posterior over the grid of the nuisances' standard deviations, of all recordings.
+/// Computes the posterior over the between-insertion standard deviations from all recordings.
+/// @param model Linear model.
+/// @param curve Columns of the fit's curves.
+/// @param grid Grid of standard deviations.
+/// @return Weight of each column of \p grid.
 Eigen::VectorXd spread_weights(LinearModel model, const CurveColumns& curve, const NuisanceGrid& grid);
-// Of all recordings but this one, over the spreads: for one fit on one scale, with a mean and without.
+/// Computes the log evidence of all recordings but one, summed over standard deviations. For one fit, results with and
+/// without a mean have the same reference.
+/// @param model Linear model.
+/// @param curve Columns of the fit's curves.
+/// @param spreads Grid of standard deviations.
+/// @param recording Recording to leave out.
+/// @return Natural log.
 double log_evidence_of_others(LinearModel model, const CurveColumns& curve, const NuisanceGrid& spreads,
                               std::size_t recording);
 
-// others: fitted to the other recordings; begun: to them and this one's readings up to until_s, where the model may be
-// far from linear. By the noise of their likelihood; this recording's phases and instants are taken as they stand.
-// Both with a mean of the nuisances or neither. Empty outside the model's domain.
+/// Predicts one recording with the noise of the fits' likelihood. Its phases and event times stay as they are.
+/// @param others Model fitted to the other recordings.
+/// @param begun Model fitted to the others and this recording's measurements up to \p until_s, where the model may be
+/// far from linear. Both models have a mean, or neither.
+/// @param curve Columns of the fits' curves.
+/// @param spreads Grid of standard deviations.
+/// @param recording Index of the recording.
+/// @param until_s End of the first measurements, in s from the recording's start.
+/// @return Predictions; nothing outside the model's domain.
 std::optional<Forecasts> forecast(LinearModel others, LinearModel begun, const CurveColumns& curve,
                                   const NuisanceGrid& spreads, std::size_t recording, double until_s);
 
-// Of several models of the same readings, with their probabilities given the others; continued, they are weighed by the
-// first readings too.
+/// Averages the predictions of several models. Continued predictions are also weighted by the first measurements.
+/// @param models Predictions of the same measurements.
+/// @param probabilities Probability of each model given the other recordings.
+/// @return Prediction of the mixture.
 Forecasts averaged(const std::vector<Forecasts>& models, const std::vector<double>& probabilities);
 
-// The time up to which a share of a recording's readings lies: of two at one time both or none.
+/// Computes the time up to which a share of a recording's measurements lies. Simultaneous measurements are not
+/// separated.
+/// @param recording Recording.
+/// @param share Share, in [0, 1].
+/// @return Time from the recording's start, in s.
 double time_of_share(const SeriesSet& recording, double share);
 
 }  // namespace bevel::inference

@@ -1,65 +1,98 @@
 // SPDX-License-Identifier: MIT
+/// @file
+/// Predicted gain of each effect: its signature in the measurements is computed once about one fit, from a grid of
+/// start values. For any other fit the linear model then estimates the log Bayes factor and the start values without a
+/// new fit.
 #pragma once
-// What each effect would do to the readings, from a grid of starts, once, about one fit; and from it, without any new
-// fit, what each promises beside a set that was fitted: an estimate of its log Bayes factor, and where to begin.
 #include <span>
 
 #include <bevel/diagnosis/inference/marginal.hpp>
 
 namespace bevel::inference {
 
+/// Start values of an effect with their predicted gain.
 struct StartPoint {
-  Eigen::VectorXd shared;              // of the effect's shared parameters, in their order
-  std::vector<Eigen::VectorXd> local;  // of its others, per recording
-  double log_bayes_factor = 0;
-  bool base_at_prior = false;  // it was seen with the base where its prior has it
-  // Of the shared unknowns of the fit that it joins, beside it, if it was seen with them there; empty: where they are.
+  Eigen::VectorXd shared;              ///< Shared parameters of the effect, in their order.
+  std::vector<Eigen::VectorXd> local;  ///< Other parameters of the effect, per recording.
+  double log_bayes_factor = 0;         ///< Predicted natural log Bayes factor.
+  bool base_at_prior = false;          ///< The signature was computed with the nominal model at its prior.
+  /// Shared unknowns of the fit that the effect joins, if the signature was computed with other values than the fit's;
+  /// empty: the fit's values.
   Eigen::VectorXd beside{};
 };
 
+/// Predicted gain of one effect.
 struct Proposal {
-  std::size_t effect = 0;
-  double log_bayes_factor = 0;     // averaged over the starts; minus infinity: no start can be evaluated
-  std::vector<StartPoint> starts;  // the likeliest first
+  std::size_t effect = 0;          ///< Index into System::effects().
+  double log_bayes_factor = 0;     ///< Natural log, averaged over the starts; -infinity: no start can be evaluated.
+  std::vector<StartPoint> starts;  ///< Start values, the most likely first.
 };
 
-// What these readings can show of each effect, beside the base.
+/// Detectability of each effect in the recordings, given the nominal model.
 struct Reach {
+  /// Detectability of one parameter at which an effect vanishes.
   struct Size {
-    std::size_t effect = 0, parameter = 0;
-    double one_deviation = 0;  // a size whose visible part has one standard deviation of the noise, over all readings
-    double typical = 0;        // where fits begin
-    double absorbed = 0;       // share of the signature, in squares, that the base and the nuisances take over
+    std::size_t effect = 0,    ///< Index into System::effects().
+        parameter = 0;         ///< Index of the parameter in the effect.
+    double one_deviation = 0;  ///< Size whose visible part has one standard deviation of the noise over all rows.
+    double typical = 0;        ///< Size at which fits begin.
+    double absorbed = 0;       ///< Share of the squared signature that nominal and local parameters absorb.
   };
-  std::vector<Size> sizes;           // of every parameter at which an effect vanishes
-  std::vector<std::size_t> effects;  // rows of
-  Eigen::MatrixXd cosine;            // between visible parts
+  std::vector<Size> sizes;           ///< Every parameter at which an effect vanishes.
+  std::vector<std::size_t> effects;  ///< Effects of the rows and columns of \p cosine.
+  Eigen::MatrixXd cosine;            ///< Cosines between the visible parts of two effects.
 };
 
-// Unknowns of one recording, shared and its own, under a layout with one effect more, at these values of its
-// parameters.
+/// Makes the unknowns of one recording for a layout with one more effect.
+/// @param layout Layout with the effect.
+/// @param from Layout without the effect.
+/// @param shared Shared unknowns, in the order of \p from.
+/// @param local Local unknowns of the recording, in the order of \p from.
+/// @param effect Index into System::effects().
+/// @param values Values of the effect's parameters.
+/// @return Shared and local unknowns, in the order of \p layout.
 std::pair<Eigen::VectorXd, Eigen::VectorXd> unknowns_with(const Layout& layout, const Layout& from,
                                                           const Eigen::VectorXd& shared, const Eigen::VectorXd& local,
                                                           std::size_t effect, const Eigen::VectorXd& values);
-// The base's parameters of normal prior where that has them, and recordings that do not differ.
+/// Moves the nominal model's parameters with normal prior to the prior means, and removes differences between
+/// recordings.
+/// @param fit Fit.
+/// @return Changed fit; not refitted.
 Fit with_base_at_prior(Fit fit);
 
+/// Signatures of all effects about one fit.
 class Proposals {
  public:
-  // About a fit of any set: what its members do is there when the others are added, as far as they are allowed beside
-  // each other.
+  /// Computes the signatures. The members of the fit stay in the model when another effect is added, if the combination
+  /// is allowed.
+  /// @param likelihood Likelihood that whitens the signatures.
+  /// @param about Fit of any candidate model.
   Proposals(const Likelihood& likelihood, const Fit& about);
 
-  // Every effect that may join the set of a fit, the likeliest first.
+  /// Predicts the gain of every effect that may join a fit.
+  /// @param fit Marginal about the fit.
+  /// @param starts Largest number of start values per effect.
+  /// @return Proposals, the most likely first.
   std::vector<Proposal> beside(const Marginal& fit, std::size_t starts) const;
-  // Of those, anew, what is no multiple of itself at another size (steps of a length, again and again), with the shared
-  // unknowns of the fit where the linear model has them beside each of its starts: what took up the steps' mean, as a
-  // latency does, shifts them, too, and steps that are elsewhere are not seen. by: whitens the columns (Marginal).
+  /// Predicts again the gain of effects whose signature is not proportional to a size (for example steps of a length).
+  /// The shared unknowns are those that the linear model gives for each start: an unknown that absorbs the mean of the
+  /// steps, as a latency does, also shifts them.
+  /// @param by Likelihood that whitens the columns (Marginal).
+  /// @param fit Fit that the effects join.
+  /// @param beside Marginal about \p fit.
+  /// @param starts Largest number of start values per effect.
+  /// @param[in,out] proposals Result of beside().
   void look_with_others_moved(const Likelihood& by, const Fit& fit, const Marginal& beside, std::size_t starts,
                               std::vector<Proposal>& proposals) const;
-  // Pairs beside the base, by their joint estimate, the likeliest first.
+  /// Predicts the joint gain of pairs of effects that join the nominal model.
+  /// @param base Marginal about the fit of the nominal model.
+  /// @param count Largest number of pairs.
+  /// @return Predicted gain and pair, the most likely first.
   std::vector<std::pair<double, ModelSet>> pairs(const Marginal& base, std::size_t count) const;
-  // Of effects in the middle of their starts; what happens at an instant, in the middle of every recording.
+  /// Computes the detectability of each effect at the middle of its starts; events occur in the middle of every
+  /// recording.
+  /// @param base Marginal about the fit of the nominal model.
+  /// @return Detectability.
   Reach reach(const Marginal& base) const;
 
  private:
@@ -70,7 +103,7 @@ class Proposals {
   };
   struct Candidate {
     std::vector<std::size_t> amplitudes;
-    int local = -1;  // parameter that each recording has for itself
+    int local = -1;  // parameter with a value per recording
     bool instant = false;
     std::vector<Signature> signatures;
     std::vector<std::vector<double>> choices;  // of the local parameter, per recording
@@ -86,7 +119,7 @@ class Proposals {
   };
   Candidate make_candidate(const Likelihood& likelihood, std::span<const Fit> views, std::size_t effect) const;
   Proposal judge(const Candidate& candidate, std::size_t effect, const Marginal& beside, std::size_t starts) const;
-  // Where the linear model has the shared unknowns beside each signature, as steps: shared x signatures.
+  // Steps of the shared unknowns that the linear model gives for each signature: shared x signatures.
   static Eigen::MatrixXd steps_beside(const Candidate& candidate, const Marginal& beside);
   Proposal judge_local(const Candidate& candidate, std::size_t effect, const Marginal& beside,
                        std::size_t starts) const;

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: MIT
+/// @file
+/// Mode of a candidate model at which fit, noise and between-insertion standard deviations agree, with its evidence.
 #pragma once
-// The mode of a set where fit, noise and the nuisances' standard deviations agree, with the evidence about it.
 #include <limits>
 
 #include <bevel/diagnosis/inference/discrepancy.hpp>
@@ -8,23 +9,35 @@
 
 namespace bevel::inference {
 
-// Logarithms of the evidence over the grid of the nuisances' standard deviations.
+/// Natural logs of the evidence over the grid of between-insertion standard deviations.
 struct GridEvidence {
-  double log_here = -std::numeric_limits<double>::infinity();      // at the standard deviations of the fit
-  double log_promised = -std::numeric_limits<double>::infinity();  // at the best of the grid, by the linear model
-  double log_mean = -std::numeric_limits<double>::infinity();      // over the grid
-  Eigen::VectorXd promised;                                        // of each combination, by the linear model
-  Eigen::VectorXd weights;
+  /// At the standard deviations of the fit.
+  double log_here = -std::numeric_limits<double>::infinity();
+  /// At the best combination of the grid, by the linear model.
+  double log_promised = -std::numeric_limits<double>::infinity();
+  double log_mean = -std::numeric_limits<double>::infinity();  ///< Averaged over the grid.
+  Eigen::VectorXd promised;                                    ///< For each combination, by the linear model.
+  Eigen::VectorXd weights;                                     ///< Posterior of each combination.
 };
 
+/// Result of settle().
 struct Settled {
-  Fit fit;
-  GridEvidence over;
+  Fit fit;            ///< Fit with its likelihood.
+  GridEvidence over;  ///< Evidence about the fit.
 };
 
-// Fit, noise (with what the inputs leave open) and the nuisances' standard deviations in turn, until none changes. From
-// the starting values and scales; likelihood: where the noise begins; discrepancy: null where the scales have no
-// curves; tangent: what they are linear about at first. Once the evidence is below give_up_below, it is left as it is.
+/// Estimates fit, noise (with the uncertain inputs) and between-insertion standard deviations in turn until none
+/// changes.
+/// @param likelihood Likelihood with the initial noise.
+/// @param discrepancy Prepared curves; null if \p scales has no curves.
+/// @param layout Layout of the candidate model.
+/// @param shared Start values of the shared unknowns.
+/// @param local Start values of the local unknowns, per recording.
+/// @param scales Initial hyperparameters.
+/// @param grid Grid of standard deviations.
+/// @param give_up_below Log evidence below which the iteration stops early.
+/// @param tangent Curve values about which the model is linear at first; null: zero.
+/// @return Fit with its evidence.
 Settled settle(const Likelihood& likelihood, const Discrepancy* discrepancy, const Layout& layout,
                Eigen::VectorXd shared, std::vector<Eigen::VectorXd> local, Scales scales, const NuisanceGrid& grid,
                double give_up_below, std::shared_ptr<const CurveTangent> tangent = nullptr);

@@ -1,26 +1,37 @@
 // SPDX-License-Identifier: MIT
+/// @file
+/// Choice of the between-insertion standard deviations for the next fit. The linear model predicts the evidence of each
+/// combination. After a wrong prediction the search halves its range: a trust region (Conn, Gould and Toint 2000,
+/// Trust-Region Methods, 6.1) on a grid.
 #pragma once
-// Which standard deviations of the nuisances a fit is made with next. The linear model about a fit says what each
-// combination promises; where it was wrong so many steps of the grid away, it is asked for half as many: a trust region
-// (Conn, Gould and Toint 2000, Trust-Region Methods, 6.1), on a grid.
 #include <set>
 
 #include <bevel/diagnosis/inference/nuisance_grid.hpp>
 
 namespace bevel::inference {
 
-// Combinations are columns of nuisance_grid().
+/// Trust region over the columns of nuisance_grid().
 class SpreadSearch {
  public:
+  /// Starts a search over the whole grid.
+  /// @param system Model; must outlive this object.
   explicit SpreadSearch(const System& system) : system_(system) {}
 
+  /// Records that a fit was made.
+  /// @param spread Column of the grid.
   void tried(Eigen::Index spread) { tried_.insert(spread); }
-  // A fit there is less likely than at the best known, though more was promised.
+  /// Records that a fit is less likely than the best one, contrary to the prediction. The range becomes half their
+  /// distance.
+  /// @param spread Column of the fit.
+  /// @param best Column of the best fit.
   void lost(Eigen::Index spread, Eigen::Index best) { reach_ = apart(system_, spread, best) / 2; }
-  // A fit was likelier than the best known, as promised.
+  /// Records that a fit is more likely than the best one, as predicted. The range doubles.
   void gained() { reach_ *= 2; }
-  // That which promises most, and more than `here` by least_gain, of those within reach where no fit was made; `here`:
-  // none does. promised: a logarithm each.
+  /// Chooses the combination with the largest prediction within the range for which no fit was made.
+  /// @param promised Predicted log evidence of each column.
+  /// @param here Column of the current fit.
+  /// @param least_gain Smallest predicted gain in log evidence.
+  /// @return Column; \p here if none gains enough.
   Eigen::Index next(const Eigen::VectorXd& promised, Eigen::Index here, double least_gain) const;
 
  private:

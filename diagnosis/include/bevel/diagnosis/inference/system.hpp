@@ -1,8 +1,9 @@
 // SPDX-License-Identifier: MIT
+/// @file
+/// Interface between the inference engine and a model: predictions with derivatives, discrepancy terms, and effects
+/// with priors. The engine uses nothing else of the model. Implementations: the needle (diagnosis/src/needle) and a
+/// pendulum (tests/inference).
 #pragma once
-// What the engine sees of a model: readings with their derivatives by shared parameters and by each recording's own
-// unknowns, a discrepancy's components, and effects with their priors. It knows nothing else of what it judges; a
-// needle is one client (diagnosis/src/needle), a pendulum another (tests/inference).
 #include <cmath>
 #include <memory>
 #include <span>
@@ -12,101 +13,144 @@
 #include <bevel/diagnosis/inference/dataset.hpp>
 #include <bevel/diagnosis/inference/priors.hpp>
 
+/// Bayesian model selection: which candidate models explain recordings, with which parameters and evidence.
 namespace bevel::inference {
 
+/// How a parameter varies between recordings.
 enum class Scope {
-  shared,   // the same in all recordings
-  phase,    // periodic, each recording has its own
-  instant,  // in seconds; each recording has its own, or none (0)
+  shared,   ///< Equal in all recordings.
+  phase,    ///< Periodic; each recording has its own value.
+  instant,  ///< Event time in s; each recording has its own, or 0 if the event does not occur in it.
 };
 
+/// Parameter of the nominal model or of an effect.
 struct Parameter {
-  std::string name;
-  double lower = 0, upper = 0;
-  double none = 0;             // where the effect vanishes; NaN: not by this parameter
-  std::vector<double> starts;  // where fits begin: a grid where the likelihood has several local minima
-  Prior prior;
-  Scope scope = Scope::shared;
-  bool periodic = false;
-  bool shape = false;   // readings at one start are no multiple of those at another: starts are taken as they stand
-  int half_turns = -1;  // periodic: the parameter of this effect that turns by half a period when this one turns by one
-  bool jumps = false;   // an instant at which readings jump: it is scanned, and no derivative says where it is
+  std::string name;             ///< Name of the parameter.
+  double lower = 0,             ///< Lower bound, in the parameter's unit.
+      upper = 0;                ///< Upper bound, in the parameter's unit.
+  double none = 0;              ///< Value at which the effect vanishes; NaN: it does not vanish by this parameter.
+  std::vector<double> starts;   ///< Start values of fits: a grid where the likelihood has several local minima.
+  Prior prior;                  ///< Prior density.
+  Scope scope = Scope::shared;  ///< How the parameter varies between recordings.
+  bool periodic = false;        ///< The parameter is an angle; its bounds span one period.
+  bool shape = false;  ///< The predictions at two start values are not multiples of each other: no start is rescaled.
+  /// periodic: index of the effect's parameter that advances by half a period when this one advances by a whole one;
+  /// -1: none.
+  int half_turns = -1;
+  bool jumps = false;  ///< The predictions jump at this event time: it is scanned, because no derivative locates it.
 };
 
-// Readings are about as far from those without the effect as the parameter is from where it vanishes.
+/// Tests whether the change of the predictions is approximately proportional to the parameter's distance from `none`.
+/// @param p Parameter.
+/// @return True if `none` is defined and the parameter is not a shape.
 inline bool is_size(const Parameter& p) { return !std::isnan(p.none) && !p.shape; }
 
-// One effect that may be missing. Two may have one name (an effect that comes in kinds): at most one of them is in a
-// set.
+/// Effect that the nominal model may lack. Two effects with one name are variants of one effect: a candidate model
+/// contains at most one of them.
 struct Effect {
-  std::string name;   // what a verdict calls it
-  std::string label;  // the same but for effects in kinds: tells them apart
-  std::vector<Parameter> parameters;
+  std::string name;                   ///< Name in the diagnosis report; equal for all variants.
+  std::string label;                  ///< Name that distinguishes the variants.
+  std::vector<Parameter> parameters;  ///< Parameters of the effect.
 };
 
-// An unknown of its own in every recording, normal about zero; its standard deviation is one of a group's, unknown too.
+/// Insertion-specific parameter (random effect): one value per recording, normal with zero mean. The standard deviation
+/// is that of its group and is estimated.
 struct Nuisance {
-  std::string name;
-  std::size_t group = 0;
+  std::string name;       ///< Name of the parameter.
+  std::size_t group = 0;  ///< Index into System::nuisance_groups().
 };
+/// Insertion-specific parameters that share a standard deviation.
 struct NuisanceGroup {
-  std::string name, unit;
-  // The first is 0: in this way the recordings do not differ.
+  std::string name,  ///< Name of the group.
+      unit;          ///< Unit of the standard deviations.
+  /// Possible standard deviations, in \p unit. The first is 0: the recordings do not differ in these parameters.
   std::vector<double> standard_deviations;
 };
 
-// A component of the discrepancy as a function of one covariate, by its values at `at`; zero mean, covariance
-// exp(-|distance| / length). periodic: the covariate is an angle and `at` divides its circle.
+/// Discrepancy term: one component as a function of one covariate, given by its values at `at`. The prior has zero mean
+/// and correlation exp(-|distance| / length).
 struct Curve {
-  std::string component, unit, covariate;
-  std::vector<double> at;
-  bool periodic = false;
+  std::string component,   ///< Component of the model that the term is added to.
+      unit,                ///< Unit of the component.
+      covariate;           ///< Covariate that the term depends on.
+  std::vector<double> at;  ///< Covariate values of the nodes.
+  bool periodic = false;   ///< The covariate is an angle, and `at` divides the full circle.
 };
 
-// Values of one of a system's curves, at its `at`.
+/// Values of one discrepancy term at its nodes.
 struct CurveValues {
-  std::size_t curve = 0;
-  Eigen::VectorXd values;
+  std::size_t curve = 0;   ///< Index into System::curves().
+  Eigen::VectorXd values;  ///< One value per node Curve::at, in the component's unit.
 };
 
-// A set of effects: indices into System::effects(), ascending.
+/// Candidate model: ascending indices into System::effects().
 using ModelSet = std::vector<std::size_t>;
 
+/// Predicted measurements of one recording with their derivatives.
 struct Prediction {
-  Eigen::VectorXd reading;    // rows of the recording
-  Eigen::MatrixXd by_shared;  // rows x shared parameters
-  Eigen::MatrixXd by_local;   // rows x local unknowns
+  Eigen::VectorXd reading;    ///< Predictions in the channels' units; one row per measurement.
+  Eigen::MatrixXd by_shared;  ///< Derivatives, rows x shared parameters.
+  Eigen::MatrixXd by_local;   ///< Derivatives, rows x local unknowns.
 };
 
+/// Model whose missing effects are inferred.
 class System {
  public:
   virtual ~System() = default;
+  /// Returns the recorded measurements.
+  /// @return Measurements of all recordings.
   virtual const Dataset& data() const = 0;
-  virtual const std::vector<Parameter>& base() const = 0;  // the model's own parameters, in every set
+  /// Returns the parameters of the nominal model. Every candidate model contains them.
+  /// @return Parameters of the nominal model.
+  virtual const std::vector<Parameter>& base() const = 0;
+  /// Returns the effect library.
+  /// @return Effects; a ModelSet holds indices into this list.
   virtual const std::vector<Effect>& effects() const = 0;
+  /// Returns the insertion-specific parameters.
+  /// @return Insertion-specific parameters, equal for all candidate models.
   virtual const std::vector<Nuisance>& nuisances() const = 0;
+  /// Returns the groups of insertion-specific parameters.
+  /// @return Groups; Nuisance::group is an index into this list.
   virtual const std::vector<NuisanceGroup>& nuisance_groups() const = 0;
+  /// Returns the possible discrepancy terms.
+  /// @return Terms; CurveValues::curve is an index into this list.
   virtual const std::vector<Curve>& curves() const = 0;
-  // Whether these effects can be in a model together.
+  /// Tests whether effects can be combined in one candidate model.
+  /// @param set Candidate model.
+  /// @return True if the combination is allowed.
   virtual bool allows(const ModelSet& set) const = 0;
 
-  // shared: base(), then each member's shared parameters; local: nuisances(), then each member's others. False outside
-  // the model's domain. Thread-safe.
+  /// Predicts the measurements of one recording. Thread-safe.
+  /// @param set Candidate model.
+  /// @param recording Index of the recording.
+  /// @param shared Shared unknowns: base(), then the shared parameters of each member of \p set.
+  /// @param local Local unknowns of the recording: nuisances(), then the other parameters of each member of \p set.
+  /// @param derivatives Whether to compute the derivatives.
+  /// @param[out] out Predictions and, if requested, their derivatives.
+  /// @return False outside the model's domain.
   virtual bool predict(const ModelSet& set, std::size_t recording, const Eigen::VectorXd& shared,
                        const Eigen::VectorXd& local, bool derivatives, Prediction& out) const = 0;
-  // Standard deviations of the rows by what the model's inputs are not known to, and by what it leaves open itself,
-  // where that matters to this set; unknowns as for predict. Empty: nowhere. Thread-safe.
+  /// Computes the standard deviations of the predictions that uncertain model inputs and the uncertainty of the model
+  /// itself cause. The arguments are the candidate model, the recording, and the unknowns as for predict().
+  /// Thread-safe.
+  /// @return One standard deviation per row, in the channels' units; empty if they do not matter to this model.
   virtual Eigen::VectorXd by_inputs(const ModelSet& /*set*/, std::size_t /*recording*/,
                                     const Eigen::VectorXd& /*shared*/, const Eigen::VectorXd& /*local*/) const {
     return {};
   }
-  // Derivatives of the readings by the values of all curves, one after the other, without effects. Thread-safe.
+  /// Computes the derivatives of the nominal model's predictions by the values of all discrepancy terms. Thread-safe.
+  /// @param recording Index of the recording.
+  /// @param base Parameters of the nominal model.
+  /// @return Derivatives, rows x values of all curves(), term after term.
   virtual Eigen::MatrixXd by_curves(std::size_t recording, const Eigen::VectorXd& base) const = 0;
-  // Whether by_curves() is all there is to say of curves; if not, predict_with() says what they do where they are
-  // large.
+  /// Tests whether by_curves() describes the discrepancy terms completely. If not, predict_with() describes large ones.
+  /// @return True if the predictions are linear in the values of the discrepancy terms.
   virtual bool is_linear_in_curves() const { return true; }
-  // predict() where curves have these values; by_values, unless null: the readings' derivatives by them, one curve
-  // after the other. False outside the model's domain. Thread-safe.
+  /// Predicts the measurements of one recording with given values of discrepancy terms. Thread-safe.
+  ///
+  /// The arguments are those of predict(), the values of the terms before the flag for derivatives, and last the output
+  /// of the derivatives by these values (rows x values, term after term; null: not computed).
+  /// @return False outside the model's domain. This implementation always returns false.
   virtual bool predict_with(const ModelSet& /*set*/, std::size_t /*recording*/, const Eigen::VectorXd& /*shared*/,
                             const Eigen::VectorXd& /*local*/, std::span<const CurveValues> /*curves*/,
                             bool /*derivatives*/, Prediction& /*out*/, Eigen::MatrixXd* /*by_values*/) const {
