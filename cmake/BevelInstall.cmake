@@ -20,6 +20,10 @@ foreach(component IN LISTS BEVEL_ALL_COMPONENTS)
   endif()
 endforeach()
 
+set(bevel_component_needs "")  # for bevelConfig.cmake
+foreach(component IN LISTS BEVEL_ALL_COMPONENTS)
+  string(APPEND bevel_component_needs "set(bevel_needs_${component} \"${BEVEL_NEEDS_${component}}\")\n")
+endforeach()
 configure_package_config_file(cmake/bevelConfig.cmake.in ${PROJECT_BINARY_DIR}/bevelConfig.cmake
   INSTALL_DESTINATION ${package_folder})
 write_basic_package_version_file(${PROJECT_BINARY_DIR}/bevelConfigVersion.cmake COMPATIBILITY SameMinorVersion)

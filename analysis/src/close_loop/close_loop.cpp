@@ -32,13 +32,13 @@ ClosedLoop close_the_loop(const CloseLoopOptions& options, std::ostream& err) {
   const estimator::EstimatorConfig estimator = load_estimator(options.estimator_path);
   ClosedLoop loop;
   loop.case_name = files.name;
-  analysis::DiagnoseOptions diagnosis;
+  DiagnoseOptions diagnosis;
   diagnosis.model_path = files.model_path;
   diagnosis.logs = files.logs;
   diagnosis.threads = options.threads;
   diagnosis.quiet = options.quiet;
   diagnosis.targets = 0;  // many more are steered to below
-  analysis::Found found = analysis::find(diagnosis, err);
+  Found found = find(diagnosis, err);
   loop.findings = std::move(found.findings);
   loop.made_of = std::move(found.made_of);
   loop.input_damaged = found.input_damaged;
@@ -48,11 +48,11 @@ ClosedLoop close_the_loop(const CloseLoopOptions& options, std::ostream& err) {
   io::ModelFile refitted = found.model;
   refitted.needle = findings.base.value;
   loop.models = {found.model, refitted,
-                 io::parse_model_file(io::to_toml(analysis::model_of(findings, found.model)), "model.toml")};
-  const diagnosis::RecordedCase recorded = without_outliers(analysis::read_case(files.logs).recorded, findings);
+                 io::parse_model_file(io::to_toml(model_of(findings, found.model)), "model.toml")};
+  const diagnosis::RecordedCase recorded = without_outliers(read_case(files.logs).recorded, findings);
   const auto noise = measure_noise(files.logs, loop.models[kAsItCame], estimator);
 
-  const analysis::DiagnosisProgress progress(options.quiet ? nullptr : stderr);
+  const DiagnosisProgress progress(options.quiet ? nullptr : stderr);
   progress.say("the rig with each model; the estimator on each recording");
   for (std::size_t stage = 0; stage < kStages; ++stage) {
     loop.rig[stage] = simulate_rig(recorded, findings.noise, loop.models[stage]);
@@ -72,19 +72,18 @@ ClosedLoop close_the_loop(const CloseLoopOptions& options, std::ostream& err) {
 }
 
 void write_results(const ClosedLoop& loop, const std::string& out_folder) {
-  auto files = analysis::result_files(loop.findings, loop.models[kAugmented], loop.made_of);
+  auto files = result_files(loop.findings, loop.models[kAugmented], loop.made_of);
   files.push_back({"close-the-loop.html", page_html(loop)});
   files.push_back({"close-the-loop.json", to_json(loop)});
-  analysis::write_together(out_folder, files);
+  write_together(out_folder, files);
 }
 
 int run(const CloseLoopOptions& options, std::ostream& out, std::ostream& err) {
-  analysis::check_writable(options.out_folder);
+  check_writable(options.out_folder);
   const ClosedLoop loop = close_the_loop(options, err);
   write_results(loop, options.out_folder);
   out << table_text(loop) << "\nwritten: " << options.out_folder
-      << "/close-the-loop.html, close-the-loop.json, and the diagnosis: " << analysis::result_names(loop.findings)
-      << '\n';
+      << "/close-the-loop.html, close-the-loop.json, and the diagnosis: " << result_names(loop.findings) << '\n';
   return loop.input_damaged ? cli::kDamagedInput : cli::kOk;
 }
 

@@ -8,8 +8,6 @@
 namespace bevel::analysis {
 namespace {
 
-using analysis::measured;
-
 std::string rig_sentence(const ClosedLoop& loop) {
   const auto &before = loop.rig[kRefitted], &after = loop.rig[kAugmented];
   const std::string change = measured(before.rmse_mm) + " to " + measured(after.rmse_mm) +
@@ -75,7 +73,7 @@ std::string found_in_words(const ClosedLoop& loop) {
   for (const auto& entry : loop.models[kAugmented].effects) {
     std::string values;
     for (const auto& [name, value] : entry.parameters)
-      values += (values.empty() ? "" : ", ") + name + " " + analysis::number(value);
+      values += (values.empty() ? "" : ", ") + name + " " + number(value);
     text += (text.empty() ? "" : "; ") + entry.name + (values.empty() ? "" : " (" + values + ")");
   }
   return text.empty() ? "nothing" : text;

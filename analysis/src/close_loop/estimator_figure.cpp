@@ -13,16 +13,16 @@ constexpr double kSignificance = 0.01;  // of one series, and of their number
 
 }  // namespace
 
-std::vector<analysis::NoiseColour> measure_noise(const std::vector<std::string>& logs, const io::ModelFile& model,
-                                                 estimator::EstimatorConfig config) {
+std::vector<NoiseColour> measure_noise(const std::vector<std::string>& logs, const io::ModelFile& model,
+                                       estimator::EstimatorConfig config) {
   config.prior.needle = model.needle;  // which plays no part: the readings are looked at alone
-  const auto replays = analysis::replay_logs(logs, config);
-  std::vector<analysis::NoiseColour> noise;
+  const auto replays = replay_logs(logs, config);
+  std::vector<NoiseColour> noise;
   for (int axis = 0; axis < 3; ++axis) {
-    std::vector<std::vector<analysis::AxisSample>> readings;
+    std::vector<std::vector<AxisSample>> readings;
     readings.reserve(replays.size());
-    for (const auto& one : replays) readings.push_back(analysis::axis_samples(one, axis));
-    noise.push_back(analysis::measure_noise(readings));
+    for (const auto& one : replays) readings.push_back(axis_samples(one, axis));
+    noise.push_back(measure_noise(readings));
   }
   return noise;
 }
@@ -36,31 +36,31 @@ estimator::EstimatorConfig with_needle_known(estimator::EstimatorConfig config,
 }
 
 EstimatorFigure replay_case(const std::vector<std::string>& logs, const io::ModelFile& model,
-                            const std::vector<analysis::NoiseColour>& noise, estimator::EstimatorConfig config) {
+                            const std::vector<NoiseColour>& noise, estimator::EstimatorConfig config) {
   config.prior.needle = model.needle;
   config.prior.variation = model.variation.value_or(model::Variation{});
-  analysis::ReplayOptions options;
+  ReplayOptions options;
   options.noise_by_axis = noise;
   options.effects = model.effects;
   options.discrepancies = model.discrepancies;
   EstimatorFigure figure;
-  for (const analysis::Replay& one : analysis::replay_logs(logs, config, options)) {
-    const analysis::InnovationFigures innovations = analysis::innovation_figures(one);
+  for (const Replay& one : replay_logs(logs, config, options)) {
+    const InnovationFigures innovations = innovation_figures(one);
     figure.measurements += innovations.measurements;
     figure.rejected += innovations.rejected;
     figure.resets += innovations.resets;
-    analysis::ChiSquareMean own;
+    ChiSquareMean own;
     for (int axis = 0; axis < 3; ++axis) {
       const auto i = static_cast<std::size_t>(axis);
       if (!(noise[i].sd_mm > 0)) continue;
-      const auto white = analysis::whiten(analysis::axis_innovations(one, axis), noise[i]);
+      const auto white = whiten(axis_innovations(one, axis), noise[i]);
       for (const double u : white) {
         figure.nis.add(u * u, 1);
         figure.axis[i].add(u * u, 1);
         own.add(u * u, 1);
       }
       ++figure.series;
-      if (analysis::ljung_box(white).p_value < kSignificance) ++figure.coloured;
+      if (ljung_box(white).p_value < kSignificance) ++figure.coloured;
     }
     figure.nis_by_recording.push_back(own.mean());
   }

@@ -22,7 +22,7 @@ std::string text(const char* format, auto... values) {
   return buffer;
 }
 
-std::string in_band(const analysis::ChiSquareMean& mean) {
+std::string in_band(const ChiSquareMean& mean) {
   return mean.degrees == 0 ? "-" : text("%.3f%s", mean.mean(), mean.in_band() ? "" : " *");
 }
 
@@ -110,7 +110,7 @@ std::vector<std::string> notes(const ClosedLoop& loop) {
 const Row kHeader = {"figure", "", kStageNames[kAsItCame], kStageNames[kRefitted], kStageNames[kAugmented]};
 
 json as_json(const WithInterval& v) { return {{"value", v.value}, {"ci95", {v.low, v.high}}}; }
-json as_json(const analysis::ChiSquareMean& m) {
+json as_json(const ChiSquareMean& m) {
   return {{"mean", m.mean()}, {"band95", {m.lowest(), m.highest()}}, {"count", m.degrees}};
 }
 json as_json(const RigFigure& f) {

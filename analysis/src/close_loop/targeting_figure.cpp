@@ -48,7 +48,7 @@ WithInterval mean_difference(const TargetingFigure& before, const TargetingFigur
 }
 
 rig::Believed believed(const io::ModelFile& model, double forgiveness) {
-  rig::Believed out = analysis::believed_of(model);
+  rig::Believed out = believed_of(model);
   auto& process = out.estimator.process;
   for (double* noise : {&process.position_mm, &process.tilt_rad, &process.roll_rad, &process.roll_per_sqrt_rad,
                         &process.curvature_per_mm, &process.lambda1_per_rad, &process.lambda2})
@@ -81,8 +81,8 @@ TargetingFigure summarised(const std::vector<rig::Insertion>& insertions, double
 std::vector<Eigen::Vector3d> choose_targets(const model::NeedleParameters& needle, double deepest_mm) {
   std::vector<Eigen::Vector3d> targets;
   for (const double share : kDepthShares) {
-    const double depth_mm = share * std::min(deepest_mm, analysis::kDeepestTarget_mm);
-    const double radius_mm = analysis::kShareOfFarthestAside * analysis::farthest_aside_mm(needle, depth_mm);
+    const double depth_mm = share * std::min(deepest_mm, kDeepestTarget_mm);
+    const double radius_mm = kShareOfFarthestAside * farthest_aside_mm(needle, depth_mm);
     for (int i = 0; i < kDirections; ++i) {
       const double angle = 2 * std::numbers::pi * (i + 0.25) / kDirections;
       const Eigen::Vector3d target(radius_mm * std::cos(angle), radius_mm * std::sin(angle), depth_mm);
@@ -97,7 +97,7 @@ std::vector<Eigen::Vector3d> choose_targets(const model::NeedleParameters& needl
 
 TargetingFigures steer_all(const Models& models, const diagnosis::RecordedCase& recorded, const inference::Noise& noise,
                            const TargetingOptions& options) {
-  const rig::Cameras cameras = analysis::cameras_of(recorded, noise);
+  const rig::Cameras cameras = cameras_of(recorded, noise);
   double deepest_mm = 0;
   for (const auto& recording : recorded.recordings)
     for (const auto& node : recording.motion.nodes)
@@ -129,7 +129,7 @@ TargetingFigures steer_all(const Models& models, const diagnosis::RecordedCase& 
     const rig::SteeredRig rig{.make_plant =
                                   [&] {
                                     return std::make_unique<rig::KinematicPlant>(
-                                        truth.needle, analysis::for_one_insertion(truth, nominal_s, seed), 0, own);
+                                        truth.needle, for_one_insertion(truth, nominal_s, seed), 0, own);
                                   },
                               .cameras = cameras};
     insertions[belief][i] = rig::steer(rig, beliefs[belief], figures.targets_mm[target], seed);

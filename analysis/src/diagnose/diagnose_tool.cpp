@@ -18,6 +18,7 @@
 #include <bevel/cli/exit_status.hpp>
 #include <bevel/diagnosis/mismatch/diagnose.hpp>
 #include <bevel/diagnosis/mismatch/effect_source.hpp>
+#include <bevel/diagnosis/statistics/quantiles.hpp>
 #include <bevel/io/find_logs.hpp>
 #include <bevel/io/model_file.hpp>
 #include <bevel/io/sha256.hpp>
@@ -36,7 +37,6 @@ void print_parameter(std::ostream& out, const FoundParameter& p, const std::stri
 // What a fitted needle says of itself that nobody should take on trust.
 std::vector<std::string> remarks_on_needle(const Findings& f) {
   if (f.two_groups) return {};
-  constexpr double k95 = 1.96;
   const NeedleEstimate& n = f.needle;
   std::vector<std::string> remarks;
   const std::string k = with_error(n.value.curvature_per_mm, n.curvature_sd_per_mm) + " 1/mm";

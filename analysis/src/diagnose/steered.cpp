@@ -13,6 +13,7 @@
 #include <bevel/controller/arc_law.hpp>
 #include <bevel/diagnosis/parallel.hpp>
 #include <bevel/diagnosis/statistics/median.hpp>
+#include <bevel/diagnosis/statistics/quantiles.hpp>
 #include <bevel/error.hpp>
 #include <bevel/io/live_effects.hpp>
 
@@ -25,7 +26,6 @@ namespace {
 constexpr std::uint64_t kSeed = 20'260'102;
 constexpr double kShallowest_mm = 30;     // a target nearer leaves no way to steer on
 constexpr double kShallowestShare = 0.9;  // of the recordings' depth
-constexpr double k95 = 1.96;
 
 bool moves_the_tip(const Findings& f) {
   const auto moves = [](const auto& part) { return !(part.moved_at_depth_mm <= 0); };  // NaN: more than can be said
@@ -53,8 +53,8 @@ std::vector<Eigen::Vector3d> draw_targets(int count, const std::array<double, 2>
                                           const model::NeedleParameters& one, const model::NeedleParameters& other) {
   constexpr int kTries = 20;  // for each
   constexpr double kTolerance_mm = 1;
-  const double widest_mm = analysis::kShareOfFarthestAside * std::min(analysis::farthest_aside_mm(one, depth_mm[0]),
-                                                                 analysis::farthest_aside_mm(other, depth_mm[0]));
+  const double widest_mm =
+      kShareOfFarthestAside * std::min(farthest_aside_mm(one, depth_mm[0]), farthest_aside_mm(other, depth_mm[0]));
   std::mt19937_64 random(kSeed);
   std::uniform_real_distribution<double> share(0, 1);
   std::vector<Eigen::Vector3d> targets;
@@ -112,8 +112,8 @@ SteeredToTargets steer(const RecordedCase& recorded, const io::ModelFile& in_use
                        const inference::Noise& noise, const std::array<double, 2>& depth_mm,
                        const std::vector<Eigen::Vector3d>& targets_mm, int threads) {
   SteeredToTargets out{.targets = targets_mm.size(), .seed = kSeed, .depth_mm = depth_mm};
-  const rig::Cameras cameras = analysis::cameras_of(recorded, noise);
-  const std::array<rig::Believed, 2> believed = {analysis::believed_of(in_use), analysis::believed_of(found)};
+  const rig::Cameras cameras = cameras_of(recorded, noise);
+  const std::array<rig::Believed, 2> believed = {believed_of(in_use), believed_of(found)};
   const double duration_s = depth_mm[1] / controller::SteeringLimits{}.insertion_rate_mm_s;
   std::array<std::vector<rig::Insertion>, 2> insertions;
   for (auto& all : insertions) all.resize(out.targets);
@@ -123,7 +123,7 @@ SteeredToTargets steer(const RecordedCase& recorded, const io::ModelFile& in_use
     const rig::SteeredRig rig{.make_plant =
                                   [&] {
                                     return std::make_unique<rig::KinematicPlant>(
-                                        found.needle, analysis::for_one_insertion(found, duration_s, seed));
+                                        found.needle, for_one_insertion(found, duration_s, seed));
                                   },
                               .cameras = cameras};
     insertions[belief][target] = rig::steer(rig, believed[belief], targets_mm[target], seed);
@@ -142,7 +142,7 @@ void steer_to_targets(const RecordedCase& recorded, const io::ModelFile& in_use,
                       const SteeringOptions& options, Findings& f) {
   const auto moved = moved_at_depth(f);
   if (options.targets < 1 || f.two_groups || !moved || !moves_the_tip(f)) return;
-  const double deepest_mm = std::min(moved->depth_mm[1], analysis::kDeepestTarget_mm);
+  const double deepest_mm = std::min(moved->depth_mm[1], kDeepestTarget_mm);
   f.not_steered = obstacle_to_steering(recorded, f, in_use, deepest_mm);
   if (!f.not_steered.empty()) return;
   const std::array<double, 2> depth_mm{kShallowestShare * deepest_mm, deepest_mm};

@@ -65,22 +65,24 @@ void remark_on_short_recordings(const RecordedCase& recorded, Findings& findings
         " readings: the cameras' noise is hardly known, and what is quicker than a few readings cannot be seen");
 }
 
+// Names of the effects that a condition selects, separated by commas.
+std::string names_of_effects(bool (*selects)(const model::Effect&)) {
+  std::string names;
+  for (const model::Effect* effect : model::all_effects())
+    if (selects(*effect)) names += (names.empty() ? "" : ", ") + std::string(effect->name());
+  return names;
+}
+
 void remark_on_clock(const NeedleSystem& system, Findings& findings) {
   if (system.recorded().has_clock) return;
-  std::string left_out;
-  for (const model::Effect* effect : model::all_effects())
-    if (model::needs_clock(effect->covariate()))
-      left_out += (left_out.empty() ? "" : ", ") + std::string(effect->name());
-  findings.remarks.push_back("these recordings have no clock: effects of time, speed and rest were not looked for (" +
-                             left_out + ")");
+  findings.remarks.push_back(
+      "these recordings have no clock: effects of time, speed and rest were not looked for (" +
+      names_of_effects([](const model::Effect& effect) { return model::needs_clock(effect.covariate()); }) + ")");
 }
 
 void remark_on_retraction(const NeedleSystem& system, Findings& findings) {
   if (system.recorded().has_retraction()) return;
-  std::string excluded;
-  for (const model::Effect* effect : model::all_effects())
-    if (effect->needs_retraction()) excluded += (excluded.empty() ? "" : ", ") + std::string(effect->name());
-  findings.remarks.push_back(excluded +
+  findings.remarks.push_back(names_of_effects([](const model::Effect& effect) { return effect.needs_retraction(); }) +
                              ": not a candidate, because no recording retracts the needle; insert 10 mm and retract "
                              "4 mm repeatedly to measure it");
 }

@@ -11,6 +11,7 @@
 
 #include <bevel/diagnosis/inference/nuisances.hpp>
 #include <bevel/diagnosis/mismatch/moved_tip.hpp>
+#include <bevel/diagnosis/statistics/quantiles.hpp>
 #include "inference/instant_posterior.hpp"
 
 namespace bevel::diagnosis {
@@ -23,8 +24,6 @@ using inference::ModelSet;
 using inference::Search;
 
 namespace {
-
-constexpr double k95 = 1.96;
 
 FoundParameter shared_parameter(const NeedleSystem& system, const inference::Unknowns& unknowns,
                                 const ChosenModel& model, std::size_t member, std::size_t p) {

@@ -6,6 +6,7 @@
 #include <cstdio>
 
 #include <bevel/diagnosis/mismatch/decision.hpp>
+#include <bevel/diagnosis/statistics/quantiles.hpp>
 #include <bevel/model/effects/effect.hpp>
 
 namespace bevel::diagnosis {
@@ -77,7 +78,7 @@ std::vector<std::string> violations(const Findings& findings) {
   for (const ProposedForm& form : findings.proposals)
     if (!std::isfinite(form.amplitude) || !std::isfinite(form.shape))
       out.push_back("the equation " + form.equation + " has a value that is no number");
-    else if (std::abs(form.amplitude) <= 1.96 * form.amplitude_sd)
+    else if (std::abs(form.amplitude) <= k95 * form.amplitude_sd)
       out.push_back("the interval of a in the equation " + form.equation + " includes none");
     else if (form.shape < form.shape_low || form.shape > form.shape_high)
       out.push_back("the value of s in the equation " + form.equation + " is outside its interval");

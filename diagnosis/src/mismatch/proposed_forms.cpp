@@ -5,6 +5,7 @@
 
 #include <bevel/diagnosis/inference/forms.hpp>
 #include <bevel/diagnosis/mismatch/found_effects.hpp>
+#include <bevel/diagnosis/statistics/quantiles.hpp>
 
 namespace bevel::diagnosis {
 
@@ -39,8 +40,6 @@ std::string equation_of(const inference::FormFit& fit, const inference::Curve& c
   }
   return "";
 }
-
-constexpr double k95 = 1.96;
 
 // Whether the 95 % interval of the amplitude excludes none, and amplitude and value at each knot lie within what a
 // model file may hold of the component.

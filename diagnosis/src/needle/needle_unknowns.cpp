@@ -248,7 +248,7 @@ void NeedleSystem::add_effects_of_library() {
                                    [&](const auto& one) { return one.effect == effect; });
     const bool shown = (recorded_.has_clock || !model::needs_clock(effect->covariate())) &&
                        (headings_ || !effect->of_headings()) &&
-                       (recorded_.has_retraction() || !effect->needs_retraction());
+                       (!effect->needs_retraction() || recorded_.has_retraction());
     // Without a parameter it is a convention of the model file, and no convention changes between two groups.
     const bool may_change = !two_groups_ || !effect->parameters().empty();
     if (!known && shown && may_change) add(*effect);

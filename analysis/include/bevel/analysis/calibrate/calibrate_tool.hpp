@@ -55,7 +55,7 @@ struct BoardPictures {
 BoardPictures read_pictures(const camera::Board& board, const CalibrateOptions& options);
 std::string name_of(camera::CharucoPattern pattern);
 
-// What the page tells beside the calibration.
+// Settings that the report prints in addition to the calibration.
 struct BoardSettings {
   std::string board;  // in words
   std::vector<camera::LeftOut> left_out;

@@ -30,8 +30,8 @@ struct EstimatorFigures {
 struct ClosedLoop {
   std::string case_name;
   diagnosis::Findings findings;
-  analysis::Provenance made_of;
-  bool input_damaged = false;  // as in analysis::Found
+  Provenance made_of;
+  bool input_damaged = false;  // as in Found
   Models models;
   std::array<RigFigure, kStages> rig;
   EstimatorFigures estimator;

@@ -47,7 +47,7 @@ struct TargetingOptions {
   int seeds = 6;
   int bootstrap_draws = 4000;
   int threads = 2;
-  cli::ProgressLine* progress = nullptr;  // told of each insertion
+  cli::ProgressLine* progress = nullptr;  // counts the simulated insertions
 };
 
 // The rig is the augmented model, its unknowns of single recordings (a phase, an instant) drawn anew for each

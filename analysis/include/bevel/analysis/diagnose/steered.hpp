@@ -14,7 +14,7 @@ struct SteeringOptions {
   int threads = 2;
 };
 
-// Draws targets in the last tenth of the recordings' depth (of at most analysis::kDeepestTarget_mm) and within the
+// Draws targets in the last tenth of the recordings' depth (of at most kDeepestTarget_mm) and within the
 // reach of both models' needles, and steers to each twice (tools/steering), on a rig that is `found` with the
 // recordings' cameras and noise: with `in_use` in estimator and controller, and with `found`. Fills findings.steered;
 // or findings.not_steered, where what was found moves the tip but cannot be steered by. Neither where nothing was found

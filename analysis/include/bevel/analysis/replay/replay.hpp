@@ -108,7 +108,7 @@ struct ReplayOptions {
   std::vector<model::DiscrepancyCurve> discrepancies{};
 };
 
-// Throws IoError, with the name, for a log of which nothing can be made: io::Recording::refusal(), or no
+// Throws IoError, with the name, for a log that cannot be used: io::Recording::refusal(), or no
 // ACTUATOR_STATE.
 Replay replay_log(std::span<const std::uint8_t> log, const std::string& name, const estimator::EstimatorConfig& config,
                   const ReplayOptions& options = {});
